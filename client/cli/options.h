@@ -1,0 +1,67 @@
+// The command line as a value.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "client/isomesh/client.h"
+#include "proto/types.h"
+
+namespace isomesh::cli {
+
+enum class Command {
+  kMesh,
+  kUpload,
+  kSubmit,
+  kStatus,
+  kWait,
+  kFetch,
+  kCancel,
+  kList,
+  kInfo,
+};
+
+// A file to write a mesh to, in the format that its suffix names.
+struct Output {
+  std::filesystem::path path;
+  MeshFormat format = MeshFormat::kDrc;
+};
+
+struct Options {
+  Command command = Command::kMesh;
+  std::string server = "http://127.0.0.1:8080";
+  std::string token;
+  bool json = false;
+
+  std::filesystem::path file;  // mesh, upload
+  bool digest = false;         // mesh, upload
+  std::optional<RawDescription> raw;
+  std::string id;                 // of a job or, for submit and info, of a volume
+  JobParameters parameters;       // mesh, submit
+  std::vector<Output> outputs;    // mesh, fetch
+  std::optional<JobState> state;  // list
+  std::string cursor;             // list
+  bool volumes = false;           // list
+};
+
+// Ends the program before any command runs: help, the version, or wrong usage. `text` belongs on
+// standard output when the status is 0, on standard error otherwise.
+class EarlyExit : public std::runtime_error {
+ public:
+  EarlyExit(int status, const std::string& text) : std::runtime_error(text), status_(status) {}
+
+  int status() const { return status_; }
+
+ private:
+  int status_;
+};
+
+constexpr int kWrongUsage = 2;
+
+// Reads the arguments, and ISOMESH_SERVER and ISOMESH_TOKEN of the environment. Throws EarlyExit.
+Options parse_options(int argc, const char* const* argv);
+
+}  // namespace isomesh::cli

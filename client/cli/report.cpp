@@ -1,0 +1,154 @@
+#include "client/cli/report.h"
+
+#include <nlohmann/json.hpp>
+
+#include "client/cli/text.h"
+#include "proto/json.h"
+
+namespace isomesh::cli {
+namespace {
+
+using Row = std::vector<std::string>;
+using Rows = std::vector<Row>;
+
+std::string dims_of(const Volume& volume) {
+  const auto& [x, y, z] = volume.dims;
+  return std::to_string(x) + " x " + std::to_string(y) + " x " + std::to_string(z);
+}
+
+template <std::size_t N>
+std::string listed(const std::array<double, N>& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : ", ") + human_number(value);
+  return text;
+}
+
+std::string percent(double part, double whole) {
+  return whole > 0 ? fixed(100 * part / whole, 1) + " %" : "";
+}
+
+std::string iso_of(const JobParameters& parameters) {
+  return parameters.iso ? human_number(*parameters.iso) : "otsu";
+}
+
+std::string extent(const MeshSummary& mesh, std::size_t axis) {
+  return fixed(mesh.bounds[0][axis], 2) + " to " + fixed(mesh.bounds[1][axis], 2) + " mm";
+}
+
+std::string size_of(const MeshFile& file) {
+  const std::string exact = grouped(static_cast<std::int64_t>(file.bytes)) + " B";
+  return file.bytes < 1000 ? exact : human_bytes(file.bytes) + " (" + exact + ")";
+}
+
+}  // namespace
+
+std::string timing_report(const Timing& timing, const ClientTiming& client) {
+  Rows rows = {{"stage", "time", "share"}};
+  const auto stage = [&](const std::string& name, double milliseconds) {
+    rows.push_back({name, human_duration(milliseconds), percent(milliseconds, timing.total)});
+  };
+  if (client.upload) rows.push_back({"upload", human_duration(*client.upload)});
+  stage("queue", timing.queue);
+  stage("load", timing.load);
+  stage("extract", timing.extract);
+  stage("smooth", timing.smooth);
+  stage("encode", timing.encode);
+  stage("total", timing.total);
+  if (client.download) rows.push_back({"download", human_duration(*client.download)});
+  return in_columns({Align::kLeft, Align::kRight, Align::kRight}, rows);
+}
+
+std::string mesh_report(const MeshSummary& mesh) {
+  const auto count = [](auto value) { return grouped(static_cast<std::int64_t>(value)); };
+  Rows rows = {{"triangles", count(mesh.triangles)},
+               {"vertices", count(mesh.vertices)},
+               {"boundary edges", count(mesh.boundary_edges)},
+               {"components", count(mesh.components)},
+               {"Euler number", count(mesh.euler)},
+               {"area", fixed(mesh.area_mm2, 1) + " mm²"},
+               {"volume", fixed(mesh.volume_mm3.extracted, 1) + " mm³ extracted"},
+               {"", fixed(mesh.volume_mm3.smoothed, 1) + " mm³ smoothed"},
+               {"x (LPS)", extent(mesh, 0)},
+               {"y", extent(mesh, 1)},
+               {"z", extent(mesh, 2)}};
+  for (const auto& [format, file] : mesh.files) {
+    rows.push_back({"mesh." + std::string(to_string(format)), size_of(file)});
+  }
+  return in_columns({Align::kLeft, Align::kLeft}, rows);
+}
+
+std::string volume_report(const Volume& volume) {
+  return in_columns(
+      {Align::kLeft, Align::kLeft},
+      {{"volume", volume.id},
+       {"format", volume.format},
+       {"samples", dims_of(volume) + " " + std::string(to_string(volume.type)) + ", " +
+                       human_bytes(volume.bytes)},
+       {"spacing", listed(volume.geometry.spacing) + " mm"},
+       {"origin", listed(volume.geometry.origin) + " mm (LPS)"},
+       {"direction", listed(volume.geometry.direction)},
+       {"range", human_number(volume.range[0]) + " to " + human_number(volume.range[1])},
+       {"suggested iso", human_number(volume.suggested_iso)},
+       {"created", volume.created}});
+}
+
+std::string job_report(const Job& job) {
+  const JobParameters& asked = job.parameters;
+  Rows rows = {{"job", job.id}, {"state", std::string(to_string(job.state))}};
+  if (!is_final(job.state)) {
+    rows.push_back(
+        {"stage", std::string(to_string(job.stage)) + ", " + fixed(100 * job.progress, 0) + " %"});
+  }
+  rows.push_back({"volume", asked.volume});
+  rows.push_back({"parameters", "iso " + iso_of(asked) + ", scheme " +
+                                    std::to_string(static_cast<int>(asked.scheme)) + ", " +
+                                    std::string(to_string(asked.interpolation)) + ", " +
+                                    std::to_string(asked.passes) + " passes of " +
+                                    std::string(to_string(asked.smoothing)) +
+                                    (asked.close ? ", closed" : "")});
+  rows.push_back({"priority", std::string(to_string(asked.priority))});
+  rows.push_back({"created", job.created});
+  if (job.started) rows.push_back({"started", *job.started});
+  if (job.finished) rows.push_back({"finished", *job.finished});
+  if (job.error) {
+    rows.push_back({"error", job.error->detail.empty() ? job.error->title : job.error->detail});
+  }
+  std::string text = in_columns({Align::kLeft, Align::kLeft}, rows);
+  if (is_final(job.state)) text += '\n' + timing_report(job.timing, {});
+  if (job.mesh) text += '\n' + mesh_report(*job.mesh);
+  return text;
+}
+
+std::string job_list(const std::vector<Job>& jobs) {
+  Rows rows = {{"job", "state", "done", "iso", "priority", "created"}};
+  for (const Job& job : jobs) {
+    rows.push_back({job.id, std::string(to_string(job.state)), fixed(100 * job.progress, 0) + " %",
+                    iso_of(job.parameters), std::string(to_string(job.parameters.priority)),
+                    job.created});
+  }
+  return in_columns(
+      {Align::kLeft, Align::kLeft, Align::kRight, Align::kRight, Align::kLeft, Align::kLeft}, rows);
+}
+
+std::string volume_list(const std::vector<Volume>& volumes) {
+  Rows rows = {{"volume", "format", "samples", "type", "size", "created"}};
+  for (const Volume& volume : volumes) {
+    rows.push_back({volume.id, volume.format, dims_of(volume), std::string(to_string(volume.type)),
+                    human_bytes(volume.bytes), volume.created});
+  }
+  return in_columns(
+      {Align::kLeft, Align::kLeft, Align::kRight, Align::kLeft, Align::kRight, Align::kLeft}, rows);
+}
+
+std::string job_json(const Job& job, const std::vector<std::filesystem::path>& outputs,
+                     const ClientTiming& client) {
+  auto json = nlohmann::ordered_json::parse(to_json(job));
+  auto& paths = json["outputs"] = nlohmann::ordered_json::array();
+  for (const auto& path : outputs) paths.push_back(path.string());
+  auto& times = json["client"] = nlohmann::ordered_json::object();
+  if (client.upload) times["upload"] = *client.upload;
+  if (client.download) times["download"] = *client.download;
+  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+}  // namespace isomesh::cli

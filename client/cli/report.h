@@ -1,0 +1,35 @@
+// What the command says about jobs and volumes. Pure functions: values in, lines of text out.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "proto/types.h"
+
+namespace isomesh::cli {
+
+// What the client saw of a job's way, beside what the server measured; milliseconds.
+struct ClientTiming {
+  std::optional<double> upload = {};
+  std::optional<double> download = {};
+};
+
+// The stages with their times and their shares of the total, transfers around them.
+std::string timing_report(const Timing& timing, const ClientTiming& client);
+
+std::string mesh_report(const MeshSummary& mesh);
+std::string volume_report(const Volume& volume);
+std::string job_report(const Job& job);
+
+// One line each under a heading.
+std::string job_list(const std::vector<Job>& jobs);
+std::string volume_list(const std::vector<Volume>& volumes);
+
+// The job as the server's JSON, with what the client adds: `outputs`, the files that were written,
+// and `client`, with `upload` and `download` in milliseconds.
+std::string job_json(const Job& job, const std::vector<std::filesystem::path>& outputs,
+                     const ClientTiming& client);
+
+}  // namespace isomesh::cli

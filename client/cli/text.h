@@ -1,0 +1,23 @@
+// Numbers as a person reads them, and columns. Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace isomesh::cli {
+
+std::string grouped(std::int64_t value);          // 1,234,567
+std::string fixed(double value, int decimals);    // grouped before the point
+std::string human_bytes(std::uint64_t bytes);     // 512 B, 3.5 MB: powers of 1000
+std::string human_duration(double milliseconds);  // 12.3 ms, 4.56 s, 2 min 03 s
+std::string human_number(double value);           // six significant digits
+
+enum class Align { kLeft, kRight };
+
+// Lines of cells under each other, two spaces between columns, indented by two, nothing at the end
+// of a line. Rows may be shorter than `columns`; cells may hold UTF-8.
+std::string in_columns(const std::vector<Align>& columns,
+                       const std::vector<std::vector<std::string>>& rows);
+
+}  // namespace isomesh::cli

@@ -1,0 +1,329 @@
+#include "client/isomesh/client.h"
+
+#include <algorithm>
+#include <charconv>
+#include <thread>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "client/isomesh/file.h"
+#include "client/isomesh/sha256.h"
+#include "client/isomesh/transport.h"
+#include "client/isomesh/url.h"
+#include "proto/json.h"
+
+namespace isomesh {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr int kTries = 4;
+constexpr milliseconds kFirstPause{100};
+constexpr seconds kLongestWait{30};
+// Between two looks at a job, for a server that does not hold a long poll.
+constexpr milliseconds kShortestLook{200};
+constexpr std::size_t kDigestBytes = 1024 * 1024;
+
+TransportOptions transport_options(ClientOptions&& options) {
+  const bool sendable =
+      std::ranges::all_of(options.token, [](char c) { return c > ' ' && c < '\x7f'; });
+  if (!sendable) throw invalid_parameter("token", "must be letters, digits and signs of ASCII");
+  return {.server = parse_server_address(options.server),
+          .server_url = options.server,
+          .token = std::move(options.token),
+          .connect_timeout = options.connect_timeout,
+          .silence_timeout = options.silence_timeout,
+          .stop = std::move(options.stop)};
+}
+
+// For refusals by something in front of the daemon, which does not send our problem documents.
+ErrorCode code_of_status(int status) {
+  switch (status) {
+    case 400:
+      return ErrorCode::kInvalidParameter;
+    case 401:
+    case 403:
+      return ErrorCode::kUnauthorized;
+    case 404:
+      return ErrorCode::kNotFound;
+    case 405:
+      return ErrorCode::kMethodNotAllowed;
+    case 409:
+      return ErrorCode::kNotReady;
+    case 410:
+      return ErrorCode::kGone;
+    case 411:
+      return ErrorCode::kLengthRequired;
+    case 413:
+      return ErrorCode::kTooLarge;
+    case 414:
+      return ErrorCode::kUriTooLong;
+    case 415:
+      return ErrorCode::kUnsupportedMedia;
+    case 422:
+      return ErrorCode::kUnusableVolume;
+    case 429:
+      return ErrorCode::kTooManyRequests;
+    case 502:
+    case 504:
+      return ErrorCode::kUnreachable;
+    case 503:
+      return ErrorCode::kUnavailable;
+    case 507:
+      return ErrorCode::kOutOfSpace;
+    default:
+      return ErrorCode::kInternal;
+  }
+}
+
+Error refusal(const Answer& answer) {
+  const std::string status = "the server answered with status " + std::to_string(answer.status);
+  if (!answer.content_type.starts_with("application/problem+json")) {
+    return {code_of_status(answer.status), status};
+  }
+  Problem problem;
+  try {
+    problem = problem_from_json(answer.body);
+  } catch (const Error&) {
+    return {code_of_status(answer.status), status};
+  }
+  Error error = to_error(problem);
+  if (error.code() != ErrorCode::kInternal || answer.status == 500) return error;
+  return {code_of_status(answer.status), problem.detail.empty() ? status : problem.detail,
+          problem.errors};
+}
+
+template <std::size_t N>
+std::string joined(const std::array<double, N>& values) {
+  std::string text;
+  for (const double value : values) {
+    std::array<char, 32> digits{};
+    // The shortest digits that read back as the same number, in every locale.
+    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
+    text += (text.empty() ? "" : ",") + std::string(digits.data(), end);
+  }
+  return text;
+}
+
+std::string raw_query(const RawDescription& raw) {
+  const auto& [x, y, z] = raw.dims;
+  std::vector<std::pair<std::string, std::string>> pairs = {
+      {"dims", std::to_string(x) + "," + std::to_string(y) + "," + std::to_string(z)},
+      {"type", std::string(to_string(raw.type))}};
+  if (raw.spacing) pairs.emplace_back("spacing", joined(*raw.spacing));
+  if (raw.origin) pairs.emplace_back("origin", joined(*raw.origin));
+  if (raw.direction) pairs.emplace_back("direction", joined(*raw.direction));
+  if (raw.big_endian) pairs.emplace_back("byte_order", "big");
+  return query_string(pairs);
+}
+
+std::string digest_of(const InputFile& file) {
+  Sha256 sha256;
+  std::vector<char> piece(kDigestBytes);
+  for (std::uint64_t offset = 0; offset < file.size(); offset += piece.size()) {
+    piece.resize(
+        static_cast<std::size_t>(std::min<std::uint64_t>(kDigestBytes, file.size() - offset)));
+    file.read(offset, piece);
+    sha256.update({piece.data(), piece.size()});
+  }
+  return sha256.finish();
+}
+
+std::string volume_path(const std::string& id) { return "/v1/volumes/" + path_segment(id); }
+std::string job_path(const std::string& id) { return "/v1/jobs/" + path_segment(id); }
+
+// The cursor in a page that jobs_from_json has accepted.
+std::string next_of(const std::string& page) {
+  const auto json = nlohmann::json::parse(page, nullptr, false);
+  const auto next = json.find("next");
+  return next != json.end() && next->is_string() ? next->get<std::string>() : std::string();
+}
+
+const MeshFile& file_of(const Job& job, MeshFormat format) {
+  if (job.state == JobState::kCancelled)
+    throw Error(ErrorCode::kCancelled, "the job was cancelled");
+  if (job.state == JobState::kFailed) {
+    throw job.error ? to_error(*job.error) : Error(ErrorCode::kInternal, "the job failed");
+  }
+  if (job.state != JobState::kSucceeded || !job.mesh) {
+    throw Error(ErrorCode::kNotReady,
+                "the job is " + std::string(to_string(job.state)) + ", its mesh is not ready");
+  }
+  const auto found = job.mesh->files.find(format);
+  if (found == job.mesh->files.end()) {
+    throw Error(ErrorCode::kNotFound,
+                "the job was not asked for the format \"" + std::string(to_string(format)) + "\"");
+  }
+  return found->second;
+}
+
+// Writes what arrives and holds it against what was announced.
+class Download {
+ public:
+  Download(const MeshFile& announced, const std::filesystem::path& target,
+           const TransferProgress& progress)
+      : announced_(announced), file_(target), progress_(progress) {}
+
+  void restart() {
+    if (received_ == 0) return;
+    file_.restart();
+    sha256_.emplace();
+    received_ = 0;
+  }
+
+  void take(std::string_view piece) {
+    received_ += piece.size();
+    if (received_ > announced_.bytes) refuse();
+    file_.write(piece);
+    sha256_->update(piece);
+    if (progress_) progress_(received_, announced_.bytes);
+  }
+
+  void publish() {
+    if (received_ != announced_.bytes || to_hex(sha256_->finish()) != announced_.sha256) refuse();
+    file_.publish();
+  }
+
+ private:
+  [[noreturn]] static void refuse() {
+    throw Error(ErrorCode::kDigestMismatch,
+                "the mesh that arrived is not the one that the job describes");
+  }
+
+  const MeshFile& announced_;
+  PartFile file_;
+  const TransferProgress& progress_;
+  std::optional<Sha256> sha256_{std::in_place};
+  std::uint64_t received_ = 0;
+};
+
+}  // namespace
+
+class Client::Impl {
+ public:
+  explicit Impl(ClientOptions&& options)
+      : stop_(options.stop), transport_(transport_options(std::move(options))) {}
+
+  // The body of a successful answer; every other answer is thrown.
+  std::string send(const Exchange& exchange) const {
+    Answer answer = transport_.send(exchange);
+    if (answer.status < 200 || answer.status >= 300) throw refusal(answer);
+    return std::move(answer.body);
+  }
+
+  // The same for a GET, which may be sent again. `before` runs ahead of every try.
+  std::string get(const Exchange& exchange, const std::function<void()>& before = {}) const {
+    for (int attempt = 1;; ++attempt) {
+      try {
+        if (before) before();
+        return send(exchange);
+      } catch (const NoAnswer& lost) {
+        if (!lost.broken() || attempt == kTries) throw;
+      }
+      pause(kFirstPause * (1 << (attempt - 1)));
+    }
+  }
+
+  void pause(milliseconds duration) const {
+    constexpr milliseconds kStep{50};
+    for (auto left = duration; left.count() > 0; left -= kStep) {
+      if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
+      std::this_thread::sleep_for(std::min(left, kStep));
+    }
+  }
+
+ private:
+  std::stop_token stop_;
+  Transport transport_;
+};
+
+Client::Client(ClientOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
+Client::~Client() = default;
+Client::Client(Client&&) noexcept = default;
+Client& Client::operator=(Client&&) noexcept = default;
+
+Volume Client::upload(const std::filesystem::path& path, const UploadOptions& options) {
+  const InputFile file(path);
+  Exchange exchange{.method = "POST", .target = "/v1/volumes"};
+  if (options.raw) exchange.target += raw_query(*options.raw);
+  exchange.headers = {{"Content-Type", "application/octet-stream"}};
+  if (options.digest) {
+    exchange.headers.emplace_back("Content-Digest", "sha-256=:" + to_base64(digest_of(file)) + ":");
+  }
+  exchange.source_bytes = file.size();
+  exchange.source = [&](std::uint64_t offset, std::span<char> piece) {
+    if (options.progress) options.progress(offset, file.size());
+    file.read(offset, piece);
+    if (options.progress && offset + piece.size() == file.size()) {
+      options.progress(file.size(), file.size());
+    }
+  };
+  return volume_from_json(impl_->send(exchange));
+}
+
+Volume Client::volume(const std::string& id) {
+  return volume_from_json(impl_->get({.target = volume_path(id)}));
+}
+
+std::vector<Volume> Client::volumes() {
+  return volumes_from_json(impl_->get({.target = "/v1/volumes"}));
+}
+
+void Client::erase_volume(const std::string& id) {
+  impl_->send({.method = "DELETE", .target = volume_path(id)});
+}
+
+Job Client::submit(const JobParameters& parameters) {
+  return job_from_json(impl_->send({.method = "POST",
+                                    .target = "/v1/jobs",
+                                    .headers = {{"Content-Type", "application/json"}},
+                                    .body = to_json(parameters)}));
+}
+
+Job Client::job(const std::string& id) {
+  return job_from_json(impl_->get({.target = job_path(id)}));
+}
+
+Job Client::job(const std::string& id, seconds wait) {
+  const std::string query = query_string({{"wait", std::to_string(wait.count())}});
+  return job_from_json(impl_->get({.target = job_path(id) + query, .patience = wait}));
+}
+
+JobPage Client::jobs(std::optional<JobState> state, const std::string& cursor) {
+  std::vector<std::pair<std::string, std::string>> query;
+  if (state) query.emplace_back("state", to_string(*state));
+  if (!cursor.empty()) query.emplace_back("cursor", cursor);
+  const std::string body = impl_->get({.target = "/v1/jobs" + query_string(query)});
+  return {.jobs = jobs_from_json(body), .next = next_of(body)};
+}
+
+void Client::cancel(const std::string& id) {
+  impl_->send({.method = "DELETE", .target = job_path(id)});
+}
+
+Job Client::wait(const std::string& id, const JobProgress& progress) {
+  const seconds patience = progress ? seconds{1} : kLongestWait;
+  while (true) {
+    const auto asked = std::chrono::steady_clock::now();
+    Job current = job(id, patience);
+    if (progress) progress(current);
+    if (is_final(current.state)) return current;
+    const auto held =
+        std::chrono::duration_cast<milliseconds>(std::chrono::steady_clock::now() - asked);
+    if (held < kShortestLook) impl_->pause(kShortestLook - held);
+  }
+}
+
+void Client::fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,
+                   const TransferProgress& progress) {
+  const Job done = job(id);
+  Download download(file_of(done, format), target, progress);
+  Exchange exchange{.target = job_path(id) + "/mesh." + std::string(to_string(format))};
+  exchange.sink = [&](std::string_view piece) { download.take(piece); };
+  impl_->get(exchange, [&] { download.restart(); });
+  download.publish();
+}
+
+}  // namespace isomesh

@@ -1,0 +1,121 @@
+// The C++ client of a running isomeshd: volumes in, jobs through, meshes out.
+//
+//   isomesh::Client client({.server = "http://127.0.0.1:8080"});
+//   isomesh::JobParameters parameters;
+//   parameters.volume = client.upload("head.nii.gz").id;
+//   parameters.iso = 60;
+//   const isomesh::Job job = client.wait(client.submit(parameters).id);
+//   client.fetch(job.id, isomesh::MeshFormat::kDrc, "head.drc");
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "proto/error.h"
+#include "proto/types.h"
+
+namespace isomesh {
+
+struct ClientOptions {
+  // `http://HOST:PORT`, `https://HOST:PORT` (the system's certificate authorities are trusted) or
+  // `unix:PATH`.
+  std::string server = "http://127.0.0.1:8080";
+  // Sent as `Authorization: Bearer`; empty: none is sent.
+  std::string token = {};
+
+  std::chrono::milliseconds connect_timeout{10'000};
+  // The longest silence in the middle of an exchange. After the last byte of an upload the server
+  // reads and checks the volume before it answers, so this is minutes rather than seconds.
+  std::chrono::milliseconds silence_timeout{300'000};
+
+  // When asked to stop, the exchange under way ends within a tenth of a second with Error
+  // kCancelled. Jobs on the server go on.
+  std::stop_token stop = {};
+};
+
+// Bytes of a transfer that are done, and all of them.
+using TransferProgress = std::function<void(std::uint64_t done, std::uint64_t total)>;
+// The job as it was last seen.
+using JobProgress = std::function<void(const Job& job)>;
+
+// What samples without a header are; x runs fastest. What is left out is the server's default.
+struct RawDescription {
+  std::array<std::int64_t, 3> dims = {0, 0, 0};
+  SampleType type = SampleType::kUint8;
+  std::optional<std::array<double, 3>> spacing = {};    // mm
+  std::optional<std::array<double, 3>> origin = {};     // mm, LPS
+  std::optional<std::array<double, 9>> direction = {};  // row-major
+  bool big_endian = false;
+};
+
+struct UploadOptions {
+  std::optional<RawDescription> raw = {};  // empty: the file says itself what it is
+  // Sends the file's SHA-256 ahead, so that the server refuses a body that changed on the way.
+  // Costs a second reading of the file.
+  bool digest = false;
+  TransferProgress progress = {};
+};
+
+struct JobPage {
+  std::vector<Job> jobs;
+  std::string next;  // the cursor of the page after this one; empty on the last
+};
+
+// Every method throws Error: kUnreachable when no answer of a server came, the server's own code
+// and reason when it refused, kInternal when its answer is not what the API says, kInvalidParameter
+// for an argument that cannot be sent or a local file that cannot be read or written. An exception
+// that a progress callback throws ends the exchange and comes out unchanged.
+//
+// Every exchange has a connection of its own: a Client may be used from several threads. Callbacks
+// run on the calling thread. A GET whose connection broke is tried again, three times at most;
+// nothing else is, and neither is a server that cannot be connected to.
+//
+// Writing to an https server that went away raises SIGPIPE: a program that uses one ignores it.
+class Client {
+ public:
+  // Throws Error kInvalidParameter when the server's address or the token is malformed. Connects to
+  // nothing.
+  explicit Client(ClientOptions options = {});
+  ~Client();
+  Client(Client&&) noexcept;
+  Client& operator=(Client&&) noexcept;
+
+  // Sends the file from disk in pieces. The same samples again give the same volume.
+  Volume upload(const std::filesystem::path& file, const UploadOptions& options = {});
+  Volume volume(const std::string& id);
+  std::vector<Volume> volumes();
+  void erase_volume(const std::string& id);
+
+  Job submit(const JobParameters& parameters);
+  Job job(const std::string& id);
+  // The job when it is done, or as it is after `wait` (whole seconds, the server allows 30).
+  Job job(const std::string& id, std::chrono::seconds wait);
+  // One page of the jobs in one state, or in any: the first, or the one that `cursor` stands for.
+  JobPage jobs(std::optional<JobState> state = std::nullopt, const std::string& cursor = {});
+  void cancel(const std::string& id);
+
+  // Returns the job in its final state, whichever that is. With a callback the job is looked at
+  // once a second at least, and the callback also sees the final state.
+  Job wait(const std::string& id, const JobProgress& progress = {});
+
+  // Writes the mesh of a finished job to `target`, which appears only when all of its bytes have
+  // come and have the SHA-256 that the job states. Throws kNotReady when the job is not done, the
+  // job's own error when it failed, kCancelled when it was cancelled, kNotFound when it was not
+  // asked for that format, kDigestMismatch when other bytes came.
+  void fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,
+             const TransferProgress& progress = {});
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace isomesh

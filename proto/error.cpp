@@ -1,0 +1,79 @@
+#include "proto/error.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace isomesh {
+namespace {
+
+constexpr std::string_view kTypePrefix = "urn:isomesh:problem:";
+
+constexpr std::array kDescriptions = {
+    ErrorDescription{ErrorCode::kInvalidParameter, 400, "invalid-parameter", "Invalid parameter"},
+    ErrorDescription{ErrorCode::kDigestMismatch, 400, "digest-mismatch",
+                     "The body does not match its digest"},
+    ErrorDescription{ErrorCode::kUnauthorized, 401, "unauthorized", "Not authorized"},
+    ErrorDescription{ErrorCode::kNotFound, 404, "not-found", "Not found"},
+    ErrorDescription{ErrorCode::kMethodNotAllowed, 405, "method-not-allowed",
+                     "Method not allowed"},
+    ErrorDescription{ErrorCode::kNotReady, 409, "not-ready", "Not ready"},
+    ErrorDescription{ErrorCode::kGone, 410, "gone", "Expired"},
+    ErrorDescription{ErrorCode::kLengthRequired, 411, "length-required", "Length required"},
+    ErrorDescription{ErrorCode::kTooLarge, 413, "too-large", "Too large"},
+    ErrorDescription{ErrorCode::kUriTooLong, 414, "uri-too-long", "Request target too long"},
+    ErrorDescription{ErrorCode::kUnsupportedMedia, 415, "unsupported-media",
+                     "Unsupported media type"},
+    ErrorDescription{ErrorCode::kRangeNotSatisfiable, 416, "range-not-satisfiable",
+                     "Range not satisfiable"},
+    ErrorDescription{ErrorCode::kUnusableVolume, 422, "unusable-volume",
+                     "The volume cannot be used"},
+    ErrorDescription{ErrorCode::kKeyReused, 422, "key-reused",
+                     "The idempotency key was used for another request"},
+    ErrorDescription{ErrorCode::kTooManyRequests, 429, "too-many-requests", "Too many requests"},
+    ErrorDescription{ErrorCode::kInternal, 500, "internal", "Internal error"},
+    ErrorDescription{ErrorCode::kUnavailable, 503, "unavailable", "Unavailable"},
+    ErrorDescription{ErrorCode::kOutOfSpace, 507, "out-of-space", "Out of space"},
+    ErrorDescription{ErrorCode::kCancelled, 409, "cancelled", "Cancelled"},
+    ErrorDescription{ErrorCode::kUnreachable, 503, "unreachable", "The server is not reachable"},
+};
+
+}  // namespace
+
+const ErrorDescription& describe(ErrorCode code) {
+  const auto* found =
+      std::ranges::find(kDescriptions, code, [](const ErrorDescription& row) { return row.code; });
+  return *found;
+}
+
+ErrorCode error_code_of(std::string_view name) {
+  const auto* found = std::ranges::find(kDescriptions, name,
+                                        [](const ErrorDescription& row) { return row.name; });
+  return found == kDescriptions.end() ? ErrorCode::kInternal : found->code;
+}
+
+Error invalid_parameter(const std::string& field, const std::string& message) {
+  return {ErrorCode::kInvalidParameter, field + ": " + message, {{field, message}}};
+}
+
+Problem to_problem(const Error& error, const std::string& instance) {
+  const ErrorDescription& row = describe(error.code());
+  const bool ours = error.code() == ErrorCode::kInternal;
+  return {.type = std::string(kTypePrefix) + std::string(row.name),
+          .title = std::string(row.title),
+          .status = row.status,
+          .detail = ours ? "The service failed on this request; its log has the reason."
+                         : std::string(error.what()),
+          .instance = instance,
+          .errors = error.fields()};
+}
+
+Error to_error(const Problem& problem) {
+  const std::string_view type = problem.type;
+  const ErrorCode code = type.starts_with(kTypePrefix)
+                             ? error_code_of(type.substr(kTypePrefix.size()))
+                             : ErrorCode::kInternal;
+  return {code, problem.detail.empty() ? problem.title : problem.detail, problem.errors};
+}
+
+}  // namespace isomesh

@@ -1,0 +1,42 @@
+// JSON <-> types. The only place that spells the API's field names.
+//
+// All functions are thread safe. Reading an answer ignores members that this version does not know,
+// so that an older client understands a newer server; reading a request refuses them.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "proto/error.h"
+#include "proto/types.h"
+
+namespace isomesh {
+
+std::string to_json(const Volume& volume);
+std::string to_json(const Job& job);
+std::string to_json(const JobParameters& parameters);
+std::string to_json(const Problem& problem);
+std::string to_json(const std::vector<Volume>& volumes);  // {"volumes": [...]}
+// {"jobs": [...], "next": cursor}; `next` is null on the last page.
+std::string to_json(const std::vector<Job>& jobs, const std::string& next = "");
+
+// Reads an answer of the server. Throws Error kInternal when it is not what the API says.
+Volume volume_from_json(std::string_view text);
+Job job_from_json(std::string_view text);
+Problem problem_from_json(std::string_view text);
+std::vector<Volume> volumes_from_json(std::string_view text);
+std::vector<Job> jobs_from_json(std::string_view text);
+
+// Reads the body of POST /v1/jobs. Throws Error kInvalidParameter that names every member which is
+// unknown, missing, of the wrong type or out of range.
+JobParameters parse_job_parameters(std::string_view body);
+
+// The same from the query of POST /v1/mesh, where everything is text: `format` (several, separated
+// by commas) stands for `formats`, `position_bits` and `speed` for the members of `draco`. The
+// volume is the request's body and stays empty here.
+JobParameters parse_job_parameters(
+    const std::vector<std::pair<std::string, std::string>>& query);
+
+}  // namespace isomesh

@@ -1,0 +1,139 @@
+#include "proto/types.h"
+
+#include <utility>
+
+namespace isomesh {
+namespace {
+
+// One table of names per enumeration; every conversion reads it.
+template <class Enum>
+struct Names;
+
+template <>
+struct Names<SampleType> {
+  static constexpr std::array kTable = {
+      std::pair{SampleType::kUint8, "uint8"},     std::pair{SampleType::kInt8, "int8"},
+      std::pair{SampleType::kUint16, "uint16"},   std::pair{SampleType::kInt16, "int16"},
+      std::pair{SampleType::kUint32, "uint32"},   std::pair{SampleType::kInt32, "int32"},
+      std::pair{SampleType::kFloat32, "float32"}, std::pair{SampleType::kFloat64, "float64"}};
+};
+
+template <>
+struct Names<Interpolation> {
+  static constexpr std::array kTable = {std::pair{Interpolation::kLinear, "linear"},
+                                        std::pair{Interpolation::kMidpoint, "midpoint"}};
+};
+
+template <>
+struct Names<Smoothing> {
+  static constexpr std::array kTable = {std::pair{Smoothing::kLaplacian, "laplacian"},
+                                        std::pair{Smoothing::kTaubin, "taubin"}};
+};
+
+template <>
+struct Names<MeshFormat> {
+  static constexpr std::array kTable = {
+      std::pair{MeshFormat::kDrc, "drc"}, std::pair{MeshFormat::kGlb, "glb"},
+      std::pair{MeshFormat::kStl, "stl"}, std::pair{MeshFormat::kPly, "ply"},
+      std::pair{MeshFormat::kObj, "obj"}};
+};
+
+template <>
+struct Names<Priority> {
+  static constexpr std::array kTable = {std::pair{Priority::kStat, "stat"},
+                                        std::pair{Priority::kRoutine, "routine"},
+                                        std::pair{Priority::kBulk, "bulk"}};
+};
+
+template <>
+struct Names<JobState> {
+  static constexpr std::array kTable = {
+      std::pair{JobState::kQueued, "queued"}, std::pair{JobState::kRunning, "running"},
+      std::pair{JobState::kSucceeded, "succeeded"}, std::pair{JobState::kFailed, "failed"},
+      std::pair{JobState::kCancelled, "cancelled"}};
+};
+
+template <>
+struct Names<Stage> {
+  static constexpr std::array kTable = {
+      std::pair{Stage::kQueue, "queue"},     std::pair{Stage::kLoad, "load"},
+      std::pair{Stage::kExtract, "extract"}, std::pair{Stage::kSmooth, "smooth"},
+      std::pair{Stage::kEncode, "encode"},   std::pair{Stage::kDone, "done"}};
+};
+
+template <class Enum>
+std::string_view name_of(Enum value) {
+  for (const auto& [known, name] : Names<Enum>::kTable) {
+    if (known == value) return name;
+  }
+  return "";
+}
+
+}  // namespace
+
+std::size_t bytes_per_sample(SampleType type) {
+  switch (type) {
+    case SampleType::kUint8:
+    case SampleType::kInt8:
+      return 1;
+    case SampleType::kUint16:
+    case SampleType::kInt16:
+      return 2;
+    case SampleType::kUint32:
+    case SampleType::kInt32:
+    case SampleType::kFloat32:
+      return 4;
+    case SampleType::kFloat64:
+      return 8;
+  }
+  return 0;
+}
+
+bool is_final(JobState state) {
+  return state == JobState::kSucceeded || state == JobState::kFailed ||
+         state == JobState::kCancelled;
+}
+
+std::string_view to_string(SampleType value) { return name_of(value); }
+std::string_view to_string(Interpolation value) { return name_of(value); }
+std::string_view to_string(Smoothing value) { return name_of(value); }
+std::string_view to_string(MeshFormat value) { return name_of(value); }
+std::string_view to_string(Priority value) { return name_of(value); }
+std::string_view to_string(JobState value) { return name_of(value); }
+std::string_view to_string(Stage value) { return name_of(value); }
+
+template <class Enum>
+std::optional<Enum> from_string(std::string_view name) {
+  for (const auto& [value, known] : Names<Enum>::kTable) {
+    if (name == known) return value;
+  }
+  return std::nullopt;
+}
+
+template std::optional<SampleType> from_string(std::string_view);
+template std::optional<Interpolation> from_string(std::string_view);
+template std::optional<Smoothing> from_string(std::string_view);
+template std::optional<MeshFormat> from_string(std::string_view);
+template std::optional<Priority> from_string(std::string_view);
+template std::optional<JobState> from_string(std::string_view);
+template std::optional<Stage> from_string(std::string_view);
+
+template <class Enum>
+std::string names_of() {
+  const auto& table = Names<Enum>::kTable;
+  std::string text;
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    if (row > 0) text += row + 1 == table.size() ? " or " : ", ";
+    text += '"' + std::string(table[row].second) + '"';
+  }
+  return text;
+}
+
+template std::string names_of<SampleType>();
+template std::string names_of<Interpolation>();
+template std::string names_of<Smoothing>();
+template std::string names_of<MeshFormat>();
+template std::string names_of<Priority>();
+template std::string names_of<JobState>();
+
+}  // namespace isomesh

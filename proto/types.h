@@ -1,0 +1,187 @@
+// Requests and answers of the HTTP API as C++ values. Their JSON is in json.h; the contract that
+// both follow is openapi.yaml. Plain values: safe to copy and to read from several threads.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/error.h"
+
+namespace isomesh {
+
+// The type of one sample as it is stored, little-endian.
+enum class SampleType {
+  kUint8,
+  kInt8,
+  kUint16,
+  kInt16,
+  kUint32,
+  kInt32,
+  kFloat32,
+  kFloat64,
+};
+
+std::size_t bytes_per_sample(SampleType type);
+
+// Where the samples lie: sample (i,j,k) is at origin + direction * diag(spacing) * (i,j,k), in
+// millimetres, in DICOM's patient space (LPS). `direction` is row-major, its columns are the unit
+// vectors of the axes i, j, k.
+struct Geometry {
+  std::array<double, 3> origin = {0, 0, 0};
+  std::array<double, 3> spacing = {1, 1, 1};
+  std::array<double, 9> direction = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+  bool operator==(const Geometry&) const = default;
+};
+
+struct Volume {
+  std::string id;      // hex SHA-256 of the canonical samples and geometry
+  std::string format;  // what was uploaded: "raw", "nifti", "nrrd", "metaimage"
+  std::array<std::uint32_t, 3> dims = {0, 0, 0};  // samples along x, y, z; x runs fastest
+  SampleType type = SampleType::kUint8;
+  Geometry geometry;
+  std::array<double, 2> range = {0, 0};  // smallest and largest sample
+  double suggested_iso = 0;              // Otsu's threshold
+  std::uint64_t bytes = 0;               // of the samples
+  std::string created;                   // RFC 3339, UTC
+
+  std::uint64_t sample_count() const {
+    return std::uint64_t{dims[0]} * dims[1] * dims[2];
+  }
+  bool operator==(const Volume&) const = default;
+};
+
+enum class Scheme { kFive = 5, kSix = 6 };  // tetrahedra per cell
+enum class Interpolation { kLinear, kMidpoint };
+enum class Smoothing { kLaplacian, kTaubin };
+enum class MeshFormat { kDrc, kGlb, kStl, kPly, kObj };
+enum class Priority { kStat, kRoutine, kBulk };  // claimed in this order
+
+struct DracoParameters {
+  int position_bits = 14;  // 8..30 per coordinate
+  int speed = 7;           // 0 smallest .. 10 fastest
+
+  bool operator==(const DracoParameters&) const = default;
+};
+
+// What a job is asked to do; the members' ranges are the contract's and are checked by
+// parse_job_parameters (json.h).
+struct JobParameters {
+  std::string volume;
+  std::optional<double> iso;  // in the volume's units; empty: Otsu's threshold
+  Scheme scheme = Scheme::kSix;
+  Interpolation interpolation = Interpolation::kLinear;
+  int passes = 5;
+  Smoothing smoothing = Smoothing::kLaplacian;
+  double lambda = 1;
+  bool close = false;
+  std::vector<MeshFormat> formats = {MeshFormat::kDrc};
+  DracoParameters draco;
+  Priority priority = Priority::kRoutine;
+
+  bool operator==(const JobParameters&) const = default;
+};
+
+enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };
+enum class Stage { kQueue, kLoad, kExtract, kSmooth, kEncode, kDone };
+
+// True for the three states that a job does not leave again.
+bool is_final(JobState state);
+
+// Wall-clock milliseconds of each stage; a stage that has not run yet is 0.
+struct Timing {
+  double queue = 0;
+  double load = 0;
+  double extract = 0;
+  double smooth = 0;
+  double encode = 0;
+  double total = 0;  // from acceptance to the end
+
+  bool operator==(const Timing&) const = default;
+};
+
+struct MeshFile {
+  std::uint64_t bytes = 0;
+  std::string sha256;  // hex
+  std::string href;    // path on the same server
+
+  bool operator==(const MeshFile&) const = default;
+};
+
+// What a finished job says about its mesh. Lengths in millimetres, after smoothing unless named
+// otherwise.
+struct MeshSummary {
+  struct Enclosed {
+    double extracted = 0;
+    double smoothed = 0;
+
+    bool operator==(const Enclosed&) const = default;
+  };
+
+  std::uint64_t triangles = 0;
+  std::uint64_t vertices = 0;
+  std::uint64_t boundary_edges = 0;
+  std::uint64_t components = 0;
+  std::int64_t euler = 0;
+  double area_mm2 = 0;
+  Enclosed volume_mm3;
+  std::array<std::array<double, 3>, 2> bounds = {};  // smallest and largest corner; 0 when empty
+  std::map<MeshFormat, MeshFile> files;
+
+  bool operator==(const MeshSummary&) const = default;
+};
+
+struct Job {
+  std::string id;
+  JobState state = JobState::kQueued;
+  Stage stage = Stage::kQueue;
+  double progress = 0;  // 0..1 over the whole job
+  JobParameters parameters;
+  std::string created;                // RFC 3339, UTC
+  std::optional<std::string> started;
+  std::optional<std::string> finished;
+  Timing timing;
+  std::optional<MeshSummary> mesh;  // of a job that succeeded
+  std::optional<Problem> error;     // of a job that failed
+
+  bool operator==(const Job&) const = default;
+};
+
+// The names that the API uses for the values of the enumerations above.
+std::string_view to_string(SampleType value);
+std::string_view to_string(Interpolation value);
+std::string_view to_string(Smoothing value);
+std::string_view to_string(MeshFormat value);
+std::string_view to_string(Priority value);
+std::string_view to_string(JobState value);
+std::string_view to_string(Stage value);
+
+// The inverse: empty for a name that is none of them.
+template <class Enum>
+std::optional<Enum> from_string(std::string_view name);
+
+extern template std::optional<SampleType> from_string(std::string_view);
+extern template std::optional<Interpolation> from_string(std::string_view);
+extern template std::optional<Smoothing> from_string(std::string_view);
+extern template std::optional<MeshFormat> from_string(std::string_view);
+extern template std::optional<Priority> from_string(std::string_view);
+extern template std::optional<JobState> from_string(std::string_view);
+extern template std::optional<Stage> from_string(std::string_view);
+
+// All names of an enumeration as a person reads them: `"stat", "routine" or "bulk"`.
+template <class Enum>
+std::string names_of();
+
+extern template std::string names_of<SampleType>();
+extern template std::string names_of<Interpolation>();
+extern template std::string names_of<Smoothing>();
+extern template std::string names_of<MeshFormat>();
+extern template std::string names_of<Priority>();
+extern template std::string names_of<JobState>();
+
+}  // namespace isomesh

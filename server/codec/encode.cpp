@@ -1,0 +1,42 @@
+#include "server/codec/encode.h"
+
+#include <string>
+
+namespace isomesh::codec {
+
+void encode(const mesh::Mesh& mesh, MeshFormat format, const DracoParameters& draco,
+            const mesh::Context& context, const Sink& sink) {
+  switch (format) {
+    case MeshFormat::kDrc:
+      return encode_drc(mesh, draco, context, sink);
+    case MeshFormat::kStl:
+      return encode_stl(mesh, context, sink);
+    case MeshFormat::kGlb:
+    case MeshFormat::kPly:
+    case MeshFormat::kObj:
+      break;
+  }
+  throw invalid_parameter("formats",
+                          "this version does not write " + std::string(to_string(format)));
+}
+
+bool can_encode(MeshFormat format) {
+  return format == MeshFormat::kDrc || format == MeshFormat::kStl;
+}
+
+std::string_view media_type(MeshFormat format) {
+  switch (format) {
+    case MeshFormat::kGlb:
+      return "model/gltf-binary";
+    case MeshFormat::kStl:
+      return "model/stl";
+    case MeshFormat::kObj:
+      return "model/obj";
+    case MeshFormat::kDrc:
+    case MeshFormat::kPly:
+      break;
+  }
+  return "application/octet-stream";
+}
+
+}  // namespace isomesh::codec

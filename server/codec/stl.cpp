@@ -1,0 +1,75 @@
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "server/codec/encode.h"
+
+namespace isomesh::codec {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "STL is little-endian");
+
+constexpr std::size_t kHeaderBytes = 80;
+constexpr std::size_t kFacetBytes = 50;
+constexpr std::size_t kFacetsPerBlock = 8192;
+
+mesh::Vec3 unit_normal(const mesh::Vec3& a, const mesh::Vec3& b, const mesh::Vec3& c) {
+  std::array<double, 3> u;
+  std::array<double, 3> v;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    u[axis] = double{b[axis]} - a[axis];
+    v[axis] = double{c[axis]} - a[axis];
+  }
+  const std::array<double, 3> n = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                                   u[0] * v[1] - u[1] * v[0]};
+  const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+  const double scale = length > 0 ? 1 / length : 0;
+  return {static_cast<float>(n[0] * scale), static_cast<float>(n[1] * scale),
+          static_cast<float>(n[2] * scale)};
+}
+
+void write_facet(const mesh::Mesh& mesh, const mesh::Triangle& triangle, std::byte* out) {
+  const mesh::Vec3& a = mesh.positions[triangle[0]];
+  const mesh::Vec3& b = mesh.positions[triangle[1]];
+  const mesh::Vec3& c = mesh.positions[triangle[2]];
+  for (const mesh::Vec3& vector : {unit_normal(a, b, c), a, b, c}) {
+    std::memcpy(out, vector.data(), sizeof vector);
+    out += sizeof vector;
+  }
+  std::memset(out, 0, 2);  // attribute byte count
+}
+
+}  // namespace
+
+void encode_stl(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink) {
+  const std::size_t triangles = mesh.triangles.size();
+  if (triangles > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error(ErrorCode::kTooLarge, "the surface has more triangles than an STL file can hold");
+  }
+  // The header must not start with "solid", or readers take the file for text.
+  constexpr std::string_view kTitle = "isomesh binary STL, millimetres, LPS";
+  std::array<std::byte, kHeaderBytes + 4> header = {};
+  std::memcpy(header.data(), kTitle.data(), kTitle.size());
+  const auto count = static_cast<std::uint32_t>(triangles);
+  std::memcpy(header.data() + kHeaderBytes, &count, sizeof count);
+  sink(header);
+
+  std::vector<std::byte> block(kFacetsPerBlock * kFacetBytes);
+  for (std::size_t begin = 0; begin < triangles; begin += kFacetsPerBlock) {
+    context.throw_if_stopped();
+    const std::size_t facets = std::min(kFacetsPerBlock, triangles - begin);
+    for (std::size_t i = 0; i < facets; ++i) {
+      write_facet(mesh, mesh.triangles[begin + i], block.data() + i * kFacetBytes);
+    }
+    sink(std::span(block).first(facets * kFacetBytes));
+    if (context.progress) {
+      context.progress(static_cast<double>(begin + facets) / static_cast<double>(triangles));
+    }
+  }
+}
+
+}  // namespace isomesh::codec

@@ -1,0 +1,206 @@
+#include "server/http/request.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include <httplib.h>
+#include <openssl/evp.h>
+
+#include "server/store/files.h"
+
+namespace isomesh::http {
+namespace {
+
+constexpr int kLongestWaitSeconds = 30;
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t";
+  const std::size_t first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(separator, begin), text.size());
+    parts.push_back(trimmed(text.substr(begin, end - begin)));
+    begin = end + 1;
+  }
+  return parts;
+}
+
+template <class Number>
+std::optional<Number> number_of(std::string_view text) {
+  Number value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+template <class Number, std::size_t N>
+std::array<Number, N> numbers_of(const std::string& name, std::string_view text) {
+  const std::vector<std::string_view> parts = split(text, ',');
+  std::array<Number, N> numbers = {};
+  bool valid = parts.size() == N;
+  for (std::size_t i = 0; valid && i < N; ++i) {
+    const auto number = number_of<Number>(parts[i]);
+    valid = number.has_value();
+    if (valid) numbers[i] = *number;
+  }
+  if (!valid) {
+    throw invalid_parameter(name, "must be " + std::to_string(N) + " numbers with commas between");
+  }
+  return numbers;
+}
+
+// The seconds of a preference `wait=N` (RFC 7240), among others in the header.
+std::optional<std::string> preferred_wait(const httplib::Request& request) {
+  for (const std::string_view preference : split(request.get_header_value("Prefer"), ',')) {
+    constexpr std::string_view kWait = "wait=";
+    if (preference.starts_with(kWait)) return std::string(preference.substr(kWait.size()));
+  }
+  return std::nullopt;
+}
+
+std::string hex_of_base64(std::string_view text) {
+  std::array<unsigned char, 48> bytes = {};
+  const bool right_length = text.size() == 44;  // 32 bytes
+  if (!right_length ||
+      EVP_DecodeBlock(bytes.data(), reinterpret_cast<const unsigned char*>(text.data()),
+                      static_cast<int>(text.size())) < 0) {
+    throw invalid_parameter("Content-Digest", "sha-256 must be 32 bytes in base64 between colons");
+  }
+  return store::to_hex({bytes.data(), store::Sha256::kBytes});
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> query_of(const httplib::Request& request) {
+  return {request.params.begin(), request.params.end()};
+}
+
+void check_known(const httplib::Request& request, const std::set<std::string>& known) {
+  std::vector<FieldError> errors;
+  std::string detail;
+  for (const auto& [name, unused] : request.params) {
+    constexpr std::size_t kLongestName = 64;
+    const std::string shown = name.substr(0, kLongestName);
+    std::string message;
+    if (!known.contains(name)) {
+      message = "is not a parameter of this request";
+    } else if (request.get_param_value_count(name) > 1) {
+      message = "is given more than once";
+    } else {
+      continue;
+    }
+    detail += (detail.empty() ? "" : "; ") + shown + ": " + message;
+    errors.push_back({shown, message});
+  }
+  if (!errors.empty()) throw Error(ErrorCode::kInvalidParameter, detail, std::move(errors));
+}
+
+std::chrono::milliseconds wait_of(const httplib::Request& request) {
+  const bool in_query = request.has_param("wait");
+  const std::optional<std::string> text =
+      in_query ? request.get_param_value("wait") : preferred_wait(request);
+  if (!text) return std::chrono::milliseconds(0);
+  const auto seconds = number_of<double>(*text);
+  if (!seconds || !(*seconds >= 0)) {
+    if (!in_query) return std::chrono::milliseconds(0);  // a preference that we cannot follow
+    throw invalid_parameter("wait", "must be a number of seconds, at least 0");
+  }
+  return std::chrono::milliseconds(
+      static_cast<std::int64_t>(std::min<double>(*seconds, kLongestWaitSeconds) * 1000));
+}
+
+std::optional<std::string> sha256_of_content_digest(const httplib::Request& request) {
+  for (const std::string_view digest : split(request.get_header_value("Content-Digest"), ',')) {
+    constexpr std::string_view kSha256 = "sha-256=";
+    if (!digest.starts_with(kSha256)) continue;
+    std::string_view value = digest.substr(kSha256.size());
+    if (value.size() < 2 || value.front() != ':' || value.back() != ':') {
+      throw invalid_parameter("Content-Digest", "sha-256 must be base64 between colons");
+    }
+    value = value.substr(1, value.size() - 2);
+    return hex_of_base64(value);
+  }
+  return std::nullopt;
+}
+
+const std::set<std::string>& raw_description_parameters() {
+  static const std::set<std::string> names = {"dims",   "type",      "spacing",
+                                              "origin", "direction", "byte_order"};
+  return names;
+}
+
+std::optional<volume::RawDescription> raw_description_of(const httplib::Request& request) {
+  const auto text = [&](const char* name) { return request.get_param_value(name); };
+  if (!request.has_param("dims")) {
+    for (const std::string& name : raw_description_parameters()) {
+      if (request.has_param(name)) {
+        throw invalid_parameter("dims", "is required, because " + name + " describes raw samples");
+      }
+    }
+    return std::nullopt;
+  }
+  volume::RawDescription raw;
+  raw.dims = numbers_of<std::uint32_t, 3>("dims", text("dims"));
+  const auto type = from_string<SampleType>(text("type"));
+  if (!type) throw invalid_parameter("type", "must be " + names_of<SampleType>());
+  raw.type = *type;
+  if (request.has_param("spacing")) {
+    raw.geometry.spacing = numbers_of<double, 3>("spacing", text("spacing"));
+  }
+  if (request.has_param("origin")) {
+    raw.geometry.origin = numbers_of<double, 3>("origin", text("origin"));
+  }
+  if (request.has_param("direction")) {
+    raw.geometry.direction = numbers_of<double, 9>("direction", text("direction"));
+  }
+  if (request.has_param("byte_order")) {
+    const std::string order = text("byte_order");
+    if (order != "little" && order != "big") {
+      throw invalid_parameter("byte_order", "must be \"little\" or \"big\"");
+    }
+    raw.big_endian = order == "big";
+  }
+  return raw;
+}
+
+std::optional<ByteRange> range_of(const httplib::Request& request, std::uint64_t size) {
+  constexpr std::string_view kUnit = "bytes=";
+  const std::string header = request.get_header_value("Range");
+  if (!std::string_view(header).starts_with(kUnit)) return std::nullopt;
+  const std::string_view spec = trimmed(std::string_view(header).substr(kUnit.size()));
+  const std::size_t dash = spec.find('-');
+  if (dash == std::string_view::npos) return std::nullopt;
+  const std::string_view before = spec.substr(0, dash);
+  const std::string_view after = spec.substr(dash + 1);
+  const auto first = number_of<std::uint64_t>(before);
+  const auto last = number_of<std::uint64_t>(after);
+  if ((!before.empty() && !first) || (!after.empty() && !last) || (!first && !last) ||
+      (first && last && *last < *first)) {
+    return std::nullopt;  // several ranges or bad syntax
+  }
+  const std::uint64_t begin = first ? *first : size - std::min(size, *last);
+  const std::uint64_t end = first && last ? std::min(size - 1, *last) : size - 1;
+  if (size == 0 || begin >= size || (!first && *last == 0)) {
+    throw Error(ErrorCode::kRangeNotSatisfiable,
+                "the file has " + std::to_string(size) + " bytes");
+  }
+  return ByteRange{begin, end - begin + 1};
+}
+
+bool matches_etag(const httplib::Request& request, std::string_view etag) {
+  for (std::string_view tag : split(request.get_header_value("If-None-Match"), ',')) {
+    if (tag.starts_with("W/")) tag.remove_prefix(2);
+    if (tag == "*" || tag == etag) return true;
+  }
+  return false;
+}
+
+}  // namespace isomesh::http

@@ -1,0 +1,53 @@
+// What requests say in their headers and queries, parsed and bounded. Free functions, thread safe;
+// what is malformed throws Error kInvalidParameter that names the header or parameter.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "server/volume/import.h"
+
+namespace httplib {
+struct Request;
+}
+
+namespace isomesh::http {
+
+// All parameters of the query, in the library's order.
+std::vector<std::pair<std::string, std::string>> query_of(const httplib::Request& request);
+
+// Refuses parameters that are not among `known`.
+void check_known(const httplib::Request& request, const std::set<std::string>& known);
+
+// How long the answer may wait: `?wait=N` or `Prefer: wait=N` in seconds, at most 30.
+std::chrono::milliseconds wait_of(const httplib::Request& request);
+
+// The SHA-256 that Content-Digest names (RFC 9530), as hex; empty when it names none.
+std::optional<std::string> sha256_of_content_digest(const httplib::Request& request);
+
+// Raw samples' description from `dims`, `type` and the rest; empty without `dims`.
+std::optional<volume::RawDescription> raw_description_of(const httplib::Request& request);
+
+// The names of the parameters that raw_description_of reads.
+const std::set<std::string>& raw_description_parameters();
+
+struct ByteRange {
+  std::uint64_t first = 0;
+  std::uint64_t length = 0;
+};
+
+// One range of a file of `size` bytes. Empty when there is no Range header, or one that RFC 9110
+// lets a server ignore: other units, several ranges, bad syntax. Throws Error kRangeNotSatisfiable
+// when the range lies outside of the file.
+std::optional<ByteRange> range_of(const httplib::Request& request, std::uint64_t size);
+
+// True when If-None-Match names the entity tag (quotes included).
+bool matches_etag(const httplib::Request& request, std::string_view etag);
+
+}  // namespace isomesh::http

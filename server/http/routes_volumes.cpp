@@ -1,0 +1,43 @@
+#include "proto/json.h"
+#include "server/http/request.h"
+#include "server/http/routes.h"
+
+namespace isomesh::http {
+namespace {
+
+const std::string kVolumes = "/v1/volumes";
+
+void upload(App& app, const httplib::Request& request, httplib::Response& response,
+            const httplib::ContentReader& read_body) {
+  check_known(request, raw_description_parameters());
+  const auto raw = raw_description_of(request);
+  const auto place = app.uploads.try_take();
+  if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
+  const Upload file(app.services.folder, app.options.upload, request, read_body);
+  const auto [volume, is_new] = app.services.library.add(file.path(), raw);
+  response.set_header("Location", kVolumes + '/' + volume.id);
+  answer_json(response, is_new ? 201 : 200, to_json(volume));
+}
+
+}  // namespace
+
+void add_volume_routes(App& app) {
+  add_post(app, kVolumes,
+           [&app](const auto& request, auto& response, const auto& read_body) {
+             upload(app, request, response, read_body);
+           });
+  add_get(app, kVolumes, [&app](const auto& request, auto& response) {
+    check_known(request, {});
+    answer_json(response, 200, to_json(app.services.volumes.list()));
+  });
+  add_get(app, kVolumes + '/' + kId, [&app](const auto& request, auto& response) {
+    check_known(request, {});
+    answer_json(response, 200, to_json(app.services.volumes.get(id_of(request))));
+  });
+  add_delete(app, kVolumes + '/' + kId, [&app](const auto& request, auto& response) {
+    app.services.library.erase(id_of(request));
+    response.status = 204;
+  });
+}
+
+}  // namespace isomesh::http

@@ -1,0 +1,74 @@
+// The HTTP side of the daemon: routes and their guards.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "server/http/upload.h"
+#include "server/jobs/volume_library.h"
+#include "server/store/blob_store.h"
+#include "server/store/job_store.h"
+#include "server/store/volume_store.h"
+
+namespace isomesh::http {
+
+// Where to listen: HOST:PORT (port 0: a free one) or unix:PATH.
+struct Address {
+  std::string host;
+  int port = 0;
+  std::filesystem::path unix_path;  // empty for TCP
+
+  bool is_unix() const { return !unix_path.empty(); }
+  bool is_loopback() const;
+};
+
+// Throws Error kInvalidParameter that says what is wrong.
+Address parse_address(const std::string& text);
+
+struct ServerOptions {
+  std::size_t threads = 32;   // connections that are served at once
+  std::size_t backlog = 256;  // connections that wait for a thread
+  // Of the threads, how many may hold uploads, and how many may wait for jobs.
+  std::size_t upload_places = 8;
+  std::size_t wait_places = 12;
+  UploadLimits upload;
+};
+
+// What the routes call.
+struct Services {
+  const store::DataFolder& folder;
+  const store::BlobStore& blobs;
+  const store::VolumeStore& volumes;
+  store::JobStore& jobs;
+  jobs::VolumeLibrary& library;
+};
+
+// Thread safe where said.
+class Server {
+ public:
+  Server(const Services& services, const ServerOptions& options);
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  // Binds; returns what clients connect to, such as http://127.0.0.1:8080 or unix:/run/iso.sock.
+  // Throws Error kUnavailable when the address cannot be bound.
+  std::string bind(const Address& address);
+
+  // Serves until stop(); to be called once, after bind.
+  void serve();
+
+  // Ready says 503 from now on, so that a balancer looks elsewhere. Thread safe.
+  void begin_drain();
+
+  // Ends serve(): no connection is accepted any more, those that are served are finished. Thread
+  // safe.
+  void stop();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace isomesh::http

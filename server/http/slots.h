@@ -1,0 +1,42 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <optional>
+
+namespace isomesh::http {
+
+// A number of places for requests that hold a thread for long, so that they never hold all of them.
+// Thread safe.
+class Slots {
+ public:
+  explicit Slots(std::size_t count) : free_(static_cast<std::ptrdiff_t>(count)) {}
+
+  // A place, given back when it goes.
+  class Place {
+   public:
+    explicit Place(Slots* slots) : slots_(slots) {}
+    Place(Place&& other) noexcept : slots_(other.slots_) { other.slots_ = nullptr; }
+    Place& operator=(Place&&) = delete;
+    Place(const Place&) = delete;
+    Place& operator=(const Place&) = delete;
+    ~Place() {
+      if (slots_ != nullptr) ++slots_->free_;
+    }
+
+   private:
+    Slots* slots_;
+  };
+
+  // Empty when all places are taken.
+  std::optional<Place> try_take() {
+    if (--free_ >= 0) return Place(this);
+    ++free_;
+    return std::nullopt;
+  }
+
+ private:
+  std::atomic<std::ptrdiff_t> free_;
+};
+
+}  // namespace isomesh::http

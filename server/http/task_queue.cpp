@@ -1,0 +1,47 @@
+#include "server/http/task_queue.h"
+
+#include <utility>
+
+namespace isomesh::http {
+
+BoundedTaskQueue::BoundedTaskQueue(std::size_t threads, std::size_t capacity)
+    : capacity_(capacity) {
+  for (std::size_t i = 0; i < threads; ++i) {
+    threads_.emplace_back([this] { work(); });
+  }
+}
+
+BoundedTaskQueue::~BoundedTaskQueue() { shutdown(); }
+
+void BoundedTaskQueue::enqueue(std::function<void()> task) {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return queue_.size() < capacity_ || closed_; });
+  queue_.push_back(std::move(task));
+  changed_.notify_all();
+}
+
+void BoundedTaskQueue::shutdown() {
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    changed_.notify_all();
+  }
+  threads_.clear();
+}
+
+void BoundedTaskQueue::work() {
+  while (true) {
+    std::function<void()> task;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [&] { return !queue_.empty() || closed_; });
+      if (queue_.empty()) return;
+      task = std::move(queue_.front());
+      queue_.pop_front();
+      changed_.notify_all();
+    }
+    task();
+  }
+}
+
+}  // namespace isomesh::http

@@ -1,0 +1,196 @@
+#include "server/jobs/pipeline.h"
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "server/codec/encode.h"
+#include "server/mesh/extract.h"
+#include "server/mesh/measure.h"
+#include "server/volume/canonical.h"
+
+namespace isomesh::jobs {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// The share of a typical job that each stage takes, for its progress.
+constexpr double kLoadShare = 0.02;
+constexpr double kExtractShare = 0.05;
+constexpr double kSmoothShare = 0.08;
+constexpr double kEncodeShare = 1 - kLoadShare - kExtractShare - kSmoothShare;
+
+double milliseconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
+// Follows a job through its stages: times each, reports its progress, passes cancellation on.
+class Progress {
+ public:
+  Progress(std::stop_token stop, const Report& report) : stop_(std::move(stop)), report_(report) {}
+
+  // Ends the stage before and starts this one, which takes `share` of the whole job.
+  void enter(Stage stage, double share, double Timing::*elapsed) {
+    end_stage();
+    stage_ = stage;
+    done_before_ += share_;
+    share_ = share;
+    elapsed_ = elapsed;
+    began_ = Clock::now();
+    report_(stage_, done_before_, timing_);
+  }
+
+  void end_stage() {
+    if (elapsed_ != nullptr) timing_.*elapsed_ = milliseconds_since(began_);
+  }
+
+  // The context of the part [from, to] of the present stage.
+  mesh::Context context(double from = 0, double to = 1) const {
+    return {stop_, [this, from, to](double done) {
+              report_(stage_, done_before_ + share_ * (from + (to - from) * done), timing_);
+            }};
+  }
+
+  // One that cancels but does not report.
+  mesh::Context quiet() const { return {stop_, nullptr}; }
+
+  const Timing& timing() const { return timing_; }
+
+ private:
+  std::stop_token stop_;
+  const Report& report_;
+  Timing timing_;
+  Stage stage_ = Stage::kQueue;
+  double done_before_ = 0;
+  double share_ = 0;
+  double Timing::*elapsed_ = nullptr;
+  Clock::time_point began_;
+};
+
+template <class T>
+void extract_as(const volume::CanonicalVolume& volume, const mesh::ExtractOptions& options,
+                const Progress& progress, mesh::Mesh& mesh) {
+  const volume::CanonicalHeader& header = volume.header();
+  const mesh::Lattice<T> lattice = {reinterpret_cast<const T*>(volume.samples().data()),
+                                    {header.dims[0], header.dims[1], header.dims[2]},
+                                    mesh::lattice_to_space(header.geometry)};
+  const mesh::SurfaceCount count = count_surface(lattice, options, progress.context(0, 0.2));
+  extract_surface(lattice, options, count, progress.context(0.2, 1), mesh);
+}
+
+void extract(const volume::CanonicalVolume& volume, const mesh::ExtractOptions& options,
+             const Progress& progress, mesh::Mesh& mesh) {
+  switch (volume.header().type) {
+    case SampleType::kUint8:
+      return extract_as<std::uint8_t>(volume, options, progress, mesh);
+    case SampleType::kInt8:
+      return extract_as<std::int8_t>(volume, options, progress, mesh);
+    case SampleType::kUint16:
+      return extract_as<std::uint16_t>(volume, options, progress, mesh);
+    case SampleType::kInt16:
+      return extract_as<std::int16_t>(volume, options, progress, mesh);
+    case SampleType::kUint32:
+      return extract_as<std::uint32_t>(volume, options, progress, mesh);
+    case SampleType::kInt32:
+      return extract_as<std::int32_t>(volume, options, progress, mesh);
+    case SampleType::kFloat32:
+      return extract_as<float>(volume, options, progress, mesh);
+    case SampleType::kFloat64:
+      return extract_as<double>(volume, options, progress, mesh);
+  }
+}
+
+// Encodes every format and, beside it, measures the mesh: Draco runs on one thread.
+void encode_and_measure(const JobParameters& parameters, const store::BlobStore& blobs,
+                        const Progress& progress, const mesh::Mesh& mesh, MeshSummary& summary) {
+  mesh::Extent extent;
+  mesh::Topology topology;
+  const std::size_t formats = parameters.formats.size();
+  const auto encode_all = [&] {
+    for (std::size_t i = 0; i < formats; ++i) {
+      const auto part = [&](std::size_t n) {
+        return static_cast<double>(n) / static_cast<double>(formats);
+      };
+      store::BlobStore::Writer writer(blobs);
+      codec::encode(mesh, parameters.formats[i], parameters.draco,
+                    progress.context(part(i), part(i + 1)),
+                    [&](std::span<const std::byte> bytes) { writer.write(bytes); });
+      const store::Blob blob = writer.commit();
+      summary.files[parameters.formats[i]] = {blob.bytes, blob.key, ""};
+    }
+  };
+  const auto measure = [&] {
+    extent = measure_extent(mesh, progress.quiet());
+    topology = measure_topology(mesh, progress.quiet());
+  };
+  mesh::parallel_for(progress.quiet(), 2,
+                     [&](std::size_t task) { task == 0 ? encode_all() : measure(); });
+  summary.boundary_edges = topology.boundary_edges;
+  summary.components = topology.components;
+  summary.euler = topology.euler;
+  summary.area_mm2 = extent.area_mm2;
+  summary.volume_mm3.smoothed = extent.volume_mm3;
+  summary.bounds = {extent.low, extent.high};
+}
+
+}  // namespace
+
+void Workspace::trim(std::size_t budget_bytes) {
+  const std::size_t held = mesh.positions.capacity_bytes() + mesh.triangles.capacity_bytes() +
+                           connectivity.offsets.capacity_bytes() +
+                           connectivity.neighbors.capacity_bytes() + scratch.capacity_bytes();
+  if (held > budget_bytes) *this = {};
+}
+
+void check_supported(const JobParameters& parameters) {
+  for (const MeshFormat format : parameters.formats) {
+    if (!codec::can_encode(format)) {
+      throw invalid_parameter(
+          "formats", "this version does not write \"" + std::string(to_string(format)) + '"');
+    }
+  }
+  if (parameters.close) throw invalid_parameter("close", "this version does not close surfaces");
+  if (parameters.smoothing != Smoothing::kLaplacian) {
+    throw invalid_parameter("smoothing", "this version does not smooth by \"" +
+                                             std::string(to_string(parameters.smoothing)) + '"');
+  }
+}
+
+PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
+                            const store::BlobStore& blobs, Workspace& workspace,
+                            std::stop_token stop, const Report& report) {
+  Progress progress(std::move(stop), report);
+  mesh::Mesh& mesh = workspace.mesh;
+  PipelineResult result;
+  MeshSummary& summary = result.mesh;
+
+  progress.enter(Stage::kLoad, kLoadShare, &Timing::load);
+  const volume::CanonicalVolume samples(blobs.path_of(volume.id));
+  samples.preload();
+
+  progress.enter(Stage::kExtract, kExtractShare, &Timing::extract);
+  extract(samples,
+          {.iso = parameters.iso.value_or(volume.suggested_iso),
+           .scheme = parameters.scheme,
+           .interpolation = parameters.interpolation},
+          progress, mesh);
+  summary.triangles = mesh.triangles.size();
+  summary.vertices = mesh.positions.size();
+  summary.volume_mm3.extracted = measure_extent(mesh, progress.quiet()).volume_mm3;
+
+  progress.enter(Stage::kSmooth, kSmoothShare, &Timing::smooth);
+  if (parameters.passes > 0) {
+    build_connectivity(mesh, progress.quiet(), workspace.connectivity);
+    smooth_laplacian(workspace.connectivity,
+                     {.passes = parameters.passes, .lambda = parameters.lambda},
+                     progress.context(), mesh, workspace.scratch);
+  }
+
+  progress.enter(Stage::kEncode, kEncodeShare, &Timing::encode);
+  encode_and_measure(parameters, blobs, progress, mesh, summary);
+  progress.end_stage();
+  result.timing = progress.timing();
+  return result;
+}
+
+}  // namespace isomesh::jobs

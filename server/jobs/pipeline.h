@@ -1,0 +1,45 @@
+// One job's way from a stored volume to stored meshes.
+#pragma once
+
+#include <functional>
+#include <stop_token>
+
+#include "proto/types.h"
+#include "server/mesh/mesh.h"
+#include "server/mesh/smooth.h"
+#include "server/store/blob_store.h"
+
+namespace isomesh::jobs {
+
+// The memory that a worker's jobs are made in, kept from one to the next so that its pages are
+// mapped already. Not thread safe.
+struct Workspace {
+  mesh::Mesh mesh;
+  mesh::Connectivity connectivity;
+  mesh::Buffer<mesh::Vec3> scratch;
+
+  // Gives memory back when it exceeds `budget_bytes`: one giant job must not keep it for ever.
+  void trim(std::size_t budget_bytes);
+};
+
+// Called as a job goes on, from several threads, with the share of the whole job that is done and
+// the milliseconds of the stages that have ended.
+using Report = std::function<void(Stage stage, double progress, const Timing& timing)>;
+
+struct PipelineResult {
+  MeshSummary mesh;  // the files' hrefs are empty
+  Timing timing;     // load, extract, smooth and encode
+};
+
+// Refuses parameters that are valid by the contract but that this version does not serve, with
+// Error kInvalidParameter.
+void check_supported(const JobParameters& parameters);
+
+// Loads the volume's samples, extracts, smooths, encodes in every format and stores the results.
+// The mesh is the same to the byte for the same volume and parameters. Throws Error kCancelled
+// when `stop` is requested, kTooLarge, kOutOfSpace or kInternal; then nothing is stored.
+PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
+                            const store::BlobStore& blobs, Workspace& workspace,
+                            std::stop_token stop, const Report& report);
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,26 @@
+#include "server/jobs/volume_library.h"
+
+namespace isomesh::jobs {
+
+std::pair<Volume, bool> VolumeLibrary::add(const std::filesystem::path& upload,
+                                           const std::optional<volume::RawDescription>& raw) {
+  const store::ScratchFolder scratch(folder_.scratch());
+  const std::filesystem::path canonical = scratch.path() / "canonical";
+  Volume volume = raw ? volume::import_raw(upload, *raw, limits_, canonical)
+                      : volume::import_file(upload, scratch.path(), limits_, canonical);
+  const std::lock_guard lock(mutex_);
+  volume.id = blobs_.adopt(canonical).key;
+  volume.created = store::timestamp();
+  return volumes_.add(volume);
+}
+
+void VolumeLibrary::erase(const std::string& id) {
+  const std::lock_guard lock(mutex_);
+  if (volumes_.contains(id) && jobs_.needs_volume(id)) {
+    throw Error(ErrorCode::kNotReady, "jobs that are not finished need this volume");
+  }
+  volumes_.erase(id);
+  blobs_.erase(id);
+}
+
+}  // namespace isomesh::jobs

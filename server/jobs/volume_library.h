@@ -1,0 +1,43 @@
+#pragma once
+
+#include <filesystem>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "proto/types.h"
+#include "server/store/blob_store.h"
+#include "server/store/data_folder.h"
+#include "server/store/job_store.h"
+#include "server/store/volume_store.h"
+#include "server/volume/import.h"
+
+namespace isomesh::jobs {
+
+// Takes uploads in and volumes out, so that records, blobs and the jobs that need them agree. Thread
+// safe; what it is made of must outlive it.
+class VolumeLibrary {
+ public:
+  VolumeLibrary(const store::DataFolder& folder, const store::BlobStore& blobs,
+                store::VolumeStore& volumes, const store::JobStore& jobs,
+                const volume::ImportLimits& limits)
+      : folder_(folder), blobs_(blobs), volumes_(volumes), jobs_(jobs), limits_(limits) {}
+
+  // Imports an uploaded file; `raw` describes it when it is bare samples. Second: false when the
+  // same samples and geometry were there already. Throws what the imports of volume/import.h throw.
+  std::pair<Volume, bool> add(const std::filesystem::path& upload,
+                              const std::optional<volume::RawDescription>& raw);
+
+  // Throws Error kNotFound, and kNotReady while a job needs the volume.
+  void erase(const std::string& id);
+
+ private:
+  const store::DataFolder& folder_;
+  const store::BlobStore& blobs_;
+  store::VolumeStore& volumes_;
+  const store::JobStore& jobs_;
+  const volume::ImportLimits limits_;
+  std::mutex mutex_;  // held while a blob and its record come or go together
+};
+
+}  // namespace isomesh::jobs

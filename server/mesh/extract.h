@@ -1,0 +1,53 @@
+// Iso-surface extraction by marching tetrahedra.
+//
+// A cell of eight samples is split into five or six tetrahedra; in each the surface is the plane
+// patch that linear interpolation puts there (A. Doi, A. Koide, "An efficient method of
+// triangulating equi-valued surfaces by using tetrahedral cells", IEICE Trans. E74, 1991). The
+// six-way split is Kuhn's, which tiles by translation; of the five-way split every cell with odd
+// i+j+k is mirrored, or the diagonals of shared faces would cross.
+//
+// The work is done in two passes over the samples. `count_surface` tells how much there will be,
+// `extract_surface` writes every vertex and triangle to its final place. Nothing is searched,
+// hashed or merged: a vertex is named by the sample that owns its edge and the edge's direction, and
+// its index is a running count.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "server/mesh/context.h"
+#include "server/mesh/lattice.h"
+#include "server/mesh/mesh.h"
+
+namespace isomesh::mesh {
+
+struct ExtractOptions {
+  double iso = 0;  // a sample is inside when its value is >= iso
+  Scheme scheme = Scheme::kSix;
+  Interpolation interpolation = Interpolation::kLinear;
+};
+
+// How large the surface is, layer by layer; layers + 1 running sums each, as in Mesh.
+struct SurfaceCount {
+  std::vector<std::uint64_t> layer_vertices = {0};
+  std::vector<std::uint64_t> layer_triangles = {0};
+
+  std::uint64_t vertices() const { return layer_vertices.back(); }
+  std::uint64_t triangles() const { return layer_triangles.back(); }
+};
+
+// Counts without writing; exact. A lattice without cells, or an iso-value outside the samples'
+// range, has an empty surface. Thread safe. Throws Error kCancelled.
+template <class T>
+SurfaceCount count_surface(const Lattice<T>& lattice, const ExtractOptions& options,
+                           const Context& context);
+
+// Extracts the surface into `mesh`, whose memory is reused. `count` must come from count_surface
+// with the same lattice and options. The result does not depend on the number of threads.
+// Thread safe for different meshes. Throws Error kTooLarge when the mesh has more vertices than
+// 32-bit indices can name, before memory is taken, and kCancelled.
+template <class T>
+void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
+                     const SurfaceCount& count, const Context& context, Mesh& mesh);
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,20 @@
+#include "server/mesh/lattice.h"
+
+namespace isomesh::mesh {
+
+double LatticeToSpace::determinant() const {
+  const auto& [a, b, c] = std::array{step_x, step_y, step_z};
+  return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) +
+         a[2] * (b[0] * c[1] - b[1] * c[0]);
+}
+
+LatticeToSpace lattice_to_space(const Geometry& geometry) {
+  const auto column = [&](std::size_t axis) {
+    const double length = geometry.spacing[axis];
+    return std::array{geometry.direction[axis] * length, geometry.direction[3 + axis] * length,
+                      geometry.direction[6 + axis] * length};
+  };
+  return {geometry.origin, column(0), column(1), column(2)};
+}
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,43 @@
+// A volume as the kernels see it: samples on a lattice, and the map from lattice to space.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "proto/types.h"
+
+namespace isomesh::mesh {
+
+// Number of samples along x, y and z.
+struct Dims {
+  std::uint32_t x = 0;
+  std::uint32_t y = 0;
+  std::uint32_t z = 0;
+
+  std::uint64_t samples() const { return std::uint64_t{x} * y * z; }
+  bool has_cells() const { return x > 1 && y > 1 && z > 1; }
+};
+
+// p = origin + step_x * i + step_y * j + step_z * k, in millimetres.
+struct LatticeToSpace {
+  std::array<double, 3> origin = {0, 0, 0};
+  std::array<double, 3> step_x = {1, 0, 0};
+  std::array<double, 3> step_y = {0, 1, 0};
+  std::array<double, 3> step_z = {0, 0, 1};
+
+  // Negative for a left-handed lattice.
+  double determinant() const;
+};
+
+LatticeToSpace lattice_to_space(const Geometry& geometry);
+
+// Samples in x-fastest order, dims.samples() of them, finite. Does not own them.
+template <class T>
+struct Lattice {
+  const T* samples = nullptr;
+  Dims dims;
+  LatticeToSpace to_space;
+};
+
+}  // namespace isomesh::mesh

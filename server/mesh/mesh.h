@@ -1,0 +1,32 @@
+// The mesh that every stage after extraction reads and writes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "server/mesh/buffer.h"
+
+namespace isomesh::mesh {
+
+using Vec3 = std::array<float, 3>;               // millimetres, LPS
+using Triangle = std::array<std::uint32_t, 3>;   // vertex indices, counter-clockwise from outside
+
+// Vertices and triangles in the order of the lattice's layers. Layer k holds the vertices on the
+// edges that the samples of plane k own and the triangles of the cells between planes k and k+1.
+// A triangle of layer k therefore names only vertices of layers k and k+1: whoever works on a run
+// of layers knows which others can touch it.
+//
+// Every vertex lies on one lattice edge; every lattice edge carries at most one vertex. The surface
+// is an oriented manifold whose boundary lies on the border of the volume.
+struct Mesh {
+  std::array<double, 3> origin = {0, 0, 0};  // where the sample (0,0,0) lies
+  Buffer<Vec3> positions;
+  Buffer<Triangle> triangles;
+  std::vector<std::uint64_t> layer_vertices;   // layers + 1 offsets into positions
+  std::vector<std::uint64_t> layer_triangles;  // layers + 1 offsets into triangles
+
+  std::size_t layers() const { return layer_vertices.empty() ? 0 : layer_vertices.size() - 1; }
+};
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,139 @@
+#include "server/volume/canonical.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <optional>
+#include <utility>
+
+#include <fcntl.h>
+#include <nlohmann/json.hpp>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "proto/error.h"
+#include "server/volume/files.h"
+#include "server/volume/geometry.h"
+
+namespace isomesh::volume {
+namespace {
+
+constexpr int kVersion = 1;
+
+template <std::size_t kSize>
+std::array<double, kSize> without_negative_zeros(std::array<double, kSize> values) {
+  for (double& value : values) value += 0.0;
+  return values;
+}
+
+std::string to_text(const CanonicalHeader& header) {
+  nlohmann::ordered_json json;
+  json["version"] = kVersion;
+  json["dims"] = header.dims;
+  json["type"] = std::string(to_string(header.type));
+  json["spacing"] = without_negative_zeros(header.geometry.spacing);
+  json["origin"] = without_negative_zeros(header.geometry.origin);
+  json["direction"] = without_negative_zeros(header.geometry.direction);
+  std::string text = json.dump();
+  text.resize(kHeaderBytes - 1, ' ');
+  return text + '\n';
+}
+
+[[noreturn]] void throw_not_canonical(const std::string& reason) {
+  throw Error(ErrorCode::kInternal, "Not a canonical volume: " + reason + ".");
+}
+
+CanonicalHeader from_text(const std::string& text) {
+  CanonicalHeader header;
+  try {
+    const auto json = nlohmann::json::parse(text);
+    const auto type = from_string<SampleType>(json.at("type").get<std::string>());
+    if (!type) throw_not_canonical("unknown type");
+    header.type = *type;
+    header.dims = json.at("dims").get<std::array<std::uint32_t, 3>>();
+    header.geometry.spacing = json.at("spacing").get<std::array<double, 3>>();
+    header.geometry.origin = json.at("origin").get<std::array<double, 3>>();
+    header.geometry.direction = json.at("direction").get<std::array<double, 9>>();
+  } catch (const nlohmann::json::exception&) {
+    throw_not_canonical("its header cannot be read");
+  }
+  // Refuses other versions, further members, another order, sizes that were cut to 32 bits.
+  if (to_text(header) != text) throw_not_canonical("its header is not in canonical form");
+  return header;
+}
+
+// Empty for sizes whose bytes cannot be counted or that are 0.
+std::optional<std::size_t> file_bytes(const CanonicalHeader& header) {
+  std::uint64_t bytes = bytes_per_sample(header.type);
+  for (const std::uint64_t size : header.dims) {
+    if (size == 0 || bytes > (std::uint64_t{1} << 62) / size) return std::nullopt;
+    bytes *= size;
+  }
+  return bytes + kHeaderBytes;
+}
+
+}  // namespace
+
+CanonicalWriter::CanonicalWriter(const std::filesystem::path& path, const CanonicalHeader& header) {
+  const auto size = file_bytes(header);
+  if (!size) throw Error(ErrorCode::kInternal, "A canonical volume of impossible size.");
+  Descriptor file(::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+  if (file.number() < 0) throw_system_error("open", errno);
+  // Room is claimed now, because a full disk met through the mapping would be a signal.
+  const int error = ::posix_fallocate(file.number(), 0, static_cast<off_t>(*size));
+  if (error != 0) throw_system_error("posix_fallocate", error);
+  void* data = ::mmap(nullptr, *size, PROT_READ | PROT_WRITE, MAP_SHARED, file.number(), 0);
+  if (data == MAP_FAILED) throw_system_error("mmap", errno);
+  data_ = static_cast<std::byte*>(data);
+  size_ = *size;
+  file_ = file.release();
+  const std::string text = to_text(header);
+  std::copy_n(std::as_bytes(std::span(text)).begin(), kHeaderBytes, data_);
+}
+
+CanonicalWriter::~CanonicalWriter() {
+  ::munmap(data_, size_);
+  ::close(file_);
+}
+
+std::span<std::byte> CanonicalWriter::samples() {
+  return {data_ + kHeaderBytes, size_ - kHeaderBytes};
+}
+
+void CanonicalWriter::finish() {
+  if (::msync(data_, size_, MS_SYNC) != 0) throw_system_error("msync", errno);
+  if (::fsync(file_) != 0) throw_system_error("fsync", errno);
+}
+
+CanonicalVolume::CanonicalVolume(const std::filesystem::path& path) {
+  const InputFile input(path);
+  header_ = from_text(input.text(0, kHeaderBytes));
+  const auto size = file_bytes(header_);
+  if (!size || *size != input.size()) throw_not_canonical("its size is not what its header tells");
+  if (find_fault(header_.dims, header_.geometry)) throw_not_canonical("its geometry is unusable");
+  void* data = ::mmap(nullptr, *size, PROT_READ, MAP_SHARED, input.descriptor(), 0);
+  if (data == MAP_FAILED) throw_system_error("mmap", errno);
+  data_ = static_cast<const std::byte*>(data);
+  size_ = *size;
+}
+
+CanonicalVolume::~CanonicalVolume() {
+  if (data_ != nullptr) ::munmap(const_cast<std::byte*>(data_), size_);
+}
+
+CanonicalVolume::CanonicalVolume(CanonicalVolume&& other) noexcept
+    : header_(other.header_),
+      data_(std::exchange(other.data_, nullptr)),
+      size_(std::exchange(other.size_, 0)) {}
+
+std::span<const std::byte> CanonicalVolume::samples() const {
+  if (data_ == nullptr) return {};
+  return {data_ + kHeaderBytes, size_ - kHeaderBytes};
+}
+
+void CanonicalVolume::preload() const {
+  // Only advice: samples that stay away are read when they are touched.
+  ::madvise(const_cast<std::byte*>(data_), size_, MADV_WILLNEED);
+}
+
+}  // namespace isomesh::volume

@@ -1,0 +1,77 @@
+// The canonical volume: the one form in which volumes are kept, whatever they came in as.
+//
+// A file of a header of kHeaderBytes bytes (one JSON object, padded with spaces, ending in a
+// newline) and then the samples, little-endian, x fastest. The header holds what identifies the
+// volume and nothing else: version, dims, type, spacing, origin, direction. So the SHA-256 of the
+// file is the volume's id, and the same samples and geometry have the same id whatever file they
+// came in.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "proto/types.h"
+
+namespace isomesh::volume {
+
+inline constexpr std::size_t kHeaderBytes = 4096;  // a page, so that mapped samples are aligned
+
+struct CanonicalHeader {
+  std::array<std::uint32_t, 3> dims = {0, 0, 0};
+  SampleType type = SampleType::kUint8;
+  Geometry geometry;
+
+  std::uint64_t sample_bytes() const {
+    return std::uint64_t{dims[0]} * dims[1] * dims[2] * bytes_per_sample(type);
+  }
+};
+
+// A canonical file that is being made. Not thread safe.
+class CanonicalWriter {
+ public:
+  // Creates the file at its full size and maps it. Throws Error kOutOfSpace or kInternal.
+  CanonicalWriter(const std::filesystem::path& path, const CanonicalHeader& header);
+  ~CanonicalWriter();
+  CanonicalWriter(const CanonicalWriter&) = delete;
+  CanonicalWriter& operator=(const CanonicalWriter&) = delete;
+
+  std::span<std::byte> samples();
+
+  // Flushes to disk. Throws Error kOutOfSpace.
+  void finish();
+
+ private:
+  std::byte* data_ = nullptr;
+  std::size_t size_ = 0;
+  int file_ = -1;
+};
+
+// A canonical file, mapped for reading. Immutable, so safe to read from several threads.
+class CanonicalVolume {
+ public:
+  // Throws Error kInternal when the file is not a canonical volume of exactly the size that its
+  // header tells.
+  explicit CanonicalVolume(const std::filesystem::path& path);
+  ~CanonicalVolume();
+  CanonicalVolume(CanonicalVolume&&) noexcept;
+  CanonicalVolume& operator=(CanonicalVolume&&) = delete;
+  CanonicalVolume(const CanonicalVolume&) = delete;
+  CanonicalVolume& operator=(const CanonicalVolume&) = delete;
+
+  const CanonicalHeader& header() const { return header_; }
+  std::span<const std::byte> samples() const;
+
+  // Brings the samples into memory, so that what follows does not wait for the disk.
+  void preload() const;
+
+ private:
+  CanonicalHeader header_;
+  const std::byte* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+}  // namespace isomesh::volume

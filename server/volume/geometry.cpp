@@ -1,0 +1,131 @@
+#include "server/volume/geometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "server/volume/text.h"
+
+namespace isomesh::volume {
+namespace {
+
+// Shear this strong is no scanner's; the flattest that a tilted gantry makes is about 0.85.
+constexpr double kFlattestDeterminant = 0.01;
+constexpr double kUnitTolerance = 1e-3;
+// Single precision has 24 bits: this leaves 8 of them between two samples.
+constexpr double kFinestRelativeSpacing = 0x1p-16;
+
+Vector3 column(const std::array<double, 9>& matrix, int axis) {
+  const auto at = static_cast<std::size_t>(axis);
+  return {matrix[at], matrix[at + 3], matrix[at + 6]};
+}
+
+double length(const Vector3& v) { return std::hypot(v[0], v[1], v[2]); }
+
+double determinant(const std::array<double, 9>& m) {
+  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+         m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
+
+template <class Numbers>
+bool all_finite(const Numbers& numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); });
+}
+
+std::optional<FieldError> spacing_fault(const Geometry& geometry) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double spacing = geometry.spacing[static_cast<std::size_t>(axis)];
+    if (std::isfinite(spacing) && spacing > 0) continue;
+    return FieldError{"spacing", "the spacing along " + axis_name(static_cast<std::size_t>(axis)) +
+                                     " is " + to_text(spacing) + ", not a positive number"};
+  }
+  return std::nullopt;
+}
+
+std::optional<FieldError> direction_fault(const Geometry& geometry) {
+  if (!all_finite(geometry.direction)) {
+    return FieldError{"direction", "the direction holds a number that is not finite"};
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::abs(length(column(geometry.direction, axis)) - 1) <= kUnitTolerance) continue;
+    return FieldError{"direction", "the direction's column for " +
+                                       axis_name(static_cast<std::size_t>(axis)) +
+                                       " is not a unit vector"};
+  }
+  if (std::abs(determinant(geometry.direction)) < kFlattestDeterminant) {
+    return FieldError{"direction", "the directions of i, j and k lie in one plane"};
+  }
+  return std::nullopt;
+}
+
+double largest_coordinate(const std::array<std::uint32_t, 3>& dims, const Geometry& geometry) {
+  double largest = 0;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    Vector3 position = geometry.origin;
+    for (int axis = 0; axis < 3; ++axis) {
+      if ((corner >> axis & 1U) == 0) continue;
+      const Vector3 step = step_of(geometry, axis);
+      const double count = dims[static_cast<std::size_t>(axis)] - 1.0;
+      for (std::size_t row = 0; row < 3; ++row) position[row] += step[row] * count;
+    }
+    for (const double coordinate : position) largest = std::max(largest, std::abs(coordinate));
+  }
+  return largest;
+}
+
+std::optional<FieldError> resolution_fault(const std::array<std::uint32_t, 3>& dims,
+                                           const Geometry& geometry) {
+  const double finest = *std::min_element(geometry.spacing.begin(), geometry.spacing.end());
+  const double largest = largest_coordinate(dims, geometry);
+  if (finest >= largest * kFinestRelativeSpacing) return std::nullopt;
+  return FieldError{"origin", "samples " + to_text(finest) + " mm apart at coordinates of up to " +
+                                  to_text(largest) +
+                                  " mm cannot be told apart in single precision"};
+}
+
+}  // namespace
+
+Geometry geometry_of(const Vector3& origin, const std::array<Vector3, 3>& steps) {
+  Geometry geometry;
+  geometry.origin = origin;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    geometry.spacing[axis] = length(steps[axis]);
+    for (std::size_t row = 0; row < 3; ++row) {
+      geometry.direction[row * 3 + axis] = steps[axis][row] / geometry.spacing[axis];
+    }
+  }
+  return geometry;
+}
+
+Vector3 step_of(const Geometry& geometry, int axis) {
+  Vector3 step = column(geometry.direction, axis);
+  for (double& part : step) part *= geometry.spacing[static_cast<std::size_t>(axis)];
+  return step;
+}
+
+Geometry normalised(const Geometry& geometry) {
+  Geometry result = geometry;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double size = length(column(geometry.direction, static_cast<int>(axis)));
+    if (std::abs(size - 1) <= kUnitTolerance) continue;
+    result.spacing[axis] *= size;
+    for (std::size_t row = 0; row < 3; ++row) result.direction[row * 3 + axis] /= size;
+  }
+  const auto drop_sign_of_zero = [](double& value) { value += 0.0; };
+  std::for_each(result.origin.begin(), result.origin.end(), drop_sign_of_zero);
+  std::for_each(result.spacing.begin(), result.spacing.end(), drop_sign_of_zero);
+  std::for_each(result.direction.begin(), result.direction.end(), drop_sign_of_zero);
+  return result;
+}
+
+std::optional<FieldError> find_fault(const std::array<std::uint32_t, 3>& dims,
+                                     const Geometry& geometry) {
+  if (auto fault = spacing_fault(geometry)) return fault;
+  if (auto fault = direction_fault(geometry)) return fault;
+  if (!all_finite(geometry.origin)) {
+    return FieldError{"origin", "the origin holds a number that is not finite"};
+  }
+  return resolution_fault(dims, geometry);
+}
+
+}  // namespace isomesh::volume

@@ -1,0 +1,319 @@
+#include "server/volume/nrrd.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/volume/itk_reader.h"
+#include "server/volume/text.h"
+#include "server/volume/units.h"
+
+namespace isomesh::volume {
+namespace {
+
+constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 20;
+
+// Names in lower case without spaces, because "data file" and "datafile" are the same field.
+using Fields = std::map<std::string, std::string, std::less<>>;
+
+struct Header {
+  Fields fields;
+  std::uint64_t bytes = 0;  // up to and with the empty line that ends it
+};
+
+std::string field_name(std::string_view text) {
+  std::string name = lower(trim(text));
+  std::erase(name, ' ');
+  if (name == "centerings") return "centers";
+  return name;
+}
+
+void add_field(Fields& fields, std::string_view line) {
+  const std::size_t colon = line.find(':');
+  if (colon == std::string_view::npos) {
+    throw_unusable("The NRRD header has a line that is no field: " + in_quotes(line) + ".");
+  }
+  // "key:=value" is a remark of some program's.
+  if (line.substr(colon).starts_with(":=")) return;
+  const std::string name = field_name(line.substr(0, colon));
+  if (!fields.emplace(name, trim(line.substr(colon + 1))).second) {
+    throw_unusable("The NRRD header has the field " + in_quotes(name) + " twice.");
+  }
+}
+
+Header read_header(const InputFile& file) {
+  const std::string text = file.text(0, kMostHeaderBytes);
+  Header header;
+  std::size_t next = 0;
+  for (bool first = true;; first = false) {
+    const std::size_t end = text.find('\n', next);
+    if (end == std::string::npos) break;
+    std::string_view line = std::string_view(text).substr(next, end - next);
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    next = end + 1;
+    if (line.empty()) {
+      header.bytes = next;
+      return header;
+    }
+    if (!first && !line.starts_with('#')) add_field(header.fields, line);
+  }
+  throw_unusable("The NRRD header does not end: no empty line is found after it.");
+}
+
+const std::string& required(const Fields& fields, std::string_view name) {
+  const auto found = fields.find(name);
+  if (found == fields.end()) {
+    throw_unusable("The NRRD header lacks the field " + in_quotes(name) + ".");
+  }
+  return found->second;
+}
+
+std::string_view optional(const Fields& fields, std::string_view name) {
+  const auto found = fields.find(name);
+  return found == fields.end() ? std::string_view{} : std::string_view(found->second);
+}
+
+StoredType type_of(const Fields& fields) {
+  using Names = std::vector<std::string_view>;
+  static const std::vector<std::pair<StoredType, Names>> kTypes = {
+      {StoredType::kInt8, {"signed char", "int8", "int8_t"}},
+      {StoredType::kUint8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
+      {StoredType::kInt16,
+       {"short", "short int", "signed short", "signed short int", "int16", "int16_t"}},
+      {StoredType::kUint16,
+       {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
+      {StoredType::kInt32, {"int", "signed int", "int32", "int32_t"}},
+      {StoredType::kUint32, {"uint", "unsigned int", "uint32", "uint32_t"}},
+      {StoredType::kInt64,
+       {"longlong", "long long", "long long int", "signed long long", "signed long long int",
+        "int64", "int64_t"}},
+      {StoredType::kUint64,
+       {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
+      {StoredType::kFloat32, {"float"}},
+      {StoredType::kFloat64, {"double"}}};
+  const std::string name = lower(required(fields, "type"));
+  for (const auto& [type, names] : kTypes) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) return type;
+  }
+  throw_unusable("The NRRD header's type " + in_quotes(name) + " is not one of plain numbers.");
+}
+
+std::vector<std::uint64_t> sizes_of(const Fields& fields) {
+  constexpr std::uint64_t kMostAxes = 16;
+  const auto count = parse_uint64(required(fields, "dimension"));
+  std::vector<std::uint64_t> sizes;
+  for (const std::string_view word : words(required(fields, "sizes"))) {
+    const auto size = parse_uint64(word);
+    if (!size) throw_unusable("The NRRD header's size " + in_quotes(word) + " is no number.");
+    sizes.push_back(*size);
+  }
+  if (!count || *count < 1 || *count > kMostAxes || *count != sizes.size()) {
+    throw_unusable("The NRRD header's dimension " + in_quotes(required(fields, "dimension")) +
+                   " does not fit its " + std::to_string(sizes.size()) + " sizes.");
+  }
+  return sizes;
+}
+
+bool is_lattice_kind(std::string_view kind) {
+  return kind == "domain" || kind == "space" || kind == "time" || kind == "???" || kind == "none";
+}
+
+// The sizes along the axes of space: without those along which the components of one sample lie,
+// which have kinds of their own, may stand anywhere and must be of size 1.
+std::vector<std::uint64_t> lattice_sizes(const Fields& fields,
+                                         const std::vector<std::uint64_t>& sizes) {
+  const auto kinds = words(optional(fields, "kinds"));
+  std::vector<std::uint64_t> result;
+  for (std::size_t axis = 0; axis < sizes.size(); ++axis) {
+    const std::string kind = axis < kinds.size() ? lower(kinds[axis]) : "none";
+    if (kind == "time" && axis < 3) {
+      throw_unusable("The NRRD header's axis " + axis_name(axis) + " is time.");
+    }
+    if (is_lattice_kind(kind)) {
+      result.push_back(sizes[axis]);
+    } else if (sizes[axis] != 1) {
+      throw_unusable("Each sample has " + std::to_string(sizes[axis]) +
+                     " components (an axis of kind " + in_quotes(kind) +
+                     "), where plain numbers are needed.");
+    }
+  }
+  return result;
+}
+
+std::size_t count_of(std::string_view text, std::string_view part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != text.npos; at = text.find(part, at + 1)) ++count;
+  return count;
+}
+
+// ITK takes what is not told for 1 mm along an axis of its own choice. The components' axes are the
+// only ones that may lie nowhere in space.
+void check_space_is_told(const Fields& fields, std::size_t component_axes) {
+  const std::string directions = lower(optional(fields, "spacedirections"));
+  const std::string spacings = lower(optional(fields, "spacings"));
+  const std::string origin = lower(optional(fields, "spaceorigin"));
+  if (count_of(directions, "none") > component_axes || count_of(spacings, "nan") > component_axes ||
+      count_of(directions, "nan") > component_axes * 3 || count_of(origin, "nan") > 0) {
+    throw_unusable("The NRRD header leaves open how its samples are spaced (none or nan).");
+  }
+}
+
+Encoding encoding_of(const Fields& fields) {
+  const std::string name = lower(required(fields, "encoding"));
+  if (name == "raw") return Encoding::kRaw;
+  if (name == "gzip" || name == "gz") return Encoding::kDeflate;
+  if (name == "text" || name == "txt" || name == "ascii") return Encoding::kText;
+  if (name == "hex") return Encoding::kHex;
+  throw_unusable("The NRRD header's encoding " + in_quotes(name) +
+                 " is not read; raw, gzip, ascii and hex are.");
+}
+
+bool is_big_endian(const Fields& fields, StoredType type, Encoding encoding) {
+  const std::string name = lower(optional(fields, "endian"));
+  if (name == "little") return false;
+  if (name == "big") return true;
+  if (!name.empty()) throw_unusable("The NRRD header's endian " + in_quotes(name) + " is unknown.");
+  if (bytes_per_sample(type) > 1 && encoding != Encoding::kText) {
+    throw_unusable("The NRRD header lacks the field \"endian\".");
+  }
+  return false;
+}
+
+void check_space(const Fields& fields) {
+  static constexpr std::string_view kReadable[] = {"",
+                                                   "right-anterior-superior",
+                                                   "ras",
+                                                   "left-anterior-superior",
+                                                   "las",
+                                                   "scanner-xyz",
+                                                   "lps",
+                                                   "left-posterior-superior",
+                                                   "3d-right-handed"};
+  const std::string space = lower(optional(fields, "space"));
+  if (space.starts_with("3d-left-handed")) {
+    throw_unusable("The NRRD header's space " + in_quotes(space) +
+                   " is left-handed, and nothing tells how it lies in the patient.");
+  }
+  if (std::find(std::begin(kReadable), std::end(kReadable), space) == std::end(kReadable)) {
+    throw_unusable("The NRRD header's space " + in_quotes(space) +
+                   " is unknown or has more than three dimensions.");
+  }
+}
+
+void refuse_other_files(const Fields& fields) {
+  if (!fields.contains("datafile")) return;
+  throw_unusable(
+      "Its samples are in another file; send the volume as one .nrrd with its header "
+      "attached.");
+}
+
+std::uint64_t skip_lines(const InputFile& file, std::uint64_t offset, std::uint64_t lines) {
+  constexpr std::size_t kPieceBytes = std::size_t{1} << 16;
+  while (lines > 0) {
+    const std::string piece = file.text(offset, kPieceBytes);
+    const std::size_t end = piece.find('\n');
+    if (piece.empty()) throw_unusable("The file ends before the lines that are to be skipped do.");
+    offset += end == std::string::npos ? piece.size() : end + 1;
+    if (end != std::string::npos) --lines;
+  }
+  return offset;
+}
+
+std::int64_t skip_field(const Fields& fields, std::string_view name) {
+  const std::string_view text = optional(fields, name);
+  if (text.empty()) return 0;
+  const auto count = parse_int64(text);
+  if (!count || *count < -1) {
+    throw_unusable("The NRRD header's " + in_quotes(name) + " is " + in_quotes(text) + ".");
+  }
+  return *count;
+}
+
+std::uint64_t payload_offset(const InputFile& file, const Header& header,
+                             const SourceVolume& volume) {
+  const std::int64_t lines = skip_field(header.fields, "lineskip");
+  const std::int64_t bytes = skip_field(header.fields, "byteskip");
+  if (lines < 0) throw_unusable("The NRRD header's \"lineskip\" is negative.");
+  if (bytes != 0 && volume.encoding == Encoding::kDeflate) {
+    throw_unusable("Skipping bytes within gzip data is not supported.");
+  }
+  if (bytes < 0) {
+    if (volume.encoding != Encoding::kRaw || file.size() < header.bytes + volume.stored_bytes()) {
+      throw_unusable("The file is too short for its samples to be at its end.");
+    }
+    return file.size() - volume.stored_bytes();
+  }
+  const std::uint64_t offset = skip_lines(file, header.bytes, static_cast<std::uint64_t>(lines)) +
+                               static_cast<std::uint64_t>(bytes);
+  if (offset > file.size()) throw_unusable("The file ends before its samples begin.");
+  return offset;
+}
+
+std::string itk_header(const Fields& fields, std::size_t axes) {
+  std::string header = "NRRD0005\ntype: unsigned char\ndimension: " + std::to_string(axes) + "\n";
+  const auto add = [&](std::string_view name, std::string_view itk_name) {
+    const std::string_view value = optional(fields, name);
+    if (!value.empty()) header += std::string(itk_name) + ": " + std::string(value) + "\n";
+  };
+  add("space", "space");
+  add("spacedimension", "space dimension");
+  add("sizes", "sizes");
+  add("spacings", "spacings");
+  add("axismins", "axis mins");
+  add("axismaxs", "axis maxs");
+  add("centers", "centers");
+  add("kinds", "kinds");
+  add("spacedirections", "space directions");
+  add("spaceorigin", "space origin");
+  return header + "encoding: raw\n\n";
+}
+
+// The unit of every axis, or empty where the header has none.
+std::string unit_of(const Fields& fields) {
+  const bool in_space = fields.contains("spaceunits");
+  const std::string_view text = optional(fields, in_space ? "spaceunits" : "units");
+  std::string unit;
+  for (std::size_t next = text.find('"'), axis = 0; next != text.npos && axis < 3; ++axis) {
+    const std::size_t end = text.find('"', next + 1);
+    if (end == text.npos) throw_unusable("The NRRD header's units are not in quotes.");
+    const std::string_view axis_unit = text.substr(next + 1, end - next - 1);
+    if (axis > 0 && axis_unit != unit) {
+      throw_unusable("The NRRD header has different units along its axes.");
+    }
+    unit = axis_unit;
+    next = text.find('"', end + 1);
+  }
+  return unit;
+}
+
+}  // namespace
+
+bool is_nrrd(std::string_view head) {
+  return head.size() >= 9 && head.starts_with("NRRD000") && head[7] >= '1' && head[7] <= '5' &&
+         (head[8] == '\n' || head[8] == '\r');
+}
+
+SourceVolume parse_nrrd(const InputFile& file, const std::filesystem::path& scratch) {
+  const Header header = read_header(file);
+  const Fields& fields = header.fields;
+  refuse_other_files(fields);
+  const std::vector<std::uint64_t> sizes = sizes_of(fields);
+  const std::vector<std::uint64_t> lattice = lattice_sizes(fields, sizes);
+  check_space(fields);
+  check_space_is_told(fields, sizes.size() - lattice.size());
+  SourceVolume volume;
+  volume.format = FileFormat::kNrrd;
+  volume.dims = volume_dims(lattice);
+  volume.encoding = encoding_of(fields);
+  volume.layout.type = type_of(fields);
+  volume.layout.big_endian = is_big_endian(fields, volume.layout.type, volume.encoding);
+  volume.payload.offset = payload_offset(file, header, volume);
+  volume.payload.bytes = file.size() - volume.payload.offset;
+  volume.geometry = read_itk_geometry(FileFormat::kNrrd, itk_header(fields, sizes.size()), scratch);
+  scale_to_millimetres(volume.geometry, unit_of(fields));
+  return volume;
+}
+
+}  // namespace isomesh::volume

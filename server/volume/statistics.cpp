@@ -1,0 +1,170 @@
+#include "server/volume/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <type_traits>
+
+#include "server/volume/samples.h"
+
+namespace isomesh::volume {
+namespace {
+
+constexpr std::size_t kMostExactBins = 65536;
+constexpr std::size_t kBins = 1024;
+
+template <class Sample>
+std::span<const Sample> as(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const Sample*>(bytes.data()), bytes.size() / sizeof(Sample)};
+}
+
+template <class Sample>
+std::vector<std::uint64_t> count_samples(std::span<const Sample> samples, const Bins& bins) {
+  std::vector<std::uint64_t> counts(bins.count);
+  // Halves, because the difference of two doubles may be beyond the largest double.
+  const double low = bins.range[0] / 2;
+  const double width = bins.range[1] / 2 - low;
+  for (const Sample sample : samples) {
+    const auto value = static_cast<double>(sample);
+    if (!(value >= bins.range[0] && value <= bins.range[1])) continue;
+    const double fraction = width > 0 ? (value / 2 - low) / width : 0;
+    const auto bin = static_cast<std::size_t>(fraction * static_cast<double>(bins.count));
+    ++counts[std::min(bin, bins.count - 1)];
+  }
+  return counts;
+}
+
+// Bin b counts the value lowest + b.
+template <class Sample>
+std::vector<std::uint64_t> count_values(std::span<const Sample> samples, std::int64_t lowest,
+                                        std::size_t bins) {
+  std::vector<std::uint64_t> counts(bins);
+  for (const Sample sample : samples) {
+    ++counts[static_cast<std::size_t>(std::int64_t{sample} - lowest)];
+  }
+  return counts;
+}
+
+Statistics from_value_counts(std::span<const std::uint64_t> counts, std::int64_t lowest) {
+  const auto is_hit = [](std::uint64_t count) { return count > 0; };
+  const auto first = std::find_if(counts.begin(), counts.end(), is_hit) - counts.begin();
+  const auto beyond = counts.rend() - std::find_if(counts.rbegin(), counts.rend(), is_hit);
+  Statistics statistics;
+  if (first == std::ssize(counts)) return statistics;
+  statistics.range = {static_cast<double>(lowest + first),
+                      static_cast<double>(lowest + beyond - 1)};
+  statistics.otsu = otsu_threshold(
+      counts.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(beyond - first)),
+      {statistics.range[0] - 0.5, statistics.range[1] + 0.5});
+  return statistics;
+}
+
+template <class Sample>
+Statistics range_of(std::span<const Sample> samples) {
+  Statistics statistics;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const Sample sample : samples) {
+    const auto value = static_cast<double>(sample);
+    const bool finite = std::isfinite(value);
+    statistics.non_finite += finite ? 0 : 1;
+    low = finite && value < low ? value : low;
+    high = finite && value > high ? value : high;
+  }
+  if (low <= high) statistics.range = {low, high};
+  return statistics;
+}
+
+template <class Sample>
+Statistics measure_wide(std::span<const Sample> samples) {
+  Statistics statistics = range_of(samples);
+  const auto [low, high] = statistics.range;
+  if constexpr (std::is_integral_v<Sample>) {
+    if (high - low < static_cast<double>(kMostExactBins)) {
+      const auto lowest = static_cast<std::int64_t>(low);
+      const auto bins = static_cast<std::size_t>(high - low) + 1;
+      return from_value_counts(count_values(samples, lowest, bins), lowest);
+    }
+  }
+  if (statistics.non_finite == samples.size() || low == high) {
+    statistics.otsu = low;
+  } else {
+    statistics.otsu =
+        otsu_threshold(count_samples(samples, {statistics.range, kBins}), statistics.range);
+  }
+  return statistics;
+}
+
+template <class Sample>
+Statistics measure_samples(std::span<const Sample> samples) {
+  if constexpr (sizeof(Sample) <= 2) {
+    // So few values that counting them all needs no range first: one pass.
+    constexpr std::int64_t kLowest = std::numeric_limits<Sample>::min();
+    constexpr std::size_t kValues = std::numeric_limits<Sample>::max() - kLowest + 1;
+    return from_value_counts(count_values(samples, kLowest, kValues), kLowest);
+  } else {
+    return measure_wide(samples);
+  }
+}
+
+}  // namespace
+
+Statistics measure(std::span<const std::byte> samples, SampleType type) {
+  Statistics statistics;
+  with_sample(stored_type(type), [&](auto sample) {
+    using Sample = decltype(sample);
+    if constexpr (sizeof(Sample) < 8 || std::is_floating_point_v<Sample>) {
+      statistics = measure_samples(as<Sample>(samples));
+    }
+  });
+  return statistics;
+}
+
+std::vector<std::uint64_t> histogram(std::span<const std::byte> samples, SampleType type,
+                                     const Bins& bins) {
+  std::vector<std::uint64_t> counts;
+  with_sample(stored_type(type),
+              [&](auto sample) { counts = count_samples(as<decltype(sample)>(samples), bins); });
+  return counts;
+}
+
+double otsu_threshold(std::span<const std::uint64_t> counts, const std::array<double, 2>& range) {
+  double total = 0;
+  double moment = 0;
+  for (std::size_t bin = 0; bin < counts.size(); ++bin) {
+    total += static_cast<double>(counts[bin]);
+    moment += static_cast<double>(counts[bin]) * static_cast<double>(bin);
+  }
+
+  double below = 0;
+  double below_moment = 0;
+  double best = -1;
+  std::size_t last = 0;        // the last bin with samples so far
+  std::size_t best_lower = 0;  // the last bin of the lower class
+  std::size_t best_upper = 0;  // the first bin of the upper class
+  for (std::size_t bin = 0; bin < counts.size(); ++bin) {
+    if (counts[bin] == 0) continue;
+    if (below > 0) {
+      const double difference = below_moment / below - (moment - below_moment) / (total - below);
+      const double variance = below * (total - below) * difference * difference;
+      if (variance > best) {
+        best = variance;
+        best_lower = last;
+        best_upper = bin;
+      }
+    } else {
+      best_lower = best_upper = bin;
+    }
+    below += static_cast<double>(counts[bin]);
+    below_moment += static_cast<double>(counts[bin]) * static_cast<double>(bin);
+    last = bin;
+  }
+
+  // From the upper edge of the one to the lower edge of the other is the same way as from middle to
+  // middle, but for a single bin, whose middle this is.
+  const double at = (static_cast<double>(best_lower + best_upper) + 1) / 2;
+  const double half_bin = (range[1] / 2 - range[0] / 2) / static_cast<double>(counts.size());
+  return range[0] + half_bin * at + half_bin * at;
+}
+
+}  // namespace isomesh::volume

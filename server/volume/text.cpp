@@ -1,0 +1,73 @@
+#include "server/volume/text.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+
+namespace isomesh::volume {
+namespace {
+
+constexpr std::string_view kSpace = " \t\r\n\v\f";
+
+template <class Number>
+std::optional<Number> parse(std::string_view text) {
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
+  Number value{};
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  if (text.empty() || error != std::errc{} || stop != end) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+std::string_view trim(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(kSpace);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kSpace) - first + 1);
+}
+
+std::string lower(std::string_view text) {
+  std::string result(text);
+  for (char& letter : result) {
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  }
+  return result;
+}
+
+std::vector<std::string_view> words(std::string_view text) {
+  std::vector<std::string_view> result;
+  for (std::size_t next = text.find_first_not_of(kSpace); next != std::string_view::npos;) {
+    const std::size_t end = std::min(text.find_first_of(kSpace, next), text.size());
+    result.push_back(text.substr(next, end - next));
+    next = text.find_first_not_of(kSpace, end);
+  }
+  return result;
+}
+
+std::optional<double> parse_double(std::string_view text) { return parse<double>(text); }
+std::optional<std::int64_t> parse_int64(std::string_view text) { return parse<std::int64_t>(text); }
+std::optional<std::uint64_t> parse_uint64(std::string_view text) {
+  return parse<std::uint64_t>(text);
+}
+
+std::string to_text(double value) {
+  std::array<char, 32> buffer;
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
+  return {buffer.data(), end};
+}
+
+std::string in_quotes(std::string_view text) {
+  constexpr std::size_t kLongest = 40;
+  std::string result = "\"";
+  for (const char letter : text.substr(0, kLongest)) {
+    result += letter >= ' ' && letter <= '~' && letter != '"' ? letter : '?';
+  }
+  return result + (text.size() > kLongest ? "...\"" : "\"");
+}
+
+std::string axis_name(std::size_t axis) {
+  return axis < 3 ? std::string(1, "ijk"[axis]) : std::to_string(axis + 1);
+}
+
+}  // namespace isomesh::volume

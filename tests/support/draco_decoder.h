@@ -1,0 +1,20 @@
+// What Debian's draco_decoder makes of a Draco stream.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+namespace isomesh::test {
+
+struct DecodedMesh {
+  std::vector<std::array<float, 3>> points;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+// Runs the command on the stream. Throws std::runtime_error with its words when it is not there or
+// refuses, or when what it writes is not a mesh.
+DecodedMesh decode_with_command(std::string_view drc);
+
+}  // namespace isomesh::test

@@ -1,0 +1,35 @@
+// What tests say about exceptions.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "proto/error.h"
+
+namespace isomesh::test {
+
+// The Error that `action` throws; empty when it throws nothing.
+inline std::optional<Error> thrown_by(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error;
+  }
+  return std::nullopt;
+}
+
+inline std::optional<ErrorCode> code_thrown_by(const std::function<void()>& action) {
+  const auto error = thrown_by(action);
+  return error ? std::optional(error->code()) : std::nullopt;
+}
+
+// The names of the fields that are at fault.
+inline std::vector<std::string> fields_of(const Error& error) {
+  std::vector<std::string> names;
+  for (const FieldError& field : error.fields()) names.push_back(field.field);
+  return names;
+}
+
+}  // namespace isomesh::test

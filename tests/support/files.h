@@ -1,0 +1,44 @@
+// Files and folders of tests.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace isomesh::test {
+
+// A new, empty folder that is removed with all it holds when it goes.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+// Throw std::runtime_error that names the file.
+void write_file(const std::filesystem::path& path, std::string_view content);
+std::string read_file(const std::filesystem::path& path);
+
+// All regular files below a folder, as sorted paths relative to it.
+std::vector<std::string> files_below(const std::filesystem::path& folder);
+
+// The bytes that an array occupies, and back to text.
+template <class T>
+std::string bytes_of(const std::vector<T>& values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
+}
+inline std::span<const std::byte> as_span(std::string_view text) {
+  return std::as_bytes(std::span(text));
+}
+
+}  // namespace isomesh::test

@@ -1,0 +1,42 @@
+// Short ways for tests to run the kernels.
+#pragma once
+
+#include "server/mesh/context.h"
+#include "server/mesh/extract.h"
+#include "server/mesh/mesh.h"
+#include "tests/support/shapes.h"
+
+namespace isomesh::test {
+
+// Counts and extracts, into the memory of `mesh`.
+template <class T>
+void extract_into(mesh::Mesh& mesh, const SampleVolume<T>& volume,
+                  const mesh::ExtractOptions& options, const mesh::Context& context = {}) {
+  const mesh::Lattice<T> lattice = volume.lattice();
+  const mesh::SurfaceCount count = mesh::count_surface(lattice, options, context);
+  mesh::extract_surface(lattice, options, count, context, mesh);
+}
+
+template <class T>
+mesh::Mesh extracted(const SampleVolume<T>& volume, const mesh::ExtractOptions& options) {
+  mesh::Mesh mesh;
+  extract_into(mesh, volume, options);
+  return mesh;
+}
+
+// Runs the kernels on another number of threads for as long as it lives. Not for tests that run
+// kernels at the same time.
+class ThreadCount {
+ public:
+  explicit ThreadCount(int threads) : before_(mesh::thread_count()) {
+    mesh::set_thread_count(threads);
+  }
+  ~ThreadCount() { mesh::set_thread_count(before_); }
+  ThreadCount(const ThreadCount&) = delete;
+  ThreadCount& operator=(const ThreadCount&) = delete;
+
+ private:
+  int before_;
+};
+
+}  // namespace isomesh::test

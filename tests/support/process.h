@@ -1,0 +1,64 @@
+// Programs that tests start. Nothing of the caller's ISOMESH_... environment reaches them.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <sys/types.h>
+
+#include "tests/support/files.h"
+
+namespace isomesh::test {
+
+// Far beyond what anything takes, also under a sanitizer on a busy machine.
+inline constexpr std::chrono::seconds kLongest{120};
+
+class Process {
+ public:
+  // Starts the command; a first word without a slash is looked for in PATH. `environment` holds
+  // NAME=VALUE. Throws std::runtime_error when it cannot be started.
+  explicit Process(const std::vector<std::string>& command,
+                   const std::vector<std::string>& environment = {});
+  // Kills it when it still runs.
+  ~Process();
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  // The first line of its standard output, as soon as there is one; what there is of it when it
+  // ends before. Throws std::runtime_error after kLongest.
+  std::string first_line();
+
+  void send_signal(int number) const;
+
+  // Its exit status; 128 and the signal's number when a signal ended it. Throws std::runtime_error
+  // after kLongest.
+  int wait();
+
+  std::string output() const;
+  std::string errors() const;
+
+ private:
+  bool has_ended();
+
+  TemporaryFolder folder_;
+  pid_t pid_ = -1;
+  std::optional<int> status_;
+};
+
+struct Finished {
+  int status = -1;
+  std::string output;
+  std::string errors;
+};
+
+// Starts the command and waits for its end.
+Finished run(const std::vector<std::string>& command,
+             const std::vector<std::string>& environment = {});
+
+// Calls `condition` until it is true; false when it is not within kLongest.
+bool eventually(const std::function<bool()>& condition);
+
+}  // namespace isomesh::test

@@ -1,0 +1,109 @@
+// Volumes that tests make up: fields sampled on a lattice, noise, and single cells. Everything is
+// deterministic: the same arguments give the same samples on every machine.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "proto/types.h"
+#include "server/mesh/lattice.h"
+
+namespace isomesh::test {
+
+using Point = std::array<double, 3>;
+
+// The map of a geometry, written down a second time so that the kernels' own is not trusted.
+mesh::LatticeToSpace space_of(const Geometry& geometry);
+
+// A point in lattice units as millimetres, and back. `map` must not be degenerate.
+Point to_space(const mesh::LatticeToSpace& map, const Point& lattice_point);
+Point to_lattice(const mesh::LatticeToSpace& map, const Point& space_point);
+
+// Samples with their owner. Instantiated, as everything below, for the eight types of SampleType.
+template <class T>
+struct SampleVolume {
+  std::vector<T> samples;  // x fastest
+  mesh::Dims dims;
+  Geometry geometry;
+
+  // A view that is valid for as long as this volume is neither moved nor changed.
+  mesh::Lattice<T> lattice() const { return {samples.data(), dims, space_of(geometry)}; }
+
+  T& at(std::uint64_t i, std::uint64_t j, std::uint64_t k) {
+    return samples[(k * dims.y + j) * dims.x + i];
+  }
+};
+
+// A smooth function of a point in millimetres.
+using Field = std::function<double(const Point&)>;
+
+// Distances to the surface, positive inside.
+Field sphere(const Point& centre, double radius);
+Field torus(const Point& centre, double major_radius, double minor_radius);  // around the z axis
+Field plane(const Point& unit_normal, double offset);  // inside where normal * p < offset
+
+// sin x cos y + sin y cos z + sin z cos x, with periods of `period` millimetres.
+Field gyroid(double period);
+
+// The quartic whose surface in [-scale, scale]^3 has five handles, shrunk to the cube [-1, 1]^3.
+Field tangle_cube(double scale);
+
+// gain * field + offset.
+Field scaled(const Field& field, double gain, double offset);
+
+// The field at every sample. For integer types rounded to the nearest and saturated.
+template <class T>
+SampleVolume<T> sample(const Field& field, const mesh::Dims& dims, const Geometry& geometry = {});
+
+// A lattice of `n` samples along each axis that spans the cube [-1, 1]^3.
+mesh::Dims unit_cube_dims(std::uint32_t n);
+Geometry unit_cube_geometry(std::uint32_t n);
+
+// Each sample one of `values`, all equally likely.
+template <class T>
+SampleVolume<T> noise(const std::vector<T>& values, const mesh::Dims& dims, std::uint64_t seed,
+                      const Geometry& geometry = {});
+
+// Each sample from [low, high], all equally likely.
+template <class T>
+SampleVolume<T> noise_between(double low, double high, const mesh::Dims& dims, std::uint64_t seed);
+
+template <class T>
+SampleVolume<T> constant(T value, const mesh::Dims& dims);
+
+// `even` where i+j+k is even, `odd` elsewhere: every axis edge is crossed.
+template <class T>
+SampleVolume<T> checkerboard(T even, T odd, const mesh::Dims& dims);
+
+// Sets all samples on the six faces of the lattice, so that a surface inside is closed.
+template <class T>
+void set_border(SampleVolume<T>& volume, T value);
+
+enum class Parity { kEven, kOdd };          // of i+j+k
+enum class Surround { kOutside, kInside };  // what all samples around a cell are
+
+// One cell whose corner c (the paper's numbering) is inside where bit c of `pattern` is set, at a
+// place of the given parity, with a layer of other samples on every side. All corners have
+// different values, and corner 0, when it is inside, has the iso-value itself.
+inline constexpr double kPatternIso = 100;
+template <class T>
+SampleVolume<T> sign_pattern(unsigned pattern, Parity parity, Surround surround);
+
+// Geometries as scanners make them.
+Geometry anisotropic_geometry();
+Geometry oblique_geometry();
+Geometry left_handed_geometry();          // axis aligned, one axis reversed
+Geometry oblique_left_handed_geometry();  // turned, anisotropic and reversed
+Geometry far_geometry();                  // fine samples more than a metre from the origin
+Geometry oblique_far_geometry();
+
+struct NamedGeometry {
+  std::string name;
+  Geometry geometry;
+};
+std::vector<NamedGeometry> all_geometries();
+
+}  // namespace isomesh::test

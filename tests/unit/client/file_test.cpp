@@ -1,0 +1,69 @@
+#include "client/isomesh/file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/client/support.h"
+
+namespace isomesh {
+namespace {
+
+using test::error_of;
+using test::TemporaryFolder;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+TEST(PartFile, IsSeenOnlyWhenItIsPublished) {
+  TemporaryFolder folder;
+  PartFile file(folder / "mesh.drc");
+  file.write("half");
+  EXPECT_FALSE(std::filesystem::exists(folder / "mesh.drc"));
+  file.restart();
+  file.write("whole");
+  file.publish();
+  EXPECT_EQ(test::read_file(folder / "mesh.drc"), "whole");
+  EXPECT_THAT(folder.names(), ElementsAre("mesh.drc"));
+}
+
+TEST(PartFile, LeavesNothingWithoutPublishing) {
+  TemporaryFolder folder;
+  { PartFile(folder / "mesh.drc").write("half"); }
+  EXPECT_THAT(folder.names(), IsEmpty());
+}
+
+TEST(PartFile, FollowsALink) {
+  TemporaryFolder folder;
+  test::write_file(folder / "real.drc", "old");
+  std::filesystem::create_symlink(folder / "real.drc", folder / "link.drc");
+  PartFile file(folder / "link.drc");
+  file.write("new");
+  file.publish();
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link.drc"));
+  EXPECT_EQ(test::read_file(folder / "real.drc"), "new");
+}
+
+// Renaming onto a device would replace it for the whole machine.
+TEST(PartFile, RefusesWhatIsNoRegularFile) {
+  TemporaryFolder folder;
+  EXPECT_EQ(error_of([&] { PartFile(folder / "."); }).code(), ErrorCode::kInvalidParameter);
+  EXPECT_EQ(error_of([] { PartFile("/dev/null"); }).code(), ErrorCode::kInvalidParameter);
+}
+
+TEST(InputFile, ReadsAnyPartAndNoticesATruncation) {
+  TemporaryFolder folder;
+  test::write_file(folder / "file", "0123456789");
+  const InputFile file(folder / "file");
+  EXPECT_EQ(file.size(), 10U);
+  std::string part(4, ' ');
+  file.read(3, part);
+  EXPECT_EQ(part, "3456");
+  std::filesystem::resize_file(folder / "file", 5);
+  EXPECT_EQ(error_of([&] { file.read(3, part); }).code(), ErrorCode::kInvalidParameter);
+}
+
+TEST(InputFile, RefusesAFolder) {
+  EXPECT_EQ(error_of([] { InputFile("/tmp"); }).code(), ErrorCode::kInvalidParameter);
+}
+
+}  // namespace
+}  // namespace isomesh

@@ -1,0 +1,94 @@
+// Whatever a server sends, the client ends with an Error and bounded memory.
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/isomesh/client.h"
+#include "tests/unit/client/support.h"
+
+namespace isomesh {
+namespace {
+
+using test::error_of;
+using test::SocketServer;
+
+std::string answer_of(const std::string& body) {
+  return "HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: " +
+         std::to_string(body.size()) + "\r\n\r\n" + body;
+}
+
+// `cancel` reads no body and `job` does; neither may crash.
+std::vector<ErrorCode> codes_for(const std::string& sent) {
+  SocketServer server([&](int socket) {
+    test::read_head(socket);
+    test::send_text(socket, sent);
+  });
+  Client client({.server = server.url(), .silence_timeout = std::chrono::seconds{5}});
+  return {error_of([&] { client.job("7"); }).code(), error_of([&] { client.volumes(); }).code()};
+}
+
+class Garbage : public testing::TestWithParam<std::string> {};
+
+TEST_P(Garbage, InPlaceOfHttpIsNoAnswer) {
+  EXPECT_THAT(codes_for(GetParam()), testing::Each(ErrorCode::kUnreachable));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Heads, Garbage,
+    testing::Values("", "SSH-2.0-OpenSSH_9.2\r\n", "\r\n\r\n", "HTTP/9.9 200 OK\r\n\r\n",
+                    "HTTP/1.1 99999 OK\r\n\r\n", "HTTP/1.1 200 OK\r\nContent-Le",
+                    "HTTP/1.1 200 OK\r\nContent-Length: 100\r\n\r\nshort",
+                    "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\nab",
+                    "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\nffffffffffffffff\r\na",
+                    "HTTP/1.1 100 Continue\r\n\r\nHTTP/1.1 " + std::string(500'000, 'a') + "\r\n",
+                    "HTTP/1.1 200 " + std::string(500'000, 'a') + "\r\n\r\n",
+                    "HTTP/1.1 200 OK\r\nX: " + std::string(500'000, 'a') + "\r\n\r\n",
+                    std::string(500'000, '\0')));
+
+TEST(HostileServer, SendsHeadersWithoutEnd) {
+  std::string head = "HTTP/1.1 200 OK\r\n";
+  for (int n = 0; n < 20'000; ++n) head += "X-" + std::to_string(n) + ": y\r\n";
+  EXPECT_THAT(codes_for(head), testing::Each(ErrorCode::kUnreachable));
+}
+
+class WrongJson : public testing::TestWithParam<std::string> {};
+
+TEST_P(WrongJson, IsNotWhatTheApiDescribes) {
+  EXPECT_THAT(codes_for(answer_of(GetParam())), testing::Each(ErrorCode::kInternal));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Bodies, WrongJson,
+    testing::Values("", "null", "[]", "7", "<html>", "{\"id\": 7, \"volumes\": 7}",
+                    "{\"id\": \"7\", \"state\": \"melted\", \"volumes\": [{\"type\": \"int3\"}]}",
+                    "{\"id\": \"7\", \"timing\": [], \"volumes\": [{\"dims\": [1]}]}",
+                    "{\"id\": \"\xff\xfe\"}", std::string(200'000, '[')));
+
+TEST(HostileServer, SendsAnEndlessBody) {
+  SocketServer server([](int socket) {
+    test::read_head(socket);
+    test::send_text(socket, "HTTP/1.1 200 OK\r\n\r\n");
+    const std::string piece(1 << 20, 'a');
+    for (int n = 0; n < 80; ++n) test::send_text(socket, piece);
+  });
+  Client client({.server = server.url()});
+  EXPECT_EQ(error_of([&] { client.volumes(); }).code(), ErrorCode::kInternal);
+}
+
+TEST(HostileServer, RefusesWithAProblemThatIsNone) {
+  for (const std::string body : {"", "{", "[]", "{\"status\": \"x\"}", "{\"errors\": 7}"}) {
+    SocketServer server([&](int socket) {
+      test::read_head(socket);
+      test::send_text(socket,
+                      "HTTP/1.1 422 No\r\nContent-Type: application/problem+json\r\n"
+                      "Content-Length: " +
+                          std::to_string(body.size()) + "\r\n\r\n" + body);
+    });
+    Client client({.server = server.url()});
+    EXPECT_EQ(error_of([&] { client.job("7"); }).code(), ErrorCode::kUnusableVolume) << body;
+  }
+}
+
+}  // namespace
+}  // namespace isomesh

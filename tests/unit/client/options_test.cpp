@@ -1,0 +1,185 @@
+#include "client/cli/options.h"
+
+#include <cstdlib>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/client/support.h"
+
+namespace isomesh::cli {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+Options parse(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), "isomesh");
+  return parse_options(static_cast<int>(arguments.size()), arguments.data());
+}
+
+// The status and the text that the arguments end with; -1 when they are fine.
+std::pair<int, std::string> ending_of(const std::vector<const char*>& arguments) {
+  try {
+    parse(arguments);
+  } catch (const EarlyExit& exit) {
+    return {exit.status(), exit.what()};
+  }
+  return {-1, ""};
+}
+
+class OptionsTest : public testing::Test {
+ protected:
+  OptionsTest() { test::write_file(folder_ / "head.nii", "x"); }
+
+  test::TemporaryFolder folder_;
+  std::string file_ = (folder_ / "head.nii").string();
+  std::string drc_ = (folder_ / "brain.drc").string();
+  std::string stl_ = (folder_ / "brain.stl").string();
+};
+
+TEST_F(OptionsTest, ReadsEverythingThatAMeshCanBeAskedFor) {
+  const Options options = parse({"mesh",
+                                 file_.c_str(),
+                                 "--iso",
+                                 "-600.5",
+                                 "--scheme",
+                                 "5",
+                                 "--interpolation",
+                                 "midpoint",
+                                 "--passes",
+                                 "20",
+                                 "--smoothing",
+                                 "taubin",
+                                 "--lambda",
+                                 "0.5",
+                                 "--close",
+                                 "--position-bits",
+                                 "11",
+                                 "--speed",
+                                 "0",
+                                 "--priority",
+                                 "stat",
+                                 "-o",
+                                 drc_.c_str(),
+                                 "-o",
+                                 stl_.c_str(),
+                                 "--digest"});
+  EXPECT_EQ(options.command, Command::kMesh);
+  EXPECT_EQ(options.file, file_);
+  EXPECT_TRUE(options.digest);
+  EXPECT_FALSE(options.raw);
+  JobParameters expected;
+  expected.iso = -600.5;
+  expected.scheme = Scheme::kFive;
+  expected.interpolation = Interpolation::kMidpoint;
+  expected.passes = 20;
+  expected.smoothing = Smoothing::kTaubin;
+  expected.lambda = 0.5;
+  expected.close = true;
+  expected.draco = {.position_bits = 11, .speed = 0};
+  expected.priority = Priority::kStat;
+  EXPECT_EQ(options.parameters, expected);
+  ASSERT_EQ(options.outputs.size(), 2U);
+  EXPECT_EQ(options.outputs[0].format, MeshFormat::kDrc);
+  EXPECT_EQ(options.outputs[1].format, MeshFormat::kStl);
+}
+
+TEST_F(OptionsTest, ReadsRawSamples) {
+  const Options options = parse({"upload", file_.c_str(), "--dims", "512,512,300", "--type",
+                                 "int16", "--spacing", "0.7,0.7,1", "--origin", "-90,0,1.5",
+                                 "--direction", "1,0,0,0,1,0,0,0,-1", "--byte-order", "big"});
+  ASSERT_TRUE(options.raw);
+  EXPECT_THAT(options.raw->dims, ElementsAre(512, 512, 300));
+  EXPECT_EQ(options.raw->type, SampleType::kInt16);
+  EXPECT_THAT(*options.raw->spacing, ElementsAre(0.7, 0.7, 1));
+  EXPECT_THAT(*options.raw->origin, ElementsAre(-90, 0, 1.5));
+  EXPECT_EQ(options.raw->direction->back(), -1);
+  EXPECT_TRUE(options.raw->big_endian);
+}
+
+TEST_F(OptionsTest, LeavesRangesToTheServer) {
+  const Options options = parse(
+      {"submit", "abc", "--iso", "otsu", "--scheme", "7", "--passes", "-1", "--format", "drc,glb"});
+  EXPECT_FALSE(options.parameters.iso);
+  EXPECT_EQ(static_cast<int>(options.parameters.scheme), 7);
+  EXPECT_EQ(options.parameters.passes, -1);
+  EXPECT_THAT(options.parameters.formats, ElementsAre(MeshFormat::kDrc, MeshFormat::kGlb));
+}
+
+TEST_F(OptionsTest, TakesGlobalOptionsBeforeAndAfterTheCommand) {
+  for (const auto& options :
+       {parse({"--server", "unix:/s", "--token", "t", "--json", "status", "7"}),
+        parse({"status", "7", "--server", "unix:/s", "--token", "t", "--json"}),
+        parse({"status", "--json", "7", "--server=unix:/s", "--token=t"})}) {
+    EXPECT_EQ(options.server, "unix:/s");
+    EXPECT_EQ(options.token, "t");
+    EXPECT_TRUE(options.json);
+    EXPECT_EQ(options.id, "7");
+  }
+}
+
+TEST_F(OptionsTest, TakesServerAndTokenFromTheEnvironment) {
+  ::setenv("ISOMESH_SERVER", "http://elsewhere:1", 1);
+  ::setenv("ISOMESH_TOKEN", "from-environment", 1);
+  const Options fallback = parse({"list"});
+  const Options given = parse({"list", "--server", "http://here:2"});
+  ::unsetenv("ISOMESH_SERVER");
+  ::unsetenv("ISOMESH_TOKEN");
+  EXPECT_EQ(fallback.server, "http://elsewhere:1");
+  EXPECT_EQ(fallback.token, "from-environment");
+  EXPECT_EQ(given.server, "http://here:2");
+  EXPECT_EQ(parse({"list"}).server, "http://127.0.0.1:8080");
+}
+
+TEST_F(OptionsTest, RefusesWrongUsage) {
+  const char* file = file_.c_str();
+  const char* drc = drc_.c_str();
+  const std::vector<std::vector<const char*>> wrong = {
+      {},
+      {"frobnicate"},
+      {"status"},
+      {"status", "7", "8"},
+      {"mesh", file, "-o", drc},
+      {"mesh", file, "--iso", "60"},
+      {"mesh", file, "--iso", "sixty", "-o", drc},
+      {"mesh", file, "--iso", "nan", "-o", drc},
+      {"mesh", file, "--iso", "60x", "-o", drc},
+      {"mesh", file, "--iso", "", "-o", drc},
+      {"mesh", file, "--iso", "60", "--passes", "1.5", "-o", drc},
+      {"mesh", file, "--iso", "60", "--passes", "99999999999", "-o", drc},
+      {"mesh", file, "--iso", "60", "--smoothing", "gauss", "-o", drc},
+      {"mesh", file, "--iso", "60", "-o", "brain.xyz"},
+      {"mesh", file, "--iso", "60", "-o", "brain"},
+      {"mesh", file, "--iso", "60", "-o", "/nowhere/brain.drc"},
+      {"mesh", "/nowhere/head.nii", "--iso", "60", "-o", drc},
+      {"mesh", "/tmp", "--iso", "60", "-o", drc},
+      {"upload", file, "--dims", "1,2,3"},
+      {"upload", file, "--type", "int16"},
+      {"upload", file, "--spacing", "1,1,1"},
+      {"upload", file, "--dims", "1,2", "--type", "int16"},
+      {"upload", file, "--dims", "1,2,3,4", "--type", "int16"},
+      {"upload", file, "--dims", "1,,3", "--type", "int16"},
+      {"upload", file, "--dims", "1,2,3,", "--type", "int16"},
+      {"upload", file, "--dims", "1,2,3", "--type", "int12"},
+      {"upload", file, "--dims", "1,2,3", "--type", "int16", "--byte-order", "middle"},
+      {"submit", "abc", "--iso", "60", "--format", "drc,vtk"},
+      {"list", "--state", "melted"}};
+  for (const auto& arguments : wrong) {
+    const auto [status, text] = ending_of(arguments);
+    EXPECT_EQ(status, kWrongUsage) << (arguments.empty() ? "" : arguments.back());
+    EXPECT_FALSE(text.empty());
+  }
+}
+
+TEST_F(OptionsTest, HelpsOnRequest) {
+  EXPECT_EQ(ending_of({"--help"}).first, 0);
+  EXPECT_THAT(ending_of({"--help"}).second, HasSubstr("Examples:"));
+  EXPECT_EQ(ending_of({"mesh", "--help"}).first, 0);
+  EXPECT_THAT(ending_of({"mesh", "--help"}).second, HasSubstr("--position-bits"));
+  EXPECT_EQ(ending_of({"--version"}).first, 0);
+  EXPECT_THAT(ending_of({"--version"}).second, HasSubstr("isomesh "));
+}
+
+}  // namespace
+}  // namespace isomesh::cli

@@ -1,0 +1,96 @@
+#include "client/cli/report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/json.h"
+#include "tests/unit/client/support.h"
+
+namespace isomesh::cli {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr Timing kTiming = {
+    .queue = 0.4, .load = 100, .extract = 250, .smooth = 1500, .encode = 149.6, .total = 2000};
+
+TEST(TimingReport, AlignsStagesTimesAndShares) {
+  EXPECT_EQ(timing_report(kTiming, {.upload = 12.34, .download = 3}),
+            "  stage         time    share\n"
+            "  upload     12.3 ms\n"
+            "  queue       0.4 ms    0.0 %\n"
+            "  load      100.0 ms    5.0 %\n"
+            "  extract   250.0 ms   12.5 %\n"
+            "  smooth      1.50 s   75.0 %\n"
+            "  encode    149.6 ms    7.5 %\n"
+            "  total       2.00 s  100.0 %\n"
+            "  download    3.0 ms\n");
+}
+
+TEST(TimingReport, SaysNothingOfSharesOfNothing) {
+  EXPECT_THAT(timing_report({}, {}), Not(HasSubstr("nan")));
+  EXPECT_THAT(timing_report({}, {}), Not(HasSubstr("upload")));
+}
+
+TEST(MeshReport, NamesWhatTheMeshIs) {
+  MeshSummary mesh;
+  mesh.triangles = 1234567;
+  mesh.vertices = 617283;
+  mesh.euler = -4;
+  mesh.area_mm2 = 123456.78;
+  mesh.volume_mm3 = {.extracted = 1000.04, .smoothed = 999.96};
+  mesh.bounds = {{{-90, -126, -72}, {90, 90, 108}}};
+  mesh.files[MeshFormat::kDrc].bytes = 3510351;
+  EXPECT_EQ(mesh_report(mesh),
+            "  triangles       1,234,567\n"
+            "  vertices        617,283\n"
+            "  boundary edges  0\n"
+            "  components      0\n"
+            "  Euler number    -4\n"
+            "  area            123,456.8 mm²\n"
+            "  volume          1,000.0 mm³ extracted\n"
+            "                  1,000.0 mm³ smoothed\n"
+            "  x (LPS)         -90.00 to 90.00 mm\n"
+            "  y               -126.00 to 90.00 mm\n"
+            "  z               -72.00 to 108.00 mm\n"
+            "  mesh.drc        3.5 MB (3,510,351 B)\n");
+}
+
+TEST(VolumeReport, NamesWhatTheVolumeIs) {
+  Volume volume;
+  volume.id = "abc";
+  volume.format = "nifti";
+  volume.dims = {181, 217, 181};
+  volume.bytes = 7109137;
+  volume.range = {0, 254.5};
+  EXPECT_THAT(volume_report(volume), HasSubstr("181 x 217 x 181 uint8, 7.1 MB"));
+  EXPECT_THAT(volume_report(volume), HasSubstr("0 to 254.5"));
+  EXPECT_THAT(volume_list({volume}), HasSubstr("  abc     nifti   181 x 217 x 181  uint8  7.1 MB"));
+}
+
+TEST(JobReport, TellsAJobThatRunsFromOneThatFailed) {
+  Job job = test::finished_job("7", "mesh");
+  job.state = JobState::kRunning;
+  job.stage = Stage::kSmooth;
+  job.progress = 0.62;
+  job.mesh.reset();
+  EXPECT_THAT(job_report(job), HasSubstr("smooth, 62 %"));
+  EXPECT_THAT(job_report(job), Not(HasSubstr("total")));
+
+  job.state = JobState::kFailed;
+  job.error.emplace().detail = "the mesh has too many triangles";
+  EXPECT_THAT(job_report(job), HasSubstr("the mesh has too many triangles"));
+  EXPECT_THAT(job_list({job}), HasSubstr("failed"));
+}
+
+TEST(JobJson, AddsWhatTheClientKnows) {
+  const Job job = test::finished_job("7", "mesh");
+  const std::string text = job_json(job, {"out/a.drc", "b\".drc"}, {.upload = 12.5});
+  EXPECT_EQ(job_from_json(text), job);
+  EXPECT_THAT(text, HasSubstr(R"("outputs":["out/a.drc","b\".drc"])"));
+  EXPECT_THAT(text, HasSubstr(R"("client":{"upload":12.5})"));
+}
+
+}  // namespace
+}  // namespace isomesh::cli

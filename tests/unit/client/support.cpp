@@ -1,0 +1,147 @@
+#include "tests/unit/client/support.h"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "client/isomesh/sha256.h"
+
+namespace isomesh::test {
+namespace {
+
+// A bound, listening socket on loopback and its port.
+std::pair<int, int> listen_on_loopback() {
+  const int listener = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof(address);
+  auto* generic = reinterpret_cast<sockaddr*>(&address);
+  if (::bind(listener, generic, size) != 0 || ::listen(listener, 8) != 0 ||
+      ::getsockname(listener, generic, &size) != 0) {
+    throw std::runtime_error("no socket on loopback");
+  }
+  return {listener, ntohs(address.sin_port)};
+}
+
+std::string url_of(int port) { return "http://127.0.0.1:" + std::to_string(port); }
+
+}  // namespace
+
+TemporaryFolder::TemporaryFolder() {
+  std::string pattern = (std::filesystem::temp_directory_path() / "isomesh-XXXXXX").string();
+  if (!::mkdtemp(pattern.data())) throw std::runtime_error("no temporary folder");
+  path_ = pattern;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+std::vector<std::string> TemporaryFolder::names() const {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(path_)) {
+    names.push_back(entry.path().filename().string());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+void write_file(const std::filesystem::path& path, const std::string& content) {
+  std::ofstream(path, std::ios::binary) << content;
+}
+
+std::string read_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::string FakeServer::start() {
+  const int port = http.bind_to_any_port("127.0.0.1");
+  thread_ = std::thread([this] { http.listen_after_bind(); });
+  while (!http.is_running()) std::this_thread::yield();
+  return url_of(port);
+}
+
+FakeServer::~FakeServer() {
+  http.stop();
+  if (thread_.joinable()) thread_.join();
+}
+
+SocketServer::SocketServer(std::function<void(int)> serve) : serve_(std::move(serve)) {
+  std::tie(listener_, port_) = listen_on_loopback();
+  thread_ = std::thread([this] {
+    while (true) {
+      const int socket = ::accept(listener_, nullptr, nullptr);
+      if (socket < 0) return;
+      ++connections_;
+      serve_(socket);
+      ::close(socket);
+    }
+  });
+}
+
+SocketServer::~SocketServer() {
+  ::shutdown(listener_, SHUT_RDWR);
+  thread_.join();
+  ::close(listener_);
+}
+
+std::string SocketServer::url() const { return url_of(port_); }
+
+std::string unused_url() {
+  const auto [listener, port] = listen_on_loopback();
+  ::close(listener);
+  return url_of(port);
+}
+
+std::string read_head(int socket) {
+  std::string head;
+  char byte = 0;
+  while (!head.ends_with("\r\n\r\n") && ::recv(socket, &byte, 1, 0) == 1) head += byte;
+  return head;
+}
+
+void send_text(int socket, const std::string& text) {
+  for (std::size_t sent = 0; sent < text.size();) {
+    const ssize_t count = ::send(socket, text.data() + sent, text.size() - sent, MSG_NOSIGNAL);
+    if (count <= 0) return;
+    sent += static_cast<std::size_t>(count);
+  }
+}
+
+Job finished_job(const std::string& id, const std::string& mesh_bytes) {
+  Sha256 sha256;
+  sha256.update(mesh_bytes);
+  Job job;
+  job.id = id;
+  job.state = JobState::kSucceeded;
+  job.stage = Stage::kDone;
+  job.progress = 1;
+  job.created = "2024-05-01T10:00:00Z";
+  job.parameters.volume = "abc";
+  job.parameters.iso = 60;
+  job.mesh.emplace().files[MeshFormat::kDrc] = {.bytes = mesh_bytes.size(),
+                                                .sha256 = to_hex(sha256.finish()),
+                                                .href = "/v1/jobs/" + id + "/mesh.drc"};
+  return job;
+}
+
+Error error_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error;
+  }
+  return {ErrorCode::kInternal, "nothing was thrown"};
+}
+
+}  // namespace isomesh::test

@@ -1,0 +1,85 @@
+// Servers of this process for the client to talk to, and a folder that goes with the test.
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <httplib.h>
+
+#include "client/isomesh/client.h"
+#include "proto/types.h"
+
+namespace isomesh::test {
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  std::vector<std::string> names() const;  // what lies in it, sorted
+
+ private:
+  std::filesystem::path path_;
+};
+
+void write_file(const std::filesystem::path& path, const std::string& content);
+std::string read_file(const std::filesystem::path& path);
+
+// An HTTP server on a free port of loopback. Routes are added through `http` before `start`.
+class FakeServer {
+ public:
+  FakeServer() = default;
+  ~FakeServer();
+  FakeServer(const FakeServer&) = delete;
+  FakeServer& operator=(const FakeServer&) = delete;
+
+  std::string start();  // returns its URL
+
+  httplib::Server http;
+
+ private:
+  std::thread thread_;
+};
+
+// Accepts connections on a free port of loopback, one after the other, and hands each to `serve`,
+// after which it is closed.
+class SocketServer {
+ public:
+  explicit SocketServer(std::function<void(int socket)> serve);
+  ~SocketServer();
+  SocketServer(const SocketServer&) = delete;
+  SocketServer& operator=(const SocketServer&) = delete;
+
+  std::string url() const;
+  int connections() const { return connections_; }
+
+ private:
+  int listener_;
+  int port_ = 0;
+  std::atomic<int> connections_ = 0;
+  std::function<void(int)> serve_;
+  std::thread thread_;
+};
+
+// A port of loopback that nothing listens on.
+std::string unused_url();
+
+// Reads from the socket until the head of a request has come, and returns it.
+std::string read_head(int socket);
+// Sends all of it; a client that went away is no error.
+void send_text(int socket, const std::string& text);
+
+// A job that has succeeded with one Draco file of these bytes.
+Job finished_job(const std::string& id, const std::string& mesh_bytes);
+
+// The Error that `action` throws; one with the detail "nothing was thrown" when it does not.
+Error error_of(const std::function<void()>& action);
+
+}  // namespace isomesh::test

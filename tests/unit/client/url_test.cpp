@@ -1,0 +1,50 @@
+#include "client/isomesh/url.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/client/support.h"
+
+namespace isomesh {
+namespace {
+
+using Kind = ServerAddress::Kind;
+
+TEST(ServerAddress, IsReadInEveryForm) {
+  const auto expect = [](const std::string& url, const ServerAddress& address) {
+    EXPECT_EQ(parse_server_address(url), address) << url;
+  };
+  expect("http://127.0.0.1:8080", {Kind::kHttp, "127.0.0.1", 8080});
+  expect("http://localhost/", {Kind::kHttp, "localhost", 80});
+  expect("https://meshes.example.org", {Kind::kHttps, "meshes.example.org", 443});
+  expect("https://meshes.example.org:8443/", {Kind::kHttps, "meshes.example.org", 8443});
+  expect("http://[::1]:8080", {Kind::kHttp, "::1", 8080});
+  expect("http://[::1]", {Kind::kHttp, "::1", 80});
+  expect("unix:/run/isomesh/http.sock", {Kind::kUnix, "/run/isomesh/http.sock", 80});
+}
+
+TEST(ServerAddress, RefusesEverythingElse) {
+  for (const std::string url :
+       {"", "localhost:8080", "ftp://a", "http://", "http://:80", "http://a:0", "http://a:65536",
+        "http://a:8o", "http://a:", "http://a/v1", "http://u@a", "http://a b", "http://[::1",
+        "http://[::1]8080", "http://a?b", "http://a\r\nX: y", "unix:"}) {
+    EXPECT_EQ(test::error_of([&] { parse_server_address(url); }).code(),
+              ErrorCode::kInvalidParameter)
+        << url;
+  }
+  EXPECT_EQ(test::error_of([] { parse_server_address("http://" + std::string(9000, 'a')); }).code(),
+            ErrorCode::kInvalidParameter);
+}
+
+TEST(PercentEncode, KeepsOnlyWhatIsUnreserved) {
+  EXPECT_EQ(percent_encode("azAZ09-._~"), "azAZ09-._~");
+  EXPECT_EQ(percent_encode("/?#%&=+ ,:\n"), "%2F%3F%23%25%26%3D%2B%20%2C%3A%0A");
+  EXPECT_EQ(percent_encode("\xc3\xa4"), "%C3%A4");
+}
+
+TEST(QueryString, JoinsEncodedPairs) {
+  EXPECT_EQ(query_string({}), "");
+  EXPECT_EQ(query_string({{"a", "1,2"}, {"b&", "="}}), "?a=1%2C2&b%26=%3D");
+}
+
+}  // namespace
+}  // namespace isomesh

@@ -1,0 +1,356 @@
+// Answers of the server: written by it, read by clients.
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "proto/json.h"
+#include "tests/support/errors.h"
+
+namespace isomesh {
+namespace {
+
+using nlohmann::json;
+using test::code_thrown_by;
+using testing::ElementsAre;
+
+Volume some_volume() {
+  return {.id = "0123abcd",
+          .format = "nifti",
+          .dims = {181, 217, 4294967295},
+          .type = SampleType::kFloat32,
+          .geometry = {.origin = {-90.5, 126, -72},
+                       .spacing = {0.1, 1.0 / 3, 2},
+                       .direction = {0, 1, 0, -1, 0, 0, 0, 0, 1}},
+          .range = {-1024, 3071.5},
+          .suggested_iso = 59.25,
+          .bytes = 18446744073709551615U,
+          .created = "2024-05-01T10:00:00.123Z"};
+}
+
+JobParameters some_parameters() {
+  return {.volume = "0123abcd",
+          .iso = -0.1,
+          .scheme = Scheme::kFive,
+          .interpolation = Interpolation::kMidpoint,
+          .passes = 1000,
+          .smoothing = Smoothing::kTaubin,
+          .lambda = 0.3,
+          .close = true,
+          .formats = {MeshFormat::kStl, MeshFormat::kDrc},
+          .draco = {.position_bits = 30, .speed = 0},
+          .priority = Priority::kStat};
+}
+
+MeshSummary some_mesh() {
+  return {.triangles = 5091320,
+          .vertices = 2544488,
+          .boundary_edges = 7,
+          .components = 12,
+          .euler = -35,
+          .area_mm2 = 593150.7,
+          .volume_mm3 = {.extracted = 2795793.9, .smoothed = 2790000.25},
+          .bounds = {{{-1, -2, -3}, {1, 2, 3}}},
+          .files = {{MeshFormat::kDrc, {.bytes = 1, .sha256 = "aa", .href = "/v1/jobs/7/mesh.drc"}},
+                    {MeshFormat::kObj, {.bytes = 2, .sha256 = "bb", .href = "/v1/jobs/7/mesh.obj"}}}};
+}
+
+Problem some_problem() {
+  return {.type = "urn:isomesh:problem:invalid-parameter",
+          .title = "Invalid parameter",
+          .status = 400,
+          .detail = "iso: is required",
+          .instance = "/v1/jobs",
+          .errors = {{"iso", "is required"}, {"volume", "is required"}}};
+}
+
+Job queued_job() {
+  Job job;
+  job.id = "018f-7";
+  job.parameters = some_parameters();
+  job.created = "2024-05-01T10:00:00.123Z";
+  return job;
+}
+
+Job succeeded_job() {
+  Job job = queued_job();
+  job.state = JobState::kSucceeded;
+  job.stage = Stage::kDone;
+  job.progress = 1;
+  job.started = "2024-05-01T10:00:01.000Z";
+  job.finished = "2024-05-01T10:00:02.000Z";
+  job.timing = {.queue = 0.5, .load = 1, .extract = 2, .smooth = 3, .encode = 4, .total = 11};
+  job.mesh = some_mesh();
+  return job;
+}
+
+Job failed_job() {
+  Job job = queued_job();
+  job.state = JobState::kFailed;
+  job.stage = Stage::kExtract;
+  job.started = job.created;
+  job.finished = job.created;
+  job.error = some_problem();
+  return job;
+}
+
+std::vector<std::string> members_of(const json& object) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : object.items()) names.push_back(name);
+  return names;
+}
+
+// --- Spelling ------------------------------------------------------------------------------------
+
+TEST(AnswerJson, SpellsAVolumeAsTheContractDoes) {
+  const auto written = nlohmann::ordered_json::parse(to_json(some_volume()));
+  std::vector<std::string> names;
+  for (const auto& [name, value] : written.items()) names.push_back(name);
+  EXPECT_THAT(names, ElementsAre("id", "format", "dims", "type", "spacing", "origin", "direction",
+                                 "range", "suggested_iso", "bytes", "created"));
+  EXPECT_EQ(written["dims"], json({181, 217, 4294967295}));
+  EXPECT_EQ(written["type"], "float32");
+  EXPECT_EQ(written["direction"], json({0, 1, 0, -1, 0, 0, 0, 0, 1}));
+  EXPECT_EQ(written["range"], json({-1024, 3071.5}));
+  EXPECT_EQ(written["bytes"], 18446744073709551615U);
+}
+
+TEST(AnswerJson, SpellsParametersAsTheContractDoes) {
+  EXPECT_EQ(json::parse(to_json(some_parameters())),
+            json::parse(R"({"volume": "0123abcd", "iso": -0.1, "scheme": 5,
+                            "interpolation": "midpoint", "passes": 1000, "smoothing": "taubin",
+                            "lambda": 0.3, "close": true, "formats": ["stl", "drc"],
+                            "draco": {"position_bits": 30, "speed": 0}, "priority": "stat"})"));
+}
+
+TEST(AnswerJson, SpellsAnAbsentIsoAsOtsu) {
+  EXPECT_EQ(json::parse(to_json(JobParameters{}))["iso"], "otsu");
+}
+
+TEST(AnswerJson, SpellsAJobAsTheContractDoes) {
+  const json job = json::parse(to_json(succeeded_job()));
+  EXPECT_THAT(members_of(job),
+              testing::UnorderedElementsAre("id", "state", "stage", "progress", "parameters",
+                                            "volume", "priority", "created", "started", "finished",
+                                            "timing", "mesh", "error"));
+  EXPECT_EQ(job["state"], "succeeded");
+  EXPECT_EQ(job["stage"], "done");
+  EXPECT_EQ(job["volume"], "0123abcd");
+  EXPECT_EQ(job["priority"], "stat");
+  EXPECT_TRUE(job["error"].is_null());
+  EXPECT_EQ(job["timing"], json::parse(R"({"queue": 0.5, "load": 1, "extract": 2, "smooth": 3,
+                                           "encode": 4, "total": 11})"));
+}
+
+TEST(AnswerJson, SpellsAMeshAsTheContractDoes) {
+  EXPECT_EQ(json::parse(to_json(succeeded_job()))["mesh"], json::parse(R"({
+      "triangles": 5091320, "vertices": 2544488, "boundary_edges": 7, "components": 12,
+      "euler": -35, "area_mm2": 593150.7,
+      "volume_mm3": {"extracted": 2795793.9, "smoothed": 2790000.25},
+      "bounds": [[-1, -2, -3], [1, 2, 3]],
+      "files": {"drc": {"bytes": 1, "sha256": "aa", "href": "/v1/jobs/7/mesh.drc"},
+                "obj": {"bytes": 2, "sha256": "bb", "href": "/v1/jobs/7/mesh.obj"}}})"));
+}
+
+TEST(AnswerJson, SpellsAProblemAsRfc9457Does) {
+  EXPECT_EQ(json::parse(to_json(some_problem())), json::parse(R"({
+      "type": "urn:isomesh:problem:invalid-parameter", "title": "Invalid parameter", "status": 400,
+      "detail": "iso: is required", "instance": "/v1/jobs",
+      "errors": [{"field": "iso", "message": "is required"},
+                 {"field": "volume", "message": "is required"}]})"));
+}
+
+TEST(AnswerJson, LeavesOutWhatAProblemDoesNotHave) {
+  const Problem bare{.type = "t", .title = "u", .status = 404, .detail = "d"};
+  EXPECT_THAT(members_of(json::parse(to_json(bare))),
+              testing::UnorderedElementsAre("type", "title", "status", "detail"));
+}
+
+TEST(AnswerJson, NothingYetIsNull) {
+  const json job = json::parse(to_json(queued_job()));
+  for (const char* name : {"started", "finished", "mesh", "error"}) {
+    EXPECT_TRUE(job.contains(name) && job[name].is_null()) << name;
+  }
+  EXPECT_EQ(job["timing"]["total"], 0);
+}
+
+TEST(AnswerJson, ListsSayWhereTheNextPageIs) {
+  EXPECT_EQ(json::parse(to_json(std::vector<Job>{})), json::parse(R"({"jobs": [], "next": null})"));
+  EXPECT_EQ(json::parse(to_json(std::vector<Job>{queued_job()}, "018f"))["next"], "018f");
+  EXPECT_EQ(json::parse(to_json(std::vector<Volume>{})), json::parse(R"({"volumes": []})"));
+}
+
+// --- Round trips ---------------------------------------------------------------------------------
+
+TEST(AnswerJson, VolumesComeBackTheSame) {
+  EXPECT_EQ(volume_from_json(to_json(some_volume())), some_volume());
+  EXPECT_EQ(volume_from_json(to_json(Volume{})), Volume{});
+  const std::vector<Volume> several = {some_volume(), Volume{}, some_volume()};
+  EXPECT_EQ(volumes_from_json(to_json(several)), several);
+}
+
+TEST(AnswerJson, JobsComeBackTheSame) {
+  const std::vector<Job> several = {queued_job(), succeeded_job(), failed_job()};
+  for (const Job& job : several) EXPECT_EQ(job_from_json(to_json(job)), job);
+  EXPECT_EQ(jobs_from_json(to_json(several, "next")), several);
+}
+
+TEST(AnswerJson, AJobForOtsuComesBackTheSame) {
+  Job job = queued_job();
+  job.parameters.iso.reset();
+  EXPECT_EQ(job_from_json(to_json(job)), job);
+}
+
+TEST(AnswerJson, ProblemsComeBackTheSame) {
+  EXPECT_EQ(problem_from_json(to_json(some_problem())), some_problem());
+}
+
+TEST(AnswerJson, NumbersComeBackToTheLastBit) {
+  for (const double number : {0.1, 1e-300, 1.7976931348623157e308, 4.9e-324, -0.0, 1.0 / 3,
+                              9007199254740993.0, std::nextafter(60.0, 61.0)}) {
+    Volume volume = some_volume();
+    volume.suggested_iso = number;
+    const double read = volume_from_json(to_json(volume)).suggested_iso;
+    EXPECT_EQ(read, number);
+    EXPECT_EQ(std::signbit(read), std::signbit(number));
+  }
+}
+
+TEST(AnswerJson, EveryEnumeratorComesBack) {
+  for (int number = 0; !to_string(SampleType{number}).empty(); ++number) {
+    Volume volume;
+    volume.type = SampleType{number};
+    EXPECT_EQ(volume_from_json(to_json(volume)), volume);
+  }
+  for (int state = 0; !to_string(JobState{state}).empty(); ++state) {
+    for (int stage = 0; !to_string(Stage{stage}).empty(); ++stage) {
+      Job job;
+      job.state = JobState{state};
+      job.stage = Stage{stage};
+      EXPECT_EQ(job_from_json(to_json(job)), job);
+    }
+  }
+}
+
+TEST(AnswerJson, BytesThatAreNotUtf8AreReplaced) {
+  const Problem problem{.title = "t", .status = 404, .detail = "a\xff\xc3z", .instance = "/\x80"};
+  const Problem read = problem_from_json(to_json(problem));
+  EXPECT_EQ(read.detail.front(), 'a');
+  EXPECT_EQ(read.detail.back(), 'z');
+  EXPECT_EQ(read.detail.find('\xff'), std::string::npos);
+}
+
+// --- From other versions, and from nobody ----------------------------------------------------------
+
+TEST(AnswerJson, UnknownMembersAreIgnored) {
+  json volume = json::parse(to_json(some_volume()));
+  volume["owner"] = "later";
+  volume["extra"] = {{"deep", {1, 2, 3}}};
+  EXPECT_EQ(volume_from_json(volume.dump()), some_volume());
+
+  json job = json::parse(to_json(succeeded_job()));
+  job["worker"] = 7;
+  job["parameters"]["later"] = true;
+  job["timing"]["later"] = 3;
+  job["mesh"]["genus"] = 1;
+  job["mesh"]["files"]["usdz"] = {{"bytes", 1}};
+  job["mesh"]["files"]["drc"]["later"] = 1;
+  EXPECT_EQ(job_from_json(job.dump()), succeeded_job());
+}
+
+class NoAnswer : public testing::TestWithParam<std::string> {};
+
+TEST_P(NoAnswer, IsNotWhatTheApiDescribes) {
+  const std::string text = GetParam();
+  EXPECT_EQ(code_thrown_by([&] { volume_from_json(text); }), ErrorCode::kInternal);
+  EXPECT_EQ(code_thrown_by([&] { job_from_json(text); }), ErrorCode::kInternal);
+  EXPECT_EQ(code_thrown_by([&] { problem_from_json(text); }), ErrorCode::kInternal);
+  EXPECT_EQ(code_thrown_by([&] { volumes_from_json(text); }), ErrorCode::kInternal);
+  EXPECT_EQ(code_thrown_by([&] { jobs_from_json(text); }), ErrorCode::kInternal);
+}
+
+INSTANTIATE_TEST_SUITE_P(Texts, NoAnswer,
+                         testing::Values("", " ", "{", "}", "nul", "null", "true", "7", "\"id\"",
+                                         "[]", "[{}]", "{\"id\": \"a\",}", "{'id': 'a'}", "NaN",
+                                         "<!DOCTYPE html>", "{\"id\": \"\xff\"}",
+                                         std::string(100'000, '['), std::string(100'000, '{'),
+                                         std::string("{\"id\": \"a\"}\0", 12)));
+
+// Sets one member of an answer to something that it must not be.
+struct Fault {
+  const char* pointer;
+  const char* value;
+};
+
+TEST(AnswerJson, MembersOfTheWrongKindAreRefused) {
+  const json good = json::parse(to_json(some_volume()));
+  for (const Fault& fault : std::vector<Fault>{{"/id", "7"},
+                                               {"/dims", "[1]"},
+                                               {"/dims", "7"},
+                                               {"/dims/0", "\"x\""},
+                                               {"/type", "\"int3\""},
+                                               {"/type", "3"},
+                                               {"/spacing", "null"},
+                                               {"/spacing/1", "null"},
+                                               {"/range", "{}"},
+                                               {"/bytes", "\"many\""}}) {
+    json bad = good;
+    bad[json::json_pointer(fault.pointer)] = json::parse(fault.value);
+    EXPECT_EQ(code_thrown_by([&] { volume_from_json(bad.dump()); }), ErrorCode::kInternal)
+        << fault.pointer << ": " << fault.value;
+  }
+}
+
+TEST(AnswerJson, MembersOfAJobOfTheWrongKindAreRefused) {
+  const json good = json::parse(to_json(succeeded_job()));
+  for (const Fault& fault : std::vector<Fault>{{"/state", "\"melted\""},
+                                               {"/state", "null"},
+                                               {"/stage", "\"frying\""},
+                                               {"/progress", "\"1\""},
+                                               {"/parameters", "[]"},
+                                               {"/parameters", "7"},
+                                               {"/parameters/formats", "\"drc\""},
+                                               {"/parameters/draco", "3"},
+                                               {"/timing", "[]"},
+                                               {"/timing", "1"},
+                                               {"/mesh", "[]"},
+                                               {"/mesh/files", "[]"},
+                                               {"/mesh/files/drc", "3"},
+                                               {"/mesh/bounds", "[]"},
+                                               {"/error", "\"broken\""},
+                                               {"/started", "3"}}) {
+    json bad = good;
+    bad[json::json_pointer(fault.pointer)] = json::parse(fault.value);
+    EXPECT_EQ(code_thrown_by([&] { job_from_json(bad.dump()); }), ErrorCode::kInternal)
+        << fault.pointer << ": " << fault.value;
+  }
+}
+
+TEST(AnswerJson, ListsThatAreNotListsAreRefused) {
+  for (const std::string value : {"7", "null", "{}", "\"a\"", "[7]", "[null]", "[[]]", "[\"a\"]"}) {
+    EXPECT_EQ(code_thrown_by([&] { volumes_from_json("{\"volumes\": " + value + "}"); }),
+              ErrorCode::kInternal)
+        << value;
+    EXPECT_EQ(code_thrown_by([&] { jobs_from_json("{\"jobs\": " + value + "}"); }),
+              ErrorCode::kInternal)
+        << value;
+  }
+}
+
+TEST(AnswerJson, AnAnswerWithoutAnIdIsNone) {
+  EXPECT_EQ(code_thrown_by([] { volume_from_json("{}"); }), ErrorCode::kInternal);
+  EXPECT_EQ(code_thrown_by([] { job_from_json("{}"); }), ErrorCode::kInternal);
+}
+
+TEST(AnswerJson, NestingWithoutEndIsReadWithoutRecursion) {
+  const std::string deep =
+      "{\"later\": " + std::string(200'000, '[') + std::string(200'000, ']') + "}";
+  EXPECT_EQ(problem_from_json(deep), Problem{});
+}
+
+}  // namespace
+}  // namespace isomesh

@@ -1,0 +1,344 @@
+// Requests of clients: read by the server.
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/json.h"
+#include "tests/support/errors.h"
+
+namespace isomesh {
+namespace {
+
+using test::code_thrown_by;
+using test::fields_of;
+using test::thrown_by;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::UnorderedElementsAre;
+using Query = std::vector<std::pair<std::string, std::string>>;
+
+// A body with what is required and one member more.
+std::string body_with(const std::string& member) {
+  return R"({"volume": "a", "iso": 60)" + (member.empty() ? "" : ", " + member) + "}";
+}
+
+JobParameters parsed(const std::string& member) { return parse_job_parameters(body_with(member)); }
+
+std::vector<std::string> faults_in(const std::string& body) {
+  const auto error = thrown_by([&] { parse_job_parameters(body); });
+  if (!error) return {"nothing was refused"};
+  EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
+  for (const FieldError& field : error->fields()) {
+    EXPECT_THAT(error->what(), HasSubstr(field.field + ": " + field.message));
+  }
+  return fields_of(*error);
+}
+
+std::vector<std::string> faults_in(const Query& query) {
+  const auto error = thrown_by([&] { parse_job_parameters(query); });
+  return error ? fields_of(*error) : std::vector<std::string>{"nothing was refused"};
+}
+
+// --- Bodies --------------------------------------------------------------------------------------
+
+TEST(JobBody, NeedsAVolumeAndAnIsoOnly) {
+  JobParameters expected;
+  expected.volume = "a";
+  expected.iso = 60;
+  EXPECT_EQ(parsed(""), expected);
+  EXPECT_THAT(faults_in("{}"), UnorderedElementsAre("volume", "iso"));
+  EXPECT_THAT(faults_in(R"({"volume": "a"})"), ElementsAre("iso"));
+  EXPECT_THAT(faults_in(R"({"iso": 3})"), ElementsAre("volume"));
+}
+
+TEST(JobBody, TakesEveryMember) {
+  EXPECT_EQ(parse_job_parameters(R"({"volume": "abc", "iso": -1.5e2, "scheme": 5,
+      "interpolation": "midpoint", "passes": 17, "smoothing": "taubin", "lambda": 0.25,
+      "close": true, "formats": ["stl", "glb"], "draco": {"position_bits": 11, "speed": 3},
+      "priority": "bulk"})"),
+            (JobParameters{.volume = "abc",
+                           .iso = -150,
+                           .scheme = Scheme::kFive,
+                           .interpolation = Interpolation::kMidpoint,
+                           .passes = 17,
+                           .smoothing = Smoothing::kTaubin,
+                           .lambda = 0.25,
+                           .close = true,
+                           .formats = {MeshFormat::kStl, MeshFormat::kGlb},
+                           .draco = {.position_bits = 11, .speed = 3},
+                           .priority = Priority::kBulk}));
+}
+
+TEST(JobBody, IsWhatToJsonWrites) {
+  JobParameters parameters;
+  parameters.volume = "a";
+  EXPECT_EQ(parse_job_parameters(to_json(parameters)), parameters);
+  parameters.iso = 0.1;
+  parameters.formats = {MeshFormat::kObj, MeshFormat::kPly};
+  EXPECT_EQ(parse_job_parameters(to_json(parameters)), parameters);
+}
+
+TEST(JobBody, OtsuStandsForAnIso) {
+  EXPECT_EQ(parse_job_parameters(R"({"volume": "a", "iso": "otsu"})").iso, std::nullopt);
+}
+
+TEST(JobBody, DracoMayBePartial) {
+  EXPECT_EQ(parsed(R"("draco": {})").draco, DracoParameters{});
+  EXPECT_EQ(parsed(R"("draco": {"speed": 0})").draco, (DracoParameters{14, 0}));
+}
+
+TEST(JobBody, AFormatNamedTwiceIsMadeOnce) {
+  EXPECT_THAT(parsed(R"("formats": ["stl", "drc", "stl"])").formats,
+              ElementsAre(MeshFormat::kStl, MeshFormat::kDrc));
+}
+
+TEST(JobBody, TakesTheEdgesOfEveryRange) {
+  EXPECT_EQ(parsed(R"("passes": 0)").passes, 0);
+  EXPECT_EQ(parsed(R"("passes": 1000)").passes, 1000);
+  EXPECT_EQ(parsed(R"("passes": 5.0)").passes, 5);
+  EXPECT_EQ(parsed(R"("lambda": 1)").lambda, 1);
+  EXPECT_EQ(parsed(R"("lambda": 5e-324)").lambda, 5e-324);
+  EXPECT_EQ(parsed(R"("draco": {"position_bits": 8, "speed": 10})").draco,
+            (DracoParameters{8, 10}));
+  EXPECT_EQ(parsed(R"("draco": {"position_bits": 30, "speed": 0})").draco,
+            (DracoParameters{30, 0}));
+  EXPECT_EQ(parsed(R"("scheme": 5)").scheme, Scheme::kFive);
+  EXPECT_EQ(parse_job_parameters(R"({"volume": "a", "iso": 1.7976931348623157e308})").iso,
+            1.7976931348623157e308);
+}
+
+// A member that is out of range or of the wrong type, and the name under which it is refused.
+struct Refused {
+  std::string member;
+  std::string field;
+};
+
+class OneFault : public testing::TestWithParam<Refused> {};
+
+TEST_P(OneFault, IsRefusedByName) {
+  EXPECT_THAT(faults_in(body_with(GetParam().member)), ElementsAre(GetParam().field))
+      << GetParam().member;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Ranges, OneFault,
+    testing::Values(Refused{R"("passes": -1)", "passes"}, Refused{R"("passes": 1001)", "passes"},
+                    Refused{R"("passes": 1e300)", "passes"}, Refused{R"("passes": 4.5)", "passes"},
+                    Refused{R"("passes": 18446744073709551621)", "passes"},
+                    Refused{R"("lambda": 0)", "lambda"}, Refused{R"("lambda": -0.5)", "lambda"},
+                    Refused{R"("lambda": 1.0000000000000002)", "lambda"},
+                    Refused{R"("scheme": 4)", "scheme"}, Refused{R"("scheme": 7)", "scheme"},
+                    Refused{R"("scheme": 5.5)", "scheme"},
+                    Refused{R"("draco": {"position_bits": 7})", "draco.position_bits"},
+                    Refused{R"("draco": {"position_bits": 31})", "draco.position_bits"},
+                    Refused{R"("draco": {"speed": -1})", "draco.speed"},
+                    Refused{R"("draco": {"speed": 11})", "draco.speed"}));
+
+INSTANTIATE_TEST_SUITE_P(
+    Types, OneFault,
+    testing::Values(Refused{R"("scheme": "6")", "scheme"}, Refused{R"("scheme": true)", "scheme"},
+                    Refused{R"("scheme": null)", "scheme"}, Refused{R"("scheme": [6])", "scheme"},
+                    Refused{R"("interpolation": 1)", "interpolation"},
+                    Refused{R"("interpolation": "cubic")", "interpolation"},
+                    Refused{R"("interpolation": "Linear")", "interpolation"},
+                    Refused{R"("interpolation": "")", "interpolation"},
+                    Refused{R"("passes": "5")", "passes"}, Refused{R"("passes": false)", "passes"},
+                    Refused{R"("passes": null)", "passes"},
+                    Refused{R"("smoothing": "gauss")", "smoothing"},
+                    Refused{R"("lambda": "1")", "lambda"}, Refused{R"("lambda": {})", "lambda"},
+                    Refused{R"("close": 1)", "close"}, Refused{R"("close": "true")", "close"},
+                    Refused{R"("formats": [])", "formats"},
+                    Refused{R"("formats": "drc")", "formats"},
+                    Refused{R"("formats": {"drc": 1})", "formats"},
+                    Refused{R"("formats": ["drc", "exe"])", "formats"},
+                    Refused{R"("formats": ["drc", 1, 2])", "formats"},
+                    Refused{R"("draco": 14)", "draco"}, Refused{R"("draco": null)", "draco"},
+                    Refused{R"("draco": [14, 7])", "draco"},
+                    Refused{R"("priority": "urgent")", "priority"},
+                    Refused{R"("priority": 0)", "priority"}));
+
+INSTANTIATE_TEST_SUITE_P(UnknownMembers, OneFault,
+                         testing::Values(Refused{R"("isovalue": 3)", "isovalue"},
+                                         Refused{R"("Iso": 3)", "Iso"}, Refused{R"("": 3)", ""},
+                                         Refused{R"("position_bits": 14)", "position_bits"},
+                                         Refused{R"("draco": {"bits": 3})", "draco.bits"}));
+
+TEST(JobBody, AnIsoThatIsNoNumberIsRefused) {
+  for (const std::string iso :
+       {"\"60\"", "\"Otsu\"", "\"\"", "null", "true", "[60]", "{}", "\"NaN\"", "\"inf\""}) {
+    EXPECT_THAT(faults_in(R"({"volume": "a", "iso": )" + iso + "}"), ElementsAre("iso")) << iso;
+  }
+}
+
+TEST(JobBody, AVolumeThatIsNoStringIsRefused) {
+  for (const std::string volume : {"7", "null", "[\"a\"]", "{}"}) {
+    EXPECT_THAT(faults_in(R"({"iso": 1, "volume": )" + volume + "}"), ElementsAre("volume"));
+  }
+}
+
+TEST(JobBody, AllFaultsAreNamedAtOnce) {
+  EXPECT_THAT(faults_in(R"({"iso": "x", "scheme": 9, "passes": -1, "close": 0, "lambda": 2,
+                            "draco": {"speed": 99, "bits": 1}, "unknown": 1})"),
+              UnorderedElementsAre("volume", "iso", "scheme", "passes", "close", "lambda",
+                                   "draco.speed", "draco.bits", "unknown"));
+}
+
+TEST(JobBody, MessagesSayWhatIsAllowed) {
+  const auto detail = [](const std::string& member) {
+    return std::string(thrown_by([&] { parsed(member); })->what());
+  };
+  EXPECT_EQ(detail(R"("passes": 1001)"), "passes: must be a whole number from 0 to 1000");
+  EXPECT_EQ(detail(R"("draco": {"position_bits": 31})"),
+            "draco.position_bits: must be a whole number from 8 to 30");
+  EXPECT_EQ(detail(R"("draco": {"speed": 31})"),
+            "draco.speed: must be a whole number from 0 to 10");
+  EXPECT_EQ(detail(R"("scheme": 7)"), "scheme: must be 5 or 6");
+  EXPECT_EQ(detail(R"("priority": "x")"), R"(priority: must be "stat", "routine" or "bulk")");
+  EXPECT_EQ(detail(R"("isovalue": 3)"), "isovalue: is not a known member");
+}
+
+// --- Hostile bodies --------------------------------------------------------------------------------
+
+class HostileBody : public testing::TestWithParam<std::string> {};
+
+TEST_P(HostileBody, IsRefused) {
+  EXPECT_EQ(code_thrown_by([&] { parse_job_parameters(GetParam()); }),
+            ErrorCode::kInvalidParameter);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Bodies, HostileBody,
+    testing::Values("", " ", "null", "7", "\"volume\"", "[]", R"([{"volume": "a", "iso": 1}])",
+                    R"({"volume": "a", "iso": NaN})", R"({"volume": "a", "iso": Infinity})",
+                    R"({"volume": "a", "iso": 1e999})", R"({"volume": "a", "iso": -1e999})",
+                    R"({"volume": "a", "iso": 1)", R"({"volume": "a", "iso": 1}})",
+                    R"({"volume": "a", "iso": 1} {})", R"({"volume": "a", "iso": 1,})",
+                    R"({"volume": "a", /* comment */ "iso": 1})", "{\"volume\": \"\xff\"}",
+                    "{\"volume\": \"a\xc3\", \"iso\": 1}", "{\"volume\": \"a\nb\", \"iso\": 1}",
+                    std::string("{\"volume\": \"a\", \"iso\": 1}\0", 27),
+                    std::string(65536, '['), std::string(65536, '{'),
+                    R"({"volume": "a", "iso": )" + std::string(30'000, '[') +
+                        std::string(30'000, ']') + "}",
+                    R"({"volume": "a", "iso": 1, "draco": )" + std::string(30'000, '[') +
+                        std::string(30'000, ']') + "}",
+                    "{\"volume\": \"a\", \"iso\": " + std::string(60'000, '9') + "}"));
+
+TEST(JobBody, LongNamesAndValuesDoNotComeBackWhole) {
+  const std::string longest(64 * 1024, 'x');
+  for (const std::string& body :
+       {body_with('"' + longest + "\": 1"), body_with("\"interpolation\": \"" + longest + '"')}) {
+    const auto error = thrown_by([&] { parse_job_parameters(body); });
+    ASSERT_TRUE(error);
+    EXPECT_LT(std::string(error->what()).size(), 1000U);
+  }
+}
+
+TEST(JobBody, ManyUnknownMembersDoNotComeBackAll) {
+  std::string body = R"({"volume": "a", "iso": 1)";
+  for (int n = 0; n < 5000; ++n) body += ", \"m" + std::to_string(n) + "\": 1";
+  const auto error = thrown_by([&] { parse_job_parameters(body + "}"); });
+  ASSERT_TRUE(error);
+  EXPECT_GE(error->fields().size(), 10U);
+  EXPECT_LE(error->fields().size(), 100U);
+}
+
+TEST(JobBody, ALongVolumeIsAnIdThatNothingHas) {
+  const std::string longest(60 * 1024, 'x');
+  EXPECT_EQ(parse_job_parameters(R"({"iso": 1, "volume": ")" + longest + "\"}").volume, longest);
+}
+
+// As RFC 8259 says of most readers; what matters is that a wrong one never hides.
+TEST(JobBody, OfAMemberGivenTwiceTheLastCounts) {
+  EXPECT_EQ(parse_job_parameters(R"({"volume": "a", "iso": 1, "iso": 2})").iso, 2);
+  EXPECT_THAT(faults_in(R"({"volume": "a", "iso": 1, "scheme": 5, "scheme": 9})"),
+              ElementsAre("scheme"));
+}
+
+TEST(JobBody, MembersOfNonUtf8NamesAreRefusedWithoutThem) {
+  const auto error = thrown_by([] { parsed("\"\\ud800\": 1"); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
+}
+
+// --- Queries ---------------------------------------------------------------------------------------
+
+TEST(JobQuery, NeedsAnIsoOnly) {
+  JobParameters expected;
+  expected.iso = 60;
+  EXPECT_EQ(parse_job_parameters(Query{{"iso", "60"}}), expected);
+  EXPECT_THAT(faults_in(Query{}), ElementsAre("iso"));
+}
+
+TEST(JobQuery, TakesEveryParameter) {
+  EXPECT_EQ(parse_job_parameters(Query{{"iso", "-1.5e2"},
+                                       {"scheme", "5"},
+                                       {"interpolation", "midpoint"},
+                                       {"passes", "17"},
+                                       {"smoothing", "taubin"},
+                                       {"lambda", "0.25"},
+                                       {"close", "true"},
+                                       {"format", "stl,glb"},
+                                       {"position_bits", "11"},
+                                       {"speed", "3"},
+                                       {"priority", "bulk"}}),
+            (JobParameters{.volume = "",
+                           .iso = -150,
+                           .scheme = Scheme::kFive,
+                           .interpolation = Interpolation::kMidpoint,
+                           .passes = 17,
+                           .smoothing = Smoothing::kTaubin,
+                           .lambda = 0.25,
+                           .close = true,
+                           .formats = {MeshFormat::kStl, MeshFormat::kGlb},
+                           .draco = {.position_bits = 11, .speed = 3},
+                           .priority = Priority::kBulk}));
+}
+
+TEST(JobQuery, OtsuStandsForAnIso) {
+  EXPECT_EQ(parse_job_parameters(Query{{"iso", "otsu"}}).iso, std::nullopt);
+}
+
+// Faults are named as the client spelled them.
+TEST(JobQuery, RefusesByTheQuerysNames) {
+  const auto fault = [](const std::string& name, const std::string& value) {
+    return faults_in(Query{{"iso", "1"}, {name, value}});
+  };
+  for (const auto& [name, value] : Query{{"scheme", "7"},
+                                         {"scheme", ""},
+                                         {"passes", "five"},
+                                         {"passes", "-1"},
+                                         {"lambda", "0"},
+                                         {"close", "yes"},
+                                         {"priority", "urgent"},
+                                         {"format", ""},
+                                         {"format", "exe"},
+                                         {"format", "drc,,stl"},
+                                         {"position_bits", "7"},
+                                         {"speed", "11"},
+                                         {"speed", ""},
+                                         {"volume", "abc"},
+                                         {"formats", "drc"},
+                                         {"draco", "{}"},
+                                         {"isovalue", "3"}}) {
+    EXPECT_THAT(fault(name, value), ElementsAre(name)) << name << '=' << value;
+  }
+}
+
+TEST(JobQuery, RefusesAnIsoThatIsNoNumber) {
+  for (const std::string iso : {"", "abc", "nan", "inf", "1e999", "true", "[1]", "0x10", "1,5"}) {
+    EXPECT_THAT(faults_in(Query{{"iso", iso}}), ElementsAre("iso")) << iso;
+  }
+}
+
+TEST(JobQuery, RefusesAParameterGivenTwice) {
+  EXPECT_THAT(faults_in(Query{{"iso", "1"}, {"iso", "2"}}), ElementsAre("iso"));
+  EXPECT_THAT(faults_in(Query{{"iso", "1"}, {"speed", "2"}, {"speed", "2"}}), ElementsAre("speed"));
+  EXPECT_THAT(faults_in(Query{{"iso", "1"}, {"format", "drc"}, {"format", "stl"}}),
+              ElementsAre("format"));
+}
+
+}  // namespace
+}  // namespace isomesh

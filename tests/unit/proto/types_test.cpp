@@ -1,0 +1,95 @@
+#include "proto/types.h"
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace isomesh {
+namespace {
+
+// All names of an enumeration whose values are numbered without gaps, in order.
+template <class Enum>
+std::vector<std::string> names() {
+  std::vector<std::string> all;
+  for (int number = 0; !to_string(Enum{number}).empty(); ++number) {
+    all.emplace_back(to_string(Enum{number}));
+  }
+  return all;
+}
+
+template <class Enum>
+void expect_names(const std::vector<std::string>& expected) {
+  EXPECT_EQ(names<Enum>(), expected);
+  for (std::size_t number = 0; number < expected.size(); ++number) {
+    EXPECT_EQ(from_string<Enum>(expected[number]), Enum{static_cast<int>(number)});
+  }
+  for (const std::string wrong : {"", " ", "DRC", "Linear", "uint8 ", "0", "5"}) {
+    EXPECT_EQ(from_string<Enum>(wrong), std::nullopt) << wrong;
+  }
+}
+
+TEST(Names, AreThoseOfTheContract) {
+  expect_names<SampleType>(
+      {"uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"});
+  expect_names<Interpolation>({"linear", "midpoint"});
+  expect_names<Smoothing>({"laplacian", "taubin"});
+  expect_names<MeshFormat>({"drc", "glb", "stl", "ply", "obj"});
+  expect_names<Priority>({"stat", "routine", "bulk"});
+  expect_names<JobState>({"queued", "running", "succeeded", "failed", "cancelled"});
+  expect_names<Stage>({"queue", "load", "extract", "smooth", "encode", "done"});
+}
+
+TEST(NamesOf, AreForPeople) {
+  EXPECT_EQ(names_of<Interpolation>(), R"("linear" or "midpoint")");
+  EXPECT_EQ(names_of<Smoothing>(), R"("laplacian" or "taubin")");
+  EXPECT_EQ(names_of<Priority>(), R"("stat", "routine" or "bulk")");
+  EXPECT_EQ(names_of<MeshFormat>(), R"("drc", "glb", "stl", "ply" or "obj")");
+  EXPECT_EQ(names_of<JobState>(),
+            R"("queued", "running", "succeeded", "failed" or "cancelled")");
+}
+
+TEST(NamesOf, HoldsEveryName) {
+  for (const std::string& name : names<SampleType>()) {
+    EXPECT_NE(names_of<SampleType>().find('"' + name + '"'), std::string::npos) << name;
+  }
+}
+
+TEST(BytesPerSample, FollowsTheName) {
+  const std::vector<std::size_t> expected = {1, 1, 2, 2, 4, 4, 4, 8};
+  for (std::size_t number = 0; number < expected.size(); ++number) {
+    EXPECT_EQ(bytes_per_sample(SampleType{static_cast<int>(number)}), expected[number]);
+  }
+}
+
+TEST(IsFinal, IsTrueForTheThreeEnds) {
+  EXPECT_FALSE(is_final(JobState::kQueued));
+  EXPECT_FALSE(is_final(JobState::kRunning));
+  EXPECT_TRUE(is_final(JobState::kSucceeded));
+  EXPECT_TRUE(is_final(JobState::kFailed));
+  EXPECT_TRUE(is_final(JobState::kCancelled));
+}
+
+TEST(Volume, CountsSamplesBeyond32Bits) {
+  Volume volume;
+  volume.dims = {4096, 4096, 4096};
+  EXPECT_EQ(volume.sample_count(), std::uint64_t{1} << 36);
+}
+
+// The contract's table.
+TEST(JobParameters, HaveTheContractsDefaults) {
+  const JobParameters parameters;
+  EXPECT_EQ(parameters.scheme, Scheme::kSix);
+  EXPECT_EQ(parameters.interpolation, Interpolation::kLinear);
+  EXPECT_EQ(parameters.passes, 5);
+  EXPECT_EQ(parameters.smoothing, Smoothing::kLaplacian);
+  EXPECT_EQ(parameters.lambda, 1);
+  EXPECT_FALSE(parameters.close);
+  EXPECT_EQ(parameters.formats, std::vector{MeshFormat::kDrc});
+  EXPECT_EQ(parameters.draco, (DracoParameters{.position_bits = 14, .speed = 7}));
+  EXPECT_EQ(parameters.priority, Priority::kRoutine);
+}
+
+}  // namespace
+}  // namespace isomesh

@@ -1,0 +1,75 @@
+#include "tests/unit/volume/files.h"
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+namespace isomesh::volume::test {
+namespace {
+
+// Runs an import that is given a target; keeps what came of it.
+template <class Import>
+Outcome outcome_of(const Folder& folder, const Import& import) {
+  Outcome outcome;
+  const std::filesystem::path target = folder.path("target");
+  try {
+    outcome.volume = import(target);
+    outcome.canonical = read_file(target);
+  } catch (const Error& error) {
+    outcome.code = error.code();
+    outcome.error = error.what();
+  }
+  return outcome;
+}
+
+}  // namespace
+
+std::string read_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+Folder::Folder() {
+  std::string name = (std::filesystem::temp_directory_path() / "isomesh-volume-XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp failed");
+  path_ = name;
+}
+
+Folder::~Folder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+std::filesystem::path Folder::write(std::string_view name, std::string_view bytes) const {
+  std::ofstream file(path(name), std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  return path(name);
+}
+
+std::size_t Folder::entries() const {
+  const std::filesystem::directory_iterator all(path_);
+  return static_cast<std::size_t>(std::distance(begin(all), end(all)));
+}
+
+Outcome import_bytes(std::string_view bytes, const ImportLimits& limits) {
+  const Folder folder;
+  const Folder scratch;
+  const auto source = folder.write("upload", bytes);
+  Outcome outcome = outcome_of(folder, [&](const std::filesystem::path& target) {
+    return import_file(source, scratch.path(""), limits, target);
+  });
+  if (scratch.entries() != 0) throw std::logic_error("an import left files behind");
+  return outcome;
+}
+
+Outcome import_raw_bytes(std::string_view bytes, const RawDescription& description,
+                         const ImportLimits& limits) {
+  const Folder folder;
+  const auto source = folder.write("upload", bytes);
+  return outcome_of(folder, [&](const std::filesystem::path& target) {
+    return import_raw(source, description, limits, target);
+  });
+}
+
+}  // namespace isomesh::volume::test
