@@ -94,6 +94,7 @@ std::vector<MeshFormat> formats_of(const std::vector<Output>& outputs) {
 
 std::vector<std::filesystem::path> paths_of(const std::vector<Output>& outputs) {
   std::vector<std::filesystem::path> paths;
+  paths.reserve(outputs.size());
   for (const Output& output : outputs) paths.push_back(output.path);
   return paths;
 }

@@ -3,7 +3,6 @@
 #include <csignal>
 
 #include <pthread.h>
-#include <time.h>
 #include <unistd.h>
 
 namespace isomesh::cli {
@@ -17,11 +16,10 @@ sigset_t stop_signals() {
   return signals;
 }
 
-void wait_for_signals(const std::stop_token& over, std::stop_source source) {
+void wait_for_signals(const std::stop_token& over, std::stop_source& source) {
   const sigset_t signals = stop_signals();
-  constexpr timespec kLook{.tv_sec = 0, .tv_nsec = 20'000'000};
-  while (!over.stop_requested()) {
-    if (::sigtimedwait(&signals, nullptr, &kLook) < 0) continue;
+  int signal = 0;
+  while (::sigwait(&signals, &signal) == 0 && !over.stop_requested()) {
     if (!source.request_stop()) ::_exit(1);
   }
 }
@@ -32,7 +30,13 @@ Interrupt::Interrupt() {
   const sigset_t signals = stop_signals();
   ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   waiter_ = std::jthread(
-      [source = source_](const std::stop_token& over) { wait_for_signals(over, source); });
+      [source = source_](const std::stop_token& over) mutable { wait_for_signals(over, source); });
+}
+
+Interrupt::~Interrupt() {
+  waiter_.request_stop();
+  // Wakes it; nobody else receives a signal that is sent to one thread.
+  ::pthread_kill(waiter_.native_handle(), SIGINT);
 }
 
 }  // namespace isomesh::cli

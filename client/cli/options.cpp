@@ -68,8 +68,8 @@ Enum name_from(const std::string& option, const std::string& text) {
 
 // `--option VALUE` that calls `take(VALUE)`.
 CLI::Option* add(CLI::App& app, const std::string& name, const std::string& value,
-                 const std::string& help, std::function<void(const std::string&)> take) {
-  return app.add_option_function<std::string>(name, std::move(take), help)->type_name(value);
+                 const std::string& help, const std::function<void(const std::string&)>& take) {
+  return app.add_option_function<std::string>(name, take, help)->type_name(value);
 }
 
 template <class Number>

@@ -32,7 +32,7 @@ std::size_t width_of(std::string_view text) {
 std::string grouped(std::int64_t value) { return with_commas(std::to_string(value)); }
 
 std::string fixed(double value, int decimals) {
-  const std::string text = printed("%.*f", decimals, value);
+  std::string text = printed("%.*f", decimals, value);
   if (!std::isfinite(value)) return text;
   const std::size_t point = std::min(text.find('.'), text.size());
   return with_commas(text.substr(0, point)) + text.substr(point);

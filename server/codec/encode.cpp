@@ -4,14 +4,16 @@
 
 namespace isomesh::codec {
 
-void encode(const mesh::Mesh& mesh, MeshFormat format, const DracoParameters& draco,
+void encode(const mesh::Mesh& mesh, MeshFormat format, const Provenance& provenance,
             const mesh::Context& context, const Sink& sink) {
+  const DracoParameters& draco = provenance.parameters.draco;
   switch (format) {
     case MeshFormat::kDrc:
       return encode_drc(mesh, draco, context, sink);
     case MeshFormat::kStl:
       return encode_stl(mesh, context, sink);
     case MeshFormat::kGlb:
+      return encode_glb(mesh, draco, provenance, context, sink);
     case MeshFormat::kPly:
     case MeshFormat::kObj:
       break;
@@ -21,7 +23,7 @@ void encode(const mesh::Mesh& mesh, MeshFormat format, const DracoParameters& dr
 }
 
 bool can_encode(MeshFormat format) {
-  return format == MeshFormat::kDrc || format == MeshFormat::kStl;
+  return format == MeshFormat::kDrc || format == MeshFormat::kGlb || format == MeshFormat::kStl;
 }
 
 std::string_view media_type(MeshFormat format) {

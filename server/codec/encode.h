@@ -1,9 +1,12 @@
 // Mesh -> bytes of a file format.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <span>
+#include <string_view>
 
 #include "proto/types.h"
 #include "server/mesh/context.h"
@@ -14,7 +17,7 @@ namespace isomesh::codec {
 // Takes the encoded bytes, in order; may throw, which ends the encoding.
 using Sink = std::function<void(std::span<const std::byte>)>;
 
-// One Draco stream of the whole mesh (edgebreaker connectivity), millimetres in LPS. Positions are
+// One Draco stream of the whole mesh (edgebreaker connectivity; sequential at speed 10), millimetres in LPS. Positions are
 // quantised to draco.position_bits bits on a cubic grid that covers the mesh's bounds exactly, so
 // that a decoded vertex is within half a grid step of its place along each axis. The stream keeps
 // the number of vertices and triangles. Thread safe. Throws Error kInternal when Draco refuses, and
@@ -26,8 +29,25 @@ void encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco,
 // triangles, and kCancelled.
 void encode_stl(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink);
 
-// Dispatches on the format. Throws Error kInvalidParameter for a format that is not supported.
-void encode(const mesh::Mesh& mesh, MeshFormat format, const DracoParameters& draco,
+// What a file says about where its mesh comes from.
+struct Provenance {
+  JobParameters parameters;
+  double iso = 0;  // the value that was used, also where parameters say Otsu
+  std::array<std::uint32_t, 3> dims = {0, 0, 0};
+  Geometry geometry;
+};
+
+// Binary glTF 2.0: the mesh as one primitive for each run of some 200 000 triangles, each a Draco
+// stream of its own (KHR_draco_mesh_compression), encoded side by side. All share one quantisation
+// grid, so vertices on a seam between runs decode to the same bits. Positions are LPS millimetres
+// under a node that turns them into glTF's metres with Y up. The bytes do not depend on the number of
+// threads. Throws Error kTooLarge beyond the 4 GiB that GLB can hold, kInternal when Draco refuses,
+// and kCancelled, looked at before each run.
+void encode_glb(const mesh::Mesh& mesh, const DracoParameters& draco,
+                const Provenance& provenance, const mesh::Context& context, const Sink& sink);
+
+// Dispatches on the format; draco parameters are those of the provenance. Throws Error kInvalidParameter for a format that is not supported.
+void encode(const mesh::Mesh& mesh, MeshFormat format, const Provenance& provenance,
             const mesh::Context& context, const Sink& sink);
 
 // True for the formats that `encode` writes.

@@ -1,8 +1,11 @@
 #include "server/jobs/pipeline.h"
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <numeric>
 #include <string>
+#include <vector>
 
 #include "server/codec/encode.h"
 #include "server/mesh/extract.h"
@@ -100,31 +103,34 @@ void extract(const volume::CanonicalVolume& volume, const mesh::ExtractOptions& 
   }
 }
 
-// Encodes every format and, beside it, measures the mesh: Draco runs on one thread.
-void encode_and_measure(const JobParameters& parameters, const store::BlobStore& blobs,
+// Encodes every format and measures the mesh, all side by side: a single Draco stream takes one thread.
+void encode_and_measure(const codec::Provenance& provenance, const store::BlobStore& blobs,
                         const Progress& progress, const mesh::Mesh& mesh, MeshSummary& summary) {
+  const std::vector<MeshFormat>& formats = provenance.parameters.formats;
+  std::vector<std::atomic<double>> done(formats.size());
+  std::vector<store::Blob> encoded(formats.size());
+  const mesh::Context stage = progress.context();
+  const auto encode = [&](std::size_t i) {
+    const mesh::Context context = {stage.stop, [&, i](double share) {
+      done[i] = share;
+      const double sum = std::accumulate(done.begin(), done.end(), 0.0);
+      stage.progress(sum / static_cast<double>(formats.size()));
+    }};
+    store::BlobStore::Writer writer(blobs);
+    codec::encode(mesh, formats[i], provenance, context,
+                  [&](std::span<const std::byte> bytes) { writer.write(bytes); });
+    encoded[i] = writer.commit();
+  };
   mesh::Extent extent;
   mesh::Topology topology;
-  const std::size_t formats = parameters.formats.size();
-  const auto encode_all = [&] {
-    for (std::size_t i = 0; i < formats; ++i) {
-      const auto part = [&](std::size_t n) {
-        return static_cast<double>(n) / static_cast<double>(formats);
-      };
-      store::BlobStore::Writer writer(blobs);
-      codec::encode(mesh, parameters.formats[i], parameters.draco,
-                    progress.context(part(i), part(i + 1)),
-                    [&](std::span<const std::byte> bytes) { writer.write(bytes); });
-      const store::Blob blob = writer.commit();
-      summary.files[parameters.formats[i]] = {blob.bytes, blob.key, ""};
-    }
-  };
-  const auto measure = [&] {
+  mesh::parallel_for(progress.quiet(), formats.size() + 1, [&](std::size_t task) {
+    if (task < formats.size()) return encode(task);
     extent = measure_extent(mesh, progress.quiet());
     topology = measure_topology(mesh, progress.quiet());
-  };
-  mesh::parallel_for(progress.quiet(), 2,
-                     [&](std::size_t task) { task == 0 ? encode_all() : measure(); });
+  });
+  for (std::size_t i = 0; i < formats.size(); ++i) {
+    summary.files[formats[i]] = {encoded[i].bytes, encoded[i].key, ""};
+  }
   summary.boundary_edges = topology.boundary_edges;
   summary.components = topology.components;
   summary.euler = topology.euler;
@@ -169,8 +175,9 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
   samples.preload();
 
   progress.enter(Stage::kExtract, kExtractShare, &Timing::extract);
+  const double iso = parameters.iso.value_or(volume.suggested_iso);
   extract(samples,
-          {.iso = parameters.iso.value_or(volume.suggested_iso),
+          {.iso = iso,
            .scheme = parameters.scheme,
            .interpolation = parameters.interpolation},
           progress, mesh);
@@ -187,7 +194,8 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
   }
 
   progress.enter(Stage::kEncode, kEncodeShare, &Timing::encode);
-  encode_and_measure(parameters, blobs, progress, mesh, summary);
+  encode_and_measure({parameters, iso, volume.dims, volume.geometry}, blobs, progress, mesh,
+                     summary);
   progress.end_stage();
   result.timing = progress.timing();
   return result;

@@ -7,8 +7,9 @@
 namespace isomesh::mesh {
 
 // An array that the kernels fill: its memory is neither zeroed nor copied when it grows, and it is
-// kept when it shrinks, so that the next job finds pages that are mapped already. Not thread safe;
-// disjoint elements may be written from several threads.
+// kept when it shrinks, so that the next job finds pages that are mapped already. One element past
+// the last may be read, though not relied on: kernels load vectors that are wider than an element.
+// Not thread safe; disjoint elements may be written from several threads.
 template <class T>
 class Buffer {
  public:
@@ -17,10 +18,11 @@ class Buffer {
     if (count > capacity_) {
       data_.reset();  // give the old block back before asking for the larger one
       capacity_ = 0;
-      data_ = std::make_unique_for_overwrite<T[]>(count);
+      data_ = std::make_unique_for_overwrite<T[]>(count + 1);
       capacity_ = count;
     }
     size_ = count;
+    if (data_) data_[count] = T{};
   }
 
   std::size_t size() const { return size_; }

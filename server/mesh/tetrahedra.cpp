@@ -106,6 +106,13 @@ constexpr CellSplit make_split(const std::array<Tetrahedron, N>& paper, Corner m
       }
     }
   }
+  for (unsigned inside = 0; inside < 256; ++inside) {
+    for (unsigned direction = 1; direction < 8; ++direction) {
+      const EdgeEnds ends = split.ends[direction];
+      const bool crossed = ((inside >> ends.from ^ inside >> ends.to) & 1) != 0;
+      split.crossed[inside] |= static_cast<std::uint8_t>(crossed ? 1U << direction : 0);
+    }
+  }
   return split;
 }
 

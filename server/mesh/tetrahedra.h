@@ -45,7 +45,10 @@ struct CellSplit {
   std::array<std::array<std::uint8_t, 4>, 6> corners = {};  // of each tetrahedron
   std::size_t tetrahedra = 0;
   std::array<CellCase, 256> cases = {};
-  std::array<EdgeEnds, 8> ends = {};  // of the edge of each direction that corner 0 owns
+  // Of the edges that corner 0 owns, by direction: the corners that each joins, and for each case
+  // the set (bit d: direction d) of those that the surface crosses.
+  std::array<EdgeEnds, 8> ends = {};
+  std::array<std::uint8_t, 256> crossed = {};
 };
 
 // The split of a cell whose corner 0 has even or odd i+j+k; with six tetrahedra they are the same.

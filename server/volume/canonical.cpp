@@ -20,8 +20,8 @@ namespace {
 
 constexpr int kVersion = 1;
 
-template <std::size_t kSize>
-std::array<double, kSize> without_negative_zeros(std::array<double, kSize> values) {
+template <std::size_t Size>
+std::array<double, Size> without_negative_zeros(std::array<double, Size> values) {
   for (double& value : values) value += 0.0;
   return values;
 }

@@ -1,6 +1,7 @@
 #include "server/volume/metaimage.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <string>
 #include <vector>
@@ -38,7 +39,11 @@ void add_field(Fields& fields, std::string_view line) {
     throw_unusable("The MetaImage header has a line that is no field: " + in_quotes(line) + ".");
   }
   const std::string key(trim(line.substr(0, equals)));
-  if (!fields.emplace(key, trim(line.substr(equals + 1))).second) {
+  const std::string_view value = trim(line.substr(equals + 1));
+  if (has_control_characters(value)) {
+    throw_unusable("The MetaImage header's field " + in_quotes(key) + " holds control characters.");
+  }
+  if (!fields.emplace(key, value).second) {
     throw_unusable("The MetaImage header has the field " + in_quotes(key) + " twice.");
   }
 }
@@ -83,9 +88,7 @@ bool flag(const Fields& fields, std::string_view name, bool otherwise) {
 
 void refuse_other_files(const Fields& fields) {
   if (lower(optional(fields, kLastKey)) == "local") return;
-  throw_unusable(
-      "Its samples are in another file; send the volume as one .mha, or the .mhd and "
-      "its data together.");
+  throw_unusable("Its samples are in another file; send the volume as one .mha.");
 }
 
 std::vector<std::uint64_t> sizes_of(const Fields& fields) {
@@ -178,10 +181,12 @@ void check_numbers(const Fields& fields, std::string_view name, std::size_t coun
   const std::string_view value = optional(fields, name);
   if (value.empty()) return;
   const auto numbers = words(value);
-  const auto is_number = [](std::string_view word) { return parse_double(word).has_value(); };
+  const auto is_number = [](std::string_view word) {
+    return std::isfinite(parse_double(word).value_or(HUGE_VAL));
+  };
   if (numbers.size() == count && std::all_of(numbers.begin(), numbers.end(), is_number)) return;
   throw_unusable("The MetaImage header's " + in_quotes(name) + " is not " + std::to_string(count) +
-                 " numbers.");
+                 " finite numbers.");
 }
 
 // MetaIO knows several names for the same thing.

@@ -49,8 +49,8 @@ class Fields {
     return value;
   }
 
-  template <class Stored, class Value, std::size_t kCount>
-  void read(std::size_t offset, std::array<Value, kCount>& values) const {
+  template <class Stored, class Value, std::size_t Count>
+  void read(std::size_t offset, std::array<Value, Count>& values) const {
     for (Value& value : values) {
       value = at<Stored>(offset);
       offset += sizeof(Stored);

@@ -1,6 +1,7 @@
 #include "server/volume/nrrd.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -38,7 +39,11 @@ void add_field(Fields& fields, std::string_view line) {
   // "key:=value" is a remark of some program's.
   if (line.substr(colon).starts_with(":=")) return;
   const std::string name = field_name(line.substr(0, colon));
-  if (!fields.emplace(name, trim(line.substr(colon + 1))).second) {
+  const std::string_view value = trim(line.substr(colon + 1));
+  if (has_control_characters(value)) {
+    throw_unusable("The NRRD header's field " + in_quotes(name) + " holds control characters.");
+  }
+  if (!fields.emplace(name, value).second) {
     throw_unusable("The NRRD header has the field " + in_quotes(name) + " twice.");
   }
 }
@@ -77,7 +82,7 @@ std::string_view optional(const Fields& fields, std::string_view name) {
 
 StoredType type_of(const Fields& fields) {
   using Names = std::vector<std::string_view>;
-  static const std::vector<std::pair<StoredType, Names>> kTypes = {
+  static const std::vector<std::pair<StoredType, Names>> types = {
       {StoredType::kInt8, {"signed char", "int8", "int8_t"}},
       {StoredType::kUint8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
       {StoredType::kInt16,
@@ -94,7 +99,7 @@ StoredType type_of(const Fields& fields) {
       {StoredType::kFloat32, {"float"}},
       {StoredType::kFloat64, {"double"}}};
   const std::string name = lower(required(fields, "type"));
-  for (const auto& [type, names] : kTypes) {
+  for (const auto& [type, names] : types) {
     if (std::find(names.begin(), names.end(), name) != names.end()) return type;
   }
   throw_unusable("The NRRD header's type " + in_quotes(name) + " is not one of plain numbers.");
@@ -181,25 +186,36 @@ bool is_big_endian(const Fields& fields, StoredType type, Encoding encoding) {
   return false;
 }
 
-void check_space(const Fields& fields) {
-  static constexpr std::string_view kReadable[] = {"",
-                                                   "right-anterior-superior",
-                                                   "ras",
-                                                   "left-anterior-superior",
-                                                   "las",
-                                                   "scanner-xyz",
-                                                   "lps",
-                                                   "left-posterior-superior",
-                                                   "3d-right-handed"};
-  const std::string space = lower(optional(fields, "space"));
-  if (space.starts_with("3d-left-handed")) {
-    throw_unusable("The NRRD header's space " + in_quotes(space) +
+// The signs that turn a space into LPS.
+struct Space {
+  std::string_view name;
+  std::array<double, 3> to_lps;
+};
+
+// ITK would turn LAS around the wrong axis, and other spaces not at all.
+std::optional<Space> space_of(const Fields& fields) {
+  static constexpr std::array<double, 3> kSame = {1, 1, 1};
+  static constexpr Space kReadable[] = {
+      {"left-posterior-superior", kSame},
+      {"lps", kSame},
+      {"right-anterior-superior", {-1, -1, 1}},
+      {"ras", {-1, -1, 1}},
+      {"left-anterior-superior", {1, -1, 1}},
+      {"las", {1, -1, 1}},
+      {"scanner-xyz", kSame},
+      {"3d-right-handed", kSame},
+  };
+  const std::string name = lower(optional(fields, "space"));
+  if (name.empty()) return std::nullopt;
+  for (const Space& space : kReadable) {
+    if (space.name == name) return space;
+  }
+  if (name.starts_with("3d-left-handed")) {
+    throw_unusable("The NRRD header's space " + in_quotes(name) +
                    " is left-handed, and nothing tells how it lies in the patient.");
   }
-  if (std::find(std::begin(kReadable), std::end(kReadable), space) == std::end(kReadable)) {
-    throw_unusable("The NRRD header's space " + in_quotes(space) +
-                   " is unknown or has more than three dimensions.");
-  }
+  throw_unusable("The NRRD header's space " + in_quotes(name) +
+                 " is unknown or has more than three dimensions.");
 }
 
 void refuse_other_files(const Fields& fields) {
@@ -251,13 +267,14 @@ std::uint64_t payload_offset(const InputFile& file, const Header& header,
   return offset;
 }
 
+// For ITK every named space is LPS, in which it leaves all numbers as they are.
 std::string itk_header(const Fields& fields, std::size_t axes) {
   std::string header = "NRRD0005\ntype: unsigned char\ndimension: " + std::to_string(axes) + "\n";
   const auto add = [&](std::string_view name, std::string_view itk_name) {
     const std::string_view value = optional(fields, name);
     if (!value.empty()) header += std::string(itk_name) + ": " + std::string(value) + "\n";
   };
-  add("space", "space");
+  if (space_of(fields)) header += "space: left-posterior-superior\n";
   add("spacedimension", "space dimension");
   add("sizes", "sizes");
   add("spacings", "spacings");
@@ -268,6 +285,15 @@ std::string itk_header(const Fields& fields, std::size_t axes) {
   add("spacedirections", "space directions");
   add("spaceorigin", "space origin");
   return header + "encoding: raw\n\n";
+}
+
+void turn_into_lps(Geometry& geometry, const Space& space) {
+  for (std::size_t row = 0; row < 3; ++row) {
+    geometry.origin[row] *= space.to_lps[row];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      geometry.direction[row * 3 + axis] *= space.to_lps[row];
+    }
+  }
 }
 
 // The unit of every axis, or empty where the header has none.
@@ -301,17 +327,17 @@ SourceVolume parse_nrrd(const InputFile& file, const std::filesystem::path& scra
   refuse_other_files(fields);
   const std::vector<std::uint64_t> sizes = sizes_of(fields);
   const std::vector<std::uint64_t> lattice = lattice_sizes(fields, sizes);
-  check_space(fields);
-  check_space_is_told(fields, sizes.size() - lattice.size());
   SourceVolume volume;
   volume.format = FileFormat::kNrrd;
   volume.dims = volume_dims(lattice);
+  check_space_is_told(fields, sizes.size() - lattice.size());
   volume.encoding = encoding_of(fields);
   volume.layout.type = type_of(fields);
   volume.layout.big_endian = is_big_endian(fields, volume.layout.type, volume.encoding);
   volume.payload.offset = payload_offset(file, header, volume);
   volume.payload.bytes = file.size() - volume.payload.offset;
   volume.geometry = read_itk_geometry(FileFormat::kNrrd, itk_header(fields, sizes.size()), scratch);
+  if (const auto space = space_of(fields)) turn_into_lps(volume.geometry, *space);
   scale_to_millimetres(volume.geometry, unit_of(fields));
   return volume;
 }

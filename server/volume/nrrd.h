@@ -11,8 +11,8 @@ namespace isomesh::volume {
 bool is_nrrd(std::string_view head);
 
 // Reads the header of a file that is attached to its samples. What it says about space is read by
-// ITK, which turns RAS and LAS into LPS; of the other spaces those that are right-handed are taken
-// as they are, because nothing says how they lie in the patient, and left-handed ones are refused.
+// ITK; RAS and LAS become LPS. Of the other spaces those that are right-handed are taken as they
+// are, because nothing says how they lie in the patient, and left-handed ones are refused.
 // Throws Error kUnusableVolume.
 SourceVolume parse_nrrd(const InputFile& file, const std::filesystem::path& scratch);
 

@@ -99,8 +99,8 @@ template <class Sample>
 Statistics measure_samples(std::span<const Sample> samples) {
   if constexpr (sizeof(Sample) <= 2) {
     // So few values that counting them all needs no range first: one pass.
-    constexpr std::int64_t kLowest = std::numeric_limits<Sample>::min();
-    constexpr std::size_t kValues = std::numeric_limits<Sample>::max() - kLowest + 1;
+    constexpr std::size_t kValues = std::size_t{1} << (8 * sizeof(Sample));
+    constexpr std::int64_t kLowest = std::is_signed_v<Sample> ? -std::int64_t{kValues / 2} : 0;
     return from_value_counts(count_values(samples, kLowest, kValues), kLowest);
   } else {
     return measure_wide(samples);

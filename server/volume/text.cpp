@@ -35,6 +35,12 @@ std::string lower(std::string_view text) {
   return result;
 }
 
+bool has_control_characters(std::string_view text) {
+  return std::any_of(text.begin(), text.end(), [](char letter) {
+    return (static_cast<unsigned char>(letter) < ' ' && letter != '\t') || letter == '\x7f';
+  });
+}
+
 std::vector<std::string_view> words(std::string_view text) {
   std::vector<std::string_view> result;
   for (std::size_t next = text.find_first_not_of(kSpace); next != std::string_view::npos;) {

@@ -12,6 +12,8 @@ namespace isomesh::volume {
 std::string_view trim(std::string_view text);
 std::string lower(std::string_view text);  // ASCII only
 
+bool has_control_characters(std::string_view text);  // other than tabs
+
 // The words between white space.
 std::vector<std::string_view> words(std::string_view text);
 

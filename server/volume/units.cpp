@@ -14,7 +14,7 @@ double millimetres_per(std::string_view unit) {
     double millimetres;
     std::vector<std::string_view> names;
   };
-  static const std::vector<Row> kUnits = {
+  static const std::vector<Row> units = {
       {1, {"", "?", "???", "mm", "millimeter", "millimeters", "millimetre", "millimetres"}},
       {0.000001, {"nm", "nanometer", "nanometers", "nanometre", "nanometres"}},
       {0.001,
@@ -23,7 +23,7 @@ double millimetres_per(std::string_view unit) {
       {10, {"cm", "centimeter", "centimeters", "centimetre", "centimetres"}},
       {1000, {"m", "meter", "meters", "metre", "metres"}}};
   const std::string name = lower(trim(unit));
-  for (const Row& row : kUnits) {
+  for (const Row& row : units) {
     if (std::find(row.names.begin(), row.names.end(), name) != row.names.end()) {
       return row.millimetres;
     }

@@ -8,7 +8,7 @@
 
 namespace isomesh::test {
 
-inline const std::filesystem::path kBrainFile = "/usr/share/mricron/templates/ch2.nii.gz";
+inline constexpr const char* kBrainFile = "/usr/share/mricron/templates/ch2.nii.gz";
 inline constexpr double kBrainIso = 60;
 
 // The samples of a gzipped little-endian NIfTI-1 file of uint8 with three dimensions, with the

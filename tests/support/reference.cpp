@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <span>
 #include <sstream>
 #include <string>
 #include <unordered_map>
@@ -12,14 +13,14 @@ namespace isomesh::test {
 namespace {
 
 using Sample = std::array<std::uint32_t, 3>;
-using CornerTable = std::vector<std::array<unsigned, 4>>;
+using Tetrahedron = std::array<unsigned, 4>;
 
 // The paper's Table 1.
 constexpr Sample kCorners[8] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                 {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
-const CornerTable kSixTetrahedra = {{0, 2, 3, 6}, {0, 1, 2, 6}, {0, 1, 5, 6},
-                                    {0, 3, 6, 7}, {0, 4, 6, 7}, {0, 4, 5, 6}};
-const CornerTable kFiveTetrahedra = {
+constexpr Tetrahedron kSixTetrahedra[6] = {{0, 2, 3, 6}, {0, 1, 2, 6}, {0, 1, 5, 6},
+                                           {0, 3, 6, 7}, {0, 4, 6, 7}, {0, 4, 5, 6}};
+constexpr Tetrahedron kFiveTetrahedra[5] = {
     {0, 2, 3, 7}, {0, 1, 2, 5}, {0, 4, 5, 7}, {2, 5, 6, 7}, {0, 2, 5, 7}};
 
 Point as_point(const Sample& s) {
@@ -73,7 +74,9 @@ class ReferenceBuilder {
   void add_cell(const Sample& cell) {
     const bool five = options_.scheme == Scheme::kFive;
     const bool mirrored = five && (cell[0] + cell[1] + cell[2]) % 2 == 1;
-    for (const auto& tetrahedron : five ? kFiveTetrahedra : kSixTetrahedra) {
+    const std::span<const Tetrahedron> table =
+        five ? std::span<const Tetrahedron>(kFiveTetrahedra) : kSixTetrahedra;
+    for (const Tetrahedron& tetrahedron : table) {
       std::vector<Sample> inside;
       std::vector<Sample> outside;
       for (const unsigned corner : tetrahedron) {

@@ -10,9 +10,11 @@
 namespace isomesh::test {
 namespace {
 
-const mesh::ExtractOptions kOptions = {0, Scheme::kSix, Interpolation::kLinear};
+constexpr mesh::ExtractOptions kOptions = {0, Scheme::kSix, Interpolation::kLinear};
 
-SampleVolume<std::int16_t> volume() { return noise<std::int16_t>({-9, -2, 1, 5}, {6, 5, 4}, 1); }
+SampleVolume<std::int16_t> noisy_samples() {
+  return noise<std::int16_t>({-9, -2, 1, 5}, {6, 5, 4}, 1);
+}
 
 // A mesh as the kernels would make it, from the reference itself.
 mesh::Mesh mesh_of(const ReferenceMesh& reference) {
@@ -54,68 +56,68 @@ mesh::Mesh mesh_of(const ReferenceMesh& reference) {
 
 class Matches : public testing::Test {
  protected:
-  SampleVolume<std::int16_t> volume_ = volume();
-  ReferenceMesh reference_ = reference_surface(volume_.lattice(), kOptions);
-  mesh::Mesh mesh_ = mesh_of(reference_);
+  SampleVolume<std::int16_t> samples = noisy_samples();
+  ReferenceMesh expected = reference_surface(samples.lattice(), kOptions);
+  mesh::Mesh copy = mesh_of(expected);
 };
 
 TEST_F(Matches, AcceptsTheReferenceItself) {
-  EXPECT_TRUE(matches(mesh_, reference_));
-  EXPECT_TRUE(is_sound(surface_of(mesh_)));
+  EXPECT_TRUE(matches(copy, expected));
+  EXPECT_TRUE(is_sound(surface_of(copy)));
 }
 
 TEST_F(Matches, AcceptsTheOtherDiagonal) {
   std::size_t triangle = 0;
-  for (const ReferencePatch& patch : reference_.patches) {
+  for (const ReferencePatch& patch : expected.patches) {
     if (patch.corners.size() == 4) {
-      const auto [a, b, c] = mesh_.triangles[triangle];
-      const std::uint32_t d = mesh_.triangles[triangle + 1][2];
-      mesh_.triangles[triangle] = {a, b, d};
-      mesh_.triangles[triangle + 1] = {b, c, d};
+      const auto [a, b, c] = copy.triangles[triangle];
+      const std::uint32_t d = copy.triangles[triangle + 1][2];
+      copy.triangles[triangle] = {a, b, d};
+      copy.triangles[triangle + 1] = {b, c, d};
     }
     triangle += patch.corners.size() - 2;
   }
-  EXPECT_TRUE(matches(mesh_, reference_));
+  EXPECT_TRUE(matches(copy, expected));
 }
 
 TEST_F(Matches, RefusesAMovedVertex) {
-  mesh_.positions[7][0] += 1e-4F;
-  EXPECT_FALSE(matches(mesh_, reference_));
+  copy.positions[7][0] += 1e-4F;
+  EXPECT_FALSE(matches(copy, expected));
 }
 
 TEST_F(Matches, RefusesExchangedVertices) {
-  std::swap(mesh_.positions[7], mesh_.positions[8]);
-  EXPECT_FALSE(matches(mesh_, reference_));
+  std::swap(copy.positions[7], copy.positions[8]);
+  EXPECT_FALSE(matches(copy, expected));
 }
 
 TEST_F(Matches, RefusesATurnedTriangle) {
-  std::swap(mesh_.triangles[5][0], mesh_.triangles[5][1]);
-  EXPECT_FALSE(matches(mesh_, reference_));
+  std::swap(copy.triangles[5][0], copy.triangles[5][1]);
+  EXPECT_FALSE(matches(copy, expected));
 }
 
 TEST_F(Matches, RefusesATriangleThatIsThereTwice) {
-  mesh_.triangles[5] = mesh_.triangles[6];
-  EXPECT_FALSE(matches(mesh_, reference_));
+  copy.triangles[5] = copy.triangles[6];
+  EXPECT_FALSE(matches(copy, expected));
 }
 
 TEST_F(Matches, RefusesVerticesInAnotherLayer) {
-  ++mesh_.layer_vertices[2];
-  EXPECT_FALSE(matches(mesh_, reference_));
+  ++copy.layer_vertices[2];
+  EXPECT_FALSE(matches(copy, expected));
 }
 
 TEST_F(Matches, RefusesTrianglesInAnotherLayer) {
-  --mesh_.layer_triangles[2];
-  EXPECT_FALSE(matches(mesh_, reference_));
+  --copy.layer_triangles[2];
+  EXPECT_FALSE(matches(copy, expected));
 }
 
 TEST_F(Matches, RefusesTheOtherScheme) {
   const mesh::ExtractOptions five = {0, Scheme::kFive, Interpolation::kLinear};
-  EXPECT_FALSE(matches(mesh_, reference_surface(volume_.lattice(), five)));
+  EXPECT_FALSE(matches(copy, reference_surface(samples.lattice(), five)));
 }
 
 TEST_F(Matches, RefusesTheOtherInterpolation) {
   const mesh::ExtractOptions midpoint = {0, Scheme::kSix, Interpolation::kMidpoint};
-  EXPECT_FALSE(matches(mesh_, reference_surface(volume_.lattice(), midpoint)));
+  EXPECT_FALSE(matches(copy, reference_surface(samples.lattice(), midpoint)));
 }
 
 // Worked out by hand: corner 0 of one cell is inside. In the five-way split it is in four

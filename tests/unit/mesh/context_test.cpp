@@ -15,7 +15,7 @@ namespace {
 
 class ParallelFor : public testing::TestWithParam<int> {
  protected:
-  test::ThreadCount threads_{GetParam()};
+  test::ThreadCount threads{GetParam()};
 };
 
 TEST_P(ParallelFor, DoesEveryTaskOnce) {

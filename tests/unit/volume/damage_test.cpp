@@ -24,7 +24,7 @@ std::vector<Kind> kinds() {
   const Lines sized = with(with(small_metaimage(), "CompressedData", "True"), "CompressedDataSize",
                            std::to_string(packed.size()));
   const Lines unsized = with(small_metaimage(), "CompressedData", "True");
-  const std::size_t kNone = std::string::npos;
+  constexpr std::size_t kNone = std::string::npos;
   // gzip's own header holds a time and a system, which nothing guards.
   constexpr std::size_t kGzipHeader = 10;
   return {
@@ -53,15 +53,21 @@ TEST(Damage, EveryTruncationIsRefused) {
   }
 }
 
-TEST(Damage, EveryChangeOfCompressedBytesIsRefused) {
+// The last bits of a deflate stream fill up its last byte and mean nothing; all others count.
+TEST(Damage, NoChangeOfCompressedBytesIsTakenForSamples) {
   for (const Kind& kind : kinds()) {
+    std::size_t imported = 0;
     for (std::size_t at = kind.compressed_from; at < kind.bytes.size(); ++at) {
       for (const int flip : {0x01, 0x80, 0xff}) {
         std::string bytes = kind.bytes;
         bytes[at] = static_cast<char>(bytes[at] ^ flip);
-        EXPECT_FALSE(import_bytes(bytes).imported()) << kind.name << " changed at " << at;
+        const Outcome outcome = import_bytes(bytes);
+        if (!outcome.imported()) continue;
+        ++imported;
+        EXPECT_EQ(outcome.sample_bytes(), kSmallSamples) << kind.name << " changed at " << at;
       }
     }
+    EXPECT_LE(imported, 1U) << kind.name;
   }
 }
 
@@ -75,7 +81,7 @@ TEST(Damage, NoChangeOfAHeaderDoesHarm) {
         const Outcome outcome = import_bytes(bytes);
         if (!outcome.imported()) {
           EXPECT_NE(outcome.code, ErrorCode::kInternal) << outcome.error;
-          EXPECT_THAT(outcome.error, testing::Not(HasSubstr("/tmp"))) << kind.name;
+          EXPECT_THAT(outcome.error, testing::Not(HasSubstr("isomesh-volume"))) << kind.name;
         }
       }
     }
@@ -110,7 +116,7 @@ TEST(Damage, BombsAreStoppedByCounting) {
 TEST(Damage, ClaimsBeyondTheLimitsAreRefusedBeforeAnythingIsInflated) {
   const NiftiFields huge{.dim = {3, 32767, 32767, 32767, 1, 1, 1, 1}};
   EXPECT_EQ(import_bytes(gzip(nifti(huge, kSmallSamples))).code, ErrorCode::kTooLarge);
-  const Lines lines = with(small_nrrd(), "sizes", "100000 100000 100000");
+  const Lines lines = with(small_nrrd(), "sizes", "60000 60000 60000");
   EXPECT_EQ(import_bytes(nrrd(with(lines, "encoding", "gzip"), gzip("a"))).code,
             ErrorCode::kTooLarge);
   EXPECT_EQ(import_bytes(nrrd(with(lines, "encoding", "ascii"), "1 2 3")).code,

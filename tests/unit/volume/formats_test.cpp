@@ -70,6 +70,7 @@ TEST(Formats, AreReadByManyThreadsAtOnce) {
   const std::string expected = import_bytes(same.as_metaimage()).canonical;
   const std::string bad = nrrd(with(small_nrrd(), "space directions", "nonsense"), kSmallSamples);
   std::vector<std::jthread> threads;
+  threads.reserve(4);
   for (int thread = 0; thread < 4; ++thread) {
     threads.emplace_back([&] {
       for (int round = 0; round < 10; ++round) {

@@ -31,6 +31,7 @@ class Header {
   template <class Stored, class Value>
   void put(std::size_t offset, const std::vector<Value>& values) {
     std::vector<Stored> stored;
+    stored.reserve(values.size());
     for (const Value value : values) stored.push_back(static_cast<Stored>(value));
     put_text(offset, bytes_of(stored, big_endian_));
   }

@@ -37,7 +37,7 @@ std::vector<Number> some_samples(std::size_t count) {
     state ^= state >> 7;
     state ^= state << 17;
     if constexpr (std::is_floating_point_v<Number>) {
-      result.push_back(static_cast<Number>(static_cast<std::int64_t>(state) / 65536) / 1024);
+      result.push_back(static_cast<Number>(static_cast<std::int64_t>(state) >> 16) / 1024);
     } else {
       result.push_back(static_cast<Number>(state));
     }

@@ -1,0 +1,43 @@
+// Runs of triangles as Draco streams on one shared quantisation grid; private to this folder.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "proto/types.h"
+#include "server/mesh/mesh.h"
+
+namespace isomesh::codec {
+
+// The cube that all positions are quantised in: the mesh's lowest corner and its longest side. A
+// position on it decodes to the same bits in every stream that uses the grid.
+struct Grid {
+  mesh::Vec3 low = {0, 0, 0};
+  float side = 0;
+  int bits = 14;
+
+  // What a coordinate along an axis becomes by encoding and decoding.
+  float decoded(float coordinate, std::size_t axis) const;
+};
+
+// Covers the mesh exactly; of an empty one, the point 0.
+Grid grid_of(const mesh::Mesh& mesh, int bits);
+
+struct DracoStream {
+  std::vector<std::byte> bytes;
+  std::uint32_t vertices = 0;
+  std::uint32_t triangles = 0;
+  std::uint32_t position_id = 0;  // the attribute's id within the stream
+  mesh::Vec3 low = {0, 0, 0};     // bounds of the decoded positions
+  mesh::Vec3 high = {0, 0, 0};
+};
+
+// Encodes the triangles [begin, end) with the vertices they name: by edgebreaker, or for speed 10 (as
+// Draco's own convention has it) and for a mesh without triangles sequentially. Takes one thread.
+// Thread safe. Throws Error kInternal when Draco refuses.
+DracoStream encode_draco(const mesh::Mesh& mesh, std::size_t begin, std::size_t end,
+                         const Grid& grid, int speed);
+
+}  // namespace isomesh::codec

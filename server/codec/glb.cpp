@@ -1,0 +1,148 @@
+#include <array>
+#include <bit>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "proto/json.h"
+#include "server/codec/draco_chunk.h"
+#include "server/codec/encode.h"
+
+namespace isomesh::codec {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+static_assert(std::endian::native == std::endian::little, "GLB is little-endian");
+
+// Measured: smaller working sets encode faster, up to the vertices that chunks share.
+constexpr std::size_t kTrianglesPerChunk = 200'000;
+constexpr std::size_t kAlignment = 4;
+constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
+// Of glTF's specification, sections 3.4 and 3.6.2.
+constexpr int kUnsignedInt = 5125;
+constexpr int kFloat = 5126;
+constexpr std::uint32_t kMagic = 0x46546C67;
+constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
+constexpr std::uint32_t kBinaryChunk = 0x004E4942;
+
+std::vector<DracoStream> encode_chunks(const mesh::Mesh& mesh, const DracoParameters& draco,
+                                       const mesh::Context& context) {
+  const std::size_t triangles = mesh.triangles.size();
+  const Grid grid = grid_of(mesh, draco.position_bits);
+  std::vector<DracoStream> chunks((triangles + kTrianglesPerChunk - 1) / kTrianglesPerChunk);
+  mesh::parallel_for(context, chunks.size(), [&](std::size_t chunk) {
+    // Even sizes, or the last chunk could be a few triangles.
+    const auto begin = [&](std::size_t c) { return triangles * c / chunks.size(); };
+    chunks[chunk] = encode_draco(mesh, begin(chunk), begin(chunk + 1), grid, draco.speed);
+  });
+  return chunks;
+}
+
+std::size_t padded(std::size_t bytes) { return (bytes + kAlignment - 1) / kAlignment * kAlignment; }
+
+// One primitive, with the accessors and the buffer view that it names.
+void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset) {
+  const std::size_t view = gltf["bufferViews"].size();
+  gltf["bufferViews"].push_back(
+      {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", chunk.bytes.size()}});
+  const std::size_t accessor = gltf["accessors"].size();
+  gltf["accessors"].push_back({{"componentType", kFloat},
+                               {"count", chunk.vertices},
+                               {"type", "VEC3"},
+                               {"min", chunk.low},
+                               {"max", chunk.high}});
+  gltf["accessors"].push_back(
+      {{"componentType", kUnsignedInt}, {"count", std::size_t{chunk.triangles} * 3}, {"type", "SCALAR"}});
+  gltf["meshes"][0]["primitives"].push_back(
+      {{"attributes", {{"POSITION", accessor}}},
+       {"indices", accessor + 1},
+       {"material", 0},
+       {"extensions",
+        {{kDracoExtension,
+          {{"bufferView", view}, {"attributes", {{"POSITION", chunk.position_id}}}}}}}});
+}
+
+Json describe(const std::vector<DracoStream>& chunks, std::size_t binary_bytes,
+              const Provenance& provenance) {
+  Json gltf;
+  gltf["asset"] = {{"version", "2.0"},
+                   {"generator", "isomesh"},
+                   {"extras",
+                    {{"parameters", Json::parse(to_json(provenance.parameters))},
+                     {"iso", provenance.iso},
+                     {"dims", provenance.dims},
+                     {"spacing", provenance.geometry.spacing},
+                     {"origin", provenance.geometry.origin},
+                     {"direction", provenance.geometry.direction},
+                     {"units", "mm"},
+                     {"space", "LPS"}}}};
+  gltf["scene"] = 0;
+  gltf["scenes"] = Json::array({{{"nodes", {0}}}});
+  // Positions are LPS millimetres; glTF wants metres, Y up and the front towards +Z: a quarter turn
+  // about x takes S to +Y and A to +Z.
+  constexpr double kMetresPerMillimetre = 0.001;
+  constexpr double kHalfSqrt2 = 0.70710678118654752;
+  Json node = {{"name", "surface"},
+               {"rotation", {-kHalfSqrt2, 0, 0, kHalfSqrt2}},
+               {"scale", {kMetresPerMillimetre, kMetresPerMillimetre, kMetresPerMillimetre}}};
+  if (!chunks.empty()) {
+    node["mesh"] = 0;
+    gltf["meshes"] = Json::array({{{"name", "surface"}, {"primitives", Json::array()}}});
+    gltf["materials"] = Json::array(
+        {{{"name", "neutral"},
+          {"pbrMetallicRoughness",
+           {{"baseColorFactor", {0.8, 0.8, 0.8, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 0.6}}}}});
+    gltf["accessors"] = Json::array();
+    gltf["bufferViews"] = Json::array();
+    gltf["buffers"] = Json::array({{{"byteLength", binary_bytes}}});
+    gltf["extensionsUsed"] = {kDracoExtension};
+    gltf["extensionsRequired"] = {kDracoExtension};
+    std::size_t offset = 0;
+    for (const DracoStream& chunk : chunks) {
+      add_primitive(gltf, chunk, offset);
+      offset += padded(chunk.bytes.size());
+    }
+  }
+  gltf["nodes"] = Json::array({node});
+  return gltf;
+}
+
+void write_words(const Sink& sink, std::initializer_list<std::uint32_t> words) {
+  sink(std::as_bytes(std::span(words.begin(), words.size())));
+}
+
+}  // namespace
+
+void encode_glb(const mesh::Mesh& mesh, const DracoParameters& draco,
+                const Provenance& provenance, const mesh::Context& context, const Sink& sink) {
+  const std::vector<DracoStream> chunks = encode_chunks(mesh, draco, context);
+  std::size_t binary_bytes = 0;
+  for (const DracoStream& chunk : chunks) binary_bytes += padded(chunk.bytes.size());
+  std::string json = describe(chunks, binary_bytes, provenance).dump();
+  json.resize(padded(json.size()), ' ');
+
+  constexpr std::size_t kHeaderBytes = 12;
+  constexpr std::size_t kChunkHeaderBytes = 8;
+  const std::size_t total = kHeaderBytes + kChunkHeaderBytes + json.size() +
+                            (chunks.empty() ? 0 : kChunkHeaderBytes + binary_bytes);
+  if (total > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error(ErrorCode::kTooLarge, "the encoded surface exceeds the 4 GiB of a GLB file");
+  }
+  write_words(sink, {kMagic, kVersion, static_cast<std::uint32_t>(total)});
+  write_words(sink, {static_cast<std::uint32_t>(json.size()), kJsonChunk});
+  sink(std::as_bytes(std::span(json)));
+  if (chunks.empty()) return;
+  write_words(sink, {static_cast<std::uint32_t>(binary_bytes), kBinaryChunk});
+  constexpr std::array<std::byte, kAlignment> kZeros = {};
+  for (const DracoStream& chunk : chunks) {
+    sink(chunk.bytes);
+    sink(std::span(kZeros).first(padded(chunk.bytes.size()) - chunk.bytes.size()));
+  }
+}
+
+}  // namespace isomesh::codec

@@ -1,0 +1,29 @@
+// Meshes for the codecs, and what they are encoded to.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/codec/encode.h"
+#include "server/mesh/mesh.h"
+
+namespace isomesh::test {
+
+struct NamedMesh {
+  std::string name;
+  mesh::Mesh mesh;
+};
+
+mesh::Mesh mesh_of(const std::vector<mesh::Vec3>& positions,
+                   const std::vector<mesh::Triangle>& triangles);
+
+// Closed and open, of one piece and of many, flat, tiny, far from the origin.
+std::vector<NamedMesh> meshes_to_encode();
+
+// A surface of so many triangles that no codec can hold them in one block.
+mesh::Mesh large_mesh();
+
+// All bytes that an encoder hands to its sink.
+std::string encoded(const mesh::Mesh& mesh, MeshFormat format, const DracoParameters& draco = {});
+
+}  // namespace isomesh::test

@@ -1,0 +1,141 @@
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/codec/encode.h"
+#include "tests/support/errors.h"
+#include "tests/unit/codec/meshes.h"
+
+namespace isomesh::codec {
+namespace {
+
+using test::encoded;
+
+constexpr std::size_t kHeaderBytes = 80;
+constexpr std::size_t kFacetBytes = 50;
+
+template <class T>
+T value_at(const std::string& bytes, std::size_t offset) {
+  T value;
+  std::memcpy(&value, bytes.data() + offset, sizeof value);
+  return value;
+}
+
+// A facet's normal and corners as they stand in the file.
+std::array<mesh::Vec3, 4> facet(const std::string& stl, std::size_t index) {
+  return value_at<std::array<mesh::Vec3, 4>>(stl, kHeaderBytes + 4 + index * kFacetBytes);
+}
+
+mesh::Mesh tetrahedron() {
+  return test::mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                       {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}});
+}
+
+TEST(Stl, IsAHeaderACountAndFacetsOfFiftyBytes) {
+  const mesh::Mesh mesh = tetrahedron();
+  const std::string stl = encoded(mesh, MeshFormat::kStl);
+  ASSERT_EQ(stl.size(), kHeaderBytes + 4 + 4 * kFacetBytes);
+  EXPECT_EQ(value_at<std::uint32_t>(stl, kHeaderBytes), 4U);
+  for (std::size_t t = 0; t < 4; ++t) {
+    const auto [normal, a, b, c] = facet(stl, t);
+    EXPECT_EQ(a, mesh.positions[mesh.triangles[t][0]]);
+    EXPECT_EQ(b, mesh.positions[mesh.triangles[t][1]]);
+    EXPECT_EQ(c, mesh.positions[mesh.triangles[t][2]]);
+    EXPECT_EQ(value_at<std::uint16_t>(stl, kHeaderBytes + 4 + (t + 1) * kFacetBytes - 2), 0);
+  }
+}
+
+TEST(Stl, IsNotTakenForText) {
+  const std::string stl = encoded(tetrahedron(), MeshFormat::kStl);
+  EXPECT_FALSE(stl.starts_with("solid"));
+  EXPECT_EQ(stl.substr(0, kHeaderBytes).find_first_of("\r\n"), std::string::npos);
+}
+
+TEST(Stl, NormalsAreUnitVectorsOutOfTheSolid) {
+  const std::string stl = encoded(tetrahedron(), MeshFormat::kStl);
+  const float third = 1 / std::sqrt(3.0F);
+  const std::vector<mesh::Vec3> expected = {
+      {0, 0, -1}, {0, -1, 0}, {-1, 0, 0}, {third, third, third}};
+  for (std::size_t t = 0; t < expected.size(); ++t) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_FLOAT_EQ(facet(stl, t)[0][axis], expected[t][axis]);
+    }
+  }
+}
+
+TEST(Stl, NormalsOfSmallTrianglesFarAwayAreStillUnitVectors) {
+  const std::string stl = encoded(
+      test::mesh_of({{1000, 1000, 1000}, {1000.001F, 1000, 1000}, {1000, 1000.001F, 1000}},
+                    {{0, 1, 2}}),
+      MeshFormat::kStl);
+  EXPECT_EQ(facet(stl, 0)[0], (mesh::Vec3{0, 0, 1}));
+}
+
+TEST(Stl, ATriangleWithoutAreaHasNoNormal) {
+  const std::string stl =
+      encoded(test::mesh_of({{0, 0, 0}, {1, 1, 1}, {2, 2, 2}}, {{0, 1, 2}}), MeshFormat::kStl);
+  EXPECT_EQ(facet(stl, 0)[0], (mesh::Vec3{0, 0, 0}));
+}
+
+TEST(Stl, AnEmptyMeshIsAHeaderOnly) {
+  const std::string stl = encoded(mesh::Mesh{}, MeshFormat::kStl);
+  ASSERT_EQ(stl.size(), kHeaderBytes + 4);
+  EXPECT_EQ(value_at<std::uint32_t>(stl, kHeaderBytes), 0U);
+}
+
+TEST(Stl, EveryFacetOfALargeMeshIsInItsPlace) {
+  const mesh::Mesh mesh = test::large_mesh();
+  ASSERT_GT(mesh.triangles.size(), 3U * 8192);
+  const std::string stl = encoded(mesh, MeshFormat::kStl);
+  ASSERT_EQ(stl.size(), kHeaderBytes + 4 + mesh.triangles.size() * kFacetBytes);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto corners = facet(stl, t);
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      ASSERT_EQ(corners[corner + 1], mesh.positions[mesh.triangles[t][corner]]) << t;
+    }
+  }
+}
+
+TEST(Stl, ProgressGrowsToOne) {
+  double last = 0;
+  int calls = 0;
+  const auto note = [&](double done) {
+    EXPECT_GT(done, last);
+    last = done;
+    ++calls;
+  };
+  encode_stl(test::large_mesh(), {{}, note}, [](auto) {});
+  EXPECT_EQ(last, 1);
+  EXPECT_GT(calls, 2);
+}
+
+TEST(Stl, StopsOnceItIsCancelled) {
+  std::stop_source source;
+  const mesh::Mesh mesh = test::large_mesh();
+  std::size_t bytes = 0;
+  const auto stop_soon = [&](std::span<const std::byte> piece) {
+    bytes += piece.size();
+    source.request_stop();
+  };
+  EXPECT_EQ(test::code_thrown_by([&] {
+              encode_stl(mesh, {source.get_token(), {}}, stop_soon);
+            }),
+            ErrorCode::kCancelled);
+  EXPECT_LT(bytes, mesh.triangles.size() * kFacetBytes);
+}
+
+TEST(Stl, PassesOnWhatItsSinkThrows) {
+  const auto full = [](std::span<const std::byte>) {
+    throw Error(ErrorCode::kOutOfSpace, "no space");
+  };
+  EXPECT_EQ(test::code_thrown_by([&] { encode_stl(mesh::Mesh{}, {}, full); }),
+            ErrorCode::kOutOfSpace);
+}
+
+}  // namespace
+}  // namespace isomesh::codec

@@ -1,0 +1,77 @@
+// The public description has every route of the server and no other.
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include "server/http/routes.h"
+#include "tests/support/files.h"
+
+namespace isomesh::http {
+namespace {
+
+using Methods = std::set<std::string>;
+
+class OpenApi : public testing::Test {
+ protected:
+  OpenApi() {
+    add_volume_routes(app_);
+    add_job_routes(app_);
+    add_mesh_routes(app_);
+    add_service_routes(app_);
+  }
+
+  // A path as a client would send it.
+  static std::string example_of(std::string path) {
+    path = std::regex_replace(path, std::regex("\\{format\\}"), "drc");
+    return std::regex_replace(path, std::regex("\\{[a-z_]+\\}"), "0123abcd");
+  }
+
+  static Methods methods_of(const YAML::Node& path_item) {
+    Methods methods;
+    for (const auto& member : path_item) {
+      std::string name = member.first.as<std::string>();
+      for (char& letter : name) letter = static_cast<char>(std::toupper(letter));
+      if (name != "PARAMETERS" && name != "SUMMARY") methods.insert(name);
+    }
+    return methods;
+  }
+
+  test::TemporaryFolder folder_;
+  store::DataFolder data_{folder_ / "data"};
+  store::BlobStore blobs_{data_};
+  store::VolumeStore volumes_{data_};
+  store::JobStore jobs_{blobs_, store::JobStore::Limits{}};
+  jobs::VolumeLibrary library_{data_, blobs_, volumes_, jobs_, volume::ImportLimits{}};
+  App app_{Services{data_, blobs_, volumes_, jobs_, library_}, ServerOptions{}};
+  const YAML::Node description_ = YAML::LoadFile(ISOMESH_OPENAPI);
+};
+
+TEST_F(OpenApi, DescribesEveryRouteWithItsMethods) {
+  for (const auto& [pattern, methods] : app_.methods) {
+    Methods described;
+    for (const auto& path : description_["paths"]) {
+      if (std::regex_match(example_of(path.first.as<std::string>()), std::regex(pattern))) {
+        described.merge(methods_of(path.second));
+      }
+    }
+    EXPECT_EQ(described, methods) << pattern;
+  }
+}
+
+TEST_F(OpenApi, DescribesNoOtherPath) {
+  for (const auto& path : description_["paths"]) {
+    const std::string example = example_of(path.first.as<std::string>());
+    int routes = 0;
+    for (const auto& [pattern, methods] : app_.methods) {
+      routes += std::regex_match(example, std::regex(pattern)) ? 1 : 0;
+    }
+    EXPECT_EQ(routes, 1) << example;
+  }
+}
+
+}  // namespace
+}  // namespace isomesh::http

@@ -1,0 +1,49 @@
+// The stores of one daemon in a folder of the test, and volumes to put into them.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "server/jobs/volume_library.h"
+#include "server/store/job_store.h"
+#include "server/volume/import.h"
+#include "tests/support/files.h"
+#include "tests/support/shapes.h"
+
+namespace isomesh::test {
+
+class JobsFixture : public testing::Test {
+ protected:
+  // Adds samples as an upload of raw ones.
+  template <class T>
+  Volume add(const SampleVolume<T>& samples, SampleType type) {
+    return add_raw(bytes_of(samples.samples), {.dims = {samples.dims.x, samples.dims.y,
+                                                        samples.dims.z},
+                                               .type = type,
+                                               .geometry = samples.geometry,
+                                               .big_endian = false});
+  }
+  Volume add_raw(const std::string& bytes, const volume::RawDescription& description);
+
+  // A closed sphere of some thousand triangles.
+  Volume add_sphere();
+  // Noise whose surface is so large that smoothing it 1000 times takes many seconds.
+  Volume add_much();
+
+  static JobParameters parameters_of(const Volume& volume, double iso);
+
+  std::size_t blob_count() const { return files_below(data_.blobs()).size(); }
+  std::size_t scratch_count() const { return files_below(data_.scratch()).size(); }
+  std::string blob(const std::string& key) const { return read_file(blobs_.path_of(key)); }
+
+  TemporaryFolder folder_;
+  store::DataFolder data_{folder_ / "data"};
+  store::BlobStore blobs_{data_};
+  store::VolumeStore volumes_{data_};
+  store::JobStore jobs_{blobs_, store::JobStore::Limits{}};
+  jobs::VolumeLibrary library_{data_, blobs_, volumes_, jobs_, volume::ImportLimits{}};
+};
+
+}  // namespace isomesh::test

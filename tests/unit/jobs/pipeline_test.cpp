@@ -1,0 +1,293 @@
+#include "server/jobs/pipeline.h"
+
+#include <atomic>
+#include <cmath>
+#include <mutex>
+#include <numbers>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/codec/encode.h"
+#include "tests/support/draco_decoder.h"
+#include "tests/support/errors.h"
+#include "tests/support/kernels.h"
+#include "tests/unit/jobs/fixture.h"
+
+namespace isomesh::jobs {
+namespace {
+
+const Report kQuiet = [](Stage, double, const Timing&) {};
+
+class PipelineTest : public test::JobsFixture {
+ protected:
+  PipelineResult run(const Volume& volume, const JobParameters& parameters,
+                     const Report& report = kQuiet, std::stop_token stop = {}) {
+    Workspace workspace;
+    return run_pipeline(volume, parameters, blobs_, workspace, std::move(stop), report);
+  }
+
+  // The bytes of the one format that was asked for.
+  std::string mesh_bytes(const PipelineResult& result) {
+    return blob(result.mesh.files.begin()->second.sha256);
+  }
+};
+
+TEST_F(PipelineTest, MakesAMeshOfASphere) {
+  const Volume volume = add_sphere();
+  const PipelineResult result = run(volume, parameters_of(volume, 0));
+  const MeshSummary& mesh = result.mesh;
+  EXPECT_GT(mesh.triangles, 1000U);
+  EXPECT_EQ(mesh.triangles, 2 * mesh.vertices - 4);
+  EXPECT_EQ(mesh.boundary_edges, 0U);
+  EXPECT_EQ(mesh.components, 1U);
+  EXPECT_EQ(mesh.euler, 2);
+  const double exact = 4.0 / 3 * std::numbers::pi * std::pow(8.6, 3);
+  EXPECT_NEAR(mesh.volume_mm3.extracted, exact, 0.03 * exact);
+  EXPECT_LT(mesh.volume_mm3.smoothed, mesh.volume_mm3.extracted);
+  EXPECT_GT(mesh.volume_mm3.smoothed, 0.8 * exact);
+  EXPECT_GT(mesh.area_mm2, 0.8 * 4 * std::numbers::pi * 8.6 * 8.6);
+  EXPECT_NEAR(mesh.bounds[0][0], 12.2 - 8.6, 0.6);
+  EXPECT_NEAR(mesh.bounds[1][2], 11.1 + 8.6, 0.6);
+  const MeshFile& file = mesh.files.at(MeshFormat::kDrc);
+  EXPECT_EQ(blob(file.sha256).size(), file.bytes);
+  EXPECT_TRUE(file.href.empty());
+}
+
+TEST_F(PipelineTest, WhatItStoresIsTheMeshThatItDescribes) {
+  const Volume volume = add_sphere();
+  JobParameters parameters = parameters_of(volume, 0);
+  parameters.formats = {MeshFormat::kStl, MeshFormat::kDrc};
+  const PipelineResult result = run(volume, parameters);
+  ASSERT_EQ(result.mesh.files.size(), 2U);
+  const auto decoded = test::decode_with_command(
+      blob(result.mesh.files.at(MeshFormat::kDrc).sha256));
+  EXPECT_EQ(decoded.triangles.size(), result.mesh.triangles);
+  EXPECT_EQ(decoded.points.size(), result.mesh.vertices);
+  EXPECT_EQ(blob(result.mesh.files.at(MeshFormat::kStl).sha256).size(),
+            84 + 50 * result.mesh.triangles);
+}
+
+TEST_F(PipelineTest, NoPassesLeaveTheVolumeAsExtracted) {
+  const Volume volume = add_sphere();
+  JobParameters parameters = parameters_of(volume, 0);
+  parameters.passes = 0;
+  const PipelineResult result = run(volume, parameters);
+  EXPECT_EQ(result.mesh.volume_mm3.extracted, result.mesh.volume_mm3.smoothed);
+}
+
+TEST_F(PipelineTest, WithoutAnIsoItTakesTheVolumesOwn) {
+  const Volume volume = add_sphere();
+  JobParameters parameters = parameters_of(volume, volume.suggested_iso);
+  const std::string expected = mesh_bytes(run(volume, parameters));
+  parameters.iso.reset();
+  EXPECT_EQ(mesh_bytes(run(volume, parameters)), expected);
+}
+
+TEST_F(PipelineTest, AnIsoOutsideTheRangeIsAnEmptyMesh) {
+  const Volume volume = add_sphere();
+  JobParameters parameters = parameters_of(volume, 1e6);
+  parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl};
+  const PipelineResult result = run(volume, parameters);
+  EXPECT_EQ(result.mesh.triangles, 0U);
+  EXPECT_EQ(result.mesh.vertices, 0U);
+  EXPECT_EQ(result.mesh.components, 0U);
+  EXPECT_EQ(result.mesh.area_mm2, 0);
+  EXPECT_EQ(result.mesh.volume_mm3.extracted, 0);
+  EXPECT_EQ(result.mesh.files.size(), 2U);
+}
+
+template <class T>
+struct Typed {
+  SampleType type;
+};
+
+TEST_F(PipelineTest, TakesEverySampleType) {
+  const test::Field field = test::scaled(test::sphere({6, 6, 6}, 4.2), 5, 50);
+  const auto counts = [&]<class T>(Typed<T> sample) {
+    const Volume volume = add(test::sample<T>(field, {13, 13, 13}), sample.type);
+    const MeshSummary mesh = run(volume, parameters_of(volume, 50)).mesh;
+    EXPECT_EQ(mesh.euler, 2) << to_string(sample.type);
+    return mesh.triangles;
+  };
+  std::set<std::uint64_t> seen = {counts(Typed<std::uint8_t>{SampleType::kUint8}),
+                                  counts(Typed<std::int8_t>{SampleType::kInt8}),
+                                  counts(Typed<std::uint16_t>{SampleType::kUint16}),
+                                  counts(Typed<std::int16_t>{SampleType::kInt16}),
+                                  counts(Typed<std::uint32_t>{SampleType::kUint32}),
+                                  counts(Typed<std::int32_t>{SampleType::kInt32})};
+  EXPECT_EQ(seen.size(), 1U);
+  seen = {counts(Typed<float>{SampleType::kFloat32}), counts(Typed<double>{SampleType::kFloat64})};
+  EXPECT_EQ(seen.size(), 1U);
+}
+
+TEST_F(PipelineTest, EveryWayGivesTheSameBytesOnAnyNumberOfThreads) {
+  const Volume volume = add(test::noise<std::uint8_t>({0, 1, 2}, {31, 29, 40}, 9),
+                            SampleType::kUint8);
+  for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
+    for (const Interpolation interpolation : {Interpolation::kLinear, Interpolation::kMidpoint}) {
+      JobParameters parameters = parameters_of(volume, 1);
+      parameters.scheme = scheme;
+      parameters.interpolation = interpolation;
+      std::set<std::string> results;
+      for (const int threads : {1, 2, 3, 8}) {
+        const test::ThreadCount count(threads);
+        results.insert(mesh_bytes(run(volume, parameters)));
+      }
+      EXPECT_EQ(results.size(), 1U);
+    }
+  }
+}
+
+TEST_F(PipelineTest, AWorkspaceKeepsNothingOfTheJobBefore) {
+  const Volume volume = add_sphere();
+  const Volume other = add(test::noise<std::uint8_t>({0, 1}, {9, 9, 9}, 2), SampleType::kUint8);
+  const std::string expected = mesh_bytes(run(volume, parameters_of(volume, 0)));
+  Workspace workspace;
+  run_pipeline(other, parameters_of(other, 1), blobs_, workspace, {}, kQuiet);
+  const auto result =
+      run_pipeline(volume, parameters_of(volume, 0), blobs_, workspace, {}, kQuiet);
+  EXPECT_EQ(mesh_bytes(result), expected);
+}
+
+TEST_F(PipelineTest, EveryStageIsTimed) {
+  const Volume volume = add_much();
+  const Timing timing = run(volume, parameters_of(volume, 50)).timing;
+  EXPECT_GT(timing.load, 0);
+  EXPECT_GT(timing.extract, 0);
+  EXPECT_GT(timing.smooth, 0);
+  EXPECT_GT(timing.encode, 0);
+}
+
+TEST_F(PipelineTest, ReportsItsStagesInOrderAndItsProgressUpToTheEnd) {
+  std::mutex mutex;
+  std::vector<Stage> stages;
+  double most = 0;
+  const Report report = [&](Stage stage, double progress, const Timing&) {
+    const std::lock_guard lock(mutex);
+    if (stages.empty() || stages.back() != stage) stages.push_back(stage);
+    EXPECT_GE(progress, 0);
+    EXPECT_LE(progress, 1 + 1e-9);
+    most = std::max(most, progress);
+  };
+  const Volume volume = add_sphere();
+  run(volume, parameters_of(volume, 0), report);
+  EXPECT_EQ(stages,
+            (std::vector{Stage::kLoad, Stage::kExtract, Stage::kSmooth, Stage::kEncode}));
+  EXPECT_NEAR(most, 1, 1e-9);
+}
+
+class Cancelled : public PipelineTest, public testing::WithParamInterface<Stage> {};
+
+TEST_P(Cancelled, ThrowsAndStoresNothing) {
+  const Volume volume = add_sphere();
+  const std::size_t before = blob_count();
+  std::stop_source stop;
+  const Report stop_there = [&](Stage stage, double, const Timing&) {
+    if (stage == GetParam()) stop.request_stop();
+  };
+  JobParameters parameters = parameters_of(volume, 0);
+  parameters.formats = {MeshFormat::kStl, MeshFormat::kDrc};
+  EXPECT_EQ(test::code_thrown_by([&] { run(volume, parameters, stop_there, stop.get_token()); }),
+            ErrorCode::kCancelled);
+  EXPECT_EQ(blob_count(), before);
+  EXPECT_EQ(scratch_count(), 0U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Stages, Cancelled,
+                         testing::Values(Stage::kLoad, Stage::kExtract, Stage::kSmooth,
+                                         Stage::kEncode),
+                         [](const auto& stage) { return std::string(to_string(stage.param)); });
+
+// The first of two formats is stored when the second is begun.
+TEST_F(PipelineTest, CancelledBetweenTwoFormatsItStoresNothing) {
+  const Volume volume = add_sphere();
+  const std::size_t before = blob_count();
+  std::stop_source stop;
+  const Report stop_half_way = [&](Stage stage, double, const Timing&) {
+    if (stage == Stage::kEncode && blob_count() > before) stop.request_stop();
+  };
+  JobParameters parameters = parameters_of(volume, 0);
+  parameters.formats = {MeshFormat::kStl, MeshFormat::kDrc};
+  const auto code =
+      test::code_thrown_by([&] { run(volume, parameters, stop_half_way, stop.get_token()); });
+  if (code) {
+    EXPECT_EQ(*code, ErrorCode::kCancelled);
+    EXPECT_EQ(blob_count(), before);
+  } else {
+    EXPECT_EQ(blob_count(), before + 2);
+  }
+}
+
+TEST_F(PipelineTest, AFormatThatCannotBeWrittenStoresNothing) {
+  const Volume volume = add_sphere();
+  const std::size_t before = blob_count();
+  JobParameters parameters = parameters_of(volume, 0);
+  parameters.formats = {MeshFormat::kStl, MeshFormat::kObj};
+  EXPECT_EQ(test::code_thrown_by([&] { run(volume, parameters); }), ErrorCode::kInvalidParameter);
+  EXPECT_EQ(blob_count(), before);
+}
+
+TEST_F(PipelineTest, ALongJobStopsWhenItIsCancelled) {
+  const Volume volume = add_much();
+  JobParameters parameters = parameters_of(volume, 50);
+  parameters.passes = 1000;
+  std::stop_source stop;
+  const Report stop_early = [&](Stage stage, double progress, const Timing&) {
+    if (stage == Stage::kSmooth && progress > 0.07) stop.request_stop();
+  };
+  EXPECT_EQ(test::code_thrown_by([&] { run(volume, parameters, stop_early, stop.get_token()); }),
+            ErrorCode::kCancelled);
+}
+
+TEST_F(PipelineTest, AVolumeWhoseSamplesAreGoneIsAnErrorOfOurs) {
+  const Volume volume = add_sphere();
+  blobs_.erase(volume.id);
+  EXPECT_TRUE(test::code_thrown_by([&] { run(volume, parameters_of(volume, 0)); }));
+}
+
+TEST(CheckSupported, TakesWhatThisVersionServes) {
+  JobParameters parameters;
+  parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl};
+  parameters.scheme = Scheme::kFive;
+  parameters.interpolation = Interpolation::kMidpoint;
+  parameters.passes = 1000;
+  parameters.lambda = 0.1;
+  parameters.priority = Priority::kBulk;
+  check_supported(parameters);
+}
+
+TEST(CheckSupported, RefusesTheRestByName) {
+  const auto fields = [](const JobParameters& parameters) {
+    const auto error = test::thrown_by([&] { check_supported(parameters); });
+    if (!error) return std::vector<std::string>{"nothing was refused"};
+    EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
+    return test::fields_of(*error);
+  };
+  for (int number = 0; !to_string(MeshFormat{number}).empty(); ++number) {
+    if (codec::can_encode(MeshFormat{number})) continue;
+    JobParameters parameters;
+    parameters.formats = {MeshFormat::kDrc, MeshFormat{number}};
+    EXPECT_EQ(fields(parameters), std::vector<std::string>{"formats"});
+  }
+  JobParameters closed;
+  closed.close = true;
+  EXPECT_EQ(fields(closed), std::vector<std::string>{"close"});
+  JobParameters taubin;
+  taubin.smoothing = Smoothing::kTaubin;
+  EXPECT_EQ(fields(taubin), std::vector<std::string>{"smoothing"});
+}
+
+TEST(Workspace, GivesBackWhatIsBeyondItsBudget) {
+  Workspace workspace;
+  workspace.mesh.positions.resize_for_overwrite(1000);
+  workspace.trim(1 << 20);
+  EXPECT_GT(workspace.mesh.positions.capacity_bytes(), 0U);
+  workspace.trim(1000);
+  EXPECT_EQ(workspace.mesh.positions.capacity_bytes(), 0U);
+}
+
+}  // namespace
+}  // namespace isomesh::jobs

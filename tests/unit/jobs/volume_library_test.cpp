@@ -1,0 +1,118 @@
+#include "server/jobs/volume_library.h"
+
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/errors.h"
+#include "tests/unit/jobs/fixture.h"
+
+namespace isomesh::jobs {
+namespace {
+
+using test::code_thrown_by;
+
+class VolumeLibraryTest : public test::JobsFixture {
+ protected:
+  static constexpr std::array<std::uint32_t, 3> kDims = {2, 3, 4};
+
+  std::pair<Volume, bool> add_bytes(const std::string& bytes, const Geometry& geometry = {}) {
+    test::write_file(folder_ / "upload", bytes);
+    return library_.add(folder_ / "upload",
+                        volume::RawDescription{.dims = kDims,
+                                               .type = SampleType::kUint8,
+                                               .geometry = geometry,
+                                               .big_endian = false});
+  }
+
+  const std::string bytes_ = "abcdefghijklmnopqrstuvwx";
+};
+
+TEST_F(VolumeLibraryTest, AddsAVolumeWithItsRecordAndItsBlob) {
+  const auto [volume, is_new] = add_bytes(bytes_);
+  EXPECT_TRUE(is_new);
+  EXPECT_EQ(volume.format, "raw");
+  EXPECT_EQ(volume.dims, kDims);
+  EXPECT_EQ(volume.bytes, bytes_.size());
+  EXPECT_EQ(volume.range, (std::array<double, 2>{'a', 'x'}));
+  EXPECT_FALSE(volume.created.empty());
+  EXPECT_EQ(volumes_.get(volume.id), volume);
+  EXPECT_TRUE(blob(volume.id).ends_with(bytes_));
+  EXPECT_EQ(scratch_count(), 0U);
+}
+
+TEST_F(VolumeLibraryTest, TheSameVolumeAgainIsNotNew) {
+  const Volume first = add_bytes(bytes_).first;
+  EXPECT_EQ(add_bytes(bytes_), std::pair(first, false));
+  EXPECT_EQ(volumes_.list().size(), 1U);
+  EXPECT_EQ(blob_count(), 1U);
+}
+
+TEST_F(VolumeLibraryTest, OtherSamplesOrGeometryAreAnotherVolume) {
+  const std::string id = add_bytes(bytes_).first.id;
+  EXPECT_NE(add_bytes(std::string(bytes_.rbegin(), bytes_.rend())).first.id, id);
+  Geometry geometry;
+  geometry.spacing = {1, 1, 2};
+  EXPECT_NE(add_bytes(bytes_, geometry).first.id, id);
+  EXPECT_EQ(volumes_.list().size(), 3U);
+}
+
+TEST_F(VolumeLibraryTest, ARefusedUploadLeavesNothing) {
+  EXPECT_EQ(code_thrown_by([&] { add_bytes("too short"); }), ErrorCode::kInvalidParameter);
+  test::write_file(folder_ / "upload", "not a volume");
+  EXPECT_EQ(code_thrown_by([&] { library_.add(folder_ / "upload", std::nullopt); }),
+            ErrorCode::kUnsupportedMedia);
+  EXPECT_TRUE(volumes_.list().empty());
+  EXPECT_EQ(blob_count(), 0U);
+  EXPECT_EQ(scratch_count(), 0U);
+}
+
+TEST_F(VolumeLibraryTest, LeavesTheUploadToItsOwner) {
+  add_bytes(bytes_);
+  EXPECT_EQ(test::read_file(folder_ / "upload"), bytes_);
+}
+
+TEST_F(VolumeLibraryTest, ErasesRecordAndBlob) {
+  const Volume volume = add_bytes(bytes_).first;
+  library_.erase(volume.id);
+  EXPECT_FALSE(volumes_.contains(volume.id));
+  EXPECT_EQ(blob_count(), 0U);
+  EXPECT_EQ(code_thrown_by([&] { library_.erase(volume.id); }), ErrorCode::kNotFound);
+  EXPECT_TRUE(add_bytes(bytes_).second);
+}
+
+TEST_F(VolumeLibraryTest, KeepsAVolumeThatAJobNeeds) {
+  const Volume volume = add_bytes(bytes_).first;
+  const std::string job = jobs_.submit(parameters_of(volume, 100)).id;
+  EXPECT_EQ(code_thrown_by([&] { library_.erase(volume.id); }), ErrorCode::kNotReady);
+  EXPECT_EQ(volumes_.get(volume.id), volume);
+  EXPECT_EQ(blob_count(), 1U);
+  jobs_.cancel(job);
+  library_.erase(volume.id);
+  EXPECT_EQ(blob_count(), 0U);
+}
+
+TEST_F(VolumeLibraryTest, ErasingAnUnknownOneIsNotFound) {
+  EXPECT_EQ(code_thrown_by([&] { library_.erase("x"); }), ErrorCode::kNotFound);
+}
+
+TEST_F(VolumeLibraryTest, OfManyEqualUploadsOneIsNew) {
+  test::write_file(folder_ / "upload", bytes_);
+  std::atomic<int> added = 0;
+  std::vector<std::jthread> threads;
+  for (int thread = 0; thread < 8; ++thread) {
+    threads.emplace_back([&] {
+      const volume::RawDescription raw{
+          .dims = kDims, .type = SampleType::kUint8, .geometry = {}, .big_endian = false};
+      if (library_.add(folder_ / "upload", raw).second) ++added;
+    });
+  }
+  threads.clear();
+  EXPECT_EQ(added, 1);
+  EXPECT_EQ(blob_count(), 1U);
+}
+
+}  // namespace
+}  // namespace isomesh::jobs

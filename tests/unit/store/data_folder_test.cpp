@@ -1,0 +1,98 @@
+#include "server/store/data_folder.h"
+
+#include <optional>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/errors.h"
+#include "tests/support/files.h"
+
+namespace isomesh::store {
+namespace {
+
+using test::TemporaryFolder;
+
+TEST(DataFolder, CreatesWhatIsMissing) {
+  const TemporaryFolder parent;
+  const DataFolder folder(parent.path() / "a" / "b");
+  EXPECT_TRUE(std::filesystem::is_directory(folder.blobs()));
+  EXPECT_TRUE(std::filesystem::is_directory(folder.volumes()));
+  EXPECT_TRUE(std::filesystem::is_directory(folder.scratch()));
+}
+
+TEST(DataFolder, RefusesASecondHolder) {
+  const TemporaryFolder parent;
+  std::optional<DataFolder> first(std::in_place, parent / "data");
+  EXPECT_EQ(test::code_thrown_by([&] { DataFolder second(parent / "data"); }),
+            ErrorCode::kUnavailable);
+  first.reset();
+  EXPECT_EQ(test::code_thrown_by([&] { DataFolder second(parent / "data"); }), std::nullopt);
+}
+
+TEST(DataFolder, ARefusedHolderTouchesNothing) {
+  const TemporaryFolder parent;
+  const DataFolder first(parent / "data");
+  test::write_file(first.scratch() / "upload", "under way");
+  EXPECT_TRUE(test::code_thrown_by([&] { DataFolder second(parent / "data"); }));
+  EXPECT_EQ(test::read_file(first.scratch() / "upload"), "under way");
+}
+
+TEST(DataFolder, IsTheSameByAnyPath) {
+  const TemporaryFolder parent;
+  const DataFolder first(parent / "data");
+  std::filesystem::create_symlink(parent / "data", parent / "link");
+  EXPECT_EQ(test::code_thrown_by([&] { DataFolder second(parent / "link"); }),
+            ErrorCode::kUnavailable);
+  EXPECT_EQ(test::code_thrown_by([&] { DataFolder second(parent / "data/../data/"); }),
+            ErrorCode::kUnavailable);
+}
+
+// A file named lock, as a killed daemon leaves it behind, does not keep the next one out.
+TEST(DataFolder, IsFreeOnceItsHolderHasGone) {
+  const TemporaryFolder parent;
+  { const DataFolder folder(parent / "data"); }
+  ASSERT_TRUE(std::filesystem::exists(parent / "data/lock"));
+  EXPECT_EQ(test::code_thrown_by([&] { DataFolder second(parent / "data"); }), std::nullopt);
+}
+
+TEST(DataFolder, KeepsWhatIsFinishedAndEmptiesScratch) {
+  const TemporaryFolder parent;
+  {
+    const DataFolder folder(parent / "data");
+    test::write_file(folder.blobs() / "blob", "1");
+    test::write_file(folder.volumes() / "record.json", "2");
+    test::write_file(folder.scratch() / "file", "3");
+    std::filesystem::create_directories(folder.scratch() / "deep" / "er");
+    test::write_file(folder.scratch() / "deep" / "er" / "file", "4");
+  }
+  const DataFolder folder(parent / "data");
+  EXPECT_EQ(test::read_file(folder.blobs() / "blob"), "1");
+  EXPECT_EQ(test::read_file(folder.volumes() / "record.json"), "2");
+  EXPECT_TRUE(std::filesystem::is_empty(folder.scratch()));
+}
+
+TEST(DataFolder, ThatCannotBeMadeIsRefusedWithoutItsPath) {
+  const TemporaryFolder parent;
+  test::write_file(parent / "file", "not a folder");
+  const auto error = test::thrown_by([&] { DataFolder folder(parent.path() / "file" / "data"); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kInternal);
+  EXPECT_EQ(std::string(error->what()).find(parent.path()), std::string::npos);
+}
+
+TEST(ScratchFolder, GoesWithAllThatItHolds) {
+  const TemporaryFolder parent;
+  {
+    const ScratchFolder one(parent.path());
+    const ScratchFolder other(parent.path());
+    EXPECT_NE(one.path(), other.path());
+    EXPECT_EQ(one.path().parent_path(), parent.path());
+    std::filesystem::create_directories(one.path() / "deep");
+    test::write_file(one.path() / "deep" / "file", "text");
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(parent.path()));
+}
+
+}  // namespace
+}  // namespace isomesh::store
