@@ -179,6 +179,16 @@ template <class T>
 void read(const Json& json, T& value);
 
 template <class T>
+constexpr bool kIsOptional = false;
+template <class T>
+constexpr bool kIsOptional<std::optional<T>> = true;
+
+// Throws as nlohmann's own readers do, where those would take another kind for an empty one.
+void check_kind(bool right) {
+  if (!right) throw Error(ErrorCode::kInternal, "the server's answer has a member of a wrong kind");
+}
+
+template <class T>
 void read_field(const Json& json, std::optional<T>& value) {
   if (json.is_null() || (json.is_string() && std::is_same_v<T, double>)) {
     value.reset();
@@ -201,19 +211,29 @@ void read(const Json& json, T& value) {
     if (!known) throw Error(ErrorCode::kInternal, "the server's answer names an unknown value");
     value = *known;
   } else if constexpr (std::is_same_v<T, std::map<MeshFormat, MeshFile>>) {
+    check_kind(json.is_object());
     for (const auto& [name, file] : json.items()) {
       if (const auto format = from_string<MeshFormat>(name)) read(file, value[*format]);
     }
   } else if constexpr (std::is_arithmetic_v<T> || std::is_same_v<T, std::string>) {
     value = json.get<T>();
   } else if constexpr (requires { value.emplace_back(); }) {
+    check_kind(json.is_array());
     value.clear();
     for (const auto& element : json) read(element, value.emplace_back());
   } else if constexpr (requires { value.begin(); }) {
     for (std::size_t i = 0; i < value.size(); ++i) read(json.at(i), value[i]);
   } else {
+    check_kind(json.is_object());
     visit(value, [&](const char* name, auto& member) {
-      if (const auto found = json.find(name); found != json.end()) read_field(*found, member);
+      // RFC 9457 requires no member of a problem.
+      constexpr bool kMayBeMissing =
+          std::is_same_v<T, Problem> || kIsOptional<std::remove_reference_t<decltype(member)>>;
+      if (const auto found = json.find(name); found != json.end()) {
+        read_field(*found, member);
+      } else if (!kMayBeMissing) {
+        throw Error(ErrorCode::kInternal, std::string("the server's answer lacks ") + name);
+      }
     });
   }
 }
@@ -235,6 +255,9 @@ T from_text(std::string_view text, const char* list = nullptr) {
 // Collects what is wrong with every member, so that one answer names all of it.
 class RequestReader {
  public:
+  // Faults are named as a query spells them: `format` for `formats`, no `draco.` before its members.
+  void name_as_in_query() { as_in_query_ = true; }
+
   // Reads `json` into `value`, whose fields are those of `visit`, and refuses any other.
   template <class T>
   void read_object(const Json& json, T& value, const std::string& prefix) {
@@ -253,7 +276,7 @@ class RequestReader {
   }
 
   void add(const std::string& field, const std::string& message) {
-    if (errors_.size() < kMostErrors) errors_.push_back({field, message});
+    if (errors_.size() < kMostErrors) errors_.push_back({spelled(field), message});
   }
 
   void throw_if_any() {
@@ -266,6 +289,13 @@ class RequestReader {
   }
 
  private:
+  std::string spelled(const std::string& field) const {
+    constexpr std::string_view kDraco = "draco.";
+    if (!as_in_query_) return field;
+    if (field == "formats") return "format";
+    return field.starts_with(kDraco) ? field.substr(kDraco.size()) : field;
+  }
+
   static constexpr std::size_t kMostErrors = 20;
   static constexpr std::size_t kLongestName = 64;
 
@@ -346,6 +376,7 @@ class RequestReader {
     return {0, 10};  // draco.speed
   }
 
+  bool as_in_query_ = false;
   std::vector<FieldError> errors_;
 };
 
@@ -414,19 +445,24 @@ JobParameters parse_job_parameters(std::string_view body) {
 JobParameters parse_job_parameters(
     const std::vector<std::pair<std::string, std::string>>& query) {
   RequestReader reader;
+  std::vector<std::string> misplaced;
   Json json = Json::object();
   for (const auto& [name, text] : query) {
     const bool of_draco = name == "position_bits" || name == "speed";
     Json& owner = of_draco ? json["draco"] : json;
     const std::string member = name == "format" ? "formats" : name;
     if (name == "volume" || name == "draco" || name == "formats") {
-      reader.add(name, "is not a parameter of this request");
+      misplaced.push_back(name);
     } else if (owner.contains(member)) {
       reader.add(name, "is given twice");
     } else {
       owner[member] = name == "format" ? list_of(text) : value_of(text);
     }
   }
+  for (const std::string& name : misplaced) {
+    reader.add(name, "is not a parameter of this request");
+  }
+  reader.name_as_in_query();
   return read_parameters(json, false, reader);
 }
 

@@ -17,6 +17,10 @@ namespace {
 
 constexpr int kSequentialSpeed = 10;
 
+// Draco's entropy coder counts values in an array of all that there could be, four bytes each: 4 GiB
+// at 30 bits. Finer grids than this are stored without it, in up to four bytes a coordinate.
+constexpr int kMostEntropyCodedBits = 24;
+
 struct Bounds {
   mesh::Vec3 low = {0, 0, 0};
   mesh::Vec3 high = {0, 0, 0};
@@ -40,23 +44,32 @@ struct Part {
   std::vector<mesh::Triangle> triangles;
 };
 
-Part part_of(const mesh::Mesh& mesh, std::size_t begin, std::size_t end) {
+// Calls visit(triangle) for the block's triangles in order.
+template <class Visit>
+void for_each_triangle(const mesh::Mesh& mesh, const Block& block, Visit visit) {
+  for (const Run& run : block) {
+    for (std::size_t t = run.begin; t < run.end; ++t) visit(mesh.triangles[t]);
+  }
+}
+
+Part part_of(const mesh::Mesh& mesh, const Block& block) {
   constexpr std::uint32_t kUnnamed = std::numeric_limits<std::uint32_t>::max();
-  const std::span triangles = mesh.triangles.span().subspan(begin, end - begin);
   std::uint32_t low = kUnnamed;
   std::uint32_t high = 0;
-  for (const mesh::Triangle& triangle : triangles) {
+  std::size_t triangles = 0;
+  for_each_triangle(mesh, block, [&](const mesh::Triangle& triangle) {
     for (const std::uint32_t vertex : triangle) {
       low = std::min(low, vertex);
       high = std::max(high, vertex);
     }
-  }
+    ++triangles;
+  });
   // Triangles of neighbouring layers name vertices of neighbouring layers, so the range is short.
   std::vector<std::uint32_t> number(std::size_t{high} - low + 1, kUnnamed);
   Part part;
-  part.positions.reserve(triangles.size() / 2);
-  part.triangles.reserve(triangles.size());
-  for (const mesh::Triangle& triangle : triangles) {
+  part.positions.reserve(triangles / 2);
+  part.triangles.reserve(triangles);
+  for_each_triangle(mesh, block, [&](const mesh::Triangle& triangle) {
     mesh::Triangle& renumbered = part.triangles.emplace_back();
     for (std::size_t corner = 0; corner < 3; ++corner) {
       std::uint32_t& vertex = number[triangle[corner] - low];
@@ -66,7 +79,7 @@ Part part_of(const mesh::Mesh& mesh, std::size_t begin, std::size_t end) {
       }
       renumbered[corner] = vertex;
     }
-  }
+  });
   return part;
 }
 
@@ -116,10 +129,41 @@ Grid grid_of(const mesh::Mesh& mesh, int bits) {
   return grid;
 }
 
-DracoStream encode_draco(const mesh::Mesh& mesh, std::size_t begin, std::size_t end,
-                         const Grid& grid, int speed) {
-  const bool whole = begin == 0 && end == mesh.triangles.size();
-  const Part part = whole ? Part() : part_of(mesh, begin, end);
+std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_block) {
+  const auto triangles = static_cast<double>(mesh.triangles.size());
+  const auto layers = static_cast<double>(mesh.layers());
+  const auto target = static_cast<double>(triangles_per_block);
+  if (mesh.triangles.size() == 0) return {};
+  // As if the volume were as deep as it is high: then a block of n layers by a layer's nth part is
+  // a cube.
+  const auto parts =
+      static_cast<std::size_t>(std::max(1.0, std::round(std::sqrt(triangles / target))));
+  const auto depth = static_cast<std::size_t>(std::max(
+      1.0, std::round(target * static_cast<double>(parts) * layers / triangles)));
+  std::vector<Block> blocks;
+  for (std::size_t bottom = 0; bottom < mesh.layers(); bottom += depth) {
+    const std::size_t top = std::min(mesh.layers(), bottom + depth);
+    for (std::size_t part = 0; part < parts; ++part) {
+      Block block;
+      for (std::size_t layer = bottom; layer < top; ++layer) {
+        const std::uint64_t first = mesh.layer_triangles[layer];
+        const std::uint64_t count = mesh.layer_triangles[layer + 1] - first;
+        const Run run = {first + count * part / parts, first + count * (part + 1) / parts};
+        if (run.begin < run.end) block.push_back(run);
+      }
+      if (!block.empty()) blocks.push_back(std::move(block));
+    }
+  }
+  return blocks;
+}
+
+Block whole_block(const mesh::Mesh& mesh) { return {{0, mesh.triangles.size()}}; }
+
+DracoStream encode_draco(const mesh::Mesh& mesh, const Block& block, const Grid& grid,
+                         int speed) {
+  const bool whole = block.size() == 1 && block[0].begin == 0 &&
+                     block[0].end == mesh.triangles.size();
+  const Part part = whole ? Part() : part_of(mesh, block);
   const std::span positions = whole ? mesh.positions.span() : std::span(part.positions);
   const std::span triangles = whole ? mesh.triangles.span() : std::span(part.triangles);
 
@@ -130,6 +174,14 @@ DracoStream encode_draco(const mesh::Mesh& mesh, std::size_t begin, std::size_t 
   stream.position_id = draco_mesh->attribute(0)->unique_id();
   draco::Encoder encoder;
   encoder.SetSpeedOptions(speed, speed);
+  if (grid.bits > kMostEntropyCodedBits) {
+    encoder.options().SetGlobalBool("use_built_in_attribute_compression", false);
+    // The predictions of the slowest speeds count values too.
+    encoder.SetAttributePredictionScheme(draco::GeometryAttribute::POSITION,
+                                         draco::PREDICTION_DIFFERENCE);
+  }
+  // Of the sequential encoding: indices as entropy coded differences, a third of their size.
+  encoder.options().SetGlobalBool("compress_connectivity", true);
   if (triangles.empty()) {
     // Neither edgebreaker nor quantisation has a code for nothing.
     encoder.SetEncodingMethod(draco::MESH_SEQUENTIAL_ENCODING);

@@ -1,4 +1,4 @@
-// Runs of triangles as Draco streams on one shared quantisation grid; private to this folder.
+// Blocks of triangles as Draco streams on one shared quantisation grid; private to this folder.
 #pragma once
 
 #include <array>
@@ -34,10 +34,27 @@ struct DracoStream {
   mesh::Vec3 high = {0, 0, 0};
 };
 
-// Encodes the triangles [begin, end) with the vertices they name: by edgebreaker, or for speed 10 (as
+// Consecutive triangles [begin, end).
+struct Run {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
+// Triangles that are encoded together: a run from each of some consecutive layers.
+using Block = std::vector<Run>;
+
+// Cuts the mesh into blocks of about that many triangles which are as compact as the order of the
+// triangles allows, because blocks share the vertices on their seams: a layer is cut into equal runs,
+// and runs of the same place in consecutive layers lie above each other. Every triangle is in one
+// block. No empty blocks.
+std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_block);
+
+// The block of all triangles.
+Block whole_block(const mesh::Mesh& mesh);
+
+// Encodes the block's triangles with the vertices they name: by edgebreaker, or for speed 10 (as
 // Draco's own convention has it) and for a mesh without triangles sequentially. Takes one thread.
 // Thread safe. Throws Error kInternal when Draco refuses.
-DracoStream encode_draco(const mesh::Mesh& mesh, std::size_t begin, std::size_t end,
-                         const Grid& grid, int speed);
+DracoStream encode_draco(const mesh::Mesh& mesh, const Block& block, const Grid& grid, int speed);
 
 }  // namespace isomesh::codec

@@ -11,7 +11,7 @@ void encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco,
   if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::kTooLarge, "the surface has more triangles than Draco can encode");
   }
-  const DracoStream stream = encode_draco(mesh, 0, mesh.triangles.size(),
+  const DracoStream stream = encode_draco(mesh, whole_block(mesh),
                                           grid_of(mesh, draco.position_bits), draco.speed);
   context.throw_if_stopped();
   sink(stream.bytes);

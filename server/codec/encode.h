@@ -37,12 +37,12 @@ struct Provenance {
   Geometry geometry;
 };
 
-// Binary glTF 2.0: the mesh as one primitive for each run of some 200 000 triangles, each a Draco
+// Binary glTF 2.0: the mesh as one primitive for each block of some 60 000 triangles, each a Draco
 // stream of its own (KHR_draco_mesh_compression), encoded side by side. All share one quantisation
-// grid, so vertices on a seam between runs decode to the same bits. Positions are LPS millimetres
+// grid, so vertices on a seam between blocks decode to the same bits. Positions are LPS millimetres
 // under a node that turns them into glTF's metres with Y up. The bytes do not depend on the number of
 // threads. Throws Error kTooLarge beyond the 4 GiB that GLB can hold, kInternal when Draco refuses,
-// and kCancelled, looked at before each run.
+// and kCancelled, looked at before each block.
 void encode_glb(const mesh::Mesh& mesh, const DracoParameters& draco,
                 const Provenance& provenance, const mesh::Context& context, const Sink& sink);
 

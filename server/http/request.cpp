@@ -23,6 +23,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
+// The parts are views of `text`, which must outlive them.
 std::vector<std::string_view> split(std::string_view text, char separator) {
   std::vector<std::string_view> parts;
   for (std::size_t begin = 0; begin <= text.size();) {
@@ -59,7 +60,8 @@ std::array<Number, N> numbers_of(const std::string& name, std::string_view text)
 
 // The seconds of a preference `wait=N` (RFC 7240), among others in the header.
 std::optional<std::string> preferred_wait(const httplib::Request& request) {
-  for (const std::string_view preference : split(request.get_header_value("Prefer"), ',')) {
+  const std::string header = request.get_header_value("Prefer");
+  for (const std::string_view preference : split(header, ',')) {
     constexpr std::string_view kWait = "wait=";
     if (preference.starts_with(kWait)) return std::string(preference.substr(kWait.size()));
   }
@@ -68,7 +70,8 @@ std::optional<std::string> preferred_wait(const httplib::Request& request) {
 
 std::string hex_of_base64(std::string_view text) {
   std::array<unsigned char, 48> bytes = {};
-  const bool right_length = text.size() == 44;  // 32 bytes
+  // 32 bytes are 44 characters, of which one fills up.
+  const bool right_length = text.size() == 44 && text[43] == '=' && text[42] != '=';
   if (!right_length ||
       EVP_DecodeBlock(bytes.data(), reinterpret_cast<const unsigned char*>(text.data()),
                       static_cast<int>(text.size())) < 0) {
@@ -118,7 +121,8 @@ std::chrono::milliseconds wait_of(const httplib::Request& request) {
 }
 
 std::optional<std::string> sha256_of_content_digest(const httplib::Request& request) {
-  for (const std::string_view digest : split(request.get_header_value("Content-Digest"), ',')) {
+  const std::string header = request.get_header_value("Content-Digest");
+  for (const std::string_view digest : split(header, ',')) {
     constexpr std::string_view kSha256 = "sha-256=";
     if (!digest.starts_with(kSha256)) continue;
     std::string_view value = digest.substr(kSha256.size());
@@ -196,7 +200,8 @@ std::optional<ByteRange> range_of(const httplib::Request& request, std::uint64_t
 }
 
 bool matches_etag(const httplib::Request& request, std::string_view etag) {
-  for (std::string_view tag : split(request.get_header_value("If-None-Match"), ',')) {
+  const std::string header = request.get_header_value("If-None-Match");
+  for (std::string_view tag : split(header, ',')) {
     if (tag.starts_with("W/")) tag.remove_prefix(2);
     if (tag == "*" || tag == etag) return true;
   }

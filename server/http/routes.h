@@ -29,7 +29,8 @@ struct App {
   ServerOptions options;
   Slots uploads;
   Slots waits;
-  std::atomic<bool> draining = false;
+  std::atomic<bool> draining = false;  // running jobs are finished, others are not accepted
+  std::atomic<bool> stopping = false;  // nobody is waited for any more
   httplib::Server http;
   std::map<std::string, std::set<std::string>> methods;  // of each route's pattern
 };

@@ -67,6 +67,7 @@ void add_job_routes(App& app) {
     answer_json(response, 200, to_json(waited(app, id_of(request), wait_of(request))));
   });
   add_delete(app, kJobs + '/' + kId, [&app](const auto& request, auto& response) {
+    check_known(request, {});
     answer_json(response, 200, to_json(app.services.jobs.cancel(id_of(request))));
   });
 }

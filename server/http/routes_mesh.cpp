@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <set>
 #include <vector>
 
 #include "proto/json.h"
@@ -46,13 +47,31 @@ void stream(httplib::Response& response, store::File file, const ByteRange& rang
       });
 }
 
+// The part that a GET asks for; a 416 tells how long the whole is.
+std::optional<ByteRange> part_of(const httplib::Request& request, httplib::Response& response,
+                                 const std::string& etag, std::uint64_t size) {
+  if (request.method != "GET") return std::nullopt;
+  if (request.has_header("If-Range") && request.get_header_value("If-Range") != etag) {
+    return std::nullopt;
+  }
+  try {
+    return range_of(request, size);
+  } catch (const Error&) {
+    response.set_header("Content-Range", "bytes */" + std::to_string(size));
+    throw;
+  }
+}
+
 // One request: the volume is the body, the mesh the answer.
 void mesh_in_one(App& app, const httplib::Request& request, httplib::Response& response,
                  const httplib::ContentReader& read_body) {
   std::vector<std::pair<std::string, std::string>> job_query;
+  std::set<std::string> names;  // so far only checked for being there once
   for (const auto& parameter : query_of(request)) {
+    names.insert(parameter.first);
     if (!raw_description_parameters().contains(parameter.first)) job_query.push_back(parameter);
   }
+  check_known(request, names);
   JobParameters parameters = parse_job_parameters(job_query);
   if (parameters.formats.size() != 1) {
     throw invalid_parameter("format", "must be one format: the answer is one file");
@@ -62,13 +81,14 @@ void mesh_in_one(App& app, const httplib::Request& request, httplib::Response& r
   const auto place = app.uploads.try_take();
   if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
   {
-    const Upload file(app.services.folder, app.options.upload, request, read_body);
+    const Upload file(app.services.folder, app.options.upload, app.stopping, request, read_body);
     parameters.volume = app.services.library.add(file.path(), raw).first.id;
   }
   const std::string id = app.services.jobs.submit(parameters).id;
   response.set_header("Location", "/v1/jobs/" + id);
   Job job = app.services.jobs.get(id);
-  while (!is_final(job.state) && !app.draining) {
+  while (!is_final(job.state)) {
+    if (app.stopping) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
     job = app.services.jobs.wait(id, std::chrono::seconds(1));
   }
   answer_mesh(app, request, response, job, parameters.formats.front());
@@ -94,9 +114,8 @@ void answer_mesh(const App& app, const httplib::Request& request, httplib::Respo
   const MeshFile& file = found->second;
   const std::string etag = '"' + file.sha256 + '"';
   const bool unchanged = matches_etag(request, etag);
-  const auto part =
-      request.method == "POST" || unchanged ? std::nullopt : range_of(request, file.bytes);
   response.set_header("ETag", etag);
+  const auto part = unchanged ? std::nullopt : part_of(request, response, etag, file.bytes);
   response.set_header("Cache-Control", "private, immutable");
   response.set_header("Server-Timing", server_timing(job.timing));
   response.set_header("Accept-Ranges", "bytes");

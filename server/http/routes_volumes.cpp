@@ -13,7 +13,7 @@ void upload(App& app, const httplib::Request& request, httplib::Response& respon
   const auto raw = raw_description_of(request);
   const auto place = app.uploads.try_take();
   if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
-  const Upload file(app.services.folder, app.options.upload, request, read_body);
+  const Upload file(app.services.folder, app.options.upload, app.stopping, request, read_body);
   const auto [volume, is_new] = app.services.library.add(file.path(), raw);
   response.set_header("Location", kVolumes + '/' + volume.id);
   answer_json(response, is_new ? 201 : 200, to_json(volume));
@@ -35,6 +35,7 @@ void add_volume_routes(App& app) {
     answer_json(response, 200, to_json(app.services.volumes.get(id_of(request))));
   });
   add_delete(app, kVolumes + '/' + kId, [&app](const auto& request, auto& response) {
+    check_known(request, {});
     app.services.library.erase(id_of(request));
     response.status = 204;
   });

@@ -5,9 +5,11 @@
 #include <chrono>
 #include <regex>
 
+#include <arpa/inet.h>
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <strings.h>
 #include <unistd.h>
 
 #include "server/http/routes.h"
@@ -19,15 +21,15 @@ namespace {
 constexpr std::size_t kLongestPath = 256;
 constexpr std::size_t kLongestTarget = 4096;
 constexpr std::size_t kMostHeaders = 100;
-constexpr std::chrono::seconds kReadTimeout{20};
-constexpr std::chrono::seconds kWriteTimeout{20};
+constexpr std::chrono::seconds kReadTimeout{10};
+constexpr std::chrono::seconds kWriteTimeout{10};
 
 // When the request that this thread serves began.
 thread_local std::chrono::steady_clock::time_point request_began;
 
 bool has_body_length(const httplib::Request& request) {
   return request.has_header("Content-Length") ||
-         request.get_header_value("Transfer-Encoding").find("chunked") != std::string::npos;
+         ::strcasecmp(request.get_header_value("Transfer-Encoding").c_str(), "chunked") == 0;
 }
 
 // What must be refused before the library looks for a route or reads a body. The reasons are in the
@@ -75,6 +77,9 @@ void complete_error(const App& app, const httplib::Request& request, httplib::Re
       return answer_problem(request, response, {ErrorCode::kTooLarge, "the body is too large"});
     case 414:
       return answer_problem(request, response, {ErrorCode::kUriTooLong, "the target is too long"});
+    case 416:
+      return answer_problem(request, response,
+                            {ErrorCode::kRangeNotSatisfiable, "the range is malformed"});
     case 500:
       return answer_problem(request, response, {ErrorCode::kInternal, ""});
     default:
@@ -132,7 +137,10 @@ void configure(App& app) {
 }  // namespace
 
 bool Address::is_loopback() const {
-  return is_unix() || host == "localhost" || host == "::1" || host.starts_with("127.");
+  if (is_unix() || host == "localhost" || host == "::1") return true;
+  in_addr v4 = {};
+  constexpr std::uint32_t kLoopbackNetwork = 127;
+  return ::inet_pton(AF_INET, host.c_str(), &v4) == 1 && ntohl(v4.s_addr) >> 24 == kLoopbackNetwork;
 }
 
 Address parse_address(const std::string& text) {
@@ -206,8 +214,15 @@ std::string Server::bind(const Address& address) {
 
 void Server::serve() { state_->app.http.listen_after_bind(); }
 
-void Server::begin_drain() { state_->app.draining = true; }
+void Server::begin_drain() {
+  state_->app.draining = true;
+  state_->app.services.jobs.refuse_new();
+}
 
-void Server::stop() { state_->app.http.stop(); }
+void Server::stop() {
+  state_->app.stopping = true;
+  state_->app.services.jobs.close();
+  state_->app.http.stop();
+}
 
 }  // namespace isomesh::http

@@ -59,11 +59,12 @@ class Server {
   // Serves until stop(); to be called once, after bind.
   void serve();
 
-  // Ready says 503 from now on, so that a balancer looks elsewhere. Thread safe.
+  // Ready says 503 from now on, so that a balancer looks elsewhere, and no job is accepted. Thread
+  // safe.
   void begin_drain();
 
-  // Ends serve(): no connection is accepted any more, those that are served are finished. Thread
-  // safe.
+  // Ends serve(): no connection is accepted any more, nobody waits for a job, uploads are cut off.
+  // Thread safe.
   void stop();
 
  private:

@@ -33,10 +33,12 @@ void check_length(const httplib::Request& request, std::uint64_t max_bytes) {
 // reading ended.
 class Receiver {
  public:
-  Receiver(store::File& file, const UploadLimits& limits) : file_(file), limits_(limits) {}
+  Receiver(store::File& file, const UploadLimits& limits, const std::atomic<bool>& stopping)
+      : file_(file), limits_(limits), stopping_(stopping) {}
 
   bool take(const char* data, std::size_t size) {
     try {
+      if (stopping_) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
       bytes_ += size;
       if (bytes_ > limits_.max_bytes) throw too_large(limits_.max_bytes);
       if (std::chrono::steady_clock::now() > deadline_) {
@@ -79,6 +81,7 @@ class Receiver {
  private:
   store::File& file_;
   const UploadLimits& limits_;
+  const std::atomic<bool>& stopping_;
   const std::chrono::steady_clock::time_point deadline_ =
       std::chrono::steady_clock::now() + limits_.max_time;
   store::Sha256 digest_;
@@ -90,7 +93,7 @@ class Receiver {
 }  // namespace
 
 Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
-               const httplib::Request& request, const httplib::ContentReader& read_body)
+               const std::atomic<bool>& stopping, const httplib::Request& request, const httplib::ContentReader& read_body)
     : scratch_(folder.scratch()), path_(scratch_.path() / "upload") {
   refuse_encoded(request);
   check_length(request, limits.max_bytes);
@@ -100,7 +103,7 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
     throw invalid_parameter("Content-Digest", "is not supported with a form: send the bare file");
   }
   store::File file = store::File::create(path_);
-  Receiver receiver(file, limits);
+  Receiver receiver(file, limits, stopping);
   const auto take = [&](const char* data, std::size_t size) { return receiver.take(data, size); };
   const bool complete =
       is_form ? read_body(

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -70,36 +71,59 @@ class Progress {
   Clock::time_point began_;
 };
 
+void check_memory(const mesh::SurfaceCount& count, const JobParameters& parameters,
+                  const PipelineLimits& limits) {
+  const std::uint64_t needed = estimate_memory(count.vertices(), count.triangles(), parameters);
+  if (needed <= limits.memory_bytes) return;
+  constexpr std::uint64_t kMebibyte = 1 << 20;
+  throw Error(ErrorCode::kTooLarge,
+              "the surface has " + std::to_string(count.triangles()) + " triangles and " +
+                  std::to_string(count.vertices()) + " vertices; the job would take about " +
+                  std::to_string(needed / kMebibyte) + " MiB of memory, and " +
+                  std::to_string(limits.memory_bytes / kMebibyte) + " MiB are allowed");
+}
+
+// What a job is to be made of and what it may take.
+struct Request {
+  const JobParameters& parameters;
+  const PipelineLimits& limits;
+  double iso;
+};
+
 template <class T>
-void extract_as(const volume::CanonicalVolume& volume, const mesh::ExtractOptions& options,
+void extract_as(const volume::CanonicalVolume& volume, const Request& request,
                 const Progress& progress, mesh::Mesh& mesh) {
   const volume::CanonicalHeader& header = volume.header();
   const mesh::Lattice<T> lattice = {reinterpret_cast<const T*>(volume.samples().data()),
                                     {header.dims[0], header.dims[1], header.dims[2]},
                                     mesh::lattice_to_space(header.geometry)};
+  const mesh::ExtractOptions options = {.iso = request.iso,
+                                        .scheme = request.parameters.scheme,
+                                        .interpolation = request.parameters.interpolation};
   const mesh::SurfaceCount count = count_surface(lattice, options, progress.context(0, 0.2));
+  check_memory(count, request.parameters, request.limits);
   extract_surface(lattice, options, count, progress.context(0.2, 1), mesh);
 }
 
-void extract(const volume::CanonicalVolume& volume, const mesh::ExtractOptions& options,
+void extract(const volume::CanonicalVolume& volume, const Request& request,
              const Progress& progress, mesh::Mesh& mesh) {
   switch (volume.header().type) {
     case SampleType::kUint8:
-      return extract_as<std::uint8_t>(volume, options, progress, mesh);
+      return extract_as<std::uint8_t>(volume, request, progress, mesh);
     case SampleType::kInt8:
-      return extract_as<std::int8_t>(volume, options, progress, mesh);
+      return extract_as<std::int8_t>(volume, request, progress, mesh);
     case SampleType::kUint16:
-      return extract_as<std::uint16_t>(volume, options, progress, mesh);
+      return extract_as<std::uint16_t>(volume, request, progress, mesh);
     case SampleType::kInt16:
-      return extract_as<std::int16_t>(volume, options, progress, mesh);
+      return extract_as<std::int16_t>(volume, request, progress, mesh);
     case SampleType::kUint32:
-      return extract_as<std::uint32_t>(volume, options, progress, mesh);
+      return extract_as<std::uint32_t>(volume, request, progress, mesh);
     case SampleType::kInt32:
-      return extract_as<std::int32_t>(volume, options, progress, mesh);
+      return extract_as<std::int32_t>(volume, request, progress, mesh);
     case SampleType::kFloat32:
-      return extract_as<float>(volume, options, progress, mesh);
+      return extract_as<float>(volume, request, progress, mesh);
     case SampleType::kFloat64:
-      return extract_as<double>(volume, options, progress, mesh);
+      return extract_as<double>(volume, request, progress, mesh);
   }
 }
 
@@ -108,7 +132,9 @@ void encode_and_measure(const codec::Provenance& provenance, const store::BlobSt
                         const Progress& progress, const mesh::Mesh& mesh, MeshSummary& summary) {
   const std::vector<MeshFormat>& formats = provenance.parameters.formats;
   std::vector<std::atomic<double>> done(formats.size());
-  std::vector<store::Blob> encoded(formats.size());
+  // Committed together at the end: a job that ends on the way leaves no file of it.
+  std::deque<store::BlobStore::Writer> writers;
+  for (std::size_t i = 0; i < formats.size(); ++i) writers.emplace_back(blobs);
   const mesh::Context stage = progress.context();
   const auto encode = [&](std::size_t i) {
     const mesh::Context context = {stage.stop, [&, i](double share) {
@@ -116,10 +142,8 @@ void encode_and_measure(const codec::Provenance& provenance, const store::BlobSt
       const double sum = std::accumulate(done.begin(), done.end(), 0.0);
       stage.progress(sum / static_cast<double>(formats.size()));
     }};
-    store::BlobStore::Writer writer(blobs);
     codec::encode(mesh, formats[i], provenance, context,
-                  [&](std::span<const std::byte> bytes) { writer.write(bytes); });
-    encoded[i] = writer.commit();
+                  [&](std::span<const std::byte> bytes) { writers[i].write(bytes); });
   };
   mesh::Extent extent;
   mesh::Topology topology;
@@ -129,7 +153,8 @@ void encode_and_measure(const codec::Provenance& provenance, const store::BlobSt
     topology = measure_topology(mesh, progress.quiet());
   });
   for (std::size_t i = 0; i < formats.size(); ++i) {
-    summary.files[formats[i]] = {encoded[i].bytes, encoded[i].key, ""};
+    const store::Blob blob = writers[i].commit();
+    summary.files[formats[i]] = {blob.bytes, blob.key, ""};
   }
   summary.boundary_edges = topology.boundary_edges;
   summary.components = topology.components;
@@ -162,9 +187,27 @@ void check_supported(const JobParameters& parameters) {
   }
 }
 
+std::uint64_t estimate_memory(std::uint64_t vertices, std::uint64_t triangles,
+                              const JobParameters& parameters) {
+  constexpr std::uint64_t kNeighborsPerVertex = 6;  // on average, in a surface of triangles
+  // Measured: what Draco takes at its slowest speed, and what GLB's chunks and their bytes add.
+  constexpr std::uint64_t kDracoBytesPerTriangle = 100;
+  constexpr std::uint64_t kGlbBytesPerTriangle = 15;
+  std::uint64_t bytes = vertices * sizeof(mesh::Vec3) + triangles * sizeof(mesh::Triangle);
+  if (parameters.passes > 0) {
+    bytes += vertices * (sizeof(mesh::Vec3) + (1 + kNeighborsPerVertex) * sizeof(std::uint32_t));
+  }
+  for (const MeshFormat format : parameters.formats) {
+    if (format == MeshFormat::kDrc) bytes += triangles * kDracoBytesPerTriangle;
+    if (format == MeshFormat::kGlb) bytes += triangles * kGlbBytesPerTriangle;
+  }
+  bytes += vertices * 2 * sizeof(std::uint32_t);  // for measuring
+  return bytes;
+}
+
 PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
-                            const store::BlobStore& blobs, Workspace& workspace,
-                            std::stop_token stop, const Report& report) {
+                            const PipelineLimits& limits, const store::BlobStore& blobs,
+                            Workspace& workspace, std::stop_token stop, const Report& report) {
   Progress progress(std::move(stop), report);
   mesh::Mesh& mesh = workspace.mesh;
   PipelineResult result;
@@ -176,11 +219,7 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
 
   progress.enter(Stage::kExtract, kExtractShare, &Timing::extract);
   const double iso = parameters.iso.value_or(volume.suggested_iso);
-  extract(samples,
-          {.iso = iso,
-           .scheme = parameters.scheme,
-           .interpolation = parameters.interpolation},
-          progress, mesh);
+  extract(samples, {parameters, limits, iso}, progress, mesh);
   summary.triangles = mesh.triangles.size();
   summary.vertices = mesh.positions.size();
   summary.volume_mm3.extracted = measure_extent(mesh, progress.quiet()).volume_mm3;

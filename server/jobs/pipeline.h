@@ -1,6 +1,7 @@
 // One job's way from a stored volume to stored meshes.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <stop_token>
 
@@ -35,11 +36,21 @@ struct PipelineResult {
 // Error kInvalidParameter.
 void check_supported(const JobParameters& parameters);
 
+// How much memory a job with a surface of that size takes at its peak, beside its mapped volume:
+// mesh, connectivity, encoders. An upper estimate.
+std::uint64_t estimate_memory(std::uint64_t vertices, std::uint64_t triangles,
+                              const JobParameters& parameters);
+
+struct PipelineLimits {
+  std::uint64_t memory_bytes = std::uint64_t{8} << 30;  // of one job
+};
+
 // Loads the volume's samples, extracts, smooths, encodes in every format and stores the results.
 // The mesh is the same to the byte for the same volume and parameters. Throws Error kCancelled
-// when `stop` is requested, kTooLarge, kOutOfSpace or kInternal; then nothing is stored.
+// when `stop` is requested, kTooLarge with the estimate when the job would exceed the limits (told
+// before memory is taken), kOutOfSpace or kInternal.
 PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
-                            const store::BlobStore& blobs, Workspace& workspace,
-                            std::stop_token stop, const Report& report);
+                            const PipelineLimits& limits, const store::BlobStore& blobs,
+                            Workspace& workspace, std::stop_token stop, const Report& report);
 
 }  // namespace isomesh::jobs

@@ -7,7 +7,6 @@
 
 #include <spdlog/spdlog.h>
 
-#include "server/jobs/pipeline.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -26,8 +25,8 @@ Problem problem_of(const Error& error, const std::string& job) {
 }  // namespace
 
 Workers::Workers(std::size_t threads, store::JobStore& jobs, const store::VolumeStore& volumes,
-                 const store::BlobStore& blobs)
-    : jobs_(jobs), volumes_(volumes), blobs_(blobs), alive_(threads) {
+                 const store::BlobStore& blobs, const PipelineLimits& limits)
+    : jobs_(jobs), volumes_(volumes), blobs_(blobs), limits_(limits), alive_(threads) {
   for (std::size_t i = 0; i < threads; ++i) {
     threads_.emplace_back([this] { work(claims_.get_token()); });
   }
@@ -67,7 +66,7 @@ void Workers::run(const store::Lease& lease, Workspace& workspace) {
   try {
     const Volume volume = volumes_.get(lease.parameters.volume);
     PipelineResult result = run_pipeline(
-        volume, lease.parameters, blobs_, workspace, stop.get_token(),
+        volume, lease.parameters, limits_, blobs_, workspace, stop.get_token(),
         [&](Stage stage, double progress, const Timing& so_far) {
           jobs_.report(lease, stage, progress, so_far);
         });

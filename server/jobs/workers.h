@@ -6,20 +6,19 @@
 #include <thread>
 #include <vector>
 
+#include "server/jobs/pipeline.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh::jobs {
 
-struct Workspace;
-
 // The threads that run jobs, one job each at a time; the kernels' own threads are shared between
 // them. The stores must outlive it. Thread safe.
 class Workers {
  public:
   Workers(std::size_t threads, store::JobStore& jobs, const store::VolumeStore& volumes,
-          const store::BlobStore& blobs);
+          const store::BlobStore& blobs, const PipelineLimits& limits);
 
   // Running jobs are stopped and put back; returns when all threads have ended.
   ~Workers();
@@ -37,6 +36,7 @@ class Workers {
   store::JobStore& jobs_;
   const store::VolumeStore& volumes_;
   const store::BlobStore& blobs_;
+  const PipelineLimits limits_;
   std::stop_source claims_;   // ends the taking of jobs
   std::stop_source running_;  // interrupts those that run
   std::atomic<std::size_t> alive_;     // threads that may still run a job

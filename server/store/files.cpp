@@ -1,5 +1,6 @@
 #include "server/store/files.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -7,6 +8,7 @@
 #include <cstring>
 #include <ctime>
 #include <fcntl.h>
+#include <mutex>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <utility>
@@ -168,15 +170,25 @@ std::string random_hex(std::size_t bytes) {
 }
 
 std::string time_ordered_id() {
+  // Ids of the same millisecond are told apart, and put in order, by the twelve bits behind the time
+  // (RFC 9562, section 6.2, method 1).
+  static std::mutex mutex;
+  static std::int64_t last_stamp = 0;
+  constexpr int kCounterBits = 12;
   const auto now = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::system_clock::now().time_since_epoch());
-  std::array<char, 13> time = {};
-  std::snprintf(time.data(), time.size(), "%012llx",
-                static_cast<unsigned long long>(now.count()) & 0xFFFFFFFFFFFF);
-  const std::string random = random_hex(10);
-  const std::string stamp(time.data());
-  return stamp.substr(0, 8) + '-' + stamp.substr(8) + "-7" + random.substr(0, 3) + "-a" +
-         random.substr(3, 3) + '-' + random.substr(6, 12);
+  std::int64_t stamp = now.count() << kCounterBits;
+  {
+    const std::lock_guard lock(mutex);
+    stamp = std::max(stamp, last_stamp + 1);
+    last_stamp = stamp;
+  }
+  std::array<char, 20> digits = {};
+  std::snprintf(digits.data(), digits.size(), "%015llx", static_cast<unsigned long long>(stamp));
+  const std::string time(digits.data());
+  const std::string random = random_hex(8);
+  return time.substr(0, 8) + '-' + time.substr(8, 4) + "-7" + time.substr(12, 3) + "-a" +
+         random.substr(0, 3) + '-' + random.substr(3, 12);
 }
 
 std::string timestamp() {

@@ -81,7 +81,8 @@ std::string to_hex(std::span<const std::uint8_t> bytes);
 // Lower-case hexadecimal from the system's random source.
 std::string random_hex(std::size_t bytes);
 
-// A name that sorts by the time it was made: a UUID of version 7 (RFC 9562).
+// A name that sorts after all that this process made before: a UUID of version 7 (RFC 9562). Thread
+// safe.
 std::string time_ordered_id();
 
 // The present time as RFC 3339 in UTC, with milliseconds.

@@ -19,7 +19,7 @@ double milliseconds_since(std::chrono::steady_clock::time_point begin) {
 
 Job JobStore::submit(const JobParameters& parameters) {
   const std::lock_guard lock(mutex_);
-  if (closed_) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
+  if (refusing_) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
   std::size_t queued = 0;
   for (const auto& queue : queues_) queued += queue.size();
   if (queued >= limits_.max_queued) {
@@ -47,6 +47,7 @@ std::optional<Lease> JobStore::claim(std::stop_token stop) {
   Entry& entry = jobs_.at(queue.front());
   queue.pop_front();
   entry.fence = ++last_fence_;
+  running_.insert(entry.fence);
   entry.stop = std::stop_source();
   entry.job.state = JobState::kRunning;
   entry.job.stage = Stage::kLoad;
@@ -75,14 +76,17 @@ bool JobStore::finish(const Lease& lease, const Outcome& outcome, const Timing& 
   const double queue = job.timing.queue;
   job.timing = timing;
   job.timing.queue = queue;
+  if (outcome.mesh) {
+    for (const auto& [format, file] : outcome.mesh->files) ++mesh_users_[file.sha256];
+  }
   if (entry->stop.stop_requested() || (!outcome.mesh && !outcome.error)) {
+    if (outcome.mesh) release(*outcome.mesh);
     end(*entry, JobState::kCancelled);
   } else if (outcome.error) {
     job.error = outcome.error;
     end(*entry, JobState::kFailed);
   } else {
     job.mesh = outcome.mesh;
-    for (const auto& [format, file] : job.mesh->files) ++mesh_users_[file.sha256];
     job.stage = Stage::kDone;
     job.progress = 1;
     end(*entry, JobState::kSucceeded);
@@ -96,6 +100,11 @@ void JobStore::put_back(const Lease& lease) {
   Entry* entry = leased(lease);
   if (entry == nullptr) return;
   Job& job = entry->job;
+  if (entry->stop.stop_requested()) {
+    end(*entry, JobState::kCancelled);
+    return forget_oldest();
+  }
+  running_.erase(entry->fence);
   job.state = JobState::kQueued;
   job.stage = Stage::kQueue;
   job.progress = 0;
@@ -161,11 +170,17 @@ bool JobStore::is_full() const {
   const std::lock_guard lock(mutex_);
   std::size_t queued = 0;
   for (const auto& queue : queues_) queued += queue.size();
-  return closed_ || queued >= limits_.max_queued;
+  return refusing_ || queued >= limits_.max_queued;
+}
+
+void JobStore::refuse_new() {
+  const std::lock_guard lock(mutex_);
+  refusing_ = true;
 }
 
 void JobStore::close() {
   const std::lock_guard lock(mutex_);
+  refusing_ = true;
   closed_ = true;
   changed_.notify_all();
 }
@@ -190,6 +205,7 @@ JobStore::Entry* JobStore::leased(const Lease& lease) {
 }
 
 void JobStore::end(Entry& entry, JobState state) {
+  running_.erase(entry.fence);
   entry.job.state = state;
   entry.job.finished = timestamp();
   entry.job.timing.total = milliseconds_since(entry.accepted);
@@ -201,15 +217,28 @@ void JobStore::forget_oldest() {
   while (finished_.size() > limits_.max_finished) {
     const auto oldest = jobs_.find(finished_.front());
     finished_.pop_front();
-    if (oldest->second.job.mesh) {
-      for (const auto& [format, file] : oldest->second.job.mesh->files) {
-        if (--mesh_users_[file.sha256] > 0) continue;
-        mesh_users_.erase(file.sha256);
-        blobs_.erase(file.sha256);
-      }
-    }
+    if (oldest->second.job.mesh) release(*oldest->second.job.mesh);
     jobs_.erase(oldest);
   }
+  erase_unnamed();
+}
+
+void JobStore::release(const MeshSummary& mesh) {
+  for (const auto& [format, file] : mesh.files) {
+    if (--mesh_users_[file.sha256] > 0) continue;
+    mesh_users_.erase(file.sha256);
+    unnamed_[file.sha256] = last_fence_;
+  }
+}
+
+void JobStore::erase_unnamed() {
+  std::erase_if(unnamed_, [&](const auto& unnamed) {
+    const auto& [key, fence] = unnamed;
+    if (mesh_users_.contains(key)) return true;  // named again
+    if (!running_.empty() && *running_.begin() <= fence) return false;
+    blobs_.erase(key);
+    return true;
+  });
 }
 
 }  // namespace isomesh::store

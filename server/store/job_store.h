@@ -8,6 +8,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <stop_token>
 #include <string>
 #include <variant>
@@ -54,11 +55,12 @@ class JobStore {
   // What a running job does. False when the lease is not valid any more.
   bool report(const Lease& lease, Stage stage, double progress, const Timing& timing);
 
-  // Ends a job; one that was asked to cancel ends cancelled whatever the outcome. False when the
-  // lease is not valid any more: then nothing has changed.
+  // Ends a job; one that was asked to cancel ends cancelled whatever the outcome, and its mesh is
+  // erased. False when the lease is not valid any more: then nothing has changed.
   bool finish(const Lease& lease, const Outcome& outcome, const Timing& timing);
 
-  // Gives a job back, to be claimed again as if it had not run.
+  // Gives a job back, to be claimed again as if it had not run; one that was asked to cancel ends
+  // cancelled.
   void put_back(const Lease& lease);
 
   // A queued job never runs, a running one is asked to stop, a finished one stays as it is. Throws
@@ -80,7 +82,10 @@ class JobStore {
 
   bool is_full() const;
 
-  // Nothing is accepted any more, and everybody who waits for a job gets its present state.
+  // No job is accepted any more.
+  void refuse_new();
+
+  // The same, and everybody who waits for a job gets its present state.
   void close();
 
  private:
@@ -96,6 +101,8 @@ class JobStore {
   Entry* leased(const Lease& lease);
   void end(Entry& entry, JobState state);
   void forget_oldest();
+  void release(const MeshSummary& mesh);
+  void erase_unnamed();
 
   const BlobStore& blobs_;
   const Limits limits_;
@@ -105,7 +112,12 @@ class JobStore {
   std::array<std::deque<std::string>, 3> queues_;  // of each priority, oldest first
   std::deque<std::string> finished_;               // oldest first
   std::map<std::string, std::size_t> mesh_users_;  // how many jobs name each blob
+  std::set<std::uint64_t> running_;                // the fences of running jobs
+  // Blobs that no job names any more. A job that ran already when that happened may have stored the
+  // same bytes and be about to name them, so they stay until all fences up to that one are gone.
+  std::map<std::string, std::uint64_t> unnamed_;
   std::uint64_t last_fence_ = 0;
+  bool refusing_ = false;
   bool closed_ = false;
 };
 

@@ -15,8 +15,12 @@ Error unknown_volume() { return {ErrorCode::kNotFound, "there is no volume with 
 VolumeStore::VolumeStore(const DataFolder& folder) : folder_(folder) {
   for (const auto& entry : std::filesystem::directory_iterator(folder_.volumes())) {
     if (entry.path().extension() != ".json") continue;  // a write that a crash cut short
-    const Volume volume = volume_from_json(read_whole(entry.path()));
-    volumes_.emplace(volume.id, volume);
+    try {
+      const Volume volume = volume_from_json(read_whole(entry.path()));
+      volumes_.emplace(volume.id, volume);
+    } catch (const Error&) {
+      unreadable_.push_back(entry.path().stem());
+    }
   }
 }
 

@@ -15,8 +15,11 @@ namespace isomesh::store {
 // it. A record is added after its blob and erased before it, so it never names one that is missing.
 class VolumeStore {
  public:
-  // Reads the records that are there.
+  // Reads the records that are there; see unreadable().
   explicit VolumeStore(const DataFolder& folder);
+
+  // The ids of records that were there but could not be read: left where they are, for a person.
+  const std::vector<std::string>& unreadable() const { return unreadable_; }
 
   // Adds a record, or returns the one that has the same id already. Second: whether it is new.
   std::pair<Volume, bool> add(const Volume& volume);
@@ -36,6 +39,7 @@ class VolumeStore {
   std::filesystem::path path_of(const std::string& id) const;
 
   const DataFolder& folder_;
+  std::vector<std::string> unreadable_;  // constant after construction
   mutable std::mutex mutex_;
   std::map<std::string, Volume> volumes_;  // guarded by mutex_
 };

@@ -92,6 +92,10 @@ int Process::wait() {
   return *status_;
 }
 
+bool Process::ends_within(std::chrono::seconds longest) {
+  return eventually([&] { return has_ended(); }, longest);
+}
+
 std::string Process::output() const { return read_file(folder_ / "output"); }
 std::string Process::errors() const { return read_file(folder_ / "errors"); }
 
@@ -104,16 +108,15 @@ bool Process::has_ended() {
   return true;
 }
 
-Finished run(const std::vector<std::string>& command,
-             const std::vector<std::string>& environment) {
+Finished run(const std::vector<std::string>& command, const std::vector<std::string>& environment) {
   Process process(command, environment);
   const int status = process.wait();
   return {status, process.output(), process.errors()};
 }
 
-bool eventually(const std::function<bool()>& condition) {
+bool eventually(const std::function<bool()>& condition, std::chrono::seconds longest) {
   constexpr std::chrono::milliseconds kBetweenLooks{2};
-  const auto deadline = std::chrono::steady_clock::now() + kLongest;
+  const auto deadline = std::chrono::steady_clock::now() + longest;
   while (!condition()) {
     if (std::chrono::steady_clock::now() > deadline) return false;
     std::this_thread::sleep_for(kBetweenLooks);

@@ -37,6 +37,9 @@ class Process {
   // after kLongest.
   int wait();
 
+  // Whether it ends within that time.
+  bool ends_within(std::chrono::seconds longest);
+
   std::string output() const;
   std::string errors() const;
 
@@ -58,7 +61,7 @@ struct Finished {
 Finished run(const std::vector<std::string>& command,
              const std::vector<std::string>& environment = {});
 
-// Calls `condition` until it is true; false when it is not within kLongest.
-bool eventually(const std::function<bool()>& condition);
+// Calls `condition` until it is true; false when it is not within that time.
+bool eventually(const std::function<bool()>& condition, std::chrono::seconds longest = kLongest);
 
 }  // namespace isomesh::test

@@ -152,15 +152,15 @@ TEST_P(Drc, DecodesByDebiansCommandAsInProcess) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Parameters, Drc,
-    testing::Values(DracoParameters{8, 7}, DracoParameters{11, 5}, DracoParameters{14, 7},
-                    DracoParameters{16, 0}, DracoParameters{18, 3}, DracoParameters{20, 7},
-                    DracoParameters{22, 10}, DracoParameters{24, 5}),
-    [](const auto& parameters) {
-      return "Bits" + std::to_string(parameters.param.position_bits) + "Speed" +
-             std::to_string(parameters.param.speed);
-    });
+INSTANTIATE_TEST_SUITE_P(Parameters, Drc,
+                         testing::Values(DracoParameters{8, 7}, DracoParameters{11, 5},
+                                         DracoParameters{14, 7}, DracoParameters{16, 0},
+                                         DracoParameters{18, 3}, DracoParameters{20, 7},
+                                         DracoParameters{22, 10}, DracoParameters{24, 5}),
+                         [](const auto& parameters) {
+                           return "Bits" + std::to_string(parameters.param.position_bits) +
+                                  "Speed" + std::to_string(parameters.param.speed);
+                         });
 
 TEST(DrcGrid, CoversTheMeshExactly) {
   const auto meshes = test::meshes_to_encode();

@@ -69,10 +69,10 @@ TEST(Stl, NormalsAreUnitVectorsOutOfTheSolid) {
 }
 
 TEST(Stl, NormalsOfSmallTrianglesFarAwayAreStillUnitVectors) {
-  const std::string stl = encoded(
-      test::mesh_of({{1000, 1000, 1000}, {1000.001F, 1000, 1000}, {1000, 1000.001F, 1000}},
-                    {{0, 1, 2}}),
-      MeshFormat::kStl);
+  const std::string stl =
+      encoded(test::mesh_of({{1000, 1000, 1000}, {1000.001F, 1000, 1000}, {1000, 1000.001F, 1000}},
+                            {{0, 1, 2}}),
+              MeshFormat::kStl);
   EXPECT_EQ(facet(stl, 0)[0], (mesh::Vec3{0, 0, 1}));
 }
 

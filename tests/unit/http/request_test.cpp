@@ -33,7 +33,8 @@ httplib::Request with_query(const Pairs& parameters) {
   return request;
 }
 
-// --- Ranges ------------------------------------------------------------------------------------------
+// --- Ranges
+// ------------------------------------------------------------------------------------------
 
 constexpr std::uint64_t kSize = 1000;
 
@@ -87,7 +88,8 @@ TEST(Range, IsIgnoredWhereItMayBe) {
   }
 }
 
-// --- Waiting -----------------------------------------------------------------------------------------
+// --- Waiting
+// -----------------------------------------------------------------------------------------
 
 TEST(Wait, IsNoneWithoutAWish) { EXPECT_EQ(wait_of({}), milliseconds(0)); }
 
@@ -119,8 +121,8 @@ TEST(Wait, TakesThePreference) {
 }
 
 TEST(Wait, IgnoresAPreferenceThatItCannotFollow) {
-  for (const std::string value : {"", "wait", "wait=", "wait=-1", "wait=x", "wait=nan", "await=5",
-                                  "respond-async"}) {
+  for (const std::string value :
+       {"", "wait", "wait=", "wait=-1", "wait=x", "wait=nan", "await=5", "respond-async"}) {
     EXPECT_EQ(wait_of(with_header("Prefer", value)), milliseconds(0)) << value;
   }
 }
@@ -131,7 +133,8 @@ TEST(Wait, TheQueryGoesBeforeThePreference) {
   EXPECT_EQ(wait_of(request), milliseconds(1'000));
 }
 
-// --- Digests -----------------------------------------------------------------------------------------
+// --- Digests
+// -----------------------------------------------------------------------------------------
 
 // Of "hello".
 constexpr const char* kHex = "2cf24dba5fb0a30e26e83b2ac5b9e29e1b161e5c1fa7425e73043362938b9824";
@@ -167,7 +170,8 @@ TEST(ContentDigest, WhatIsNoDigestIsRefused) {
   }
 }
 
-// --- Raw samples -------------------------------------------------------------------------------------
+// --- Raw samples
+// -------------------------------------------------------------------------------------
 
 TEST(RawDescription, IsNoneWithoutDims) { EXPECT_FALSE(raw_description_of({})); }
 
@@ -236,7 +240,8 @@ TEST(RawDescription, KnowsItsParameters) {
               UnorderedElementsAre("dims", "type", "spacing", "origin", "direction", "byte_order"));
 }
 
-// --- Queries and entity tags -------------------------------------------------------------------------
+// --- Queries and entity tags
+// -------------------------------------------------------------------------
 
 TEST(CheckKnown, TakesWhatIsKnown) {
   check_known(with_query({}), {});
@@ -244,8 +249,9 @@ TEST(CheckKnown, TakesWhatIsKnown) {
 }
 
 TEST(CheckKnown, NamesAllThatIsNot) {
-  const auto error =
-      thrown_by([] { check_known(with_query({{"a", "1"}, {"x", "2"}, {"y", "3"}}), {"a"}); });
+  const auto error = thrown_by([] {
+    check_known(with_query({{"a", "1"}, {"x", "2"}, {"y", "3"}}), {"a"});
+  });
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
   EXPECT_THAT(fields_of(*error), UnorderedElementsAre("x", "y"));
@@ -258,8 +264,7 @@ TEST(CheckKnown, RefusesWhatIsGivenTwice) {
 }
 
 TEST(CheckKnown, DoesNotRepeatLongNamesWhole) {
-  const auto error =
-      thrown_by([] { check_known(with_query({{std::string(4000, 'x'), ""}}), {}); });
+  const auto error = thrown_by([] { check_known(with_query({{std::string(4000, 'x'), ""}}), {}); });
   ASSERT_TRUE(error);
   EXPECT_LT(std::string(error->what()).size(), 200U);
 }

@@ -49,7 +49,8 @@ TEST(ParseAddress, RefusesTheRest) {
 }
 
 TEST(Address, KnowsWhatStaysOnTheMachine) {
-  for (const std::string text : {"127.0.0.1:1", "127.1.2.3:1", "localhost:1", "[::1]:1", "unix:a"}) {
+  for (const std::string text :
+       {"127.0.0.1:1", "127.1.2.3:1", "localhost:1", "[::1]:1", "unix:a"}) {
     EXPECT_TRUE(parse_address(text).is_loopback()) << text;
   }
   for (const std::string text :

@@ -19,11 +19,11 @@ class JobsFixture : public testing::Test {
   // Adds samples as an upload of raw ones.
   template <class T>
   Volume add(const SampleVolume<T>& samples, SampleType type) {
-    return add_raw(bytes_of(samples.samples), {.dims = {samples.dims.x, samples.dims.y,
-                                                        samples.dims.z},
-                                               .type = type,
-                                               .geometry = samples.geometry,
-                                               .big_endian = false});
+    return add_raw(bytes_of(samples.samples),
+                   {.dims = {samples.dims.x, samples.dims.y, samples.dims.z},
+                    .type = type,
+                    .geometry = samples.geometry,
+                    .big_endian = false});
   }
   Volume add_raw(const std::string& bytes, const volume::RawDescription& description);
 

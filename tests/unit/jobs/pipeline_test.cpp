@@ -26,7 +26,7 @@ class PipelineTest : public test::JobsFixture {
   PipelineResult run(const Volume& volume, const JobParameters& parameters,
                      const Report& report = kQuiet, std::stop_token stop = {}) {
     Workspace workspace;
-    return run_pipeline(volume, parameters, blobs_, workspace, std::move(stop), report);
+    return run_pipeline(volume, parameters, {}, blobs_, workspace, std::move(stop), report);
   }
 
   // The bytes of the one format that was asked for.
@@ -62,8 +62,8 @@ TEST_F(PipelineTest, WhatItStoresIsTheMeshThatItDescribes) {
   parameters.formats = {MeshFormat::kStl, MeshFormat::kDrc};
   const PipelineResult result = run(volume, parameters);
   ASSERT_EQ(result.mesh.files.size(), 2U);
-  const auto decoded = test::decode_with_command(
-      blob(result.mesh.files.at(MeshFormat::kDrc).sha256));
+  const auto decoded =
+      test::decode_with_command(blob(result.mesh.files.at(MeshFormat::kDrc).sha256));
   EXPECT_EQ(decoded.triangles.size(), result.mesh.triangles);
   EXPECT_EQ(decoded.points.size(), result.mesh.vertices);
   EXPECT_EQ(blob(result.mesh.files.at(MeshFormat::kStl).sha256).size(),
@@ -124,8 +124,8 @@ TEST_F(PipelineTest, TakesEverySampleType) {
 }
 
 TEST_F(PipelineTest, EveryWayGivesTheSameBytesOnAnyNumberOfThreads) {
-  const Volume volume = add(test::noise<std::uint8_t>({0, 1, 2}, {31, 29, 40}, 9),
-                            SampleType::kUint8);
+  const Volume volume =
+      add(test::noise<std::uint8_t>({0, 1, 2}, {31, 29, 40}, 9), SampleType::kUint8);
   for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
     for (const Interpolation interpolation : {Interpolation::kLinear, Interpolation::kMidpoint}) {
       JobParameters parameters = parameters_of(volume, 1);
@@ -146,9 +146,8 @@ TEST_F(PipelineTest, AWorkspaceKeepsNothingOfTheJobBefore) {
   const Volume other = add(test::noise<std::uint8_t>({0, 1}, {9, 9, 9}, 2), SampleType::kUint8);
   const std::string expected = mesh_bytes(run(volume, parameters_of(volume, 0)));
   Workspace workspace;
-  run_pipeline(other, parameters_of(other, 1), blobs_, workspace, {}, kQuiet);
-  const auto result =
-      run_pipeline(volume, parameters_of(volume, 0), blobs_, workspace, {}, kQuiet);
+  run_pipeline(other, parameters_of(other, 1), {}, blobs_, workspace, {}, kQuiet);
+  const auto result = run_pipeline(volume, parameters_of(volume, 0), {}, blobs_, workspace, {}, kQuiet);
   EXPECT_EQ(mesh_bytes(result), expected);
 }
 
@@ -174,8 +173,7 @@ TEST_F(PipelineTest, ReportsItsStagesInOrderAndItsProgressUpToTheEnd) {
   };
   const Volume volume = add_sphere();
   run(volume, parameters_of(volume, 0), report);
-  EXPECT_EQ(stages,
-            (std::vector{Stage::kLoad, Stage::kExtract, Stage::kSmooth, Stage::kEncode}));
+  EXPECT_EQ(stages, (std::vector{Stage::kLoad, Stage::kExtract, Stage::kSmooth, Stage::kEncode}));
   EXPECT_NEAR(most, 1, 1e-9);
 }
 

@@ -20,11 +20,10 @@ class VolumeLibraryTest : public test::JobsFixture {
 
   std::pair<Volume, bool> add_bytes(const std::string& bytes, const Geometry& geometry = {}) {
     test::write_file(folder_ / "upload", bytes);
-    return library_.add(folder_ / "upload",
-                        volume::RawDescription{.dims = kDims,
-                                               .type = SampleType::kUint8,
-                                               .geometry = geometry,
-                                               .big_endian = false});
+    return library_.add(
+        folder_ / "upload",
+        volume::RawDescription{
+            .dims = kDims, .type = SampleType::kUint8, .geometry = geometry, .big_endian = false});
   }
 
   const std::string bytes_ = "abcdefghijklmnopqrstuvwx";

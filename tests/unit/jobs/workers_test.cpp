@@ -34,7 +34,7 @@ class WorkersTest : public test::JobsFixture {
 };
 
 TEST_F(WorkersTest, RunAJobToItsMesh) {
-  const Workers workers(1, jobs_, volumes_, blobs_);
+  const Workers workers(1, jobs_, volumes_, blobs_, {});
   JobParameters parameters = parameters_of(add_sphere(), 0);
   parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl};
   const Job job = jobs_.wait(submit(parameters), kLongest);
@@ -54,7 +54,7 @@ TEST_F(WorkersTest, RunAJobToItsMesh) {
 }
 
 TEST_F(WorkersTest, AJobWithoutAVolumeFailsWithAProblem) {
-  const Workers workers(1, jobs_, volumes_, blobs_);
+  const Workers workers(1, jobs_, volumes_, blobs_, {});
   JobParameters parameters;
   parameters.volume = "gone";
   parameters.iso = 1;
@@ -69,7 +69,7 @@ TEST_F(WorkersTest, AJobWithoutAVolumeFailsWithAProblem) {
 TEST_F(WorkersTest, AFailureTellsNothingOfTheMachine) {
   const Volume volume = add_sphere();
   test::write_file(blobs_.path_of(volume.id), "spoilt by the disk");
-  const Workers workers(1, jobs_, volumes_, blobs_);
+  const Workers workers(1, jobs_, volumes_, blobs_, {});
   const Job job = jobs_.wait(submit(parameters_of(volume, 0)), kLongest);
   EXPECT_EQ(job.state, JobState::kFailed);
   ASSERT_TRUE(job.error);
@@ -78,7 +78,7 @@ TEST_F(WorkersTest, AFailureTellsNothingOfTheMachine) {
 }
 
 TEST_F(WorkersTest, GoOnAfterAFailure) {
-  const Workers workers(1, jobs_, volumes_, blobs_);
+  const Workers workers(1, jobs_, volumes_, blobs_, {});
   JobParameters unknown;
   unknown.volume = "gone";
   submit(unknown);
@@ -90,7 +90,7 @@ TEST_F(WorkersTest, ManyJobsAtATimeGiveEachItsOwnMesh) {
   const Volume volume = add_sphere();
   std::vector<std::string> ids;
   {
-    const Workers workers(4, jobs_, volumes_, blobs_);
+    const Workers workers(4, jobs_, volumes_, blobs_, {});
     for (int n = 0; n < 24; ++n) ids.push_back(submit(parameters_of(volume, n % 3)));
     for (const std::string& id : ids) jobs_.wait(id, kLongest);
   }
@@ -107,7 +107,7 @@ TEST_F(WorkersTest, ManyJobsAtATimeGiveEachItsOwnMesh) {
 }
 
 TEST_F(WorkersTest, ARunningJobStopsWhenItIsCancelled) {
-  const Workers workers(1, jobs_, volumes_, blobs_);
+  const Workers workers(1, jobs_, volumes_, blobs_, {});
   const std::string id = submit_long();
   ASSERT_TRUE(eventually([&] { return jobs_.get(id).stage == Stage::kSmooth; }));
   const std::size_t before = blob_count();
@@ -119,7 +119,7 @@ TEST_F(WorkersTest, ARunningJobStopsWhenItIsCancelled) {
 }
 
 TEST_F(WorkersTest, ARunningJobTellsItsProgress) {
-  const Workers workers(1, jobs_, volumes_, blobs_);
+  const Workers workers(1, jobs_, volumes_, blobs_, {});
   const std::string id = submit_long();
   ASSERT_TRUE(eventually([&] { return jobs_.get(id).stage == Stage::kSmooth; }));
   const Job early = jobs_.get(id);
@@ -130,7 +130,7 @@ TEST_F(WorkersTest, ARunningJobTellsItsProgress) {
 }
 
 TEST_F(WorkersTest, DrainLetsARunningJobFinishAndBeginsNoOther) {
-  std::optional<Workers> workers(std::in_place, 1, jobs_, volumes_, blobs_);
+  std::optional<Workers> workers(std::in_place, 1, jobs_, volumes_, blobs_, PipelineLimits{});
   JobParameters parameters = parameters_of(add_much(), 50);
   parameters.passes = 40;
   const std::string running = submit(parameters);
@@ -144,7 +144,7 @@ TEST_F(WorkersTest, DrainLetsARunningJobFinishAndBeginsNoOther) {
 }
 
 TEST_F(WorkersTest, AJobThatOutlastsTheDrainIsPutBack) {
-  std::optional<Workers> workers(std::in_place, 1, jobs_, volumes_, blobs_);
+  std::optional<Workers> workers(std::in_place, 1, jobs_, volumes_, blobs_, PipelineLimits{});
   const std::string id = submit_long();
   ASSERT_TRUE(comes_to(id, JobState::kRunning));
   EXPECT_FALSE(workers->drain(milliseconds(1)));
@@ -156,7 +156,7 @@ TEST_F(WorkersTest, AJobThatOutlastsTheDrainIsPutBack) {
 }
 
 TEST_F(WorkersTest, DrainingIdleOnesIsDoneAtOnce) {
-  Workers workers(3, jobs_, volumes_, blobs_);
+  Workers workers(3, jobs_, volumes_, blobs_, {});
   EXPECT_TRUE(workers.drain(kLongest));
   EXPECT_TRUE(workers.drain(milliseconds(0)));
 }

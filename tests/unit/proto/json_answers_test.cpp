@@ -47,16 +47,17 @@ JobParameters some_parameters() {
 }
 
 MeshSummary some_mesh() {
-  return {.triangles = 5091320,
-          .vertices = 2544488,
-          .boundary_edges = 7,
-          .components = 12,
-          .euler = -35,
-          .area_mm2 = 593150.7,
-          .volume_mm3 = {.extracted = 2795793.9, .smoothed = 2790000.25},
-          .bounds = {{{-1, -2, -3}, {1, 2, 3}}},
-          .files = {{MeshFormat::kDrc, {.bytes = 1, .sha256 = "aa", .href = "/v1/jobs/7/mesh.drc"}},
-                    {MeshFormat::kObj, {.bytes = 2, .sha256 = "bb", .href = "/v1/jobs/7/mesh.obj"}}}};
+  return {
+      .triangles = 5091320,
+      .vertices = 2544488,
+      .boundary_edges = 7,
+      .components = 12,
+      .euler = -35,
+      .area_mm2 = 593150.7,
+      .volume_mm3 = {.extracted = 2795793.9, .smoothed = 2790000.25},
+      .bounds = {{{-1, -2, -3}, {1, 2, 3}}},
+      .files = {{MeshFormat::kDrc, {.bytes = 1, .sha256 = "aa", .href = "/v1/jobs/7/mesh.drc"}},
+                {MeshFormat::kObj, {.bytes = 2, .sha256 = "bb", .href = "/v1/jobs/7/mesh.obj"}}}};
 }
 
 Problem some_problem() {
@@ -248,7 +249,8 @@ TEST(AnswerJson, BytesThatAreNotUtf8AreReplaced) {
   EXPECT_EQ(read.detail.find('\xff'), std::string::npos);
 }
 
-// --- From other versions, and from nobody ----------------------------------------------------------
+// --- From other versions, and from nobody
+// ----------------------------------------------------------
 
 TEST(AnswerJson, UnknownMembersAreIgnored) {
   json volume = json::parse(to_json(some_volume()));

@@ -139,26 +139,22 @@ INSTANTIATE_TEST_SUITE_P(
 
 INSTANTIATE_TEST_SUITE_P(
     Types, OneFault,
-    testing::Values(Refused{R"("scheme": "6")", "scheme"}, Refused{R"("scheme": true)", "scheme"},
-                    Refused{R"("scheme": null)", "scheme"}, Refused{R"("scheme": [6])", "scheme"},
-                    Refused{R"("interpolation": 1)", "interpolation"},
-                    Refused{R"("interpolation": "cubic")", "interpolation"},
-                    Refused{R"("interpolation": "Linear")", "interpolation"},
-                    Refused{R"("interpolation": "")", "interpolation"},
-                    Refused{R"("passes": "5")", "passes"}, Refused{R"("passes": false)", "passes"},
-                    Refused{R"("passes": null)", "passes"},
-                    Refused{R"("smoothing": "gauss")", "smoothing"},
-                    Refused{R"("lambda": "1")", "lambda"}, Refused{R"("lambda": {})", "lambda"},
-                    Refused{R"("close": 1)", "close"}, Refused{R"("close": "true")", "close"},
-                    Refused{R"("formats": [])", "formats"},
-                    Refused{R"("formats": "drc")", "formats"},
-                    Refused{R"("formats": {"drc": 1})", "formats"},
-                    Refused{R"("formats": ["drc", "exe"])", "formats"},
-                    Refused{R"("formats": ["drc", 1, 2])", "formats"},
-                    Refused{R"("draco": 14)", "draco"}, Refused{R"("draco": null)", "draco"},
-                    Refused{R"("draco": [14, 7])", "draco"},
-                    Refused{R"("priority": "urgent")", "priority"},
-                    Refused{R"("priority": 0)", "priority"}));
+    testing::Values(
+        Refused{R"("scheme": "6")", "scheme"}, Refused{R"("scheme": true)", "scheme"},
+        Refused{R"("scheme": null)", "scheme"}, Refused{R"("scheme": [6])", "scheme"},
+        Refused{R"("interpolation": 1)", "interpolation"},
+        Refused{R"("interpolation": "cubic")", "interpolation"},
+        Refused{R"("interpolation": "Linear")", "interpolation"},
+        Refused{R"("interpolation": "")", "interpolation"}, Refused{R"("passes": "5")", "passes"},
+        Refused{R"("passes": false)", "passes"}, Refused{R"("passes": null)", "passes"},
+        Refused{R"("smoothing": "gauss")", "smoothing"}, Refused{R"("lambda": "1")", "lambda"},
+        Refused{R"("lambda": {})", "lambda"}, Refused{R"("close": 1)", "close"},
+        Refused{R"("close": "true")", "close"}, Refused{R"("formats": [])", "formats"},
+        Refused{R"("formats": "drc")", "formats"}, Refused{R"("formats": {"drc": 1})", "formats"},
+        Refused{R"("formats": ["drc", "exe"])", "formats"},
+        Refused{R"("formats": ["drc", 1, 2])", "formats"}, Refused{R"("draco": 14)", "draco"},
+        Refused{R"("draco": null)", "draco"}, Refused{R"("draco": [14, 7])", "draco"},
+        Refused{R"("priority": "urgent")", "priority"}, Refused{R"("priority": 0)", "priority"}));
 
 INSTANTIATE_TEST_SUITE_P(UnknownMembers, OneFault,
                          testing::Values(Refused{R"("isovalue": 3)", "isovalue"},
@@ -200,7 +196,8 @@ TEST(JobBody, MessagesSayWhatIsAllowed) {
   EXPECT_EQ(detail(R"("isovalue": 3)"), "isovalue: is not a known member");
 }
 
-// --- Hostile bodies --------------------------------------------------------------------------------
+// --- Hostile bodies
+// --------------------------------------------------------------------------------
 
 class HostileBody : public testing::TestWithParam<std::string> {};
 
@@ -262,7 +259,8 @@ TEST(JobBody, MembersOfNonUtf8NamesAreRefusedWithoutThem) {
   EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
 }
 
-// --- Queries ---------------------------------------------------------------------------------------
+// --- Queries
+// ---------------------------------------------------------------------------------------
 
 TEST(JobQuery, NeedsAnIsoOnly) {
   JobParameters expected;

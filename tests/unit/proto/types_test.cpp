@@ -46,8 +46,7 @@ TEST(NamesOf, AreForPeople) {
   EXPECT_EQ(names_of<Smoothing>(), R"("laplacian" or "taubin")");
   EXPECT_EQ(names_of<Priority>(), R"("stat", "routine" or "bulk")");
   EXPECT_EQ(names_of<MeshFormat>(), R"("drc", "glb", "stl", "ply" or "obj")");
-  EXPECT_EQ(names_of<JobState>(),
-            R"("queued", "running", "succeeded", "failed" or "cancelled")");
+  EXPECT_EQ(names_of<JobState>(), R"("queued", "running", "succeeded", "failed" or "cancelled")");
 }
 
 TEST(NamesOf, HoldsEveryName) {

@@ -36,9 +36,7 @@ class JobStoreTest : public testing::Test {
   // Takes the next job; there must be one.
   static Lease claimed(JobStore& jobs) { return jobs.claim({}).value(); }
 
-  static bool has_work(JobStore& jobs) {
-    return !jobs.list(JobState::kQueued, "", 1).empty();
-  }
+  static bool has_work(JobStore& jobs) { return !jobs.list(JobState::kQueued, "", 1).empty(); }
 
   std::string blob(std::string_view text) {
     BlobStore::Writer writer(blobs_);
@@ -75,7 +73,8 @@ class JobStoreTest : public testing::Test {
   JobStore jobs_{blobs_, JobStore::Limits{}};
 };
 
-// --- Submitting and claiming -----------------------------------------------------------------------
+// --- Submitting and claiming
+// -----------------------------------------------------------------------
 
 TEST_F(JobStoreTest, ASubmittedJobIsQueued) {
   const Job job = jobs_.submit(parameters(Priority::kBulk));
@@ -141,7 +140,8 @@ TEST_F(JobStoreTest, ClaimEndsWhenItIsStopped) {
   EXPECT_TRUE(has_work(jobs_));
 }
 
-// --- Running -----------------------------------------------------------------------------------------
+// --- Running
+// -----------------------------------------------------------------------------------------
 
 TEST_F(JobStoreTest, AReportIsSeen) {
   const std::string id = jobs_.submit(parameters()).id;
@@ -231,7 +231,8 @@ TEST_F(JobStoreTest, AJobThatIsPutBackIsAsIfItHadNotRun) {
   EXPECT_EQ(claimed(jobs_).id, next);
 }
 
-// --- Cancelling --------------------------------------------------------------------------------------
+// --- Cancelling
+// --------------------------------------------------------------------------------------
 
 TEST_F(JobStoreTest, ACancelledQueuedJobNeverRuns) {
   const std::string id = jobs_.submit(parameters()).id;
@@ -290,7 +291,8 @@ TEST_F(JobStoreTest, ACancelledJobThatIsPutBackEndsCancelled) {
   EXPECT_FALSE(has_work(jobs_));
 }
 
-// --- Waiting -----------------------------------------------------------------------------------------
+// --- Waiting
+// -----------------------------------------------------------------------------------------
 
 TEST_F(JobStoreTest, WaitReturnsAtOnceForAFinishedJob) {
   const std::string id = jobs_.submit(parameters()).id;
@@ -343,7 +345,8 @@ TEST_F(JobStoreTest, NothingIsAcceptedOnceItIsClosed) {
   EXPECT_EQ(code_thrown_by([&] { jobs_.submit(parameters()); }), ErrorCode::kUnavailable);
 }
 
-// --- Limits ------------------------------------------------------------------------------------------
+// --- Limits
+// ------------------------------------------------------------------------------------------
 
 TEST_F(JobStoreTest, AFullQueueAcceptsNothing) {
   JobStore jobs(blobs_, {.max_queued = 3, .max_finished = 10});
@@ -418,7 +421,8 @@ TEST_F(JobStoreTest, AVolumeIsNeededWhileAJobWaitsOrRuns) {
   EXPECT_FALSE(jobs_.needs_volume("some volume"));
 }
 
-// --- Listing -----------------------------------------------------------------------------------------
+// --- Listing
+// -----------------------------------------------------------------------------------------
 
 TEST_F(JobStoreTest, ListsTheNewestFirst) {
   std::vector<std::string> ids;

@@ -1,0 +1,222 @@
+// The real command against the real daemon.
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "proto/json.h"
+#include "tests/api/daemon.h"
+#include "tests/support/draco_decoder.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+using nlohmann::json;
+using testing::HasSubstr;
+
+// A line without its end.
+std::string line_of(const Finished& result) {
+  return result.output.substr(0, result.output.find('\n'));
+}
+
+class CommandTest : public testing::Test {
+ protected:
+  CommandTest() { write_file(folder_ / "sphere.raw", sphere_.bytes); }
+
+  // `words` and the options that describe the sphere.
+  std::vector<std::string> raw(std::vector<std::string> words) {
+    words.insert(words.end(), sphere_.options.begin(), sphere_.options.end());
+    return words;
+  }
+
+  std::string upload() {
+    const Finished result = daemon_.command(raw({"upload", folder_ / "sphere.raw"}));
+    EXPECT_EQ(result.status, 0) << result.errors;
+    return line_of(result);
+  }
+
+  std::string submit(const std::vector<std::string>& options = {}) {
+    std::vector<std::string> words = {"submit", upload(), "--iso", "100"};
+    words.insert(words.end(), options.begin(), options.end());
+    const Finished result = daemon_.command(words);
+    EXPECT_EQ(result.status, 0) << result.errors;
+    return line_of(result);
+  }
+
+  Daemon daemon_;
+  TemporaryFolder folder_;
+  const RawUpload sphere_ = sphere_upload();
+};
+
+TEST_F(CommandTest, MeshWritesTheMeshAndPrintsTheTimingTable) {
+  const Finished result = daemon_.command(
+      raw({"mesh", folder_ / "sphere.raw", "--iso", "100", "-o", folder_ / "out.drc"}));
+  ASSERT_EQ(result.status, 0) << result.errors;
+  for (const std::string word :
+       {"upload", "queue", "load", "extract", "smooth", "encode", "total", "download"}) {
+    EXPECT_THAT(result.output, HasSubstr(word));
+  }
+  const Job job = daemon_.client().jobs().jobs.at(0);
+  const DecodedMesh decoded = decode_with_command(read_file(folder_ / "out.drc"));
+  EXPECT_EQ(decoded.triangles.size(), job.mesh->triangles);
+  EXPECT_EQ(decoded.points.size(), job.mesh->vertices);
+}
+
+TEST_F(CommandTest, MeshTakesTheFormatFromTheSuffix) {
+  const Finished result = daemon_.command(raw({"mesh", folder_ / "sphere.raw", "--iso", "100", "-o",
+                                               folder_ / "out.stl", "-o", folder_ / "out.drc"}));
+  ASSERT_EQ(result.status, 0) << result.errors;
+  EXPECT_TRUE(read_file(folder_ / "out.drc").starts_with("DRACO"));
+  const Job job = daemon_.client().jobs().jobs.at(0);
+  EXPECT_EQ(read_file(folder_ / "out.stl").size(), 84 + 50 * job.mesh->triangles);
+}
+
+TEST_F(CommandTest, MeshPassesEveryOptionOn) {
+  const Finished result = daemon_.command(raw({"mesh",
+                                               folder_ / "sphere.raw",
+                                               "--iso",
+                                               "120",
+                                               "--scheme",
+                                               "5",
+                                               "--interpolation",
+                                               "midpoint",
+                                               "--passes",
+                                               "2",
+                                               "--smoothing",
+                                               "laplacian",
+                                               "--lambda",
+                                               "0.5",
+                                               "--position-bits",
+                                               "12",
+                                               "--speed",
+                                               "3",
+                                               "--priority",
+                                               "stat",
+                                               "--spacing",
+                                               "1,1,2",
+                                               "--digest",
+                                               "--json",
+                                               "-o",
+                                               folder_ / "out.drc"}));
+  ASSERT_EQ(result.status, 0) << result.errors;
+  const Job job = job_from_json(result.output);
+  EXPECT_EQ(job.state, JobState::kSucceeded);
+  EXPECT_EQ(job.parameters.iso, 120);
+  EXPECT_EQ(job.parameters.scheme, Scheme::kFive);
+  EXPECT_EQ(job.parameters.interpolation, Interpolation::kMidpoint);
+  EXPECT_EQ(job.parameters.passes, 2);
+  EXPECT_EQ(job.parameters.lambda, 0.5);
+  EXPECT_EQ(job.parameters.draco, (DracoParameters{12, 3}));
+  EXPECT_EQ(job.parameters.priority, Priority::kStat);
+  EXPECT_EQ(daemon_.client().volume(job.parameters.volume).geometry.spacing[2], 2);
+  EXPECT_EQ(json::parse(result.output)["outputs"][0], (folder_ / "out.drc").string());
+}
+
+TEST_F(CommandTest, StepByStep) {
+  const std::string volume = upload();
+  EXPECT_EQ(upload(), volume);
+  const Finished info = daemon_.command({"info", volume});
+  EXPECT_EQ(info.status, 0);
+  EXPECT_THAT(info.output, HasSubstr("21 x 20 x 19"));
+
+  const std::string job = submit({"--format", "drc,stl"});
+  const Finished wait = daemon_.command({"wait", job});
+  EXPECT_EQ(wait.status, 0) << wait.errors;
+  EXPECT_THAT(wait.output, HasSubstr("succeeded"));
+  EXPECT_THAT(daemon_.command({"status", job}).output, HasSubstr("triangles"));
+
+  EXPECT_EQ(
+      daemon_.command({"fetch", job, "-o", folder_ / "a.drc", "-o", folder_ / "a.stl"}).status, 0);
+  EXPECT_TRUE(read_file(folder_ / "a.drc").starts_with("DRACO"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "a.stl"));
+
+  EXPECT_THAT(daemon_.command({"list"}).output, HasSubstr(job));
+  EXPECT_THAT(daemon_.command({"list", "--state", "failed"}).output, testing::Not(HasSubstr(job)));
+  EXPECT_THAT(daemon_.command({"list", "--volumes"}).output, HasSubstr(volume));
+}
+
+TEST_F(CommandTest, JsonIsTheServersOwn) {
+  const Finished uploaded = daemon_.command(raw({"--json", "upload", folder_ / "sphere.raw"}));
+  const Volume volume = volume_from_json(uploaded.output);
+  EXPECT_EQ(volume_from_json(daemon_.command({"--json", "info", volume.id}).output), volume);
+  const Job submitted =
+      job_from_json(daemon_.command({"--json", "submit", volume.id, "--iso", "otsu"}).output);
+  const Job ended = job_from_json(daemon_.command({"--json", "wait", submitted.id}).output);
+  EXPECT_EQ(ended.state, JobState::kSucceeded);
+  EXPECT_EQ(ended.parameters.iso, std::nullopt);
+  EXPECT_EQ(job_from_json(daemon_.command({"--json", "status", ended.id}).output), ended);
+  EXPECT_EQ(jobs_from_json(daemon_.command({"--json", "list"}).output), std::vector{ended});
+  EXPECT_EQ(volumes_from_json(daemon_.command({"--json", "list", "--volumes"}).output),
+            std::vector{volume});
+}
+
+TEST_F(CommandTest, CancelStopsARunningJob) {
+  const Job job = long_job(daemon_);
+  EXPECT_EQ(daemon_.command({"cancel", job.id}).status, 0);
+  const Finished wait = daemon_.command({"wait", job.id});
+  EXPECT_EQ(wait.status, 1);
+  EXPECT_EQ(daemon_.client().job(job.id).state, JobState::kCancelled);
+}
+
+TEST_F(CommandTest, WhatTheServerRefusesIsStatus1WithItsReason) {
+  const auto refused = [&](const std::vector<std::string>& words, const std::string& reason) {
+    const Finished result = daemon_.command(words);
+    EXPECT_EQ(result.status, 1) << words[0];
+    EXPECT_THAT(result.errors, HasSubstr(reason));
+    EXPECT_TRUE(result.output.empty()) << result.output;
+  };
+  write_file(folder_ / "garbage.nii", "garbage");
+  refused({"upload", folder_ / "garbage.nii"}, "NIfTI");
+  refused({"mesh", folder_ / "garbage.nii", "--iso", "1", "-o", folder_ / "out.drc"}, "NIfTI");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out.drc"));
+  refused({"status", "0123"}, "no job");
+  refused({"wait", "0123"}, "no job");
+  refused({"cancel", "0123"}, "no job");
+  refused({"fetch", "0123", "-o", folder_ / "out.drc"}, "no job");
+  refused({"info", "0123"}, "no volume");
+  refused({"submit", "0123", "--iso", "1"}, "no volume");
+  refused({"submit", upload(), "--iso", "1", "--passes", "1001"}, "passes");
+  refused({"fetch", submit(), "-o", folder_ / "out.stl"}, "");
+}
+
+TEST_F(CommandTest, WrongUsageIsStatus2) {
+  for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
+           {},
+           {"fly"},
+           {"mesh"},
+           {"mesh", folder_ / "absent.nii", "--iso", "1", "-o", folder_ / "out.drc"},
+           {"mesh", folder_ / "sphere.raw", "-o", folder_ / "out.drc"},
+           {"mesh", folder_ / "sphere.raw", "--iso", "1", "-o", folder_ / "out.exe"},
+           {"mesh", folder_ / "sphere.raw", "--iso", "x", "-o", folder_ / "out.drc"},
+           {"submit", "0123"},
+           {"list", "--state", "melted"},
+           {"status"}}) {
+    EXPECT_EQ(daemon_.command(words).status, 2) << testing::PrintToString(words);
+  }
+}
+
+TEST(CommandWithoutServer, IsStatus3) {
+  std::string url;
+  {
+    Daemon gone;
+    url = gone.url();
+    gone.stop();
+  }
+  const Finished result = run({ISOMESH, "--server", url, "list"});
+  EXPECT_EQ(result.status, 3);
+  EXPECT_FALSE(result.errors.empty());
+  EXPECT_EQ(run({ISOMESH, "list"}, {"ISOMESH_SERVER=" + url}).status, 3);
+  EXPECT_EQ(run({ISOMESH, "--server", "unix:/no/such/socket", "list"}).status, 3);
+  EXPECT_EQ(run({ISOMESH, "--server", "nonsense", "list"}).status, 2);
+}
+
+TEST(CommandFromTheEnvironment, FindsItsServer) {
+  const Daemon daemon;
+  EXPECT_EQ(run({ISOMESH, "list"}, {"ISOMESH_SERVER=" + daemon.url()}).status, 0);
+}
+
+}  // namespace
+}  // namespace isomesh

@@ -1,0 +1,105 @@
+#include "tests/api/daemon.h"
+
+#include <stdexcept>
+
+#include "proto/json.h"
+
+namespace isomesh::test {
+namespace {
+
+std::vector<std::string> command_line(const std::filesystem::path& data, const std::string& listen,
+                                      const std::vector<std::string>& arguments) {
+  std::vector<std::string> command = {ISOMESHD, "--listen", listen, "--data", data};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  return command;
+}
+
+std::string numbers(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  return std::to_string(x) + ',' + std::to_string(y) + ',' + std::to_string(z);
+}
+
+}  // namespace
+
+Daemon::Daemon(const std::vector<std::string>& arguments)
+    : data_(folder_ / "data"), process_(command_line(data_, "127.0.0.1:0", arguments)) {
+  begin();
+}
+
+Daemon::Daemon(const std::filesystem::path& data, const std::string& listen,
+               const std::vector<std::string>& arguments)
+    : data_(data), process_(command_line(data, listen, arguments)) {
+  begin();
+}
+
+void Daemon::begin() {
+  constexpr std::string_view kWords = "listening on ";
+  const std::string line = process_.first_line();
+  if (!line.starts_with(kWords)) {
+    throw std::runtime_error("the daemon does not listen: " + line + process_.errors());
+  }
+  url_ = line.substr(kWords.size());
+}
+
+int Daemon::stop() {
+  terminate();
+  return wait();
+}
+
+Answer Daemon::send(const std::string& method, const std::string& target, const std::string& body,
+                    const Headers& headers) const {
+  return answer_to(url_, request(method, target, body, headers));
+}
+
+Finished Daemon::command(const std::vector<std::string>& arguments) const {
+  std::vector<std::string> words = {ISOMESH, "--server", url_};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  return run(words);
+}
+
+RawUpload raw_upload(const SampleVolume<std::uint8_t>& volume) {
+  const std::string dims = numbers(volume.dims.x, volume.dims.y, volume.dims.z);
+  return {bytes_of(volume.samples),
+          "dims=" + dims + "&type=uint8",
+          {"--dims", dims, "--type", "uint8"}};
+}
+
+RawUpload sphere_upload() {
+  const Field field = scaled(sphere({10.2, 9.7, 9.1}, 6.4), 12, 100);
+  return raw_upload(sample<std::uint8_t>(field, {21, 20, 19}));
+}
+
+RawUpload long_upload() { return raw_upload(noise<std::uint8_t>({0, 100}, {96, 96, 96}, 11)); }
+
+Volume upload(const Daemon& daemon, const RawUpload& raw) {
+  const Answer answer = daemon.send("POST", "/v1/volumes?" + raw.query, raw.bytes);
+  if (answer.status != 201 && answer.status != 200) throw std::runtime_error(answer.body);
+  return volume_from_json(answer.body);
+}
+
+Job submit(const Daemon& daemon, const Volume& volume, double iso, const std::string& members) {
+  const std::string body = "{\"volume\": \"" + volume.id + "\", \"iso\": " + std::to_string(iso) +
+                           (members.empty() ? "" : ", " + members) + "}";
+  const Answer answer = daemon.send("POST", "/v1/jobs", body);
+  if (answer.status != 202) throw std::runtime_error(answer.body);
+  return job_from_json(answer.body);
+}
+
+Job finished_job(const Daemon& daemon, const std::string& members) {
+  const Job job = submit(daemon, upload(daemon, sphere_upload()), 100, members);
+  const Job ended = daemon.client().wait(job.id);
+  if (ended.state != JobState::kSucceeded) throw std::runtime_error(to_json(ended));
+  return ended;
+}
+
+Job long_job(const Daemon& daemon) {
+  const Job job = submit(daemon, upload(daemon, long_upload()), 50, "\"passes\": 1000");
+  Job seen;
+  const bool runs = eventually([&] {
+    seen = daemon.client().job(job.id);
+    return seen.stage == Stage::kSmooth || is_final(seen.state);
+  });
+  if (!runs || seen.state != JobState::kRunning) throw std::runtime_error(to_json(seen));
+  return seen;
+}
+
+}  // namespace isomesh::test

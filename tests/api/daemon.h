@@ -1,0 +1,85 @@
+// A running isomeshd of the test's own, and the command that talks to it.
+#pragma once
+
+#include <csignal>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "client/isomesh/client.h"
+#include "proto/types.h"
+#include "tests/api/http.h"
+#include "tests/support/files.h"
+#include "tests/support/process.h"
+#include "tests/support/shapes.h"
+
+namespace isomesh::test {
+
+// Starts with a data folder of its own on a free port of loopback; killed when it goes.
+class Daemon {
+ public:
+  // `arguments` are added to those. Throws std::runtime_error when it does not listen.
+  explicit Daemon(const std::vector<std::string>& arguments = {});
+  // On a data folder that outlives it and the address of a --listen.
+  Daemon(const std::filesystem::path& data, const std::string& listen,
+         const std::vector<std::string>& arguments = {});
+
+  // As its first line names it: http://127.0.0.1:PORT or unix:PATH.
+  const std::string& url() const { return url_; }
+  const std::filesystem::path& data() const { return data_; }
+
+  // SIGTERM, and its exit status.
+  int stop();
+  void terminate() { process_.send_signal(SIGTERM); }
+  int wait() { return process_.wait(); }
+  bool ends_within(std::chrono::seconds longest) { return process_.ends_within(longest); }
+
+  // A request over a connection of its own.
+  Answer send(const std::string& method, const std::string& target, const std::string& body = {},
+              const Headers& headers = {}) const;
+  Answer get(const std::string& target, const Headers& headers = {}) const {
+    return send("GET", target, {}, headers);
+  }
+
+  Client client() const { return Client({.server = url_}); }
+
+  // Runs `isomesh --server URL` with these arguments.
+  Finished command(const std::vector<std::string>& arguments) const;
+
+ private:
+  void begin();
+
+  TemporaryFolder folder_;
+  std::filesystem::path data_;
+  Process process_;
+  std::string url_;
+};
+
+// Samples of uint8 and the query that describes them.
+struct RawUpload {
+  std::string bytes;
+  std::string query;                 // dims=..&type=uint8
+  std::vector<std::string> options;  // the same for the command
+};
+
+RawUpload raw_upload(const SampleVolume<std::uint8_t>& volume);
+
+// A sphere at iso 100, of some thousand triangles.
+RawUpload sphere_upload();
+
+// Noise at iso 50 whose surface takes many seconds to smooth 1000 times.
+RawUpload long_upload();
+
+// Uploads it; throws std::runtime_error when it is refused.
+Volume upload(const Daemon& daemon, const RawUpload& raw);
+
+// Submits a job with further members such as `"passes": 3`.
+Job submit(const Daemon& daemon, const Volume& volume, double iso, const std::string& members = {});
+
+// A sphere's job that has succeeded.
+Job finished_job(const Daemon& daemon, const std::string& members = {});
+
+// A job that runs for longer than any test waits for, and has begun to.
+Job long_job(const Daemon& daemon);
+
+}  // namespace isomesh::test

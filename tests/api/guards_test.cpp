@@ -1,0 +1,177 @@
+// Requests that no honest client sends, and the guards that httplib needs against them. Whatever is
+// sent, the daemon answers the next request.
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/api/daemon.h"
+#include "tests/api/problems.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+
+class GuardsTest : public testing::Test {
+ protected:
+  ~GuardsTest() override { EXPECT_EQ(daemon_.get("/livez").status, 200); }
+
+  Answer answer_to(const std::string& bytes) { return test::answer_to(daemon_.url(), bytes); }
+
+  Daemon daemon_;
+};
+
+TEST_F(GuardsTest, ABodyWithoutALengthIsRefusedAtOnce) {
+  const Connection connection(daemon_.url());
+  connection.send("POST /v1/volumes HTTP/1.1\r\nHost: test\r\n\r\n");
+  // The connection stays open on this side: a server that waited for a body would not answer.
+  EXPECT_TRUE(is_problem(connection.receive(), ErrorCode::kLengthRequired));
+  for (const std::string method : {"POST", "PUT", "PATCH"}) {
+    EXPECT_TRUE(is_problem(answer_to(method + " /v1/jobs HTTP/1.1\r\nHost: test\r\n\r\n"),
+                           ErrorCode::kLengthRequired));
+  }
+}
+
+TEST_F(GuardsTest, ADeleteNeedsNoBody) {
+  const Connection connection(daemon_.url());
+  connection.send("DELETE /v1/jobs/0123 HTTP/1.1\r\nHost: test\r\n\r\n");
+  EXPECT_TRUE(is_problem(connection.receive(), ErrorCode::kNotFound));
+}
+
+TEST_F(GuardsTest, AnEncodedBodyIsRefused) {
+  for (const std::string encoding : {"gzip", "br", "deflate", "gzip, gzip", "unknown"}) {
+    for (const std::string path : {"/v1/volumes", "/v1/jobs", "/v1/mesh?iso=1"}) {
+      EXPECT_TRUE(
+          is_problem(daemon_.send("POST", path, "\x1f\x8b body", {{"Content-Encoding", encoding}}),
+                     ErrorCode::kUnsupportedMedia))
+          << encoding << ' ' << path;
+    }
+  }
+}
+
+TEST_F(GuardsTest, ALongPathIsRefusedBeforeItIsMatched) {
+  for (const std::size_t length : {257U, 4000U, 8000U}) {
+    EXPECT_TRUE(is_problem(daemon_.get('/' + std::string(length, 'a')), ErrorCode::kUriTooLong));
+  }
+  EXPECT_TRUE(
+      is_problem(daemon_.get("/v1/jobs?cursor=" + std::string(5000, 'a')), ErrorCode::kUriTooLong));
+  EXPECT_EQ(daemon_.get('/' + std::string(100'000, 'a')).status, 414);
+  EXPECT_TRUE(is_problem(daemon_.get("/v1/jobs/" + std::string(200, 'a')), ErrorCode::kNotFound));
+}
+
+TEST_F(GuardsTest, ALongHeaderIsRefused) {
+  EXPECT_TRUE(is_problem(daemon_.get("/livez", {{"X-Long", std::string(10'000, 'a')}}),
+                         ErrorCode::kInvalidParameter));
+  EXPECT_EQ(daemon_.get("/livez", {{"X-Long", std::string(4'000, 'a')}}).status, 200);
+}
+
+TEST_F(GuardsTest, ManyHeadersAreRefused) {
+  Headers headers;
+  for (int n = 0; n < 150; ++n) headers.emplace_back("X-" + std::to_string(n), "y");
+  EXPECT_TRUE(is_problem(daemon_.get("/livez", headers), ErrorCode::kInvalidParameter));
+  headers.resize(60);
+  EXPECT_EQ(daemon_.get("/livez", headers).status, 200);
+}
+
+TEST_F(GuardsTest, OtherMethodsAreNotAllowed) {
+  struct Wrong {
+    std::string method;
+    std::string path;
+    std::string allowed;
+  };
+  for (const Wrong& wrong :
+       {Wrong{"DELETE", "/v1/jobs", "GET, HEAD, POST"},
+        Wrong{"PUT", "/v1/volumes", "GET, HEAD, POST"},
+        Wrong{"POST", "/v1/jobs/0123", "DELETE, GET, HEAD"},
+        Wrong{"PATCH", "/v1/volumes/0123", "DELETE, GET, HEAD"},
+        Wrong{"DELETE", "/v1/jobs/0123/mesh.drc", "GET, HEAD"}, Wrong{"GET", "/v1/mesh", "POST"},
+        Wrong{"HEAD", "/v1/mesh", "POST"}, Wrong{"OPTIONS", "/v1/jobs", "GET, HEAD, POST"},
+        Wrong{"POST", "/livez", "GET, HEAD"}}) {
+    const Answer answer = daemon_.send(wrong.method, wrong.path);
+    EXPECT_EQ(answer.status, 405) << wrong.method << ' ' << wrong.path;
+    EXPECT_EQ(answer.header("allow"), wrong.allowed) << wrong.method << ' ' << wrong.path;
+    if (wrong.method != "HEAD") {
+      EXPECT_TRUE(is_problem(answer, ErrorCode::kMethodNotAllowed));
+    }
+  }
+}
+
+// The unread body of a refused request must not be taken for the next request.
+TEST_F(GuardsTest, ARefusedBodyIsNoRequest) {
+  const std::string smuggled = request("GET", "/livez");
+  const Connection connection(daemon_.url());
+  connection.send(request("POST", "/v1/volumes?flavour=sweet", smuggled));
+  const Answer answer = connection.receive();
+  EXPECT_EQ(answer.status, 400);
+  EXPECT_EQ(answer.body.find("HTTP/1.1"), std::string::npos);
+}
+
+TEST_F(GuardsTest, AConnectionIsForOneRequest) {
+  const Connection connection(daemon_.url());
+  connection.send(request("GET", "/livez") + request("GET", "/readyz"));
+  const Answer answer = connection.receive();
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(answer.body, "ok\n");
+  EXPECT_EQ(answer.header("connection"), "close");
+}
+
+TEST_F(GuardsTest, WhatIsNoHttpIsRefused) {
+  for (const std::string& bytes :
+       {std::string("\r\n\r\n"), std::string("hello\r\n\r\n"), std::string("GET /livez\r\n\r\n"),
+        std::string("FETCH /livez HTTP/1.1\r\n\r\n"), std::string("GET /livez HTTP/9.9\r\n\r\n"),
+        std::string("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n", 15),
+        std::string(1000, '\0') + "\r\n\r\n", std::string("GET  HTTP/1.1\r\n\r\n")}) {
+    const Connection connection(daemon_.url());
+    connection.send(bytes);
+    connection.finish_sending();
+    const int status = connection.receive().status;
+    EXPECT_TRUE(status == 0 || (status >= 400 && status < 500)) << status << ": " << bytes;
+  }
+}
+
+TEST_F(GuardsTest, ASpoofedAddressDoesNoHarm) {
+  EXPECT_EQ(daemon_.get("/livez", {{"REMOTE_ADDR", "1.2.3.4"}, {"REMOTE_PORT", "x"}}).status, 200);
+}
+
+TEST_F(GuardsTest, LengthsThatAreNoneAreRefused) {
+  for (const std::string length : {"-1", "18446744073709551616", "99999999999999999999999999"}) {
+    const Answer answer = answer_to(
+        "POST /v1/volumes HTTP/1.1\r\nHost: test\r\nContent-Length: " + length + "\r\n\r\n");
+    EXPECT_TRUE(answer.status == 400 || answer.status == 413) << length << ": " << answer.status;
+  }
+}
+
+TEST_F(GuardsTest, SlowClientsDoNotStarveOthers) {
+  std::vector<std::unique_ptr<Connection>> slow;
+  for (int n = 0; n < 16; ++n) {
+    slow.push_back(std::make_unique<Connection>(daemon_.url()));
+    slow.back()->send("GET /livez HTTP/1.1\r\nX-Slow: ");
+  }
+  EXPECT_EQ(daemon_.get("/livez").status, 200);
+}
+
+TEST_F(GuardsTest, WaitersDoNotStarveOthers) {
+  const Job job = long_job(daemon_);
+  std::vector<std::unique_ptr<Connection>> waiting;
+  for (int n = 0; n < 40; ++n) {
+    waiting.push_back(std::make_unique<Connection>(daemon_.url()));
+    waiting.back()->send(request("GET", "/v1/jobs/" + job.id + "?wait=30"));
+  }
+  EXPECT_EQ(daemon_.get("/livez").status, 200);
+  daemon_.client().cancel(job.id);
+  for (const auto& connection : waiting) EXPECT_EQ(connection->receive().status, 200);
+}
+
+TEST_F(GuardsTest, NothingHalfSentIsAnswered) {
+  for (const std::string part : {"G", "GET /livez", "GET /livez HTTP/1.1\r\nHost: te"}) {
+    const Connection connection(daemon_.url());
+    connection.send(part);
+    connection.finish_sending();
+    const int status = connection.receive().status;
+    EXPECT_TRUE(status == 0 || status == 400) << status;
+  }
+}
+
+}  // namespace
+}  // namespace isomesh

@@ -1,0 +1,134 @@
+#include "tests/api/http.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+#include <sstream>
+#include <stdexcept>
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "tests/support/process.h"
+
+namespace isomesh::test {
+namespace {
+
+template <class Address>
+int connected(int family, const Address& address) {
+  const int socket = ::socket(family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const timeval longest = {std::chrono::seconds(kLongest).count(), 0};
+  ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &longest, sizeof longest);
+  ::setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &longest, sizeof longest);
+  if (::connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    ::close(socket);
+    throw std::runtime_error("no connection to the daemon");
+  }
+  return socket;
+}
+
+int connected_to(const std::string& url) {
+  if (url.starts_with("unix:")) {
+    sockaddr_un address = {};
+    address.sun_family = AF_UNIX;
+    url.copy(address.sun_path, sizeof address.sun_path - 1, 5);
+    return connected(AF_UNIX, address);
+  }
+  sockaddr_in address = {};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const auto port = static_cast<std::uint16_t>(std::stoi(url.substr(url.rfind(':') + 1)));
+  address.sin_port = htons(port);
+  return connected(AF_INET, address);
+}
+
+std::string lower(std::string text) {
+  std::ranges::transform(text, text.begin(),
+                         [](unsigned char letter) { return std::tolower(letter); });
+  return text;
+}
+
+Answer parse(const std::string& text) {
+  Answer answer;
+  const std::size_t end = text.find("\r\n\r\n");
+  if (!text.starts_with("HTTP/1.1 ") || end == std::string::npos) return answer;
+  answer.status = std::stoi(text.substr(9, 3));
+  std::istringstream lines(text.substr(0, end));
+  std::string line;
+  std::getline(lines, line);
+  while (std::getline(lines, line)) {
+    const std::size_t colon = line.find(": ");
+    if (colon == std::string::npos) continue;
+    std::string value = line.substr(colon + 2);
+    if (value.ends_with('\r')) value.pop_back();
+    answer.headers.emplace(lower(line.substr(0, colon)), value);
+  }
+  answer.body = text.substr(end + 4);
+  return answer;
+}
+
+}  // namespace
+
+std::string Answer::header(const std::string& name) const {
+  const auto found = headers.find(name);
+  return found == headers.end() ? "" : found->second;
+}
+
+Connection::Connection(const std::string& url) : socket_(connected_to(url)) {}
+
+Connection::~Connection() { ::close(socket_); }
+
+bool Connection::send(std::string_view bytes) const {
+  while (!bytes.empty()) {
+    const ssize_t count = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (count <= 0) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(count));
+  }
+  return true;
+}
+
+void Connection::finish_sending() const { ::shutdown(socket_, SHUT_WR); }
+
+Answer Connection::receive() const {
+  std::string text;
+  std::string block(1 << 16, '\0');
+  while (true) {
+    const ssize_t count = ::recv(socket_, block.data(), block.size(), 0);
+    if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
+      throw std::runtime_error("the daemon does not answer");
+    }
+    if (count <= 0) return parse(text);
+    text.append(block, 0, static_cast<std::size_t>(count));
+  }
+}
+
+std::string request(const std::string& method, const std::string& target, const std::string& body,
+                    const Headers& headers) {
+  std::string text = method + ' ' + target + " HTTP/1.1\r\nHost: test\r\n";
+  for (const auto& [name, value] : headers) text += name + ": " + value + "\r\n";
+  if (method == "POST" || method == "PUT" || method == "PATCH" || !body.empty()) {
+    text += "Content-Length: " + std::to_string(body.size()) + "\r\n";
+  }
+  return text + "\r\n" + body;
+}
+
+Answer answer_to(const std::string& url, std::string_view bytes) {
+  const Connection connection(url);
+  connection.send(bytes);
+  return connection.receive();
+}
+
+std::string chunked(std::string_view body, std::size_t chunk_bytes) {
+  std::ostringstream text;
+  for (; !body.empty(); body.remove_prefix(std::min(chunk_bytes, body.size()))) {
+    const std::string_view chunk = body.substr(0, chunk_bytes);
+    text << std::hex << chunk.size() << "\r\n" << chunk << "\r\n";
+  }
+  text << "0\r\n\r\n";
+  return text.str();
+}
+
+}  // namespace isomesh::test

@@ -1,0 +1,54 @@
+// HTTP as bytes on a socket, so that tests can also say what no client library would.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace isomesh::test {
+
+using Headers = std::vector<std::pair<std::string, std::string>>;
+
+struct Answer {
+  int status = 0;
+  std::multimap<std::string, std::string> headers;  // names in lower case
+  std::string body;
+
+  // The value of the header, whose name is in lower case; empty without one.
+  std::string header(const std::string& name) const;
+};
+
+// A connection to http://HOST:PORT or unix:PATH. Throws std::runtime_error when there is none, and
+// when the server is silent for longer than kLongest.
+class Connection {
+ public:
+  explicit Connection(const std::string& url);
+  ~Connection();
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  // False when the server does not listen any more.
+  bool send(std::string_view bytes) const;
+  // Nothing more is sent; the server sees the end.
+  void finish_sending() const;
+  // Everything up to the end that the server makes, as an answer. The status is 0 when it is none.
+  Answer receive() const;
+
+ private:
+  int socket_;
+};
+
+// The bytes of a request, with Host and, where there is a body or the method wants one,
+// Content-Length.
+std::string request(const std::string& method, const std::string& target,
+                    const std::string& body = {}, const Headers& headers = {});
+
+// Sends the bytes over a new connection and returns the answer.
+Answer answer_to(const std::string& url, std::string_view bytes);
+
+// The body as one chunk after the other, for Transfer-Encoding: chunked.
+std::string chunked(std::string_view body, std::size_t chunk_bytes);
+
+}  // namespace isomesh::test

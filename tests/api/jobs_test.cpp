@@ -1,0 +1,242 @@
+// Jobs over HTTP: submitting, waiting, cancelling, listing.
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "proto/json.h"
+#include "tests/api/daemon.h"
+#include "tests/api/problems.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+using testing::ElementsAre;
+using testing::UnorderedElementsAre;
+
+class JobsTest : public testing::Test {
+ protected:
+  Answer post(const std::string& body, const Headers& headers = {}) {
+    return daemon_.send("POST", "/v1/jobs", body, headers);
+  }
+  Answer post_with(const std::string& members, const Headers& headers = {}) {
+    return post("{\"volume\": \"" + volume_.id + "\", \"iso\": 100" +
+                    (members.empty() ? "" : ", " + members) + "}",
+                headers);
+  }
+
+  Daemon daemon_;
+  const Volume volume_ = upload(daemon_, sphere_upload());
+};
+
+TEST_F(JobsTest, AJobIsAcceptedAndRuns) {
+  const Answer answer = post_with("");
+  ASSERT_EQ(answer.status, 202) << answer.body;
+  const Job job = job_from_json(answer.body);
+  EXPECT_EQ(answer.header("location"), "/v1/jobs/" + job.id);
+  EXPECT_EQ(answer.header("cache-control"), "no-store");
+  EXPECT_EQ(job.parameters.volume, volume_.id);
+  const Job ended = daemon_.client().wait(job.id);
+  EXPECT_EQ(ended.state, JobState::kSucceeded);
+  EXPECT_EQ(ended.mesh->euler, 2);
+  EXPECT_EQ(ended.mesh->files.at(MeshFormat::kDrc).href, "/v1/jobs/" + job.id + "/mesh.drc");
+  for (const double stage : {ended.timing.queue, ended.timing.load, ended.timing.extract,
+                             ended.timing.smooth, ended.timing.encode}) {
+    EXPECT_GT(stage, 0);
+    EXPECT_LE(stage, ended.timing.total);
+  }
+}
+
+TEST_F(JobsTest, TheSameJobTwiceIsTwoJobsAndOneMesh) {
+  const Job first = finished_job(daemon_);
+  const Job second = finished_job(daemon_);
+  EXPECT_NE(first.id, second.id);
+  EXPECT_EQ(first.mesh->files.at(MeshFormat::kDrc).sha256,
+            second.mesh->files.at(MeshFormat::kDrc).sha256);
+}
+
+TEST_F(JobsTest, PreferWaitAnswersWhenItIsDone) {
+  const Answer answer = post_with("", {{"Prefer", "wait=30"}});
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(job_from_json(answer.body).state, JobState::kSucceeded);
+  EXPECT_EQ(answer.header("location"), "/v1/jobs/" + job_from_json(answer.body).id);
+}
+
+TEST_F(JobsTest, AWaitThatIsNoNumberIsRefused) {
+  const std::string path = "/v1/jobs/" + finished_job(daemon_).id;
+  EXPECT_TRUE(blames(daemon_.get(path + "?wait=soon"), "wait"));
+  EXPECT_TRUE(blames(daemon_.get(path + "?wait=-1"), "wait"));
+  EXPECT_EQ(daemon_.get(path + "?wait=0.5").status, 200);
+  EXPECT_EQ(daemon_.get(path, {{"Prefer", "wait=soon"}}).status, 200);
+}
+
+TEST_F(JobsTest, AWaitEndsWhenItsTimeIsOver) {
+  const Job job = long_job(daemon_);
+  const Job seen = job_from_json(daemon_.get("/v1/jobs/" + job.id + "?wait=0.05").body);
+  EXPECT_EQ(seen.state, JobState::kRunning);
+  daemon_.client().cancel(job.id);
+}
+
+TEST_F(JobsTest, ARunningJobStopsWhenItIsCancelled) {
+  const Job job = long_job(daemon_);
+  const std::string path = "/v1/jobs/" + job.id;
+  EXPECT_GT(job.progress, 0);
+  const Answer answer = daemon_.send("DELETE", path);
+  EXPECT_EQ(answer.status, 200);
+  const Job ended = job_from_json(daemon_.get(path + "?wait=30").body);
+  EXPECT_EQ(ended.state, JobState::kCancelled);
+  EXPECT_FALSE(ended.mesh || ended.error);
+  EXPECT_TRUE(is_problem(daemon_.get(path + "/mesh.drc"), ErrorCode::kCancelled));
+}
+
+TEST_F(JobsTest, AFinishedJobCannotBeCancelled) {
+  const Job job = finished_job(daemon_);
+  const Answer answer = daemon_.send("DELETE", "/v1/jobs/" + job.id);
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(job_from_json(answer.body), job);
+}
+
+TEST_F(JobsTest, AMeshBeforeItsTimeIsNotReady) {
+  const Job job = long_job(daemon_);
+  EXPECT_TRUE(is_problem(daemon_.get("/v1/jobs/" + job.id + "/mesh.drc"), ErrorCode::kNotReady));
+  daemon_.client().cancel(job.id);
+}
+
+TEST_F(JobsTest, WhatIsNotThereIsNotFound) {
+  for (const std::string path :
+       {"/v1/jobs/0123", "/v1/jobs/0123/mesh.drc", "/v1/volumes/0123", "/v1/nothing", "/v2/jobs",
+        "/v1/jobs/", "/v1/jobs/0123/", "/v1/jobs/0123/mesh", "/v1/jobs/0123/mesh.exe",
+        "/v1/jobs/..%2f..%2fetc%2fpasswd", "/v1/volumes/../../etc/passwd", "/v1//jobs"}) {
+    EXPECT_TRUE(is_problem(daemon_.get(path), ErrorCode::kNotFound)) << path;
+  }
+  EXPECT_TRUE(is_problem(daemon_.send("DELETE", "/v1/jobs/0123"), ErrorCode::kNotFound));
+}
+
+TEST_F(JobsTest, AJobForAnUnknownVolumeIsNotFound) {
+  const Answer answer = post(R"({"volume": "0123", "iso": 1})");
+  EXPECT_TRUE(is_problem(answer, ErrorCode::kNotFound));
+  EXPECT_EQ(problem_from_json(answer.body).errors.at(0).field, "volume");
+}
+
+TEST_F(JobsTest, EveryFaultyMemberIsNamed) {
+  const Answer answer = post(R"({"iso": "x", "scheme": 7, "passes": 1001, "color": "red"})");
+  EXPECT_TRUE(is_problem(answer, ErrorCode::kInvalidParameter));
+  std::set<std::string> fields;
+  for (const FieldError& error : problem_from_json(answer.body).errors) fields.insert(error.field);
+  EXPECT_THAT(fields, UnorderedElementsAre("iso", "scheme", "passes", "color", "volume"));
+}
+
+TEST_F(JobsTest, ABodyThatIsNoJsonIsRefused) {
+  for (const std::string& body :
+       {std::string(), std::string("{"), std::string("[]"), std::string("iso=3"),
+        std::string("{\"volume\": \"\xff\"}"), std::string(60'000, '[')}) {
+    EXPECT_TRUE(is_problem(post(body), ErrorCode::kInvalidParameter));
+  }
+}
+
+TEST_F(JobsTest, ABodyThatIsTooLargeIsRefused) {
+  const std::string padding(65'000, ' ');
+  EXPECT_EQ(post_with("\"passes\": 0" + padding).status, 202);
+  EXPECT_TRUE(is_problem(post_with("\"passes\": 0" + padding + padding), ErrorCode::kTooLarge));
+  EXPECT_TRUE(is_problem(answer_to(daemon_.url(),
+                                   "POST /v1/jobs HTTP/1.1\r\nHost: test\r\n"
+                                   "Transfer-Encoding: chunked\r\n\r\n" +
+                                       chunked(padding + padding, 1000)),
+                         ErrorCode::kTooLarge));
+}
+
+// curl's default for -d is a form's media type.
+TEST_F(JobsTest, TheMediaTypeOfTheBodyDoesNotMatter) {
+  for (const std::string type :
+       {"application/x-www-form-urlencoded", "text/plain", "application/json; charset=utf-8"}) {
+    EXPECT_EQ(
+        post_with("\"passes\": 0" + std::string(20'000, ' '), {{"Content-Type", type}}).status, 202)
+        << type;
+  }
+  EXPECT_TRUE(is_problem(post_with("", {{"Content-Type", "multipart/form-data; boundary=x"}}),
+                         ErrorCode::kUnsupportedMedia));
+}
+
+TEST_F(JobsTest, ListsByStateInPages) {
+  for (int n = 0; n < 105; ++n) ASSERT_EQ(post_with("\"passes\": 0").status, 202);
+  std::set<std::string> seen;
+  Client client = daemon_.client();
+  JobPage page = client.jobs();
+  EXPECT_EQ(page.jobs.size(), 100U);
+  for (const Job& job : page.jobs) seen.insert(job.id);
+  page = client.jobs(std::nullopt, page.next);
+  EXPECT_EQ(page.jobs.size(), 5U);
+  EXPECT_TRUE(page.next.empty());
+  for (const Job& job : page.jobs) seen.insert(job.id);
+  EXPECT_EQ(seen.size(), 105U);
+  client.wait(*seen.begin());
+  EXPECT_FALSE(client.jobs(JobState::kSucceeded).jobs.empty());
+  EXPECT_TRUE(client.jobs(JobState::kFailed).jobs.empty());
+  EXPECT_TRUE(blames(daemon_.get("/v1/jobs?state=melted"), "state"));
+}
+
+TEST_F(JobsTest, UnknownParametersAreRefusedEverywhere) {
+  const std::string job = "/v1/jobs/" + finished_job(daemon_).id;
+  const std::string volume = "/v1/volumes/" + volume_.id;
+  for (const std::string& path :
+       {std::string("/v1/jobs"), std::string("/v1/volumes"), job, volume, job + "/mesh.drc"}) {
+    EXPECT_TRUE(blames(daemon_.get(path + "?flavour=sweet"), "flavour")) << path;
+  }
+  for (const std::string& path : {job, volume}) {
+    EXPECT_TRUE(blames(daemon_.send("DELETE", path + "?flavour=sweet"), "flavour")) << path;
+  }
+  EXPECT_TRUE(blames(daemon_.send("POST", "/v1/jobs?flavour=sweet", "{}"), "flavour"));
+  EXPECT_TRUE(blames(daemon_.send("POST", "/v1/mesh?iso=1&flavour=sweet", "x"), "flavour"));
+}
+
+TEST_F(JobsTest, ManyClientsGetEachTheirOwn) {
+  constexpr int kClients = 12;
+  std::vector<std::string> triangles(kClients);
+  std::vector<std::jthread> clients;
+  for (int client = 0; client < kClients; ++client) {
+    clients.emplace_back([&, client] {
+      const double iso = 60 + 10 * (client % 3);
+      const Job job = daemon_.client().wait(submit(daemon_, volume_, iso).id);
+      EXPECT_EQ(job.state, JobState::kSucceeded);
+      EXPECT_EQ(job.parameters.iso, iso);
+      if (job.mesh)
+        triangles[static_cast<std::size_t>(client)] =
+            to_json(job.parameters) + std::to_string(job.mesh->triangles);
+    });
+  }
+  clients.clear();
+  EXPECT_EQ(std::set(triangles.begin(), triangles.end()).size(), 3U);
+}
+
+TEST(FullQueue, AnswersLater) {
+  const Daemon daemon({"--max-queue", "1", "--workers", "1"});
+  const Job running = long_job(daemon);
+  Volume volume;
+  volume.id = running.parameters.volume;
+  const Job queued = submit(daemon, volume, 50);
+  const Answer answer =
+      daemon.send("POST", "/v1/jobs", "{\"volume\": \"" + volume.id + "\", \"iso\": 50}");
+  EXPECT_TRUE(is_problem(answer, ErrorCode::kUnavailable));
+  EXPECT_FALSE(answer.header("retry-after").empty());
+  EXPECT_TRUE(is_problem(daemon.get("/readyz"), ErrorCode::kUnavailable));
+  EXPECT_EQ(daemon.get("/livez").status, 200);
+  EXPECT_EQ(job_from_json(daemon.send("DELETE", "/v1/jobs/" + queued.id).body).state,
+            JobState::kCancelled);
+  EXPECT_EQ(daemon.get("/readyz").status, 200);
+  daemon.client().cancel(running.id);
+}
+
+TEST(ForgottenJobs, AreNotFound) {
+  const Daemon daemon(std::vector<std::string>{"--max-finished", "2"});
+  const std::string first = finished_job(daemon).id;
+  for (int n = 0; n < 2; ++n) finished_job(daemon);
+  EXPECT_TRUE(is_problem(daemon.get("/v1/jobs/" + first), ErrorCode::kNotFound));
+}
+
+}  // namespace
+}  // namespace isomesh

@@ -1,0 +1,247 @@
+// Meshes over HTTP: the bytes, parts of them, and all in one request.
+#include <cstring>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/json.h"
+#include "tests/api/daemon.h"
+#include "tests/api/problems.h"
+#include "tests/support/draco_decoder.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+using testing::HasSubstr;
+
+class MeshTest : public testing::Test {
+ protected:
+  Answer get(const Headers& headers = {}) { return daemon_.get(path_, headers); }
+  Answer range(const std::string& value) { return get({{"Range", value}}); }
+
+  Daemon daemon_;
+  const Job job_ = finished_job(daemon_, R"("formats": ["drc", "stl"])");
+  const std::string path_ = "/v1/jobs/" + job_.id + "/mesh.stl";
+  const MeshFile file_ = job_.mesh->files.at(MeshFormat::kStl);
+  const std::string bytes_ = get().body;
+};
+
+TEST_F(MeshTest, IsWhatTheJobDescribes) {
+  const Answer answer = get();
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(answer.body.size(), file_.bytes);
+  EXPECT_EQ(answer.header("content-length"), std::to_string(file_.bytes));
+  EXPECT_EQ(answer.header("etag"), '"' + file_.sha256 + '"');
+  EXPECT_EQ(answer.header("cache-control"), "private, immutable");
+  EXPECT_EQ(answer.header("content-type"), "model/stl");
+  EXPECT_EQ(answer.header("accept-ranges"), "bytes");
+  EXPECT_THAT(answer.header("content-disposition"), HasSubstr("mesh.stl"));
+  std::uint32_t triangles = 0;
+  std::memcpy(&triangles, answer.body.data() + 80, sizeof triangles);
+  EXPECT_EQ(triangles, job_.mesh->triangles);
+}
+
+TEST_F(MeshTest, DracoHasNoMediaTypeOfItsOwn) {
+  const Answer answer = daemon_.get("/v1/jobs/" + job_.id + "/mesh.drc");
+  EXPECT_EQ(answer.header("content-type"), "application/octet-stream");
+  EXPECT_THAT(answer.header("content-disposition"), HasSubstr("mesh.drc"));
+  const DecodedMesh decoded = decode_with_command(answer.body);
+  EXPECT_EQ(decoded.triangles.size(), job_.mesh->triangles);
+  EXPECT_EQ(decoded.points.size(), job_.mesh->vertices);
+}
+
+TEST_F(MeshTest, TellsItsTimings) {
+  const std::string timing = get().header("server-timing");
+  std::size_t last = 0;
+  for (const std::string stage : {"queue", "load", "extract", "smooth", "encode"}) {
+    const std::size_t found = timing.find(stage + ";dur=");
+    ASSERT_NE(found, std::string::npos) << timing;
+    EXPECT_GE(found, last);
+    EXPECT_GT(std::stod(timing.substr(found + stage.size() + 5)), 0);
+    last = found;
+  }
+}
+
+TEST_F(MeshTest, AFormatThatWasNotAskedForIsNotFound) {
+  EXPECT_TRUE(is_problem(daemon_.get("/v1/jobs/" + job_.id + "/mesh.glb"), ErrorCode::kNotFound));
+}
+
+TEST_F(MeshTest, IsNotSentTwice) {
+  const std::string etag = get().header("etag");
+  for (const std::string& value : {etag, "W/" + etag, "\"other\", " + etag, std::string("*")}) {
+    const Answer answer = get({{"If-None-Match", value}});
+    EXPECT_EQ(answer.status, 304) << value;
+    EXPECT_TRUE(answer.body.empty());
+    EXPECT_EQ(answer.header("etag"), etag);
+  }
+  for (const std::string value : {"\"other\"", "", "abc"}) {
+    EXPECT_EQ(get({{"If-None-Match", value}}).status, 200) << value;
+  }
+}
+
+TEST_F(MeshTest, HeadIsGetWithoutTheBytes) {
+  const Answer head = daemon_.send("HEAD", path_);
+  const Answer whole = get();
+  EXPECT_EQ(head.status, 200);
+  EXPECT_TRUE(head.body.empty());
+  EXPECT_EQ(head.header("content-length"), whole.header("content-length"));
+  EXPECT_EQ(head.header("etag"), whole.header("etag"));
+  EXPECT_EQ(daemon_.send("HEAD", "/v1/jobs/" + job_.id).status, 200);
+  EXPECT_EQ(daemon_.send("HEAD", "/v1/jobs/0123").status, 404);
+}
+
+// RFC 9110, 14.2: a range is for GET alone.
+TEST_F(MeshTest, HeadHasNoRanges) {
+  const Answer head = daemon_.send("HEAD", path_, {}, {{"Range", "bytes=0-9"}});
+  EXPECT_EQ(head.status, 200);
+  EXPECT_EQ(head.header("content-length"), std::to_string(bytes_.size()));
+}
+
+TEST_F(MeshTest, GivesAnyPart) {
+  struct Part {
+    std::string range;
+    std::size_t first;
+    std::size_t length;
+  };
+  const std::size_t size = bytes_.size();
+  const std::string last = std::to_string(size - 1);
+  for (const Part& part :
+       {Part{"bytes=0-0", 0, 1}, Part{"bytes=0-99", 0, 100}, Part{"bytes=80-83", 80, 4},
+        Part{"bytes=-1", size - 1, 1}, Part{"bytes=" + last + "-", size - 1, 1},
+        Part{"bytes=0-", 0, size}, Part{"bytes=10-99999999", 10, size - 10},
+        Part{"bytes=-99999999", 0, size}}) {
+    SCOPED_TRACE(part.range);
+    const Answer answer = range(part.range);
+    EXPECT_EQ(answer.status, 206);
+    EXPECT_TRUE(answer.body == bytes_.substr(part.first, part.length));
+    EXPECT_EQ(answer.header("content-length"), std::to_string(part.length));
+    EXPECT_EQ(answer.header("content-range"), "bytes " + std::to_string(part.first) + '-' +
+                                                  std::to_string(part.first + part.length - 1) +
+                                                  '/' + std::to_string(size));
+    EXPECT_EQ(answer.header("etag"), '"' + file_.sha256 + '"');
+  }
+}
+
+TEST_F(MeshTest, APartOutsideOfItIsNotSatisfiable) {
+  for (const std::string& value : {"bytes=" + std::to_string(bytes_.size()) + "-",
+                                   std::string("bytes=99999999-"), std::string("bytes=-0")}) {
+    const Answer answer = range(value);
+    EXPECT_TRUE(is_problem(answer, ErrorCode::kRangeNotSatisfiable)) << value;
+    // RFC 9110, 15.5.17: so that the client learns what it may ask for.
+    EXPECT_EQ(answer.header("content-range"), "bytes */" + std::to_string(bytes_.size())) << value;
+  }
+}
+
+TEST_F(MeshTest, SeveralRangesAreTheWholeFile) {
+  std::string many = "bytes=0-0";
+  for (int n = 0; n < 800; ++n) many += ",0-999";
+  for (const std::string& value : {std::string("bytes=0-9,20-29"), many}) {
+    const Answer answer = range(value);
+    EXPECT_EQ(answer.status, 200);
+    EXPECT_TRUE(answer.body == bytes_);
+  }
+}
+
+// RFC 9110, 14.2: what is no range may be ignored or refused. The library refuses most of it before
+// anybody can look at it, and must not do so in words of its own.
+TEST_F(MeshTest, RangesThatAreNoneAreIgnoredOrNotSatisfiable) {
+  for (const std::string& value :
+       {std::string("items=0-5"), std::string("bytes=9-5"), std::string("bytes=a-b"),
+        std::string("bytes=-"), std::string("bytes="), std::string("bytes"), std::string("=0-5"),
+        std::string("bytes=0-18446744073709551615"), std::string("bytes=18446744073709551615-"),
+        std::string("bytes=99999999999999999999999-"), std::string("bytes=--5"),
+        "bytes=" + std::string(7000, '1') + "-"}) {
+    const Answer answer = range(value);
+    if (answer.status == 200) {
+      EXPECT_TRUE(answer.body == bytes_) << value.substr(0, 60);
+    } else {
+      EXPECT_TRUE(is_problem(answer, ErrorCode::kRangeNotSatisfiable)) << value.substr(0, 60);
+    }
+  }
+}
+
+// RFC 9110, 13.1.5: with another version's validator the whole file is due.
+TEST_F(MeshTest, ARangeOfAnotherVersionIsTheWholeFile) {
+  const std::string etag = '"' + file_.sha256 + '"';
+  EXPECT_EQ(get({{"Range", "bytes=0-9"}, {"If-Range", etag}}).status, 206);
+  EXPECT_EQ(get({{"Range", "bytes=0-9"}, {"If-Range", "\"other\""}}).status, 200);
+}
+
+// --- In one request
+// ----------------------------------------------------------------------------------
+
+class MeshInOne : public testing::Test {
+ protected:
+  Answer post(const std::string& query, const std::string& body) {
+    return daemon_.send("POST", "/v1/mesh?" + query, body);
+  }
+  Answer post(const std::string& query) { return post(sphere_.query + '&' + query, sphere_.bytes); }
+
+  Daemon daemon_;
+  const RawUpload sphere_ = sphere_upload();
+};
+
+TEST_F(MeshInOne, GivesTheMeshOfTheJob) {
+  const Answer answer = post("iso=100");
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const Job job = job_from_json(daemon_.get(answer.header("location")).body);
+  EXPECT_EQ(job.state, JobState::kSucceeded);
+  EXPECT_EQ(answer.header("etag"), '"' + job.mesh->files.at(MeshFormat::kDrc).sha256 + '"');
+  EXPECT_THAT(answer.header("server-timing"), HasSubstr("extract;dur="));
+  EXPECT_EQ(decode_with_command(answer.body).triangles.size(), job.mesh->triangles);
+  EXPECT_TRUE(daemon_.get(answer.header("location") + "/mesh.drc").body == answer.body);
+}
+
+TEST_F(MeshInOne, TakesEveryParameter) {
+  const Answer answer = post(
+      "iso=100&scheme=5&interpolation=midpoint&passes=2&smoothing=laplacian&lambda=0.5"
+      "&close=false&format=stl&position_bits=11&speed=5&priority=stat&spacing=1,1,2");
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  EXPECT_EQ(answer.header("content-type"), "model/stl");
+  const Job job = job_from_json(daemon_.get(answer.header("location")).body);
+  EXPECT_EQ(job.parameters.scheme, Scheme::kFive);
+  EXPECT_EQ(job.parameters.interpolation, Interpolation::kMidpoint);
+  EXPECT_EQ(job.parameters.passes, 2);
+  EXPECT_EQ(job.parameters.lambda, 0.5);
+  EXPECT_EQ(job.parameters.draco, (DracoParameters{11, 5}));
+  EXPECT_EQ(job.parameters.priority, Priority::kStat);
+}
+
+TEST_F(MeshInOne, TakesOtsu) {
+  const Answer answer = post("iso=otsu");
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const Job job = job_from_json(daemon_.get(answer.header("location")).body);
+  EXPECT_EQ(job.parameters.iso, std::nullopt);
+  EXPECT_GT(job.mesh->triangles, 0U);
+}
+
+TEST_F(MeshInOne, IgnoresConditionsAndRanges) {
+  const Answer answer = daemon_.send("POST", "/v1/mesh?iso=100&" + sphere_.query, sphere_.bytes,
+                                     {{"Range", "bytes=0-9"}});
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_GT(answer.body.size(), 10U);
+}
+
+TEST_F(MeshInOne, RefusesBeforeItTakesTheVolume) {
+  EXPECT_TRUE(blames(post("passes=3"), "iso"));
+  EXPECT_TRUE(blames(post("iso=1&passes=1001"), "passes"));
+  EXPECT_TRUE(blames(post("iso=1&formats=drc"), "formats"));
+  EXPECT_TRUE(blames(post("iso=1&volume=abc"), "volume"));
+  EXPECT_TRUE(blames(post("iso=1&format=drc,stl"), "format"));
+  EXPECT_TRUE(blames(post("iso=1&format=exe"), "format"));
+  EXPECT_TRUE(blames(post("iso=1&position_bits=31"), "position_bits"));
+  EXPECT_TRUE(blames(post("iso=1&iso=2"), "iso"));
+  EXPECT_TRUE(blames(post("iso=1&dims=1,2,3"), "dims"));
+  EXPECT_TRUE(daemon_.client().volumes().empty());
+}
+
+TEST_F(MeshInOne, RefusesWhatIsNoVolume) {
+  EXPECT_TRUE(is_problem(post("iso=1", "garbage"), ErrorCode::kUnsupportedMedia));
+  EXPECT_TRUE(is_problem(post("iso=1", ""), ErrorCode::kInvalidParameter));
+  EXPECT_TRUE(daemon_.client().jobs().jobs.empty());
+}
+
+}  // namespace
+}  // namespace isomesh

@@ -1,0 +1,220 @@
+// Starting, listening, ending.
+#include <csignal>
+#include <regex>
+#include <string>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include "proto/json.h"
+#include "tests/api/daemon.h"
+#include "tests/api/problems.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+using testing::HasSubstr;
+
+TEST(Start, TellsWhereItListensOnItsFirstLine) {
+  const Daemon daemon;
+  EXPECT_TRUE(std::regex_match(daemon.url(), std::regex("http://127\\.0\\.0\\.1:[1-9][0-9]*")))
+      << daemon.url();
+  EXPECT_EQ(daemon.get("/livez").body, "ok\n");
+  EXPECT_EQ(daemon.get("/readyz").body, "ok\n");
+}
+
+TEST(Start, HelpAndVersion) {
+  const Finished help = run({ISOMESHD, "--help"});
+  EXPECT_EQ(help.status, 0);
+  for (const std::string option : {"--listen", "--data", "--workers", "--config"}) {
+    EXPECT_THAT(help.output, HasSubstr(option));
+  }
+  const Finished version = run({ISOMESHD, "--version"});
+  EXPECT_EQ(version.status, 0);
+  EXPECT_TRUE(std::regex_search(version.output, std::regex("[0-9]+\\.[0-9]+\\.[0-9]+")));
+}
+
+TEST(Start, WrongUsageIsToldAndNotServed) {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  for (const std::vector<std::string>& wrong :
+       std::vector<std::vector<std::string>>{{"--listen", "nowhere"},
+                                             {"--listen", "127.0.0.1:99999"},
+                                             {"--workers", "0"},
+                                             {"--no-such-option"},
+                                             {"--config", folder / "absent"}}) {
+    std::vector<std::string> command = {ISOMESHD, "--data", data};
+    command.insert(command.end(), wrong.begin(), wrong.end());
+    const Finished result = run(command);
+    EXPECT_NE(result.status, 0) << wrong[0];
+    EXPECT_FALSE((result.output + result.errors).empty());
+    EXPECT_THAT(result.output, testing::Not(HasSubstr("listening")));
+  }
+}
+
+TEST(Start, OptionsComeFromTheEnvironmentAndFromAFileToo) {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  write_file(folder / "config.toml", "max-upload = 1234\n");
+  Process process({ISOMESHD}, {"ISOMESH_LISTEN=127.0.0.1:0", "ISOMESH_DATA=" + data,
+                               "ISOMESH_CONFIG=" + std::string(folder / "config.toml")});
+  const std::string line = process.first_line();
+  ASSERT_TRUE(line.starts_with("listening on ")) << process.errors();
+  const Answer answer =
+      answer_to(line.substr(13), request("POST", "/v1/volumes", std::string(2000, 'x')));
+  EXPECT_TRUE(is_problem(answer, ErrorCode::kTooLarge));
+  EXPECT_THAT(answer.body, HasSubstr("1234"));
+}
+
+// Without tokens only this machine may ask.
+TEST(Start, TheOpenNetworkIsRefusedUnlessAskedFor) {
+  const TemporaryFolder folder;
+  const Finished result = run({ISOMESHD, "--data", folder / "data", "--listen", "0.0.0.0:0"});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_THAT(result.errors, HasSubstr("--open-network"));
+  const Daemon open(folder / "data", "0.0.0.0:0", {"--open-network"});
+  EXPECT_EQ(open.get("/livez").status, 200);
+}
+
+TEST(Start, ASecondDaemonOnTheSameFolderIsRefused) {
+  const Daemon first;
+  const Finished second = run({ISOMESHD, "--data", first.data(), "--listen", "127.0.0.1:0"});
+  EXPECT_EQ(second.status, 1);
+  EXPECT_THAT(second.errors, HasSubstr("another isomeshd"));
+  EXPECT_TRUE(second.output.empty());
+  EXPECT_EQ(first.get("/livez").status, 200);
+}
+
+TEST(Start, ASecondDaemonOnTheSamePortIsRefused) {
+  const Daemon first;
+  const TemporaryFolder folder;
+  const std::string address = first.url().substr(std::string("http://").size());
+  const Finished second = run({ISOMESHD, "--data", folder / "data", "--listen", address});
+  EXPECT_EQ(second.status, 1);
+  EXPECT_FALSE(second.errors.empty());
+}
+
+TEST(UnixSocket, IsServedAndRemoved) {
+  const TemporaryFolder folder;
+  const std::string socket = folder / "http.sock";
+  Daemon daemon(folder / "data", "unix:" + socket);
+  EXPECT_EQ(daemon.url(), "unix:" + socket);
+  struct stat status = {};
+  ASSERT_EQ(::stat(socket.c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777, 0660U);
+  EXPECT_EQ(daemon.get("/livez").status, 200);
+  EXPECT_EQ(finished_job(daemon).state, JobState::kSucceeded);
+  EXPECT_EQ(daemon.command({"list"}).status, 0);
+  EXPECT_EQ(daemon.stop(), 0);
+  EXPECT_FALSE(std::filesystem::exists(socket));
+}
+
+TEST(UnixSocket, OfAKilledDaemonIsNoObstacle) {
+  const TemporaryFolder folder;
+  const std::string socket = folder / "http.sock";
+  { const Daemon killed(folder / "data", "unix:" + socket); }
+  ASSERT_TRUE(std::filesystem::exists(socket));
+  const Daemon next(folder / "data", "unix:" + socket);
+  EXPECT_EQ(next.get("/livez").status, 200);
+}
+
+TEST(Restart, KeepsVolumesAndSweepsTheRest) {
+  const TemporaryFolder folder;
+  Volume volume;
+  {
+    Daemon daemon(folder / "data", "127.0.0.1:0");
+    finished_job(daemon);
+    volume = daemon.client().volumes().at(0);
+    EXPECT_EQ(daemon.stop(), 0);
+  }
+  write_file(folder / "data/scratch/left-behind", "by a crash");
+  const Daemon daemon(folder / "data", "127.0.0.1:0");
+  EXPECT_EQ(daemon.client().volumes(), std::vector{volume});
+  EXPECT_EQ(files_below(folder / "data/blobs").size(), 1U);
+  EXPECT_TRUE(files_below(folder / "data/scratch").empty());
+  const Job job = submit(daemon, volume, 100);
+  EXPECT_EQ(daemon.client().wait(job.id).state, JobState::kSucceeded);
+}
+
+TEST(Drain, AnIdleDaemonEndsAtOnceOnEitherSignal) {
+  for (const int signal : {SIGTERM, SIGINT}) {
+    const TemporaryFolder folder;
+    Process process({ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder / "data"});
+    process.first_line();
+    process.send_signal(signal);
+    EXPECT_EQ(process.wait(), 0);
+  }
+}
+
+TEST(Drain, LetsARunningJobFinish) {
+  Daemon daemon(std::vector<std::string>{"--drain-seconds", "100"});
+  const Job job = submit(daemon, upload(daemon, long_upload()), 50, "\"passes\": 25");
+  ASSERT_TRUE(eventually([&] { return daemon.client().job(job.id).stage == Stage::kSmooth; }));
+  Job ended;
+  std::jthread waiter(
+      [&] { ended = job_from_json(daemon.get("/v1/jobs/" + job.id + "?wait=30").body); });
+  daemon.terminate();
+  EXPECT_EQ(daemon.wait(), 0);
+  waiter.join();
+  EXPECT_EQ(ended.state, JobState::kSucceeded);
+}
+
+TEST(Drain, AJobThatTakesTooLongIsPutBack) {
+  Daemon daemon(std::vector<std::string>{"--drain-seconds", "0"});
+  long_job(daemon);
+  EXPECT_EQ(daemon.stop(), 0);
+}
+
+TEST(Drain, IsNotReadyAndAcceptsNothing) {
+  Daemon daemon(std::vector<std::string>{"--drain-seconds", "100"});
+  const Job job = long_job(daemon);
+  daemon.terminate();
+  ASSERT_TRUE(eventually([&] { return daemon.get("/readyz").status == 503; }));
+  EXPECT_EQ(daemon.get("/livez").status, 200);
+  // Nobody would run it any more.
+  EXPECT_TRUE(
+      is_problem(daemon.send("POST", "/v1/jobs",
+                             "{\"volume\": \"" + job.parameters.volume + "\", \"iso\": 50}"),
+                 ErrorCode::kUnavailable));
+  EXPECT_EQ(daemon.get("/v1/jobs/" + job.id).status, 200);
+  daemon.client().cancel(job.id);
+  EXPECT_EQ(daemon.wait(), 0);
+}
+
+TEST(Drain, FinishesTheMeshOfOneRequest) {
+  Daemon daemon(std::vector<std::string>{"--drain-seconds", "100"});
+  const RawUpload raw = long_upload();
+  Answer answer;
+  std::jthread client(
+      [&] { answer = daemon.send("POST", "/v1/mesh?iso=50&passes=25&" + raw.query, raw.bytes); });
+  ASSERT_TRUE(eventually([&] {
+    const auto jobs = daemon.client().jobs(JobState::kRunning).jobs;
+    return !jobs.empty() && jobs[0].stage == Stage::kSmooth;
+  }));
+  daemon.terminate();
+  EXPECT_EQ(daemon.wait(), 0);
+  client.join();
+  EXPECT_EQ(answer.status, 200) << answer.body.substr(0, 300);
+}
+
+// One that sends a byte now and then never runs into the time-out of a single read.
+TEST(Drain, ATricklingUploadDoesNotHoldItUp) {
+  Daemon daemon(std::vector<std::string>{"--drain-seconds", "0"});
+  const Connection connection(daemon.url());
+  connection.send("POST /v1/volumes HTTP/1.1\r\nHost: test\r\nContent-Length: 99999999\r\n\r\n");
+  ASSERT_TRUE(eventually([&] { return !files_below(daemon.data() / "scratch").empty(); }));
+  std::jthread trickle([&](const std::stop_token& stop) {
+    while (!stop.stop_requested() && connection.send("x")) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  });
+  daemon.terminate();
+  EXPECT_TRUE(daemon.ends_within(std::chrono::seconds(15)));
+  trickle.request_stop();
+}
+
+}  // namespace
+}  // namespace isomesh

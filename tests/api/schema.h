@@ -1,0 +1,35 @@
+// As much of JSON Schema as openapi.yaml uses, to hold answers against it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+#include <yaml-cpp/yaml.h>
+
+namespace isomesh::test {
+
+class OpenApi {
+ public:
+  explicit OpenApi(const std::string& yaml) : root_(YAML::Load(yaml)) {}
+
+  YAML::Node paths() const { return root_["paths"]; }
+  // Follows `$ref`, if that is what the node is.
+  YAML::Node resolved(const YAML::Node& node) const;
+  YAML::Node schema(const std::string& name) const { return root_["components"]["schemas"][name]; }
+
+  // What is wrong with the value, each with where it is; empty when nothing is. A member that the
+  // schema does not name is wrong. Throws std::runtime_error for a keyword that is not known here.
+  std::vector<std::string> faults(const nlohmann::json& value, const YAML::Node& schema) const;
+
+ private:
+  YAML::Node root_;
+};
+
+// What a YAML node says, as JSON.
+nlohmann::json json_of(const YAML::Node& node);
+
+// The scalars of a sequence, as text.
+std::vector<std::string> texts_of(const YAML::Node& sequence);
+
+}  // namespace isomesh::test

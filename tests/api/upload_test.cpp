@@ -1,0 +1,289 @@
+// Volumes over HTTP: formats, digests, limits, and what is left of those that were refused.
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <openssl/evp.h>
+
+#include "proto/json.h"
+#include "tests/api/daemon.h"
+#include "tests/api/problems.h"
+#include "tests/support/nifti.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+std::string digest_of(const std::string& bytes) {
+  std::array<unsigned char, 32> digest = {};
+  unsigned size = digest.size();
+  EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr);
+  std::array<unsigned char, 48> base64 = {};
+  EVP_EncodeBlock(base64.data(), digest.data(), static_cast<int>(digest.size()));
+  return "sha-256=:" + std::string(reinterpret_cast<const char*>(base64.data())) + ":";
+}
+
+// A field of a form and the file in it.
+std::string form(const std::string& name, const std::string& bytes) {
+  return "--xyz\r\nContent-Disposition: form-data; name=\"" + name +
+         "\"; filename=\"head.raw\"\r\nContent-Type: application/octet-stream\r\n\r\n" + bytes +
+         "\r\n";
+}
+const Headers kForm = {{"Content-Type", "multipart/form-data; boundary=xyz"}};
+const std::string kFormEnd = "--xyz--\r\n";
+
+class UploadTest : public testing::Test {
+ protected:
+  Answer post(const std::string& body, const Headers& headers = {}) {
+    return daemon_.send("POST", target_, body, headers);
+  }
+
+  std::size_t volumes() { return daemon_.client().volumes().size(); }
+
+  // Volumes or parts of them in the daemon's folder, whatever it says.
+  std::vector<std::string> files_left() {
+    std::vector<std::string> files = files_below(daemon_.data());
+    std::erase(files, "lock");
+    return files;
+  }
+
+  Daemon daemon_;
+  const RawUpload sphere_ = sphere_upload();
+  const std::string target_ = "/v1/volumes?" + sphere_.query;
+};
+
+TEST_F(UploadTest, ANewVolumeIsCreated) {
+  const Answer answer = post(sphere_.bytes);
+  ASSERT_EQ(answer.status, 201);
+  EXPECT_EQ(answer.header("content-type"), "application/json");
+  const Volume volume = volume_from_json(answer.body);
+  EXPECT_EQ(answer.header("location"), "/v1/volumes/" + volume.id);
+  EXPECT_EQ(volume.format, "raw");
+  EXPECT_EQ(volume.dims, (std::array<std::uint32_t, 3>{21, 20, 19}));
+  EXPECT_EQ(volume.bytes, sphere_.bytes.size());
+  EXPECT_EQ(volume.id.size(), 64U);
+  EXPECT_EQ(volume_from_json(daemon_.get("/v1/volumes/" + volume.id).body), volume);
+  EXPECT_THAT(daemon_.client().volumes(), ElementsAre(volume));
+}
+
+TEST_F(UploadTest, TheSameVolumeAgainIsTheSame) {
+  const Answer first = post(sphere_.bytes);
+  const Answer second = post(sphere_.bytes);
+  EXPECT_EQ(second.status, 200);
+  EXPECT_EQ(second.body, first.body);
+  EXPECT_EQ(second.header("location"), first.header("location"));
+  EXPECT_EQ(volumes(), 1U);
+}
+
+TEST_F(UploadTest, TakesTheWholeDescriptionOfRawSamples) {
+  const Answer answer = daemon_.send(
+      "POST",
+      target_ + "&spacing=0.5,1,2&origin=-1,-2,3.5&direction=0,1,0,1,0,0,0,0,1&byte_order=big",
+      sphere_.bytes);
+  ASSERT_EQ(answer.status, 201) << answer.body;
+  const Geometry geometry = volume_from_json(answer.body).geometry;
+  EXPECT_EQ(geometry.spacing, (std::array<double, 3>{0.5, 1, 2}));
+  EXPECT_EQ(geometry.origin, (std::array<double, 3>{-1, -2, 3.5}));
+  EXPECT_EQ(geometry.direction, (std::array<double, 9>{0, 1, 0, 1, 0, 0, 0, 0, 1}));
+}
+
+TEST_F(UploadTest, ComesChunkedAsWell) {
+  const Answer answer = answer_to(daemon_.url(), "POST " + target_ +
+                                                     " HTTP/1.1\r\nHost: test\r\n"
+                                                     "Transfer-Encoding: chunked\r\n\r\n" +
+                                                     chunked(sphere_.bytes, 1000));
+  ASSERT_EQ(answer.status, 201) << answer.body;
+  EXPECT_EQ(post(sphere_.bytes).status, 200);
+}
+
+// The names of transfer codings are case-insensitive (RFC 9112, 7).
+TEST_F(UploadTest, ComesChunkedInAnyCase) {
+  const Answer answer = answer_to(daemon_.url(), "POST " + target_ +
+                                                     " HTTP/1.1\r\nHost: test\r\n"
+                                                     "Transfer-Encoding: Chunked\r\n\r\n" +
+                                                     chunked(sphere_.bytes, 1000));
+  EXPECT_EQ(answer.status, 201) << answer.body;
+}
+
+TEST_F(UploadTest, ComesAsAForm) {
+  const Answer answer = post(form("file", sphere_.bytes) + kFormEnd, kForm);
+  ASSERT_EQ(answer.status, 201) << answer.body;
+  EXPECT_EQ(post(sphere_.bytes).status, 200);
+}
+
+TEST_F(UploadTest, AFormOfAnythingElseIsRefused) {
+  const std::string file = form("file", sphere_.bytes);
+  EXPECT_TRUE(blames(post(form("volume", sphere_.bytes) + kFormEnd, kForm), "file"));
+  EXPECT_TRUE(blames(post(file + file + kFormEnd, kForm), "file"));
+  EXPECT_TRUE(blames(post(file + form("note", "x") + kFormEnd, kForm), "file"));
+  EXPECT_TRUE(is_problem(post(kFormEnd, kForm), ErrorCode::kInvalidParameter));
+  EXPECT_TRUE(is_problem(post("no form at all", kForm), ErrorCode::kInvalidParameter));
+  EXPECT_TRUE(is_problem(post(form("file", ""), kForm), ErrorCode::kInvalidParameter));
+  EXPECT_EQ(volumes(), 0U);
+  EXPECT_THAT(files_left(), IsEmpty());
+}
+
+TEST_F(UploadTest, ADigestIsChecked) {
+  EXPECT_TRUE(is_problem(post(sphere_.bytes, {{"Content-Digest", digest_of("another body")}}),
+                         ErrorCode::kDigestMismatch));
+  EXPECT_EQ(volumes(), 0U);
+  EXPECT_THAT(files_left(), IsEmpty());
+  EXPECT_EQ(post(sphere_.bytes, {{"Content-Digest", digest_of(sphere_.bytes)}}).status, 201);
+}
+
+TEST_F(UploadTest, ADigestThatIsNoneIsRefused) {
+  for (const std::string value : {"sha-256=:abc:", "sha-256=abc", "sha-256=::"}) {
+    EXPECT_TRUE(blames(post(sphere_.bytes, {{"Content-Digest", value}}), "Content-Digest"));
+  }
+  EXPECT_EQ(volumes(), 0U);
+}
+
+TEST_F(UploadTest, ADescriptionThatDoesNotFitIsRefused) {
+  const auto with = [&](const std::string& query) {
+    return daemon_.send("POST", "/v1/volumes?" + query, sphere_.bytes);
+  };
+  EXPECT_TRUE(blames(with("dims=21,20,18&type=uint8"), "dims"));
+  EXPECT_TRUE(blames(with("dims=21,20&type=uint8"), "dims"));
+  EXPECT_TRUE(blames(with("dims=0,20,19&type=uint8"), "dims"));
+  EXPECT_TRUE(blames(with("dims=4294967295,4294967295,4294967295&type=float64"), "dims"));
+  EXPECT_TRUE(blames(with("dims=21,20,19"), "type"));
+  EXPECT_TRUE(blames(with("dims=21,20,19&type=int64"), "type"));
+  EXPECT_TRUE(blames(with("type=uint8"), "dims"));
+  EXPECT_TRUE(blames(with(sphere_.query + "&spacing=0,1,1"), "spacing"));
+  EXPECT_TRUE(blames(with(sphere_.query + "&spacing=nan,1,1"), "spacing"));
+  EXPECT_TRUE(blames(with(sphere_.query + "&spacing=1,1,-1"), "spacing"));
+  EXPECT_TRUE(blames(with(sphere_.query + "&direction=1,0,0,1,0,0,1,0,0"), "direction"));
+  EXPECT_TRUE(blames(with(sphere_.query + "&byte_order=middle"), "byte_order"));
+  EXPECT_TRUE(blames(with(sphere_.query + "&flavour=sweet"), "flavour"));
+  EXPECT_EQ(volumes(), 0U);
+  EXPECT_THAT(files_left(), IsEmpty());
+}
+
+TEST_F(UploadTest, WhatIsNoVolumeIsUnsupported) {
+  for (const std::string& body :
+       {std::string("hello"), std::string(100'000, 'x'), std::string(1000, '\0'),
+        std::string("%PDF-1.4 and so on"), std::string("PK\3\4 and no more")}) {
+    EXPECT_TRUE(
+        is_problem(daemon_.send("POST", "/v1/volumes", body), ErrorCode::kUnsupportedMedia));
+  }
+  EXPECT_THAT(files_left(), IsEmpty());
+}
+
+TEST_F(UploadTest, AnEmptyBodyIsRefused) {
+  EXPECT_TRUE(is_problem(post(""), ErrorCode::kInvalidParameter));
+  EXPECT_TRUE(is_problem(daemon_.send("POST", "/v1/volumes", ""), ErrorCode::kInvalidParameter));
+}
+
+TEST_F(UploadTest, ATruncatedVolumeIsUnusable) {
+  const std::string brain = read_file(kBrainFile);
+  for (const std::size_t bytes : {std::size_t{400}, brain.size() / 2, brain.size() - 9}) {
+    EXPECT_TRUE(is_problem(daemon_.send("POST", "/v1/volumes", brain.substr(0, bytes)),
+                           ErrorCode::kUnusableVolume))
+        << bytes;
+  }
+  EXPECT_EQ(volumes(), 0U);
+  EXPECT_THAT(files_left(), IsEmpty());
+}
+
+TEST_F(UploadTest, CutAtHalfLeavesNothing) {
+  {
+    const Connection connection(daemon_.url());
+    const std::string whole = request("POST", target_, sphere_.bytes);
+    connection.send(std::string_view(whole).substr(0, whole.size() - sphere_.bytes.size() / 2));
+    ASSERT_TRUE(eventually([&] { return !files_left().empty(); }));
+    EXPECT_EQ(volumes(), 0U);
+  }
+  EXPECT_TRUE(eventually([&] { return files_left().empty(); }));
+  EXPECT_EQ(volumes(), 0U);
+}
+
+TEST_F(UploadTest, CutInTheMiddleOfAChunkLeavesNothing) {
+  {
+    const Connection connection(daemon_.url());
+    connection.send("POST " + target_ +
+                    " HTTP/1.1\r\nHost: test\r\nTransfer-Encoding: chunked\r\n\r\n1000\r\nabc");
+    ASSERT_TRUE(eventually([&] { return !files_left().empty(); }));
+  }
+  EXPECT_TRUE(eventually([&] { return files_left().empty(); }));
+  EXPECT_EQ(volumes(), 0U);
+}
+
+TEST_F(UploadTest, ABrokenChunkIsRefused) {
+  const Connection connection(daemon_.url());
+  connection.send("POST " + target_ +
+                  " HTTP/1.1\r\nHost: test\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\nabc\r\n");
+  EXPECT_TRUE(is_problem(connection.receive(), ErrorCode::kInvalidParameter));
+  EXPECT_TRUE(eventually([&] { return files_left().empty(); }));
+}
+
+TEST_F(UploadTest, AnErasedVolumeIsGone) {
+  const std::string path = "/v1/volumes/" + upload(daemon_, sphere_).id;
+  EXPECT_EQ(daemon_.send("DELETE", path).status, 204);
+  EXPECT_TRUE(is_problem(daemon_.get(path), ErrorCode::kNotFound));
+  EXPECT_TRUE(is_problem(daemon_.send("DELETE", path), ErrorCode::kNotFound));
+  EXPECT_THAT(files_left(), IsEmpty());
+}
+
+TEST_F(UploadTest, AVolumeThatAJobNeedsIsKept) {
+  const Job job = long_job(daemon_);
+  const std::string path = "/v1/volumes/" + job.parameters.volume;
+  EXPECT_TRUE(is_problem(daemon_.send("DELETE", path), ErrorCode::kNotReady));
+  EXPECT_EQ(daemon_.get(path).status, 200);
+  daemon_.client().cancel(job.id);
+}
+
+TEST(UploadLimit, HoldsForEveryWayToSend) {
+  const Daemon daemon(std::vector<std::string>{"--max-upload", "5000"});
+  const RawUpload sphere = sphere_upload();
+  const std::string target = "/v1/volumes?" + sphere.query;
+  EXPECT_TRUE(is_problem(daemon.send("POST", target, sphere.bytes), ErrorCode::kTooLarge));
+  EXPECT_TRUE(is_problem(
+      answer_to(daemon.url(), "POST " + target +
+                                  " HTTP/1.1\r\nHost: test\r\nTransfer-Encoding: chunked\r\n\r\n" +
+                                  chunked(sphere.bytes, 100)),
+      ErrorCode::kTooLarge));
+  EXPECT_TRUE(is_problem(daemon.send("POST", target, form("file", sphere.bytes) + kFormEnd, kForm),
+                         ErrorCode::kTooLarge));
+  // Refused for what it announces, before any of it has come.
+  EXPECT_TRUE(is_problem(answer_to(daemon.url(), "POST " + target +
+                                                     " HTTP/1.1\r\nHost: test\r\n"
+                                                     "Content-Length: 99999999999999\r\n\r\n"),
+                         ErrorCode::kTooLarge));
+  EXPECT_EQ(
+      daemon.send("POST", "/v1/volumes?dims=10,10,50&type=uint8", std::string(5000, 'x')).status,
+      201);
+}
+
+TEST(VolumeLimit, HoldsForTheSamples) {
+  const Daemon daemon(std::vector<std::string>{"--max-volume", "5000"});
+  const RawUpload sphere = sphere_upload();
+  EXPECT_TRUE(is_problem(daemon.send("POST", "/v1/volumes?" + sphere.query, sphere.bytes),
+                         ErrorCode::kTooLarge));
+}
+
+TEST(Uploads, OfManyClientsAtATimeAreAllKept) {
+  const Daemon daemon;
+  std::vector<std::jthread> clients;
+  std::atomic<int> created = 0;
+  for (int client = 0; client < 8; ++client) {
+    clients.emplace_back([&, client] {
+      const std::string bytes(1000, static_cast<char>('a' + client));
+      if (daemon.send("POST", "/v1/volumes?dims=10,10,10&type=uint8", bytes).status == 201) {
+        ++created;
+      }
+    });
+  }
+  clients.clear();
+  EXPECT_EQ(created, 8);
+  EXPECT_EQ(daemon.client().volumes().size(), 8U);
+}
+
+}  // namespace
+}  // namespace isomesh

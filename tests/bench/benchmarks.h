@@ -1,0 +1,28 @@
+// Every stage, ours and the peers', under Google Benchmark.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/bench/samples.h"
+
+namespace isomesh::bench {
+
+// What a run of isomesh-bench is to measure.
+struct Plan {
+  std::optional<Samples> volume;           // the real one
+  double iso = 0;                          // its iso-value
+  std::vector<std::uint32_t> field_sizes;  // of the synthetic field
+  std::vector<int> threads;                // ascending
+  std::string filter = ".";                // a regular expression on the names; "." is all
+  bool json = false;
+};
+
+// Runs the benchmarks whose names match and prints medians to standard output, unless the plan is
+// for JSON. Returns Google Benchmark's JSON document. Sets the threads of the stages and of the
+// peers.
+std::string run_benchmarks(const Plan& plan);
+
+}  // namespace isomesh::bench

@@ -1,0 +1,19 @@
+// What the figures were measured on.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace isomesh::bench {
+
+int processors();
+
+// Says on standard error when others keep the machine busy: stages on two threads then take as long
+// as on one, now and then.
+void warn_when_busy();
+
+// Name and value: processor, cores, memory, system, compiler, versions, load, date.
+std::vector<std::pair<std::string, std::string>> describe_machine();
+
+}  // namespace isomesh::bench

@@ -1,0 +1,141 @@
+// isomesh-bench: times every stage and, where VTK was found when it was built, VTK's on the same
+// volume in the same run; and writes the report on the paper.
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+#include <regex>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "tests/bench/benchmarks.h"
+#include "tests/bench/machine.h"
+#include "tests/bench/memory.h"
+#include "tests/bench/peers.h"
+#include "tests/bench/ratios.h"
+#include "tests/bench/report.h"
+#include "tests/bench/stages.h"
+
+namespace isomesh::bench {
+namespace {
+
+const std::filesystem::path kDefaultVolume = "/usr/share/mricron/templates/ch2.nii.gz";
+constexpr double kDefaultIso = 60;
+
+struct Options {
+  std::filesystem::path volume;
+  std::optional<double> iso;
+  int threads = 0;  // 0: one and two
+  std::vector<std::uint32_t> sizes = {64, 128, 256, 512};
+  bool large = false;
+  bool json = false;
+  std::string filter = ".";
+};
+
+// The real volume into the plan; a default one that is not installed is left out, saying so.
+void load(const Options& options, Plan& plan) {
+  const bool is_default = options.volume.empty();
+  const std::filesystem::path path = is_default ? kDefaultVolume : options.volume;
+  if (is_default && !std::filesystem::exists(path)) {
+    std::cerr << "isomesh-bench: " << path.string()
+              << " is not there (Debian's package mricron-data); only the synthetic field is "
+                 "measured\n";
+    return;
+  }
+  LoadedVolume loaded = load_volume(path);
+  plan.iso = options.iso.value_or(is_default ? kDefaultIso : loaded.suggested_iso);
+  if (Stages(loaded.samples, {.iso = plan.iso}).count().triangles == 0) {
+    throw std::runtime_error("there is no surface at iso-value " + std::to_string(plan.iso));
+  }
+  plan.volume = std::move(loaded.samples);
+}
+
+Plan plan_of(const Options& options) {
+  Plan plan;
+  plan.json = options.json;
+  plan.filter = options.filter;
+  plan.field_sizes = options.sizes;
+  if (options.large) plan.field_sizes.push_back(1024);
+  std::ranges::sort(plan.field_sizes);
+  plan.threads = options.threads > 0 ? std::vector{options.threads} : std::vector{1, 2};
+  load(options, plan);
+  return plan;
+}
+
+int run(const Options& options) {
+  const Plan plan = plan_of(options);
+  if (!plan.json) {
+    for (const auto& [key, value] : describe_machine()) std::cout << key << ": " << value << '\n';
+    std::cout << std::endl;
+  }
+  const std::string document = run_benchmarks(plan);
+  const std::vector<Finding> findings = measure_findings(plan);
+  if (plan.json) {
+    std::cout << with_findings(document, findings) << '\n';
+    return 0;
+  }
+  if (!findings.empty()) std::cout << '\n' << to_table(findings);
+  if (!peers_available()) std::cout << '\n' << peers_description() << '\n';
+  return 0;
+}
+
+std::string check_filter(const std::string& text) {
+  try {
+    const std::regex filter(text);
+    return {};
+  } catch (const std::regex_error&) {
+    return "is not a regular expression";
+  }
+}
+
+}  // namespace
+}  // namespace isomesh::bench
+
+int main(int argc, char** argv) {
+  using namespace isomesh::bench;
+  Options options;
+  CLI::App app("Times the stages of isomesh, beside VTK's where it was built with VTK.",
+               "isomesh-bench");
+  app.add_option("--volume", options.volume, "A volume file in any format that isomesh imports")
+      ->check(CLI::ExistingFile);
+  app.add_option("--iso", options.iso, "Its iso-value; Otsu's threshold unless given");
+  app.add_option("--threads", options.threads, "Only this number of threads, instead of 1 and 2")
+      ->check(CLI::Range(1, 1024));
+  app.add_option("--size", options.sizes, "Sizes of the synthetic field")
+      ->check(CLI::Range(8, 2048));
+  app.add_flag("--large", options.large, "The synthetic field at 1024^3 too");
+  app.add_option("--filter", options.filter, "Only what has a name that this expression matches")
+      ->check(check_filter);
+  app.add_flag("--json", options.json, "One JSON document instead of text");
+
+  std::filesystem::path folder;
+  CLI::App* report = app.add_subcommand("report", "Write the report on the paper");
+  report->add_option("DIR", folder, "Where REPORT.md and its plots go")->required();
+
+  std::string stage;
+  std::uint32_t size = 0;
+  int threads = 1;
+  CLI::App* memory = app.add_subcommand(kMemoryCommand, "")->group("");
+  memory->add_option("stage", stage)->required();
+  memory->add_option("size", size)->required();
+  memory->add_option("threads", threads)->required();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    constexpr int kWrongUsage = 2;
+    return app.exit(error) == 0 ? 0 : kWrongUsage;
+  }
+
+  try {
+    if (*memory) return run_memory_command(stage, size, threads);
+    warn_when_busy();
+    if (*report) return write_report(folder);
+    return run(options);
+  } catch (const std::exception& error) {
+    std::cerr << "isomesh-bench: " << error.what() << '\n';
+    return 1;
+  }
+}

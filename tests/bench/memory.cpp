@@ -1,0 +1,119 @@
+#include "tests/bench/memory.h"
+
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <map>
+#include <sstream>
+
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "tests/bench/peers.h"
+#include "tests/bench/samples.h"
+#include "tests/bench/stages.h"
+
+namespace isomesh::bench {
+namespace {
+
+constexpr int kPasses = 5;
+
+// A field of /proc/self/status, in bytes.
+std::uint64_t own_status(const std::string& field) {
+  std::ifstream file("/proc/self/status");
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with(field + ':')) return std::stoull(line.substr(field.size() + 1)) << 10;
+  }
+  return 0;
+}
+
+bool reset_peak() {
+  std::ofstream file("/proc/self/clear_refs");
+  file << "5" << std::flush;
+  return static_cast<bool>(file);
+}
+
+// Runs a stage and returns the size of its output.
+std::uint64_t run_stage(const std::string& stage, const Samples& field) {
+  const Surface surface = {.iso = kFieldIso};
+  if (stage == kPeerExtractStage || stage == kPeerJobStage) {
+    Peers peers(field, surface.iso);
+    if (stage == kPeerJobStage) return peers.pipeline();
+    peers.flying_edges();
+    constexpr std::uint64_t kVertexBytes = 12;
+    constexpr std::uint64_t kTriangleBytes = 12;  // as we count our own, whatever VTK takes
+    return peers.size().vertices * kVertexBytes + peers.size().triangles * kTriangleBytes;
+  }
+  Stages stages(field, surface);
+  if (stage == kJobStage) return stages.run_job(kPasses, MeshFormat::kDrc);
+  stages.extract();
+  if (stage == kSmoothStage) stages.smooth_from_scratch(kPasses);
+  return stages.mesh_bytes();
+}
+
+std::string own_path() {
+  std::string path(4096, '\0');
+  const ssize_t length = readlink("/proc/self/exe", path.data(), path.size());
+  path.resize(length > 0 ? static_cast<std::size_t>(length) : 0);
+  return path;
+}
+
+// Runs this program with arguments and returns what it prints; empty when it fails.
+std::string run_self(std::vector<std::string> arguments) {
+  const std::string path = own_path();
+  int ends[2];
+  if (path.empty() || pipe(ends) != 0) return {};
+  std::vector<char*> argv;
+  arguments.insert(arguments.begin(), path);
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+  posix_spawn_file_actions_addclose(&actions, ends[0]);
+  posix_spawn_file_actions_addclose(&actions, ends[1]);
+  pid_t child = 0;
+  const int failure = posix_spawn(&child, path.c_str(), &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  close(ends[1]);
+  std::string printed;
+  char block[256];
+  for (ssize_t got = 1; failure == 0 && got > 0;) {
+    got = read(ends[0], block, sizeof block);
+    if (got > 0) printed.append(block, static_cast<std::size_t>(got));
+  }
+  close(ends[0]);
+  int status = 1;
+  if (failure != 0 || waitpid(child, &status, 0) != child || status != 0) return {};
+  return printed;
+}
+
+}  // namespace
+
+std::optional<PeakMemory> measure_memory(const std::string& stage, std::uint32_t size,
+                                         int threads) {
+  std::istringstream answer(
+      run_self({kMemoryCommand, stage, std::to_string(size), std::to_string(threads)}));
+  PeakMemory memory;
+  if (answer >> memory.peak_bytes >> memory.input_bytes >> memory.output_bytes) return memory;
+  std::cerr << "isomesh-bench: the memory of " << stage << " at " << size
+            << "^3 could not be measured\n";
+  return std::nullopt;
+}
+
+int run_memory_command(const std::string& stage, std::uint32_t size, int threads) {
+  set_threads(threads);
+  Peers::set_threads(threads);
+  const Samples field = synthetic_field(size);
+  if (!reset_peak()) return 1;
+  const std::uint64_t before = own_status("VmRSS");
+  const std::uint64_t output = run_stage(stage, field);
+  const std::uint64_t peak = own_status("VmHWM") - before + field.bytes.size();
+  std::cout << peak << ' ' << field.bytes.size() << ' ' << output << '\n';
+  return 0;
+}
+
+}  // namespace isomesh::bench

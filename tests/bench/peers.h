@@ -1,0 +1,52 @@
+// What a user would take instead of isomesh: VTK's filters and Draco in one call. In a program that
+// was built without VTK the class is there, but constructing one throws.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "tests/bench/samples.h"
+#include "tests/bench/stages.h"
+
+namespace isomesh::bench {
+
+inline constexpr int kPeerSincPasses = 20;  // the filter's own default
+
+// Whether there are peers, and in one sentence which or why not.
+bool peers_available();
+std::string peers_description();
+
+// VTK on one volume. Filters are made anew for every run, because they would return what they have
+// cached; normals, gradients and scalars are off, because isomesh makes none. Not thread safe.
+// Keeps a reference to the samples.
+class Peers {
+ public:
+  // Throws std::logic_error when there are none.
+  Peers(const Samples& samples, double iso);
+  ~Peers();
+  Peers(const Peers&) = delete;
+  Peers& operator=(const Peers&) = delete;
+
+  // Threads of all peers; of VTK's SMP backend, which is TBB where VTK has it.
+  static void set_threads(int threads);
+
+  void flying_edges();
+  void marching_cubes();
+  // These take the last Flying Edges mesh, which they keep.
+  void smooth(int passes);         // vtkSmoothPolyDataFilter
+  void windowed_sinc(int passes);  // vtkWindowedSincPolyDataFilter
+  std::uint64_t draco() const;     // edgebreaker, 14 bits, speed 5; the number of bytes
+  // Flying Edges, windowed sinc and Draco; the number of bytes.
+  std::uint64_t pipeline();
+
+  // Frees all outputs, so that freeing is not in the next run's time.
+  void release();
+  MeshSize size() const;  // of the last Flying Edges mesh
+
+ private:
+  struct Vtk;
+  std::unique_ptr<Vtk> vtk_;
+};
+
+}  // namespace isomesh::bench

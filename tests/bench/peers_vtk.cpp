@@ -1,0 +1,165 @@
+#include <stdexcept>
+
+#include <malloc.h>
+#include <vtkCellArray.h>
+#include <vtkDataArray.h>
+#include <vtkFloatArray.h>
+#include <vtkFlyingEdges3D.h>
+#include <vtkImageData.h>
+#include <vtkMarchingCubes.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkSmartPointer.h>
+#include <vtkSmoothPolyDataFilter.h>
+#include <vtkTypeInt32Array.h>
+#include <vtkTypeInt64Array.h>
+#include <vtkVersion.h>
+#include <vtkWindowedSincPolyDataFilter.h>
+
+#include "tests/bench/draco_call.h"
+#include "tests/bench/peers.h"
+#include "tests/bench/vtk_threads.h"
+
+namespace isomesh::bench {
+namespace {
+
+int vtk_type(SampleType type) {
+  switch (type) {
+    case SampleType::kUint8:
+      return VTK_UNSIGNED_CHAR;
+    case SampleType::kInt8:
+      return VTK_SIGNED_CHAR;
+    case SampleType::kUint16:
+      return VTK_UNSIGNED_SHORT;
+    case SampleType::kInt16:
+      return VTK_SHORT;
+    case SampleType::kUint32:
+      return VTK_UNSIGNED_INT;
+    case SampleType::kInt32:
+      return VTK_INT;
+    case SampleType::kFloat32:
+      return VTK_FLOAT;
+    case SampleType::kFloat64:
+      break;
+  }
+  return VTK_DOUBLE;
+}
+
+// The samples as they are, without a copy.
+vtkSmartPointer<vtkImageData> image_of(const Samples& samples) {
+  const auto image = vtkSmartPointer<vtkImageData>::New();
+  image->SetDimensions(static_cast<int>(samples.dims.x), static_cast<int>(samples.dims.y),
+                       static_cast<int>(samples.dims.z));
+  image->SetSpacing(samples.geometry.spacing.data());
+  image->SetOrigin(samples.geometry.origin.data());
+  const auto scalars =
+      vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtk_type(samples.type)));
+  constexpr int kKeep = 1;  // VTK must not free what it does not own
+  scalars->SetVoidArray(const_cast<std::byte*>(samples.bytes.data()),
+                        static_cast<vtkIdType>(samples.dims.samples()), kKeep);
+  image->GetPointData()->SetScalars(scalars);
+  return image;
+}
+
+// The points and polygons alone: links that one filter left with its input would save the next one
+// work.
+vtkSmartPointer<vtkPolyData> bare(vtkPolyData* mesh) {
+  const auto result = vtkSmartPointer<vtkPolyData>::New();
+  result->SetPoints(mesh->GetPoints());
+  result->SetPolys(mesh->GetPolys());
+  return result;
+}
+
+template <class Filter>
+vtkSmartPointer<vtkPolyData> contour(vtkImageData* image, double iso) {
+  const vtkNew<Filter> filter;
+  filter->SetInputData(image);
+  filter->SetValue(0, iso);
+  filter->ComputeNormalsOff();
+  filter->ComputeGradientsOff();
+  filter->ComputeScalarsOff();
+  filter->Update();
+  return filter->GetOutput();
+}
+
+template <class Filter>
+vtkSmartPointer<vtkPolyData> smoothed(vtkPolyData* mesh, int passes) {
+  const vtkNew<Filter> filter;
+  filter->SetInputData(bare(mesh));
+  filter->SetNumberOfIterations(passes);
+  filter->Update();
+  return filter->GetOutput();
+}
+
+std::uint64_t draco_of(vtkPolyData* mesh) {
+  auto* points = vtkFloatArray::SafeDownCast(mesh->GetPoints()->GetData());
+  if (points == nullptr) throw std::logic_error("VTK's points are not of single precision");
+  const std::span positions(reinterpret_cast<const mesh::Vec3*>(points->GetPointer(0)),
+                            static_cast<std::size_t>(points->GetNumberOfTuples()));
+  vtkCellArray* polys = mesh->GetPolys();
+  if (!polys->IsStorage64Bit()) polys->ConvertTo64BitStorage();
+  static_assert(sizeof(long long) == sizeof(vtkTypeInt64));
+  const auto* corners = polys->GetConnectivityArray64();
+  return encode_in_one_call(
+      positions, std::span(reinterpret_cast<const long long*>(
+                               const_cast<vtkCellArray::ArrayType64*>(corners)->GetPointer(0)),
+                           static_cast<std::size_t>(polys->GetNumberOfConnectivityIds())));
+}
+
+}  // namespace
+
+struct Peers::Vtk {
+  vtkSmartPointer<vtkImageData> image;
+  double iso = 0;
+  vtkSmartPointer<vtkPolyData> mesh;   // the last Flying Edges mesh
+  vtkSmartPointer<vtkPolyData> other;  // what came from it, or another surface
+};
+
+bool peers_available() { return true; }
+
+std::string peers_description() {
+  return std::string("VTK ") + vtkVersion::GetVTKVersion() + " with its SMP backend " +
+         vtk_backend();
+}
+
+Peers::Peers(const Samples& samples, double iso)
+    : vtk_(std::make_unique<Vtk>(Vtk{image_of(samples), iso, nullptr, nullptr})) {}
+
+Peers::~Peers() = default;
+
+void Peers::set_threads(int threads) { set_vtk_threads(threads); }
+
+void Peers::flying_edges() { vtk_->mesh = contour<vtkFlyingEdges3D>(vtk_->image, vtk_->iso); }
+
+void Peers::marching_cubes() { vtk_->other = contour<vtkMarchingCubes>(vtk_->image, vtk_->iso); }
+
+void Peers::smooth(int passes) {
+  vtk_->other = smoothed<vtkSmoothPolyDataFilter>(vtk_->mesh, passes);
+}
+
+void Peers::windowed_sinc(int passes) {
+  vtk_->other = smoothed<vtkWindowedSincPolyDataFilter>(vtk_->mesh, passes);
+}
+
+std::uint64_t Peers::draco() const { return draco_of(vtk_->mesh); }
+
+std::uint64_t Peers::pipeline() {
+  flying_edges();
+  windowed_sinc(kPeerSincPasses);
+  return draco_of(vtk_->other);
+}
+
+void Peers::release() {
+  vtk_->mesh = nullptr;
+  vtk_->other = nullptr;
+  malloc_trim(0);
+}
+
+MeshSize Peers::size() const {
+  return {static_cast<std::uint64_t>(vtk_->mesh->GetNumberOfPoints()),
+          static_cast<std::uint64_t>(vtk_->mesh->GetNumberOfPolys())};
+}
+
+}  // namespace isomesh::bench

@@ -1,0 +1,249 @@
+#include "tests/bench/ratios.h"
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <iomanip>
+#include <regex>
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/bench/memory.h"
+#include "tests/bench/numbers.h"
+#include "tests/bench/peers.h"
+#include "tests/bench/stages.h"
+#include "tests/bench/timing.h"
+
+namespace isomesh::bench {
+namespace {
+
+constexpr int kPasses = 5;
+constexpr Goal kExtractGoal = {0.6};
+constexpr Goal kSmoothRateGoal = {200, false};   // Mvertex-passes/s
+constexpr Goal kSmoothFactorGoal = {40, false};  // times vtkSmoothPolyDataFilter
+constexpr Goal kJobGoal = {0.6};
+constexpr Goal kGrowthGoal = {1.1};  // linear within the noise
+constexpr std::uint32_t kCompareSize = 256;
+constexpr std::uint32_t kMemorySize = 256;
+
+double rate(const MeshSize& size, int passes, double ms) {
+  return static_cast<double>(size.vertices) * passes / ms / 1000;
+}
+
+std::string rate_text(double rate) { return fixed(rate, 0) + " Mvp/s"; }
+
+// The findings about one volume.
+class Comparison {
+ public:
+  Comparison(const Samples& samples, double iso, const std::function<bool(std::string)>& wanted,
+             std::vector<Finding>& findings)
+      : samples_(samples),
+        stages_(samples, {.iso = iso}),
+        iso_(iso),
+        wanted_(wanted),
+        findings_(findings) {
+    stages_.extract();
+  }
+
+  void run() {
+    if (wanted("smooth_rate")) compare_smoothing();
+    if (!peers_available()) return;
+    if (wanted("extract_reused_memory")) compare_extraction("extract_reused_memory", false);
+    if (wanted("extract_fresh_memory")) compare_extraction("extract_fresh_memory", true);
+    for (const MeshFormat format : {MeshFormat::kDrc, MeshFormat::kGlb}) {
+      const std::string name = "job_" + std::string(to_string(format));
+      if (wanted(name)) compare_job(name, format);
+    }
+  }
+
+ private:
+  std::string full(const std::string& name) const { return "ratio/" + name + "/" + samples_.name; }
+  bool wanted(const std::string& name) const { return wanted_(full(name)); }
+
+  void add(const std::string& name, const std::string& what, const Paired& times, Goal goal) {
+    findings_.push_back({full(name), what + ", " + samples_.name, milliseconds(times.ours_ms),
+                         milliseconds(times.peer_ms), times.ratio, goal});
+  }
+
+  void compare_extraction(const std::string& name, bool fresh) {
+    Peers peers(samples_, iso_);
+    const Timed ours = {[&] { stages_.extract(); },
+                        [&, fresh] {
+                          if (fresh) stages_.release_memory();
+                        }};
+    const Timed theirs = {[&] { peers.flying_edges(); }, [&] { peers.release(); }};
+    add(name,
+        std::string("extraction, 6 tetrahedra, ") + (fresh ? "fresh" : "reused") +
+            " memory / Flying Edges",
+        time_in_pairs(ours, theirs), kExtractGoal);
+  }
+
+  void compare_smoothing() {
+    const Timed ours = {[&] { stages_.smooth_from_scratch(kPasses); }, [&] { stages_.extract(); }};
+    const std::string what = "smoothing, 5 passes with connectivity";
+    if (!peers_available()) {
+      const double ms = median_ms(ours, kPairs);
+      add_rate(what, rate(stages_.size(), kPasses, ms));
+      return;
+    }
+    Peers peers(samples_, iso_);
+    peers.flying_edges();
+    const Paired times = time_in_pairs(ours, {[&] { peers.smooth(kPasses); }});
+    const double our_rate = rate(stages_.size(), kPasses, times.ours_ms);
+    const double peer_rate = rate(peers.size(), kPasses, times.peer_ms);
+    // The meshes differ in size: the ratio of rates is that of times, turned around and scaled.
+    const double scale =
+        static_cast<double>(stages_.size().vertices) / static_cast<double>(peers.size().vertices);
+    add_rate(what, our_rate);
+    findings_.push_back(
+        {full("smooth_factor"), "rate of that / vtkSmoothPolyDataFilter, " + samples_.name,
+         rate_text(our_rate), rate_text(peer_rate), scale / times.ratio, kSmoothFactorGoal});
+  }
+
+  void add_rate(const std::string& what, double our_rate) {
+    findings_.push_back({full("smooth_rate"), what + ", Mvertex-passes/s, " + samples_.name,
+                         rate_text(our_rate), "", our_rate, kSmoothRateGoal});
+  }
+
+  void compare_job(const std::string& name, MeshFormat format) {
+    Peers peers(samples_, iso_);
+    const Timed ours = {[&] { stages_.run_job(kPasses, format); }};
+    const Timed theirs = {[&] { peers.pipeline(); }, [&] { peers.release(); }};
+    add(name,
+        "whole job to " + std::string(to_string(format)) +
+            " / Flying Edges + windowed sinc (20) + Draco",
+        time_in_pairs(ours, theirs), kJobGoal);
+  }
+
+  const Samples& samples_;
+  Stages stages_;
+  double iso_;
+  const std::function<bool(std::string)>& wanted_;
+  std::vector<Finding>& findings_;
+};
+
+Finding growth_of_time(const std::vector<std::uint32_t>& sizes) {
+  std::vector<std::array<double, 2>> points;
+  std::string ours;
+  for (const std::uint32_t size : sizes) {
+    const Samples field = synthetic_field(size);
+    Stages stages(field, {.iso = kFieldIso});
+    stages.extract();  // to warm up
+    constexpr int kRuns = 5;
+    const double ms = median_ms({[&] {
+                                  stages.extract();
+                                  stages.smooth_from_scratch(kPasses);
+                                }},
+                                kRuns);
+    points.push_back({static_cast<double>(field.dims.samples() + stages.size().triangles), ms});
+  }
+  ours = milliseconds(points.front()[1]) + " .. " + milliseconds(points.back()[1]);
+  return {"ratio/growth_of_time",
+          "exponent of extraction + smoothing time over samples + triangles, " +
+              std::to_string(sizes.front()) + "^3 to " + std::to_string(sizes.back()) + "^3",
+          ours,
+          "",
+          log_log_slope(points),
+          kGrowthGoal};
+}
+
+// Peak over input + output + O(slice): what each thread may hold of planes while it walks through
+// them, and a little that does not grow at all.
+std::optional<Finding> memory_of(const std::string& stage, int threads) {
+  const auto memory = measure_memory(stage, kMemorySize, threads);
+  if (!memory) return std::nullopt;
+  constexpr std::uint64_t kBytesPerPlaneSample = 16;
+  constexpr std::uint64_t kConstant = 4 << 20;
+  const std::uint64_t slices =
+      static_cast<std::uint64_t>(threads) * kBytesPerPlaneSample * kMemorySize * kMemorySize;
+  const auto allowed =
+      static_cast<double>(memory->input_bytes + memory->output_bytes + slices + kConstant);
+  return Finding{"ratio/memory_" + stage,
+                 "peak memory of " +
+                     std::string(stage == kExtractStage ? "extraction" : "extraction + smoothing") +
+                     " / (input + output + slices), field-" + std::to_string(kMemorySize),
+                 mebibytes(memory->peak_bytes),
+                 "",
+                 static_cast<double>(memory->peak_bytes) / allowed,
+                 Goal{1}};
+}
+
+}  // namespace
+
+bool Finding::reached() const {
+  return !goal || (goal->at_most ? value <= goal->value : value >= goal->value);
+}
+
+std::vector<Finding> measure_findings(const Plan& plan) {
+  const std::regex filter(plan.filter);
+  const std::function<bool(std::string)> wanted = [&](const std::string& name) {
+    return std::regex_search(name, filter);
+  };
+  const int threads = plan.threads.back();
+  set_threads(threads);
+  Peers::set_threads(threads);
+
+  std::vector<Finding> findings;
+  if (plan.volume) Comparison(*plan.volume, plan.iso, wanted, findings).run();
+  const auto& sizes = plan.field_sizes;
+  if (!sizes.empty()) {
+    const bool has_usual = std::ranges::find(sizes, kCompareSize) != sizes.end();
+    const Samples field = synthetic_field(has_usual ? kCompareSize : sizes.front());
+    Comparison(field, kFieldIso, wanted, findings).run();
+  }
+  constexpr std::size_t kFewestForGrowth = 3;
+  if (sizes.size() >= kFewestForGrowth && wanted("ratio/growth_of_time")) {
+    findings.push_back(growth_of_time(sizes));
+  }
+  for (const char* stage : {kExtractStage, kSmoothStage}) {
+    if (!wanted(std::string("ratio/memory_") + stage)) continue;
+    if (const auto finding = memory_of(stage, threads)) findings.push_back(*finding);
+  }
+  return findings;
+}
+
+std::string to_table(const std::vector<Finding>& findings) {
+  std::size_t width = 0;
+  for (const Finding& finding : findings) width = std::max(width, finding.what.size());
+  std::ostringstream text;
+  const auto row = [&](const std::string& what, const std::string& ours, const std::string& peer,
+                       const std::string& value, const std::string& goal,
+                       const std::string& verdict) {
+    text << std::left << std::setw(static_cast<int>(width) + 2) << what << std::right
+         << std::setw(20) << ours << std::setw(12) << peer << std::setw(9) << value << std::setw(10)
+         << goal << "  " << verdict << '\n';
+  };
+  row("", "isomesh", "peer", "value", "goal", "");
+  for (const Finding& finding : findings) {
+    const std::string goal =
+        finding.goal ? (finding.goal->at_most ? "<= " : ">= ") + fixed(finding.goal->value, 1) : "";
+    row(finding.what, finding.ours, finding.peer, fixed(finding.value, finding.value < 10 ? 2 : 0),
+        goal,
+        !finding.goal       ? ""
+        : finding.reached() ? "reached"
+                            : "NOT REACHED");
+  }
+  return text.str();
+}
+
+std::string with_findings(const std::string& document, const std::vector<Finding>& findings) {
+  auto json = nlohmann::ordered_json::parse(document);
+  auto& ratios = json["ratios"] = nlohmann::ordered_json::array();
+  for (const Finding& finding : findings) {
+    nlohmann::ordered_json entry = {{"name", finding.name},
+                                    {"what", finding.what},
+                                    {"isomesh", finding.ours},
+                                    {"value", finding.value}};
+    if (!finding.peer.empty()) entry["peer"] = finding.peer;
+    if (finding.goal) {
+      entry[finding.goal->at_most ? "goal_at_most" : "goal_at_least"] = finding.goal->value;
+      entry["reached"] = finding.reached();
+    }
+    ratios.push_back(std::move(entry));
+  }
+  json["peers"] = {{"available", peers_available()}, {"description", peers_description()}};
+  return json.dump(2);
+}
+
+}  // namespace isomesh::bench

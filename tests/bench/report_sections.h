@@ -1,0 +1,44 @@
+// The sections of the report. Each measures, and writes what it measured beside what the paper
+// gives and what VTK takes; what contradicts the paper, or the paper itself, goes to `remarks`.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tests/bench/document.h"
+#include "tests/bench/ratios.h"
+#include "tests/bench/samples.h"
+
+namespace isomesh::bench {
+
+// A volume and the surfaces of it that the report looks at.
+struct Subject {
+  Samples samples;
+  struct Level {
+    std::string name;
+    double iso;
+  };
+  std::vector<Level> levels;
+};
+
+struct Report {
+  Document& document;
+  std::vector<std::string> remarks;
+  int threads = 1;
+};
+
+// Five against six tetrahedra: the paper's Table 2.
+void write_table_2(const std::vector<Subject>& subjects, Report& report);
+// Vertices against unique ones: the paper's Table 3. `head` at its own resolution.
+void write_table_3(const Subject& head, Report& report);
+// Time against the number of sub-tables: the paper's Figure 4.
+void write_figure_4(const Subject& head, Report& report);
+// Generation and smoothing: the paper's Figures 5 and 6.
+void write_figures_5_and_6(const Subject& head, Report& report);
+void write_passes(const Subject& subject, Report& report);
+void write_growth(const std::vector<std::uint32_t>& sizes, Report& report);
+// What scheme, interpolation and smoothing do to the mesh.
+void write_choices(const std::vector<Subject>& subjects, Report& report);
+void write_goals(const Plan& plan, Report& report);
+
+}  // namespace isomesh::bench

@@ -1,0 +1,72 @@
+// The volumes that are measured, held in memory.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "proto/types.h"
+#include "server/mesh/lattice.h"
+
+namespace isomesh::bench {
+
+// Samples with their owner, x fastest, as many bytes as dims and type tell.
+struct Samples {
+  std::string name;  // as it appears in the names of benchmarks
+  SampleType type = SampleType::kUint8;
+  mesh::Dims dims;
+  Geometry geometry;
+  std::vector<std::byte> bytes;
+
+  template <class T>
+  const T* as() const {
+    return reinterpret_cast<const T*>(bytes.data());
+  }
+};
+
+// Calls visit(const T* samples) with T the type of the samples.
+template <class Visit>
+decltype(auto) visit_samples(const Samples& samples, Visit visit) {
+  switch (samples.type) {
+    case SampleType::kUint8:
+      return visit(samples.as<std::uint8_t>());
+    case SampleType::kInt8:
+      return visit(samples.as<std::int8_t>());
+    case SampleType::kUint16:
+      return visit(samples.as<std::uint16_t>());
+    case SampleType::kInt16:
+      return visit(samples.as<std::int16_t>());
+    case SampleType::kUint32:
+      return visit(samples.as<std::uint32_t>());
+    case SampleType::kInt32:
+      return visit(samples.as<std::int32_t>());
+    case SampleType::kFloat32:
+      return visit(samples.as<float>());
+    case SampleType::kFloat64:
+      break;
+  }
+  return visit(samples.as<double>());
+}
+
+struct LoadedVolume {
+  Samples samples;
+  double suggested_iso = 0;
+};
+
+// Reads a file in any format that the daemon imports, through the daemon's own import. Throws Error
+// with the reason when it cannot.
+LoadedVolume load_volume(const std::filesystem::path& path);
+
+// A field of n^3 uint8 samples whose surface at kFieldIso grows with n^2: a gyroid of a fixed
+// number of periods per volume with a finer and weaker one on it. Deterministic.
+inline constexpr double kFieldIso = 127.5;
+Samples synthetic_field(std::uint32_t n);
+
+// The same box of space on another lattice, trilinear, as float32. Both lattices need two samples
+// along each axis at least.
+Samples resample(const Samples& samples, const mesh::Dims& dims);
+
+}  // namespace isomesh::bench

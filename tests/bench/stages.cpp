@@ -1,0 +1,146 @@
+#include "tests/bench/stages.h"
+
+#include <malloc.h>
+
+#include "server/codec/encode.h"
+#include "server/mesh/extract.h"
+#include "server/mesh/measure.h"
+
+namespace isomesh::bench {
+namespace {
+
+// Counts bytes instead of writing them.
+struct CountingSink {
+  std::uint64_t bytes = 0;
+
+  codec::Sink sink() {
+    return [this](std::span<const std::byte> piece) { bytes += piece.size(); };
+  }
+};
+
+mesh::ExtractOptions options_of(const Surface& surface) {
+  return {.iso = surface.iso, .scheme = surface.scheme, .interpolation = surface.interpolation};
+}
+
+template <class T>
+mesh::Lattice<T> lattice_of(const Samples& samples, const T* data) {
+  return {data, samples.dims, mesh::lattice_to_space(samples.geometry)};
+}
+
+constexpr int kDefaultSpeed = DracoParameters{}.speed;
+constexpr int kSequentialSpeed = 10;
+
+}  // namespace
+
+const char* name_of(Encoding encoding) {
+  switch (encoding) {
+    case Encoding::kEdgebreakerWhole:
+      return "edgebreaker_whole";
+    case Encoding::kSequentialWhole:
+      return "sequential_whole";
+    case Encoding::kEdgebreakerChunks:
+      return "edgebreaker_chunks";
+    case Encoding::kSequentialChunks:
+      return "sequential_chunks";
+    case Encoding::kStl:
+      break;
+  }
+  return "stl";
+}
+
+bool is_parallel(Encoding encoding) {
+  return encoding == Encoding::kEdgebreakerChunks || encoding == Encoding::kSequentialChunks;
+}
+
+void set_threads(int threads) { mesh::set_thread_count(threads); }
+
+MeshSize Stages::count() const {
+  return visit_samples(samples_, [&](const auto* data) {
+    const auto count = mesh::count_surface(lattice_of(samples_, data), options_of(surface_), {});
+    return MeshSize{count.vertices(), count.triangles()};
+  });
+}
+
+void Stages::extract() {
+  visit_samples(samples_, [&](const auto* data) {
+    const auto lattice = lattice_of(samples_, data);
+    const mesh::ExtractOptions options = options_of(surface_);
+    mesh::extract_surface(lattice, options, mesh::count_surface(lattice, options, {}), {}, mesh_);
+  });
+}
+
+void Stages::build_connectivity() { mesh::build_connectivity(mesh_, {}, connectivity_); }
+
+void Stages::smooth(int passes) {
+  mesh::smooth_laplacian(connectivity_, {.passes = passes}, {}, mesh_, scratch_);
+}
+
+void Stages::smooth_from_scratch(int passes) {
+  if (passes == 0) return;
+  build_connectivity();
+  smooth(passes);
+}
+
+void Stages::measure() const {
+  mesh::measure_extent(mesh_, {});
+  mesh::measure_topology(mesh_, {});
+}
+
+std::uint64_t Stages::encode_as(MeshFormat format, int speed) const {
+  codec::Provenance provenance;
+  provenance.iso = surface_.iso;
+  provenance.dims = {samples_.dims.x, samples_.dims.y, samples_.dims.z};
+  provenance.geometry = samples_.geometry;
+  provenance.parameters.draco.speed = speed;
+  CountingSink counting;
+  codec::encode(mesh_, format, provenance, {}, counting.sink());
+  return counting.bytes;
+}
+
+std::uint64_t Stages::encode(Encoding encoding) const {
+  switch (encoding) {
+    case Encoding::kEdgebreakerWhole:
+      return encode_as(MeshFormat::kDrc, kDefaultSpeed);
+    case Encoding::kSequentialWhole:
+      return encode_as(MeshFormat::kDrc, kSequentialSpeed);
+    case Encoding::kEdgebreakerChunks:
+      return encode_as(MeshFormat::kGlb, kDefaultSpeed);
+    case Encoding::kSequentialChunks:
+      return encode_as(MeshFormat::kGlb, kSequentialSpeed);
+    case Encoding::kStl:
+      break;
+  }
+  return encode_as(MeshFormat::kStl, kDefaultSpeed);
+}
+
+std::uint64_t Stages::run_job(int passes, MeshFormat format) {
+  extract();
+  mesh::measure_extent(mesh_, {});
+  smooth_from_scratch(passes);
+  std::uint64_t bytes = 0;
+  mesh::parallel_for({}, 2, [&](std::size_t task) {
+    if (task == 0) {
+      bytes = encode_as(format, kDefaultSpeed);
+    } else {
+      measure();
+    }
+  });
+  return bytes;
+}
+
+void Stages::release_memory() {
+  mesh_ = {};
+  connectivity_ = {};
+  scratch_ = {};
+  malloc_trim(0);  // or smaller blocks stay mapped
+}
+
+MeshSize Stages::size() const { return {mesh_.positions.size(), mesh_.triangles.size()}; }
+
+double Stages::volume_mm3() const { return mesh::measure_extent(mesh_, {}).volume_mm3; }
+
+std::uint64_t Stages::mesh_bytes() const {
+  return positions().size_bytes() + triangles().size_bytes();
+}
+
+}  // namespace isomesh::bench

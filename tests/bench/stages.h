@@ -1,0 +1,90 @@
+// Every call of the benchmarks into the kernels, the encoder and the job's way through them. What
+// changes there is followed here and nowhere else.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "proto/types.h"
+#include "server/mesh/mesh.h"
+#include "server/mesh/smooth.h"
+#include "tests/bench/samples.h"
+
+namespace isomesh::bench {
+
+// Which surface of a volume.
+struct Surface {
+  double iso = 0;
+  Scheme scheme = Scheme::kSix;
+  Interpolation interpolation = Interpolation::kLinear;
+};
+
+struct MeshSize {
+  std::uint64_t vertices = 0;
+  std::uint64_t triangles = 0;
+};
+
+// Draco's two methods, which the encoder chooses between by its speed: edgebreaker at the default
+// speed, sequential at the highest.
+enum class Encoding {
+  kEdgebreakerWhole,  // a `drc` file
+  kSequentialWhole,
+  kEdgebreakerChunks,  // a `glb` file
+  kSequentialChunks,
+  kStl,
+};
+inline constexpr std::array kEncodings = {Encoding::kEdgebreakerWhole, Encoding::kSequentialWhole,
+                                          Encoding::kEdgebreakerChunks, Encoding::kSequentialChunks,
+                                          Encoding::kStl};
+
+const char* name_of(Encoding encoding);
+// True when it runs on more than one thread.
+bool is_parallel(Encoding encoding);
+
+// Threads that the stages run on, 1 at least. Not while one runs.
+void set_threads(int threads);
+
+// One volume's way through the stages, in memory that is kept from run to run as a worker of the
+// daemon keeps it. Stages must run in order: extract, build_connectivity, smooth; measure and
+// encode take whatever mesh there is. Not thread safe. Keeps a reference to the samples.
+class Stages {
+ public:
+  Stages(const Samples& samples, const Surface& surface) : samples_(samples), surface_(surface) {}
+
+  MeshSize count() const;
+  void extract();  // counts first
+  void build_connectivity();
+  void smooth(int passes);
+  // Connectivity and passes, the way a job does it.
+  void smooth_from_scratch(int passes);
+  // Area, volume, bounds and topology.
+  void measure() const;
+  // The number of bytes.
+  std::uint64_t encode(Encoding encoding) const;
+  // What a job does between the samples in memory and the bytes of its one file, disk left out. The
+  // number of bytes.
+  std::uint64_t run_job(int passes, MeshFormat format);
+
+  // Gives the memory back to the system, so that the next run meets pages that are not mapped.
+  void release_memory();
+
+  MeshSize size() const;
+  double volume_mm3() const;
+  std::span<const mesh::Vec3> positions() const { return mesh_.positions.span(); }
+  std::span<const mesh::Triangle> triangles() const { return mesh_.triangles.span(); }
+  // What the mesh alone takes.
+  std::uint64_t mesh_bytes() const;
+
+ private:
+  std::uint64_t encode_as(MeshFormat format, int speed) const;
+
+  const Samples& samples_;
+  Surface surface_;
+  mesh::Mesh mesh_;
+  mesh::Connectivity connectivity_;
+  mesh::Buffer<mesh::Vec3> scratch_;
+};
+
+}  // namespace isomesh::bench
