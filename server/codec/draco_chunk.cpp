@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <string>
 
 #include <draco/compression/encode.h>
 #include <draco/core/quantization_utils.h>
@@ -20,6 +21,11 @@ constexpr int kSequentialSpeed = 10;
 // Draco's entropy coder counts values in an array of all that there could be, four bytes each: 4 GiB
 // at 30 bits. Finer grids than this are stored without it, in up to four bytes a coordinate.
 constexpr int kMostEntropyCodedBits = 24;
+
+// Draco keeps its options as text with six decimals: what it quantises with is what that reads as.
+constexpr float kOptionStep = 1e-6F;
+
+float as_draco_keeps(float value) { return std::stof(std::to_string(value)); }
 
 struct Bounds {
   mesh::Vec3 low = {0, 0, 0};
@@ -119,12 +125,12 @@ float Grid::decoded(float coordinate, std::size_t axis) const {
 
 Grid grid_of(const mesh::Mesh& mesh, int bits) {
   const Bounds bounds = bounds_of(mesh.positions.span());
-  Grid grid = {bounds.low, 0, bits};
+  Grid grid = {.low = {}, .side = 0, .bits = bits};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    // Rounded up, or the highest vertex could lie outside by a rounding error.
-    const float length = std::nextafter(bounds.high[axis] - bounds.low[axis],
-                                        std::numeric_limits<float>::infinity());
-    grid.side = std::max(grid.side, length);
+    grid.low[axis] = as_draco_keeps(bounds.low[axis]);
+    // A little more, or the highest vertex could lie outside by a rounding error.
+    const float length = bounds.high[axis] - grid.low[axis] + kOptionStep;
+    grid.side = std::max(grid.side, as_draco_keeps(length));
   }
   return grid;
 }
@@ -168,8 +174,6 @@ DracoStream encode_draco(const mesh::Mesh& mesh, const Block& block, const Grid&
   const std::span triangles = whole ? mesh.triangles.span() : std::span(part.triangles);
 
   DracoStream stream;
-  stream.vertices = static_cast<std::uint32_t>(positions.size());
-  stream.triangles = static_cast<std::uint32_t>(triangles.size());
   const std::unique_ptr<draco::Mesh> draco_mesh = to_draco(positions, triangles);
   stream.position_id = draco_mesh->attribute(0)->unique_id();
   draco::Encoder encoder;
@@ -196,9 +200,16 @@ DracoStream encode_draco(const mesh::Mesh& mesh, const Block& block, const Grid&
       stream.high[axis] = grid.decoded(bounds.high[axis], axis);
     }
   }
+  // Where a block's cut leaves two fans at one vertex, edgebreaker makes two of it.
+  encoder.SetTrackEncodedProperties(true);
   draco::EncoderBuffer buffer;
   const draco::Status status = encoder.EncodeMeshToBuffer(*draco_mesh, &buffer);
   if (!status.ok()) throw Error(ErrorCode::kInternal, "Draco: " + status.error_msg_string());
+  stream.vertices = static_cast<std::uint32_t>(encoder.num_encoded_points());
+  stream.triangles = static_cast<std::uint32_t>(encoder.num_encoded_faces());
+  if (stream.triangles != triangles.size()) {
+    throw Error(ErrorCode::kInternal, "Draco dropped triangles");
+  }
   const auto bytes = std::as_bytes(std::span(buffer.data(), buffer.size()));
   stream.bytes.assign(bytes.begin(), bytes.end());
   return stream;

@@ -22,7 +22,7 @@ struct Grid {
   float decoded(float coordinate, std::size_t axis) const;
 };
 
-// Covers the mesh exactly; of an empty one, the point 0.
+// Covers the mesh, to a millionth of a millimetre; of an empty one, the point 0.
 Grid grid_of(const mesh::Mesh& mesh, int bits);
 
 struct DracoStream {

@@ -18,7 +18,7 @@ namespace isomesh::codec {
 using Sink = std::function<void(std::span<const std::byte>)>;
 
 // One Draco stream of the whole mesh (edgebreaker connectivity; sequential at speed 10), millimetres in LPS. Positions are
-// quantised to draco.position_bits bits on a cubic grid that covers the mesh's bounds exactly, so
+// quantised to draco.position_bits bits on a cubic grid that covers the mesh closely, so
 // that a decoded vertex is within half a grid step of its place along each axis. The stream keeps
 // the number of vertices and triangles. Thread safe. Throws Error kInternal when Draco refuses, and
 // kCancelled, looked at before and after Draco's one call.

@@ -1,6 +1,5 @@
 // Starting, listening, ending.
 #include <csignal>
-#include <regex>
 #include <string>
 #include <thread>
 
@@ -20,8 +19,7 @@ using testing::HasSubstr;
 
 TEST(Start, TellsWhereItListensOnItsFirstLine) {
   const Daemon daemon;
-  EXPECT_TRUE(std::regex_match(daemon.url(), std::regex("http://127\\.0\\.0\\.1:[1-9][0-9]*")))
-      << daemon.url();
+  EXPECT_THAT(daemon.url(), testing::MatchesRegex("http://127\\.0\\.0\\.1:[1-9][0-9]*"));
   EXPECT_EQ(daemon.get("/livez").body, "ok\n");
   EXPECT_EQ(daemon.get("/readyz").body, "ok\n");
 }
@@ -34,7 +32,7 @@ TEST(Start, HelpAndVersion) {
   }
   const Finished version = run({ISOMESHD, "--version"});
   EXPECT_EQ(version.status, 0);
-  EXPECT_TRUE(std::regex_search(version.output, std::regex("[0-9]+\\.[0-9]+\\.[0-9]+")));
+  EXPECT_THAT(version.output, testing::ContainsRegex("[0-9]+\\.[0-9]+\\.[0-9]+"));
 }
 
 TEST(Start, WrongUsageIsToldAndNotServed) {

@@ -9,8 +9,6 @@
 #include <string>
 #include <vector>
 
-#include <draco/compression/decode.h>
-#include <draco/mesh/mesh.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -18,32 +16,15 @@
 #include "server/codec/encode.h"
 #include "tests/support/draco_decoder.h"
 #include "tests/support/errors.h"
+#include "tests/unit/codec/decode.h"
 #include "tests/unit/codec/meshes.h"
 
 namespace isomesh::codec {
 namespace {
 
+using test::decode_in_process;
 using test::DecodedMesh;
 using test::encoded;
-
-DecodedMesh decode_in_process(const std::string& drc) {
-  draco::DecoderBuffer buffer;
-  buffer.Init(drc.data(), drc.size());
-  draco::Decoder decoder;
-  auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
-  if (!decoded.ok()) throw std::runtime_error(decoded.status().error_msg_string());
-  const draco::Mesh& mesh = *decoded.value();
-  const auto* position = mesh.GetNamedAttribute(draco::GeometryAttribute::POSITION);
-  DecodedMesh result;
-  for (std::uint32_t point = 0; point < mesh.num_points(); ++point) {
-    position->GetMappedValue(draco::PointIndex(point), result.points.emplace_back().data());
-  }
-  for (std::uint32_t face = 0; face < mesh.num_faces(); ++face) {
-    const auto& corners = mesh.face(draco::FaceIndex(face));
-    result.triangles.push_back({corners[0].value(), corners[1].value(), corners[2].value()});
-  }
-  return result;
-}
 
 // The grid that the header promises: it starts at the mesh's lowest corner and its cube's side is
 // the mesh's longest extent.

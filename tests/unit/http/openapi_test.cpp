@@ -1,9 +1,9 @@
 // The public description has every route of the server and no other.
 #include <map>
-#include <regex>
 #include <set>
 #include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
@@ -15,6 +15,15 @@ namespace {
 
 using Methods = std::set<std::string>;
 
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t found = text.find(from);
+  return found == std::string::npos ? text : text.replace(found, from.size(), to);
+}
+
+bool matches(const std::string& path, const std::string& pattern) {
+  return testing::Matches(testing::MatchesRegex(pattern))(path);
+}
+
 class OpenApi : public testing::Test {
  protected:
   OpenApi() {
@@ -25,9 +34,8 @@ class OpenApi : public testing::Test {
   }
 
   // A path as a client would send it.
-  static std::string example_of(std::string path) {
-    path = std::regex_replace(path, std::regex("\\{format\\}"), "drc");
-    return std::regex_replace(path, std::regex("\\{[a-z_]+\\}"), "0123abcd");
+  static std::string example_of(const std::string& path) {
+    return replaced(replaced(path, "{format}", "drc"), "{id}", "0123abcd");
   }
 
   // HEAD goes without saying where there is GET.
@@ -53,7 +61,7 @@ TEST_F(OpenApi, DescribesEveryRouteWithItsMethods) {
   for (const auto& [pattern, methods] : app_.methods) {
     Methods described;
     for (const auto& path : description_["paths"]) {
-      if (std::regex_match(example_of(path.first.as<std::string>()), std::regex(pattern))) {
+      if (matches(example_of(path.first.as<std::string>()), pattern)) {
         described.merge(methods_of(path.second));
       }
     }
@@ -66,7 +74,7 @@ TEST_F(OpenApi, DescribesNoOtherPath) {
     const std::string example = example_of(path.first.as<std::string>());
     int routes = 0;
     for (const auto& [pattern, methods] : app_.methods) {
-      routes += std::regex_match(example, std::regex(pattern)) ? 1 : 0;
+      routes += matches(example, pattern) ? 1 : 0;
     }
     EXPECT_EQ(routes, 1) << example;
   }

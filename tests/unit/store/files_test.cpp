@@ -4,12 +4,12 @@
 #include <csignal>
 #include <functional>
 #include <mutex>
-#include <regex>
 #include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -194,8 +194,9 @@ TEST(RandomHex, HasItsLengthAndIsNeverTheSame) {
 }
 
 TEST(TimeOrderedId, IsAUuidOfVersion7) {
-  const std::regex uuid("[0-9a-f]{8}-[0-9a-f]{4}-7[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}");
-  for (int n = 0; n < 100; ++n) EXPECT_TRUE(std::regex_match(time_ordered_id(), uuid));
+  const auto is_uuid =
+      testing::MatchesRegex("[0-9a-f]{8}-[0-9a-f]{4}-7[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}");
+  for (int n = 0; n < 100; ++n) EXPECT_THAT(time_ordered_id(), is_uuid);
 }
 
 TEST(TimeOrderedId, IsNeverTheSameAlsoFromThreads) {
@@ -224,11 +225,12 @@ TEST(TimeOrderedId, SortsByTheTimeThatItWasMade) {
 }
 
 TEST(Timestamp, IsRfc3339InUtcWithMilliseconds) {
-  const std::regex form(R"(20[0-9]{2}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}:[0-9]{2}\.[0-9]{3}Z)");
+  const auto is_timestamp =
+      testing::MatchesRegex("20[0-9]{2}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}:[0-9]{2}\\.[0-9]{3}Z");
   std::vector<std::string> stamps;
   for (int n = 0; n < 100; ++n) {
     stamps.push_back(timestamp());
-    EXPECT_TRUE(std::regex_match(stamps.back(), form)) << stamps.back();
+    EXPECT_THAT(stamps.back(), is_timestamp);
   }
   EXPECT_TRUE(std::ranges::is_sorted(stamps));
 }

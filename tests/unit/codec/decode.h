@@ -1,0 +1,13 @@
+// What libdraco makes of a Draco stream.
+#pragma once
+
+#include <string_view>
+
+#include "tests/support/draco_decoder.h"
+
+namespace isomesh::test {
+
+// Points and triangles in the stream's order. Throws std::runtime_error when it is not a mesh.
+DecodedMesh decode_in_process(std::string_view drc);
+
+}  // namespace isomesh::test

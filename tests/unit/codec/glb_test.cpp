@@ -1,0 +1,209 @@
+// GLB is taken apart here by what glTF's specification says of it, and its streams by libdraco.
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "server/codec/encode.h"
+#include "tests/support/errors.h"
+#include "tests/support/kernels.h"
+#include "tests/support/mesh_checks.h"
+#include "tests/unit/codec/decode.h"
+#include "tests/unit/codec/meshes.h"
+
+namespace isomesh::codec {
+namespace {
+
+using nlohmann::json;
+using test::DecodedMesh;
+using test::encoded;
+
+std::uint32_t word_at(const std::string& bytes, std::size_t offset) {
+  std::uint32_t word = 0;
+  std::memcpy(&word, bytes.data() + offset, sizeof word);
+  return word;
+}
+
+// The two chunks of a GLB file; fails where the container is not as specified.
+struct Container {
+  json document;
+  std::string binary;
+};
+
+Container open_container(const std::string& glb) {
+  EXPECT_EQ(glb.substr(0, 4), "glTF");
+  EXPECT_EQ(word_at(glb, 4), 2U);
+  EXPECT_EQ(word_at(glb, 8), glb.size());
+  EXPECT_EQ(glb.size() % 4, 0U);
+  const std::uint32_t json_bytes = word_at(glb, 12);
+  EXPECT_EQ(glb.substr(16, 4), "JSON");
+  Container container;
+  container.document = json::parse(glb.substr(20, json_bytes));
+  const std::size_t binary_at = 20 + std::size_t{json_bytes};
+  if (binary_at == glb.size()) return container;
+  EXPECT_EQ(glb.substr(binary_at + 4, 4), std::string("BIN\0", 4));
+  EXPECT_EQ(word_at(glb, binary_at), glb.size() - binary_at - 8);
+  container.binary = glb.substr(binary_at + 8);
+  return container;
+}
+
+// The primitives decoded, each checked against its accessors.
+std::vector<DecodedMesh> decoded_primitives(const Container& container) {
+  const json& document = container.document;
+  std::vector<DecodedMesh> result;
+  for (const json& primitive : document["meshes"][0]["primitives"]) {
+    const json& draco = primitive["extensions"]["KHR_draco_mesh_compression"];
+    const json& view = document["bufferViews"][draco["bufferView"].get<std::size_t>()];
+    EXPECT_EQ(view["byteOffset"].get<std::size_t>() % 4, 0U);
+    DecodedMesh& mesh = result.emplace_back(test::decode_in_process(
+        container.binary.substr(view["byteOffset"], view["byteLength"])));
+    const json& positions =
+        document["accessors"][primitive["attributes"]["POSITION"].get<std::size_t>()];
+    const json& indices = document["accessors"][primitive["indices"].get<std::size_t>()];
+    EXPECT_EQ(positions["count"], mesh.points.size());
+    EXPECT_EQ(indices["count"], mesh.triangles.size() * 3);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto [low, high] = std::ranges::minmax_element(
+          mesh.points, {}, [&](const auto& point) { return point[axis]; });
+      EXPECT_EQ(positions["min"][axis].get<float>(), (*low)[axis]);
+      EXPECT_EQ(positions["max"][axis].get<float>(), (*high)[axis]);
+    }
+  }
+  return result;
+}
+
+// All primitives as one mesh, in which points of the same bits are one.
+DecodedMesh welded(const std::vector<DecodedMesh>& parts) {
+  DecodedMesh whole;
+  std::map<std::array<float, 3>, std::uint32_t> numbers;
+  for (const DecodedMesh& part : parts) {
+    for (const auto& triangle : part.triangles) {
+      auto& corners = whole.triangles.emplace_back();
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        const auto& point = part.points[triangle[corner]];
+        const auto [found, is_new] =
+            numbers.emplace(point, static_cast<std::uint32_t>(whole.points.size()));
+        if (is_new) whole.points.push_back(point);
+        corners[corner] = found->second;
+      }
+    }
+  }
+  return whole;
+}
+
+// A closed surface of several blocks; midpoints, so that no two vertices share a place on the grid.
+mesh::Mesh several_blocks() {
+  return test::extracted(test::sample<float>(test::sphere({60, 60, 60}, 55), {121, 121, 121}),
+                         {0, Scheme::kSix, Interpolation::kMidpoint});
+}
+
+TEST(Glb, CarriesTheMeshInBlocksWhoseSeamsFit) {
+  const mesh::Mesh mesh = several_blocks();
+  const Container container = open_container(encoded(mesh, MeshFormat::kGlb, {16, 7}));
+  const auto parts = decoded_primitives(container);
+  ASSERT_GT(parts.size(), 2U) << "one block has no seams: " << mesh.triangles.size();
+  const DecodedMesh whole = welded(parts);
+  EXPECT_EQ(whole.points.size(), mesh.positions.size());
+  EXPECT_EQ(whole.triangles.size(), mesh.triangles.size());
+
+  test::Surface surface;
+  for (const auto& point : whole.points) surface.points.push_back({point[0], point[1], point[2]});
+  surface.triangles = whole.triangles;
+  const test::TopologyFacts topology = test::topology_of(surface);
+  EXPECT_TRUE(topology.boundary_edges.empty()) << "the seams leak";
+  EXPECT_EQ(topology.crowded_edges, 0U);
+  EXPECT_EQ(topology.misoriented_edges, 0U);
+  EXPECT_EQ(topology.euler, 2);
+  EXPECT_NEAR(test::extent_of(surface).volume, test::extent_of(test::surface_of(mesh)).volume,
+              1e-3 * test::extent_of(surface).volume);
+}
+
+TEST(Glb, IsTheSameToTheByteOnAnyNumberOfThreads) {
+  const mesh::Mesh mesh = several_blocks();
+  std::string first;
+  for (const int threads : {1, 2, 16}) {
+    const test::ThreadCount count(threads);
+    const std::string glb = encoded(mesh, MeshFormat::kGlb);
+    if (first.empty()) first = glb;
+    EXPECT_TRUE(glb == first) << threads;
+  }
+}
+
+TEST(Glb, EveryMeshAndSpeedDecodesToAllItsTriangles) {
+  for (const auto& [name, mesh] : test::meshes_to_encode()) {
+    SCOPED_TRACE(name);
+    for (const int speed : {0, 7, 10}) {
+      const auto parts =
+          decoded_primitives(open_container(encoded(mesh, MeshFormat::kGlb, {14, speed})));
+      std::size_t triangles = 0;
+      for (const DecodedMesh& part : parts) triangles += part.triangles.size();
+      EXPECT_EQ(triangles, mesh.triangles.size()) << speed;
+    }
+  }
+}
+
+TEST(Glb, ThePatientsHeadIsUpAndMetresAreTheUnit) {
+  const json document =
+      open_container(encoded(several_blocks(), MeshFormat::kGlb)).document;
+  const json& node = document["nodes"][document["scenes"][0]["nodes"][0].get<std::size_t>()];
+  const auto quaternion = node["rotation"].get<std::array<double, 4>>();
+  const auto turned = [&](const std::array<double, 3>& v) {
+    const auto& [x, y, z, w] = quaternion;
+    const std::array<double, 3> t = {2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]),
+                                     2 * (x * v[1] - y * v[0])};
+    return std::array{v[0] + w * t[0] + y * t[2] - z * t[1], v[1] + w * t[1] + z * t[0] - x * t[2],
+                      v[2] + w * t[2] + x * t[1] - y * t[0]};
+  };
+  const auto superior = turned({0, 0, 1});
+  const auto anterior = turned({0, -1, 0});
+  EXPECT_NEAR(superior[1], 1, 1e-12) << "glTF's up is +Y";
+  EXPECT_NEAR(anterior[2], 1, 1e-12) << "glTF's front is +Z";
+  EXPECT_EQ(node["scale"], json({0.001, 0.001, 0.001}));
+}
+
+TEST(Glb, SaysWhereItComesFrom) {
+  Provenance provenance;
+  provenance.parameters.volume = "abc";
+  provenance.parameters.passes = 9;
+  provenance.iso = 60.5;
+  provenance.dims = {4, 5, 6};
+  provenance.geometry.origin = {1, 2, 3};
+  std::string glb;
+  encode(several_blocks(), MeshFormat::kGlb, provenance, {}, [&](std::span<const std::byte> bytes) {
+    glb.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  });
+  const json extras = open_container(glb).document["asset"]["extras"];
+  EXPECT_EQ(extras["parameters"]["passes"], 9);
+  EXPECT_EQ(extras["parameters"]["volume"], "abc");
+  EXPECT_EQ(extras["iso"], 60.5);
+  EXPECT_EQ(extras["dims"], json({4, 5, 6}));
+  EXPECT_EQ(extras["origin"], json({1.0, 2.0, 3.0}));
+  EXPECT_EQ(extras["units"], "mm");
+  EXPECT_EQ(extras["space"], "LPS");
+}
+
+TEST(Glb, AnEmptyMeshIsASceneWithoutOne) {
+  const Container container = open_container(encoded(mesh::Mesh{}, MeshFormat::kGlb));
+  EXPECT_FALSE(container.document.contains("meshes"));
+  EXPECT_FALSE(container.document["nodes"][0].contains("mesh"));
+  EXPECT_TRUE(container.binary.empty());
+}
+
+TEST(Glb, StopsWhenItIsCancelled) {
+  std::stop_source stop;
+  stop.request_stop();
+  const auto code = test::code_thrown_by([&] {
+    encode(several_blocks(), MeshFormat::kGlb, {}, {stop.get_token(), nullptr},
+           [](std::span<const std::byte>) {});
+  });
+  EXPECT_EQ(code, ErrorCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace isomesh::codec
