@@ -15,8 +15,7 @@ constexpr std::array kDescriptions = {
                      "The body does not match its digest"},
     ErrorDescription{ErrorCode::kUnauthorized, 401, "unauthorized", "Not authorized"},
     ErrorDescription{ErrorCode::kNotFound, 404, "not-found", "Not found"},
-    ErrorDescription{ErrorCode::kMethodNotAllowed, 405, "method-not-allowed",
-                     "Method not allowed"},
+    ErrorDescription{ErrorCode::kMethodNotAllowed, 405, "method-not-allowed", "Method not allowed"},
     ErrorDescription{ErrorCode::kNotReady, 409, "not-ready", "Not ready"},
     ErrorDescription{ErrorCode::kGone, 410, "gone", "Expired"},
     ErrorDescription{ErrorCode::kLengthRequired, 411, "length-required", "Length required"},
@@ -47,13 +46,22 @@ const ErrorDescription& describe(ErrorCode code) {
 }
 
 ErrorCode error_code_of(std::string_view name) {
-  const auto* found = std::ranges::find(kDescriptions, name,
-                                        [](const ErrorDescription& row) { return row.name; });
+  const auto* found =
+      std::ranges::find(kDescriptions, name, [](const ErrorDescription& row) { return row.name; });
   return found == kDescriptions.end() ? ErrorCode::kInternal : found->code;
 }
 
 Error invalid_parameter(const std::string& field, const std::string& message) {
-  return {ErrorCode::kInvalidParameter, field + ": " + message, {{field, message}}};
+  return invalid_parameters({{field, message}});
+}
+
+Error invalid_parameters(std::vector<FieldError> fields) {
+  std::string detail;
+  for (const FieldError& fault : fields) {
+    if (!detail.empty()) detail += "; ";
+    detail.append(fault.field).append(": ").append(fault.message);
+  }
+  return {ErrorCode::kInvalidParameter, detail, std::move(fields)};
 }
 
 Problem to_problem(const Error& error, const std::string& instance) {

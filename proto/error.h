@@ -10,26 +10,26 @@ namespace isomesh {
 
 // Why a request or a job was refused. Every value has one HTTP status; see `describe`.
 enum class ErrorCode {
-  kInvalidParameter,   // 400: a member, query parameter or header is unknown or out of range
-  kDigestMismatch,     // 400: the body is not the one that its Content-Digest names
-  kUnauthorized,       // 401
-  kNotFound,           // 404
-  kMethodNotAllowed,   // 405
-  kNotReady,           // 409: the mesh of a job that has not succeeded (yet)
-  kGone,               // 410: it was here and has expired
-  kLengthRequired,     // 411
-  kTooLarge,           // 413: a body, a volume or a mesh beyond what is configured or possible
-  kUriTooLong,         // 414
-  kUnsupportedMedia,   // 415: not a volume format, or a content encoding, that we read
+  kInvalidParameter,     // 400: a member, query parameter or header is unknown or out of range
+  kDigestMismatch,       // 400: the body is not the one that its Content-Digest names
+  kUnauthorized,         // 401
+  kNotFound,             // 404
+  kMethodNotAllowed,     // 405
+  kNotReady,             // 409: the mesh of a job that has not succeeded (yet)
+  kGone,                 // 410: it was here and has expired
+  kLengthRequired,       // 411
+  kTooLarge,             // 413: a body, a volume or a mesh beyond what is configured or possible
+  kUriTooLong,           // 414
+  kUnsupportedMedia,     // 415: not a volume format, or a content encoding, that we read
   kRangeNotSatisfiable,  // 416
-  kUnusableVolume,     // 422: a volume that is broken or cannot be trusted
-  kKeyReused,          // 422: an idempotency key that came with another body before
-  kTooManyRequests,    // 429
-  kInternal,           // 500: a defect of ours; the detail is never sent to a client
-  kUnavailable,        // 503: full or draining
-  kOutOfSpace,         // 507
-  kCancelled,          // the job was cancelled; 409 where it reaches a client
-  kUnreachable,        // client side only: no answer from the server
+  kUnusableVolume,       // 422: a volume that is broken or cannot be trusted
+  kKeyReused,            // 422: an idempotency key that came with another body before
+  kTooManyRequests,      // 429
+  kInternal,             // 500: a defect of ours; the detail is never sent to a client
+  kUnavailable,          // 503: full or draining
+  kOutOfSpace,           // 507
+  kCancelled,            // the job was cancelled; 409 where it reaches a client
+  kUnreachable,          // client side only: no answer from the server
 };
 
 // One field that is at fault, by the name that the client used for it.
@@ -72,6 +72,9 @@ class Error : public std::runtime_error {
 
 // kInvalidParameter with one field at fault.
 Error invalid_parameter(const std::string& field, const std::string& message);
+
+// kInvalidParameter with several; the detail names them all.
+Error invalid_parameters(std::vector<FieldError> fields);
 
 // RFC 9457 problem details: what an Error becomes on the wire.
 struct Problem {

@@ -255,7 +255,8 @@ T from_text(std::string_view text, const char* list = nullptr) {
 // Collects what is wrong with every member, so that one answer names all of it.
 class RequestReader {
  public:
-  // Faults are named as a query spells them: `format` for `formats`, no `draco.` before its members.
+  // Faults are named as a query spells them: `format` for `formats`, no `draco.` before its
+  // members.
   void name_as_in_query() { as_in_query_ = true; }
 
   // Reads `json` into `value`, whose fields are those of `visit`, and refuses any other.
@@ -280,12 +281,7 @@ class RequestReader {
   }
 
   void throw_if_any() {
-    if (errors_.empty()) return;
-    std::string detail;
-    for (const FieldError& error : errors_) {
-      detail += (detail.empty() ? "" : "; ") + error.field + ": " + error.message;
-    }
-    throw Error(ErrorCode::kInvalidParameter, detail, std::move(errors_));
+    if (!errors_.empty()) throw invalid_parameters(std::move(errors_));
   }
 
  private:
@@ -418,7 +414,8 @@ std::string to_json(const std::vector<Volume>& volumes) {
 }
 
 std::string to_json(const std::vector<Job>& jobs, const std::string& next) {
-  return Json{{"jobs", write(jobs)}, {"next", next.empty() ? Json(nullptr) : Json(next)}}.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return Json{{"jobs", write(jobs)}, {"next", next.empty() ? Json(nullptr) : Json(next)}}.dump(
+      -1, ' ', false, Json::error_handler_t::replace);
 }
 
 Volume volume_from_json(std::string_view text) { return from_text<Volume>(text); }
@@ -442,8 +439,7 @@ JobParameters parse_job_parameters(std::string_view body) {
   return read_parameters(json, true, reader);
 }
 
-JobParameters parse_job_parameters(
-    const std::vector<std::pair<std::string, std::string>>& query) {
+JobParameters parse_job_parameters(const std::vector<std::pair<std::string, std::string>>& query) {
   RequestReader reader;
   std::vector<std::string> misplaced;
   Json json = Json::object();

@@ -36,7 +36,6 @@ JobParameters parse_job_parameters(std::string_view body);
 // The same from the query of POST /v1/mesh, where everything is text: `format` (several, separated
 // by commas) stands for `formats`, `position_bits` and `speed` for the members of `draco`. The
 // volume is the request's body and stays empty here.
-JobParameters parse_job_parameters(
-    const std::vector<std::pair<std::string, std::string>>& query);
+JobParameters parse_job_parameters(const std::vector<std::pair<std::string, std::string>>& query);
 
 }  // namespace isomesh

@@ -50,9 +50,7 @@ struct Volume {
   std::uint64_t bytes = 0;               // of the samples
   std::string created;                   // RFC 3339, UTC
 
-  std::uint64_t sample_count() const {
-    return std::uint64_t{dims[0]} * dims[1] * dims[2];
-  }
+  std::uint64_t sample_count() const { return std::uint64_t{dims[0]} * dims[1] * dims[2]; }
   bool operator==(const Volume&) const = default;
 };
 
@@ -142,7 +140,7 @@ struct Job {
   Stage stage = Stage::kQueue;
   double progress = 0;  // 0..1 over the whole job
   JobParameters parameters;
-  std::string created;                // RFC 3339, UTC
+  std::string created;  // RFC 3339, UTC
   std::optional<std::string> started;
   std::optional<std::string> finished;
   Timing timing;

@@ -10,12 +10,11 @@
 #include <string>
 #include <thread>
 
-#include <malloc.h>
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
+#include <malloc.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include "server/http/server.h"
 #include "server/jobs/volume_library.h"
@@ -104,8 +103,9 @@ void add_options(CLI::App& cli, Options& options) {
       ->envname("ISOMESH_OPEN_NETWORK");
 }
 
-// Encoders take and give back megabytes thousands of times a second. By default each such block comes
-// fresh from the kernel, which clears its pages anew: a seventh of the encoding time went there.
+// Encoders take and give back megabytes thousands of times a second. By default each such block
+// comes fresh from the kernel, which clears its pages anew: a seventh of the encoding time went
+// there.
 void keep_freed_memory() {
   constexpr int kLargestBlockBytes = 32 << 20;
   constexpr int kKeptBytes = 256 << 20;
@@ -144,8 +144,8 @@ int run(const Options& options, const sigset_t& signals) {
   });
   store::JobStore jobs(blobs, options.jobs);
   jobs::VolumeLibrary library(folder, blobs, volumes, jobs, options.import);
-  const jobs::PipelineLimits limits = {options.job_memory > 0 ? options.job_memory
-                                                              : default_job_memory(options.workers)};
+  const jobs::PipelineLimits limits = {
+      options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
   jobs::Workers workers(options.workers, jobs, volumes, blobs, limits);
   http::Server server({folder, blobs, volumes, jobs, library}, options.http);
 
@@ -166,15 +166,15 @@ int run(const Options& options, const sigset_t& signals) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const sigset_t signals = block_signals();
-  keep_freed_memory();
-  Options options;
-  CLI::App cli("isomeshd turns medical volumes into surface meshes over HTTP");
-  add_options(cli, options);
-  CLI11_PARSE(cli, argc, argv);
-  spdlog::set_default_logger(spdlog::stderr_logger_mt("isomeshd"));
-  spdlog::set_level(spdlog::level::from_str(options.log_level));
   try {
+    const sigset_t signals = block_signals();
+    keep_freed_memory();
+    spdlog::set_default_logger(spdlog::stderr_logger_mt("isomeshd"));
+    Options options;
+    CLI::App cli("isomeshd turns medical volumes into surface meshes over HTTP");
+    add_options(cli, options);
+    CLI11_PARSE(cli, argc, argv);
+    spdlog::set_level(spdlog::level::from_str(options.log_level));
     return run(options, signals);
   } catch (const std::exception& error) {
     spdlog::critical("{}", error.what());

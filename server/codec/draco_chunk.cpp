@@ -18,8 +18,8 @@ namespace {
 
 constexpr int kSequentialSpeed = 10;
 
-// Draco's entropy coder counts values in an array of all that there could be, four bytes each: 4 GiB
-// at 30 bits. Finer grids than this are stored without it, in up to four bytes a coordinate.
+// Draco's entropy coder counts values in an array of all that there could be, four bytes each: 4
+// GiB at 30 bits. Finer grids than this are stored without it, in up to four bytes a coordinate.
 constexpr int kMostEntropyCodedBits = 24;
 
 // Draco keeps its options as text with six decimals: what it quantises with is what that reads as.
@@ -144,8 +144,8 @@ std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_
   // a cube.
   const auto parts =
       static_cast<std::size_t>(std::max(1.0, std::round(std::sqrt(triangles / target))));
-  const auto depth = static_cast<std::size_t>(std::max(
-      1.0, std::round(target * static_cast<double>(parts) * layers / triangles)));
+  const auto depth = static_cast<std::size_t>(
+      std::max(1.0, std::round(target * static_cast<double>(parts) * layers / triangles)));
   std::vector<Block> blocks;
   for (std::size_t bottom = 0; bottom < mesh.layers(); bottom += depth) {
     const std::size_t top = std::min(mesh.layers(), bottom + depth);
@@ -165,10 +165,9 @@ std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_
 
 Block whole_block(const mesh::Mesh& mesh) { return {{0, mesh.triangles.size()}}; }
 
-DracoStream encode_draco(const mesh::Mesh& mesh, const Block& block, const Grid& grid,
-                         int speed) {
-  const bool whole = block.size() == 1 && block[0].begin == 0 &&
-                     block[0].end == mesh.triangles.size();
+DracoStream encode_draco(const mesh::Mesh& mesh, const Block& block, const Grid& grid, int speed) {
+  const bool whole =
+      block.size() == 1 && block[0].begin == 0 && block[0].end == mesh.triangles.size();
   const Part part = whole ? Part() : part_of(mesh, block);
   const std::span positions = whole ? mesh.positions.span() : std::span(part.positions);
   const std::span triangles = whole ? mesh.triangles.span() : std::span(part.triangles);

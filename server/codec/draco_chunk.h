@@ -44,9 +44,9 @@ struct Run {
 using Block = std::vector<Run>;
 
 // Cuts the mesh into blocks of about that many triangles which are as compact as the order of the
-// triangles allows, because blocks share the vertices on their seams: a layer is cut into equal runs,
-// and runs of the same place in consecutive layers lie above each other. Every triangle is in one
-// block. No empty blocks.
+// triangles allows, because blocks share the vertices on their seams: a layer is cut into equal
+// runs, and runs of the same place in consecutive layers lie above each other. Every triangle is in
+// one block. No empty blocks.
 std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_block);
 
 // The block of all triangles.

@@ -17,13 +17,13 @@ namespace isomesh::codec {
 // Takes the encoded bytes, in order; may throw, which ends the encoding.
 using Sink = std::function<void(std::span<const std::byte>)>;
 
-// One Draco stream of the whole mesh (edgebreaker connectivity; sequential at speed 10), millimetres in LPS. Positions are
-// quantised to draco.position_bits bits on a cubic grid that covers the mesh closely, so
-// that a decoded vertex is within half a grid step of its place along each axis. The stream keeps
-// the number of vertices and triangles. Thread safe. Throws Error kInternal when Draco refuses, and
-// kCancelled, looked at before and after Draco's one call.
-void encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco,
-                const mesh::Context& context, const Sink& sink);
+// One Draco stream of the whole mesh (edgebreaker connectivity; sequential at speed 10),
+// millimetres in LPS. Positions are quantised to draco.position_bits bits on a cubic grid that
+// covers the mesh closely, so that a decoded vertex is within half a grid step of its place along
+// each axis. The stream keeps the number of vertices and triangles. Thread safe. Throws Error
+// kInternal when Draco refuses, and kCancelled, looked at before and after Draco's one call.
+void encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco, const mesh::Context& context,
+                const Sink& sink);
 
 // Binary STL, millimetres in LPS, normals from the winding. Throws Error kTooLarge beyond 2^32 - 1
 // triangles, and kCancelled.
@@ -40,13 +40,14 @@ struct Provenance {
 // Binary glTF 2.0: the mesh as one primitive for each block of some 60 000 triangles, each a Draco
 // stream of its own (KHR_draco_mesh_compression), encoded side by side. All share one quantisation
 // grid, so vertices on a seam between blocks decode to the same bits. Positions are LPS millimetres
-// under a node that turns them into glTF's metres with Y up. The bytes do not depend on the number of
-// threads. Throws Error kTooLarge beyond the 4 GiB that GLB can hold, kInternal when Draco refuses,
-// and kCancelled, looked at before each block.
-void encode_glb(const mesh::Mesh& mesh, const DracoParameters& draco,
-                const Provenance& provenance, const mesh::Context& context, const Sink& sink);
+// under a node that turns them into glTF's metres with Y up. The bytes do not depend on the number
+// of threads. Throws Error kTooLarge beyond the 4 GiB that GLB can hold, kInternal when Draco
+// refuses, and kCancelled, looked at before each block.
+void encode_glb(const mesh::Mesh& mesh, const DracoParameters& draco, const Provenance& provenance,
+                const mesh::Context& context, const Sink& sink);
 
-// Dispatches on the format; draco parameters are those of the provenance. Throws Error kInvalidParameter for a format that is not supported.
+// Dispatches on the format; draco parameters are those of the provenance. Throws Error
+// kInvalidParameter for a format that is not supported.
 void encode(const mesh::Mesh& mesh, MeshFormat format, const Provenance& provenance,
             const mesh::Context& context, const Sink& sink);
 

@@ -54,8 +54,9 @@ void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset) {
                                {"type", "VEC3"},
                                {"min", chunk.low},
                                {"max", chunk.high}});
-  gltf["accessors"].push_back(
-      {{"componentType", kUnsignedInt}, {"count", std::size_t{chunk.triangles} * 3}, {"type", "SCALAR"}});
+  gltf["accessors"].push_back({{"componentType", kUnsignedInt},
+                               {"count", std::size_t{chunk.triangles} * 3},
+                               {"type", "SCALAR"}});
   gltf["meshes"][0]["primitives"].push_back(
       {{"attributes", {{"POSITION", accessor}}},
        {"indices", accessor + 1},
@@ -91,10 +92,11 @@ Json describe(const std::vector<DracoStream>& chunks, std::size_t binary_bytes,
   if (!chunks.empty()) {
     node["mesh"] = 0;
     gltf["meshes"] = Json::array({{{"name", "surface"}, {"primitives", Json::array()}}});
-    gltf["materials"] = Json::array(
-        {{{"name", "neutral"},
-          {"pbrMetallicRoughness",
-           {{"baseColorFactor", {0.8, 0.8, 0.8, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 0.6}}}}});
+    gltf["materials"] = Json::array({{{"name", "neutral"},
+                                      {"pbrMetallicRoughness",
+                                       {{"baseColorFactor", {0.8, 0.8, 0.8, 1}},
+                                        {"metallicFactor", 0},
+                                        {"roughnessFactor", 0.6}}}}});
     gltf["accessors"] = Json::array();
     gltf["bufferViews"] = Json::array();
     gltf["buffers"] = Json::array({{{"byteLength", binary_bytes}}});
@@ -116,8 +118,8 @@ void write_words(const Sink& sink, std::initializer_list<std::uint32_t> words) {
 
 }  // namespace
 
-void encode_glb(const mesh::Mesh& mesh, const DracoParameters& draco,
-                const Provenance& provenance, const mesh::Context& context, const Sink& sink) {
+void encode_glb(const mesh::Mesh& mesh, const DracoParameters& draco, const Provenance& provenance,
+                const mesh::Context& context, const Sink& sink) {
   const std::vector<DracoStream> chunks = encode_chunks(mesh, draco, context);
   std::size_t binary_bytes = 0;
   for (const DracoStream& chunk : chunks) binary_bytes += padded(chunk.bytes.size());

@@ -88,22 +88,16 @@ std::vector<std::pair<std::string, std::string>> query_of(const httplib::Request
 
 void check_known(const httplib::Request& request, const std::set<std::string>& known) {
   std::vector<FieldError> errors;
-  std::string detail;
   for (const auto& [name, unused] : request.params) {
     constexpr std::size_t kLongestName = 64;
     const std::string shown = name.substr(0, kLongestName);
-    std::string message;
     if (!known.contains(name)) {
-      message = "is not a parameter of this request";
+      errors.push_back({shown, "is not a parameter of this request"});
     } else if (request.get_param_value_count(name) > 1) {
-      message = "is given more than once";
-    } else {
-      continue;
+      errors.push_back({shown, "is given more than once"});
     }
-    detail += (detail.empty() ? "" : "; ") + shown + ": " + message;
-    errors.push_back({shown, message});
   }
-  if (!errors.empty()) throw Error(ErrorCode::kInvalidParameter, detail, std::move(errors));
+  if (!errors.empty()) throw invalid_parameters(std::move(errors));
 }
 
 std::chrono::milliseconds wait_of(const httplib::Request& request) {
@@ -193,8 +187,7 @@ std::optional<ByteRange> range_of(const httplib::Request& request, std::uint64_t
   const std::uint64_t begin = first ? *first : size - std::min(size, *last);
   const std::uint64_t end = first && last ? std::min(size - 1, *last) : size - 1;
   if (size == 0 || begin >= size || (!first && *last == 0)) {
-    throw Error(ErrorCode::kRangeNotSatisfiable,
-                "the file has " + std::to_string(size) + " bytes");
+    throw Error(ErrorCode::kRangeNotSatisfiable, "the file has " + std::to_string(size) + " bytes");
   }
   return ByteRange{begin, end - begin + 1};
 }

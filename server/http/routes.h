@@ -32,13 +32,14 @@ struct App {
   std::atomic<bool> draining = false;  // running jobs are finished, others are not accepted
   std::atomic<bool> stopping = false;  // nobody is waited for any more
   httplib::Server http;
+  socket_t listening = -1;  // the socket that `http` accepts from, once bound
   std::map<std::string, std::set<std::string>> methods;  // of each route's pattern
 };
 
 // A handler may throw: Error becomes its problem, anything else is logged and becomes kInternal.
 using Handler = std::function<void(const httplib::Request&, httplib::Response&)>;
-using BodyHandler = std::function<void(const httplib::Request&, httplib::Response&,
-                                       const httplib::ContentReader&)>;
+using BodyHandler =
+    std::function<void(const httplib::Request&, httplib::Response&, const httplib::ContentReader&)>;
 
 // Patterns are whole paths; only bounded repetitions, because std::regex recurses.
 void add_get(App& app, const std::string& pattern, const Handler& handler);

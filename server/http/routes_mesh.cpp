@@ -141,8 +141,7 @@ void add_mesh_routes(App& app) {
             check_known(request, {});
             const auto format = from_string<MeshFormat>(request.matches[2].str());
             if (!format) {
-              throw Error(ErrorCode::kNotFound,
-                          "a mesh has the suffix " + names_of<MeshFormat>());
+              throw Error(ErrorCode::kNotFound, "a mesh has the suffix " + names_of<MeshFormat>());
             }
             answer_mesh(app, request, response, app.services.jobs.get(id_of(request)), *format);
           });

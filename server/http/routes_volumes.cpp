@@ -22,10 +22,9 @@ void upload(App& app, const httplib::Request& request, httplib::Response& respon
 }  // namespace
 
 void add_volume_routes(App& app) {
-  add_post(app, kVolumes,
-           [&app](const auto& request, auto& response, const auto& read_body) {
-             upload(app, request, response, read_body);
-           });
+  add_post(app, kVolumes, [&app](const auto& request, auto& response, const auto& read_body) {
+    upload(app, request, response, read_body);
+  });
   add_get(app, kVolumes, [&app](const auto& request, auto& response) {
     check_known(request, {});
     answer_json(response, 200, to_json(app.services.volumes.list()));

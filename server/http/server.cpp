@@ -7,9 +7,9 @@
 
 #include <arpa/inet.h>
 #include <spdlog/spdlog.h>
+#include <strings.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <strings.h>
 #include <unistd.h>
 
 #include "server/http/routes.h"
@@ -101,9 +101,10 @@ void configure(App& app) {
     return new BoundedTaskQueue(app.options.threads, app.options.backlog);
   };
   // The default lets a second daemon bind the same port and take half of the connections.
-  http.set_socket_options([](socket_t socket) {
+  http.set_socket_options([&app](socket_t socket) {
     const int yes = 1;
     ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    app.listening = socket;
   });
   http.set_tcp_nodelay(true);
   http.set_read_timeout(kReadTimeout);
@@ -126,13 +127,17 @@ void configure(App& app) {
   http.set_error_handler([&app](const httplib::Request& request, httplib::Response& response) {
     complete_error(app, request, response);
   });
-  http.set_exception_handler([](const httplib::Request& request, httplib::Response& response,
-                                const std::exception_ptr&) {
-    spdlog::error("{} {}: an exception left its route", request.method, request.path);
-    answer_problem(request, response, {ErrorCode::kInternal, ""});
-  });
+  http.set_exception_handler(
+      [](const httplib::Request& request, httplib::Response& response, const std::exception_ptr&) {
+        spdlog::error("{} {}: an exception left its route", request.method, request.path);
+        answer_problem(request, response, {ErrorCode::kInternal, ""});
+      });
   http.set_logger(log_request);
 }
+
+// The library lets five connections wait to be accepted; the next ones in a burst would be dropped,
+// and try again a second later.
+void widen_backlog(const App& app) { ::listen(app.listening, SOMAXCONN); }
 
 }  // namespace
 
@@ -200,16 +205,18 @@ std::string Server::bind(const Address& address) {
     constexpr int kUnusedPort = 80;
     if (!http.bind_to_port(address.unix_path, kUnusedPort)) throw cannot;
     state_->address = address;
+    widen_backlog(state_->app);
     // For a reverse proxy in the same group.
     ::chmod(address.unix_path.c_str(), 0660);
     return "unix:" + address.unix_path.string();
   }
-  const int port = address.port == 0 ? http.bind_to_any_port(address.host)
-                                     : (http.bind_to_port(address.host, address.port) ? address.port : -1);
+  const int port = address.port == 0
+                       ? http.bind_to_any_port(address.host)
+                       : (http.bind_to_port(address.host, address.port) ? address.port : -1);
   if (port < 0) throw cannot;
+  widen_backlog(state_->app);
   const bool is_v6 = address.host.find(':') != std::string::npos;
-  return "http://" + (is_v6 ? '[' + address.host + ']' : address.host) + ':' +
-         std::to_string(port);
+  return "http://" + (is_v6 ? '[' + address.host + ']' : address.host) + ':' + std::to_string(port);
 }
 
 void Server::serve() { state_->app.http.listen_after_bind(); }

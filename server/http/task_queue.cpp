@@ -11,7 +11,7 @@ BoundedTaskQueue::BoundedTaskQueue(std::size_t threads, std::size_t capacity)
   }
 }
 
-BoundedTaskQueue::~BoundedTaskQueue() { shutdown(); }
+BoundedTaskQueue::~BoundedTaskQueue() { BoundedTaskQueue::shutdown(); }
 
 void BoundedTaskQueue::enqueue(std::function<void()> task) {
   std::unique_lock lock(mutex_);

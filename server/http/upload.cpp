@@ -42,9 +42,9 @@ class Receiver {
       bytes_ += size;
       if (bytes_ > limits_.max_bytes) throw too_large(limits_.max_bytes);
       if (std::chrono::steady_clock::now() > deadline_) {
-        throw Error(ErrorCode::kTooLarge, "the upload took longer than " +
-                                              std::to_string(limits_.max_time.count()) +
-                                              " seconds");
+        throw Error(
+            ErrorCode::kTooLarge,
+            "the upload took longer than " + std::to_string(limits_.max_time.count()) + " seconds");
       }
       const auto piece = std::as_bytes(std::span(data, size));
       file_.write(piece);
@@ -93,7 +93,8 @@ class Receiver {
 }  // namespace
 
 Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
-               const std::atomic<bool>& stopping, const httplib::Request& request, const httplib::ContentReader& read_body)
+               const std::atomic<bool>& stopping, const httplib::Request& request,
+               const httplib::ContentReader& read_body)
     : scratch_(folder.scratch()), path_(scratch_.path() / "upload") {
   refuse_encoded(request);
   check_length(request, limits.max_bytes);
@@ -106,10 +107,11 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
   Receiver receiver(file, limits, stopping);
   const auto take = [&](const char* data, std::size_t size) { return receiver.take(data, size); };
   const bool complete =
-      is_form ? read_body(
-                    [&](const httplib::MultipartFormData& part) { return receiver.begin_part(part); },
-                    take)
-              : read_body(take);
+      is_form
+          ? read_body(
+                [&](const httplib::MultipartFormData& part) { return receiver.begin_part(part); },
+                take)
+          : read_body(take);
   receiver.check(complete, is_form);
   if (expected && receiver.digest() != *expected) {
     throw Error(ErrorCode::kDigestMismatch,

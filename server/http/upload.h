@@ -21,10 +21,11 @@ struct UploadLimits {
 class Upload {
  public:
   // Receives the body, or the one field `file` of a form. Throws Error kTooLarge, kDigestMismatch,
-  // kUnsupportedMedia for an encoded body, kInvalidParameter for a broken or empty one, kOutOfSpace,
-  // and kUnavailable once `stopping` is true.
+  // kUnsupportedMedia for an encoded body, kInvalidParameter for a broken or empty one,
+  // kOutOfSpace, and kUnavailable once `stopping` is true.
   Upload(const store::DataFolder& folder, const UploadLimits& limits,
-         const std::atomic<bool>& stopping, const httplib::Request& request, const httplib::ContentReader& read_body);
+         const std::atomic<bool>& stopping, const httplib::Request& request,
+         const httplib::ContentReader& read_body);
 
   const std::filesystem::path& path() const { return path_; }
 

@@ -127,7 +127,8 @@ void extract(const volume::CanonicalVolume& volume, const Request& request,
   }
 }
 
-// Encodes every format and measures the mesh, all side by side: a single Draco stream takes one thread.
+// Encodes every format and measures the mesh, all side by side: a single Draco stream takes one
+// thread.
 void encode_and_measure(const codec::Provenance& provenance, const store::BlobStore& blobs,
                         const Progress& progress, const mesh::Mesh& mesh, MeshSummary& summary) {
   const std::vector<MeshFormat>& formats = provenance.parameters.formats;
@@ -138,10 +139,11 @@ void encode_and_measure(const codec::Provenance& provenance, const store::BlobSt
   const mesh::Context stage = progress.context();
   const auto encode = [&](std::size_t i) {
     const mesh::Context context = {stage.stop, [&, i](double share) {
-      done[i] = share;
-      const double sum = std::accumulate(done.begin(), done.end(), 0.0);
-      stage.progress(sum / static_cast<double>(formats.size()));
-    }};
+                                     done[i] = share;
+                                     const double sum =
+                                         std::accumulate(done.begin(), done.end(), 0.0);
+                                     stage.progress(sum / static_cast<double>(formats.size()));
+                                   }};
     codec::encode(mesh, formats[i], provenance, context,
                   [&](std::span<const std::byte> bytes) { writers[i].write(bytes); });
   };
@@ -228,8 +230,8 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
   if (parameters.passes > 0) {
     build_connectivity(mesh, progress.quiet(), workspace.connectivity);
     smooth_laplacian(workspace.connectivity,
-                     {.passes = parameters.passes, .lambda = parameters.lambda},
-                     progress.context(), mesh, workspace.scratch);
+                     {.passes = parameters.passes, .lambda = parameters.lambda}, progress.context(),
+                     mesh, workspace.scratch);
   }
 
   progress.enter(Stage::kEncode, kEncodeShare, &Timing::encode);

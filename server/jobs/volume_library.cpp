@@ -8,8 +8,10 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::filesystem::path& upload,
   const std::filesystem::path canonical = scratch.path() / "canonical";
   Volume volume = raw ? volume::import_raw(upload, *raw, limits_, canonical)
                       : volume::import_file(upload, scratch.path(), limits_, canonical);
+  const store::Blob blob = store::digest_of(canonical);
   const std::lock_guard lock(mutex_);
-  volume.id = blobs_.adopt(canonical).key;
+  blobs_.adopt(canonical, blob);
+  volume.id = blob.key;
   volume.created = store::timestamp();
   return volumes_.add(volume);
 }

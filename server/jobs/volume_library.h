@@ -14,8 +14,8 @@
 
 namespace isomesh::jobs {
 
-// Takes uploads in and volumes out, so that records, blobs and the jobs that need them agree. Thread
-// safe; what it is made of must outlive it.
+// Takes uploads in and volumes out, so that records, blobs and the jobs that need them agree.
+// Thread safe; what it is made of must outlive it.
 class VolumeLibrary {
  public:
   VolumeLibrary(const store::DataFolder& folder, const store::BlobStore& blobs,

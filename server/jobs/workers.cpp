@@ -7,7 +7,6 @@
 
 #include <spdlog/spdlog.h>
 
-
 namespace isomesh::jobs {
 namespace {
 
@@ -47,7 +46,7 @@ bool Workers::drain(std::chrono::milliseconds wait) {
   return alive_ == 0;
 }
 
-void Workers::work(std::stop_token stop) {
+void Workers::work(const std::stop_token& stop) {
   Workspace workspace;
   while (const auto lease = jobs_.claim(stop)) {
     run(*lease, workspace);
@@ -65,11 +64,11 @@ void Workers::run(const store::Lease& lease, Workspace& workspace) {
   store::Outcome outcome;
   try {
     const Volume volume = volumes_.get(lease.parameters.volume);
-    PipelineResult result = run_pipeline(
-        volume, lease.parameters, limits_, blobs_, workspace, stop.get_token(),
-        [&](Stage stage, double progress, const Timing& so_far) {
-          jobs_.report(lease, stage, progress, so_far);
-        });
+    PipelineResult result =
+        run_pipeline(volume, lease.parameters, limits_, blobs_, workspace, stop.get_token(),
+                     [&](Stage stage, double progress, const Timing& so_far) {
+                       jobs_.report(lease, stage, progress, so_far);
+                     });
     for (auto& [format, file] : result.mesh.files) file.href = mesh_path(lease.id, format);
     outcome.mesh = std::move(result.mesh);
     timing = result.timing;

@@ -30,15 +30,15 @@ class Workers {
   bool drain(std::chrono::milliseconds wait);
 
  private:
-  void work(std::stop_token stop);
+  void work(const std::stop_token& stop);
   void run(const store::Lease& lease, Workspace& workspace);
 
   store::JobStore& jobs_;
   const store::VolumeStore& volumes_;
   const store::BlobStore& blobs_;
   const PipelineLimits limits_;
-  std::stop_source claims_;   // ends the taking of jobs
-  std::stop_source running_;  // interrupts those that run
+  std::stop_source claims_;            // ends the taking of jobs
+  std::stop_source running_;           // interrupts those that run
   std::atomic<std::size_t> alive_;     // threads that may still run a job
   std::vector<std::jthread> threads_;  // last: joined first
 };

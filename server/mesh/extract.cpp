@@ -118,18 +118,15 @@ void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
   IndexMemory memory(index_memory_size(lattice.dims));
   // A layer costs its triangles, and its samples even when it is empty.
   const std::uint64_t samples_cost = std::uint64_t{lattice.dims.x} * lattice.dims.y / 16;
-  const auto slabs = cut_slabs(lattice.dims.z, [&](std::uint32_t z) {
-    return count.layer_triangles[z] + z * samples_cost;
-  });
-  parallel_for(context, slabs.size(), [&](std::size_t task) {
-    write_slab(extraction, slabs[task], memory, mesh);
-  });
+  const auto slabs = cut_slabs(
+      lattice.dims.z, [&](std::uint32_t z) { return count.layer_triangles[z] + z * samples_cost; });
+  parallel_for(context, slabs.size(),
+               [&](std::size_t task) { write_slab(extraction, slabs[task], memory, mesh); });
 }
 
-#define ISOMESH_INSTANTIATE(T)                                                               \
-  template SurfaceCount count_surface(const Lattice<T>&, const ExtractOptions&,              \
-                                      const Context&);                                       \
-  template void extract_surface(const Lattice<T>&, const ExtractOptions&, const SurfaceCount&, \
+#define ISOMESH_INSTANTIATE(T)                                                                   \
+  template SurfaceCount count_surface(const Lattice<T>&, const ExtractOptions&, const Context&); \
+  template void extract_surface(const Lattice<T>&, const ExtractOptions&, const SurfaceCount&,   \
                                 const Context&, Mesh&);
 ISOMESH_INSTANTIATE(std::uint8_t)
 ISOMESH_INSTANTIATE(std::int8_t)

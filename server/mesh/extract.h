@@ -8,8 +8,8 @@
 //
 // The work is done in two passes over the samples. `count_surface` tells how much there will be,
 // `extract_surface` writes every vertex and triangle to its final place. Nothing is searched,
-// hashed or merged: a vertex is named by the sample that owns its edge and the edge's direction, and
-// its index is a running count.
+// hashed or merged: a vertex is named by the sample that owns its edge and the edge's direction,
+// and its index is a running count.
 #pragma once
 
 #include <cstdint>

@@ -35,11 +35,11 @@ PartialExtent measure_chunk(const Mesh& mesh, std::size_t begin, std::size_t end
   for (std::size_t t = begin; t < end; ++t) {
     const auto& [a, b, c] = mesh.triangles[t];
     const Vec3& corner = mesh.positions[a];
-    const Point normal =
-        cross(mesh.positions[b] - corner, mesh.positions[c] - corner);
+    const Point normal = cross(mesh.positions[b] - corner, mesh.positions[c] - corner);
     const Point to_corner = {corner[0] - mesh.origin[0], corner[1] - mesh.origin[1],
                              corner[2] - mesh.origin[2]};
-    part.area += std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]) / 2;
+    part.area +=
+        std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]) / 2;
     part.volume +=
         (to_corner[0] * normal[0] + to_corner[1] * normal[1] + to_corner[2] * normal[2]) / 6;
     for (const std::uint32_t vertex : {a, b, c}) {
@@ -116,8 +116,7 @@ Extent measure_extent(const Mesh& mesh, const Context& context) {
   std::vector<PartialExtent> parts((triangles + kTrianglesPerChunk - 1) / kTrianglesPerChunk);
   parallel_for(context, parts.size(), [&](std::size_t chunk) {
     const std::size_t begin = chunk * kTrianglesPerChunk;
-    parts[chunk] =
-        measure_chunk(mesh, begin, std::min(triangles, begin + kTrianglesPerChunk));
+    parts[chunk] = measure_chunk(mesh, begin, std::min(triangles, begin + kTrianglesPerChunk));
   });
   PartialExtent whole;
   for (const PartialExtent& part : parts) {

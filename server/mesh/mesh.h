@@ -9,8 +9,8 @@
 
 namespace isomesh::mesh {
 
-using Vec3 = std::array<float, 3>;               // millimetres, LPS
-using Triangle = std::array<std::uint32_t, 3>;   // vertex indices, counter-clockwise from outside
+using Vec3 = std::array<float, 3>;              // millimetres, LPS
+using Triangle = std::array<std::uint32_t, 3>;  // vertex indices, counter-clockwise from outside
 
 // Vertices and triangles in the order of the lattice's layers. Layer k holds the vertices on the
 // edges that the samples of plane k own and the triangles of the cells between planes k and k+1.

@@ -34,8 +34,8 @@ class Placement {
   }
 
   // A vertex on a sample that equals the iso-value would coincide with those on the sample's other
-  // edges, and their triangles would have no area. So every vertex keeps a distance from the samples
-  // that single precision still resolves. This is that distance as a share of an edge.
+  // edges, and their triangles would have no area. So every vertex keeps a distance from the
+  // samples that single precision still resolves. This is that distance as a share of an edge.
   static double nearest_share(const Dims& dims, const LatticeToSpace& to_space);
 
  private:

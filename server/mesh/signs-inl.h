@@ -75,8 +75,8 @@ void classify(const Lattice<T>& lattice, std::uint32_t z, T smallest, SignPlane&
     Word* row = plane.row(y);
     for (std::size_t w = 0; w < plane.words(); ++w) {
       const std::size_t begin = w * kWordBits;
-      row[w] = classify_word(samples + begin, std::min<std::size_t>(kWordBits, width - begin),
-                             smallest);
+      row[w] =
+          classify_word(samples + begin, std::min<std::size_t>(kWordBits, width - begin), smallest);
     }
   }
 }

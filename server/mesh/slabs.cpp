@@ -1,18 +1,19 @@
-// The code between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE is compiled once for each instruction
-// set: this file includes itself through Highway's foreach_target.h. No vector types are needed
-// here; what gains is what the compiler makes of 64-bit counts, shifts and four-lane positions.
+// The code between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE is compiled once for each
+// instruction set: this file includes itself through Highway's foreach_target.h. No vector types
+// are needed here; what gains is what the compiler makes of 64-bit counts, shifts and four-lane
+// positions.
 #include "server/mesh/slabs.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "server/mesh/slabs.cpp"
-#include <hwy/foreach_target.h>
-#include <hwy/highway.h>
-
 #include <bit>
 #include <cstring>
 #include <functional>
 #include <numeric>
 #include <utility>
+
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
 
 #include "server/mesh/signs-inl.h"
 
@@ -283,13 +284,13 @@ void write_slab_here(const Extraction<T>& extraction, const Slab& slab, IndexMem
 }  // namespace
 
 // Highway's tables hold functions, not templates.
-#define ISOMESH_FOR_TYPE(T, Name)                                                              \
+#define ISOMESH_FOR_TYPE(T, Name)                                                                  \
   void count_slab_##Name(const Extraction<T>& extraction, const Slab& slab, SurfaceCount& count) { \
-    count_slab_here(extraction, slab, count);                                                  \
-  }                                                                                            \
+    count_slab_here(extraction, slab, count);                                                      \
+  }                                                                                                \
   void write_slab_##Name(const Extraction<T>& extraction, const Slab& slab, IndexMemory& memory,   \
-                         Mesh& mesh) {                                                         \
-    write_slab_here(extraction, slab, memory, mesh);                                           \
+                         Mesh& mesh) {                                                             \
+    write_slab_here(extraction, slab, memory, mesh);                                               \
   }
 ISOMESH_FOR_TYPE(std::uint8_t, uint8)
 ISOMESH_FOR_TYPE(std::int8_t, int8)
@@ -312,17 +313,17 @@ std::size_t index_memory_size(const Dims& dims) {
   return (std::size_t{dims.y} + 2) * dims.x * kPlaces;
 }
 
-#define ISOMESH_DISPATCH(T, Name)                                                              \
-  HWY_EXPORT(count_slab_##Name);                                                               \
-  HWY_EXPORT(write_slab_##Name);                                                               \
-  template <>                                                                                  \
-  void count_slab(const Extraction<T>& extraction, const Slab& slab, SurfaceCount& count) {    \
-    HWY_DYNAMIC_DISPATCH(count_slab_##Name)(extraction, slab, count);                          \
-  }                                                                                            \
-  template <>                                                                                  \
-  void write_slab(const Extraction<T>& extraction, const Slab& slab, IndexMemory& memory,      \
-                  Mesh& mesh) {                                                                \
-    HWY_DYNAMIC_DISPATCH(write_slab_##Name)(extraction, slab, memory, mesh);                   \
+#define ISOMESH_DISPATCH(T, Name)                                                           \
+  HWY_EXPORT(count_slab_##Name);                                                            \
+  HWY_EXPORT(write_slab_##Name);                                                            \
+  template <>                                                                               \
+  void count_slab(const Extraction<T>& extraction, const Slab& slab, SurfaceCount& count) { \
+    HWY_DYNAMIC_DISPATCH(count_slab_##Name)(extraction, slab, count);                       \
+  }                                                                                         \
+  template <>                                                                               \
+  void write_slab(const Extraction<T>& extraction, const Slab& slab, IndexMemory& memory,   \
+                  Mesh& mesh) {                                                             \
+    HWY_DYNAMIC_DISPATCH(write_slab_##Name)(extraction, slab, memory, mesh);                \
   }
 ISOMESH_DISPATCH(std::uint8_t, uint8)
 ISOMESH_DISPATCH(std::int8_t, int8)

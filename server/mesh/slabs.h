@@ -70,7 +70,6 @@ void count_slab(const Extraction<T>& extraction, const Slab& slab, SurfaceCount&
 // Writes the slab's vertices and triangles to their places, which mesh.layer_vertices and
 // mesh.layer_triangles tell.
 template <class T>
-void write_slab(const Extraction<T>& extraction, const Slab& slab, IndexMemory& memory,
-                Mesh& mesh);
+void write_slab(const Extraction<T>& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh);
 
 }  // namespace isomesh::mesh

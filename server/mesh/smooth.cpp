@@ -46,8 +46,8 @@ void for_each_corner(const VertexSlab& slab, Visit visit) {
   }
 }
 
-// Writes the number of neighbours of the slab's vertices to offsets[v + 1]; returns their sum. In an
-// oriented manifold the triangles around a vertex name each of its neighbours once as the next
+// Writes the number of neighbours of the slab's vertices to offsets[v + 1]; returns their sum. In
+// an oriented manifold the triangles around a vertex name each of its neighbours once as the next
 // corner and once as the previous one, unless the vertex lies on the boundary: then its first
 // neighbour is never a next one and its last never a previous one, and the sums differ.
 std::uint64_t count_neighbors(const VertexSlab& slab, Connectivity& connectivity) {

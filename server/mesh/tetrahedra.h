@@ -1,8 +1,8 @@
 // How a cell is split into tetrahedra, and what the surface looks like in each of its 256 cases.
 //
 // A corner of a cell is a number 0..7 whose bits are its offsets along x, y and z. So is the
-// direction 1..7 of an edge. The edge of direction d that belongs to a sample lies in the cell whose
-// corner 0 is that sample, within the smallest face or cell that spans d there:
+// direction 1..7 of an edge. The edge of direction d that belongs to a sample lies in the cell
+// whose corner 0 is that sample, within the smallest face or cell that spans d there:
 //  * six-way (Kuhn) split: from corner 0 to corner d; seven edges a sample;
 //  * five-way split: the three axis edges, and one diagonal of each lower face (d = 3, 5, 6). The
 //    diagonals join samples of even i+j+k: from corner 0 to corner d of an even sample, between the

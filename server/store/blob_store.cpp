@@ -34,7 +34,7 @@ Blob BlobStore::Writer::commit() {
   return {key, bytes_};
 }
 
-Blob BlobStore::adopt(const std::filesystem::path& path) const {
+Blob digest_of(const std::filesystem::path& path) {
   File file = File::open(path);
   Sha256 digest;
   std::vector<std::byte> block(kBlockBytes);
@@ -44,9 +44,11 @@ Blob BlobStore::adopt(const std::filesystem::path& path) const {
     offset += count;
   }
   file.sync();
-  const std::string key = to_hex(digest.finish());
-  publish_as(path, key);
-  return {key, offset};
+  return {to_hex(digest.finish()), offset};
+}
+
+void BlobStore::adopt(const std::filesystem::path& file, const Blob& blob) const {
+  publish_as(file, blob.key);
 }
 
 File BlobStore::open(const std::string& key) const { return File::open(path_of(key)); }

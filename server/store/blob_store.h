@@ -19,6 +19,9 @@ struct Blob {
   std::uint64_t bytes = 0;
 };
 
+// Reads a file and brings it to disk. Throws Error kOutOfSpace or kInternal.
+Blob digest_of(const std::filesystem::path& file);
+
 // Blobs as files of the data folder. A blob is seen whole or not at all, and never changes. Thread
 // safe; `folder` must outlive it.
 class BlobStore {
@@ -47,8 +50,9 @@ class BlobStore {
     std::uint64_t bytes_ = 0;
   };
 
-  // Makes a finished file of the scratch folder a blob, by moving it. Throws Error kOutOfSpace.
-  Blob adopt(const std::filesystem::path& file) const;
+  // Makes a finished file of the scratch folder, which digest_of named, a blob by moving it. Throws
+  // Error kOutOfSpace.
+  void adopt(const std::filesystem::path& file, const Blob& blob) const;
 
   // Throws Error kNotFound.
   File open(const std::string& key) const;

@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <cstring>
+
 #include <fcntl.h>
 #include <sys/file.h>
 #include <unistd.h>
@@ -33,8 +34,7 @@ DataFolder::DataFolder(const std::filesystem::path& root) : root_(root) {
 
 DataFolder::~DataFolder() { ::close(lock_); }
 
-ScratchFolder::ScratchFolder(const std::filesystem::path& parent)
-    : path_(parent / random_hex(8)) {
+ScratchFolder::ScratchFolder(const std::filesystem::path& parent) : path_(parent / random_hex(8)) {
   std::error_code error;
   std::filesystem::create_directory(path_, error);
   if (error == std::errc::no_space_on_device) {

@@ -5,8 +5,8 @@
 
 namespace isomesh::store {
 
-// The one folder that a daemon keeps everything in. Holding it locks it: a second daemon on the same
-// folder is refused. Immutable after construction.
+// The one folder that a daemon keeps everything in. Holding it locks it: a second daemon on the
+// same folder is refused. Immutable after construction.
 class DataFolder {
  public:
   // Creates what is missing and empties the scratch folder, which holds what a crash cut short.

@@ -7,14 +7,14 @@
 #include <cstdio>
 #include <cstring>
 #include <ctime>
-#include <fcntl.h>
 #include <mutex>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <utility>
 
+#include <fcntl.h>
 #include <openssl/evp.h>
 #include <openssl/rand.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "proto/error.h"
 
@@ -170,8 +170,8 @@ std::string random_hex(std::size_t bytes) {
 }
 
 std::string time_ordered_id() {
-  // Ids of the same millisecond are told apart, and put in order, by the twelve bits behind the time
-  // (RFC 9562, section 6.2, method 1).
+  // Ids of the same millisecond are told apart, and put in order, by the twelve bits behind the
+  // time (RFC 9562, section 6.2, method 1).
   static std::mutex mutex;
   static std::int64_t last_stamp = 0;
   constexpr int kCounterBits = 12;
@@ -193,8 +193,8 @@ std::string time_ordered_id() {
 
 std::string timestamp() {
   const auto now = std::chrono::system_clock::now();
-  const std::time_t seconds = std::chrono::system_clock::to_time_t(
-      std::chrono::floor<std::chrono::seconds>(now));
+  const std::time_t seconds =
+      std::chrono::system_clock::to_time_t(std::chrono::floor<std::chrono::seconds>(now));
   const auto fraction = std::chrono::duration_cast<std::chrono::milliseconds>(
                             now - std::chrono::floor<std::chrono::seconds>(now))
                             .count();

@@ -1,7 +1,6 @@
 #include "server/store/job_store.h"
 
 #include <algorithm>
-#include <ranges>
 
 #include "server/store/files.h"
 
@@ -36,7 +35,7 @@ Job JobStore::submit(const JobParameters& parameters) {
   return entry.job;
 }
 
-std::optional<Lease> JobStore::claim(std::stop_token stop) {
+std::optional<Lease> JobStore::claim(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   const auto waiting = [&] {
     return std::ranges::find_if(queues_, [](const auto& queue) { return !queue.empty(); });
@@ -123,7 +122,7 @@ Job JobStore::cancel(const std::string& id) {
   } else if (entry.job.state == JobState::kRunning) {
     entry.stop.request_stop();
   }
-  const Job job = entry.job;
+  Job job = entry.job;
   forget_oldest();
   return job;
 }
@@ -150,10 +149,10 @@ std::vector<Job> JobStore::list(std::optional<JobState> state, const std::string
                                 std::size_t limit) const {
   const std::lock_guard lock(mutex_);
   std::vector<Job> result;
-  const auto end = after.empty() ? jobs_.end() : jobs_.lower_bound(after);
-  for (const auto& [id, entry] : std::ranges::subrange(jobs_.begin(), end) | std::views::reverse) {
-    if (result.size() == limit) break;
-    if (!state || entry.job.state == *state) result.push_back(entry.job);
+  auto entry = after.empty() ? jobs_.end() : jobs_.lower_bound(after);
+  while (entry != jobs_.begin() && result.size() < limit) {
+    const Job& job = (--entry)->second.job;
+    if (!state || job.state == *state) result.push_back(job);
   }
   return result;
 }

@@ -34,13 +34,13 @@ struct Outcome {
   std::optional<Problem> error;
 };
 
-// The jobs of this process: queue, running and the last finished ones, in memory. Its verbs are those
-// of a store that survives a restart, which will stand in its place. Thread safe.
+// The jobs of this process: queue, running and the last finished ones, in memory. Its verbs are
+// those of a store that survives a restart, which will stand in its place. Thread safe.
 class JobStore {
  public:
   struct Limits {
-    std::size_t max_queued = 1000;   // a queue that is longer answers "later"
-    std::size_t max_finished = 1000; // the oldest finished jobs beyond it are forgotten
+    std::size_t max_queued = 1000;    // a queue that is longer answers "later"
+    std::size_t max_finished = 1000;  // the oldest finished jobs beyond it are forgotten
   };
 
   // `blobs` must outlive it; the meshes of forgotten jobs are erased there.
@@ -50,7 +50,7 @@ class JobStore {
   Job submit(const JobParameters& parameters);
 
   // The next job by priority, then age; waits for one. Empty once `stop` is requested.
-  std::optional<Lease> claim(std::stop_token stop);
+  std::optional<Lease> claim(const std::stop_token& stop);
 
   // What a running job does. False when the lease is not valid any more.
   bool report(const Lease& lease, Stage stage, double progress, const Timing& timing);
@@ -108,7 +108,7 @@ class JobStore {
   const Limits limits_;
   mutable std::mutex mutex_;  // guards everything below
   mutable std::condition_variable_any changed_;
-  std::map<std::string, Entry> jobs_;  // ids sort by age
+  std::map<std::string, Entry> jobs_;              // ids sort by age
   std::array<std::deque<std::string>, 3> queues_;  // of each priority, oldest first
   std::deque<std::string> finished_;               // oldest first
   std::map<std::string, std::size_t> mesh_users_;  // how many jobs name each blob

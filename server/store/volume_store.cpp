@@ -52,7 +52,8 @@ std::vector<Volume> VolumeStore::list() const {
     const std::lock_guard lock(mutex_);
     for (const auto& [id, volume] : volumes_) all.push_back(volume);
   }
-  std::ranges::sort(all, {}, [](const Volume& volume) { return std::pair(volume.created, volume.id); });
+  std::ranges::sort(all, {},
+                    [](const Volume& volume) { return std::pair(volume.created, volume.id); });
   return all;
 }
 

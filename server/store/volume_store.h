@@ -11,8 +11,9 @@
 
 namespace isomesh::store {
 
-// The records of the volumes that are there, one small file each. Thread safe; `folder` must outlive
-// it. A record is added after its blob and erased before it, so it never names one that is missing.
+// The records of the volumes that are there, one small file each. Thread safe; `folder` must
+// outlive it. A record is added after its blob and erased before it, so it never names one that is
+// missing.
 class VolumeStore {
  public:
   // Reads the records that are there; see unreadable().

@@ -7,7 +7,7 @@
 
 namespace isomesh::bench {
 
-inline const std::filesystem::path kCtHeadFile =
+inline constexpr const char* kCtHeadFile =
     "/usr/share/doc/invesalius-examples/examples/Cranium.inv3";
 inline constexpr double kBoneIso = 250;  // Hounsfield units
 inline constexpr double kSkinIso = -300;

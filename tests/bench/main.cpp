@@ -22,7 +22,7 @@
 namespace isomesh::bench {
 namespace {
 
-const std::filesystem::path kDefaultVolume = "/usr/share/mricron/templates/ch2.nii.gz";
+constexpr const char* kDefaultVolume = "/usr/share/mricron/templates/ch2.nii.gz";
 constexpr double kDefaultIso = 60;
 
 struct Options {
@@ -91,11 +91,8 @@ std::string check_filter(const std::string& text) {
   }
 }
 
-}  // namespace
-}  // namespace isomesh::bench
-
-int main(int argc, char** argv) {
-  using namespace isomesh::bench;
+// Parses and runs; the exit status.
+int run_program(int argc, char** argv) {
   Options options;
   CLI::App app("Times the stages of isomesh, beside VTK's where it was built with VTK.",
                "isomesh-bench");
@@ -122,18 +119,24 @@ int main(int argc, char** argv) {
   memory->add_option("stage", stage)->required();
   memory->add_option("size", size)->required();
   memory->add_option("threads", threads)->required();
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     constexpr int kWrongUsage = 2;
     return app.exit(error) == 0 ? 0 : kWrongUsage;
   }
+  if (*memory) return run_memory_command(stage, size, threads);
+  warn_when_busy();
+  return *report ? write_report(folder) : run(options);
+}
 
+}  // namespace
+}  // namespace isomesh::bench
+
+int main(int argc, char** argv) {
   try {
-    if (*memory) return run_memory_command(stage, size, threads);
-    warn_when_busy();
-    if (*report) return write_report(folder);
-    return run(options);
+    return isomesh::bench::run_program(argc, argv);
   } catch (const std::exception& error) {
     std::cerr << "isomesh-bench: " << error.what() << '\n';
     return 1;

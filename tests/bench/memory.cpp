@@ -67,6 +67,7 @@ std::string run_self(std::vector<std::string> arguments) {
   if (path.empty() || pipe(ends) != 0) return {};
   std::vector<char*> argv;
   arguments.insert(arguments.begin(), path);
+  argv.reserve(arguments.size() + 1);
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
 

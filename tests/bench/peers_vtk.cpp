@@ -49,7 +49,7 @@ int vtk_type(SampleType type) {
 
 // The samples as they are, without a copy.
 vtkSmartPointer<vtkImageData> image_of(const Samples& samples) {
-  const auto image = vtkSmartPointer<vtkImageData>::New();
+  auto image = vtkSmartPointer<vtkImageData>::New();
   image->SetDimensions(static_cast<int>(samples.dims.x), static_cast<int>(samples.dims.y),
                        static_cast<int>(samples.dims.z));
   image->SetSpacing(samples.geometry.spacing.data());
@@ -66,7 +66,7 @@ vtkSmartPointer<vtkImageData> image_of(const Samples& samples) {
 // The points and polygons alone: links that one filter left with its input would save the next one
 // work.
 vtkSmartPointer<vtkPolyData> bare(vtkPolyData* mesh) {
-  const auto result = vtkSmartPointer<vtkPolyData>::New();
+  auto result = vtkSmartPointer<vtkPolyData>::New();
   result->SetPoints(mesh->GetPoints());
   result->SetPolys(mesh->GetPolys());
   return result;

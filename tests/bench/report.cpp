@@ -1,6 +1,7 @@
 #include "tests/bench/report.h"
 
 #include <algorithm>
+#include <array>
 #include <iostream>
 #include <optional>
 
@@ -13,10 +14,10 @@
 namespace isomesh::bench {
 namespace {
 
-const std::filesystem::path kBrainFile = "/usr/share/mricron/templates/ch2.nii.gz";
+constexpr const char* kBrainFile = "/usr/share/mricron/templates/ch2.nii.gz";
 constexpr double kBrainIso = 60;
 constexpr std::uint32_t kPaperSize = 128;
-const std::vector<std::uint32_t> kSizes = {64, 96, 128, 192, 256, 384, 512};
+constexpr std::array kSizes = {64U, 96U, 128U, 192U, 256U, 384U, 512U};
 
 std::optional<Subject> ct_head() {
   if (!std::filesystem::exists(kCtHeadFile)) return std::nullopt;

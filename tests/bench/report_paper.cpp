@@ -90,11 +90,10 @@ Series time_sub_tables(const Soup& soup, Rows& rows, Report& report) {
                     milliseconds(figures->neighbors_ms), milliseconds(figures->passes_ms),
                     milliseconds(total_ms)});
   }
-  report.remarks.push_back(
-      "The paper finds 150 to 250 sub-tables best, and that more cost time. For " + triangles +
-      " the best of those tried here is " + std::to_string(best) + " with " +
-      milliseconds(best_ms) + ", beside " + milliseconds(time_with(series, kPaperSubTables)) +
-      " with 250.");
+  report.remarks.push_back("The paper finds 150 to 250 sub-tables best. For " + triangles +
+                           " the best of those tried here is " + std::to_string(best) + " with " +
+                           milliseconds(best_ms) + ", beside " +
+                           milliseconds(time_with(series, kPaperSubTables)) + " with 250.");
   return series;
 }
 

@@ -2,6 +2,8 @@
 // gives and what VTK takes; what contradicts the paper, or the paper itself, goes to `remarks`.
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -36,7 +38,7 @@ void write_figure_4(const Subject& head, Report& report);
 // Generation and smoothing: the paper's Figures 5 and 6.
 void write_figures_5_and_6(const Subject& head, Report& report);
 void write_passes(const Subject& subject, Report& report);
-void write_growth(const std::vector<std::uint32_t>& sizes, Report& report);
+void write_growth(std::span<const std::uint32_t> sizes, Report& report);
 // What scheme, interpolation and smoothing do to the mesh.
 void write_choices(const std::vector<Subject>& subjects, Report& report);
 void write_goals(const Plan& plan, Report& report);

@@ -141,7 +141,7 @@ void write_passes(const Subject& subject, Report& report) {
                         rows);
 }
 
-void write_growth(const std::vector<std::uint32_t>& sizes, Report& report) {
+void write_growth(std::span<const std::uint32_t> sizes, Report& report) {
   std::vector<GrowthFigures> all;
   for (const std::uint32_t size : sizes) {
     say("growth, " + cube_name(size));

@@ -93,10 +93,12 @@ class PageAxis {
   std::vector<double> log_ticks() const {
     std::vector<double> ticks;
     const bool all = high_ / low_ <= 200;
-    for (double tick = low_; tick <= high_ * (1 + 1e-9); tick = nice_above(tick * 1.01)) {
+    double tick = low_;
+    while (tick <= high_ * (1 + 1e-9)) {
       const double exponent = std::log10(tick);
       const bool is_decade = std::abs(exponent - std::round(exponent)) < 1e-6;
       if (all || is_decade) ticks.push_back(tick);
+      tick = nice_above(tick * 1.01);
     }
     return ticks;
   }

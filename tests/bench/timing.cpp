@@ -23,6 +23,7 @@ double time_ms(const Timed& timed) {
 
 double median_ms(const Timed& timed, int runs) {
   std::vector<double> times;
+  times.reserve(static_cast<std::size_t>(runs));
   for (int i = 0; i < runs; ++i) times.push_back(time_ms(timed));
   return median(times);
 }

@@ -61,8 +61,8 @@ std::vector<DecodedMesh> decoded_primitives(const Container& container) {
     const json& draco = primitive["extensions"]["KHR_draco_mesh_compression"];
     const json& view = document["bufferViews"][draco["bufferView"].get<std::size_t>()];
     EXPECT_EQ(view["byteOffset"].get<std::size_t>() % 4, 0U);
-    DecodedMesh& mesh = result.emplace_back(test::decode_in_process(
-        container.binary.substr(view["byteOffset"], view["byteLength"])));
+    DecodedMesh& mesh = result.emplace_back(
+        test::decode_in_process(container.binary.substr(view["byteOffset"], view["byteLength"])));
     const json& positions =
         document["accessors"][primitive["attributes"]["POSITION"].get<std::size_t>()];
     const json& indices = document["accessors"][primitive["indices"].get<std::size_t>()];
@@ -149,8 +149,7 @@ TEST(Glb, EveryMeshAndSpeedDecodesToAllItsTriangles) {
 }
 
 TEST(Glb, ThePatientsHeadIsUpAndMetresAreTheUnit) {
-  const json document =
-      open_container(encoded(several_blocks(), MeshFormat::kGlb)).document;
+  const json document = open_container(encoded(several_blocks(), MeshFormat::kGlb)).document;
   const json& node = document["nodes"][document["scenes"][0]["nodes"][0].get<std::size_t>()];
   const auto quaternion = node["rotation"].get<std::array<double, 4>>();
   const auto turned = [&](const std::array<double, 3>& v) {

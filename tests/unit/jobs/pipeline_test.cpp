@@ -147,7 +147,8 @@ TEST_F(PipelineTest, AWorkspaceKeepsNothingOfTheJobBefore) {
   const std::string expected = mesh_bytes(run(volume, parameters_of(volume, 0)));
   Workspace workspace;
   run_pipeline(other, parameters_of(other, 1), {}, blobs_, workspace, {}, kQuiet);
-  const auto result = run_pipeline(volume, parameters_of(volume, 0), {}, blobs_, workspace, {}, kQuiet);
+  const auto result =
+      run_pipeline(volume, parameters_of(volume, 0), {}, blobs_, workspace, {}, kQuiet);
   EXPECT_EQ(mesh_bytes(result), expected);
 }
 

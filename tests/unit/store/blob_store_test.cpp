@@ -106,7 +106,8 @@ TEST_F(BlobStoreTest, WritersDoNotMeet) {
 TEST_F(BlobStoreTest, AdoptsAFinishedFileByMovingIt) {
   const std::string text(3 << 20, 'x');
   test::write_file(data_.scratch() / "made", text);
-  const Blob blob = blobs_.adopt(data_.scratch() / "made");
+  const Blob blob = digest_of(data_.scratch() / "made");
+  blobs_.adopt(data_.scratch() / "made", blob);
   EXPECT_EQ(blob.bytes, text.size());
   EXPECT_EQ(blob.key, put(text).key);
   EXPECT_FALSE(std::filesystem::exists(data_.scratch() / "made"));
@@ -114,8 +115,7 @@ TEST_F(BlobStoreTest, AdoptsAFinishedFileByMovingIt) {
 }
 
 TEST_F(BlobStoreTest, AdoptingWhatIsNotThereIsRefused) {
-  EXPECT_EQ(code_thrown_by([&] { blobs_.adopt(data_.scratch() / "absent"); }),
-            ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { digest_of(data_.scratch() / "absent"); }), ErrorCode::kNotFound);
 }
 
 TEST_F(BlobStoreTest, ErasesABlobAndNothingElse) {
