@@ -11,12 +11,12 @@
 #include <thread>
 
 #include <CLI/CLI.hpp>
-#include <malloc.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include "server/http/server.h"
+#include "server/jobs/memory.h"
 #include "server/jobs/volume_library.h"
 #include "server/jobs/workers.h"
 #include "server/mesh/context.h"
@@ -103,16 +103,6 @@ void add_options(CLI::App& cli, Options& options) {
       ->envname("ISOMESH_OPEN_NETWORK");
 }
 
-// Encoders take and give back megabytes thousands of times a second. By default each such block
-// comes fresh from the kernel, which clears its pages anew: a seventh of the encoding time went
-// there.
-void keep_freed_memory() {
-  constexpr int kLargestBlockBytes = 32 << 20;
-  constexpr int kKeptBytes = 256 << 20;
-  ::mallopt(M_MMAP_THRESHOLD, kLargestBlockBytes);
-  ::mallopt(M_TRIM_THRESHOLD, kKeptBytes);
-}
-
 sigset_t block_signals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -168,7 +158,7 @@ int run(const Options& options, const sigset_t& signals) {
 int main(int argc, char** argv) {
   try {
     const sigset_t signals = block_signals();
-    keep_freed_memory();
+    jobs::keep_freed_memory();
     spdlog::set_default_logger(spdlog::stderr_logger_mt("isomeshd"));
     Options options;
     CLI::App cli("isomeshd turns medical volumes into surface meshes over HTTP");

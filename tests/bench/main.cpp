@@ -11,6 +11,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "server/jobs/memory.h"
 #include "tests/bench/benchmarks.h"
 #include "tests/bench/machine.h"
 #include "tests/bench/memory.h"
@@ -136,6 +137,8 @@ int run_program(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
+    // As the daemon does; the peers run in the same process and have it too.
+    isomesh::jobs::keep_freed_memory();
     return isomesh::bench::run_program(argc, argv);
   } catch (const std::exception& error) {
     std::cerr << "isomesh-bench: " << error.what() << '\n';
