@@ -21,9 +21,6 @@ HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 namespace {
 
-// Eight places a sample, by direction, for the indices of the vertices on the edges that it owns.
-constexpr std::size_t kPlaces = 8;
-
 // For each set of directions its members in order.
 constexpr auto kMembers = [] {
   std::array<std::array<std::uint8_t, kPlaces>, 256> members = {};
@@ -307,11 +304,6 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace isomesh::mesh {
-
-std::size_t index_memory_size(const Dims& dims) {
-  constexpr std::size_t kPlaces = 8;
-  return (std::size_t{dims.y} + 2) * dims.x * kPlaces;
-}
 
 #define ISOMESH_DISPATCH(T, Name)                                                           \
   HWY_EXPORT(count_slab_##Name);                                                            \

@@ -59,8 +59,13 @@ class IndexMemory {
   std::vector<Block> free_;  // guarded by mutex_
 };
 
-// How many indices a slab of such a lattice works with.
-std::size_t index_memory_size(const Dims& dims);
+// Places a sample, by direction, for the indices of the vertices on the edges that it owns.
+inline constexpr std::size_t kPlaces = 8;
+
+// How many indices a slab of such a lattice works with: those of one plane and two rows.
+inline std::size_t index_memory_size(const Dims& dims) {
+  return (std::size_t{dims.y} + 2) * dims.x * kPlaces;
+}
 
 // Writes the numbers of vertices and triangles of layer k to layer_vertices[k + 1] and
 // layer_triangles[k + 1].
