@@ -139,7 +139,8 @@ int run(const Options& options, const sigset_t& signals) {
   jobs::Workers workers(options.workers, jobs, volumes, blobs, limits);
   http::Server server({folder, blobs, volumes, jobs, library}, options.http);
 
-  std::cout << "listening on " << server.bind(address) << std::endl;
+  const std::string url = server.bind(address);
+  std::cout << "listening on " << url << std::endl;
   std::jthread serving([&] { server.serve(); });
 
   int signal = 0;
@@ -163,7 +164,12 @@ int main(int argc, char** argv) {
     Options options;
     CLI::App cli("isomeshd turns medical volumes into surface meshes over HTTP");
     add_options(cli, options);
-    CLI11_PARSE(cli, argc, argv);
+    try {
+      cli.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      constexpr int kWrongUsage = 2;
+      return cli.exit(error) == 0 ? 0 : kWrongUsage;  // 0 for --help and --version
+    }
     spdlog::set_level(spdlog::level::from_str(options.log_level));
     return run(options, signals);
   } catch (const std::exception& error) {

@@ -19,8 +19,8 @@ constexpr const char* kDescription = "Turns volumes into surface meshes on an is
 constexpr const char* kExamples = R"(
 Examples:
   isomesh mesh head.nii.gz --iso 60 -o head.drc
-  isomesh mesh ct.nrrd --iso otsu --passes 20 --smoothing taubin -o bone.glb -o bone.stl
-  isomesh mesh ct.raw --dims 512,512,300 --type int16 --spacing 0.7,0.7,1 --iso 300 -o ct.ply
+  isomesh mesh ct.nrrd --iso otsu --passes 10 -o bone.glb -o bone.stl
+  isomesh mesh ct.raw --dims 512,512,300 --type int16 --spacing 0.7,0.7,1 --iso 300 -o ct.stl
   isomesh submit $(isomesh upload head.nii.gz) --iso 60 --format drc,stl
   isomesh --server https://meshes.example.org --json list
 

@@ -91,6 +91,7 @@ void check_known(const httplib::Request& request, const std::set<std::string>& k
   for (const auto& [name, unused] : request.params) {
     constexpr std::size_t kLongestName = 64;
     const std::string shown = name.substr(0, kLongestName);
+    if (!errors.empty() && errors.back().field == shown) continue;  // said already
     if (!known.contains(name)) {
       errors.push_back({shown, "is not a parameter of this request"});
     } else if (request.get_param_value_count(name) > 1) {

@@ -27,6 +27,29 @@ constexpr std::chrono::seconds kWriteTimeout{10};
 // When the request that this thread serves began.
 thread_local std::chrono::steady_clock::time_point request_began;
 
+// Text that cannot forge a line of the log.
+std::string printable(std::string text) {
+  std::ranges::replace_if(
+      text, [](unsigned char c) { return c < 0x20 || c == 0x7F; }, '?');
+  return text;
+}
+
+// Two readings of where a body ends are how requests are smuggled past a proxy (RFC 9112, 6.3).
+void check_framing(const httplib::Request& request) {
+  const std::string length = request.get_header_value("Content-Length");
+  const bool digits_only =
+      std::ranges::all_of(length, [](unsigned char c) { return c >= '0' && c <= '9'; });
+  if (request.get_header_value_count("Content-Length") > 1 || !digits_only) {
+    throw invalid_parameter("Content-Length", "must be one whole number");
+  }
+  if (!request.has_header("Transfer-Encoding")) return;
+  if (request.has_header("Content-Length") ||
+      ::strcasecmp(request.get_header_value("Transfer-Encoding").c_str(), "chunked") != 0) {
+    throw invalid_parameter("Transfer-Encoding",
+                            "must be \"chunked\", and without a Content-Length");
+  }
+}
+
 bool has_body_length(const httplib::Request& request) {
   return request.has_header("Content-Length") ||
          ::strcasecmp(request.get_header_value("Transfer-Encoding").c_str(), "chunked") == 0;
@@ -43,6 +66,7 @@ void check_request(httplib::Request& request) {
   if (request.headers.size() > kMostHeaders) {
     throw Error(ErrorCode::kInvalidParameter, "the request has too many headers");
   }
+  check_framing(request);
   const bool needs_body =
       request.method == "POST" || request.method == "PUT" || request.method == "PATCH";
   if (needs_body && !has_body_length(request)) {
@@ -91,8 +115,8 @@ void complete_error(const App& app, const httplib::Request& request, httplib::Re
 void log_request(const httplib::Request& request, const httplib::Response& response) {
   const std::chrono::duration<double, std::milli> elapsed =
       std::chrono::steady_clock::now() - request_began;
-  spdlog::info("{} {} {} {:.1f} ms", request.method, request.path.substr(0, kLongestPath),
-               response.status, elapsed.count());
+  spdlog::info("{} {} {} {:.1f} ms", printable(request.method),
+               printable(request.path.substr(0, kLongestPath)), response.status, elapsed.count());
 }
 
 void configure(App& app) {
@@ -129,7 +153,7 @@ void configure(App& app) {
   });
   http.set_exception_handler(
       [](const httplib::Request& request, httplib::Response& response, const std::exception_ptr&) {
-        spdlog::error("{} {}: an exception left its route", request.method, request.path);
+        spdlog::error("{}: an exception left its route", printable(request.path));
         answer_problem(request, response, {ErrorCode::kInternal, ""});
       });
   http.set_logger(log_request);

@@ -12,6 +12,10 @@ namespace {
 // Shear this strong is no scanner's; the flattest that a tilted gantry makes is about 0.85.
 constexpr double kFlattestDeterminant = 0.01;
 constexpr double kUnitTolerance = 1e-3;
+// Of a sample spacing in millimetres: an electron microscope's and a geologist's lie between.
+// Beyond, areas and volumes leave the range of the numbers that they are computed and sent in.
+constexpr double kFinestSpacing = 1e-6;
+constexpr double kCoarsestSpacing = 1e6;
 // Single precision has 24 bits: this leaves 8 of them between two samples.
 constexpr double kFinestRelativeSpacing = 0x1p-16;
 
@@ -35,9 +39,10 @@ bool all_finite(const Numbers& numbers) {
 std::optional<FieldError> spacing_fault(const Geometry& geometry) {
   for (int axis = 0; axis < 3; ++axis) {
     const double spacing = geometry.spacing[static_cast<std::size_t>(axis)];
-    if (std::isfinite(spacing) && spacing > 0) continue;
+    if (spacing >= kFinestSpacing && spacing <= kCoarsestSpacing) continue;
     return FieldError{"spacing", "the spacing along " + axis_name(static_cast<std::size_t>(axis)) +
-                                     " is " + to_text(spacing) + ", not a positive number"};
+                                     " is " + to_text(spacing) +
+                                     " mm, which is not between a millionth and a million"};
   }
   return std::nullopt;
 }
