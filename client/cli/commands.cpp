@@ -199,10 +199,12 @@ int fetch(const Options& options, const std::stop_token& stop) {
 int cancel(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
   client.cancel(options.id);
+  const Job job = client.job(options.id);
   if (options.json) {
-    std::cout << to_json(client.job(options.id)) << '\n';
+    std::cout << to_json(job) << '\n';
   } else {
-    std::cout << "cancelled " << options.id << '\n';
+    // A job that had ended stays as it was, and one that runs takes a moment to stop.
+    std::cout << (is_final(job.state) ? to_string(job.state) : "stopping") << ' ' << job.id << '\n';
   }
   return kDone;
 }
