@@ -1,0 +1,123 @@
+// The fields of every type that has a JSON form, each name once: `visit(value, field)` calls
+// field(name, member) for each, in the order in which they are written. Private to this folder.
+#pragma once
+
+#include <concepts>
+#include <type_traits>
+
+#include <nlohmann/json.hpp>
+
+#include "proto/error.h"
+#include "proto/types.h"
+
+namespace isomesh {
+
+using Json = nlohmann::ordered_json;
+
+template <class T>
+concept Enumeration = std::is_enum_v<T>;
+
+template <class Self, class T>
+concept Is = std::same_as<std::remove_const_t<Self>, T>;
+
+void visit(Is<Volume> auto& self, auto&& field) {
+  field("id", self.id);
+  field("format", self.format);
+  field("dims", self.dims);
+  field("type", self.type);
+  field("spacing", self.geometry.spacing);
+  field("origin", self.geometry.origin);
+  field("direction", self.geometry.direction);
+  field("range", self.range);
+  field("suggested_iso", self.suggested_iso);
+  field("bytes", self.bytes);
+  field("created", self.created);
+}
+
+void visit(Is<DracoParameters> auto& self, auto&& field) {
+  field("position_bits", self.position_bits);
+  field("speed", self.speed);
+}
+
+void visit(Is<JobParameters> auto& self, auto&& field) {
+  field("volume", self.volume);
+  field("iso", self.iso);
+  field("scheme", self.scheme);
+  field("interpolation", self.interpolation);
+  field("passes", self.passes);
+  field("smoothing", self.smoothing);
+  field("lambda", self.lambda);
+  field("close", self.close);
+  field("formats", self.formats);
+  field("draco", self.draco);
+  field("priority", self.priority);
+}
+
+void visit(Is<Timing> auto& self, auto&& field) {
+  field("queue", self.queue);
+  field("load", self.load);
+  field("extract", self.extract);
+  field("smooth", self.smooth);
+  field("encode", self.encode);
+  field("total", self.total);
+}
+
+void visit(Is<MeshFile> auto& self, auto&& field) {
+  field("bytes", self.bytes);
+  field("sha256", self.sha256);
+  field("href", self.href);
+}
+
+void visit(Is<MeshSummary::Enclosed> auto& self, auto&& field) {
+  field("extracted", self.extracted);
+  field("smoothed", self.smoothed);
+}
+
+void visit(Is<MeshSummary> auto& self, auto&& field) {
+  field("triangles", self.triangles);
+  field("vertices", self.vertices);
+  field("boundary_edges", self.boundary_edges);
+  field("components", self.components);
+  field("euler", self.euler);
+  field("area_mm2", self.area_mm2);
+  field("volume_mm3", self.volume_mm3);
+  field("bounds", self.bounds);
+  field("files", self.files);
+}
+
+void visit(Is<FieldError> auto& self, auto&& field) {
+  field("field", self.field);
+  field("message", self.message);
+}
+
+void visit(Is<Problem> auto& self, auto&& field) {
+  field("type", self.type);
+  field("title", self.title);
+  field("status", self.status);
+  field("detail", self.detail);
+  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? !self.instance.empty() : true) {
+    field("instance", self.instance);
+  }
+  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? !self.errors.empty() : true) {
+    field("errors", self.errors);
+  }
+}
+
+// `volume` and `priority` stand beside the parameters too; the members inside are the truth.
+void visit(Is<Job> auto& self, auto&& field) {
+  field("id", self.id);
+  field("state", self.state);
+  field("stage", self.stage);
+  field("progress", self.progress);
+  field("parameters", self.parameters);
+  field("volume", self.parameters.volume);
+  field("priority", self.parameters.priority);
+  field("created", self.created);
+  field("started", self.started);
+  field("finished", self.finished);
+  field("timing", self.timing);
+  field("mesh", self.mesh);
+  field("error", self.error);
+}
+
+}  // namespace isomesh

@@ -1,0 +1,196 @@
+#include <algorithm>
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include "proto/fields.h"
+#include "proto/json.h"
+
+namespace isomesh {
+namespace {
+
+// Collects what is wrong with every member, so that one answer names all of it.
+class RequestReader {
+ public:
+  // Faults are named as a query spells them: `format` for `formats`, no `draco.` before its
+  // members.
+  void name_as_in_query() { as_in_query_ = true; }
+
+  // Reads `json` into `value`, whose fields are those of `visit`, and refuses any other.
+  template <class T>
+  void read_object(const Json& json, T& value, const std::string& prefix) {
+    std::vector<std::string> known;
+    visit(value, [&](const char* name, auto& member) {
+      known.emplace_back(name);
+      if (const auto found = json.find(name); found != json.end()) {
+        read_member(*found, prefix + name, member);
+      }
+    });
+    for (const auto& [name, unused] : json.items()) {
+      if (std::ranges::find(known, name) == known.end()) {
+        add(prefix + name.substr(0, kLongestName), "is not a known member");
+      }
+    }
+  }
+
+  void add(const std::string& field, const std::string& message) {
+    if (errors_.size() < kMostErrors) errors_.push_back({spelled(field), message});
+  }
+
+  void throw_if_any() {
+    if (!errors_.empty()) throw invalid_parameters(std::move(errors_));
+  }
+
+ private:
+  std::string spelled(const std::string& field) const {
+    constexpr std::string_view kDraco = "draco.";
+    if (!as_in_query_) return field;
+    if (field == "formats") return "format";
+    return field.starts_with(kDraco) ? field.substr(kDraco.size()) : field;
+  }
+
+  static constexpr std::size_t kMostErrors = 20;
+  static constexpr std::size_t kLongestName = 64;
+
+  void read_member(const Json& json, const std::string& name, std::string& value) {
+    if (!json.is_string()) return add(name, "must be a string");
+    value = json.get<std::string>();
+  }
+
+  void read_member(const Json& json, const std::string& name, std::optional<double>& iso) {
+    if (json == "otsu") return iso.reset();
+    if (!json.is_number() || !std::isfinite(json.get<double>())) {
+      return add(name, "must be a finite number or \"otsu\"");
+    }
+    iso = json.get<double>();
+  }
+
+  void read_member(const Json& json, const std::string& name, Scheme& value) {
+    if (json == 5) {
+      value = Scheme::kFive;
+    } else if (json == 6) {
+      value = Scheme::kSix;
+    } else {
+      add(name, "must be 5 or 6");
+    }
+  }
+
+  void read_member(const Json& json, const std::string& name, Enumeration auto& value) {
+    using Enum = std::remove_reference_t<decltype(value)>;
+    const auto known = json.is_string() ? from_string<Enum>(json.get<std::string>()) : std::nullopt;
+    if (!known) return add(name, "must be " + names_of<Enum>());
+    value = *known;
+  }
+
+  void read_member(const Json& json, const std::string& name, int& value) {
+    const auto [low, high] = range_of(name);
+    const bool whole = json.is_number() && std::floor(json.get<double>()) == json.get<double>();
+    if (!whole || json.get<double>() < low || json.get<double>() > high) {
+      return add(name, "must be a whole number from " + std::to_string(low) + " to " +
+                           std::to_string(high));
+    }
+    value = static_cast<int>(json.get<double>());
+  }
+
+  void read_member(const Json& json, const std::string& name, double& lambda) {
+    if (!json.is_number() || !(json.get<double>() > 0 && json.get<double>() <= 1)) {
+      return add(name, "must be a number above 0 and at most 1");
+    }
+    lambda = json.get<double>();
+  }
+
+  void read_member(const Json& json, const std::string& name, bool& value) {
+    if (!json.is_boolean()) return add(name, "must be true or false");
+    value = json.get<bool>();
+  }
+
+  void read_member(const Json& json, const std::string& name, std::vector<MeshFormat>& formats) {
+    if (!json.is_array() || json.empty()) {
+      return add(name, "must be a list of at least one of " + names_of<MeshFormat>());
+    }
+    formats.clear();
+    for (const Json& element : json) {
+      MeshFormat format{};
+      const std::size_t before = errors_.size();
+      read_member(element, name, format);
+      if (errors_.size() > before) return;
+      if (std::ranges::find(formats, format) == formats.end()) formats.push_back(format);
+    }
+  }
+
+  void read_member(const Json& json, const std::string& name, DracoParameters& value) {
+    if (!json.is_object()) return add(name, "must be an object");
+    read_object(json, value, name + ".");
+  }
+
+  static std::pair<int, int> range_of(const std::string& name) {
+    if (name == "passes") return {0, 1000};
+    if (name == "draco.position_bits") return {8, 30};
+    return {0, 10};  // draco.speed
+  }
+
+  bool as_in_query_ = false;
+  std::vector<FieldError> errors_;
+};
+
+// A query's text as the JSON value that the member would have had in a body.
+Json value_of(const std::string& text) {
+  const Json parsed = Json::parse(text, nullptr, false);
+  return parsed.is_number() || parsed.is_boolean() ? parsed : Json(text);
+}
+
+Json list_of(const std::string& text) {
+  Json list = Json::array();
+  std::size_t begin = 0;
+  while (begin <= text.size()) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    list.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return list;
+}
+
+JobParameters read_parameters(const Json& json, bool with_volume, RequestReader& reader) {
+  JobParameters parameters;
+  reader.read_object(json, parameters, "");
+  if (with_volume && !json.contains("volume")) reader.add("volume", "is required");
+  if (!json.contains("iso")) reader.add("iso", "is required");
+  reader.throw_if_any();
+  return parameters;
+}
+
+}  // namespace
+
+JobParameters parse_job_parameters(std::string_view body) {
+  const Json json = Json::parse(body, nullptr, false);
+  if (!json.is_object()) {
+    throw Error(ErrorCode::kInvalidParameter, "the body must be one JSON object");
+  }
+  RequestReader reader;
+  return read_parameters(json, true, reader);
+}
+
+JobParameters parse_job_parameters(const std::vector<std::pair<std::string, std::string>>& query) {
+  RequestReader reader;
+  std::vector<std::string> misplaced;
+  Json json = Json::object();
+  for (const auto& [name, text] : query) {
+    const bool of_draco = name == "position_bits" || name == "speed";
+    Json& owner = of_draco ? json["draco"] : json;
+    const std::string member = name == "format" ? "formats" : name;
+    if (name == "volume" || name == "draco" || name == "formats") {
+      misplaced.push_back(name);
+    } else if (owner.contains(member)) {
+      reader.add(name, "is given twice");
+    } else {
+      owner[member] = name == "format" ? list_of(text) : value_of(text);
+    }
+  }
+  for (const std::string& name : misplaced) {
+    reader.add(name, "is not a parameter of this request");
+  }
+  reader.name_as_in_query();
+  return read_parameters(json, false, reader);
+}
+
+}  // namespace isomesh
