@@ -80,6 +80,12 @@ std::string hex_of_base64(std::string_view text) {
   return store::to_hex({bytes.data(), store::Sha256::kBytes});
 }
 
+bool is_uid(std::string_view text) {
+  constexpr std::size_t kLongestUid = 64;
+  return !text.empty() && text.size() <= kLongestUid &&
+         text.find_first_not_of("0123456789.") == std::string_view::npos;
+}
+
 }  // namespace
 
 std::vector<std::pair<std::string, std::string>> query_of(const httplib::Request& request) {
@@ -134,6 +140,26 @@ const std::set<std::string>& raw_description_parameters() {
   static const std::set<std::string> names = {"dims",   "type",      "spacing",
                                               "origin", "direction", "byte_order"};
   return names;
+}
+
+const std::set<std::string>& import_parameters() {
+  static const std::set<std::string> names = [] {
+    std::set<std::string> all = raw_description_parameters();
+    all.insert("series");
+    return all;
+  }();
+  return names;
+}
+
+volume::ImportOptions import_options_of(const httplib::Request& request) {
+  volume::ImportOptions options{.raw = raw_description_of(request), .series = {}};
+  if (!request.has_param("series")) return options;
+  options.series = request.get_param_value("series");
+  if (!is_uid(options.series)) {
+    throw invalid_parameter("series", "must be a DICOM UID: digits and dots, at most 64 of them");
+  }
+  if (options.raw) throw invalid_parameter("series", "raw samples have no series");
+  return options;
 }
 
 std::optional<volume::RawDescription> raw_description_of(const httplib::Request& request) {

@@ -37,6 +37,12 @@ std::optional<volume::RawDescription> raw_description_of(const httplib::Request&
 // The names of the parameters that raw_description_of reads.
 const std::set<std::string>& raw_description_parameters();
 
+// What the query says about a body that is a volume: raw samples' description, the series to take.
+volume::ImportOptions import_options_of(const httplib::Request& request);
+
+// The names of the parameters that import_options_of reads.
+const std::set<std::string>& import_parameters();
+
 struct ByteRange {
   std::uint64_t first = 0;
   std::uint64_t length = 0;

@@ -69,7 +69,7 @@ void mesh_in_one(App& app, const httplib::Request& request, httplib::Response& r
   std::set<std::string> names;  // so far only checked for being there once
   for (const auto& parameter : query_of(request)) {
     names.insert(parameter.first);
-    if (!raw_description_parameters().contains(parameter.first)) job_query.push_back(parameter);
+    if (!import_parameters().contains(parameter.first)) job_query.push_back(parameter);
   }
   check_known(request, names);
   JobParameters parameters = parse_job_parameters(job_query);
@@ -77,12 +77,12 @@ void mesh_in_one(App& app, const httplib::Request& request, httplib::Response& r
     throw invalid_parameter("format", "must be one format: the answer is one file");
   }
   jobs::check_supported(parameters);
-  const auto raw = raw_description_of(request);
+  const volume::ImportOptions options = import_options_of(request);
   const auto place = app.uploads.try_take();
   if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
   {
     const Upload file(app.services.folder, app.options.upload, app.stopping, request, read_body);
-    parameters.volume = app.services.library.add(file.path(), raw).first.id;
+    parameters.volume = app.services.library.add(file.path(), options).first.id;
   }
   const std::string id = app.services.jobs.submit(parameters).id;
   response.set_header("Location", "/v1/jobs/" + id);

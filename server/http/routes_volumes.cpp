@@ -9,12 +9,12 @@ const std::string kVolumes = "/v1/volumes";
 
 void upload(App& app, const httplib::Request& request, httplib::Response& response,
             const httplib::ContentReader& read_body) {
-  check_known(request, raw_description_parameters());
-  const auto raw = raw_description_of(request);
+  check_known(request, import_parameters());
+  const volume::ImportOptions options = import_options_of(request);
   const auto place = app.uploads.try_take();
   if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
   const Upload file(app.services.folder, app.options.upload, app.stopping, request, read_body);
-  const auto [volume, is_new] = app.services.library.add(file.path(), raw);
+  const auto [volume, is_new] = app.services.library.add(file.path(), options);
   response.set_header("Location", kVolumes + '/' + volume.id);
   answer_json(response, is_new ? 201 : 200, to_json(volume));
 }

@@ -3,11 +3,12 @@
 namespace isomesh::jobs {
 
 std::pair<Volume, bool> VolumeLibrary::add(const std::filesystem::path& upload,
-                                           const std::optional<volume::RawDescription>& raw) {
+                                           const volume::ImportOptions& options) {
   const store::ScratchFolder scratch(folder_.scratch());
   const std::filesystem::path canonical = scratch.path() / "canonical";
-  Volume volume = raw ? volume::import_raw(upload, *raw, limits_, canonical)
-                      : volume::import_file(upload, scratch.path(), limits_, canonical);
+  Volume volume =
+      options.raw ? volume::import_raw(upload, *options.raw, limits_, canonical)
+                  : volume::import_file(upload, options.series, scratch.path(), limits_, canonical);
   const store::Blob blob = store::digest_of(canonical);
   const std::lock_guard lock(mutex_);
   blobs_.adopt(canonical, blob);

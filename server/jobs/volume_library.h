@@ -23,10 +23,10 @@ class VolumeLibrary {
                 const volume::ImportLimits& limits)
       : folder_(folder), blobs_(blobs), volumes_(volumes), jobs_(jobs), limits_(limits) {}
 
-  // Imports an uploaded file; `raw` describes it when it is bare samples. Second: false when the
-  // same samples and geometry were there already. Throws what the imports of volume/import.h throw.
+  // Imports an uploaded file. Second: false when the same samples and geometry were there already.
+  // Throws what the imports of volume/import.h throw.
   std::pair<Volume, bool> add(const std::filesystem::path& upload,
-                              const std::optional<volume::RawDescription>& raw);
+                              const volume::ImportOptions& options = {});
 
   // Throws Error kNotFound, and kNotReady while a job needs the volume.
   void erase(const std::string& id);

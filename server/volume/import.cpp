@@ -88,11 +88,15 @@ Volume import_plain(const InputFile& file, FileFormat format, const std::filesys
 
 }  // namespace
 
-Volume import_file(const std::filesystem::path& source, const std::filesystem::path& scratch,
-                   const ImportLimits& limits, const std::filesystem::path& target) {
+Volume import_file(const std::filesystem::path& source, const std::string& series,
+                   const std::filesystem::path& scratch, const ImportLimits& limits,
+                   const std::filesystem::path& target) {
   const InputFile file(source);
   const std::string head = file.text(0, kSniffBytes);
   const FileFormat format = format_of(head);
+  if (!series.empty()) {
+    throw invalid_parameter("series", "chooses among DICOM series, and this is no DICOM");
+  }
   if (!is_gzip(std::as_bytes(std::span(head)))) {
     return import_plain(file, format, scratch, limits, target);
   }

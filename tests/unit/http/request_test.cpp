@@ -240,6 +240,30 @@ TEST(RawDescription, KnowsItsParameters) {
               UnorderedElementsAre("dims", "type", "spacing", "origin", "direction", "byte_order"));
 }
 
+TEST(ImportOptionsOf, TakesASeries) {
+  const auto options = import_options_of(with_query({{"series", "1.2.840.113619.2.30"}}));
+  EXPECT_EQ(options.series, "1.2.840.113619.2.30");
+  EXPECT_FALSE(options.raw);
+  EXPECT_TRUE(import_options_of(with_query({})).series.empty());
+}
+
+TEST(ImportOptionsOf, RefusesASeriesThatIsNoUid) {
+  for (const std::string& series : {std::string(), std::string("1.2.x"), std::string("../1"),
+                                    std::string("1.2 "), std::string(65, '1')}) {
+    const auto error = thrown_by([&] { import_options_of(with_query({{"series", series}})); });
+    ASSERT_TRUE(error) << series;
+    EXPECT_THAT(fields_of(*error), ElementsAre("series"));
+  }
+}
+
+TEST(ImportOptionsOf, RawSamplesHaveNoSeries) {
+  const auto error = thrown_by([] {
+    import_options_of(with_query({{"dims", "3,4,5"}, {"type", "int16"}, {"series", "1.2"}}));
+  });
+  ASSERT_TRUE(error);
+  EXPECT_THAT(fields_of(*error), ElementsAre("series"));
+}
+
 // --- Queries and entity tags
 // -------------------------------------------------------------------------
 

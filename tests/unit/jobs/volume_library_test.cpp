@@ -20,10 +20,12 @@ class VolumeLibraryTest : public test::JobsFixture {
 
   std::pair<Volume, bool> add_bytes(const std::string& bytes, const Geometry& geometry = {}) {
     test::write_file(folder_ / "upload", bytes);
-    return library_.add(
-        folder_ / "upload",
-        volume::RawDescription{
-            .dims = kDims, .type = SampleType::kUint8, .geometry = geometry, .big_endian = false});
+    return library_.add(folder_ / "upload",
+                        {.raw = volume::RawDescription{.dims = kDims,
+                                                       .type = SampleType::kUint8,
+                                                       .geometry = geometry,
+                                                       .big_endian = false},
+                         .series = {}});
   }
 
   const std::string bytes_ = "abcdefghijklmnopqrstuvwx";
@@ -61,7 +63,7 @@ TEST_F(VolumeLibraryTest, OtherSamplesOrGeometryAreAnotherVolume) {
 TEST_F(VolumeLibraryTest, ARefusedUploadLeavesNothing) {
   EXPECT_EQ(code_thrown_by([&] { add_bytes("too short"); }), ErrorCode::kInvalidParameter);
   test::write_file(folder_ / "upload", "not a volume");
-  EXPECT_EQ(code_thrown_by([&] { library_.add(folder_ / "upload", std::nullopt); }),
+  EXPECT_EQ(code_thrown_by([&] { library_.add(folder_ / "upload"); }),
             ErrorCode::kUnsupportedMedia);
   EXPECT_TRUE(volumes_.list().empty());
   EXPECT_EQ(blob_count(), 0U);
@@ -105,7 +107,7 @@ TEST_F(VolumeLibraryTest, OfManyEqualUploadsOneIsNew) {
     threads.emplace_back([&] {
       const volume::RawDescription raw{
           .dims = kDims, .type = SampleType::kUint8, .geometry = {}, .big_endian = false};
-      if (library_.add(folder_ / "upload", raw).second) ++added;
+      if (library_.add(folder_ / "upload", {.raw = raw, .series = {}}).second) ++added;
     });
   }
   threads.clear();

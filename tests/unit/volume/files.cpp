@@ -63,7 +63,7 @@ Outcome import_bytes(std::string_view bytes, const ImportLimits& limits) {
   const Folder scratch;
   const auto source = folder.write("upload", bytes);
   Outcome outcome = outcome_of(folder, [&](const std::filesystem::path& target) {
-    return import_file(source, scratch.path(""), limits, target);
+    return import_file(source, {}, scratch.path(""), limits, target);
   });
   if (scratch.entries() != 0) throw std::logic_error("an import left files behind");
   return outcome;
