@@ -20,6 +20,40 @@ concept Enumeration = std::is_enum_v<T>;
 template <class Self, class T>
 concept Is = std::same_as<std::remove_const_t<Self>, T>;
 
+void visit(Is<Preset> auto& self, auto&& field) {
+  field("name", self.name);
+  field("iso", self.iso);
+}
+
+void visit(Is<IgnoredObject> auto& self, auto&& field) {
+  field("name", self.name);
+  field("reason", self.reason);
+}
+
+void visit(Is<DicomInstance> auto& self, auto&& field) {
+  field("sop_class_uid", self.sop_class_uid);
+  field("sop_instance_uid", self.sop_instance_uid);
+}
+
+void visit(Is<DicomIdentity> auto& self, auto&& field) {
+  field("patient_name", self.patient_name);
+  field("patient_id", self.patient_id);
+  field("patient_birth_date", self.patient_birth_date);
+  field("patient_sex", self.patient_sex);
+  field("study_uid", self.study_uid);
+  field("study_date", self.study_date);
+  field("study_time", self.study_time);
+  field("study_id", self.study_id);
+  field("study_description", self.study_description);
+  field("accession_number", self.accession_number);
+  field("referring_physician", self.referring_physician);
+  field("series_uid", self.series_uid);
+  field("series_description", self.series_description);
+  field("modality", self.modality);
+  field("frame_of_reference_uid", self.frame_of_reference_uid);
+  field("instances", self.instances);
+}
+
 void visit(Is<Volume> auto& self, auto&& field) {
   field("id", self.id);
   field("format", self.format);
@@ -32,6 +66,12 @@ void visit(Is<Volume> auto& self, auto&& field) {
   field("suggested_iso", self.suggested_iso);
   field("bytes", self.bytes);
   field("created", self.created);
+  field("modality", self.modality);
+  field("presets", self.presets);
+  field("ignored", self.ignored);
+  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? self.dicom.has_value() : true) {
+    field("dicom", self.dicom);
+  }
 }
 
 void visit(Is<DracoParameters> auto& self, auto&& field) {

@@ -116,9 +116,12 @@ void read(const Json& json, T& value) {
   } else {
     check_kind(json.is_object());
     visit(value, [&](const char* name, auto& member) {
-      // RFC 9457 requires no member of a problem.
+      // RFC 9457 requires no member of a problem; lists of a volume came after the first version.
+      using Member = std::remove_reference_t<decltype(member)>;
       constexpr bool kMayBeMissing =
-          std::is_same_v<T, Problem> || kIsOptional<std::remove_reference_t<decltype(member)>>;
+          std::is_same_v<T, Problem> || kIsOptional<Member> ||
+          (std::is_same_v<T, Volume> && !std::is_same_v<Member, std::string> &&
+           requires { member.emplace_back(); });
       if (const auto found = json.find(name); found != json.end()) {
         read_field(*found, member);
       } else if (!kMayBeMissing) {

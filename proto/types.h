@@ -39,9 +39,57 @@ struct Geometry {
   bool operator==(const Geometry&) const = default;
 };
 
+// An iso-value that is known to suit volumes of a kind.
+struct Preset {
+  std::string name;
+  double iso = 0;  // in the volume's units
+
+  bool operator==(const Preset&) const = default;
+};
+
+// Something in an upload that is no part of the volume.
+struct IgnoredObject {
+  std::string name;  // of the file or archive member, without folders
+  std::string reason;
+
+  bool operator==(const IgnoredObject&) const = default;
+};
+
+// A DICOM object that samples came from.
+struct DicomInstance {
+  std::string sop_class_uid;
+  std::string sop_instance_uid;
+
+  bool operator==(const DicomInstance&) const = default;
+};
+
+// Whose volume it is and what it was made from, as DICOM tells it, in UTF-8; empty where it does
+// not tell. What a mesh needs to be sent back with. Only for the volume's owner, and never in a
+// log.
+struct DicomIdentity {
+  std::string patient_name;
+  std::string patient_id;
+  std::string patient_birth_date;
+  std::string patient_sex;
+  std::string study_uid;
+  std::string study_date;
+  std::string study_time;
+  std::string study_id;
+  std::string study_description;
+  std::string accession_number;
+  std::string referring_physician;
+  std::string series_uid;
+  std::string series_description;
+  std::string modality;
+  std::string frame_of_reference_uid;
+  std::vector<DicomInstance> instances;  // in the order of the slices
+
+  bool operator==(const DicomIdentity&) const = default;
+};
+
 struct Volume {
   std::string id;      // hex SHA-256 of the canonical samples and geometry
-  std::string format;  // what was uploaded: "raw", "nifti", "nrrd", "metaimage"
+  std::string format;  // what was uploaded: "raw", "nifti", "nrrd", "metaimage", "dicom"
   std::array<std::uint32_t, 3> dims = {0, 0, 0};  // samples along x, y, z; x runs fastest
   SampleType type = SampleType::kUint8;
   Geometry geometry;
@@ -49,6 +97,10 @@ struct Volume {
   double suggested_iso = 0;              // Otsu's threshold
   std::uint64_t bytes = 0;               // of the samples
   std::string created;                   // RFC 3339, UTC
+  std::optional<std::string> modality;   // DICOM's: "CT", "MR", ...; empty when it is not told
+  std::vector<Preset> presets;           // within `range`
+  std::vector<IgnoredObject> ignored;
+  std::optional<DicomIdentity> dicom;  // of a volume that came as DICOM
 
   std::uint64_t sample_count() const { return std::uint64_t{dims[0]} * dims[1] * dims[2]; }
   bool operator==(const Volume&) const = default;

@@ -11,12 +11,15 @@ namespace isomesh::volume {
 namespace {
 
 constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
-constexpr int kZlibOrGzip = MAX_WBITS + 32;
+
+int window_bits(Wrapping wrapping) {
+  return wrapping == Wrapping::kNone ? -MAX_WBITS : MAX_WBITS + 32;
+}
 
 class Inflater {
  public:
-  Inflater() {
-    if (inflateInit2(&stream_, kZlibOrGzip) != Z_OK) {
+  explicit Inflater(Wrapping wrapping = Wrapping::kZlibOrGzip) {
+    if (inflateInit2(&stream_, window_bits(wrapping)) != Z_OK) {
       throw Error(ErrorCode::kInternal, "zlib cannot start.");
     }
   }
@@ -108,8 +111,8 @@ std::string inflate_head(std::span<const std::byte> head, std::size_t count) {
 }
 
 std::uint64_t inflate_range(const InputFile& file, const CompressedRange& range,
-                            std::uint64_t limit, const ByteSink& sink) {
-  Inflater inflater;
+                            std::uint64_t limit, const ByteSink& sink, Wrapping wrapping) {
+  Inflater inflater(wrapping);
   z_stream& stream = inflater.stream();
   Feed feed(file, range);
   std::vector<std::byte> output(kPieceBytes);

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "proto/error.h"
+#include "server/volume/dicom.h"
 #include "server/volume/files.h"
 #include "server/volume/geometry.h"
 #include "server/volume/gzip.h"
@@ -25,7 +26,7 @@ FileFormat format_of(const std::string& head) {
   const auto format = sniff(std::as_bytes(std::span(head)));
   if (format) return *format;
   throw Error(ErrorCode::kUnsupportedMedia,
-              "The file is not NIfTI, NRRD or MetaImage; raw samples need dims and type.");
+              "The file is not NIfTI, NRRD, MetaImage or DICOM; raw samples need dims and type.");
 }
 
 void check_limits(const SourceVolume& volume, const ImportLimits& limits) {
@@ -93,6 +94,9 @@ Volume import_file(const std::filesystem::path& source, const std::string& serie
                    const std::filesystem::path& target) {
   const InputFile file(source);
   const std::string head = file.text(0, kSniffBytes);
+  if (is_dicom(std::as_bytes(std::span(head)))) {
+    return import_dicom(std::array{source}, "", limits, target);
+  }
   const FileFormat format = format_of(head);
   if (!series.empty()) {
     throw invalid_parameter("series", "chooses among DICOM series, and this is no DICOM");

@@ -1,7 +1,8 @@
 #include "server/volume/transfer.h"
 
+#include <utility>
+
 #include "proto/error.h"
-#include "server/volume/canonical.h"
 #include "server/volume/source.h"
 #include "server/volume/statistics.h"
 
@@ -12,6 +13,10 @@ Volume write_canonical(const PlainSamples& samples, Volume volume,
   volume.type = canonical_type(samples.layout);
   CanonicalWriter writer(target, {volume.dims, volume.type, volume.geometry});
   read_samples(samples.file, samples.offset, samples.layout, writer.samples());
+  return finish(writer, std::move(volume));
+}
+
+Volume finish(CanonicalWriter& writer, Volume volume) {
   const Statistics statistics = measure(writer.samples(), volume.type);
   if (statistics.non_finite > 0) {
     throw_unusable(std::to_string(statistics.non_finite) + " of its " +

@@ -29,7 +29,37 @@ Volume some_volume() {
           .range = {-1024, 3071.5},
           .suggested_iso = 59.25,
           .bytes = 18446744073709551615U,
-          .created = "2024-05-01T10:00:00.123Z"};
+          .created = "2024-05-01T10:00:00.123Z",
+          .modality = {},
+          .presets = {},
+          .ignored = {},
+          .dicom = {}};
+}
+
+Volume dicom_volume() {
+  Volume volume = some_volume();
+  volume.format = "dicom";
+  volume.modality = "CT";
+  volume.presets = {{"skin", -300}, {"bone", 250}};
+  volume.ignored = {{"DICOMDIR", "it is a directory of DICOM files"}};
+  volume.dicom = DicomIdentity{.patient_name = "M\xc3\xbcller^Eva",
+                               .patient_id = "4711",
+                               .patient_birth_date = "19700101",
+                               .patient_sex = "F",
+                               .study_uid = "1.2.3",
+                               .study_date = "20240501",
+                               .study_time = "101112",
+                               .study_id = "S1",
+                               .study_description = "head",
+                               .accession_number = "A1",
+                               .referring_physician = "Roe^Jane",
+                               .series_uid = "1.2.3.4",
+                               .series_description = "axial",
+                               .modality = "CT",
+                               .frame_of_reference_uid = "1.2.3.5",
+                               .instances = {{"1.2.840.10008.5.1.4.1.1.2", "1.2.3.4.1"},
+                                             {"1.2.840.10008.5.1.4.1.1.2", "1.2.3.4.2"}}};
+  return volume;
 }
 
 JobParameters some_parameters() {
@@ -111,13 +141,26 @@ TEST(AnswerJson, SpellsAVolumeAsTheContractDoes) {
   const auto written = nlohmann::ordered_json::parse(to_json(some_volume()));
   std::vector<std::string> names;
   for (const auto& [name, value] : written.items()) names.push_back(name);
-  EXPECT_THAT(names, ElementsAre("id", "format", "dims", "type", "spacing", "origin", "direction",
-                                 "range", "suggested_iso", "bytes", "created"));
+  EXPECT_THAT(names,
+              ElementsAre("id", "format", "dims", "type", "spacing", "origin", "direction", "range",
+                          "suggested_iso", "bytes", "created", "modality", "presets", "ignored"));
+  EXPECT_TRUE(written["modality"].is_null());
   EXPECT_EQ(written["dims"], json({181, 217, 4294967295}));
   EXPECT_EQ(written["type"], "float32");
   EXPECT_EQ(written["direction"], json({0, 1, 0, -1, 0, 0, 0, 0, 1}));
   EXPECT_EQ(written["range"], json({-1024, 3071.5}));
   EXPECT_EQ(written["bytes"], 18446744073709551615U);
+}
+
+TEST(AnswerJson, SpellsWhatDicomTellsOfAVolume) {
+  const auto written = json::parse(to_json(dicom_volume()));
+  EXPECT_EQ(written["modality"], "CT");
+  EXPECT_EQ(written["presets"], json::parse(R"([{"name": "skin", "iso": -300},
+                                                {"name": "bone", "iso": 250}])"));
+  EXPECT_EQ(written["ignored"], json::parse(R"([{"name": "DICOMDIR",
+                                      "reason": "it is a directory of DICOM files"}])"));
+  EXPECT_EQ(written["dicom"]["patient_name"], "M\xc3\xbcller^Eva");
+  EXPECT_EQ(written["dicom"]["instances"][1]["sop_instance_uid"], "1.2.3.4.2");
 }
 
 TEST(AnswerJson, SpellsParametersAsTheContractDoes) {
@@ -192,7 +235,7 @@ TEST(AnswerJson, ListsSayWhereTheNextPageIs) {
 TEST(AnswerJson, VolumesComeBackTheSame) {
   EXPECT_EQ(volume_from_json(to_json(some_volume())), some_volume());
   EXPECT_EQ(volume_from_json(to_json(Volume{})), Volume{});
-  const std::vector<Volume> several = {some_volume(), Volume{}, some_volume()};
+  const std::vector<Volume> several = {some_volume(), Volume{}, dicom_volume()};
   EXPECT_EQ(volumes_from_json(to_json(several)), several);
 }
 
@@ -251,6 +294,14 @@ TEST(AnswerJson, BytesThatAreNotUtf8AreReplaced) {
 
 // --- From other versions, and from nobody
 // ----------------------------------------------------------
+
+TEST(AnswerJson, VolumesOfTheFirstVersionAreRead) {
+  json volume = json::parse(to_json(dicom_volume()));
+  for (const char* name : {"modality", "presets", "ignored", "dicom"}) volume.erase(name);
+  Volume expected = some_volume();
+  expected.format = "dicom";
+  EXPECT_EQ(volume_from_json(volume.dump()), expected);
+}
 
 TEST(AnswerJson, UnknownMembersAreIgnored) {
   json volume = json::parse(to_json(some_volume()));

@@ -1,0 +1,289 @@
+#include "server/volume/dicom_parser.h"
+
+#include <algorithm>
+#include <array>
+
+#include "server/volume/dicom_tags.h"
+#include "server/volume/source.h"
+
+namespace isomesh::volume::dicom {
+namespace {
+
+constexpr std::uint32_t kUndefinedLength = 0xFFFFFFFF;
+constexpr unsigned kDeepestSequence = 32;
+constexpr std::size_t kMostElements = std::size_t{1} << 21;
+constexpr std::size_t kWindowBytes = std::size_t{1} << 16;
+
+// The two ways in which data sets are written.
+struct Encoding {
+  bool is_explicit = true;
+  bool big_endian = false;
+};
+
+// What stands before an element's value.
+struct Head {
+  Tag tag = 0;
+  std::string vr;  // empty when it is implicit
+  std::uint32_t length = 0;
+
+  bool has_undefined_length() const { return length == kUndefinedLength; }
+};
+
+bool is_letter(char letter) { return letter >= 'A' && letter <= 'Z'; }
+
+// Those whose length has 16 bits; all others, and all to come, have 32 after two reserved bytes.
+bool has_short_length(std::string_view vr) {
+  static constexpr std::array<std::string_view, 21> kShort = {
+      "AE", "AS", "AT", "CS", "DA", "DS", "DT", "FD", "FL", "IS", "LO",
+      "LT", "PN", "SH", "SL", "SS", "ST", "TM", "UI", "UL", "US"};
+  return std::find(kShort.begin(), kShort.end(), vr) != kShort.end();
+}
+
+// The sequences that a volume needs; implicit ones do not say that they are sequences.
+bool is_needed_sequence(Tag tag) {
+  switch (tag) {
+    case kFrameContentSequence:
+    case kPlanePositionSequence:
+    case kPlaneOrientationSequence:
+    case kModalityLutSequence:
+    case kPixelMeasuresSequence:
+    case kPixelValueTransformationSequence:
+    case kSharedFunctionalGroups:
+    case kPerFrameFunctionalGroups:
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool is_private(Tag tag) { return (tag >> 16 & 1U) != 0; }
+
+bool is_pixel_data(Tag tag) {
+  return tag == kPixelData || tag == kFloatPixelData || tag == kDoubleFloatPixelData;
+}
+
+class Parser {
+ public:
+  Parser(const InputFile& file, std::uint64_t offset) : file_(file), at_(offset) {}
+
+  std::uint64_t position() const { return at_; }
+  std::uint64_t end() const { return file_.size(); }
+
+  MetaInformation meta_information() {
+    MetaInformation meta;
+    const Encoding encoding;
+    while (end() - at_ >= 8 && number(at_, 2, false) == 2) {
+      const Head head = read_head(encoding, end());
+      const std::string stored = read_value(head, end());
+      const std::string_view value = without_padding(stored);
+      if (head.tag == kTransferSyntaxUid) meta.transfer_syntax = value;
+      if (head.tag == kMediaStorageSopClassUid) meta.sop_class_uid = value;
+      if (head.tag == kMediaStorageSopInstanceUid) meta.sop_instance_uid = value;
+    }
+    meta.end = at_;
+    return meta;
+  }
+
+  // True when the element at the position names its value representation.
+  bool looks_explicit() {
+    if (end() - at_ < 8) return true;
+    const std::string_view head = window(at_, 8);
+    return is_letter(head[4]) && is_letter(head[5]);
+  }
+
+  ParsedFile file(const Encoding& encoding) {
+    ParsedFile result;
+    result.data.big_endian = encoding.big_endian;
+    while (at_ < end()) {
+      // Zeros and other remains of media that are read in blocks.
+      if (end() - at_ < 8 || number(at_, 4, encoding.big_endian) == 0) break;
+      const Head head = read_head(encoding, end());
+      if (is_pixel_data(head.tag)) {
+        result.pixels = read_pixels(head, encoding);
+        break;
+      }
+      read_element(head, encoding, end(), 0, result.data);
+    }
+    return result;
+  }
+
+ private:
+  // Bytes that are known to be there.
+  std::string_view window(std::uint64_t offset, std::size_t count) {
+    if (offset < window_begin_ || offset + count > window_begin_ + window_.size()) {
+      window_ = file_.text(offset, std::max(kWindowBytes, count));
+      window_begin_ = offset;
+    }
+    return std::string_view(window_).substr(offset - window_begin_, count);
+  }
+
+  std::uint32_t number(std::uint64_t offset, std::size_t bytes, bool big_endian) {
+    const std::string_view text = window(offset, bytes);
+    std::uint32_t result = 0;
+    for (std::size_t i = 0; i < bytes; ++i) {
+      result = result << 8 | static_cast<unsigned char>(text[big_endian ? i : bytes - 1 - i]);
+    }
+    return result;
+  }
+
+  Tag read_tag(bool big_endian) {
+    const Tag tag = number(at_, 2, big_endian) << 16 | number(at_ + 2, 2, big_endian);
+    at_ += 4;
+    return tag;
+  }
+
+  // Throws unless `bytes` more lie before `limit`.
+  void require(std::uint64_t bytes, std::uint64_t limit, Tag tag) const {
+    if (limit >= at_ && bytes <= limit - at_) return;
+    const std::string name = is_pixel_data(tag) ? "pixel data"
+                             : tag == 0         ? "data set"
+                                                : "element " + to_text(tag);
+    const std::string there = std::to_string(limit > at_ ? limit - at_ : 0);
+    throw_unusable("The DICOM file is truncated or corrupt: its " + name + " takes " +
+                   std::to_string(bytes) + " bytes, and " + there + " are there.");
+  }
+
+  Head read_head(const Encoding& encoding, std::uint64_t limit) {
+    require(8, limit, 0);
+    Head head;
+    head.tag = read_tag(encoding.big_endian);
+    if (!encoding.is_explicit || head.tag >> 16 == kItem >> 16) {
+      head.length = number(at_, 4, encoding.big_endian);
+      at_ += 4;
+      return head;
+    }
+    head.vr = window(at_, 2);
+    if (!is_letter(head.vr[0]) || !is_letter(head.vr[1])) {
+      throw_unusable("The DICOM file is corrupt: its element " + to_text(head.tag) +
+                     " has no value representation.");
+    }
+    if (has_short_length(head.vr)) {
+      head.length = number(at_ + 2, 2, encoding.big_endian);
+      at_ += 4;
+      return head;
+    }
+    require(8, limit, head.tag);
+    head.length = number(at_ + 4, 4, encoding.big_endian);
+    at_ += 8;
+    return head;
+  }
+
+  std::string read_value(const Head& head, std::uint64_t limit) {
+    require(head.length, limit, head.tag);
+    std::string value;
+    if (head.length <= kLongestValue) value = window(at_, head.length);
+    at_ += head.length;
+    return value;
+  }
+
+  void keep(DataSet& set, Element element) {
+    if (is_private(element.tag)) return;
+    if (++kept_ > kMostElements) {
+      throw_unusable("The DICOM file has more than " + std::to_string(kMostElements) +
+                     " elements.");
+    }
+    set.elements.push_back(std::move(element));
+  }
+
+  void read_element(const Head& head, const Encoding& encoding, std::uint64_t limit, unsigned depth,
+                    DataSet& set) {
+    Element element;
+    element.tag = head.tag;
+    const bool is_sequence =
+        head.vr == "SQ" || head.has_undefined_length() || is_needed_sequence(head.tag);
+    if (is_sequence) {
+      // What came through a system that did not know it is written as implicit ones are.
+      const Encoding inside = head.vr == "UN" ? Encoding{false, false} : encoding;
+      read_items(head, inside, limit, depth + 1, element);
+    } else {
+      element.value = read_value(head, limit);
+    }
+    keep(set, std::move(element));
+  }
+
+  void read_items(const Head& head, const Encoding& encoding, std::uint64_t limit, unsigned depth,
+                  Element& sequence) {
+    if (depth > kDeepestSequence) {
+      throw_unusable("The DICOM file is corrupt: more than " + std::to_string(kDeepestSequence) +
+                     " sequences lie in one another.");
+    }
+    const bool has_end = !head.has_undefined_length();
+    if (has_end) require(head.length, limit, head.tag);
+    const std::uint64_t end = has_end ? at_ + head.length : limit;
+    while (!has_end || at_ < end) {
+      const Head item = read_head(encoding, end);
+      if (item.tag == kSequenceEnd) return;
+      if (item.tag != kItem) {
+        throw_unusable("The DICOM file is corrupt: its sequence " + to_text(sequence.tag) +
+                       " holds something that is no item.");
+      }
+      DataSet set = read_item(item, encoding, end, depth);
+      if (!is_private(sequence.tag)) sequence.items.push_back(std::move(set));
+    }
+  }
+
+  DataSet read_item(const Head& item, const Encoding& encoding, std::uint64_t limit,
+                    unsigned depth) {
+    const bool has_end = !item.has_undefined_length();
+    if (has_end) require(item.length, limit, kItem);
+    const std::uint64_t end = has_end ? at_ + item.length : limit;
+    DataSet set;
+    set.big_endian = encoding.big_endian;
+    while (!has_end || at_ < end) {
+      const Head head = read_head(encoding, end);
+      if (head.tag == kItemEnd) break;
+      read_element(head, encoding, end, depth, set);
+    }
+    return set;
+  }
+
+  PixelElement read_pixels(const Head& head, const Encoding& encoding) {
+    PixelElement pixels;
+    pixels.tag = head.tag;
+    pixels.is_words = head.vr == "OW";
+    pixels.is_encapsulated = head.has_undefined_length();
+    if (!pixels.is_encapsulated) {
+      require(head.length, end(), head.tag);
+      pixels.native = {at_, head.length};
+      return pixels;
+    }
+    for (bool is_table = true;; is_table = false) {
+      const Head item = read_head(encoding, end());
+      if (item.tag == kSequenceEnd) return pixels;
+      if (item.tag != kItem || item.has_undefined_length()) {
+        throw_unusable("The DICOM file is corrupt: its compressed pixel data is not in items.");
+      }
+      require(item.length, end(), kPixelData);
+      if (is_table) {
+        for (std::uint64_t next = at_; next + 4 <= at_ + item.length; next += 4) {
+          pixels.frame_offsets.push_back(number(next, 4, false));
+        }
+      } else {
+        pixels.fragments.push_back({at_, item.length});
+      }
+      at_ += item.length;
+    }
+  }
+
+  const InputFile& file_;
+  std::uint64_t at_;
+  std::string window_;
+  std::uint64_t window_begin_ = 0;
+  std::size_t kept_ = 0;
+};
+
+}  // namespace
+
+MetaInformation parse_meta_information(const InputFile& file, std::uint64_t offset) {
+  if (file.size() < offset) throw_unusable("The DICOM file is truncated: it ends in its preamble.");
+  return Parser(file, offset).meta_information();
+}
+
+ParsedFile parse_data_set(const InputFile& file, std::uint64_t offset,
+                          std::string_view transfer_syntax) {
+  Parser parser(file, offset);
+  const bool big_endian = transfer_syntax == kExplicitBigEndian;
+  return parser.file({big_endian || parser.looks_explicit(), big_endian});
+}
+
+}  // namespace isomesh::volume::dicom

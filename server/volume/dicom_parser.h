@@ -1,0 +1,26 @@
+// Bytes -> elements (DICOM PS3.5, chapter 7, and PS3.10).
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "server/volume/dicom_dataset.h"
+
+namespace isomesh::volume::dicom {
+
+// The group 0002, which begins at `offset`. Throws Error kUnusableVolume.
+MetaInformation parse_meta_information(const InputFile& file, std::uint64_t offset);
+
+struct ParsedFile {
+  DataSet data;
+  std::optional<PixelElement> pixels;
+};
+
+// The data set from `offset` on, up to its pixels; nothing that a volume needs follows them.
+// Whether value representations are written out is seen from the first element, because some
+// writers tell the wrong syntax. Throws Error kUnusableVolume when an element reaches beyond what
+// surrounds it, sequences lie too deep in one another, or there are too many elements.
+ParsedFile parse_data_set(const InputFile& file, std::uint64_t offset,
+                          std::string_view transfer_syntax);
+
+}  // namespace isomesh::volume::dicom

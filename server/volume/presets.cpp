@@ -1,0 +1,29 @@
+#include "server/volume/presets.h"
+
+namespace isomesh::volume {
+namespace {
+
+struct Row {
+  std::string_view name;
+  double hounsfield;
+};
+
+// Air is -1000 and water 0. Skin lies where air ends. Soft tissue lies midway between fat (about
+// -100) and muscle and organs (about 50), so fat is left out. Bone begins above what contrast agent
+// and calcified tissue commonly reach.
+constexpr Row kPresets[] = {{"skin", -300}, {"soft tissue", -25}, {"bone", 250}};
+
+}  // namespace
+
+std::vector<Preset> presets_for(std::string_view modality, std::string_view rescale_type,
+                                const std::array<double, 2>& range) {
+  std::vector<Preset> presets;
+  if (modality != "CT" || (!rescale_type.empty() && rescale_type != "HU")) return presets;
+  for (const Row& row : kPresets) {
+    if (row.hounsfield <= range[0] || row.hounsfield > range[1]) continue;
+    presets.push_back({std::string(row.name), row.hounsfield});
+  }
+  return presets;
+}
+
+}  // namespace isomesh::volume
