@@ -160,4 +160,28 @@ void visit(Is<Job> auto& self, auto&& field) {
   field("error", self.error);
 }
 
+void visit(Is<Histogram> auto& self, auto&& field) {
+  field("volume", self.volume);
+  field("range", self.range);
+  field("counts", self.counts);
+}
+
+void visit(Is<Estimate::Queue> auto& self, auto&& field) {
+  field("queued", self.queued);
+  field("running", self.running);
+}
+
+void visit(Is<Estimate> auto& self, auto&& field) {
+  field("volume", self.volume);
+  field("iso", self.iso);
+  field("scheme", self.scheme);
+  field("triangles", self.triangles);
+  field("vertices", self.vertices);
+  field("bytes", self.bytes);
+  field("memory_bytes", self.memory_bytes);
+  field("fits", self.fits);
+  field("milliseconds", self.milliseconds);
+  field("queue", self.queue);
+}
+
 }  // namespace isomesh

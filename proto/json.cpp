@@ -9,6 +9,11 @@
 namespace isomesh {
 namespace {
 
+template <class T>
+constexpr bool kIsPerFormat = false;
+template <class T>
+constexpr bool kIsPerFormat<std::map<MeshFormat, T>> = true;
+
 // --- Writing -------------------------------------------------------------------------------------
 
 template <class T>
@@ -40,7 +45,7 @@ Json write(const T& value) {
     return static_cast<int>(value);
   } else if constexpr (Enumeration<T>) {
     return std::string(to_string(value));
-  } else if constexpr (std::is_same_v<T, std::map<MeshFormat, MeshFile>>) {
+  } else if constexpr (kIsPerFormat<T>) {
     Json object = Json::object();
     for (const auto& [format, file] : value) object[std::string(to_string(format))] = write(file);
     return object;
@@ -100,7 +105,7 @@ void read(const Json& json, T& value) {
     const auto known = from_string<T>(json.get<std::string>());
     if (!known) throw Error(ErrorCode::kInternal, "the server's answer names an unknown value");
     value = *known;
-  } else if constexpr (std::is_same_v<T, std::map<MeshFormat, MeshFile>>) {
+  } else if constexpr (kIsPerFormat<T>) {
     check_kind(json.is_object());
     for (const auto& [name, file] : json.items()) {
       if (const auto format = from_string<MeshFormat>(name)) read(file, value[*format]);
@@ -149,6 +154,8 @@ std::string to_json(const Volume& volume) { return to_text(volume); }
 std::string to_json(const Job& job) { return to_text(job); }
 std::string to_json(const JobParameters& parameters) { return to_text(parameters); }
 std::string to_json(const Problem& problem) { return to_text(problem); }
+std::string to_json(const Histogram& histogram) { return to_text(histogram); }
+std::string to_json(const Estimate& estimate) { return to_text(estimate); }
 
 std::string to_json(const std::vector<Volume>& volumes) {
   return Json{{"volumes", write(volumes)}}.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -162,6 +169,8 @@ std::string to_json(const std::vector<Job>& jobs, const std::string& next) {
 Volume volume_from_json(std::string_view text) { return from_text<Volume>(text); }
 Job job_from_json(std::string_view text) { return from_text<Job>(text); }
 Problem problem_from_json(std::string_view text) { return from_text<Problem>(text); }
+Histogram histogram_from_json(std::string_view text) { return from_text<Histogram>(text); }
+Estimate estimate_from_json(std::string_view text) { return from_text<Estimate>(text); }
 
 std::vector<Volume> volumes_from_json(std::string_view text) {
   return from_text<std::vector<Volume>>(text, "volumes");

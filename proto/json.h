@@ -18,6 +18,8 @@ std::string to_json(const Volume& volume);
 std::string to_json(const Job& job);
 std::string to_json(const JobParameters& parameters);
 std::string to_json(const Problem& problem);
+std::string to_json(const Histogram& histogram);
+std::string to_json(const Estimate& estimate);
 std::string to_json(const std::vector<Volume>& volumes);  // {"volumes": [...]}
 // {"jobs": [...], "next": cursor}; `next` is null on the last page.
 std::string to_json(const std::vector<Job>& jobs, const std::string& next = "");
@@ -26,6 +28,8 @@ std::string to_json(const std::vector<Job>& jobs, const std::string& next = "");
 Volume volume_from_json(std::string_view text);
 Job job_from_json(std::string_view text);
 Problem problem_from_json(std::string_view text);
+Histogram histogram_from_json(std::string_view text);
+Estimate estimate_from_json(std::string_view text);
 std::vector<Volume> volumes_from_json(std::string_view text);
 std::vector<Job> jobs_from_json(std::string_view text);
 
@@ -33,9 +37,14 @@ std::vector<Job> jobs_from_json(std::string_view text);
 // unknown, missing, of the wrong type or out of range.
 JobParameters parse_job_parameters(std::string_view body);
 
-// The same from the query of POST /v1/mesh, where everything is text: `format` (several, separated
-// by commas) stands for `formats`, `position_bits` and `speed` for the members of `draco`. The
-// volume is the request's body and stays empty here.
-JobParameters parse_job_parameters(const std::vector<std::pair<std::string, std::string>>& query);
+// The same from a query, where everything is text: `format` (several, separated by commas) stands
+// for `formats`, `position_bits` and `speed` for the members of `draco`. The volume is a parameter
+// of its own, or the request's body and then stays empty here.
+enum class VolumeIn { kQuery, kBody };
+JobParameters parse_job_parameters(const std::vector<std::pair<std::string, std::string>>& query,
+                                   VolumeIn volume_in = VolumeIn::kBody);
+
+// What a query calls the member of a body: `format` for `formats`, `speed` for `draco.speed`.
+std::string spelled_in_query(const std::string& member);
 
 }  // namespace isomesh

@@ -43,10 +43,7 @@ class RequestReader {
 
  private:
   std::string spelled(const std::string& field) const {
-    constexpr std::string_view kDraco = "draco.";
-    if (!as_in_query_) return field;
-    if (field == "formats") return "format";
-    return field.starts_with(kDraco) ? field.substr(kDraco.size()) : field;
+    return as_in_query_ ? spelled_in_query(field) : field;
   }
 
   static constexpr std::size_t kMostErrors = 20;
@@ -161,6 +158,12 @@ JobParameters read_parameters(const Json& json, bool with_volume, RequestReader&
 
 }  // namespace
 
+std::string spelled_in_query(const std::string& member) {
+  constexpr std::string_view kDraco = "draco.";
+  if (member == "formats") return "format";
+  return member.starts_with(kDraco) ? member.substr(kDraco.size()) : member;
+}
+
 JobParameters parse_job_parameters(std::string_view body) {
   const Json json = Json::parse(body, nullptr, false);
   if (!json.is_object()) {
@@ -170,7 +173,8 @@ JobParameters parse_job_parameters(std::string_view body) {
   return read_parameters(json, true, reader);
 }
 
-JobParameters parse_job_parameters(const std::vector<std::pair<std::string, std::string>>& query) {
+JobParameters parse_job_parameters(const std::vector<std::pair<std::string, std::string>>& query,
+                                   VolumeIn volume_in) {
   RequestReader reader;
   std::vector<std::string> misplaced;
   Json json = Json::object();
@@ -178,19 +182,20 @@ JobParameters parse_job_parameters(const std::vector<std::pair<std::string, std:
     const bool of_draco = name == "position_bits" || name == "speed";
     Json& owner = of_draco ? json["draco"] : json;
     const std::string member = name == "format" ? "formats" : name;
-    if (name == "volume" || name == "draco" || name == "formats") {
+    const bool is_text = name == "volume" && volume_in == VolumeIn::kQuery;
+    if ((name == "volume" && !is_text) || name == "draco" || name == "formats") {
       misplaced.push_back(name);
     } else if (owner.contains(member)) {
       reader.add(name, "is given twice");
     } else {
-      owner[member] = name == "format" ? list_of(text) : value_of(text);
+      owner[member] = is_text ? Json(text) : name == "format" ? list_of(text) : value_of(text);
     }
   }
   for (const std::string& name : misplaced) {
     reader.add(name, "is not a parameter of this request");
   }
   reader.name_as_in_query();
-  return read_parameters(json, false, reader);
+  return read_parameters(json, volume_in == VolumeIn::kQuery, reader);
 }
 
 }  // namespace isomesh

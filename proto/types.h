@@ -202,6 +202,38 @@ struct Job {
   bool operator==(const Job&) const = default;
 };
 
+// How often samples have which values: bins of equal width over the volume's range.
+struct Histogram {
+  std::string volume;
+  std::array<double, 2> range = {0, 0};  // where the first bin begins and the last one ends
+  std::vector<std::uint64_t> counts;     // of each bin
+
+  bool operator==(const Histogram&) const = default;
+};
+
+// What a job with these parameters would make and take.
+struct Estimate {
+  struct Queue {
+    std::uint64_t queued = 0;
+    std::uint64_t running = 0;
+
+    bool operator==(const Queue&) const = default;
+  };
+
+  std::string volume;
+  double iso = 0;  // Otsu's threshold where that was asked for
+  Scheme scheme = Scheme::kSix;
+  std::uint64_t triangles = 0;  // exact, as `vertices`
+  std::uint64_t vertices = 0;
+  std::map<MeshFormat, std::uint64_t> bytes;  // of each file
+  std::uint64_t memory_bytes = 0;             // at the job's peak, beside its mapped volume
+  bool fits = false;                          // whether one job may take that much
+  double milliseconds = 0;                    // of the run, without the time in the queue
+  Queue queue;
+
+  bool operator==(const Estimate&) const = default;
+};
+
 // The names that the API uses for the values of the enumerations above.
 std::string_view to_string(SampleType value);
 std::string_view to_string(Interpolation value);

@@ -16,6 +16,8 @@
 #include <unistd.h>
 
 #include "server/http/server.h"
+#include "server/jobs/estimate.h"
+#include "server/jobs/histograms.h"
 #include "server/jobs/memory.h"
 #include "server/jobs/volume_library.h"
 #include "server/jobs/workers.h"
@@ -137,7 +139,9 @@ int run(const Options& options, const sigset_t& signals) {
   const jobs::PipelineLimits limits = {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
   jobs::Workers workers(options.workers, jobs, volumes, blobs, limits);
-  http::Server server({folder, blobs, volumes, jobs, library}, options.http);
+  jobs::Histograms histograms(blobs);
+  jobs::Estimator estimator(volumes, blobs, jobs, limits);
+  http::Server server({folder, blobs, volumes, jobs, library, histograms, estimator}, options.http);
 
   const std::string url = server.bind(address);
   std::cout << "listening on " << url << std::endl;

@@ -9,6 +9,7 @@
 #include <httplib.h>
 #include <openssl/evp.h>
 
+#include "server/jobs/pipeline.h"
 #include "server/store/files.h"
 
 namespace isomesh::http {
@@ -107,6 +108,19 @@ void check_known(const httplib::Request& request, const std::set<std::string>& k
   if (!errors.empty()) throw invalid_parameters(std::move(errors));
 }
 
+JobParameters job_parameters_of(const std::vector<std::pair<std::string, std::string>>& query,
+                                VolumeIn volume_in) {
+  JobParameters parameters = parse_job_parameters(query, volume_in);
+  try {
+    jobs::check_supported(parameters);
+  } catch (const Error& error) {
+    std::vector<FieldError> fields = error.fields();
+    for (FieldError& field : fields) field.field = spelled_in_query(field.field);
+    throw invalid_parameters(std::move(fields));
+  }
+  return parameters;
+}
+
 std::chrono::milliseconds wait_of(const httplib::Request& request) {
   const bool in_query = request.has_param("wait");
   const std::optional<std::string> text =
@@ -194,6 +208,28 @@ std::optional<volume::RawDescription> raw_description_of(const httplib::Request&
     raw.big_endian = order == "big";
   }
   return raw;
+}
+
+std::uint64_t whole_number_of(const httplib::Request& request, const std::string& name,
+                              const WholeNumbers& among, std::uint64_t otherwise) {
+  if (!request.has_param(name.c_str())) return otherwise;
+  const auto number = number_of<std::uint64_t>(request.get_param_value(name.c_str()));
+  if (!number || *number < among.low || *number > among.high) {
+    throw invalid_parameter(name, "must be a whole number from " + std::to_string(among.low) +
+                                      " to " + std::to_string(among.high));
+  }
+  return *number;
+}
+
+std::optional<std::array<double, 2>> interval_of(const httplib::Request& request,
+                                                 const std::string& name) {
+  if (!request.has_param(name.c_str())) return std::nullopt;
+  const auto interval = numbers_of<double, 2>(name, request.get_param_value(name.c_str()));
+  const bool finite = std::isfinite(interval[0]) && std::isfinite(interval[1]);
+  if (!finite || interval[0] >= interval[1]) {
+    throw invalid_parameter(name, "must be two finite numbers, the smaller first");
+  }
+  return interval;
 }
 
 std::optional<ByteRange> range_of(const httplib::Request& request, std::uint64_t size) {

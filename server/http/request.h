@@ -2,6 +2,7 @@
 // what is malformed throws Error kInvalidParameter that names the header or parameter.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -11,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "proto/json.h"
+#include "proto/types.h"
 #include "server/volume/import.h"
 
 namespace httplib {
@@ -24,6 +27,11 @@ std::vector<std::pair<std::string, std::string>> query_of(const httplib::Request
 
 // Refuses parameters that are not among `known`.
 void check_known(const httplib::Request& request, const std::set<std::string>& known);
+
+// A job's parameters from a query, as parse_job_parameters (proto/json.h) reads them; refuses also
+// what this version does not serve.
+JobParameters job_parameters_of(const std::vector<std::pair<std::string, std::string>>& query,
+                                VolumeIn volume_in);
 
 // How long the answer may wait: `?wait=N` or `Prefer: wait=N` in seconds, at most 30.
 std::chrono::milliseconds wait_of(const httplib::Request& request);
@@ -42,6 +50,19 @@ volume::ImportOptions import_options_of(const httplib::Request& request);
 
 // The names of the parameters that import_options_of reads.
 const std::set<std::string>& import_parameters();
+
+struct WholeNumbers {
+  std::uint64_t low = 0;
+  std::uint64_t high = 0;
+};
+
+// The parameter's value, which must be among those; `otherwise` without the parameter.
+std::uint64_t whole_number_of(const httplib::Request& request, const std::string& name,
+                              const WholeNumbers& among, std::uint64_t otherwise);
+
+// Two finite numbers of which the second is greater; empty without the parameter.
+std::optional<std::array<double, 2>> interval_of(const httplib::Request& request,
+                                                 const std::string& name);
 
 struct ByteRange {
   std::uint64_t first = 0;

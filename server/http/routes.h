@@ -62,6 +62,7 @@ void answer_mesh(const App& app, const httplib::Request& request, httplib::Respo
 void add_volume_routes(App& app);
 void add_job_routes(App& app);
 void add_mesh_routes(App& app);
+void add_survey_routes(App& app);
 void add_service_routes(App& app);
 
 }  // namespace isomesh::http

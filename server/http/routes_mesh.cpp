@@ -9,7 +9,6 @@
 #include "server/codec/encode.h"
 #include "server/http/request.h"
 #include "server/http/routes.h"
-#include "server/jobs/pipeline.h"
 
 namespace isomesh::http {
 namespace {
@@ -72,11 +71,10 @@ void mesh_in_one(App& app, const httplib::Request& request, httplib::Response& r
     if (!import_parameters().contains(parameter.first)) job_query.push_back(parameter);
   }
   check_known(request, names);
-  JobParameters parameters = parse_job_parameters(job_query);
+  JobParameters parameters = job_parameters_of(job_query, VolumeIn::kBody);
   if (parameters.formats.size() != 1) {
     throw invalid_parameter("format", "must be one format: the answer is one file");
   }
-  jobs::check_supported(parameters);
   const volume::ImportOptions options = import_options_of(request);
   const auto place = app.uploads.try_take();
   if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");

@@ -207,6 +207,7 @@ Server::Server(const Services& services, const ServerOptions& options)
   add_volume_routes(state_->app);
   add_job_routes(state_->app);
   add_mesh_routes(state_->app);
+  add_survey_routes(state_->app);
   add_service_routes(state_->app);
 }
 
@@ -252,6 +253,7 @@ void Server::begin_drain() {
 
 void Server::stop() {
   state_->app.stopping = true;
+  state_->app.services.estimator.stop();
   state_->app.services.jobs.close();
   state_->app.http.stop();
 }

@@ -6,6 +6,8 @@
 #include <string>
 
 #include "server/http/upload.h"
+#include "server/jobs/estimate.h"
+#include "server/jobs/histograms.h"
 #include "server/jobs/volume_library.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
@@ -42,6 +44,8 @@ struct Services {
   const store::VolumeStore& volumes;
   store::JobStore& jobs;
   jobs::VolumeLibrary& library;
+  jobs::Histograms& histograms;
+  jobs::Estimator& estimator;
 };
 
 // Thread safe where said.

@@ -157,6 +157,12 @@ std::vector<Job> JobStore::list(std::optional<JobState> state, const std::string
   return result;
 }
 
+std::size_t JobStore::count(JobState state) const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<std::size_t>(
+      std::ranges::count(jobs_, state, [](const auto& named) { return named.second.job.state; }));
+}
+
 bool JobStore::needs_volume(const std::string& volume) const {
   const std::lock_guard lock(mutex_);
   return std::ranges::any_of(jobs_, [&](const auto& named) {

@@ -77,6 +77,9 @@ class JobStore {
   std::vector<Job> list(std::optional<JobState> state, const std::string& after,
                         std::size_t limit) const;
 
+  // How many jobs are in that state.
+  std::size_t count(JobState state) const;
+
   // True while a queued or running job needs the volume.
   bool needs_volume(const std::string& volume) const;
 

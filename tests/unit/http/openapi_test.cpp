@@ -30,6 +30,7 @@ class OpenApi : public testing::Test {
     add_volume_routes(app_);
     add_job_routes(app_);
     add_mesh_routes(app_);
+    add_survey_routes(app_);
     add_service_routes(app_);
   }
 
@@ -53,7 +54,10 @@ class OpenApi : public testing::Test {
   store::VolumeStore volumes_{data_};
   store::JobStore jobs_{blobs_, store::JobStore::Limits{}};
   jobs::VolumeLibrary library_{data_, blobs_, volumes_, jobs_, volume::ImportLimits{}};
-  App app_{Services{data_, blobs_, volumes_, jobs_, library_}, ServerOptions{}};
+  jobs::Histograms histograms_{blobs_};
+  jobs::Estimator estimator_{volumes_, blobs_, jobs_, jobs::PipelineLimits{}};
+  App app_{Services{data_, blobs_, volumes_, jobs_, library_, histograms_, estimator_},
+           ServerOptions{}};
   const YAML::Node description_ = YAML::LoadFile(ISOMESH_OPENAPI);
 };
 

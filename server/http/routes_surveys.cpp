@@ -1,0 +1,101 @@
+// What a person looks at before starting a job: histograms, slices, estimates.
+#include <array>
+#include <charconv>
+#include <memory>
+
+#include "proto/json.h"
+#include "server/http/request.h"
+#include "server/http/routes.h"
+#include "server/volume/slice.h"
+
+namespace isomesh::http {
+namespace {
+
+constexpr std::uint64_t kMostBins = 65536;
+constexpr std::uint64_t kUsualBins = 256;
+
+// A volume never changes under its id, so neither does what is made of it.
+constexpr const char* kForever = "private, max-age=31536000, immutable";
+
+// Sets the headers of what never changes. True when the client has it already; then the answer is
+// complete.
+bool is_known(const httplib::Request& request, httplib::Response& response,
+              const std::string& etag) {
+  response.set_header("ETag", etag);
+  response.set_header("Cache-Control", kForever);
+  if (!matches_etag(request, etag)) return false;
+  response.status = 304;
+  return true;
+}
+
+std::string text_of(double value) {
+  std::array<char, 32> text = {};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  return {text.data(), end};
+}
+
+void histogram(App& app, const httplib::Request& request, httplib::Response& response) {
+  check_known(request, {"bins"});
+  const Volume volume = app.services.volumes.get(id_of(request));
+  const std::uint64_t bins = whole_number_of(request, "bins", {1, kMostBins}, kUsualBins);
+  if (is_known(request, response, '"' + volume.id + ".bins" + std::to_string(bins) + '"')) return;
+  response.status = 200;
+  response.set_content(to_json(app.services.histograms.of(volume, bins)), "application/json");
+}
+
+volume::SliceChoice slice_choice(const httplib::Request& request, const Volume& volume) {
+  volume::SliceChoice choice;
+  if (request.has_param("axis")) {
+    const auto axis = volume::axis_of(request.get_param_value("axis"));
+    if (!axis) throw invalid_parameter("axis", R"(must be "x", "y" or "z")");
+    choice.axis = *axis;
+  }
+  const std::uint32_t slices = volume.dims.at(static_cast<std::size_t>(choice.axis));
+  choice.index =
+      static_cast<std::uint32_t>(whole_number_of(request, "index", {0, slices - 1}, slices / 2));
+  choice.window = interval_of(request, "window").value_or(volume.range);
+  return choice;
+}
+
+void slice(App& app, const httplib::Request& request, httplib::Response& response) {
+  check_known(request, {"axis", "index", "window"});
+  const Volume volume = app.services.volumes.get(id_of(request));
+  const volume::SliceChoice choice = slice_choice(request, volume);
+  const std::string etag = '"' + volume.id + '.' + std::string(to_string(choice.axis)) +
+                           std::to_string(choice.index) + '.' + text_of(choice.window[0]) + '.' +
+                           text_of(choice.window[1]) + '"';
+  if (is_known(request, response, etag)) return;
+  const auto canonical =
+      std::make_shared<const volume::CanonicalVolume>(app.services.blobs.path_of(volume.id));
+  const auto picture = std::make_shared<volume::SlicePng>(canonical, choice);
+  response.status = 200;
+  response.set_header("Accept-Ranges", "none");
+  response.set_chunked_content_provider("image/png",
+                                        [picture](std::size_t /*offset*/, httplib::DataSink& sink) {
+                                          const std::string_view bytes = picture->next();
+                                          if (bytes.empty()) {
+                                            sink.done();
+                                            return true;
+                                          }
+                                          return sink.write(bytes.data(), bytes.size());
+                                        });
+}
+
+void estimate(App& app, const httplib::Request& request, httplib::Response& response) {
+  const JobParameters parameters = job_parameters_of(query_of(request), VolumeIn::kQuery);
+  answer_json(response, 200, to_json(app.services.estimator.estimate(parameters)));
+}
+
+}  // namespace
+
+void add_survey_routes(App& app) {
+  const std::string volume = "/v1/volumes/" + kId;
+  add_get(app, volume + "/histogram",
+          [&app](const auto& request, auto& response) { histogram(app, request, response); });
+  add_get(app, volume + "/slice\\.png",
+          [&app](const auto& request, auto& response) { slice(app, request, response); });
+  add_get(app, "/v1/estimate",
+          [&app](const auto& request, auto& response) { estimate(app, request, response); });
+}
+
+}  // namespace isomesh::http

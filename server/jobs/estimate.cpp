@@ -1,0 +1,184 @@
+#include "server/jobs/estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "server/mesh/extract.h"
+#include "server/volume/canonical.h"
+#include "server/volume/samples.h"
+
+namespace isomesh::jobs {
+namespace {
+
+// First guesses, from an 7.1 million voxel head of five million triangles on two cores.
+constexpr double kMillisecondsPerJob = 1;
+constexpr double kLoadPerSample = 1.3e-6;
+constexpr double kExtractPerSample = 1.0e-6;
+constexpr double kExtractPerTriangle = 1.6e-5;
+constexpr double kConnectivityPerTriangle = 1.0e-5;
+constexpr double kSmoothPerTriangleAndPass = 3.0e-6;
+constexpr double kMeasurePerTriangle = 3.0e-5;
+constexpr double kUsualPositionBits = 14;
+
+// Calibrating looks at these many finished jobs, the youngest.
+constexpr std::size_t kJobsLookedAt = 50;
+
+double as_double(std::uint64_t count) { return static_cast<double>(count); }
+
+double load_ms(std::uint64_t samples) { return kLoadPerSample * as_double(samples); }
+
+double extract_ms(const SurfaceSize& surface, std::uint64_t samples) {
+  return kExtractPerSample * as_double(samples) +
+         kExtractPerTriangle * as_double(surface.triangles);
+}
+
+double smooth_ms(const SurfaceSize& surface, const JobParameters& parameters) {
+  if (parameters.passes == 0) return 0;
+  return as_double(surface.triangles) *
+         (kConnectivityPerTriangle + kSmoothPerTriangleAndPass * parameters.passes);
+}
+
+double encode_ms_per_triangle(MeshFormat format) {
+  switch (format) {
+    case MeshFormat::kDrc:
+      return 3.0e-4;
+    case MeshFormat::kGlb:
+      return 1.5e-4;
+    case MeshFormat::kStl:
+      return 3.0e-5;
+    case MeshFormat::kPly:
+      return 3.0e-5;
+    case MeshFormat::kObj:
+      break;
+  }
+  return 2.0e-4;
+}
+
+// Formats are written side by side, so the slowest counts whole and the others by half.
+double encode_ms(const SurfaceSize& surface, const JobParameters& parameters) {
+  double slowest = kMeasurePerTriangle;
+  double sum = kMeasurePerTriangle;
+  for (const MeshFormat format : parameters.formats) {
+    slowest = std::max(slowest, encode_ms_per_triangle(format));
+    sum += encode_ms_per_triangle(format);
+  }
+  return as_double(surface.triangles) * (slowest + (sum - slowest) / 2);
+}
+
+double guessed_bytes(MeshFormat format, const SurfaceSize& surface,
+                     const JobParameters& parameters) {
+  const double triangles = as_double(surface.triangles);
+  const double vertices = as_double(surface.vertices);
+  // A bit more for a coordinate is about a bit more for each coordinate of each vertex.
+  const double more_bits = 3 * (parameters.draco.position_bits - kUsualPositionBits) / 8;
+  constexpr double kSmallestPerVertex = 1;
+  switch (format) {
+    case MeshFormat::kDrc:
+      return 100 + vertices * std::max(kSmallestPerVertex, 3.2 + more_bits);
+    case MeshFormat::kGlb:
+      return 2000 + vertices * std::max(kSmallestPerVertex, 3.3 + more_bits);
+    case MeshFormat::kStl:
+      return 84 + 50 * triangles;
+    case MeshFormat::kPly:
+      return 300 + 12 * vertices + 13 * triangles;
+    case MeshFormat::kObj:
+      break;
+  }
+  return 100 + 30 * vertices + 24 * triangles;
+}
+
+template <class T>
+SurfaceSize count_as(const volume::CanonicalVolume& canonical, const mesh::ExtractOptions& options,
+                     const std::stop_token& stop) {
+  const volume::CanonicalHeader& header = canonical.header();
+  const mesh::Lattice<T> lattice = {reinterpret_cast<const T*>(canonical.samples().data()),
+                                    {header.dims[0], header.dims[1], header.dims[2]},
+                                    mesh::lattice_to_space(header.geometry)};
+  const mesh::SurfaceCount count = count_surface(lattice, options, {stop, nullptr});
+  return {count.triangles(), count.vertices()};
+}
+
+}  // namespace
+
+void CostModel::learn(const Job& job, std::uint64_t samples) {
+  if (!job.mesh || job.timing.encode <= 0) return;
+  const SurfaceSize surface = {job.mesh->triangles, job.mesh->vertices};
+  const auto add = [](Correction& correction, double seen, double guessed) {
+    correction.seen += seen;
+    correction.guessed += guessed;
+  };
+  add(extract_, job.timing.extract, extract_ms(surface, samples));
+  add(smooth_, job.timing.smooth, smooth_ms(surface, job.parameters));
+  add(encode_, job.timing.encode, encode_ms(surface, job.parameters));
+  for (const auto& [format, file] : job.mesh->files) {
+    add(files_.at(static_cast<std::size_t>(format)), as_double(file.bytes),
+        guessed_bytes(format, surface, job.parameters));
+  }
+}
+
+double CostModel::milliseconds(const SurfaceSize& surface, std::uint64_t samples,
+                               const JobParameters& parameters) const {
+  return kMillisecondsPerJob + load_ms(samples) + extract_.factor() * extract_ms(surface, samples) +
+         smooth_.factor() * smooth_ms(surface, parameters) +
+         encode_.factor() * encode_ms(surface, parameters);
+}
+
+std::uint64_t CostModel::file_bytes(MeshFormat format, const SurfaceSize& surface,
+                                    const JobParameters& parameters) const {
+  const double factor = files_.at(static_cast<std::size_t>(format)).factor();
+  return static_cast<std::uint64_t>(
+      std::llround(factor * guessed_bytes(format, surface, parameters)));
+}
+
+Estimate Estimator::estimate(const JobParameters& parameters) {
+  const Volume volume = volumes_.get(parameters.volume);
+  Estimate estimate;
+  estimate.volume = volume.id;
+  estimate.iso = parameters.iso.value_or(volume.suggested_iso);
+  estimate.scheme = parameters.scheme;
+  const SurfaceSize surface = count(volume, estimate.iso, parameters.scheme);
+  estimate.triangles = surface.triangles;
+  estimate.vertices = surface.vertices;
+  estimate.memory_bytes = estimate_memory(surface.vertices, surface.triangles, parameters);
+  estimate.fits = estimate.memory_bytes <= limits_.memory_bytes;
+  const CostModel costs = model();
+  estimate.milliseconds = costs.milliseconds(surface, volume.sample_count(), parameters);
+  for (const MeshFormat format : parameters.formats) {
+    estimate.bytes[format] = costs.file_bytes(format, surface, parameters);
+  }
+  estimate.queue = {jobs_.count(JobState::kQueued), jobs_.count(JobState::kRunning)};
+  return estimate;
+}
+
+SurfaceSize Estimator::count(const Volume& volume, double iso, Scheme scheme) {
+  const auto size = counts_.get({volume.id, iso, scheme}, [&] {
+    const volume::CanonicalVolume canonical(blobs_.path_of(volume.id));
+    const mesh::ExtractOptions options = {.iso = iso, .scheme = scheme};
+    SurfaceSize counted;
+    volume::with_sample(volume::stored_type(volume.type), [&](auto sample) {
+      using Sample = decltype(sample);
+      if constexpr (!std::is_same_v<Sample, std::uint64_t> &&
+                    !std::is_same_v<Sample, std::int64_t>) {
+        counted = count_as<Sample>(canonical, options, stop_.get_token());
+      }
+    });
+    return counted;
+  });
+  return *size;
+}
+
+CostModel Estimator::model() const {
+  CostModel costs;
+  std::map<std::string, std::uint64_t> samples;
+  for (const Job& job : jobs_.list(JobState::kSucceeded, "", kJobsLookedAt)) {
+    const std::string& id = job.parameters.volume;
+    if (!volumes_.contains(id)) continue;
+    const auto [known, is_new] = samples.try_emplace(id);
+    if (is_new) known->second = volumes_.get(id).sample_count();
+    costs.learn(job, known->second);
+  }
+  return costs;
+}
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,95 @@
+// What a job would take, told before it runs.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <stop_token>
+#include <string>
+#include <tuple>
+
+#include "proto/types.h"
+#include "server/jobs/memo.h"
+#include "server/jobs/pipeline.h"
+#include "server/store/blob_store.h"
+#include "server/store/job_store.h"
+#include "server/store/volume_store.h"
+
+namespace isomesh::jobs {
+
+// The size of a surface without its vertices.
+struct SurfaceSize {
+  std::uint64_t triangles = 0;
+  std::uint64_t vertices = 0;
+};
+
+// How a job's time and files follow from its surface: first guesses, corrected by the jobs that
+// have finished. Plain values.
+class CostModel {
+ public:
+  // Takes a job that succeeded into account; `samples` is the size of its volume. Jobs without a
+  // run of their own, whose stages took no time, change nothing.
+  void learn(const Job& job, std::uint64_t samples);
+
+  // Load to encode, in milliseconds, without the queue.
+  double milliseconds(const SurfaceSize& surface, std::uint64_t samples,
+                      const JobParameters& parameters) const;
+
+  // Of one file. Exact for STL.
+  std::uint64_t file_bytes(MeshFormat format, const SurfaceSize& surface,
+                           const JobParameters& parameters) const;
+
+ private:
+  // What was seen and what the first guess had said, of which the quotient corrects the next one.
+  // Both begin with some weight, so that a few small jobs do not turn it over.
+  struct Correction {
+    double seen;
+    double guessed;
+
+    double factor() const { return seen / guessed; }
+  };
+
+  static constexpr Correction kFewMilliseconds = {20, 20};
+  static constexpr Correction kFewBytes = {100'000, 100'000};
+
+  Correction extract_ = kFewMilliseconds;
+  Correction smooth_ = kFewMilliseconds;
+  Correction encode_ = kFewMilliseconds;
+  std::array<Correction, 5> files_ = {kFewBytes, kFewBytes, kFewBytes, kFewBytes,
+                                      kFewBytes};  // by format
+};
+
+// Estimates jobs on stored volumes. Counts of the last surfaces are kept. Thread safe; what it is
+// made of must outlive it.
+class Estimator {
+ public:
+  Estimator(const store::VolumeStore& volumes, const store::BlobStore& blobs,
+            const store::JobStore& jobs, const PipelineLimits& limits)
+      : volumes_(volumes), blobs_(blobs), jobs_(jobs), limits_(limits) {}
+
+  // Triangles and vertices are exact; the rest follows from them and from the jobs that this daemon
+  // has finished. Throws Error kNotFound without the volume, kUnavailable when too many wait for an
+  // estimate already or after stop().
+  Estimate estimate(const JobParameters& parameters);
+
+  // Ends the counting that is under way, for good.
+  void stop() { stop_.request_stop(); }
+
+ private:
+  // Volume, iso-value, scheme.
+  using Surface = std::tuple<std::string, double, Scheme>;
+
+  static constexpr std::size_t kSurfaces = 1024;
+  static constexpr std::size_t kMostWaiting = 6;
+
+  SurfaceSize count(const Volume& volume, double iso, Scheme scheme);
+  CostModel model() const;
+
+  const store::VolumeStore& volumes_;
+  const store::BlobStore& blobs_;
+  const store::JobStore& jobs_;
+  const PipelineLimits limits_;
+  std::stop_source stop_;
+  Memo<Surface, SurfaceSize> counts_{kSurfaces, kMostWaiting};
+};
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "proto/types.h"
+#include "server/jobs/memo.h"
+#include "server/store/blob_store.h"
+#include "server/volume/histogram.h"
+
+namespace isomesh::jobs {
+
+// Histograms of stored volumes. The first one of a volume reads all of its samples; the counts of
+// the last kVolumes volumes are kept, so that others of any width cost nothing. Thread safe;
+// `blobs` must outlive it.
+class Histograms {
+ public:
+  static constexpr std::size_t kVolumes = 32;  // half a megabyte each at most
+  static constexpr std::size_t kMostWaiting = 6;
+
+  explicit Histograms(const store::BlobStore& blobs) : blobs_(blobs) {}
+
+  // Throws Error kUnavailable when too many wait for one already, kInternal.
+  Histogram of(const Volume& volume, std::size_t bins);
+
+ private:
+  const store::BlobStore& blobs_;
+  Memo<std::string, volume::ValueCounts> counts_{kVolumes, kMostWaiting};
+};
+
+}  // namespace isomesh::jobs

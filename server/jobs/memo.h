@@ -1,0 +1,108 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <future>
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "proto/error.h"
+
+namespace isomesh::jobs {
+
+// Answers that are dear to find and never change: the last ones are kept, and one that several ask
+// for at a time is found once. Thread safe.
+template <class Key, class Value>
+class Memo {
+ public:
+  // Keeps `capacity` answers, and lets at most `most_waiting` callers find or wait for one.
+  Memo(std::size_t capacity, std::size_t most_waiting)
+      : capacity_(capacity), most_waiting_(most_waiting) {}
+
+  // The answer to `key`, by `find` when it is not there. Throws Error kUnavailable when too many
+  // callers wait already, and what `find` throws; then nothing is kept.
+  std::shared_ptr<const Value> get(const Key& key, const std::function<Value()>& find) {
+    std::promise<std::shared_ptr<const Value>> promise;
+    std::shared_future<std::shared_ptr<const Value>> answer;
+    bool is_mine = false;
+    {
+      const std::lock_guard lock(mutex_);
+      if (const auto known = answers_.find(key); known != answers_.end()) {
+        order_.splice(order_.begin(), order_, known->second.place);
+        answer = known->second.answer;
+      }
+      const bool is_ready =
+          answer.valid() && answer.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+      if (is_ready) return answer.get();
+      if (waiting_ >= most_waiting_) {
+        throw Error(ErrorCode::kUnavailable, "too many requests of this kind are under way");
+      }
+      ++waiting_;
+      if (!answer.valid()) {
+        is_mine = true;
+        answer = promise.get_future().share();
+        order_.push_front(key);
+        answers_.emplace(key, Entry{answer, order_.begin()});
+        forget_oldest();
+      }
+    }
+    const Leave leave(*this);
+    if (is_mine) fulfil(key, find, promise);
+    return answer.get();
+  }
+
+ private:
+  struct Entry {
+    std::shared_future<std::shared_ptr<const Value>> answer;
+    typename std::list<Key>::iterator place;
+  };
+
+  // Gives the caller's place among the waiting ones back.
+  class Leave {
+   public:
+    explicit Leave(Memo& memo) : memo_(memo) {}
+    ~Leave() {
+      const std::lock_guard lock(memo_.mutex_);
+      --memo_.waiting_;
+    }
+    Leave(const Leave&) = delete;
+    Leave& operator=(const Leave&) = delete;
+
+   private:
+    Memo& memo_;
+  };
+
+  void fulfil(const Key& key, const std::function<Value()>& find,
+              std::promise<std::shared_ptr<const Value>>& promise) {
+    try {
+      promise.set_value(std::make_shared<const Value>(find()));
+    } catch (...) {
+      promise.set_exception(std::current_exception());
+      const std::lock_guard lock(mutex_);
+      if (const auto failed = answers_.find(key); failed != answers_.end()) {
+        order_.erase(failed->second.place);
+        answers_.erase(failed);
+      }
+    }
+  }
+
+  // Those that still wait for it hold its future themselves.
+  void forget_oldest() {
+    while (order_.size() > capacity_) {
+      answers_.erase(order_.back());
+      order_.pop_back();
+    }
+  }
+
+  const std::size_t capacity_;
+  const std::size_t most_waiting_;
+  std::mutex mutex_;      // guards everything below
+  std::list<Key> order_;  // the last asked for first
+  std::map<Key, Entry> answers_;
+  std::size_t waiting_ = 0;
+};
+
+}  // namespace isomesh::jobs

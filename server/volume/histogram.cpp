@@ -1,0 +1,54 @@
+#include "server/volume/histogram.h"
+
+#include <algorithm>
+
+#include "server/volume/statistics.h"
+
+namespace isomesh::volume {
+namespace {
+
+constexpr std::size_t kMostValues = 65536;
+
+bool is_integer(SampleType type) {
+  return type != SampleType::kFloat32 && type != SampleType::kFloat64;
+}
+
+// Halves, because the difference of two doubles may be beyond the largest double.
+double half_width(const std::array<double, 2>& range) { return range[1] / 2 - range[0] / 2; }
+
+// Where the counts' b-th value lies within the range, 0..1.
+double position_of(const ValueCounts& values, std::size_t b) {
+  const auto count = static_cast<double>(values.counts.size());
+  if (!values.exact) return (static_cast<double>(b) + 0.5) / count;
+  return values.counts.size() > 1 ? static_cast<double>(b) / (count - 1) : 0;
+}
+
+}  // namespace
+
+ValueCounts no_values(SampleType type, const std::array<double, 2>& range) {
+  ValueCounts values;
+  values.range = range;
+  values.exact = is_integer(type) && half_width(range) * 2 < static_cast<double>(kMostValues);
+  values.counts.resize(values.exact ? static_cast<std::size_t>(range[1] - range[0]) + 1
+                                    : kMostValues);
+  return values;
+}
+
+void add_values(std::span<const std::byte> samples, SampleType type, ValueCounts& counts) {
+  // With half a step added on both sides each integer is the middle of its bin.
+  const double margin = counts.exact ? 0.5 : 0;
+  const std::vector<std::uint64_t> more = histogram(
+      samples, type, {{counts.range[0] - margin, counts.range[1] + margin}, counts.counts.size()});
+  std::ranges::transform(more, counts.counts, counts.counts.begin(), std::plus());
+}
+
+std::vector<std::uint64_t> rebinned(const ValueCounts& values, std::size_t bins) {
+  std::vector<std::uint64_t> result(bins);
+  for (std::size_t b = 0; b < values.counts.size(); ++b) {
+    const double at = position_of(values, b) * static_cast<double>(bins);
+    result[std::min(static_cast<std::size_t>(at), bins - 1)] += values.counts[b];
+  }
+  return result;
+}
+
+}  // namespace isomesh::volume

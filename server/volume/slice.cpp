@@ -1,0 +1,180 @@
+#include "server/volume/slice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <csetjmp>
+
+#include <png.h>
+
+#include "proto/error.h"
+#include "server/volume/samples.h"
+
+namespace isomesh::volume {
+namespace {
+
+constexpr std::size_t kBlockBytes = 64 * 1024;
+constexpr int kCompression = 3;  // slices are looked at once: time matters more than the last tenth
+
+// Which of the volume's axes run along a picture's columns and rows.
+struct Plane {
+  std::size_t fixed;
+  std::size_t column;
+  std::size_t row;
+};
+
+Plane plane_of(Axis axis) {
+  switch (axis) {
+    case Axis::kX:
+      return {0, 1, 2};
+    case Axis::kY:
+      return {1, 0, 2};
+    case Axis::kZ:
+      break;
+  }
+  return {2, 0, 1};
+}
+
+std::uint8_t grey(double value, const std::array<double, 2>& window) {
+  if (!(value > window[0])) return 0;
+  if (value >= window[1]) return 255;
+  // Halves, because the difference of two doubles may be beyond the largest double.
+  const double half_width = window[1] / 2 - window[0] / 2;
+  return static_cast<std::uint8_t>(std::lround((value / 2 - window[0] / 2) / half_width * 255));
+}
+
+void append(png_struct* png, png_byte* data, std::size_t size) {
+  auto* bytes = static_cast<std::string*>(png_get_io_ptr(png));
+  try {
+    bytes->append(reinterpret_cast<const char*>(data), size);
+  } catch (...) {
+    png_error(png, "out of memory");  // an exception must not cross the library
+  }
+}
+
+void flush(png_struct* /*png*/) {}
+
+void jump(png_struct* png, const char* /*message*/) { png_longjmp(png, 1); }
+
+void be_silent(png_struct* /*png*/, const char* /*message*/) {}
+
+}  // namespace
+
+// The library's state. It reports errors by jumping, so each of these functions is where it jumps
+// to, and holds nothing that would have to be destroyed on the way.
+struct SlicePng::Writer {
+  explicit Writer(std::string& bytes) {
+    png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, jump, be_silent);
+    info = png == nullptr ? nullptr : png_create_info_struct(png);
+    if (info == nullptr) {
+      png_destroy_write_struct(&png, nullptr);
+      throw std::bad_alloc();
+    }
+    png_set_write_fn(png, &bytes, append, flush);
+  }
+  ~Writer() { png_destroy_write_struct(&png, &info); }
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
+
+  bool begin(std::uint32_t width, std::uint32_t height, const std::array<double, 2>& spacing) {
+    if (setjmp(png_jmpbuf(png)) != 0) return false;
+    png_set_IHDR(png, info, width, height, 8, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
+                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    const double across = 1000 / spacing[0];  // pixels a metre
+    const double down = 1000 / spacing[1];
+    constexpr double kMost = 2147483647;
+    if (std::min(across, down) >= 1 && std::max(across, down) <= kMost) {
+      png_set_pHYs(png, info, static_cast<png_uint_32>(std::lround(across)),
+                   static_cast<png_uint_32>(std::lround(down)), PNG_RESOLUTION_METER);
+    }
+    png_set_compression_level(png, kCompression);
+    png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_UP);
+    png_write_info(png, info);
+    return true;
+  }
+
+  bool write(const std::uint8_t* row) {
+    if (setjmp(png_jmpbuf(png)) != 0) return false;
+    png_write_row(png, row);
+    return true;
+  }
+
+  bool end() {
+    if (setjmp(png_jmpbuf(png)) != 0) return false;
+    png_write_end(png, nullptr);
+    return true;
+  }
+
+  png_struct* png = nullptr;
+  png_info* info = nullptr;
+};
+
+namespace {
+
+void check(bool written) {
+  if (!written) throw Error(ErrorCode::kInternal, "a slice could not be written as PNG");
+}
+
+}  // namespace
+
+std::optional<Axis> axis_of(std::string_view name) {
+  if (name == "x") return Axis::kX;
+  if (name == "y") return Axis::kY;
+  if (name == "z") return Axis::kZ;
+  return std::nullopt;
+}
+
+std::string_view to_string(Axis axis) {
+  return axis == Axis::kX ? "x" : axis == Axis::kY ? "y" : "z";
+}
+
+SlicePng::SlicePng(std::shared_ptr<const CanonicalVolume> volume, const SliceChoice& choice)
+    : volume_(std::move(volume)), choice_(choice) {
+  const CanonicalHeader& header = volume_->header();
+  const Plane plane = plane_of(choice.axis);
+  width_ = header.dims[plane.column];
+  height_ = header.dims[plane.row];
+  row_.resize(width_);
+  writer_ = std::make_unique<Writer>(bytes_);
+  check(
+      writer_->begin(width_, height_,
+                     {header.geometry.spacing[plane.column], header.geometry.spacing[plane.row]}));
+}
+
+SlicePng::~SlicePng() = default;
+
+std::string_view SlicePng::next() {
+  bytes_.erase(0, taken_);
+  while (next_row_ <= height_ && bytes_.size() < kBlockBytes) write_row();
+  taken_ = bytes_.size();
+  return bytes_;
+}
+
+// The row after the last is the file's end.
+void SlicePng::write_row() {
+  if (next_row_ < height_) {
+    read_row(next_row_);
+    check(writer_->write(row_.data()));
+  } else {
+    check(writer_->end());
+  }
+  ++next_row_;
+}
+
+void SlicePng::read_row(std::uint32_t row) {
+  const CanonicalHeader& header = volume_->header();
+  const Plane plane = plane_of(choice_.axis);
+  const std::array<std::uint64_t, 3> stride = {1, header.dims[0],
+                                               std::uint64_t{header.dims[0]} * header.dims[1]};
+  const std::uint64_t first =
+      choice_.index * stride[plane.fixed] + std::uint64_t{row} * stride[plane.row];
+  const std::uint64_t step = stride[plane.column];
+  with_sample(stored_type(header.type), [&](auto sample) {
+    using Sample = decltype(sample);
+    const auto* at = reinterpret_cast<const Sample*>(volume_->samples().data()) + first;
+    for (std::uint32_t column = 0; column < width_; ++column) {
+      row_[column] = grey(static_cast<double>(at[column * step]), choice_.window);
+    }
+  });
+}
+
+}  // namespace isomesh::volume

@@ -1,0 +1,64 @@
+// One slice of a canonical volume as an 8-bit grey PNG.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/volume/canonical.h"
+
+namespace isomesh::volume {
+
+enum class Axis { kX, kY, kZ };
+
+// Empty for a name that is not "x", "y" or "z".
+std::optional<Axis> axis_of(std::string_view name);
+std::string_view to_string(Axis axis);
+
+struct SliceChoice {
+  Axis axis = Axis::kZ;               // which index is fixed
+  std::uint32_t index = 0;            // at which sample; below the volume's size along the axis
+  std::array<double, 2> window = {};  // what becomes black and what becomes white
+};
+
+// A PNG that is written while it is asked for: a few rows of samples are read at a time, and no
+// others. The picture's columns run along x (along y for the axis x), its rows along y (along z for
+// the axes x and y); the first row and column are sample 0, nothing is turned over. Samples at or
+// below window[0] are black, those at or above window[1] white, those between linear; what is no
+// number is black. The picture says its pixels' sizes (pHYs).
+//
+// The bytes depend on the volume and the choice alone. Not thread safe.
+class SlicePng {
+ public:
+  // Throws Error kInternal.
+  SlicePng(std::shared_ptr<const CanonicalVolume> volume, const SliceChoice& choice);
+  ~SlicePng();
+  SlicePng(const SlicePng&) = delete;
+  SlicePng& operator=(const SlicePng&) = delete;
+
+  // The next bytes of the file; empty at its end. Throws Error kInternal.
+  std::string_view next();
+
+ private:
+  struct Writer;
+
+  void write_row();
+  void read_row(std::uint32_t row);
+
+  std::shared_ptr<const CanonicalVolume> volume_;
+  SliceChoice choice_;
+  std::uint32_t width_ = 0;
+  std::uint32_t height_ = 0;
+  std::uint32_t next_row_ = 0;
+  std::vector<std::uint8_t> row_;
+  std::string bytes_;  // written; the first taken_ of them are with the caller
+  std::size_t taken_ = 0;
+  std::unique_ptr<Writer> writer_;
+};
+
+}  // namespace isomesh::volume

@@ -1,0 +1,131 @@
+#include "server/jobs/estimate.h"
+
+#include <gtest/gtest.h>
+
+#include "server/jobs/histograms.h"
+#include "server/jobs/workers.h"
+#include "tests/support/errors.h"
+#include "tests/unit/jobs/fixture.h"
+
+namespace isomesh::jobs {
+namespace {
+
+class EstimateTest : public test::JobsFixture {
+ protected:
+  Job run(const JobParameters& parameters) {
+    Workers workers(1, jobs_, volumes_, blobs_, {});
+    return jobs_.wait(jobs_.submit(parameters).id, std::chrono::seconds(60));
+  }
+
+  Estimator estimator_{volumes_, blobs_, jobs_, {.memory_bytes = 4 << 20}};
+};
+
+TEST_F(EstimateTest, CountsWhatTheJobMakes) {
+  const Volume volume = add_sphere();
+  for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
+    JobParameters parameters = parameters_of(volume, 0.5);
+    parameters.scheme = scheme;
+    parameters.formats = {MeshFormat::kStl, MeshFormat::kDrc};
+    const Estimate estimate = estimator_.estimate(parameters);
+    const Job job = run(parameters);
+    ASSERT_TRUE(job.mesh);
+    EXPECT_EQ(estimate.triangles, job.mesh->triangles);
+    EXPECT_EQ(estimate.vertices, job.mesh->vertices);
+    EXPECT_EQ(estimate.bytes.at(MeshFormat::kStl), job.mesh->files.at(MeshFormat::kStl).bytes);
+    const auto drc = static_cast<double>(job.mesh->files.at(MeshFormat::kDrc).bytes);
+    EXPECT_NEAR(static_cast<double>(estimate.bytes.at(MeshFormat::kDrc)), drc, drc);
+    EXPECT_EQ(estimate.memory_bytes,
+              estimate_memory(job.mesh->vertices, job.mesh->triangles, parameters));
+    EXPECT_GT(estimate.milliseconds, 0);
+    EXPECT_EQ(estimate.volume, volume.id);
+    EXPECT_EQ(estimate.iso, 0.5);
+    EXPECT_EQ(estimate.scheme, scheme);
+  }
+}
+
+TEST_F(EstimateTest, OtsuIsTheVolumesOwn) {
+  const Volume volume = add_sphere();
+  JobParameters parameters = parameters_of(volume, 0);
+  parameters.iso.reset();
+  EXPECT_EQ(estimator_.estimate(parameters).iso, volume.suggested_iso);
+}
+
+TEST_F(EstimateTest, NoSurfaceTakesNothing) {
+  const Estimate estimate = estimator_.estimate(parameters_of(add_sphere(), 1e9));
+  EXPECT_EQ(estimate.triangles, 0U);
+  EXPECT_TRUE(estimate.fits);
+}
+
+TEST_F(EstimateTest, SaysWhatOneJobMayNotTake) {
+  EXPECT_TRUE(estimator_.estimate(parameters_of(add_sphere(), 0)).fits);
+  EXPECT_FALSE(estimator_.estimate(parameters_of(add_much(), 50)).fits);
+}
+
+TEST_F(EstimateTest, SaysHowLongTheQueueIs) {
+  const JobParameters parameters = parameters_of(add_sphere(), 0);
+  jobs_.submit(parameters);
+  jobs_.submit(parameters);
+  EXPECT_EQ(estimator_.estimate(parameters).queue, (Estimate::Queue{2, 0}));
+  jobs_.claim({});
+  EXPECT_EQ(estimator_.estimate(parameters).queue, (Estimate::Queue{1, 1}));
+}
+
+TEST_F(EstimateTest, RefusesWhatIsNotThereOrHasStopped) {
+  JobParameters unknown;
+  unknown.volume = "0123";
+  unknown.iso = 1;
+  EXPECT_EQ(test::code_thrown_by([&] { estimator_.estimate(unknown); }), ErrorCode::kNotFound);
+  const Volume volume = add_sphere();
+  estimator_.stop();
+  EXPECT_TRUE(test::code_thrown_by([&] { estimator_.estimate(parameters_of(volume, 0)); }));
+}
+
+TEST(CostModel, FollowsTheJobsThatItHasSeen) {
+  const SurfaceSize surface = {1'000'000, 500'000};
+  JobParameters parameters;
+  const double first = CostModel().milliseconds(surface, 1000, parameters);
+  const auto bytes = CostModel().file_bytes(MeshFormat::kDrc, surface, parameters);
+  Job job;
+  job.parameters = parameters;
+  job.timing.encode = 3000;
+  job.timing.smooth = 500;
+  job.timing.extract = 100;
+  job.mesh.emplace();
+  job.mesh->triangles = surface.triangles;
+  job.mesh->vertices = surface.vertices;
+  job.mesh->files[MeshFormat::kDrc] = {3'000'000, "", ""};
+  job.mesh->files[MeshFormat::kStl] = {84 + 50'000'000, "", ""};
+  CostModel slower;
+  for (int n = 0; n < 20; ++n) slower.learn(job, 1000);
+  EXPECT_NEAR(slower.milliseconds(surface, 1000, parameters), 3600, 400);
+  EXPECT_GT(slower.milliseconds(surface, 1000, parameters), first);
+  EXPECT_NEAR(static_cast<double>(slower.file_bytes(MeshFormat::kDrc, surface, parameters)), 3e6,
+              2e5);
+  EXPECT_LT(bytes, 2'500'000U);
+  EXPECT_EQ(slower.file_bytes(MeshFormat::kStl, surface, parameters), 50'000'084U);
+}
+
+TEST(CostModel, AJobWithoutARunTeachesNothing) {
+  Job job;
+  job.mesh.emplace();
+  job.mesh->triangles = 1'000'000;
+  CostModel costs;
+  costs.learn(job, 1000);
+  EXPECT_EQ(costs.milliseconds({1000, 500}, 1000, {}),
+            CostModel().milliseconds({1000, 500}, 1000, {}));
+}
+
+using HistogramsTest = test::JobsFixture;
+
+TEST_F(HistogramsTest, CountAllSamples) {
+  const Volume volume = add_much();
+  Histograms histograms(blobs_);
+  const Histogram two = histograms.of(volume, 2);
+  EXPECT_EQ(two.volume, volume.id);
+  EXPECT_EQ(two.range, volume.range);
+  EXPECT_EQ(two.counts.at(0) + two.counts.at(1), volume.sample_count());
+  EXPECT_EQ(histograms.of(volume, 101).counts.at(100), two.counts[1]);
+}
+
+}  // namespace
+}  // namespace isomesh::jobs

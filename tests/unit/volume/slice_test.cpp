@@ -1,0 +1,129 @@
+#include "server/volume/slice.h"
+
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/png.h"
+#include "tests/unit/volume/files.h"
+
+namespace isomesh::volume::test {
+namespace {
+
+using isomesh::test::GreyPicture;
+using testing::ElementsAre;
+
+class SliceTest : public testing::Test {
+ protected:
+  template <class Sample>
+  std::shared_ptr<const CanonicalVolume> volume_of(const CanonicalHeader& header,
+                                                   const std::vector<Sample>& samples) {
+    CanonicalWriter writer(folder_.path("volume"), header);
+    std::memcpy(writer.samples().data(), samples.data(), writer.samples().size());
+    writer.finish();
+    return std::make_shared<const CanonicalVolume>(folder_.path("volume"));
+  }
+
+  // The sample (i,j,k) is 100 k + 10 j + i.
+  std::shared_ptr<const CanonicalVolume> numbered() {
+    CanonicalHeader header;
+    header.dims = {4, 3, 2};
+    header.type = SampleType::kUint8;
+    header.geometry.spacing = {0.5, 2, 4};
+    std::vector<std::uint8_t> samples;
+    for (int k = 0; k < 2; ++k) {
+      for (int j = 0; j < 3; ++j) {
+        for (int i = 0; i < 4; ++i)
+          samples.push_back(static_cast<std::uint8_t>(100 * k + 10 * j + i));
+      }
+    }
+    return volume_of(header, samples);
+  }
+
+  static GreyPicture picture(const std::shared_ptr<const CanonicalVolume>& volume,
+                             const SliceChoice& choice) {
+    SlicePng png(volume, choice);
+    std::string bytes;
+    for (std::string_view more = png.next(); !more.empty(); more = png.next()) bytes += more;
+    EXPECT_TRUE(png.next().empty());
+    return isomesh::test::read_png(bytes);
+  }
+
+  const Folder folder_;
+};
+
+TEST_F(SliceTest, HasTheSamplesOfEachAxisInTheirOrder) {
+  const auto volume = numbered();
+  const GreyPicture z = picture(volume, {Axis::kZ, 1, {0, 255}});
+  EXPECT_EQ(z.width, 4U);
+  EXPECT_EQ(z.height, 3U);
+  EXPECT_THAT(z.pixels, ElementsAre(100, 101, 102, 103, 110, 111, 112, 113, 120, 121, 122, 123));
+  const GreyPicture y = picture(volume, {Axis::kY, 2, {0, 255}});
+  EXPECT_EQ(y.width, 4U);
+  EXPECT_EQ(y.height, 2U);
+  EXPECT_THAT(y.pixels, ElementsAre(20, 21, 22, 23, 120, 121, 122, 123));
+  const GreyPicture x = picture(volume, {Axis::kX, 3, {0, 255}});
+  EXPECT_EQ(x.width, 3U);
+  EXPECT_EQ(x.height, 2U);
+  EXPECT_THAT(x.pixels, ElementsAre(3, 13, 23, 103, 113, 123));
+}
+
+TEST_F(SliceTest, SaysHowLargeItsPixelsAre) {
+  const GreyPicture z = picture(numbered(), {Axis::kZ, 0, {0, 255}});
+  EXPECT_EQ(z.across, 2000U);
+  EXPECT_EQ(z.down, 500U);
+  const GreyPicture x = picture(numbered(), {Axis::kX, 0, {0, 255}});
+  EXPECT_EQ(x.across, 500U);
+  EXPECT_EQ(x.down, 250U);
+}
+
+TEST_F(SliceTest, TheWindowIsLinearBetweenBlackAndWhite) {
+  CanonicalHeader header;
+  header.dims = {8, 1, 1};
+  header.type = SampleType::kFloat32;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinite = std::numeric_limits<float>::infinity();
+  const auto volume =
+      volume_of(header, std::vector<float>{-500, -160, -159, 40, 239, 240, nan, infinite});
+  EXPECT_THAT(picture(volume, {Axis::kZ, 0, {-160, 240}}).pixels,
+              ElementsAre(0, 0, 1, 128, 254, 255, 0, 255));
+}
+
+TEST_F(SliceTest, AConstantVolumeIsBlackInItsRange) {
+  CanonicalHeader header;
+  header.dims = {2, 2, 1};
+  header.type = SampleType::kInt16;
+  const auto volume = volume_of(header, std::vector<std::int16_t>(4, -7));
+  EXPECT_THAT(picture(volume, {Axis::kZ, 0, {-7, -7}}).pixels, ElementsAre(0, 0, 0, 0));
+}
+
+TEST_F(SliceTest, ComesInPiecesThatAreBounded) {
+  CanonicalHeader header;
+  header.dims = {3000, 400, 1};
+  header.type = SampleType::kUint16;
+  std::vector<std::uint16_t> noise(1'200'000);
+  std::uint32_t state = 1;
+  for (std::uint16_t& sample : noise) {
+    state = state * 1664525 + 1013904223;
+    sample = static_cast<std::uint16_t>(state >> 16);
+  }
+  SlicePng png(volume_of(header, noise), {Axis::kZ, 0, {0, 65535}});
+  std::size_t pieces = 0;
+  std::string bytes;
+  for (std::string_view more = png.next(); !more.empty(); more = png.next()) {
+    EXPECT_LT(more.size(), 200'000U);
+    bytes += more;
+    ++pieces;
+  }
+  EXPECT_GT(pieces, 3U);
+  const GreyPicture whole = isomesh::test::read_png(bytes);
+  EXPECT_EQ(whole.width, 3000U);
+  EXPECT_EQ(whole.height, 400U);
+}
+
+}  // namespace
+}  // namespace isomesh::volume::test
