@@ -14,6 +14,7 @@ constexpr std::array kDescriptions = {
     ErrorDescription{ErrorCode::kDigestMismatch, 400, "digest-mismatch",
                      "The body does not match its digest"},
     ErrorDescription{ErrorCode::kUnauthorized, 401, "unauthorized", "Not authorized"},
+    ErrorDescription{ErrorCode::kForbidden, 403, "forbidden", "Not allowed"},
     ErrorDescription{ErrorCode::kNotFound, 404, "not-found", "Not found"},
     ErrorDescription{ErrorCode::kMethodNotAllowed, 405, "method-not-allowed", "Method not allowed"},
     ErrorDescription{ErrorCode::kNotReady, 409, "not-ready", "Not ready"},

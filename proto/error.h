@@ -12,7 +12,8 @@ namespace isomesh {
 enum class ErrorCode {
   kInvalidParameter,     // 400: a member, query parameter or header is unknown or out of range
   kDigestMismatch,       // 400: the body is not the one that its Content-Digest names
-  kUnauthorized,         // 401
+  kUnauthorized,         // 401: no token, or not one that is known
+  kForbidden,            // 403: the token is for something else
   kNotFound,             // 404
   kMethodNotAllowed,     // 405
   kNotReady,             // 409: the mesh of a job that has not succeeded (yet)

@@ -7,14 +7,17 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <map>
+#include <memory>
 #include <string>
 #include <thread>
 
 #include <CLI/CLI.hpp>
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "server/http/auth.h"
+#include "server/http/log.h"
 #include "server/http/server.h"
 #include "server/jobs/estimate.h"
 #include "server/jobs/histograms.h"
@@ -23,6 +26,7 @@
 #include "server/jobs/workers.h"
 #include "server/mesh/context.h"
 #include "server/store/data_folder.h"
+#include "server/token_command.h"
 
 namespace {
 
@@ -35,7 +39,9 @@ struct Options {
   int threads = 0;  // of the kernels; 0: one a processor
   bool open_network = false;
   unsigned drain_seconds = 30;
-  std::string log_level = "info";
+  http::LogLevel log_level = http::LogLevel::kInfo;
+  http::LogFormat log_format = http::LogFormat::kText;
+  std::filesystem::path tokens;  // empty: requests are not authenticated
   store::JobStore::Limits jobs;
   http::ServerOptions http;
   volume::ImportLimits import;
@@ -47,6 +53,34 @@ std::uint64_t default_job_memory(std::size_t workers) {
   const auto pages = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES));
   const auto page_bytes = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
   return pages * page_bytes / 4 * 3 / workers;
+}
+
+void add_log_options(CLI::App& cli, Options& options) {
+  using http::LogFormat;
+  using http::LogLevel;
+  const std::map<std::string, LogLevel> levels = {{"debug", LogLevel::kDebug},
+                                                  {"info", LogLevel::kInfo},
+                                                  {"warn", LogLevel::kWarn},
+                                                  {"error", LogLevel::kError},
+                                                  {"off", LogLevel::kOff}};
+  const std::map<std::string, LogFormat> formats = {{"text", LogFormat::kText},
+                                                    {"json", LogFormat::kJson}};
+  cli.add_option("--log-level", options.log_level, "debug, info, warn, error or off")
+      ->envname("ISOMESH_LOG_LEVEL")
+      ->transform(CLI::CheckedTransformer(levels).description(""))
+      ->default_str("info");
+  cli.add_option("--log-format", options.log_format,
+                 "The form of the log's lines on standard error: text or json")
+      ->envname("ISOMESH_LOG_FORMAT")
+      ->transform(CLI::CheckedTransformer(formats).description(""))
+      ->default_str("text");
+}
+
+void add_security_options(CLI::App& cli, Options& options) {
+  cli.add_option("--tokens", options.tokens,
+                 "File of tokens that requests must have; `isomeshd token` makes them. SIGHUP "
+                 "reads it again")
+      ->envname("ISOMESH_TOKENS");
 }
 
 // Every option also as ISOMESH_... in the environment and by its name in the file of --config.
@@ -96,13 +130,24 @@ void add_options(CLI::App& cli, Options& options) {
                  "How long running jobs may finish after SIGTERM")
       ->envname("ISOMESH_DRAIN_SECONDS")
       ->capture_default_str();
-  cli.add_option("--log-level", options.log_level, "debug, info, warn, error or off")
-      ->envname("ISOMESH_LOG_LEVEL")
-      ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
-      ->capture_default_str();
   cli.add_flag("--open-network", options.open_network,
                "Listen beyond loopback although requests are not authenticated")
       ->envname("ISOMESH_OPEN_NETWORK");
+  add_log_options(cli, options);
+  add_security_options(cli, options);
+}
+
+CLI::App& add_token_command(CLI::App& cli, TokenRequest& request) {
+  CLI::App& command = *cli.add_subcommand("token", "Make a token and print it, once");
+  command.add_option("NAME", request.name, "Whose it is, as jobs and the log name it")->required();
+  command
+      .add_option("--role", request.role,
+                  "user: its own volumes and jobs; admin: everybody's, and /metrics; monitor: "
+                  "/metrics alone")
+      ->capture_default_str();
+  command.add_option("--into", request.file,
+                     "Append the token's hash to this file, instead of printing its line");
+  return command;
 }
 
 sigset_t block_signals() {
@@ -110,17 +155,42 @@ sigset_t block_signals() {
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
   return signals;
 }
 
+// Reads again what may change while the daemon runs. What cannot be read stays as it was.
+void reload(http::Tokens* tokens) {
+  try {
+    if (tokens != nullptr) {
+      tokens->reload();
+      spdlog::info("{} tokens are known now", tokens->count());
+    }
+  } catch (const Error& error) {
+    spdlog::error("{}; what was there before stays", error.what());
+  }
+}
+
+// Returns the signal that ends the daemon.
+int wait_for_end(const sigset_t& signals, http::Tokens* tokens) {
+  while (true) {
+    int signal = 0;
+    ::sigwait(&signals, &signal);
+    if (signal != SIGHUP) return signal;
+    reload(tokens);
+  }
+}
+
 int run(const Options& options, const sigset_t& signals) {
   const http::Address address = http::parse_address(options.listen);
-  if (!address.is_loopback() && !options.open_network) {
+  std::unique_ptr<http::Tokens> tokens;
+  if (!options.tokens.empty()) tokens = std::make_unique<http::Tokens>(options.tokens);
+  if (!address.is_loopback() && !tokens && !options.open_network) {
     throw invalid_parameter("listen",
                             "requests are not authenticated, so only loopback or a Unix socket is "
-                            "listened on; --open-network allows other addresses");
+                            "listened on; --tokens or --open-network allow other addresses");
   }
   if (options.threads > 0) mesh::set_thread_count(options.threads);
 
@@ -141,14 +211,13 @@ int run(const Options& options, const sigset_t& signals) {
   jobs::Workers workers(options.workers, jobs, volumes, blobs, limits);
   jobs::Histograms histograms(blobs);
   jobs::Estimator estimator(volumes, blobs, jobs, limits);
-  http::Server server({folder, blobs, volumes, jobs, library, histograms, estimator}, options.http);
+  http::Server server({folder, blobs, volumes, jobs, library, histograms, estimator, tokens.get()}, options.http);
 
   const std::string url = server.bind(address);
   std::cout << "listening on " << url << std::endl;
   std::jthread serving([&] { server.serve(); });
 
-  int signal = 0;
-  sigwait(&signals, &signal);
+  const int signal = wait_for_end(signals, tokens.get());
   spdlog::info("signal {}: draining", signal);
   server.begin_drain();
   if (!workers.drain(std::chrono::seconds(options.drain_seconds))) {
@@ -164,17 +233,23 @@ int main(int argc, char** argv) {
   try {
     const sigset_t signals = block_signals();
     jobs::keep_freed_memory();
-    spdlog::set_default_logger(spdlog::stderr_logger_mt("isomeshd"));
+    http::start_log(http::LogFormat::kText, http::LogLevel::kInfo);
     Options options;
+    TokenRequest token;
     CLI::App cli("isomeshd turns medical volumes into surface meshes over HTTP");
     add_options(cli, options);
+    CLI::App& token_command = add_token_command(cli, token);
     try {
       cli.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
       constexpr int kWrongUsage = 2;
       return cli.exit(error) == 0 ? 0 : kWrongUsage;  // 0 for --help and --version
     }
-    spdlog::set_level(spdlog::level::from_str(options.log_level));
+    if (token_command.parsed()) {
+      make_token(token);
+      return 0;
+    }
+    http::start_log(options.log_format, options.log_level);
     return run(options, signals);
   } catch (const std::exception& error) {
     spdlog::critical("{}", error.what());

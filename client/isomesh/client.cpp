@@ -44,8 +44,9 @@ ErrorCode code_of_status(int status) {
     case 400:
       return ErrorCode::kInvalidParameter;
     case 401:
-    case 403:
       return ErrorCode::kUnauthorized;
+    case 403:
+      return ErrorCode::kForbidden;
     case 404:
       return ErrorCode::kNotFound;
     case 405:

@@ -36,15 +36,19 @@ void guarded(const httplib::Request& request, httplib::Response& response, const
 
 void add_get(App& app, const std::string& pattern, const Handler& handler) {
   app.methods[pattern].insert({"GET", "HEAD"});
-  app.http.Get(pattern, [handler](const httplib::Request& request, httplib::Response& response) {
+  app.http.Get(pattern, [handler, label = label_of(pattern)](const httplib::Request& request,
+                                                             httplib::Response& response) {
+    current_request().route = label;
     guarded(request, response, [&] { handler(request, response); });
   });
 }
 
 void add_post(App& app, const std::string& pattern, const BodyHandler& handler) {
   app.methods[pattern].insert("POST");
-  app.http.Post(pattern, [handler](const httplib::Request& request, httplib::Response& response,
-                                   const httplib::ContentReader& read_body) {
+  app.http.Post(pattern, [handler, label = label_of(pattern)](
+                             const httplib::Request& request, httplib::Response& response,
+                             const httplib::ContentReader& read_body) {
+    current_request().route = label;
     guarded(request, response, [&] { handler(request, response, read_body); });
   });
 }
@@ -53,8 +57,10 @@ void add_post(App& app, const std::string& pattern, const BodyHandler& handler) 
 // does not have.
 void add_delete(App& app, const std::string& pattern, const Handler& handler) {
   app.methods[pattern].insert("DELETE");
-  app.http.Delete(pattern, [handler](const httplib::Request& request, httplib::Response& response,
-                                     const httplib::ContentReader& /*read_body*/) {
+  app.http.Delete(pattern, [handler, label = label_of(pattern)](
+                               const httplib::Request& request, httplib::Response& response,
+                               const httplib::ContentReader& /*read_body*/) {
+    current_request().route = label;
     guarded(request, response, [&] { handler(request, response); });
   });
 }

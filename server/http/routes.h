@@ -12,6 +12,7 @@
 
 #include "proto/error.h"
 #include "proto/types.h"
+#include "server/http/access.h"
 #include "server/http/server.h"
 #include "server/http/slots.h"
 
@@ -27,6 +28,8 @@ struct App {
 
   Services services;
   ServerOptions options;
+  const Tokens* tokens = services.tokens;  // null: everybody may do everything
+  Metrics metrics;
   Slots uploads;
   Slots waits;
   std::atomic<bool> draining = false;  // running jobs are finished, others are not accepted

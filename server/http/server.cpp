@@ -24,9 +24,6 @@ constexpr std::size_t kMostHeaders = 100;
 constexpr std::chrono::seconds kReadTimeout{10};
 constexpr std::chrono::seconds kWriteTimeout{10};
 
-// When the request that this thread serves began.
-thread_local std::chrono::steady_clock::time_point request_began;
-
 // Text that cannot forge a line of the log.
 std::string printable(std::string text) {
   std::ranges::replace_if(
@@ -112,13 +109,6 @@ void complete_error(const App& app, const httplib::Request& request, httplib::Re
   }
 }
 
-void log_request(const httplib::Request& request, const httplib::Response& response) {
-  const std::chrono::duration<double, std::milli> elapsed =
-      std::chrono::steady_clock::now() - request_began;
-  spdlog::info("{} {} {} {:.1f} ms", printable(request.method),
-               printable(request.path.substr(0, kLongestPath)), response.status, elapsed.count());
-}
-
 void configure(App& app) {
   httplib::Server& http = app.http;
   http.new_task_queue = [&app] {
@@ -137,17 +127,18 @@ void configure(App& app) {
   http.set_keep_alive_max_count(1);
   http.set_payload_max_length(app.options.upload.max_bytes);
   http.set_default_headers({{"X-Content-Type-Options", "nosniff"}});
-  http.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
-    request_began = std::chrono::steady_clock::now();
-    try {
-      // The library hands its own request over as constant; the guard has to clear its ranges.
-      check_request(const_cast<httplib::Request&>(request));
-      return httplib::Server::HandlerResponse::Unhandled;
-    } catch (const Error& error) {
-      answer_problem(request, response, error);
-      return httplib::Server::HandlerResponse::Handled;
-    }
-  });
+  http.set_pre_routing_handler(
+      [&app](const httplib::Request& request, httplib::Response& response) {
+        try {
+          begin_request(app, request, response);
+          // The library hands its own request over as constant; the guard has to clear its ranges.
+          check_request(const_cast<httplib::Request&>(request));
+          return httplib::Server::HandlerResponse::Unhandled;
+        } catch (const Error& error) {
+          answer_problem(request, response, error);
+          return httplib::Server::HandlerResponse::Handled;
+        }
+      });
   http.set_error_handler([&app](const httplib::Request& request, httplib::Response& response) {
     complete_error(app, request, response);
   });
@@ -156,7 +147,9 @@ void configure(App& app) {
         spdlog::error("{}: an exception left its route", printable(request.path));
         answer_problem(request, response, {ErrorCode::kInternal, ""});
       });
-  http.set_logger(log_request);
+  http.set_logger([&app](const httplib::Request& request, const httplib::Response& response) {
+    end_request(app, request, response);
+  });
 }
 
 // The library lets five connections wait to be accepted; the next ones in a burst would be dropped,
@@ -245,6 +238,8 @@ std::string Server::bind(const Address& address) {
 }
 
 void Server::serve() { state_->app.http.listen_after_bind(); }
+
+Metrics& Server::metrics() { return state_->app.metrics; }
 
 void Server::begin_drain() {
   state_->app.draining = true;

@@ -5,6 +5,8 @@
 #include <memory>
 #include <string>
 
+#include "server/http/auth.h"
+#include "server/http/metrics.h"
 #include "server/http/upload.h"
 #include "server/jobs/estimate.h"
 #include "server/jobs/histograms.h"
@@ -46,6 +48,7 @@ struct Services {
   jobs::VolumeLibrary& library;
   jobs::Histograms& histograms;
   jobs::Estimator& estimator;
+  const Tokens* tokens = nullptr;  // null: requests are not authenticated
 };
 
 // Thread safe where said.
@@ -62,6 +65,9 @@ class Server {
 
   // Serves until stop(); to be called once, after bind.
   void serve();
+
+  // What is counted; those who count beside the routes add to it. Thread safe.
+  Metrics& metrics();
 
   // Ready says 503 from now on, so that a balancer looks elsewhere, and no job is accepted. Thread
   // safe.

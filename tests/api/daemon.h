@@ -30,8 +30,11 @@ class Daemon {
 
   // SIGTERM, and its exit status.
   int stop();
+  void send_signal(int number) { process_.send_signal(number); }
   void terminate() { process_.send_signal(SIGTERM); }
   int wait() { return process_.wait(); }
+  // What it has written to standard error so far.
+  std::string errors() const { return process_.errors(); }
   bool ends_within(std::chrono::seconds longest) { return process_.ends_within(longest); }
 
   // A request over a connection of its own.

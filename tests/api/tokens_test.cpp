@@ -1,0 +1,132 @@
+// Who may ask what, where tokens are configured.
+#include <algorithm>
+#include <csignal>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/api/daemon.h"
+#include "tests/api/problems.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+using testing::HasSubstr;
+using testing::Not;
+
+Headers bearer(const std::string& token) { return {{"Authorization", "Bearer " + token}}; }
+
+class TokensTest : public testing::Test {
+ protected:
+  // A new token, which the file knows from then on.
+  std::string made(const std::string& name, const std::string& role) const {
+    const Finished result = run({ISOMESHD, "token", name, "--role", role, "--into", file_});
+    EXPECT_EQ(result.status, 0) << result.errors;
+    return result.output.substr(0, result.output.find('\n'));
+  }
+
+  const TemporaryFolder folder_;
+  const std::string file_ = folder_ / "tokens";
+  const std::string ct_ = made("ct", "user");
+  const std::string mr_ = made("mr", "user");
+  const std::string boss_ = made("boss", "admin");
+  const std::string probe_ = made("probe", "monitor");
+  Daemon daemon_{std::vector<std::string>{"--tokens", file_}};
+};
+
+TEST_F(TokensTest, WithoutAKnownOneNothingIsServed) {
+  const std::string cut = ct_.substr(0, ct_.size() - 1);
+  for (const Headers& headers :
+       {Headers{}, bearer("isomesh_unknown"), bearer(cut), bearer(""), bearer(ct_ + "x"),
+        Headers{{"Authorization", "Basic " + ct_}}, Headers{{"Authorization", ct_}},
+        Headers{{"Authorization", "Bearer " + ct_}, {"Authorization", "Bearer " + ct_}}}) {
+    for (const std::string path : {"/v1/jobs", "/v1/volumes", "/v1/jobs/0123", "/v1", "/v1/none"}) {
+      const Answer answer = daemon_.get(path, headers);
+      EXPECT_TRUE(is_problem(answer, ErrorCode::kUnauthorized)) << path;
+      EXPECT_EQ(answer.header("www-authenticate"), "Bearer realm=\"isomesh\"");
+    }
+    EXPECT_TRUE(
+        is_problem(daemon_.send("POST", "/v1/jobs", "{}", headers), ErrorCode::kUnauthorized));
+    EXPECT_TRUE(is_problem(daemon_.send("DELETE", "/v1/volumes/0123", "", headers),
+                           ErrorCode::kUnauthorized));
+  }
+  EXPECT_EQ(daemon_.get("/v1/jobs", bearer(ct_)).status, 200);
+}
+
+TEST_F(TokensTest, WhatTellsNothingIsOpen) {
+  for (const std::string path : {"/livez", "/readyz", "/openapi.yaml"}) {
+    EXPECT_EQ(daemon_.get(path).status, 200) << path;
+  }
+}
+
+TEST_F(TokensTest, ARoleReachesAsFarAsItSays) {
+  EXPECT_EQ(daemon_.get("/v1/jobs", bearer(boss_)).status, 200);
+  EXPECT_TRUE(is_problem(daemon_.get("/v1/jobs", bearer(probe_)), ErrorCode::kForbidden));
+  EXPECT_TRUE(is_problem(daemon_.get("/metrics"), ErrorCode::kUnauthorized));
+  EXPECT_TRUE(is_problem(daemon_.get("/metrics", bearer(ct_)), ErrorCode::kForbidden));
+}
+
+TEST_F(TokensTest, TheCommandSendsItAndSaysWhatIsMissing) {
+  const Finished refused = daemon_.command({"list"});
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.errors, HasSubstr("token"));
+  EXPECT_EQ(daemon_.command({"--token", ct_, "list"}).status, 0);
+  EXPECT_EQ(run({ISOMESH, "--server", daemon_.url(), "list"}, {"ISOMESH_TOKEN=" + ct_}).status, 0);
+}
+
+TEST_F(TokensTest, AreReadAgainOnSighup) {
+  const std::string later = made("later", "user");
+  EXPECT_EQ(daemon_.get("/v1/jobs", bearer(later)).status, 401);
+  daemon_.send_signal(SIGHUP);
+  EXPECT_TRUE(eventually([&] { return daemon_.get("/v1/jobs", bearer(later)).status == 200; }));
+  // One that became unreadable changes nothing.
+  write_file(file_, "half a line");
+  daemon_.send_signal(SIGHUP);
+  EXPECT_TRUE(eventually([&] { return daemon_.errors().find("stays") != std::string::npos; }));
+  EXPECT_EQ(daemon_.get("/v1/jobs", bearer(later)).status, 200);
+}
+
+TEST_F(TokensTest, TheLogNamesTheOwnerAndNeverTheToken) {
+  daemon_.get("/v1/jobs?state=queued", bearer(ct_));
+  daemon_.get("/v1/jobs", bearer("isomesh_guessed"));
+  EXPECT_EQ(daemon_.stop(), 0);
+  EXPECT_THAT(daemon_.errors(), HasSubstr("token=ct"));
+  for (const std::string& secret : {ct_, std::string("isomesh_guessed"), std::string("queued")}) {
+    EXPECT_THAT(daemon_.errors(), Not(HasSubstr(secret)));
+  }
+}
+
+TEST(TokenCommand, PrintsTheTokenAndItsLine) {
+  const Finished result = run({ISOMESHD, "token", "ct"});
+  EXPECT_EQ(result.status, 0);
+  EXPECT_THAT(result.output, testing::MatchesRegex("isomesh_[0-9a-f]{64}\nct user [0-9a-f]{64}\n"));
+  EXPECT_EQ(run({ISOMESHD, "token", "c t"}).status, 1);
+  EXPECT_EQ(run({ISOMESHD, "token", "ct", "--role", "root"}).status, 1);
+  EXPECT_EQ(run({ISOMESHD, "token"}).status, 2);
+}
+
+TEST(Tokens, LetTheDaemonListenBeyondThisMachine) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run({ISOMESHD, "token", "ct", "--into", folder / "tokens"}).status, 0);
+  const Daemon daemon(folder / "data", "0.0.0.0:0", {"--tokens", folder / "tokens"});
+  EXPECT_EQ(daemon.get("/livez").status, 200);
+  EXPECT_EQ(daemon.get("/v1/jobs").status, 401);
+}
+
+TEST(Tokens, AFileThatCannotBeTrustedIsRefused) {
+  const TemporaryFolder folder;
+  write_file(folder / "tokens", "ct user 00\n");
+  for (const std::string file : {"tokens", "absent"}) {
+    const Finished result = run({ISOMESHD, "--data", folder / "data", "--listen", "127.0.0.1:0",
+                                 "--tokens", folder / file});
+    EXPECT_EQ(result.status, 1);
+    EXPECT_THAT(result.errors, HasSubstr("tokens"));
+  }
+}
+
+}  // namespace
+}  // namespace isomesh
