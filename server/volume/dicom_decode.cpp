@@ -248,11 +248,6 @@ bool can_decode(std::string_view transfer_syntax) {
   return find_syntax(transfer_syntax) != nullptr;
 }
 
-std::string name_of_syntax(std::string_view transfer_syntax) {
-  const Syntax* syntax = find_syntax(transfer_syntax);
-  return syntax != nullptr ? std::string(syntax->name) : in_quotes(transfer_syntax);
-}
-
 void decode_frame(std::string_view transfer_syntax, std::span<const std::byte> compressed,
                   const PixelLayout& layout, std::span<std::byte> target) {
   const Syntax* syntax = find_syntax(transfer_syntax);

@@ -12,9 +12,6 @@ namespace isomesh::volume::dicom {
 // True for the transfer syntaxes that frames are decoded from.
 bool can_decode(std::string_view transfer_syntax);
 
-// What a person calls a transfer syntax, or its identifier in quotes.
-std::string name_of_syntax(std::string_view transfer_syntax);
-
 // Decodes one frame into `target`, which has layout.frame_bytes() bytes, little-endian. What the
 // code stream tells about its size is compared with the layout before anything is decoded.
 // Throws Error kUnusableVolume with the reason, a clause without a subject: "its ...".

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/volume/dicom_decode.h"
 #include "server/volume/dicom_tags.h"
 #include "server/volume/source.h"
 #include "server/volume/text.h"
@@ -64,9 +65,21 @@ PixelLayout pixel_layout(const DataSet& data) {
   return layout;
 }
 
+// Empty where it is not told.
+bool is_native_syntax(std::string_view syntax) {
+  return syntax.empty() || syntax == kImplicitLittleEndian || syntax == kExplicitLittleEndian ||
+         syntax == kDeflated || syntax == kExplicitBigEndian;
+}
+
 void require_pixels(const DicomFile& file, const PixelLayout& layout, std::uint32_t frames) {
   const auto& pixels = file.pixels();
+  const std::string& syntax = file.transfer_syntax();
   if (!pixels) throw_unusable("The DICOM image holds no pixel data.");
+  if (!(pixels->is_encapsulated ? can_decode(syntax) : is_native_syntax(syntax))) {
+    throw_unusable("The DICOM image's transfer syntax " + in_quotes(syntax) +
+                   (pixels->is_encapsulated ? " is not one of compressed samples that are read."
+                                            : " is not one of plain samples."));
+  }
   if (pixels->tag != kPixelData) {
     throw_unusable("The DICOM image's pixels are floating-point numbers, which are not read.");
   }

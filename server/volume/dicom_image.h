@@ -52,6 +52,7 @@ struct Frame {
 };
 
 struct Image {
+  std::string file_name;  // without folders; empty when the upload is one file
   std::string series_uid;
   std::string frame_of_reference_uid;
   std::string modality;

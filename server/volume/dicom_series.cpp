@@ -110,6 +110,9 @@ Upload read_headers(std::span<const std::filesystem::path> files,
       rethrow_for(path, error);
     }
   }
+  if (files.size() > 1) {
+    for (Source& source : upload.sources) source.image.file_name = name_of(source.path);
+  }
   if (!upload.sources.empty()) return upload;
   if (upload.ignored.size() == 1) {
     throw_unusable("The upload holds no DICOM image: " + upload.ignored.front().reason + ".");

@@ -18,7 +18,7 @@ struct Source {
   std::filesystem::path path;
   std::string series_uid;
   std::string series_description;  // UTF-8
-  std::int64_t frame_count = 1;    // as it tells
+  std::int64_t frame_count = 1;    // as it tells, unchecked
   DicomInstance instance;
   Image image;
   std::optional<Error> fault;  // why `image` is not filled in

@@ -51,13 +51,23 @@ bool nearly_same(const std::array<double, 2>& a, const std::array<double, 2>& b)
   return true;
 }
 
-// Counts the slices of one kind, for "3 of 20 slices".
+// Where to find a slice whose place among the others is not known.
+std::string place_of(const Slice& slice) {
+  const std::string& file = slice.image->file_name;
+  std::string text;
+  if (slice.image->frames.size() > 1) text = "frame " + std::to_string(slice.frame->number + 1);
+  if (!file.empty()) text += (text.empty() ? "" : " of ") + in_quotes(file);
+  return text;
+}
+
 template <class IsOther>
 void refuse_others(std::span<const Slice> slices, const std::string& what, IsOther&& is_other) {
-  const auto others = std::count_if(slices.begin(), slices.end(), is_other);
-  if (others == 0) return;
-  throw_unusable("The series is no single volume: " + std::to_string(others) + " of its " +
-                 count_of(slices.size(), "slice") + " differ from the first in " + what + ".");
+  const auto count = std::count_if(slices.begin(), slices.end(), is_other);
+  if (count == 0) return;
+  const auto other = std::find_if(slices.begin(), slices.end(), is_other);
+  throw_unusable("The series is no single volume: " + std::to_string(count) + " of its " +
+                 count_of(slices.size(), "slice") + " differ in " + what + " from the others: " +
+                 place_of(*other) + " from " + place_of(slices.front()) + ", for one.");
 }
 
 void refuse_mixtures(std::span<const Slice> slices) {
