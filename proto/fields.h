@@ -158,6 +158,7 @@ void visit(Is<Job> auto& self, auto&& field) {
   field("timing", self.timing);
   field("mesh", self.mesh);
   field("error", self.error);
+  field("reused", self.reused);
 }
 
 void visit(Is<Histogram> auto& self, auto&& field) {

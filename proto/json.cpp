@@ -148,6 +148,33 @@ T from_text(std::string_view text, const char* list = nullptr) {
   }
 }
 
+// Adds the members that `defaults` has and `record` lacks, at every depth.
+void fill(Json& record, const Json& defaults) {
+  if (!record.is_object() || !defaults.is_object()) return;
+  for (const auto& [name, value] : defaults.items()) {
+    const auto found = record.find(name);
+    if (found == record.end()) {
+      record[name] = value;
+    } else {
+      fill(*found, value);
+    }
+  }
+}
+
+template <class T>
+T from_record(std::string_view text) {
+  try {
+    Json json = Json::parse(text);
+    fill(json, write(T{}));
+    if constexpr (std::is_same_v<T, Job>) fill(json["mesh"], write(MeshSummary{}));
+    T value{};
+    read(json, value);
+    return value;
+  } catch (const Json::exception&) {
+    throw Error(ErrorCode::kInternal, "a record is not what a version of this service wrote");
+  }
+}
+
 }  // namespace
 
 std::string to_json(const Volume& volume) { return to_text(volume); }
@@ -165,6 +192,9 @@ std::string to_json(const std::vector<Job>& jobs, const std::string& next) {
   return Json{{"jobs", write(jobs)}, {"next", next.empty() ? Json(nullptr) : Json(next)}}.dump(
       -1, ' ', false, Json::error_handler_t::replace);
 }
+
+Volume volume_from_record(std::string_view text) { return from_record<Volume>(text); }
+Job job_from_record(std::string_view text) { return from_record<Job>(text); }
 
 Volume volume_from_json(std::string_view text) { return from_text<Volume>(text); }
 Job job_from_json(std::string_view text) { return from_text<Job>(text); }

@@ -33,6 +33,11 @@ Estimate estimate_from_json(std::string_view text);
 std::vector<Volume> volumes_from_json(std::string_view text);
 std::vector<Job> jobs_from_json(std::string_view text);
 
+// Reads what to_json() made in this version or an older one: members that it did not know yet have
+// their defaults. Throws Error kInternal.
+Volume volume_from_record(std::string_view text);
+Job job_from_record(std::string_view text);
+
 // Reads the body of POST /v1/jobs. Throws Error kInvalidParameter that names every member which is
 // unknown, missing, of the wrong type or out of range.
 JobParameters parse_job_parameters(std::string_view body);

@@ -94,6 +94,10 @@ bool is_final(JobState state) {
          state == JobState::kCancelled;
 }
 
+std::string mesh_path(const std::string& job, MeshFormat format) {
+  return "/v1/jobs/" + job + "/mesh." + std::string(to_string(format));
+}
+
 std::string_view to_string(SampleType value) { return name_of(value); }
 std::string_view to_string(Interpolation value) { return name_of(value); }
 std::string_view to_string(Smoothing value) { return name_of(value); }

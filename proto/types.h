@@ -143,6 +143,9 @@ enum class Stage { kQueue, kLoad, kExtract, kSmooth, kEncode, kDone };
 // True for the three states that a job does not leave again.
 bool is_final(JobState state);
 
+// The path of a job's mesh on its server.
+std::string mesh_path(const std::string& job, MeshFormat format);
+
 // Wall-clock milliseconds of each stage; a stage that has not run yet is 0.
 struct Timing {
   double queue = 0;
@@ -198,6 +201,7 @@ struct Job {
   Timing timing;
   std::optional<MeshSummary> mesh;  // of a job that succeeded
   std::optional<Problem> error;     // of a job that failed
+  bool reused = false;              // took the mesh of a job like it instead of making one
 
   bool operator==(const Job&) const = default;
 };

@@ -21,11 +21,17 @@
 #include "server/http/server.h"
 #include "server/jobs/estimate.h"
 #include "server/jobs/histograms.h"
+#include "server/jobs/housekeeper.h"
 #include "server/jobs/memory.h"
 #include "server/jobs/volume_library.h"
 #include "server/jobs/workers.h"
 #include "server/mesh/context.h"
 #include "server/store/data_folder.h"
+#include "server/store/database.h"
+#include "server/store/file_blob_store.h"
+#include "server/store/retention.h"
+#include "server/store/sqlite_job_store.h"
+#include "server/store/sqlite_volume_store.h"
 #include "server/token_command.h"
 
 namespace {
@@ -42,7 +48,11 @@ struct Options {
   http::LogLevel log_level = http::LogLevel::kInfo;
   http::LogFormat log_format = http::LogFormat::kText;
   std::filesystem::path tokens;  // empty: requests are not authenticated
-  store::JobStore::Limits jobs;
+  store::JobStoreOptions jobs;
+  double keep_days = 30;
+  std::uint64_t max_disk = 0;
+  unsigned lease_seconds = 30;
+  unsigned longest_job_minutes = 60;
   http::ServerOptions http;
   volume::ImportLimits import;
   std::uint64_t job_memory = 0;  // 0: see default_job_memory
@@ -53,6 +63,12 @@ std::uint64_t default_job_memory(std::size_t workers) {
   const auto pages = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES));
   const auto page_bytes = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
   return pages * page_bytes / 4 * 3 / workers;
+}
+
+// Often enough that what is kept is not kept much longer, and that a disk does not fill in between.
+std::chrono::milliseconds housekeeping_interval(std::chrono::milliseconds keep) {
+  return std::clamp<std::chrono::milliseconds>(keep / 4, std::chrono::seconds(1),
+                                               std::chrono::seconds(30));
 }
 
 void add_log_options(CLI::App& cli, Options& options) {
@@ -108,10 +124,25 @@ void add_options(CLI::App& cli, Options& options) {
       ->envname("ISOMESH_MAX_QUEUE")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  cli.add_option("--max-finished", options.jobs.max_finished,
-                 "Finished jobs that are kept; older ones are forgotten with their meshes")
-      ->envname("ISOMESH_MAX_FINISHED")
-      ->check(CLI::Range(1, 1000000))
+  cli.add_option("--keep-days", options.keep_days,
+                 "How long finished jobs are kept with their meshes, and volumes that none used")
+      ->envname("ISOMESH_KEEP_DAYS")
+      ->check(CLI::Range(0.0, 100000.0))
+      ->capture_default_str();
+  cli.add_option("--max-disk", options.max_disk,
+                 "Bytes of all volumes and meshes; the oldest go first; 0: what the disk holds")
+      ->envname("ISOMESH_MAX_DISK")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+  cli.add_option("--lease-seconds", options.lease_seconds,
+                 "How long a job stays with a worker that shows no sign of life")
+      ->envname("ISOMESH_LEASE_SECONDS")
+      ->check(CLI::Range(1, 3600))
+      ->capture_default_str();
+  cli.add_option("--max-job-minutes", options.longest_job_minutes,
+                 "How long a job may run; one that takes longer fails")
+      ->envname("ISOMESH_MAX_JOB_MINUTES")
+      ->check(CLI::Range(1, 10000))
       ->capture_default_str();
   cli.add_option("--max-upload", options.http.upload.max_bytes, "Bytes of one upload")
       ->envname("ISOMESH_MAX_UPLOAD")
@@ -158,6 +189,7 @@ sigset_t block_signals() {
   sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
   return signals;
 }
 
@@ -195,23 +227,36 @@ int run(const Options& options, const sigset_t& signals) {
   if (options.threads > 0) mesh::set_thread_count(options.threads);
 
   const store::DataFolder folder(options.data);
-  const store::BlobStore blobs(folder);
-  store::VolumeStore volumes(folder);
-  for (const std::string& id : volumes.unreadable()) {
+  store::Database database(folder);
+  for (const std::string& id : database.unreadable()) {
     spdlog::error("the record of volume {} cannot be read; it is left where it is", id);
   }
-  // Jobs do not outlive the process, so meshes of the last one have nobody to ask for them.
-  blobs.sweep([&](const std::string& key) {
-    return volumes.contains(key) || std::ranges::count(volumes.unreadable(), key) > 0;
-  });
-  store::JobStore jobs(blobs, options.jobs);
-  jobs::VolumeLibrary library(folder, blobs, volumes, jobs, options.import);
+  const store::FileBlobStore blobs(folder);
+  store::SqliteVolumeStore volumes(database);
+  store::JobStoreOptions job_options = options.jobs;
+  job_options.mesher_version = jobs::kMesherVersion;
+  store::SqliteJobStore jobs(database, blobs, job_options);
+  if (const std::size_t count = jobs.reap_all()) {
+    spdlog::warn("{} jobs ran when the last daemon ended", count);
+  }
+  const auto keep = std::chrono::duration_cast<std::chrono::milliseconds>(
+      std::chrono::duration<double, std::chrono::days::period>(options.keep_days));
+  store::Retention retention(folder, database, blobs,
+                             {.keep = keep, .max_bytes = options.max_disk});
+  jobs::VolumeLibrary library(folder, blobs, volumes, retention, options.import);
   const jobs::PipelineLimits limits = {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
-  jobs::Workers workers(options.workers, jobs, volumes, blobs, limits);
+  const jobs::WorkerOptions worker_options = {
+      .threads = options.workers,
+      .limits = limits,
+      .lease = std::chrono::seconds(options.lease_seconds),
+      .longest_job = std::chrono::minutes(options.longest_job_minutes)};
+  jobs::Workers workers(worker_options, jobs, volumes, blobs);
+  const jobs::Housekeeper housekeeper(retention, housekeeping_interval(keep));
   jobs::Histograms histograms(blobs);
   jobs::Estimator estimator(volumes, blobs, jobs, limits);
-  http::Server server({folder, blobs, volumes, jobs, library, histograms, estimator, tokens.get()}, options.http);
+  http::Server server({folder, blobs, volumes, jobs, library, histograms, estimator, tokens.get()},
+                      options.http);
 
   const std::string url = server.bind(address);
   std::cout << "listening on " << url << std::endl;

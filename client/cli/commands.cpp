@@ -141,6 +141,7 @@ int mesh(const Options& options, const std::stop_token& stop) {
     std::cout << job_json(job, paths_of(options.outputs), seen) << '\n';
   } else {
     report_outputs(job, options.outputs);
+    if (job.reused) std::cout << "\nthe mesh is that of an earlier job like this one\n";
     std::cout << '\n' << timing_report(job.timing, seen) << '\n' << mesh_report(*job.mesh);
   }
   return kDone;

@@ -110,6 +110,7 @@ std::string job_report(const Job& job) {
   rows.push_back({"created", job.created});
   if (job.started) rows.push_back({"started", *job.started});
   if (job.finished) rows.push_back({"finished", *job.finished});
+  if (job.reused) rows.push_back({"mesh", "taken from an earlier job like this one"});
   if (job.error) {
     rows.push_back({"error", job.error->detail.empty() ? job.error->title : job.error->detail});
   }

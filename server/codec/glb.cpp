@@ -66,13 +66,21 @@ void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset) {
           {{"bufferView", view}, {"attributes", {{"POSITION", chunk.position_id}}}}}}}});
 }
 
+// What the mesh was made with. When its job was to run is no part of it: the bytes of a mesh follow
+// from what is here.
+Json parameters_of(const Provenance& provenance) {
+  Json parameters = Json::parse(to_json(provenance.parameters));
+  parameters.erase("priority");
+  return parameters;
+}
+
 Json describe(const std::vector<DracoStream>& chunks, std::size_t binary_bytes,
               const Provenance& provenance) {
   Json gltf;
   gltf["asset"] = {{"version", "2.0"},
                    {"generator", "isomesh"},
                    {"extras",
-                    {{"parameters", Json::parse(to_json(provenance.parameters))},
+                    {{"parameters", parameters_of(provenance)},
                      {"iso", provenance.iso},
                      {"dims", provenance.dims},
                      {"spacing", provenance.geometry.spacing},

@@ -50,6 +50,13 @@ CurrentRequest& current_request() {
   return request;
 }
 
+const std::string& owner() { return current_request().caller.name; }
+
+store::Viewer viewer() {
+  const Caller& caller = current_request().caller;
+  return caller.role == Role::kAdmin ? store::Viewer() : store::Viewer(caller.name);
+}
+
 void begin_request(const App& app, const httplib::Request& request, httplib::Response& response) {
   CurrentRequest& current = current_request();
   current = {};

@@ -11,6 +11,7 @@
 #include "server/http/auth.h"
 #include "server/http/metrics.h"
 #include "server/http/trace.h"
+#include "server/store/job_store.h"
 
 namespace isomesh::http {
 
@@ -27,6 +28,12 @@ struct CurrentRequest {
 
 // Thread safe: every thread has its own.
 CurrentRequest& current_request();
+
+// Whose what this request makes is; "" where no tokens are configured.
+const std::string& owner();
+
+// Whose things this request may see: its owner's, or everybody's for an administrator.
+store::Viewer viewer();
 
 // Names the request, in X-Request-Id too, and finds out who sends it. To be called before anything
 // else looks at it. Throws Error kUnauthorized, and kForbidden when the caller's role does not

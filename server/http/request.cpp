@@ -135,6 +135,19 @@ std::chrono::milliseconds wait_of(const httplib::Request& request) {
       static_cast<std::int64_t>(std::min<double>(*seconds, kLongestWaitSeconds) * 1000));
 }
 
+std::string idempotency_key_of(const httplib::Request& request) {
+  constexpr const char* kHeader = "Idempotency-Key";
+  constexpr std::size_t kLongest = 255;
+  if (!request.has_header(kHeader)) return {};
+  const std::string key = request.get_header_value(kHeader);
+  const bool is_printable = std::ranges::all_of(key, [](char c) { return c > 0x20 && c < 0x7F; });
+  if (request.get_header_value_count(kHeader) > 1 || key.empty() || key.size() > kLongest ||
+      !is_printable) {
+    throw invalid_parameter(kHeader, "must be one key of 1 to 255 printable characters");
+  }
+  return key;
+}
+
 std::optional<std::string> sha256_of_content_digest(const httplib::Request& request) {
   const std::string header = request.get_header_value("Content-Digest");
   for (const std::string_view digest : split(header, ',')) {

@@ -36,6 +36,9 @@ JobParameters job_parameters_of(const std::vector<std::pair<std::string, std::st
 // How long the answer may wait: `?wait=N` or `Prefer: wait=N` in seconds, at most 30.
 std::chrono::milliseconds wait_of(const httplib::Request& request);
 
+// The Idempotency-Key header, as it is; empty without one. At most 255 printable characters.
+std::string idempotency_key_of(const httplib::Request& request);
+
 // The SHA-256 that Content-Digest names (RFC 9530), as hex; empty when it names none.
 std::optional<std::string> sha256_of_content_digest(const httplib::Request& request);
 

@@ -5,6 +5,7 @@
 #include "server/http/routes.h"
 #include "server/http/upload.h"
 #include "server/jobs/pipeline.h"
+#include "server/store/files.h"
 
 namespace isomesh::http {
 namespace {
@@ -17,24 +18,21 @@ constexpr std::size_t kJobsPerPage = 100;
 // an upper bound.
 Job waited(App& app, const std::string& id, std::chrono::milliseconds wait) {
   const auto place = wait.count() > 0 ? app.waits.try_take() : std::nullopt;
-  return place ? app.services.jobs.wait(id, wait) : app.services.jobs.get(id);
+  return place ? app.services.jobs.wait(viewer(), id, wait) : app.services.jobs.get(viewer(), id);
 }
 
 void submit(App& app, const httplib::Request& request, httplib::Response& response,
             const httplib::ContentReader& read_body) {
   check_known(request, {"wait"});
-  const JobParameters parameters =
-      parse_job_parameters(read_text(request, read_body, kMostBodyBytes));
-  jobs::check_supported(parameters);
-  if (!app.services.volumes.contains(parameters.volume)) {
-    throw Error(ErrorCode::kNotFound, "there is no volume with this id",
-                {{"volume", "there is no volume with this id"}});
-  }
+  const std::string body = read_text(request, read_body, kMostBodyBytes);
+  store::JobSpec spec = {owner(), parse_job_parameters(body), idempotency_key_of(request), ""};
+  jobs::check_supported(spec.parameters);
+  if (!spec.idempotency_key.empty()) spec.request_digest = store::sha256_of(body);
   const auto wait = wait_of(request);
-  const std::string id = app.services.jobs.submit(parameters).id;
-  const Job job = waited(app, id, wait);
-  response.set_header("Location", kJobs + '/' + id);
-  answer_json(response, is_final(job.state) ? 200 : 202, to_json(job));
+  Job job = store::job_of(app.services.jobs.submit(spec));
+  if (wait.count() > 0) job = waited(app, job.id, wait);
+  response.set_header("Location", kJobs + '/' + job.id);
+  answer_json(response, wait.count() > 0 && is_final(job.state) ? 200 : 202, to_json(job));
 }
 
 void list(App& app, const httplib::Request& request, httplib::Response& response) {
@@ -45,7 +43,7 @@ void list(App& app, const httplib::Request& request, httplib::Response& response
     if (!state) throw invalid_parameter("state", "must be " + names_of<JobState>());
   }
   const std::string cursor = request.get_param_value("cursor");
-  std::vector<Job> jobs = app.services.jobs.list(state, cursor, kJobsPerPage + 1);
+  std::vector<Job> jobs = app.services.jobs.list(viewer(), state, cursor, kJobsPerPage + 1);
   std::string next;
   if (jobs.size() > kJobsPerPage) {
     jobs.pop_back();
@@ -68,7 +66,7 @@ void add_job_routes(App& app) {
   });
   add_delete(app, kJobs + '/' + kId, [&app](const auto& request, auto& response) {
     check_known(request, {});
-    answer_json(response, 200, to_json(app.services.jobs.cancel(id_of(request))));
+    answer_json(response, 200, to_json(app.services.jobs.cancel(viewer(), id_of(request))));
   });
 }
 

@@ -30,9 +30,8 @@ std::string server_timing(const Timing& timing) {
 }
 
 // Streams part of a blob; the provider is asked for pieces of it and must not trust the bounds.
-void stream(httplib::Response& response, store::File file, const ByteRange& range,
-            const std::string& media_type) {
-  const auto blob = std::make_shared<store::File>(std::move(file));
+void stream(httplib::Response& response, std::shared_ptr<store::BlobReader> blob,
+            const ByteRange& range, const std::string& media_type) {
   response.set_content_provider(
       range.length, media_type,
       [blob, range, block = std::vector<std::byte>(kBlockBytes)](
@@ -80,14 +79,13 @@ void mesh_in_one(App& app, const httplib::Request& request, httplib::Response& r
   if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
   {
     const Upload file(app.services.folder, app.options.upload, app.stopping, request, read_body);
-    parameters.volume = app.services.library.add(file.path(), options).first.id;
+    parameters.volume = app.services.library.add(owner(), file.path(), options).first.id;
   }
-  const std::string id = app.services.jobs.submit(parameters).id;
-  response.set_header("Location", "/v1/jobs/" + id);
-  Job job = app.services.jobs.get(id);
+  Job job = store::job_of(app.services.jobs.submit({owner(), parameters, "", ""}));
+  response.set_header("Location", "/v1/jobs/" + job.id);
   while (!is_final(job.state)) {
     if (app.stopping) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
-    job = app.services.jobs.wait(id, std::chrono::seconds(1));
+    job = app.services.jobs.wait(viewer(), job.id, std::chrono::seconds(1));
   }
   answer_mesh(app, request, response, job, parameters.formats.front());
 }
@@ -141,7 +139,8 @@ void add_mesh_routes(App& app) {
             if (!format) {
               throw Error(ErrorCode::kNotFound, "a mesh has the suffix " + names_of<MeshFormat>());
             }
-            answer_mesh(app, request, response, app.services.jobs.get(id_of(request)), *format);
+            answer_mesh(app, request, response, app.services.jobs.get(viewer(), id_of(request)),
+                        *format);
           });
   add_post(app, "/v1/mesh", [&app](const auto& request, auto& response, const auto& read_body) {
     mesh_in_one(app, request, response, read_body);

@@ -36,7 +36,7 @@ std::string text_of(double value) {
 
 void histogram(App& app, const httplib::Request& request, httplib::Response& response) {
   check_known(request, {"bins"});
-  const Volume volume = app.services.volumes.get(id_of(request));
+  const Volume volume = app.services.volumes.get(viewer(), id_of(request));
   const std::uint64_t bins = whole_number_of(request, "bins", {1, kMostBins}, kUsualBins);
   if (is_known(request, response, '"' + volume.id + ".bins" + std::to_string(bins) + '"')) return;
   response.status = 200;
@@ -59,14 +59,14 @@ volume::SliceChoice slice_choice(const httplib::Request& request, const Volume& 
 
 void slice(App& app, const httplib::Request& request, httplib::Response& response) {
   check_known(request, {"axis", "index", "window"});
-  const Volume volume = app.services.volumes.get(id_of(request));
+  const Volume volume = app.services.volumes.get(viewer(), id_of(request));
   const volume::SliceChoice choice = slice_choice(request, volume);
   const std::string etag = '"' + volume.id + '.' + std::string(to_string(choice.axis)) +
                            std::to_string(choice.index) + '.' + text_of(choice.window[0]) + '.' +
                            text_of(choice.window[1]) + '"';
   if (is_known(request, response, etag)) return;
   const auto canonical =
-      std::make_shared<const volume::CanonicalVolume>(app.services.blobs.path_of(volume.id));
+      std::make_shared<const volume::CanonicalVolume>(app.services.blobs.local(volume.id).path);
   const auto picture = std::make_shared<volume::SlicePng>(canonical, choice);
   response.status = 200;
   response.set_header("Accept-Ranges", "none");
@@ -83,7 +83,7 @@ void slice(App& app, const httplib::Request& request, httplib::Response& respons
 
 void estimate(App& app, const httplib::Request& request, httplib::Response& response) {
   const JobParameters parameters = job_parameters_of(query_of(request), VolumeIn::kQuery);
-  answer_json(response, 200, to_json(app.services.estimator.estimate(parameters)));
+  answer_json(response, 200, to_json(app.services.estimator.estimate(viewer(), parameters)));
 }
 
 }  // namespace

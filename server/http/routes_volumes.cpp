@@ -14,7 +14,7 @@ void upload(App& app, const httplib::Request& request, httplib::Response& respon
   const auto place = app.uploads.try_take();
   if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
   const Upload file(app.services.folder, app.options.upload, app.stopping, request, read_body);
-  const auto [volume, is_new] = app.services.library.add(file.path(), options);
+  const auto [volume, is_new] = app.services.library.add(owner(), file.path(), options);
   response.set_header("Location", kVolumes + '/' + volume.id);
   answer_json(response, is_new ? 201 : 200, to_json(volume));
 }
@@ -27,15 +27,15 @@ void add_volume_routes(App& app) {
   });
   add_get(app, kVolumes, [&app](const auto& request, auto& response) {
     check_known(request, {});
-    answer_json(response, 200, to_json(app.services.volumes.list()));
+    answer_json(response, 200, to_json(app.services.volumes.list(viewer())));
   });
   add_get(app, kVolumes + '/' + kId, [&app](const auto& request, auto& response) {
     check_known(request, {});
-    answer_json(response, 200, to_json(app.services.volumes.get(id_of(request))));
+    answer_json(response, 200, to_json(app.services.volumes.get(viewer(), id_of(request))));
   });
   add_delete(app, kVolumes + '/' + kId, [&app](const auto& request, auto& response) {
     check_known(request, {});
-    app.services.library.erase(id_of(request));
+    app.services.library.erase(owner(), id_of(request));
     response.status = 204;
   });
 }

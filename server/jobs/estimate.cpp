@@ -131,8 +131,8 @@ std::uint64_t CostModel::file_bytes(MeshFormat format, const SurfaceSize& surfac
       std::llround(factor * guessed_bytes(format, surface, parameters)));
 }
 
-Estimate Estimator::estimate(const JobParameters& parameters) {
-  const Volume volume = volumes_.get(parameters.volume);
+Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& parameters) {
+  const Volume volume = volumes_.get(viewer, parameters.volume);
   Estimate estimate;
   estimate.volume = volume.id;
   estimate.iso = parameters.iso.value_or(volume.suggested_iso);
@@ -147,13 +147,15 @@ Estimate Estimator::estimate(const JobParameters& parameters) {
   for (const MeshFormat format : parameters.formats) {
     estimate.bytes[format] = costs.file_bytes(format, surface, parameters);
   }
-  estimate.queue = {jobs_.count(JobState::kQueued), jobs_.count(JobState::kRunning)};
+  const store::QueueDepth depth = jobs_.depth();
+  estimate.queue = {depth.all_queued(), depth.running};
   return estimate;
 }
 
 SurfaceSize Estimator::count(const Volume& volume, double iso, Scheme scheme) {
   const auto size = counts_.get({volume.id, iso, scheme}, [&] {
-    const volume::CanonicalVolume canonical(blobs_.path_of(volume.id));
+    const store::LocalBlob file = blobs_.local(volume.id);
+    const volume::CanonicalVolume canonical(file.path);
     const mesh::ExtractOptions options = {.iso = iso, .scheme = scheme};
     SurfaceSize counted;
     volume::with_sample(volume::stored_type(volume.type), [&](auto sample) {
@@ -171,11 +173,11 @@ SurfaceSize Estimator::count(const Volume& volume, double iso, Scheme scheme) {
 CostModel Estimator::model() const {
   CostModel costs;
   std::map<std::string, std::uint64_t> samples;
-  for (const Job& job : jobs_.list(JobState::kSucceeded, "", kJobsLookedAt)) {
+  for (const Job& job : jobs_.list(std::nullopt, JobState::kSucceeded, "", kJobsLookedAt)) {
     const std::string& id = job.parameters.volume;
-    if (!volumes_.contains(id)) continue;
+    if (!volumes_.contains(std::nullopt, id)) continue;
     const auto [known, is_new] = samples.try_emplace(id);
-    if (is_new) known->second = volumes_.get(id).sample_count();
+    if (is_new) known->second = volumes_.get(std::nullopt, id).sample_count();
     costs.learn(job, known->second);
   }
   return costs;

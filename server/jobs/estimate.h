@@ -69,7 +69,7 @@ class Estimator {
   // Triangles and vertices are exact; the rest follows from them and from the jobs that this daemon
   // has finished. Throws Error kNotFound without the volume, kUnavailable when too many wait for an
   // estimate already or after stop().
-  Estimate estimate(const JobParameters& parameters);
+  Estimate estimate(const store::Viewer& viewer, const JobParameters& parameters);
 
   // Ends the counting that is under way, for good.
   void stop() { stop_.request_stop(); }

@@ -35,7 +35,7 @@ volume::ValueCounts count_values(const volume::CanonicalVolume& canonical, const
 
 Histogram Histograms::of(const Volume& volume, std::size_t bins) {
   const auto values = counts_.get(volume.id, [&] {
-    return count_values(volume::CanonicalVolume(blobs_.path_of(volume.id)), volume);
+    return count_values(volume::CanonicalVolume(blobs_.local(volume.id).path), volume);
   });
   return {volume.id, volume.range, volume::rebinned(*values, bins)};
 }

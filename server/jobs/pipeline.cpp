@@ -3,7 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <deque>
+#include <memory>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -134,8 +134,8 @@ void encode_and_measure(const codec::Provenance& provenance, const store::BlobSt
   const std::vector<MeshFormat>& formats = provenance.parameters.formats;
   std::vector<std::atomic<double>> done(formats.size());
   // Committed together at the end: a job that ends on the way leaves no file of it.
-  std::deque<store::BlobStore::Writer> writers;
-  for (std::size_t i = 0; i < formats.size(); ++i) writers.emplace_back(blobs);
+  std::vector<std::unique_ptr<store::BlobWriter>> writers;
+  for (std::size_t i = 0; i < formats.size(); ++i) writers.push_back(blobs.begin());
   const mesh::Context stage = progress.context();
   const auto encode = [&](std::size_t i) {
     const mesh::Context context = {stage.stop, [&, i](double share) {
@@ -145,7 +145,7 @@ void encode_and_measure(const codec::Provenance& provenance, const store::BlobSt
                                      stage.progress(sum / static_cast<double>(formats.size()));
                                    }};
     codec::encode(mesh, formats[i], provenance, context,
-                  [&](std::span<const std::byte> bytes) { writers[i].write(bytes); });
+                  [&](std::span<const std::byte> bytes) { writers[i]->write(bytes); });
   };
   mesh::Extent extent;
   mesh::Topology topology;
@@ -155,7 +155,7 @@ void encode_and_measure(const codec::Provenance& provenance, const store::BlobSt
     topology = measure_topology(mesh, progress.quiet());
   });
   for (std::size_t i = 0; i < formats.size(); ++i) {
-    const store::Blob blob = writers[i].commit();
+    const store::Blob blob = writers[i]->commit();
     summary.files[formats[i]] = {blob.bytes, blob.key, ""};
   }
   summary.boundary_edges = topology.boundary_edges;
@@ -164,6 +164,20 @@ void encode_and_measure(const codec::Provenance& provenance, const store::BlobSt
   summary.area_mm2 = extent.area_mm2;
   summary.volume_mm3.smoothed = extent.volume_mm3;
   summary.bounds = {extent.low, extent.high};
+}
+
+// The volume's file, once its bytes are known to be those that its id names: a mesh of samples that
+// a disk has spoilt would look like any other.
+store::LocalBlob checked_file(const Volume& volume, const store::BlobStore& blobs,
+                              const std::stop_token& stop) {
+  const Error spoilt(ErrorCode::kUnusableVolume, "the stored volume is damaged: upload it again");
+  try {
+    if (!blobs.is_intact(volume.id, stop)) throw spoilt;
+    return blobs.local(volume.id);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kNotFound) throw spoilt;
+    throw;
+  }
 }
 
 }  // namespace
@@ -210,13 +224,14 @@ std::uint64_t estimate_memory(std::uint64_t vertices, std::uint64_t triangles,
 PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
                             const PipelineLimits& limits, const store::BlobStore& blobs,
                             Workspace& workspace, std::stop_token stop, const Report& report) {
-  Progress progress(std::move(stop), report);
+  Progress progress(stop, report);
   mesh::Mesh& mesh = workspace.mesh;
   PipelineResult result;
   MeshSummary& summary = result.mesh;
 
   progress.enter(Stage::kLoad, kLoadShare, &Timing::load);
-  const volume::CanonicalVolume samples(blobs.path_of(volume.id));
+  const store::LocalBlob file = checked_file(volume, blobs, stop);
+  const volume::CanonicalVolume samples(file.path);
   samples.preload();
 
   progress.enter(Stage::kExtract, kExtractShare, &Timing::extract);

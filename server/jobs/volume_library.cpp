@@ -1,8 +1,11 @@
 #include "server/jobs/volume_library.h"
 
+#include "server/store/files.h"
+
 namespace isomesh::jobs {
 
-std::pair<Volume, bool> VolumeLibrary::add(const std::filesystem::path& upload,
+std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
+                                           const std::filesystem::path& upload,
                                            const volume::ImportOptions& options) {
   const store::ScratchFolder scratch(folder_.scratch());
   const std::filesystem::path canonical = scratch.path() / "canonical";
@@ -11,19 +14,17 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::filesystem::path& upload,
                   : volume::import_file(upload, options.series, scratch.path(), limits_, canonical);
   const store::Blob blob = store::digest_of(canonical);
   const std::lock_guard lock(mutex_);
+  if (!volumes_.names(blob.key)) retention_.make_room(blob.bytes);
   blobs_.adopt(canonical, blob);
   volume.id = blob.key;
   volume.created = store::timestamp();
-  return volumes_.add(volume);
+  return volumes_.add(owner, volume);
 }
 
-void VolumeLibrary::erase(const std::string& id) {
+void VolumeLibrary::erase(const std::string& owner, const std::string& id) {
   const std::lock_guard lock(mutex_);
-  if (volumes_.contains(id) && jobs_.needs_volume(id)) {
-    throw Error(ErrorCode::kNotReady, "jobs that are not finished need this volume");
-  }
-  volumes_.erase(id);
-  blobs_.erase(id);
+  volumes_.erase(owner, id);
+  if (!volumes_.names(id)) blobs_.erase(id);
 }
 
 }  // namespace isomesh::jobs

@@ -8,7 +8,7 @@
 #include "proto/types.h"
 #include "server/store/blob_store.h"
 #include "server/store/data_folder.h"
-#include "server/store/job_store.h"
+#include "server/store/retention.h"
 #include "server/store/volume_store.h"
 #include "server/volume/import.h"
 
@@ -19,23 +19,24 @@ namespace isomesh::jobs {
 class VolumeLibrary {
  public:
   VolumeLibrary(const store::DataFolder& folder, const store::BlobStore& blobs,
-                store::VolumeStore& volumes, const store::JobStore& jobs,
+                store::VolumeStore& volumes, store::Retention& retention,
                 const volume::ImportLimits& limits)
-      : folder_(folder), blobs_(blobs), volumes_(volumes), jobs_(jobs), limits_(limits) {}
+      : folder_(folder), blobs_(blobs), volumes_(volumes), retention_(retention), limits_(limits) {}
 
-  // Imports an uploaded file. Second: false when the same samples and geometry were there already.
-  // Throws what the imports of volume/import.h throw.
-  std::pair<Volume, bool> add(const std::filesystem::path& upload,
+  // Imports an uploaded file. Second: false when the owner had the same samples and geometry
+  // already. Throws what the imports of volume/import.h throw, and kOutOfSpace.
+  std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
                               const volume::ImportOptions& options = {});
 
-  // Throws Error kNotFound, and kNotReady while a job needs the volume.
-  void erase(const std::string& id);
+  // The samples go with the last owner's record. Throws Error kNotFound, kGone, and kNotReady while
+  // a job needs the volume.
+  void erase(const std::string& owner, const std::string& id);
 
  private:
   const store::DataFolder& folder_;
   const store::BlobStore& blobs_;
   store::VolumeStore& volumes_;
-  const store::JobStore& jobs_;
+  store::Retention& retention_;
   const volume::ImportLimits limits_;
   std::mutex mutex_;  // held while a blob and its record come or go together
 };

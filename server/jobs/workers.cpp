@@ -1,95 +1,252 @@
 #include "server/jobs/workers.h"
 
-#include <chrono>
+#include <array>
 #include <exception>
 #include <new>
-#include <string>
+#include <optional>
+#include <utility>
 
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 namespace isomesh::jobs {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
 // What a worker keeps between jobs: enough for a surface of some twenty million triangles.
 constexpr std::size_t kWorkspaceBudgetBytes = std::size_t{1} << 30;
+// How often a running job tells how far it is and learns that it is to stop.
+constexpr milliseconds kBetweenRenewals{100};
+constexpr milliseconds kBetweenReaps{1000};
+constexpr milliseconds kLongestIdle{1000};
+// How long a job waits that found the disk full; a shorter wait before the same verb is tried
+// again.
+constexpr milliseconds kFullDiskDelay{5000};
+constexpr milliseconds kFullDiskRetry{500};
 
-std::string mesh_path(const std::string& job, MeshFormat format) {
-  return "/v1/jobs/" + job + "/mesh." + std::string(to_string(format));
+// Why a run was asked to stop.
+enum class Reason { kNone, kCancelled, kLost, kTooLong, kFullDisk, kEnding };
+
+std::string worker_name(std::size_t thread) {
+  std::array<char, 256> host = {};
+  ::gethostname(host.data(), host.size() - 1);
+  return std::string(host.data()) + ':' + std::to_string(::getpid()) + ':' + std::to_string(thread);
 }
 
-Problem problem_of(const Error& error, const std::string& job) {
-  return to_problem(error, "/v1/jobs/" + job);
+void pause(const std::stop_token& stop, milliseconds time) {
+  constexpr milliseconds kStep{20};
+  for (const auto end = Clock::now() + time; Clock::now() < end && !stop.stop_requested();) {
+    std::this_thread::sleep_for(kStep);
+  }
 }
 
 }  // namespace
 
-Workers::Workers(std::size_t threads, store::JobStore& jobs, const store::VolumeStore& volumes,
-                 const store::BlobStore& blobs, const PipelineLimits& limits)
-    : jobs_(jobs), volumes_(volumes), blobs_(blobs), limits_(limits), alive_(threads) {
-  for (std::size_t i = 0; i < threads; ++i) {
-    threads_.emplace_back([this] { work(claims_.get_token()); });
+// A job under way, as its worker and the thread that looks after leases share it. Thread safe.
+class Workers::Run {
+ public:
+  explicit Run(const store::Lease& lease) : lease_(lease) {}
+
+  const store::Lease& lease() const { return lease_; }
+  std::stop_token token() const { return stop_.get_token(); }
+  Reason reason() const { return reason_; }
+  Clock::duration age() const { return Clock::now() - began_; }
+
+  // Only the first reason counts.
+  void stop(Reason reason) {
+    Reason none = Reason::kNone;
+    reason_.compare_exchange_strong(none, reason);
+    stop_.request_stop();
   }
+
+  // True when it is in another stage than before.
+  bool advance(const store::Progress& progress) {
+    const std::lock_guard lock(mutex_);
+    const bool is_other_stage = progress.stage != progress_.stage;
+    progress_ = progress;
+    return is_other_stage;
+  }
+
+  // Prolongs the lease unless the run is over, and stops the run when it is not to go on.
+  void renew(store::JobStore& jobs, milliseconds lease) {
+    const std::lock_guard renewing(renewal_);
+    if (is_over_) return;
+    const store::Standing standing = jobs.renew(lease_, progress(), lease);
+    if (standing == store::Standing::kCancel) stop(Reason::kCancelled);
+    if (standing == store::Standing::kLost) stop(Reason::kLost);
+  }
+
+  // No renewal is under way any more, and none begins.
+  void end() {
+    const std::lock_guard renewing(renewal_);
+    is_over_ = true;
+  }
+
+ private:
+  store::Progress progress() const {
+    const std::lock_guard lock(mutex_);
+    return progress_;
+  }
+
+  const store::Lease lease_;
+  const Clock::time_point began_ = Clock::now();
+  std::stop_source stop_;
+  std::atomic<Reason> reason_ = Reason::kNone;
+  mutable std::mutex mutex_;
+  store::Progress progress_;  // guarded by mutex_
+  std::mutex renewal_;
+  bool is_over_ = false;  // guarded by renewal_
+};
+
+Workers::Workers(const WorkerOptions& options, store::JobStore& jobs,
+                 const store::VolumeStore& volumes, const store::BlobStore& blobs)
+    : options_(options), jobs_(jobs), volumes_(volumes), blobs_(blobs), alive_(options.threads) {
+  for (std::size_t i = 0; i < options.threads; ++i) {
+    threads_.emplace_back([this, i] { work(claims_.get_token(), worker_name(i)); });
+  }
+  leases_ = std::jthread([this](const std::stop_token& stop) { look_after_leases(stop); });
 }
 
 Workers::~Workers() {
   claims_.request_stop();
   running_.request_stop();
+  threads_.clear();  // the leases are looked after until the last has ended
 }
 
-bool Workers::drain(std::chrono::milliseconds wait) {
+bool Workers::drain(milliseconds wait) {
   claims_.request_stop();
-  const auto deadline = std::chrono::steady_clock::now() + wait;
-  constexpr auto kPoll = std::chrono::milliseconds(10);
-  while (alive_ > 0 && std::chrono::steady_clock::now() < deadline) {
-    std::this_thread::sleep_for(kPoll);
-  }
+  const auto deadline = Clock::now() + wait;
+  constexpr milliseconds kPoll{10};
+  while (alive_ > 0 && Clock::now() < deadline) std::this_thread::sleep_for(kPoll);
   return alive_ == 0;
 }
 
-void Workers::work(const std::stop_token& stop) {
+void Workers::work(const std::stop_token& stop, const std::string& name) {
   Workspace workspace;
-  while (const auto lease = jobs_.claim(stop)) {
-    run(*lease, workspace);
-    workspace.trim(kWorkspaceBudgetBytes);
+  while (!stop.stop_requested()) {
+    try {
+      if (const auto lease = jobs_.claim(name, options_.lease)) {
+        run(*lease, workspace);
+        workspace.trim(kWorkspaceBudgetBytes);
+      } else {
+        jobs_.wait_for_work(stop, kLongestIdle);
+      }
+    } catch (const std::exception& error) {
+      spdlog::error("the queue does not answer: {}", error.what());
+      pause(stop, kLongestIdle);
+    }
   }
   --alive_;
 }
 
 void Workers::run(const store::Lease& lease, Workspace& workspace) {
-  // One token for both reasons to stop: the job is cancelled, or the service ends.
-  std::stop_source stop;
-  const std::stop_callback on_cancel(lease.cancelled, [&] { stop.request_stop(); });
-  const std::stop_callback on_end(running_.get_token(), [&] { stop.request_stop(); });
-  Timing timing;
+  const auto run = std::make_shared<Run>(lease);
+  {
+    const std::lock_guard lock(runs_mutex_);
+    runs_.push_back(run);
+  }
+  const std::stop_callback on_end(running_.get_token(), [&] { run->stop(Reason::kEnding); });
+  const std::string path = "/v1/jobs/" + lease.id;
   store::Outcome outcome;
   try {
-    const Volume volume = volumes_.get(lease.parameters.volume);
+    const Volume volume = volumes_.get(lease.owner, lease.parameters.volume);
     PipelineResult result =
-        run_pipeline(volume, lease.parameters, limits_, blobs_, workspace, stop.get_token(),
-                     [&](Stage stage, double progress, const Timing& so_far) {
-                       jobs_.report(lease, stage, progress, so_far);
+        run_pipeline(volume, lease.parameters, options_.limits, blobs_, workspace, run->token(),
+                     [&](Stage stage, double share, const Timing& so_far) {
+                       if (run->advance({stage, share, so_far})) renew(*run);
                      });
-    for (auto& [format, file] : result.mesh.files) file.href = mesh_path(lease.id, format);
     outcome.mesh = std::move(result.mesh);
-    timing = result.timing;
+    outcome.timing = result.timing;
   } catch (const Error& error) {
-    if (error.code() == ErrorCode::kCancelled && !lease.cancelled.stop_requested()) {
-      return jobs_.put_back(lease);
-    }
+    if (error.code() == ErrorCode::kOutOfSpace) run->stop(Reason::kFullDisk);
     if (error.code() != ErrorCode::kCancelled) {
-      spdlog::error("job {} failed: {}", lease.id, error.what());
-      outcome.error = problem_of(error, lease.id);
+      outcome.error = to_problem(error, path);
+      outcome.may_retry = error.code() == ErrorCode::kInternal;
+      spdlog::error("job {}, attempt {}: {}", lease.id, lease.attempt, error.what());
     }
   } catch (const std::bad_alloc&) {
-    spdlog::error("job {} failed: out of memory", lease.id);
-    outcome.error = problem_of(
-        Error(ErrorCode::kTooLarge, "there is not enough memory for this surface"), lease.id);
+    outcome.error =
+        to_problem({ErrorCode::kTooLarge, "there is not enough memory for this surface"}, path);
+    spdlog::error("job {}, attempt {}: out of memory", lease.id, lease.attempt);
   } catch (const std::exception& error) {
-    spdlog::error("job {} failed: {}", lease.id, error.what());
-    outcome.error = problem_of(Error(ErrorCode::kInternal, error.what()), lease.id);
+    outcome.error = to_problem({ErrorCode::kInternal, error.what()}, path);
+    outcome.may_retry = true;
+    spdlog::error("job {}, attempt {}: {}", lease.id, lease.attempt, error.what());
   }
-  if (!jobs_.finish(lease, outcome, timing)) {
-    spdlog::warn("job {} was ended by somebody else", lease.id);
+  run->end();
+  {
+    const std::lock_guard lock(runs_mutex_);
+    std::erase(runs_, run);
+  }
+  conclude(*run, outcome);
+}
+
+// Tells the queue how the run ended, and again while the disk has no room for that.
+void Workers::conclude(const Run& run, store::Outcome outcome) {
+  const store::Lease& lease = run.lease();
+  const bool was_stopped = !outcome.mesh && !outcome.error;
+  if (was_stopped && run.reason() == Reason::kTooLong) {
+    const std::string minutes = std::to_string(options_.longest_job.count());
+    outcome.error = to_problem(
+        {ErrorCode::kTooLarge, "the job took longer than the " + minutes + " minutes allowed"},
+        "/v1/jobs/" + lease.id);
+  }
+  const auto tell = [&] {
+    if (was_stopped && run.reason() == Reason::kEnding) {
+      return jobs_.put_back(lease, milliseconds(0));
+    }
+    if (!outcome.mesh && run.reason() == Reason::kFullDisk) {
+      return jobs_.put_back(lease, kFullDiskDelay);
+    }
+    return jobs_.finish(lease, outcome);
+  };
+  while (true) {
+    try {
+      if (!tell()) spdlog::warn("job {} had lost its lease: its result is dropped", lease.id);
+      return;
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kOutOfSpace || running_.stop_requested()) throw;
+      spdlog::error("job {} cannot be finished yet: {}", lease.id, error.what());
+    }
+    pause(running_.get_token(), kFullDiskRetry);
+  }
+}
+
+void Workers::renew(Run& run) {
+  try {
+    run.renew(jobs_, options_.lease);
+  } catch (const std::exception& error) {
+    spdlog::error("the lease of job {} was not prolonged: {}", run.lease().id, error.what());
+  }
+}
+
+void Workers::look_after_leases(const std::stop_token& stop) {
+  auto last_reap = Clock::now();
+  while (!stop.stop_requested()) {
+    std::vector<std::shared_ptr<Run>> runs;
+    {
+      const std::lock_guard lock(runs_mutex_);
+      runs = runs_;
+    }
+    for (const auto& run : runs) {
+      if (run->age() > options_.longest_job) run->stop(Reason::kTooLong);
+      renew(*run);
+    }
+    if (Clock::now() - last_reap > kBetweenReaps) {
+      last_reap = Clock::now();
+      reap();
+    }
+    pause(stop, kBetweenRenewals);
+  }
+}
+
+void Workers::reap() {
+  try {
+    if (const std::size_t count = jobs_.reap()) spdlog::warn("{} leases ran out", count);
+  } catch (const std::exception& error) {
+    spdlog::error("leases that ran out are left: {}", error.what());
   }
 }
 

@@ -2,7 +2,10 @@
 
 #include <atomic>
 #include <chrono>
+#include <memory>
+#include <mutex>
 #include <stop_token>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -13,12 +16,20 @@
 
 namespace isomesh::jobs {
 
+struct WorkerOptions {
+  std::size_t threads = 2;
+  PipelineLimits limits = {};
+  std::chrono::milliseconds lease{30'000};  // how soon a dead worker's job is run again
+  std::chrono::minutes longest_job{60};     // one that runs longer fails
+};
+
 // The threads that run jobs, one job each at a time; the kernels' own threads are shared between
-// them. The stores must outlive it. Thread safe.
+// them. One more thread prolongs their leases and looks after those that ran out. The stores must
+// outlive it. Thread safe.
 class Workers {
  public:
-  Workers(std::size_t threads, store::JobStore& jobs, const store::VolumeStore& volumes,
-          const store::BlobStore& blobs, const PipelineLimits& limits);
+  Workers(const WorkerOptions& options, store::JobStore& jobs, const store::VolumeStore& volumes,
+          const store::BlobStore& blobs);
 
   // Running jobs are stopped and put back; returns when all threads have ended.
   ~Workers();
@@ -30,17 +41,26 @@ class Workers {
   bool drain(std::chrono::milliseconds wait);
 
  private:
-  void work(const std::stop_token& stop);
-  void run(const store::Lease& lease, Workspace& workspace);
+  class Run;
 
+  void work(const std::stop_token& stop, const std::string& name);
+  void run(const store::Lease& lease, Workspace& workspace);
+  void conclude(const Run& run, store::Outcome outcome);
+  void renew(Run& run);
+  void look_after_leases(const std::stop_token& stop);
+  void reap();
+
+  const WorkerOptions options_;
   store::JobStore& jobs_;
   const store::VolumeStore& volumes_;
   const store::BlobStore& blobs_;
-  const PipelineLimits limits_;
-  std::stop_source claims_;            // ends the taking of jobs
-  std::stop_source running_;           // interrupts those that run
-  std::atomic<std::size_t> alive_;     // threads that may still run a job
-  std::vector<std::jthread> threads_;  // last: joined first
+  std::stop_source claims_;         // ends the taking of jobs
+  std::stop_source running_;        // interrupts those that run
+  std::atomic<std::size_t> alive_;  // threads that may still run a job
+  std::mutex runs_mutex_;
+  std::vector<std::shared_ptr<Run>> runs_;  // under way; guarded by runs_mutex_
+  std::vector<std::jthread> threads_;
+  std::jthread leases_;  // last: joined first
 };
 
 }  // namespace isomesh::jobs

@@ -1,15 +1,14 @@
-// Finished files, named by the SHA-256 of their bytes.
+// Finished files, named by the SHA-256 of their bytes: the interface behind which engines stand.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
+#include <memory>
+#include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
-
-#include "server/store/data_folder.h"
-#include "server/store/files.h"
 
 namespace isomesh::store {
 
@@ -22,54 +21,61 @@ struct Blob {
 // Reads a file and brings it to disk. Throws Error kOutOfSpace or kInternal.
 Blob digest_of(const std::filesystem::path& file);
 
-// Blobs as files of the data folder. A blob is seen whole or not at all, and never changes. Thread
-// safe; `folder` must outlive it.
+// Takes a blob's bytes in order. Not thread safe. What is not committed is removed.
+class BlobWriter {
+ public:
+  virtual ~BlobWriter() = default;
+
+  // Throws Error kOutOfSpace.
+  virtual void write(std::span<const std::byte> bytes) = 0;
+
+  // Afterwards the blob is there and on disk. To be called once. Throws Error kOutOfSpace.
+  virtual Blob commit() = 0;
+};
+
+// An open blob; outlives its erasing. Thread safe.
+class BlobReader {
+ public:
+  virtual ~BlobReader() = default;
+
+  virtual std::uint64_t size() const = 0;
+
+  // Reads up to bytes.size() bytes from `offset`; fewer only at the end. Throws Error kInternal.
+  virtual std::size_t read_at(std::uint64_t offset, std::span<std::byte> bytes) const = 0;
+};
+
+// A blob as a file of this machine, for those that map it; what else holds it goes with it.
+struct LocalBlob {
+  std::filesystem::path path;
+  std::shared_ptr<const void> held = {};
+};
+
+// A blob is seen whole or not at all, and never changes. Thread safe.
 class BlobStore {
  public:
-  explicit BlobStore(const DataFolder& folder) : folder_(folder) {}
+  virtual ~BlobStore() = default;
 
-  // Takes a blob's bytes in order. Not thread safe. What is not committed is removed.
-  class Writer {
-   public:
-    explicit Writer(const BlobStore& store);
-    ~Writer();
-    Writer(const Writer&) = delete;
-    Writer& operator=(const Writer&) = delete;
+  virtual std::unique_ptr<BlobWriter> begin() const = 0;
 
-    // Throws Error kOutOfSpace.
-    void write(std::span<const std::byte> bytes);
-
-    // Afterwards the blob is there and on disk. To be called once. Throws Error kOutOfSpace.
-    Blob commit();
-
-   private:
-    const BlobStore& store_;
-    std::filesystem::path path_;
-    File file_;
-    Sha256 digest_;
-    std::uint64_t bytes_ = 0;
-  };
-
-  // Makes a finished file of the scratch folder, which digest_of named, a blob by moving it. Throws
+  // Makes a finished file of this machine, which digest_of named, a blob and removes it. Throws
   // Error kOutOfSpace.
-  void adopt(const std::filesystem::path& file, const Blob& blob) const;
+  virtual void adopt(const std::filesystem::path& file, const Blob& blob) const = 0;
 
   // Throws Error kNotFound.
-  File open(const std::string& key) const;
+  virtual std::unique_ptr<BlobReader> open(const std::string& key) const = 0;
 
-  // Where a blob lies, for those that map it. It may not be there.
-  std::filesystem::path path_of(const std::string& key) const;
+  // Throws Error kNotFound.
+  virtual LocalBlob local(const std::string& key) const = 0;
+
+  // Whether the bytes are those that the key names. What was found intact is believed for a while,
+  // as long as nothing has touched it. Throws Error kNotFound, kCancelled when `stop` is requested.
+  virtual bool is_intact(const std::string& key, const std::stop_token& stop) const = 0;
+
+  // In bytes; empty when it is not there.
+  virtual std::optional<std::uint64_t> size(const std::string& key) const = 0;
 
   // Nothing happens when it is not there. Those that have it open keep what they have.
-  void erase(const std::string& key) const;
-
-  // Erases every blob for which `keep` is false.
-  void sweep(const std::function<bool(const std::string& key)>& keep) const;
-
- private:
-  void publish_as(const std::filesystem::path& file, const std::string& key) const;
-
-  const DataFolder& folder_;
+  virtual void erase(const std::string& key) const = 0;
 };
 
 }  // namespace isomesh::store

@@ -16,8 +16,9 @@ class DataFolder {
   DataFolder(const DataFolder&) = delete;
   DataFolder& operator=(const DataFolder&) = delete;
 
-  std::filesystem::path blobs() const { return root_ / "blobs"; }      // finished files, by digest
-  std::filesystem::path volumes() const { return root_ / "volumes"; }  // records
+  std::filesystem::path blobs() const { return root_ / "blobs"; }  // finished files, by digest
+  std::filesystem::path records() const { return root_ / "isomesh.sqlite"; }  // the database
+  std::filesystem::path volumes() const { return root_ / "volumes"; }  // records before databases
   std::filesystem::path scratch() const { return root_ / "scratch"; }  // unfinished files
 
  private:

@@ -85,8 +85,12 @@ void File::sync() {
   if (::fsync(descriptor_) != 0) fail(errno, "syncing a file");
 }
 
-void publish(const std::filesystem::path& from, const std::filesystem::path& to) {
+void move_to(const std::filesystem::path& from, const std::filesystem::path& to) {
   if (::rename(from.c_str(), to.c_str()) != 0) fail(errno, "renaming a file");
+}
+
+void publish(const std::filesystem::path& from, const std::filesystem::path& to) {
+  move_to(from, to);
   sync_folder(to.parent_path());
 }
 
@@ -147,6 +151,12 @@ std::array<std::uint8_t, Sha256::kBytes> Sha256::finish() {
     throw Error(ErrorCode::kInternal, "SHA-256 failed");
   }
   return digest;
+}
+
+std::string sha256_of(std::string_view text) {
+  Sha256 digest;
+  digest.update(std::as_bytes(std::span(text)));
+  return to_hex(digest.finish());
 }
 
 std::string to_hex(std::span<const std::uint8_t> bytes) {

@@ -43,6 +43,9 @@ class File {
   int descriptor_;
 };
 
+// Moves a file within its file system, over what is there.
+void move_to(const std::filesystem::path& from, const std::filesystem::path& to);
+
 // Moves a finished, synced file to its place and syncs the folder, so that a crash leaves either
 // nothing there or all of it. Both must be on one file system.
 void publish(const std::filesystem::path& from, const std::filesystem::path& to);
@@ -75,6 +78,9 @@ class Sha256 {
   struct State;
   std::unique_ptr<State> state_;
 };
+
+// The digest of a text, in hex.
+std::string sha256_of(std::string_view text);
 
 std::string to_hex(std::span<const std::uint8_t> bytes);
 

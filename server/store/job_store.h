@@ -1,127 +1,176 @@
+// The queue of jobs and what became of them: the interface behind which engines stand.
+//
+// The order that loses nothing: a volume's blob, its record, then submit; a worker writes the
+// mesh's blobs, then finish. So a record never names a blob that is not there.
 #pragma once
 
+#include <array>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
-#include <deque>
-#include <list>
-#include <map>
-#include <mutex>
 #include <optional>
-#include <set>
 #include <stop_token>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "proto/types.h"
-#include "server/store/blob_store.h"
 
 namespace isomesh::store {
 
-// A worker's right to run a job. The fence grows with every claim: whoever holds an older one can
-// no longer report or finish.
+// Who asks: an owner sees its own only, and what is another's is "not found". Empty (nullopt) is
+// the service itself, which sees everything. The owner is "" where no tokens are configured.
+using Viewer = std::optional<std::string>;
+
+struct JobSpec {
+  std::string owner;
+  JobParameters parameters;
+  std::string idempotency_key;  // within the owner's; empty: none
+  std::string request_digest;   // of the request with the key: tells a retry from another request
+};
+
+struct Submission {
+  enum class Kind {
+    kNew,
+    kExisting,  // the job that the same key and request made before
+    kConflict,  // the key came with another request before
+    kBusy,      // nothing was stored: the queue is full, or accepts nothing any more
+  };
+
+  Kind kind = Kind::kNew;
+  Job job;                              // of kNew and kExisting
+  std::chrono::seconds retry_after{0};  // of kBusy
+};
+
+// The submission's job. Throws Error kKeyReused for kConflict and kUnavailable for kBusy.
+const Job& job_of(const Submission& submission);
+
+// A worker's right to run a job until its time is over. The fence grows with every claim of a job:
+// whoever holds an older one can neither renew nor finish.
 struct Lease {
   std::string id;
   std::uint64_t fence = 0;
+  int attempt = 0;  // 1 for the first
+  std::string owner;
   JobParameters parameters;
-  std::stop_token cancelled;
+};
+
+enum class Standing {
+  kOk,
+  kCancel,  // the lease holds, but the job is to be stopped: finish it without mesh and error
+  kLost,    // the time is over or somebody else holds it: nothing of this run counts
+};
+
+// How far a running job is.
+struct Progress {
+  Stage stage = Stage::kLoad;
+  double share = 0;  // 0..1 of the whole job
+  Timing timing;     // of the stages that have ended
 };
 
 // How a run ended. A cancelled run has neither mesh nor error.
 struct Outcome {
   std::optional<MeshSummary> mesh;
   std::optional<Problem> error;
+  // The error may not come again: the job waits a while and is run again, unless this was its last
+  // attempt.
+  bool may_retry = false;
+  Timing timing;
 };
 
-// The jobs of this process: queue, running and the last finished ones, in memory. Its verbs are
-// those of a store that survives a restart, which will stand in its place. Thread safe.
+enum class EventKind {
+  kStage,     // queued, or at a stage of its run
+  kProgress,  // further in the same stage
+  kDone,      // in a final state
+};
+
+// What happened to a job. Queued, claimed and done are kept; what a run tells on its way is known
+// to this process only, and a reader that comes late may miss some of it.
+struct Event {
+  std::uint64_t id = 0;  // grows, also over restarts
+  std::string owner;
+  std::string job;
+  EventKind kind = EventKind::kStage;
+  JobState state = JobState::kQueued;
+  Stage stage = Stage::kQueue;
+  double progress = 0;
+
+  bool operator==(const Event&) const = default;
+};
+
+struct QueueDepth {
+  std::array<std::size_t, 3> queued = {};  // by Priority
+  std::size_t running = 0;
+
+  std::size_t all_queued() const { return queued[0] + queued[1] + queued[2]; }
+};
+
+// Thread safe. Every verb is one transaction; nothing is held open between them. All may throw
+// Error kOutOfSpace (then nothing has changed) or kInternal. What has expired is kGone for some
+// time, and kNotFound later.
 class JobStore {
  public:
-  struct Limits {
-    std::size_t max_queued = 1000;    // a queue that is longer answers "later"
-    std::size_t max_finished = 1000;  // the oldest finished jobs beyond it are forgotten
-  };
+  virtual ~JobStore() = default;
 
-  // `blobs` must outlive it; the meshes of forgotten jobs are erased there.
-  JobStore(const BlobStore& blobs, const Limits& limits) : blobs_(blobs), limits_(limits) {}
+  // Stores a job. One whose mesh the owner has already is finished at once, with `reused` set.
+  // Throws Error kNotFound or kGone when the owner has no such volume.
+  virtual Submission submit(const JobSpec& spec) = 0;
 
-  // Throws Error kUnavailable when the queue is full or closed.
-  Job submit(const JobParameters& parameters);
+  // The next job by priority, then age, for `lease` from now. A job whose like is running for the
+  // same owner is left until that one has ended. Empty when there is none.
+  virtual std::optional<Lease> claim(const std::string& worker,
+                                     std::chrono::milliseconds lease) = 0;
 
-  // The next job by priority, then age; waits for one. Empty once `stop` is requested.
-  std::optional<Lease> claim(const std::stop_token& stop);
+  // Returns when a claim may succeed, `longest` is over or `stop` is requested. True: try.
+  virtual bool wait_for_work(const std::stop_token& stop, std::chrono::milliseconds longest) = 0;
 
-  // What a running job does. False when the lease is not valid any more.
-  bool report(const Lease& lease, Stage stage, double progress, const Timing& timing);
+  // Prolongs the lease to `lease` from now and tells how far the job is. Meant to be called often:
+  // it reaches the disk only when a third of the lease is used up.
+  virtual Standing renew(const Lease& lease, const Progress& progress,
+                         std::chrono::milliseconds length) = 0;
 
-  // Ends a job; one that was asked to cancel ends cancelled whatever the outcome, and its mesh is
-  // erased. False when the lease is not valid any more: then nothing has changed.
-  bool finish(const Lease& lease, const Outcome& outcome, const Timing& timing);
+  // Ends a run. A job that was asked to cancel ends cancelled, whatever the outcome; jobs like one
+  // that succeeded end with it. False when the lease is lost: then nothing has changed.
+  virtual bool finish(const Lease& lease, const Outcome& outcome) = 0;
 
-  // Gives a job back, to be claimed again as if it had not run; one that was asked to cancel ends
-  // cancelled.
-  void put_back(const Lease& lease);
+  // Gives a job back that could not be run now; it is claimed again after `delay`, and the attempt
+  // does not count. One that was asked to cancel ends cancelled. False when the lease is lost.
+  virtual bool put_back(const Lease& lease, std::chrono::milliseconds delay) = 0;
+
+  // Ends what expired leases leave: queued again, failed after the last attempt, or cancelled.
+  // Anyone may call. Returns how many there were.
+  virtual std::size_t reap() = 0;
 
   // A queued job never runs, a running one is asked to stop, a finished one stays as it is. Throws
-  // Error kNotFound.
-  Job cancel(const std::string& id);
+  // Error kNotFound or kGone.
+  virtual Job cancel(const Viewer& viewer, const std::string& id) = 0;
 
-  // Throws Error kNotFound.
-  Job get(const std::string& id) const;
+  // Throws Error kNotFound or kGone.
+  virtual Job get(const Viewer& viewer, const std::string& id) const = 0;
 
-  // The job when it is final or `wait` is over, whichever is first. Throws Error kNotFound.
-  Job wait(const std::string& id, std::chrono::milliseconds wait) const;
+  // The job when it is final, `wait` is over or close() was called. Throws Error kNotFound or
+  // kGone.
+  virtual Job wait(const Viewer& viewer, const std::string& id,
+                   std::chrono::milliseconds wait) const = 0;
 
-  // Newest first; at most `limit` that are older than the job `after`.
-  std::vector<Job> list(std::optional<JobState> state, const std::string& after,
-                        std::size_t limit) const;
+  // Newest first; at most `limit` that are older than the job `after` (empty: from the newest).
+  virtual std::vector<Job> list(const Viewer& viewer, std::optional<JobState> state,
+                                const std::string& after, std::size_t limit) const = 0;
 
-  // How many jobs are in that state.
-  std::size_t count(JobState state) const;
+  // What happened after the event `since` to one job, or to all with an empty id; oldest first, at
+  // most some hundred. Waits for at most `timeout` while there is nothing.
+  virtual std::vector<Event> events(const Viewer& viewer, const std::string& job,
+                                    std::uint64_t since,
+                                    std::chrono::milliseconds timeout) const = 0;
 
-  // True while a queued or running job needs the volume.
-  bool needs_volume(const std::string& volume) const;
+  virtual QueueDepth depth() const = 0;
 
-  bool is_full() const;
+  // True when submit would answer kBusy.
+  virtual bool is_full() const = 0;
 
   // No job is accepted any more.
-  void refuse_new();
+  virtual void refuse_new() = 0;
 
-  // The same, and everybody who waits for a job gets its present state.
-  void close();
-
- private:
-  struct Entry {
-    Job job;
-    std::uint64_t fence = 0;
-    std::stop_source stop;
-    std::chrono::steady_clock::time_point accepted = std::chrono::steady_clock::now();
-  };
-
-  Entry& entry_of(const std::string& id);
-  const Entry& entry_of(const std::string& id) const;
-  Entry* leased(const Lease& lease);
-  void end(Entry& entry, JobState state);
-  void forget_oldest();
-  void release(const MeshSummary& mesh);
-  void erase_unnamed();
-
-  const BlobStore& blobs_;
-  const Limits limits_;
-  mutable std::mutex mutex_;  // guards everything below
-  mutable std::condition_variable_any changed_;
-  std::map<std::string, Entry> jobs_;              // ids sort by age
-  std::array<std::deque<std::string>, 3> queues_;  // of each priority, oldest first
-  std::deque<std::string> finished_;               // oldest first
-  std::map<std::string, std::size_t> mesh_users_;  // how many jobs name each blob
-  std::set<std::uint64_t> running_;                // the fences of running jobs
-  // Blobs that no job names any more. A job that ran already when that happened may have stored the
-  // same bytes and be about to name them, so they stay until all fences up to that one are gone.
-  std::map<std::string, std::uint64_t> unnamed_;
-  std::uint64_t last_fence_ = 0;
-  bool refusing_ = false;
-  bool closed_ = false;
+  // The same, and everybody who waits gets what there is.
+  virtual void close() = 0;
 };
 
 }  // namespace isomesh::store

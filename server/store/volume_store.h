@@ -1,48 +1,47 @@
+// The records of the volumes that are there: the interface behind which engines stand.
 #pragma once
 
-#include <map>
-#include <mutex>
+#include <cstddef>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "proto/types.h"
-#include "server/store/data_folder.h"
+#include "server/store/job_store.h"
 
 namespace isomesh::store {
 
-// The records of the volumes that are there, one small file each. Thread safe; `folder` must
-// outlive it. A record is added after its blob and erased before it, so it never names one that is
-// missing.
+// Records by owner and id: the same samples may belong to several owners, each with a record of its
+// own, while the blob that the id names is shared. A record is added after its blob and erased
+// before it, so it never names one that is missing. Thread safe; all may throw Error kOutOfSpace or
+// kInternal.
 class VolumeStore {
  public:
-  // Reads the records that are there; see unreadable().
-  explicit VolumeStore(const DataFolder& folder);
+  virtual ~VolumeStore() = default;
 
-  // The ids of records that were there but could not be read: left where they are, for a person.
-  const std::vector<std::string>& unreadable() const { return unreadable_; }
+  // Adds a record, or returns the one that the owner has already. Second: whether it is new.
+  virtual std::pair<Volume, bool> add(const std::string& owner, const Volume& volume) = 0;
 
-  // Adds a record, or returns the one that has the same id already. Second: whether it is new.
-  std::pair<Volume, bool> add(const Volume& volume);
+  // Throws Error kNotFound, or kGone when it has expired.
+  virtual Volume get(const Viewer& viewer, const std::string& id) const = 0;
 
-  // Throws Error kNotFound.
-  Volume get(const std::string& id) const;
+  virtual bool contains(const Viewer& viewer, const std::string& id) const = 0;
 
-  bool contains(const std::string& id) const;
+  // Oldest first; at most `limit` that come after the one that `after` is the cursor of.
+  virtual std::vector<Volume> list(
+      const Viewer& viewer, const std::string& after = {},
+      std::size_t limit = std::numeric_limits<std::size_t>::max()) const = 0;
 
-  // Oldest first.
-  std::vector<Volume> list() const;
+  // Throws Error kNotFound, kGone, and kNotReady while a queued or running job of the owner needs
+  // the volume.
+  virtual void erase(const std::string& owner, const std::string& id) = 0;
 
-  // Throws Error kNotFound.
-  void erase(const std::string& id);
-
- private:
-  std::filesystem::path path_of(const std::string& id) const;
-
-  const DataFolder& folder_;
-  std::vector<std::string> unreadable_;  // constant after construction
-  mutable std::mutex mutex_;
-  std::map<std::string, Volume> volumes_;  // guarded by mutex_
+  // Whether any record, of a volume or of a mesh, names the blob.
+  virtual bool names(const std::string& blob) const = 0;
 };
+
+// What list() continues after.
+std::string cursor_of(const Volume& volume);
 
 }  // namespace isomesh::store

@@ -33,6 +33,7 @@ class Daemon {
   void send_signal(int number) { process_.send_signal(number); }
   void terminate() { process_.send_signal(SIGTERM); }
   int wait() { return process_.wait(); }
+  pid_t process_id() const { return process_.id(); }
   // What it has written to standard error so far.
   std::string errors() const { return process_.errors(); }
   bool ends_within(std::chrono::seconds longest) { return process_.ends_within(longest); }

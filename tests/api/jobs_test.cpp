@@ -52,12 +52,33 @@ TEST_F(JobsTest, AJobIsAcceptedAndRuns) {
   }
 }
 
-TEST_F(JobsTest, TheSameJobTwiceIsTwoJobsAndOneMesh) {
+TEST_F(JobsTest, TheSameJobAgainTakesTheMeshAtOnce) {
   const Job first = finished_job(daemon_);
-  const Job second = finished_job(daemon_);
+  const Answer answer = post_with("\"priority\": \"stat\"");
+  ASSERT_EQ(answer.status, 202);
+  const Job second = job_from_json(answer.body);
   EXPECT_NE(first.id, second.id);
-  EXPECT_EQ(first.mesh->files.at(MeshFormat::kDrc).sha256,
-            second.mesh->files.at(MeshFormat::kDrc).sha256);
+  EXPECT_EQ(second.state, JobState::kSucceeded);
+  EXPECT_FALSE(first.reused);
+  EXPECT_TRUE(second.reused);
+  const MeshFile& file = second.mesh->files.at(MeshFormat::kDrc);
+  EXPECT_EQ(file.sha256, first.mesh->files.at(MeshFormat::kDrc).sha256);
+  EXPECT_EQ(file.href, "/v1/jobs/" + second.id + "/mesh.drc");
+  EXPECT_EQ(daemon_.get(file.href).status, 200);
+}
+
+TEST_F(JobsTest, AnIdempotencyKeyMakesARetrySafe) {
+  const Headers key = {{"Idempotency-Key", "0b1c-7"}};
+  const Job first = job_from_json(post_with("", key).body);
+  const Answer again = post_with("", key);
+  EXPECT_EQ(again.status, 202);
+  EXPECT_EQ(again.header("location"), "/v1/jobs/" + first.id);
+  EXPECT_EQ(job_from_json(again.body).id, first.id);
+  EXPECT_TRUE(is_problem(post_with("\"passes\": 1", key), ErrorCode::kKeyReused));
+  EXPECT_NE(job_from_json(post_with("\"passes\": 1").body).id, first.id);
+  for (const std::string wrong : {"a b", "", std::string(256, 'k').c_str()}) {
+    EXPECT_TRUE(blames(post_with("", {{"Idempotency-Key", wrong}}), "Idempotency-Key"));
+  }
 }
 
 TEST_F(JobsTest, PreferWaitAnswersWhenItIsDone) {
@@ -229,13 +250,6 @@ TEST(FullQueue, AnswersLater) {
             JobState::kCancelled);
   EXPECT_EQ(daemon.get("/readyz").status, 200);
   daemon.client().cancel(running.id);
-}
-
-TEST(ForgottenJobs, AreNotFound) {
-  const Daemon daemon(std::vector<std::string>{"--max-finished", "2"});
-  const std::string first = finished_job(daemon).id;
-  for (int n = 0; n < 2; ++n) finished_job(daemon);
-  EXPECT_TRUE(is_problem(daemon.get("/v1/jobs/" + first), ErrorCode::kNotFound));
 }
 
 }  // namespace

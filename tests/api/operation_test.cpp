@@ -119,22 +119,25 @@ TEST(UnixSocket, OfAKilledDaemonIsNoObstacle) {
   EXPECT_EQ(next.get("/livez").status, 200);
 }
 
-TEST(Restart, KeepsVolumesAndSweepsTheRest) {
+TEST(Restart, KeepsVolumesAndJobsAndSweepsTheRest) {
   const TemporaryFolder folder;
   Volume volume;
+  Job job;
   {
     Daemon daemon(folder / "data", "127.0.0.1:0");
-    finished_job(daemon);
+    job = finished_job(daemon);
     volume = daemon.client().volumes().at(0);
     EXPECT_EQ(daemon.stop(), 0);
   }
   write_file(folder / "data/scratch/left-behind", "by a crash");
   const Daemon daemon(folder / "data", "127.0.0.1:0");
   EXPECT_EQ(daemon.client().volumes(), std::vector{volume});
-  EXPECT_EQ(files_below(folder / "data/blobs").size(), 1U);
+  EXPECT_EQ(files_below(folder / "data/blobs").size(), 2U);
   EXPECT_TRUE(files_below(folder / "data/scratch").empty());
-  const Job job = submit(daemon, volume, 100);
-  EXPECT_EQ(daemon.client().wait(job.id).state, JobState::kSucceeded);
+  EXPECT_EQ(daemon.client().job(job.id), job);
+  EXPECT_EQ(daemon.get("/v1/jobs/" + job.id + "/mesh.drc").status, 200);
+  const Job next = submit(daemon, volume, 90);
+  EXPECT_EQ(daemon.client().wait(next.id).state, JobState::kSucceeded);
 }
 
 TEST(Drain, AnIdleDaemonEndsAtOnceOnEitherSignal) {
@@ -161,9 +164,16 @@ TEST(Drain, LetsARunningJobFinish) {
 }
 
 TEST(Drain, AJobThatTakesTooLongIsPutBack) {
-  Daemon daemon(std::vector<std::string>{"--drain-seconds", "0"});
-  long_job(daemon);
-  EXPECT_EQ(daemon.stop(), 0);
+  const TemporaryFolder folder;
+  Job job;
+  {
+    Daemon daemon(folder / "data", "127.0.0.1:0", {"--drain-seconds", "0"});
+    job = long_job(daemon);
+    EXPECT_EQ(daemon.stop(), 0);
+  }
+  const Daemon next(folder / "data", "127.0.0.1:0");
+  EXPECT_TRUE(eventually([&] { return next.client().job(job.id).state == JobState::kRunning; }));
+  next.client().cancel(job.id);
 }
 
 TEST(Drain, IsNotReadyAndAcceptsNothing) {

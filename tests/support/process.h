@@ -31,6 +31,8 @@ class Process {
   // ends before. Throws std::runtime_error after kLongest.
   std::string first_line();
 
+  pid_t id() const { return pid_; }
+
   void send_signal(int number) const;
 
   // Its exit status; 128 and the signal's number when a signal ended it. Throws std::runtime_error

@@ -84,6 +84,13 @@ TEST(JobReport, TellsAJobThatRunsFromOneThatFailed) {
   EXPECT_THAT(job_list({job}), HasSubstr("failed"));
 }
 
+TEST(JobReport, TellsAMeshThatWasThereAlready) {
+  Job job = test::finished_job("7", "mesh");
+  EXPECT_THAT(job_report(job), Not(HasSubstr("earlier job")));
+  job.reused = true;
+  EXPECT_THAT(job_report(job), HasSubstr("earlier job"));
+}
+
 TEST(JobJson, AddsWhatTheClientKnows) {
   const Job job = test::finished_job("7", "mesh");
   const std::string text = job_json(job, {"out/a.drc", "b\".drc"}, {.upload = 12.5});

@@ -8,6 +8,11 @@
 #include <yaml-cpp/yaml.h>
 
 #include "server/http/routes.h"
+#include "server/store/database.h"
+#include "server/store/file_blob_store.h"
+#include "server/store/retention.h"
+#include "server/store/sqlite_job_store.h"
+#include "server/store/sqlite_volume_store.h"
 #include "tests/support/files.h"
 
 namespace isomesh::http {
@@ -50,10 +55,12 @@ class OpenApi : public testing::Test {
 
   test::TemporaryFolder folder_;
   store::DataFolder data_{folder_ / "data"};
-  store::BlobStore blobs_{data_};
-  store::VolumeStore volumes_{data_};
-  store::JobStore jobs_{blobs_, store::JobStore::Limits{}};
-  jobs::VolumeLibrary library_{data_, blobs_, volumes_, jobs_, volume::ImportLimits{}};
+  store::Database database_{data_};
+  store::FileBlobStore blobs_{data_};
+  store::SqliteVolumeStore volumes_{database_};
+  store::SqliteJobStore jobs_{database_, blobs_, store::JobStoreOptions{}};
+  store::Retention retention_{data_, database_, blobs_, store::RetentionOptions{}};
+  jobs::VolumeLibrary library_{data_, blobs_, volumes_, retention_, volume::ImportLimits{}};
   jobs::Histograms histograms_{blobs_};
   jobs::Estimator estimator_{volumes_, blobs_, jobs_, jobs::PipelineLimits{}};
   App app_{Services{data_, blobs_, volumes_, jobs_, library_, histograms_, estimator_},

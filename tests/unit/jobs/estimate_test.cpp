@@ -13,8 +13,9 @@ namespace {
 class EstimateTest : public test::JobsFixture {
  protected:
   Job run(const JobParameters& parameters) {
-    Workers workers(1, jobs_, volumes_, blobs_, {});
-    return jobs_.wait(jobs_.submit(parameters).id, std::chrono::seconds(60));
+    const Workers workers({.threads = 1}, jobs_, volumes_, blobs_);
+    return jobs_.wait("", job_of(jobs_.submit({"", parameters, "", ""})).id,
+                      std::chrono::seconds(60));
   }
 
   Estimator estimator_{volumes_, blobs_, jobs_, {.memory_bytes = 4 << 20}};
@@ -26,7 +27,7 @@ TEST_F(EstimateTest, CountsWhatTheJobMakes) {
     JobParameters parameters = parameters_of(volume, 0.5);
     parameters.scheme = scheme;
     parameters.formats = {MeshFormat::kStl, MeshFormat::kDrc};
-    const Estimate estimate = estimator_.estimate(parameters);
+    const Estimate estimate = estimator_.estimate("", parameters);
     const Job job = run(parameters);
     ASSERT_TRUE(job.mesh);
     EXPECT_EQ(estimate.triangles, job.mesh->triangles);
@@ -47,37 +48,37 @@ TEST_F(EstimateTest, OtsuIsTheVolumesOwn) {
   const Volume volume = add_sphere();
   JobParameters parameters = parameters_of(volume, 0);
   parameters.iso.reset();
-  EXPECT_EQ(estimator_.estimate(parameters).iso, volume.suggested_iso);
+  EXPECT_EQ(estimator_.estimate("", parameters).iso, volume.suggested_iso);
 }
 
 TEST_F(EstimateTest, NoSurfaceTakesNothing) {
-  const Estimate estimate = estimator_.estimate(parameters_of(add_sphere(), 1e9));
+  const Estimate estimate = estimator_.estimate("", parameters_of(add_sphere(), 1e9));
   EXPECT_EQ(estimate.triangles, 0U);
   EXPECT_TRUE(estimate.fits);
 }
 
 TEST_F(EstimateTest, SaysWhatOneJobMayNotTake) {
-  EXPECT_TRUE(estimator_.estimate(parameters_of(add_sphere(), 0)).fits);
-  EXPECT_FALSE(estimator_.estimate(parameters_of(add_much(), 50)).fits);
+  EXPECT_TRUE(estimator_.estimate("", parameters_of(add_sphere(), 0)).fits);
+  EXPECT_FALSE(estimator_.estimate("", parameters_of(add_much(), 50)).fits);
 }
 
 TEST_F(EstimateTest, SaysHowLongTheQueueIs) {
   const JobParameters parameters = parameters_of(add_sphere(), 0);
-  jobs_.submit(parameters);
-  jobs_.submit(parameters);
-  EXPECT_EQ(estimator_.estimate(parameters).queue, (Estimate::Queue{2, 0}));
-  jobs_.claim({});
-  EXPECT_EQ(estimator_.estimate(parameters).queue, (Estimate::Queue{1, 1}));
+  jobs_.submit({"", parameters, "", ""});
+  jobs_.submit({"", parameters, "", ""});
+  EXPECT_EQ(estimator_.estimate("", parameters).queue, (Estimate::Queue{2, 0}));
+  jobs_.claim("worker", std::chrono::minutes(1));
+  EXPECT_EQ(estimator_.estimate("", parameters).queue, (Estimate::Queue{1, 1}));
 }
 
 TEST_F(EstimateTest, RefusesWhatIsNotThereOrHasStopped) {
   JobParameters unknown;
   unknown.volume = "0123";
   unknown.iso = 1;
-  EXPECT_EQ(test::code_thrown_by([&] { estimator_.estimate(unknown); }), ErrorCode::kNotFound);
+  EXPECT_EQ(test::code_thrown_by([&] { estimator_.estimate("", unknown); }), ErrorCode::kNotFound);
   const Volume volume = add_sphere();
   estimator_.stop();
-  EXPECT_TRUE(test::code_thrown_by([&] { estimator_.estimate(parameters_of(volume, 0)); }));
+  EXPECT_TRUE(test::code_thrown_by([&] { estimator_.estimate("", parameters_of(volume, 0)); }));
 }
 
 TEST(CostModel, FollowsTheJobsThatItHasSeen) {

@@ -7,7 +7,10 @@
 #include <gtest/gtest.h>
 
 #include "server/jobs/volume_library.h"
-#include "server/store/job_store.h"
+#include "server/store/database.h"
+#include "server/store/file_blob_store.h"
+#include "server/store/sqlite_job_store.h"
+#include "server/store/sqlite_volume_store.h"
 #include "server/volume/import.h"
 #include "tests/support/files.h"
 #include "tests/support/shapes.h"
@@ -32,6 +35,13 @@ class JobsFixture : public testing::Test {
   // Noise whose surface is so large that smoothing it 1000 times takes many seconds.
   Volume add_much();
 
+  // Of the queue: what fails is tried again soon.
+  static store::JobStoreOptions options() {
+    store::JobStoreOptions result;
+    result.retry_delay = std::chrono::milliseconds(5);
+    return result;
+  }
+
   static JobParameters parameters_of(const Volume& volume, double iso);
 
   std::size_t blob_count() const { return files_below(data_.blobs()).size(); }
@@ -40,10 +50,12 @@ class JobsFixture : public testing::Test {
 
   TemporaryFolder folder_;
   store::DataFolder data_{folder_ / "data"};
-  store::BlobStore blobs_{data_};
-  store::VolumeStore volumes_{data_};
-  store::JobStore jobs_{blobs_, store::JobStore::Limits{}};
-  jobs::VolumeLibrary library_{data_, blobs_, volumes_, jobs_, volume::ImportLimits{}};
+  store::Database database_{data_};
+  store::FileBlobStore blobs_{data_};
+  store::SqliteVolumeStore volumes_{database_};
+  store::SqliteJobStore jobs_{database_, blobs_, options()};
+  store::Retention retention_{data_, database_, blobs_, store::RetentionOptions{}};
+  jobs::VolumeLibrary library_{data_, blobs_, volumes_, retention_, volume::ImportLimits{}};
 };
 
 }  // namespace isomesh::test

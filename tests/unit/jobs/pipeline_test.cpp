@@ -241,10 +241,11 @@ TEST_F(PipelineTest, ALongJobStopsWhenItIsCancelled) {
             ErrorCode::kCancelled);
 }
 
-TEST_F(PipelineTest, AVolumeWhoseSamplesAreGoneIsAnErrorOfOurs) {
+TEST_F(PipelineTest, AVolumeWhoseSamplesAreGoneIsUnusable) {
   const Volume volume = add_sphere();
   blobs_.erase(volume.id);
-  EXPECT_TRUE(test::code_thrown_by([&] { run(volume, parameters_of(volume, 0)); }));
+  EXPECT_EQ(test::code_thrown_by([&] { run(volume, parameters_of(volume, 0)); }),
+            ErrorCode::kUnusableVolume);
 }
 
 TEST(CheckSupported, TakesWhatThisVersionServes) {

@@ -20,7 +20,7 @@ class VolumeLibraryTest : public test::JobsFixture {
 
   std::pair<Volume, bool> add_bytes(const std::string& bytes, const Geometry& geometry = {}) {
     test::write_file(folder_ / "upload", bytes);
-    return library_.add(folder_ / "upload",
+    return library_.add("", folder_ / "upload",
                         {.raw = volume::RawDescription{.dims = kDims,
                                                        .type = SampleType::kUint8,
                                                        .geometry = geometry,
@@ -39,7 +39,7 @@ TEST_F(VolumeLibraryTest, AddsAVolumeWithItsRecordAndItsBlob) {
   EXPECT_EQ(volume.bytes, bytes_.size());
   EXPECT_EQ(volume.range, (std::array<double, 2>{'a', 'x'}));
   EXPECT_FALSE(volume.created.empty());
-  EXPECT_EQ(volumes_.get(volume.id), volume);
+  EXPECT_EQ(volumes_.get("", volume.id), volume);
   EXPECT_TRUE(blob(volume.id).ends_with(bytes_));
   EXPECT_EQ(scratch_count(), 0U);
 }
@@ -47,7 +47,7 @@ TEST_F(VolumeLibraryTest, AddsAVolumeWithItsRecordAndItsBlob) {
 TEST_F(VolumeLibraryTest, TheSameVolumeAgainIsNotNew) {
   const Volume first = add_bytes(bytes_).first;
   EXPECT_EQ(add_bytes(bytes_), std::pair(first, false));
-  EXPECT_EQ(volumes_.list().size(), 1U);
+  EXPECT_EQ(volumes_.list("", {}, 100).size(), 1U);
   EXPECT_EQ(blob_count(), 1U);
 }
 
@@ -57,15 +57,15 @@ TEST_F(VolumeLibraryTest, OtherSamplesOrGeometryAreAnotherVolume) {
   Geometry geometry;
   geometry.spacing = {1, 1, 2};
   EXPECT_NE(add_bytes(bytes_, geometry).first.id, id);
-  EXPECT_EQ(volumes_.list().size(), 3U);
+  EXPECT_EQ(volumes_.list("", {}, 100).size(), 3U);
 }
 
 TEST_F(VolumeLibraryTest, ARefusedUploadLeavesNothing) {
   EXPECT_EQ(code_thrown_by([&] { add_bytes("too short"); }), ErrorCode::kInvalidParameter);
   test::write_file(folder_ / "upload", "not a volume");
-  EXPECT_EQ(code_thrown_by([&] { library_.add(folder_ / "upload"); }),
+  EXPECT_EQ(code_thrown_by([&] { library_.add("", folder_ / "upload"); }),
             ErrorCode::kUnsupportedMedia);
-  EXPECT_TRUE(volumes_.list().empty());
+  EXPECT_TRUE(volumes_.list("", {}, 100).empty());
   EXPECT_EQ(blob_count(), 0U);
   EXPECT_EQ(scratch_count(), 0U);
 }
@@ -77,26 +77,41 @@ TEST_F(VolumeLibraryTest, LeavesTheUploadToItsOwner) {
 
 TEST_F(VolumeLibraryTest, ErasesRecordAndBlob) {
   const Volume volume = add_bytes(bytes_).first;
-  library_.erase(volume.id);
-  EXPECT_FALSE(volumes_.contains(volume.id));
+  library_.erase("", volume.id);
+  EXPECT_FALSE(volumes_.contains("", volume.id));
   EXPECT_EQ(blob_count(), 0U);
-  EXPECT_EQ(code_thrown_by([&] { library_.erase(volume.id); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { library_.erase("", volume.id); }), ErrorCode::kNotFound);
   EXPECT_TRUE(add_bytes(bytes_).second);
 }
 
 TEST_F(VolumeLibraryTest, KeepsAVolumeThatAJobNeeds) {
   const Volume volume = add_bytes(bytes_).first;
-  const std::string job = jobs_.submit(parameters_of(volume, 100)).id;
-  EXPECT_EQ(code_thrown_by([&] { library_.erase(volume.id); }), ErrorCode::kNotReady);
-  EXPECT_EQ(volumes_.get(volume.id), volume);
+  const std::string job = job_of(jobs_.submit({"", parameters_of(volume, 100), "", ""})).id;
+  EXPECT_EQ(code_thrown_by([&] { library_.erase("", volume.id); }), ErrorCode::kNotReady);
+  EXPECT_EQ(volumes_.get("", volume.id), volume);
   EXPECT_EQ(blob_count(), 1U);
-  jobs_.cancel(job);
-  library_.erase(volume.id);
+  jobs_.cancel("", job);
+  library_.erase("", volume.id);
+  EXPECT_EQ(blob_count(), 0U);
+}
+
+TEST_F(VolumeLibraryTest, SamplesStayUntilTheirLastOwnerGoes) {
+  test::write_file(folder_ / "upload", bytes_);
+  const volume::RawDescription raw{
+      .dims = kDims, .type = SampleType::kUint8, .geometry = {}, .big_endian = false};
+  const volume::ImportOptions options{.raw = raw, .series = {}};
+  const std::string id = library_.add("one", folder_ / "upload", options).first.id;
+  EXPECT_TRUE(library_.add("other", folder_ / "upload", options).second);
+  EXPECT_EQ(blob_count(), 1U);
+  library_.erase("one", id);
+  EXPECT_EQ(blob_count(), 1U);
+  EXPECT_TRUE(volumes_.contains("other", id));
+  library_.erase("other", id);
   EXPECT_EQ(blob_count(), 0U);
 }
 
 TEST_F(VolumeLibraryTest, ErasingAnUnknownOneIsNotFound) {
-  EXPECT_EQ(code_thrown_by([&] { library_.erase("x"); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { library_.erase("", "x"); }), ErrorCode::kNotFound);
 }
 
 TEST_F(VolumeLibraryTest, OfManyEqualUploadsOneIsNew) {
@@ -107,7 +122,7 @@ TEST_F(VolumeLibraryTest, OfManyEqualUploadsOneIsNew) {
     threads.emplace_back([&] {
       const volume::RawDescription raw{
           .dims = kDims, .type = SampleType::kUint8, .geometry = {}, .big_endian = false};
-      if (library_.add(folder_ / "upload", {.raw = raw, .series = {}}).second) ++added;
+      if (library_.add("", folder_ / "upload", {.raw = raw, .series = {}}).second) ++added;
     });
   }
   threads.clear();

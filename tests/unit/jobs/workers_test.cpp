@@ -1,5 +1,7 @@
 #include "server/jobs/workers.h"
 
+#include <algorithm>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,7 +21,11 @@ using test::kLongest;
 
 class WorkersTest : public test::JobsFixture {
  protected:
-  std::string submit(const JobParameters& parameters) { return jobs_.submit(parameters).id; }
+  static WorkerOptions threads(std::size_t count) { return {.threads = count}; }
+
+  std::string submit(const JobParameters& parameters) {
+    return job_of(jobs_.submit({"", parameters, "", ""})).id;
+  }
 
   // A job that runs for longer than any test waits for.
   std::string submit_long() {
@@ -29,15 +35,15 @@ class WorkersTest : public test::JobsFixture {
   }
 
   bool comes_to(const std::string& id, JobState state) {
-    return eventually([&] { return jobs_.get(id).state == state; });
+    return eventually([&] { return jobs_.get("", id).state == state; });
   }
 };
 
 TEST_F(WorkersTest, RunAJobToItsMesh) {
-  const Workers workers(1, jobs_, volumes_, blobs_, {});
+  const Workers workers(threads(1), jobs_, volumes_, blobs_);
   JobParameters parameters = parameters_of(add_sphere(), 0);
   parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl};
-  const Job job = jobs_.wait(submit(parameters), kLongest);
+  const Job job = jobs_.wait("", submit(parameters), kLongest);
   ASSERT_EQ(job.state, JobState::kSucceeded);
   EXPECT_EQ(job.progress, 1);
   EXPECT_EQ(job.mesh->files.at(MeshFormat::kDrc).href, "/v1/jobs/" + job.id + "/mesh.drc");
@@ -53,51 +59,69 @@ TEST_F(WorkersTest, RunAJobToItsMesh) {
             timing.queue + timing.load + timing.extract + timing.smooth + timing.encode - 0.01);
 }
 
-TEST_F(WorkersTest, AJobWithoutAVolumeFailsWithAProblem) {
-  const Workers workers(1, jobs_, volumes_, blobs_, {});
-  JobParameters parameters;
-  parameters.volume = "gone";
-  parameters.iso = 1;
-  const Job job = jobs_.wait(submit(parameters), kLongest);
-  EXPECT_EQ(job.state, JobState::kFailed);
-  ASSERT_TRUE(job.error);
-  EXPECT_EQ(job.error->type, "urn:isomesh:problem:not-found");
-  EXPECT_EQ(job.error->instance, "/v1/jobs/" + job.id);
-  EXPECT_FALSE(job.mesh);
+// No mesh may come from samples that are not those that the volume's id names.
+TEST_F(WorkersTest, AVolumeThatIsDamagedOnDiskFailsItsJob) {
+  const Volume volume = add_sphere();
+  for (const auto& damage : std::vector<std::function<void(std::string&)>>{
+           [](std::string& bytes) { bytes.back() ^= 1; },
+           [](std::string& bytes) { bytes.resize(bytes.size() / 2); },
+           [](std::string& bytes) { bytes.clear(); }}) {
+    std::string bytes = blob(volume.id);
+    damage(bytes);
+    test::write_file(blobs_.path_of(volume.id), bytes);
+    const Workers workers(threads(1), jobs_, volumes_, blobs_);
+    const Job job = jobs_.wait("", submit(parameters_of(volume, 0)), kLongest);
+    EXPECT_EQ(job.state, JobState::kFailed);
+    ASSERT_TRUE(job.error);
+    EXPECT_EQ(job.error->type, "urn:isomesh:problem:unusable-volume");
+    EXPECT_EQ(job.error->instance, "/v1/jobs/" + job.id);
+    EXPECT_FALSE(job.mesh);
+    EXPECT_EQ(blob_count(), 1U);
+  }
 }
 
-TEST_F(WorkersTest, AFailureTellsNothingOfTheMachine) {
+TEST_F(WorkersTest, AFailureOfOursTellsNothingAndIsTriedThreeTimes) {
   const Volume volume = add_sphere();
-  test::write_file(blobs_.path_of(volume.id), "spoilt by the disk");
-  const Workers workers(1, jobs_, volumes_, blobs_, {});
-  const Job job = jobs_.wait(submit(parameters_of(volume, 0)), kLongest);
+  std::filesystem::remove_all(data_.scratch());
+  test::write_file(data_.scratch(), "where a folder should be");
+  const Workers workers(threads(1), jobs_, volumes_, blobs_);
+  const Job job = jobs_.wait("", submit(parameters_of(volume, 0)), kLongest);
   EXPECT_EQ(job.state, JobState::kFailed);
   ASSERT_TRUE(job.error);
   EXPECT_EQ(job.error->status, 500);
+  const auto events = jobs_.events("", job.id, 0, milliseconds(0));
+  EXPECT_EQ(std::ranges::count(events, Stage::kLoad, &store::Event::stage), 3 + 1);
   EXPECT_EQ(job.error->detail.find(folder_.path()), std::string::npos);
 }
 
 TEST_F(WorkersTest, GoOnAfterAFailure) {
-  const Workers workers(1, jobs_, volumes_, blobs_, {});
-  JobParameters unknown;
-  unknown.volume = "gone";
-  submit(unknown);
-  EXPECT_EQ(jobs_.wait(submit(parameters_of(add_sphere(), 0)), kLongest).state,
-            JobState::kSucceeded);
+  const Workers workers(threads(1), jobs_, volumes_, blobs_);
+  const Volume spoilt = add_sphere();
+  const std::string intact = blob(spoilt.id);
+  test::write_file(blobs_.path_of(spoilt.id), "spoilt by the disk");
+  EXPECT_EQ(jobs_.wait("", submit(parameters_of(spoilt, 0)), kLongest).state, JobState::kFailed);
+  test::write_file(blobs_.path_of(spoilt.id), intact);
+  EXPECT_EQ(jobs_.wait("", submit(parameters_of(spoilt, 0)), kLongest).state, JobState::kSucceeded);
 }
 
+// Each of another owner, because one owner's jobs alike are computed once.
 TEST_F(WorkersTest, ManyJobsAtATimeGiveEachItsOwnMesh) {
   const Volume volume = add_sphere();
   std::vector<std::string> ids;
   {
-    const Workers workers(4, jobs_, volumes_, blobs_, {});
-    for (int n = 0; n < 24; ++n) ids.push_back(submit(parameters_of(volume, n % 3)));
-    for (const std::string& id : ids) jobs_.wait(id, kLongest);
+    const Workers workers(threads(4), jobs_, volumes_, blobs_);
+    for (int n = 0; n < 24; ++n) {
+      const std::string owner = "owner " + std::to_string(n);
+      volumes_.add(owner, volume);
+      ids.push_back(job_of(jobs_.submit({owner, parameters_of(volume, n % 3), "", ""})).id);
+    }
+    for (const std::string& id : ids) jobs_.wait(std::nullopt, id, kLongest);
   }
   std::vector<Job> first;
   for (const std::string& id : ids) {
-    const Job job = jobs_.get(id);
+    const Job job = jobs_.get(std::nullopt, id);
     ASSERT_EQ(job.state, JobState::kSucceeded);
+    EXPECT_FALSE(job.reused);
     if (first.size() < 3) first.push_back(job);
     const std::size_t kind = (&id - ids.data()) % 3;
     EXPECT_EQ(job.mesh->files.at(MeshFormat::kDrc).sha256,
@@ -106,57 +130,79 @@ TEST_F(WorkersTest, ManyJobsAtATimeGiveEachItsOwnMesh) {
   EXPECT_NE(first[0].mesh->triangles, first[1].mesh->triangles);
 }
 
-TEST_F(WorkersTest, ARunningJobStopsWhenItIsCancelled) {
-  const Workers workers(1, jobs_, volumes_, blobs_, {});
+TEST_F(WorkersTest, AJobThatTakesTooLongFails) {
+  WorkerOptions options = threads(1);
+  options.longest_job = std::chrono::minutes(0);
+  const Workers workers(options, jobs_, volumes_, blobs_);
+  const Job job = jobs_.wait("", submit_long(), kLongest);
+  EXPECT_EQ(job.state, JobState::kFailed);
+  ASSERT_TRUE(job.error);
+  EXPECT_EQ(job.error->status, 413);
+}
+
+TEST_F(WorkersTest, ALeaseIsProlongedWhileItsJobRuns) {
+  WorkerOptions options = threads(1);
+  options.lease = milliseconds(600);
+  const Workers workers(options, jobs_, volumes_, blobs_);
   const std::string id = submit_long();
-  ASSERT_TRUE(eventually([&] { return jobs_.get(id).stage == Stage::kSmooth; }));
+  ASSERT_TRUE(comes_to(id, JobState::kRunning));
+  std::this_thread::sleep_for(2 * options.lease);
+  EXPECT_EQ(jobs_.reap(), 0U);
+  EXPECT_EQ(jobs_.get("", id).state, JobState::kRunning);
+  jobs_.cancel("", id);
+}
+
+TEST_F(WorkersTest, ARunningJobStopsWhenItIsCancelled) {
+  const Workers workers(threads(1), jobs_, volumes_, blobs_);
+  const std::string id = submit_long();
+  ASSERT_TRUE(eventually([&] { return jobs_.get("", id).stage == Stage::kSmooth; }));
   const std::size_t before = blob_count();
-  jobs_.cancel(id);
-  const Job job = jobs_.wait(id, kLongest);
+  jobs_.cancel("", id);
+  const Job job = jobs_.wait("", id, kLongest);
   EXPECT_EQ(job.state, JobState::kCancelled);
   EXPECT_FALSE(job.mesh || job.error);
   EXPECT_EQ(blob_count(), before);
 }
 
 TEST_F(WorkersTest, ARunningJobTellsItsProgress) {
-  const Workers workers(1, jobs_, volumes_, blobs_, {});
+  const Workers workers(threads(1), jobs_, volumes_, blobs_);
   const std::string id = submit_long();
-  ASSERT_TRUE(eventually([&] { return jobs_.get(id).stage == Stage::kSmooth; }));
-  const Job early = jobs_.get(id);
+  ASSERT_TRUE(eventually([&] { return jobs_.get("", id).stage == Stage::kSmooth; }));
+  const Job early = jobs_.get("", id);
   EXPECT_GT(early.progress, 0);
   EXPECT_GT(early.timing.extract, 0);
-  EXPECT_TRUE(eventually([&] { return jobs_.get(id).progress > early.progress; }));
-  jobs_.cancel(id);
+  EXPECT_TRUE(eventually([&] { return jobs_.get("", id).progress > early.progress; }));
+  jobs_.cancel("", id);
 }
 
 TEST_F(WorkersTest, DrainLetsARunningJobFinishAndBeginsNoOther) {
-  std::optional<Workers> workers(std::in_place, 1, jobs_, volumes_, blobs_, PipelineLimits{});
+  std::optional<Workers> workers(std::in_place, threads(1), jobs_, volumes_, blobs_);
   JobParameters parameters = parameters_of(add_much(), 50);
   parameters.passes = 40;
   const std::string running = submit(parameters);
   ASSERT_TRUE(comes_to(running, JobState::kRunning));
   const std::string waiting = submit(parameters_of(add_sphere(), 0));
   EXPECT_TRUE(workers->drain(kLongest));
-  EXPECT_EQ(jobs_.get(running).state, JobState::kSucceeded);
-  EXPECT_EQ(jobs_.get(waiting).state, JobState::kQueued);
+  EXPECT_EQ(jobs_.get("", running).state, JobState::kSucceeded);
+  EXPECT_EQ(jobs_.get("", waiting).state, JobState::kQueued);
   workers.reset();
-  EXPECT_EQ(jobs_.get(waiting).state, JobState::kQueued);
+  EXPECT_EQ(jobs_.get("", waiting).state, JobState::kQueued);
 }
 
 TEST_F(WorkersTest, AJobThatOutlastsTheDrainIsPutBack) {
-  std::optional<Workers> workers(std::in_place, 1, jobs_, volumes_, blobs_, PipelineLimits{});
+  std::optional<Workers> workers(std::in_place, threads(1), jobs_, volumes_, blobs_);
   const std::string id = submit_long();
   ASSERT_TRUE(comes_to(id, JobState::kRunning));
   EXPECT_FALSE(workers->drain(milliseconds(1)));
   workers.reset();
-  const Job job = jobs_.get(id);
+  const Job job = jobs_.get("", id);
   EXPECT_EQ(job.state, JobState::kQueued);
   EXPECT_EQ(job.progress, 0);
   EXPECT_EQ(scratch_count(), 0U);
 }
 
 TEST_F(WorkersTest, DrainingIdleOnesIsDoneAtOnce) {
-  Workers workers(3, jobs_, volumes_, blobs_, {});
+  Workers workers(threads(3), jobs_, volumes_, blobs_);
   EXPECT_TRUE(workers.drain(kLongest));
   EXPECT_TRUE(workers.drain(milliseconds(0)));
 }

@@ -180,7 +180,7 @@ TEST(AnswerJson, SpellsAJobAsTheContractDoes) {
   EXPECT_THAT(members_of(job),
               testing::UnorderedElementsAre("id", "state", "stage", "progress", "parameters",
                                             "volume", "priority", "created", "started", "finished",
-                                            "timing", "mesh", "error"));
+                                            "timing", "mesh", "error", "reused"));
   EXPECT_EQ(job["state"], "succeeded");
   EXPECT_EQ(job["stage"], "done");
   EXPECT_EQ(job["volume"], "0123abcd");
@@ -406,6 +406,29 @@ TEST(AnswerJson, NestingWithoutEndIsReadWithoutRecursion) {
   const std::string deep =
       "{\"later\": " + std::string(200'000, '[') + std::string(200'000, ']') + "}";
   EXPECT_EQ(problem_from_json(deep), Problem{});
+}
+
+TEST(Records, AreReadBackWhole) {
+  const Job job = succeeded_job();
+  EXPECT_EQ(job_from_record(to_json(job)), job);
+  EXPECT_EQ(job_from_record(to_json(Job{})), Job{});
+}
+
+TEST(Records, OfAnOlderVersionHaveDefaultsForWhatItDidNotKnow) {
+  const Job job = succeeded_job();
+  json record = json::parse(to_json(job));
+  record.erase("reused");
+  record["parameters"].erase("close");
+  record["parameters"]["draco"].erase("speed");
+  record["mesh"].erase("components");
+  Job expected = job;
+  expected.parameters.close = false;
+  expected.parameters.draco.speed = DracoParameters{}.speed;
+  expected.mesh->components = 0;
+  EXPECT_EQ(job_from_record(record.dump()), expected);
+  for (const std::string text : {"", "[]", "{\"id\": 7}"}) {
+    EXPECT_EQ(test::code_thrown_by([&] { job_from_record(text); }), ErrorCode::kInternal) << text;
+  }
 }
 
 }  // namespace

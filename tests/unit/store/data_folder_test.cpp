@@ -17,7 +17,6 @@ TEST(DataFolder, CreatesWhatIsMissing) {
   const TemporaryFolder parent;
   const DataFolder folder(parent.path() / "a" / "b");
   EXPECT_TRUE(std::filesystem::is_directory(folder.blobs()));
-  EXPECT_TRUE(std::filesystem::is_directory(folder.volumes()));
   EXPECT_TRUE(std::filesystem::is_directory(folder.scratch()));
 }
 
@@ -61,14 +60,14 @@ TEST(DataFolder, KeepsWhatIsFinishedAndEmptiesScratch) {
   {
     const DataFolder folder(parent / "data");
     test::write_file(folder.blobs() / "blob", "1");
-    test::write_file(folder.volumes() / "record.json", "2");
+    test::write_file(folder.records(), "2");
     test::write_file(folder.scratch() / "file", "3");
     std::filesystem::create_directories(folder.scratch() / "deep" / "er");
     test::write_file(folder.scratch() / "deep" / "er" / "file", "4");
   }
   const DataFolder folder(parent / "data");
   EXPECT_EQ(test::read_file(folder.blobs() / "blob"), "1");
-  EXPECT_EQ(test::read_file(folder.volumes() / "record.json"), "2");
+  EXPECT_EQ(test::read_file(folder.records()), "2");
   EXPECT_TRUE(std::filesystem::is_empty(folder.scratch()));
 }
 

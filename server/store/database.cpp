@@ -1,0 +1,168 @@
+#include "server/store/database.h"
+
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+
+#include "proto/json.h"
+#include "server/store/files.h"
+
+namespace isomesh::store {
+namespace {
+
+// What each version added; a database of version n has run the first n. Never to be changed, only
+// to be added to.
+//
+// States are the values of JobState: 0 queued, 1 running, 2 succeeded, 3 failed, 4 cancelled. A
+// record is the JSON of the API; the columns beside it are what is searched for.
+constexpr std::array kVersions = {R"sql(
+CREATE TABLE volumes(
+  owner TEXT NOT NULL,
+  id TEXT NOT NULL,
+  created INTEGER NOT NULL,
+  used INTEGER NOT NULL,      -- when it was created or a job that needed it ended, whichever is last
+  bytes INTEGER NOT NULL,     -- of its blob
+  record TEXT NOT NULL,
+  PRIMARY KEY(owner, id)
+) WITHOUT ROWID;
+CREATE INDEX volumes_by_blob ON volumes(id);
+CREATE INDEX volumes_by_use ON volumes(used);
+
+CREATE TABLE jobs(
+  id TEXT NOT NULL PRIMARY KEY,
+  owner TEXT NOT NULL,
+  state INTEGER NOT NULL,
+  priority INTEGER NOT NULL,
+  volume TEXT NOT NULL,
+  result_key TEXT NOT NULL,   -- the same for jobs that make the same mesh
+  accepted INTEGER NOT NULL,
+  finished INTEGER,
+  not_before INTEGER NOT NULL,
+  attempts INTEGER NOT NULL,
+  fence INTEGER NOT NULL,
+  claimed INTEGER,            -- when its run began, while it runs
+  lease_until INTEGER,
+  worker TEXT,
+  cancelling INTEGER NOT NULL,
+  idempotency_key TEXT,
+  request_digest TEXT,
+  record TEXT NOT NULL
+) WITHOUT ROWID;
+CREATE INDEX jobs_queue ON jobs(priority, id) WHERE state = 0;
+CREATE INDEX jobs_running ON jobs(lease_until) WHERE state = 1;
+CREATE INDEX jobs_by_result ON jobs(owner, result_key, state);
+CREATE INDEX jobs_by_volume ON jobs(volume) WHERE state < 2;
+CREATE INDEX jobs_by_end ON jobs(finished) WHERE finished IS NOT NULL;
+CREATE INDEX jobs_by_owner ON jobs(owner, id);
+CREATE UNIQUE INDEX jobs_by_key ON jobs(owner, idempotency_key) WHERE idempotency_key IS NOT NULL;
+
+CREATE TABLE meshes(          -- which blobs the meshes of which jobs are in
+  job TEXT NOT NULL REFERENCES jobs(id) ON DELETE CASCADE,
+  blob TEXT NOT NULL,
+  bytes INTEGER NOT NULL,
+  PRIMARY KEY(job, blob)
+) WITHOUT ROWID;
+CREATE INDEX meshes_by_blob ON meshes(blob);
+
+CREATE TABLE events(
+  id INTEGER PRIMARY KEY,
+  owner TEXT NOT NULL,
+  job TEXT NOT NULL,
+  kind INTEGER NOT NULL,
+  state INTEGER NOT NULL,
+  stage INTEGER NOT NULL,
+  progress REAL NOT NULL
+);
+CREATE INDEX events_by_job ON events(job, id);
+
+CREATE TABLE expired(         -- ids of jobs and volumes that were there
+  id TEXT NOT NULL,
+  owner TEXT NOT NULL,
+  at INTEGER NOT NULL,
+  PRIMARY KEY(id, owner)
+) WITHOUT ROWID;
+CREATE INDEX expired_by_time ON expired(at);
+)sql"};
+
+constexpr auto kNewest = static_cast<std::int64_t>(kVersions.size());
+
+std::int64_t version_of(Connection& connection) {
+  Query query = connection.query("PRAGMA user_version");
+  query.next();
+  return query.integer(0);
+}
+
+// Brings the tables up to date before anything else looks at them.
+Connection::Mode migrated(const std::filesystem::path& file) {
+  // Records may tell of patients; SQLite's other files get the rights of this one.
+  if (!std::filesystem::exists(file)) File::create(file);
+  Connection connection(file, Connection::Mode::kWrite);
+  const std::int64_t version = version_of(connection);
+  if (version > kNewest) {
+    throw Error(ErrorCode::kUnavailable,
+                "the data folder was made by a newer isomeshd: its records have version " +
+                    std::to_string(version) + ", this one knows " + std::to_string(kNewest));
+  }
+  if (version == kNewest) return Connection::Mode::kWrite;
+  Transaction transaction(connection);
+  for (std::int64_t next = version; next < kNewest; ++next) {
+    connection.script(kVersions[static_cast<std::size_t>(next)]);
+  }
+  connection.script(("PRAGMA user_version=" + std::to_string(kNewest)).c_str());
+  transaction.commit();
+  return Connection::Mode::kWrite;
+}
+
+}  // namespace
+
+Database::Database(const DataFolder& folder)
+    : writer_(folder.records(), migrated(folder.records())),
+      reader_(folder.records(), Connection::Mode::kRead) {
+  take_over_record_files(folder);
+}
+
+// Before there was a database, a volume's record was a small file.
+void Database::take_over_record_files(const DataFolder& folder) {
+  std::error_code absent;
+  std::vector<std::filesystem::path> taken;
+  Transaction transaction(writer_);
+  for (const auto& entry : std::filesystem::directory_iterator(folder.volumes(), absent)) {
+    if (entry.path().extension() != ".json") continue;  // a write that a crash cut short
+    try {
+      const std::string record = read_whole(entry.path());
+      const Volume volume = volume_from_json(record);
+      const std::int64_t created = us_of_timestamp(volume.created);
+      transaction->run("INSERT OR IGNORE INTO volumes VALUES('', ?, ?, ?, ?, ?)", volume.id,
+                       created, now_us(), volume.bytes, record);
+      taken.push_back(entry.path());
+    } catch (const Error& error) {
+      if (error.code() == ErrorCode::kOutOfSpace) throw;
+      unreadable_.push_back(entry.path().stem());
+    }
+  }
+  transaction.commit();
+  for (const auto& file : taken) std::filesystem::remove(file);
+}
+
+std::int64_t now_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+std::int64_t us_of_timestamp(std::string_view text) {
+  std::tm parts = {};
+  int milliseconds = 0;
+  const std::string copy(text);
+  if (std::sscanf(copy.c_str(), "%d-%d-%dT%d:%d:%d.%dZ", &parts.tm_year, &parts.tm_mon,
+                  &parts.tm_mday, &parts.tm_hour, &parts.tm_min, &parts.tm_sec,
+                  &milliseconds) != 7) {
+    return 0;
+  }
+  parts.tm_year -= 1900;
+  parts.tm_mon -= 1;
+  return (static_cast<std::int64_t>(::timegm(&parts)) * 1000 + milliseconds) * 1000;
+}
+
+}  // namespace isomesh::store

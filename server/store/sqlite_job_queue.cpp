@@ -1,0 +1,356 @@
+// What changes jobs, one transaction a verb; sqlite_job_store.cpp has what can be asked.
+#include <algorithm>
+
+#include "proto/json.h"
+#include "server/store/files.h"
+#include "server/store/sqlite_job_rows.h"
+#include "server/store/sqlite_job_store.h"
+
+namespace isomesh::store {
+namespace {
+
+constexpr std::chrono::milliseconds kBetweenProgressEvents{100};
+constexpr std::chrono::seconds kRetryAfter{1};
+
+std::int64_t microseconds(std::chrono::milliseconds time) {
+  return std::chrono::microseconds(time).count();
+}
+
+double milliseconds_since(std::int64_t begin_us) {
+  return static_cast<double>(std::max<std::int64_t>(now_us() - begin_us, 1)) / 1000;
+}
+
+void check_volume(Connection& connection, const JobSpec& spec) {
+  const std::string& id = spec.parameters.volume;
+  Query volume =
+      connection.query("SELECT 1 FROM volumes WHERE owner = ? AND id = ?", spec.owner, id);
+  if (volume.next()) return;
+  Query expired =
+      connection.query("SELECT 1 FROM expired WHERE owner = ? AND id = ?", spec.owner, id);
+  const bool is_gone = expired.next();
+  const std::string detail =
+      is_gone ? "the volume has expired: upload it again" : "there is no volume with this id";
+  throw Error(is_gone ? ErrorCode::kGone : ErrorCode::kNotFound, detail, {{"volume", detail}});
+}
+
+// A problem of ours, told with what is known: it would help nobody to hide it.
+Problem lost_worker(const Job& job, int attempts) {
+  Problem problem = to_problem(Error(ErrorCode::kInternal, ""), "/v1/jobs/" + job.id);
+  problem.detail = "The service ended " + std::to_string(attempts) +
+                   " times while it ran this job; the job is not begun again.";
+  return problem;
+}
+
+}  // namespace
+
+Submission SqliteJobStore::submit(const JobSpec& spec) {
+  Row row;
+  {
+    Change change(*this);
+    if (!spec.idempotency_key.empty()) {
+      Query earlier = change->query(std::string("SELECT ") + kRowColumns +
+                                        ", request_digest FROM jobs WHERE owner = ? AND "
+                                        "idempotency_key = ?",
+                                    spec.owner, spec.idempotency_key);
+      if (earlier.next()) {
+        if (earlier.text(8) != spec.request_digest) return {Submission::Kind::kConflict, {}, {}};
+        return {Submission::Kind::kExisting, with_progress(row_of(earlier)), {}};
+      }
+    }
+    check_volume(change.connection(), spec);
+    row.owner = spec.owner;
+    row.result_key = result_key(spec.parameters, options_.mesher_version);
+    row.accepted = now_us();
+    row.job.id = time_ordered_id();
+    row.job.parameters = spec.parameters;
+    row.job.created = timestamp();
+    const auto mesh = mesh_like(change.connection(), row);
+    if (refusing_ || (!mesh && count_queued(change.connection()) >= options_.max_queued)) {
+      return {Submission::Kind::kBusy, {}, kRetryAfter};
+    }
+    const std::optional<std::string> key =
+        spec.idempotency_key.empty() ? std::nullopt : std::optional(spec.idempotency_key);
+    change->run(
+        "INSERT INTO jobs VALUES(?1, ?2, 0, ?3, ?4, ?5, ?6, NULL, 0, 0, 0, NULL, NULL, NULL, 0, "
+        "?7, "
+        "?8, ?9)",
+        row.job.id, row.owner, spec.parameters.priority, spec.parameters.volume, row.result_key,
+        row.accepted, key, spec.request_digest, to_json(row.job));
+    if (mesh) {
+      row.job.reused = true;
+      succeed(change, row, *mesh);
+    } else {
+      change.announce(row, EventKind::kStage);
+    }
+    change.commit();
+  }
+  wake_workers();
+  return {Submission::Kind::kNew, row.job, {}};
+}
+
+std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
+                                           std::chrono::milliseconds lease) {
+  // A claim that a power cut takes back leaves the job queued, and its worker is gone.
+  Change change(*this, Durability::kProcess);
+  const std::int64_t now = now_us();
+  std::optional<Row> next;
+  {
+    Query query = change->query(
+        std::string("SELECT ") + kRowColumns +
+            " FROM jobs q WHERE state = 0 AND not_before <= ? AND NOT EXISTS (SELECT 1 FROM jobs r "
+            "WHERE r.owner = q.owner AND r.result_key = q.result_key AND r.state = 1) "
+            "ORDER BY priority, id LIMIT 1",
+        now);
+    if (!query.next()) return std::nullopt;
+    next = row_of(query);
+  }
+  Row& row = *next;
+  row.fence += 1;
+  row.attempts += 1;
+  row.job.state = JobState::kRunning;
+  row.job.stage = Stage::kLoad;
+  row.job.started = timestamp();
+  row.job.timing.queue = milliseconds_since(row.accepted);
+  change->run(
+      "UPDATE jobs SET state = 1, attempts = ?, fence = ?, claimed = ?, lease_until = ?, worker = "
+      "?, "
+      "record = ? WHERE id = ?",
+      row.attempts, row.fence, now, now + microseconds(lease), worker, to_json(row.job),
+      row.job.id);
+  change.announce(row, EventKind::kStage);
+  change.commit();
+  return Lease{row.job.id, row.fence, row.attempts, row.owner, row.job.parameters};
+}
+
+Standing SqliteJobStore::renew(const Lease& lease, const Progress& progress,
+                               std::chrono::milliseconds length) {
+  std::optional<Row> row;
+  {
+    const Reading reading(database_.reader());
+    row = leased(reading.connection(), lease);
+  }
+  if (!row) return Standing::kLost;
+  tell(lease, progress);
+  const std::int64_t now = now_us();
+  if (row->lease_until - now < microseconds(length) * 2 / 3) {
+    Change change(*this, Durability::kProcess);
+    const int held = change->run(
+        "UPDATE jobs SET lease_until = ? WHERE id = ? AND fence = ? AND state = 1 AND "
+        "lease_until >= ?",
+        now + microseconds(length), lease.id, lease.fence, now);
+    if (held == 0) return Standing::kLost;
+    change.commit();
+  }
+  return row->cancelling ? Standing::kCancel : Standing::kOk;
+}
+
+bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
+  {
+    Change change(*this);
+    auto held = leased(change.connection(), lease);
+    if (!held) return false;
+    Row& row = *held;
+    const double queue = row.job.timing.queue;
+    row.job.timing = outcome.timing;
+    row.job.timing.queue = queue;
+    if (row.cancelling || (!outcome.mesh && !outcome.error)) {
+      end(change, row, JobState::kCancelled);
+    } else if (outcome.mesh) {
+      succeed(change, row, *outcome.mesh);
+      succeed_alike(change, row, *outcome.mesh);
+    } else if (outcome.may_retry && row.attempts < options_.attempts) {
+      queue_again(change, row, delay_after(row.attempts));
+    } else {
+      row.job.error = outcome.error;
+      end(change, row, JobState::kFailed);
+    }
+    change.commit();
+  }
+  forget_progress(lease.id);
+  wake_workers();
+  return true;
+}
+
+bool SqliteJobStore::put_back(const Lease& lease, std::chrono::milliseconds delay) {
+  {
+    Change change(*this);
+    auto held = leased(change.connection(), lease);
+    if (!held) return false;
+    if (held->cancelling) {
+      end(change, *held, JobState::kCancelled);
+    } else {
+      held->attempts -= 1;
+      queue_again(change, *held, delay);
+    }
+    change.commit();
+  }
+  forget_progress(lease.id);
+  wake_workers();
+  return true;
+}
+
+std::size_t SqliteJobStore::reap() {
+  std::size_t reaped = 0;
+  {
+    Change change(*this);
+    std::vector<Row> rows;
+    {
+      Query query = change->query(
+          std::string("SELECT ") + kRowColumns + " FROM jobs WHERE state = 1 AND lease_until < ?",
+          now_us());
+      while (query.next()) rows.push_back(row_of(query));
+    }
+    for (Row& row : rows) {
+      if (row.cancelling) {
+        end(change, row, JobState::kCancelled);
+      } else if (row.attempts >= options_.attempts) {
+        row.job.error = lost_worker(row.job, row.attempts);
+        end(change, row, JobState::kFailed);
+      } else {
+        queue_again(change, row, std::chrono::milliseconds(0));
+      }
+      forget_progress(row.job.id);
+    }
+    reaped = rows.size();
+    change.commit();
+  }
+  if (reaped > 0) wake_workers();
+  return reaped;
+}
+
+std::size_t SqliteJobStore::reap_all() {
+  {
+    Transaction transaction(database_.writer());
+    transaction->run("UPDATE jobs SET lease_until = 0 WHERE state = 1");
+    transaction.commit();
+  }
+  return reap();
+}
+
+Job SqliteJobStore::cancel(const Viewer& viewer, const std::string& id) {
+  Job job;
+  {
+    Change change(*this);
+    Row row = found(change.connection(), viewer, id);
+    if (row.job.state == JobState::kQueued) {
+      end(change, row, JobState::kCancelled);
+    } else if (row.job.state == JobState::kRunning) {
+      change->run("UPDATE jobs SET cancelling = 1 WHERE id = ?", id);
+    }
+    change.commit();
+    job = with_progress(row);
+  }
+  wake_workers();
+  return job;
+}
+
+std::optional<SqliteJobStore::Row> SqliteJobStore::leased(Connection& connection,
+                                                          const Lease& lease) const {
+  auto row = find(connection, std::nullopt, lease.id);
+  const bool is_held = row && row->job.state == JobState::kRunning && row->fence == lease.fence &&
+                       row->lease_until >= now_us();
+  return is_held ? std::move(row) : std::nullopt;
+}
+
+std::optional<MeshSummary> SqliteJobStore::mesh_like(Connection& connection, const Row& row) const {
+  Query query = connection.query(
+      "SELECT record FROM jobs WHERE owner = ? AND result_key = ? AND state = 2 ORDER BY id DESC "
+      "LIMIT 1",
+      row.owner, row.result_key);
+  if (!query.next()) return std::nullopt;
+  auto mesh = job_from_record(query.text(0)).mesh;
+  const bool is_there = mesh && std::ranges::all_of(mesh->files, [&](const auto& named) {
+                          return blobs_.size(named.second.sha256) == named.second.bytes;
+                        });
+  return is_there ? std::move(mesh) : std::nullopt;
+}
+
+void SqliteJobStore::end(Change& change, Row& row, JobState state) const {
+  row.job.state = state;
+  row.job.finished = timestamp();
+  row.job.timing.total = milliseconds_since(row.accepted);
+  const std::int64_t now = now_us();
+  change->run(
+      "UPDATE jobs SET state = ?, finished = ?, lease_until = NULL, record = ? WHERE id = ?", state,
+      now, to_json(row.job), row.job.id);
+  change->run("UPDATE volumes SET used = ? WHERE owner = ? AND id = ?", now, row.owner,
+              row.job.parameters.volume);
+  change.announce(row, EventKind::kDone);
+}
+
+void SqliteJobStore::succeed(Change& change, Row& row, const MeshSummary& mesh) const {
+  row.job.mesh = mesh;
+  row.job.stage = Stage::kDone;
+  row.job.progress = 1;
+  for (auto& [format, file] : row.job.mesh->files) {
+    file.href = mesh_path(row.job.id, format);
+    change->run("INSERT OR IGNORE INTO meshes VALUES(?, ?, ?)", row.job.id, file.sha256,
+                file.bytes);
+  }
+  end(change, row, JobState::kSucceeded);
+}
+
+void SqliteJobStore::succeed_alike(Change& change, const Row& row, const MeshSummary& mesh) const {
+  std::vector<Row> alike;
+  {
+    Query query = change->query(std::string("SELECT ") + kRowColumns +
+                                    " FROM jobs WHERE owner = ? AND result_key = ? AND state = 0",
+                                row.owner, row.result_key);
+    while (query.next()) alike.push_back(row_of(query));
+  }
+  for (Row& other : alike) {
+    other.job.reused = true;
+    other.job.timing = {};
+    other.job.timing.queue = milliseconds_since(other.accepted);
+    succeed(change, other, mesh);
+  }
+}
+
+void SqliteJobStore::queue_again(Change& change, Row& row, std::chrono::milliseconds delay) const {
+  row.job.state = JobState::kQueued;
+  row.job.stage = Stage::kQueue;
+  row.job.progress = 0;
+  row.job.started.reset();
+  row.job.timing = {};
+  change->run(
+      "UPDATE jobs SET state = 0, attempts = ?, lease_until = NULL, not_before = ?, record = ? "
+      "WHERE id = ?",
+      row.attempts, now_us() + microseconds(delay), to_json(row.job), row.job.id);
+  change.announce(row, EventKind::kStage);
+}
+
+std::chrono::milliseconds SqliteJobStore::delay_after(int attempts) const {
+  constexpr int kGrowth = 4;
+  std::chrono::milliseconds delay = options_.retry_delay;
+  for (int n = 1; n < attempts; ++n) delay *= kGrowth;
+  return delay;
+}
+
+void SqliteJobStore::tell(const Lease& lease, const Progress& progress) {
+  const auto now = EventLog::Clock::now();
+  bool is_other_stage = false;
+  {
+    const std::lock_guard lock(live_mutex_);
+    Live& live = live_[lease.id];
+    if (live.fence != lease.fence) live = {lease.fence, {}, {}};
+    is_other_stage = live.progress.stage != progress.stage;
+    const bool is_further = live.progress.share != progress.share;
+    live.progress = progress;
+    if (!is_other_stage && (!is_further || now < live.told + kBetweenProgressEvents)) return;
+    live.told = now;
+  }
+  log_.tell({.id = 0,
+             .owner = lease.owner,
+             .job = lease.id,
+             .kind = is_other_stage ? EventKind::kStage : EventKind::kProgress,
+             .state = JobState::kRunning,
+             .stage = progress.stage,
+             .progress = progress.share});
+}
+
+void SqliteJobStore::forget_progress(const std::string& id) {
+  const std::lock_guard lock(live_mutex_);
+  live_.erase(id);
+}
+
+}  // namespace isomesh::store

@@ -1,0 +1,175 @@
+// What becomes of requests: many, the same, half, with a full queue or a full disk.
+#include <atomic>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <sys/resource.h>
+
+#include "tests/api/problems.h"
+#include "tests/faults/fixture.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+
+class Queue : public FaultTest {
+ protected:
+  static std::string body_of(const Volume& volume, double iso, const std::string& members = {}) {
+    return "{\"volume\": \"" + volume.id + "\", \"iso\": " + std::to_string(iso) + members + "}";
+  }
+
+  Answer post(const std::string& body, const std::string& key = {}) {
+    const Headers headers = key.empty() ? Headers{} : Headers{{"Idempotency-Key", key}};
+    return daemon().send("POST", "/v1/jobs", body, headers);
+  }
+};
+
+TEST_F(Queue, StatBehindAThousandRoutineJobsIsClaimedNext) {
+  start({"--workers", "1", "--max-queue", "2000"});
+  const Job running = running_job(1000);
+  const Volume volume = small_volume();
+  constexpr int kRoutine = 1000;
+  std::atomic<int> next = 0;
+  std::vector<std::jthread> clients;
+  for (int client = 0; client < 8; ++client) {
+    clients.emplace_back([&] {
+      for (int n = next++; n < kRoutine; n = next++) {
+        EXPECT_EQ(post(body_of(volume, 10 + 0.1 * n)).status, 202);
+      }
+    });
+  }
+  clients.clear();
+  const Job stat = job_from_json(post(body_of(volume, 5, ", \"priority\": \"stat\"")).body);
+  daemon().client().cancel(running.id);
+  ASSERT_TRUE(eventually([&] { return job(stat.id).started.has_value(); }));
+  // One worker: whatever began before it has ended, and whatever ended has a time of its end.
+  for (const Job& other : daemon().client().jobs(JobState::kSucceeded).jobs) {
+    EXPECT_GE(other.started, job(stat.id).started);
+  }
+  EXPECT_EQ(ended(stat.id).state, JobState::kSucceeded);
+}
+
+TEST_F(Queue, TheSameKeyFromEightClientsIsOneJob) {
+  start();
+  const Volume volume = small_volume();
+  for (int round = 0; round < 3; ++round) {
+    std::mutex mutex;
+    std::set<std::string> ids;
+    std::vector<std::jthread> clients;
+    for (int client = 0; client < 8; ++client) {
+      clients.emplace_back([&, round] {
+        const Answer answer = post(body_of(volume, 50 + round), "key-" + std::to_string(round));
+        ASSERT_EQ(answer.status, 202) << answer.body;
+        const std::lock_guard lock(mutex);
+        ids.insert(job_from_json(answer.body).id);
+      });
+    }
+    clients.clear();
+    EXPECT_EQ(ids.size(), 1U);
+  }
+  EXPECT_EQ(daemon().client().jobs().jobs.size(), 3U);
+}
+
+TEST_F(Queue, AFullQueueSaysWhenToComeBackAndStoresTheRetryOnce) {
+  start({"--workers", "1", "--max-queue", "1"});
+  const Job running = running_job(1000);
+  const Volume volume = small_volume();
+  const Job waiting = job_from_json(post(body_of(volume, 50)).body);
+  const Answer full = post(body_of(volume, 60), "retried");
+  EXPECT_TRUE(is_problem(full, ErrorCode::kUnavailable));
+  EXPECT_GE(std::stoi(full.header("retry-after")), 1);
+  daemon().client().cancel(waiting.id);
+  const Answer stored = post(body_of(volume, 60), "retried");
+  EXPECT_EQ(stored.status, 202);
+  const Answer again = post(body_of(volume, 60), "retried");
+  EXPECT_EQ(again.status, 202);
+  EXPECT_EQ(job_from_json(again.body).id, job_from_json(stored.body).id);
+  EXPECT_EQ(daemon().client().jobs(JobState::kQueued).jobs.size(), 1U);
+}
+
+TEST_F(Queue, AnUploadThatIsCutLeavesNothing) {
+  start();
+  const RawUpload raw = long_upload();
+  const std::string whole = request("POST", "/v1/volumes?" + raw.query, raw.bytes);
+  {
+    const Connection connection(daemon().url());
+    connection.send(whole.substr(0, whole.size() / 2));
+    ASSERT_TRUE(eventually([&] { return scratch_count() > 0; }));
+  }
+  EXPECT_TRUE(eventually([&] { return scratch_count() == 0; }));
+  // The same with the daemon's end instead of the client's.
+  {
+    const Connection connection(daemon().url());
+    connection.send(whole.substr(0, whole.size() / 2));
+    ASSERT_TRUE(eventually([&] { return scratch_count() > 0; }));
+    kill();
+  }
+  start();
+  EXPECT_EQ(scratch_count(), 0U);
+  EXPECT_EQ(blob_count(), 0U);
+  EXPECT_TRUE(daemon().client().volumes().empty());
+}
+
+TEST_F(Queue, SpoiltSamplesGiveNoMesh) {
+  start();
+  const Volume volume = small_volume();
+  const auto file = daemon().data() / "blobs" / volume.id.substr(0, 2) / volume.id;
+  std::string bytes = read_file(file);
+  bytes[bytes.size() / 2] ^= 1;
+  write_file(file, bytes);
+  const Job failed = ended(submit(daemon(), volume, 100).id);
+  EXPECT_EQ(failed.state, JobState::kFailed);
+  EXPECT_EQ(failed.error->status, 422);
+  EXPECT_THAT(failed.error->detail, testing::HasSubstr("damaged"));
+  EXPECT_EQ(blob_count(), 1U);
+  // Sent again it is whole again.
+  small_volume();
+  EXPECT_EQ(ended(submit(daemon(), volume, 100).id).state, JobState::kSucceeded);
+}
+
+// A limit on the size of files fails as a full disk does, and can be lifted again.
+TEST_F(Queue, AFullDiskIsToldAndAcceptedJobsStay) {
+  start({"--workers", "1"});
+  const Volume volume = small_volume();
+  const Job running = running_job(1000);
+  const std::string queued = submit(daemon(), volume, 100).id;
+  const auto limit = [&](rlim_t bytes) {
+    const rlimit value = {bytes, RLIM_INFINITY};
+    return ::prlimit(daemon().process_id(), RLIMIT_FSIZE, &value, nullptr);
+  };
+  ASSERT_EQ(limit(1), 0);
+  EXPECT_TRUE(is_problem(post(body_of(volume, 90), "kept"), ErrorCode::kOutOfSpace));
+  EXPECT_TRUE(is_problem(
+      daemon().send("POST", "/v1/volumes?" + sphere_upload().query, sphere_upload().bytes),
+      ErrorCode::kOutOfSpace));
+  EXPECT_EQ(daemon().get("/livez").status, 200);
+  EXPECT_EQ(job(queued).state, JobState::kQueued);
+  EXPECT_EQ(daemon().client().volumes().size(), 2U);
+  ASSERT_EQ(limit(RLIM_INFINITY), 0);
+  EXPECT_EQ(post(body_of(volume, 90), "kept").status, 202);
+  daemon().client().cancel(running.id);
+  EXPECT_EQ(ended(queued).state, JobState::kSucceeded);
+  EXPECT_EQ(scratch_count(), 0U);
+}
+
+// The mesh does not fit; the job is run again when there is room, and no attempt is counted.
+TEST_F(Queue, AJobThatFindsTheDiskFullWaitsForRoom) {
+  start({"--workers", "1"});
+  const Volume volume = upload(daemon(), long_upload());
+  const rlimit small = {20'000'000, RLIM_INFINITY};  // the database fits, the mesh does not
+  ASSERT_EQ(::prlimit(daemon().process_id(), RLIMIT_FSIZE, &small, nullptr), 0);
+  const std::string id = submit(daemon(), volume, 50, R"("formats": ["stl"], "passes": 0)").id;
+  ASSERT_TRUE(
+      eventually([&] { return daemon().errors().find("no space left") != std::string::npos; }));
+  ASSERT_TRUE(comes_to(id, JobState::kQueued));
+  const rlimit none = {RLIM_INFINITY, RLIM_INFINITY};
+  ASSERT_EQ(::prlimit(daemon().process_id(), RLIMIT_FSIZE, &none, nullptr), 0);
+  EXPECT_EQ(ended(id).state, JobState::kSucceeded);
+}
+
+}  // namespace
+}  // namespace isomesh

@@ -1,0 +1,283 @@
+// What every engine makes of leases that run out, failures, retries of requests and jobs alike.
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "tests/support/errors.h"
+#include "tests/support/process.h"
+#include "tests/unit/store/engine.h"
+
+namespace isomesh::store {
+namespace {
+
+using std::chrono::milliseconds;
+using test::code_thrown_by;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using Kind = Submission::Kind;
+
+class FaultConformance : public test::EngineTest {
+ protected:
+  static constexpr milliseconds kShortLease{30};
+
+  Lease expired() {
+    const Lease lease = claimed(kShortLease);
+    std::this_thread::sleep_for(2 * kShortLease);
+    return lease;
+  }
+
+  Submission submit_with(const std::string& key, const std::string& digest,
+                         const std::string& owner = "") {
+    return jobs().submit({owner, parameters(), key, digest});
+  }
+
+  std::vector<EventKind> kinds_of(const std::string& job, std::uint64_t since = 0) {
+    std::vector<EventKind> kinds;
+    for (const Event& event : jobs().events("", job, since, milliseconds(0))) {
+      EXPECT_EQ(event.job, job);
+      kinds.push_back(event.kind);
+    }
+    return kinds;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Engines, FaultConformance, testing::ValuesIn(test::all_engines()),
+                         test::name_of);
+
+// --- Leases
+
+TEST_P(FaultConformance, AnExpiredLeaseIsLost) {
+  const std::string id = submit().id;
+  const Lease lease = expired();
+  EXPECT_EQ(jobs().renew(lease, {}, kLongLease), Standing::kLost);
+  EXPECT_FALSE(jobs().finish(lease, some_mesh()));
+  EXPECT_FALSE(jobs().put_back(lease, milliseconds(0)));
+  EXPECT_EQ(jobs().get("", id).state, JobState::kRunning);
+}
+
+TEST_P(FaultConformance, ARenewedLeaseHolds) {
+  submit();
+  const Lease lease = claimed(milliseconds(200));
+  for (int n = 0; n < 10; ++n) {
+    std::this_thread::sleep_for(milliseconds(40));
+    ASSERT_EQ(jobs().renew(lease, {}, milliseconds(200)), Standing::kOk) << n;
+    EXPECT_EQ(jobs().reap(), 0U);
+  }
+  EXPECT_TRUE(jobs().finish(lease, some_mesh()));
+}
+
+TEST_P(FaultConformance, AReapedJobIsClaimedAgainAndItsLateWorkerIsRefused) {
+  const Job job = submit();
+  const Lease late = expired();
+  EXPECT_EQ(jobs().reap(), 1U);
+  EXPECT_EQ(jobs().reap(), 0U);
+  EXPECT_EQ(jobs().get("", job.id), job);
+  const Lease lease = claimed();
+  EXPECT_EQ(lease.attempt, 2);
+  EXPECT_GT(lease.fence, late.fence);
+  EXPECT_EQ(jobs().renew(late, {Stage::kEncode, 0.9, {}}, kLongLease), Standing::kLost);
+  EXPECT_FALSE(jobs().finish(late, some_mesh()));
+  EXPECT_FALSE(jobs().put_back(late, milliseconds(0)));
+  EXPECT_EQ(jobs().get("", job.id).stage, Stage::kLoad);
+  EXPECT_TRUE(jobs().finish(lease, some_mesh()));
+}
+
+TEST_P(FaultConformance, AJobThatLosesItsWorkersFailsAfterThreeAttemptsAndOthersGoOn) {
+  const std::string id = submit().id;
+  const std::string next = submit().id;
+  for (int attempt = 1; attempt <= 3; ++attempt) {
+    const Lease lease = expired();
+    EXPECT_EQ(lease.id, id);
+    EXPECT_EQ(lease.attempt, attempt);
+    jobs().reap();
+  }
+  const Job job = jobs().get("", id);
+  EXPECT_EQ(job.state, JobState::kFailed);
+  ASSERT_TRUE(job.error);
+  EXPECT_THAT(job.error->detail, testing::HasSubstr("3 times"));
+  EXPECT_EQ(claimed().id, next);
+}
+
+TEST_P(FaultConformance, APutBackCountsNoAttempt) {
+  const std::string id = submit().id;
+  for (int n = 0; n < 5; ++n) jobs().put_back(claimed(), milliseconds(0));
+  EXPECT_EQ(jobs().get("", id).state, JobState::kQueued);
+  EXPECT_EQ(claimed().attempt, 1);
+}
+
+TEST_P(FaultConformance, ACancelledJobWhoseLeaseRunsOutEndsCancelled) {
+  const std::string id = submit().id;
+  expired();
+  jobs().cancel("", id);
+  EXPECT_EQ(jobs().reap(), 1U);
+  EXPECT_EQ(jobs().get("", id).state, JobState::kCancelled);
+}
+
+// --- Failures
+
+TEST_P(FaultConformance, AFailureThatMayPassIsTriedThreeTimes) {
+  make({.retry_delay = milliseconds(40)});
+  const std::string id = submit().id;
+  for (int attempt = 1; attempt <= 3; ++attempt) {
+    ASSERT_TRUE(jobs().wait_for_work({}, kLong));
+    const Lease lease = claimed();
+    EXPECT_EQ(lease.attempt, attempt);
+    EXPECT_TRUE(jobs().finish(lease, failure(true)));
+    EXPECT_FALSE(jobs().claim("worker", kLongLease)) << "there is no delay";
+  }
+  EXPECT_EQ(jobs().get("", id).state, JobState::kFailed);
+  EXPECT_EQ(jobs().get("", id).error, failure().error);
+}
+
+// --- Idempotency
+
+TEST_P(FaultConformance, TheSameKeyAndRequestIsTheSameJob) {
+  const Submission first = submit_with("key", "digest");
+  EXPECT_EQ(first.kind, Kind::kNew);
+  const Submission again = submit_with("key", "digest");
+  EXPECT_EQ(again.kind, Kind::kExisting);
+  EXPECT_EQ(again.job, first.job);
+  jobs().finish(claimed(), some_mesh());
+  restart();
+  EXPECT_EQ(submit_with("key", "digest").job, jobs().get("", first.job.id));
+  EXPECT_EQ(jobs().list("", {}, "", 10).size(), 1U);
+}
+
+TEST_P(FaultConformance, AKeyWithAnotherRequestIsRefused) {
+  submit_with("key", "digest");
+  EXPECT_EQ(submit_with("key", "other digest").kind, Kind::kConflict);
+  EXPECT_EQ(code_thrown_by([&] { job_of(submit_with("key", "other digest")); }),
+            ErrorCode::kKeyReused);
+  EXPECT_EQ(jobs().list("", {}, "", 10).size(), 1U);
+}
+
+TEST_P(FaultConformance, KeysOfOwnersAreApart) {
+  const Submission mine = submit_with("key", "digest");
+  const Submission theirs = submit_with("key", "other digest", "other");
+  EXPECT_EQ(theirs.kind, Kind::kNew);
+  EXPECT_NE(theirs.job.id, mine.job.id);
+}
+
+TEST_P(FaultConformance, AKeyIsKnownThoughTheQueueIsFull) {
+  make({.max_queued = 1});
+  const Submission first = submit_with("key", "digest");
+  EXPECT_EQ(submit_with("another", "digest").kind, Kind::kBusy);
+  EXPECT_EQ(submit_with("key", "digest").job, first.job);
+  jobs().cancel("", first.job.id);
+  EXPECT_EQ(submit_with("another", "digest").kind, Kind::kNew);
+}
+
+// --- Jobs alike
+
+TEST_P(FaultConformance, AJobLikeAFinishedOneTakesItsMeshAtOnce) {
+  const Job first = submit(parameters());
+  jobs().finish(claimed(), some_mesh());
+  const Job second = submit(parameters(Priority::kStat));
+  EXPECT_NE(second.id, first.id);
+  EXPECT_EQ(second.state, JobState::kSucceeded);
+  EXPECT_TRUE(second.reused);
+  EXPECT_FALSE(jobs().get("", first.id).reused);
+  EXPECT_EQ(second.mesh->triangles, 12U);
+  EXPECT_EQ(second.mesh->files.at(MeshFormat::kDrc).href, "/v1/jobs/" + second.id + "/mesh.drc");
+  EXPECT_TRUE(second.finished);
+  EXPECT_EQ(jobs().get("", second.id), second);
+  EXPECT_FALSE(can_claim());
+}
+
+TEST_P(FaultConformance, AnyOtherParameterIsAnotherMesh) {
+  submit(parameters());
+  jobs().finish(claimed(), some_mesh());
+  JobParameters other = parameters();
+  other.passes += 1;
+  EXPECT_FALSE(submit(other).reused);
+}
+
+TEST_P(FaultConformance, AnotherOwnersMeshIsNotTaken) {
+  submit(parameters());
+  jobs().finish(claimed(), some_mesh());
+  const Job theirs = submit(parameters(), "other");
+  EXPECT_FALSE(theirs.reused);
+  EXPECT_EQ(claimed().id, theirs.id);
+}
+
+TEST_P(FaultConformance, AMeshWhoseBytesAreGoneIsMadeAgain) {
+  const std::string key = put_blob("lost");
+  submit(parameters());
+  jobs().finish(claimed(), mesh_of({{key, 4}}));
+  blobs().erase(key);
+  EXPECT_FALSE(submit(parameters()).reused);
+  EXPECT_TRUE(can_claim());
+}
+
+TEST_P(FaultConformance, JobsAlikeAreComputedOnce) {
+  const std::string first = submit(parameters(Priority::kBulk)).id;
+  const std::string second = submit(parameters()).id;
+  const Lease lease = claimed();
+  EXPECT_EQ(lease.id, second);
+  EXPECT_FALSE(can_claim());
+  EXPECT_FALSE(jobs().claim("worker", kLongLease));
+  EXPECT_EQ(jobs().get("", first).state, JobState::kQueued);
+  jobs().finish(lease, some_mesh());
+  const Job other = jobs().get("", first);
+  EXPECT_EQ(other.state, JobState::kSucceeded);
+  EXPECT_TRUE(other.reused);
+  EXPECT_EQ(other.mesh->files.at(MeshFormat::kDrc).href, "/v1/jobs/" + first + "/mesh.drc");
+  EXPECT_FALSE(jobs().get("", second).reused);
+}
+
+TEST_P(FaultConformance, AJobGoesOnWhenItsLikeEndsWithoutAMesh) {
+  submit(parameters());
+  const std::string second = submit(parameters()).id;
+  jobs().finish(claimed(), failure());
+  EXPECT_EQ(claimed().id, second);
+}
+
+// --- Events
+
+TEST_P(FaultConformance, EventsTellAJobsWay) {
+  const std::string id = submit().id;
+  const std::string other = submit().id;
+  const Lease lease = claimed();
+  jobs().renew(lease, {Stage::kSmooth, 0.3, {}}, kLongLease);
+  jobs().renew(lease, {Stage::kSmooth, 0.4, {}}, kLongLease);  // too soon after the last
+  std::this_thread::sleep_for(milliseconds(120));
+  jobs().renew(lease, {Stage::kSmooth, 0.5, {}}, kLongLease);
+  jobs().finish(lease, some_mesh());
+  const auto events = jobs().events("", id, 0, milliseconds(0));
+  EXPECT_THAT(kinds_of(id), ElementsAre(EventKind::kStage, EventKind::kStage, EventKind::kStage,
+                                        EventKind::kProgress, EventKind::kDone));
+  EXPECT_EQ(events[1].stage, Stage::kLoad);
+  EXPECT_EQ(events[2].stage, Stage::kSmooth);
+  EXPECT_EQ(events[3].progress, 0.5);
+  EXPECT_EQ(events[4].state, JobState::kSucceeded);
+  EXPECT_THAT(kinds_of(id, events[3].id), ElementsAre(EventKind::kDone));
+  EXPECT_THAT(kinds_of(other), ElementsAre(EventKind::kStage));
+  EXPECT_EQ(jobs().events("", "", 0, milliseconds(0)).size(), 6U);
+}
+
+TEST_P(FaultConformance, WhatWasKeptIsToldAfterARestartInOrder) {
+  const std::string id = submit().id;
+  const Lease lease = claimed();
+  jobs().renew(lease, {Stage::kSmooth, 0.3, {}}, kLongLease);
+  const std::uint64_t last = jobs().events("", id, 0, milliseconds(0)).back().id;
+  restart();
+  EXPECT_THAT(kinds_of(id, last), ElementsAre(EventKind::kStage)) << "queued again";
+  EXPECT_THAT(kinds_of(id), ElementsAre(EventKind::kStage, EventKind::kStage, EventKind::kStage));
+}
+
+TEST_P(FaultConformance, ReadersOfEventsAreWoken) {
+  const std::string id = submit().id;
+  const std::uint64_t since = jobs().events("", id, 0, milliseconds(0)).back().id;
+  std::vector<Event> seen;
+  std::jthread reader([&] { seen = jobs().events("", id, since, kLong); });
+  claimed();
+  reader.join();
+  ASSERT_EQ(seen.size(), 1U);
+  EXPECT_EQ(seen[0].state, JobState::kRunning);
+  EXPECT_THAT(jobs().events("", id, seen[0].id, milliseconds(5)), IsEmpty());
+}
+
+}  // namespace
+}  // namespace isomesh::store

@@ -1,0 +1,410 @@
+// What every engine's jobs do, from submission to their end.
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "tests/support/errors.h"
+#include "tests/unit/store/engine.h"
+
+namespace isomesh::store {
+namespace {
+
+using std::chrono::milliseconds;
+using test::code_thrown_by;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+class JobConformance : public test::EngineTest {
+ protected:
+  static std::vector<std::string> ids_of(const std::vector<Job>& jobs) {
+    std::vector<std::string> ids;
+    for (const Job& job : jobs) ids.push_back(job.id);
+    return ids;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Engines, JobConformance, testing::ValuesIn(test::all_engines()),
+                         test::name_of);
+
+// --- Submitting and claiming
+
+TEST_P(JobConformance, ASubmittedJobIsQueued) {
+  const Job job = submit(parameters(Priority::kBulk));
+  EXPECT_EQ(job.state, JobState::kQueued);
+  EXPECT_EQ(job.stage, Stage::kQueue);
+  EXPECT_EQ(job.progress, 0);
+  EXPECT_EQ(job.parameters, parameters(Priority::kBulk));
+  EXPECT_FALSE(job.created.empty());
+  EXPECT_FALSE(job.started || job.finished || job.mesh || job.error || job.reused);
+  EXPECT_EQ(job.timing, Timing{});
+  EXPECT_EQ(jobs().get("", job.id), job);
+}
+
+TEST_P(JobConformance, AnUnknownJobIsNotFound) {
+  EXPECT_EQ(code_thrown_by([&] { jobs().get("", "x"); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { jobs().cancel("", "x"); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { jobs().wait("", "x", kLong); }), ErrorCode::kNotFound);
+}
+
+TEST_P(JobConformance, AnUnknownVolumeIsNotFoundAndNamed) {
+  JobParameters unknown = parameters();
+  unknown.volume = "gone";
+  const auto error = test::thrown_by([&] { submit(unknown); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kNotFound);
+  EXPECT_EQ(error->fields().at(0).field, "volume");
+  EXPECT_THAT(jobs().list("", {}, "", 10), IsEmpty());
+}
+
+TEST_P(JobConformance, ClaimsByPriorityThenAge) {
+  std::vector<std::string> expected;
+  const std::string bulk = submit(unlike(Priority::kBulk)).id;
+  for (int n = 0; n < 20; ++n) expected.push_back(submit().id);
+  const std::string other_bulk = submit(unlike(Priority::kBulk)).id;
+  expected.insert(expected.begin(), submit(unlike(Priority::kStat)).id);
+  expected.insert(expected.begin() + 1, submit(unlike(Priority::kStat)).id);
+  expected.insert(expected.end(), {bulk, other_bulk});
+  std::vector<std::string> order;
+  while (can_claim()) order.push_back(claimed().id);
+  EXPECT_EQ(order, expected);
+  EXPECT_FALSE(jobs().claim("worker", kLongLease));
+}
+
+TEST_P(JobConformance, AClaimedJobRuns) {
+  const std::string id = submit(parameters()).id;
+  const Lease lease = claimed();
+  EXPECT_EQ(lease.id, id);
+  EXPECT_EQ(lease.attempt, 1);
+  EXPECT_EQ(lease.owner, "");
+  EXPECT_EQ(lease.parameters, parameters());
+  const Job job = jobs().get("", id);
+  EXPECT_EQ(job.state, JobState::kRunning);
+  EXPECT_TRUE(job.started);
+  EXPECT_FALSE(job.finished);
+}
+
+TEST_P(JobConformance, WaitingForWorkEndsWithAJob) {
+  bool has_work = false;
+  std::jthread worker([&] { has_work = jobs().wait_for_work({}, kLong); });
+  submit();
+  worker.join();
+  EXPECT_TRUE(has_work);
+}
+
+TEST_P(JobConformance, WaitingForWorkEndsWhenItIsStopped) {
+  std::stop_source stop;
+  std::jthread worker([&] { jobs().wait_for_work(stop.get_token(), kLong); });
+  stop.request_stop();
+  worker.join();
+  EXPECT_FALSE(jobs().wait_for_work({}, milliseconds(5)));
+}
+
+// --- Running
+
+TEST_P(JobConformance, ProgressIsSeen) {
+  const std::string id = submit().id;
+  const Lease lease = claimed();
+  const double queued = jobs().get("", id).timing.queue;
+  EXPECT_EQ(jobs().renew(lease, {Stage::kSmooth, 0.4, {.load = 1, .extract = 2}}, kLongLease),
+            Standing::kOk);
+  const Job job = jobs().get("", id);
+  EXPECT_EQ(job.stage, Stage::kSmooth);
+  EXPECT_EQ(job.progress, 0.4);
+  EXPECT_EQ(job.timing.load, 1);
+  EXPECT_EQ(job.timing.extract, 2);
+  EXPECT_EQ(job.timing.queue, queued);
+}
+
+TEST_P(JobConformance, AMeshEndsItSucceeded) {
+  const std::string id = submit().id;
+  Outcome outcome = some_mesh();
+  outcome.timing = {.load = 1, .encode = 4};
+  EXPECT_TRUE(jobs().finish(claimed(), outcome));
+  const Job job = jobs().get("", id);
+  EXPECT_EQ(job.state, JobState::kSucceeded);
+  EXPECT_EQ(job.stage, Stage::kDone);
+  EXPECT_EQ(job.progress, 1);
+  EXPECT_EQ(job.mesh->triangles, 12U);
+  EXPECT_EQ(job.mesh->files.at(MeshFormat::kDrc).href, "/v1/jobs/" + id + "/mesh.drc");
+  EXPECT_TRUE(job.started && job.finished);
+  EXPECT_EQ(job.timing.encode, 4);
+  EXPECT_GE(job.timing.total, job.timing.queue);
+  EXPECT_GT(job.timing.total, 0);
+}
+
+TEST_P(JobConformance, AnErrorEndsItFailed) {
+  const std::string id = submit().id;
+  EXPECT_TRUE(jobs().finish(claimed(), failure()));
+  const Job job = jobs().get("", id);
+  EXPECT_EQ(job.state, JobState::kFailed);
+  EXPECT_EQ(job.error->detail, "too large");
+  EXPECT_FALSE(job.mesh);
+}
+
+TEST_P(JobConformance, AFinishedJobTakesNoLateNews) {
+  const std::string id = submit().id;
+  const Lease lease = claimed();
+  jobs().finish(lease, some_mesh());
+  const Job ended = jobs().get("", id);
+  EXPECT_EQ(jobs().renew(lease, {Stage::kLoad, 0.1, {}}, kLongLease), Standing::kLost);
+  EXPECT_FALSE(jobs().finish(lease, failure()));
+  EXPECT_FALSE(jobs().put_back(lease, milliseconds(0)));
+  EXPECT_EQ(jobs().get("", id), ended);
+  EXPECT_FALSE(can_claim());
+}
+
+TEST_P(JobConformance, AJobThatIsPutBackIsAsIfItHadNotRun) {
+  const Job job = submit();
+  const std::string next = submit().id;
+  const Lease lease = claimed();
+  jobs().renew(lease, {Stage::kSmooth, 0.5, {.load = 3}}, kLongLease);
+  EXPECT_TRUE(jobs().put_back(lease, milliseconds(0)));
+  EXPECT_EQ(jobs().get("", job.id), job);
+  const Lease again = claimed();
+  EXPECT_EQ(again.id, job.id);
+  EXPECT_EQ(again.attempt, 1);
+  EXPECT_GT(again.fence, lease.fence);
+  EXPECT_EQ(claimed().id, next);
+}
+
+TEST_P(JobConformance, AJobThatIsPutBackForLaterLetsOthersGoFirst) {
+  const std::string id = submit().id;
+  const std::string next = submit().id;
+  jobs().put_back(claimed(), milliseconds(150));
+  EXPECT_EQ(claimed().id, next);
+  EXPECT_FALSE(jobs().claim("worker", kLongLease));
+  EXPECT_TRUE(jobs().wait_for_work({}, kLong));
+  EXPECT_EQ(claimed().id, id);
+}
+
+// --- Cancelling
+
+TEST_P(JobConformance, ACancelledQueuedJobNeverRuns) {
+  const std::string id = submit().id;
+  const std::string next = submit().id;
+  EXPECT_EQ(jobs().cancel("", id).state, JobState::kCancelled);
+  EXPECT_TRUE(jobs().get("", id).finished);
+  EXPECT_EQ(claimed().id, next);
+  EXPECT_FALSE(can_claim());
+}
+
+TEST_P(JobConformance, ACancelledRunningJobIsAskedToStop) {
+  const std::string id = submit().id;
+  const Lease lease = claimed();
+  EXPECT_EQ(jobs().cancel("", id).state, JobState::kRunning);
+  EXPECT_EQ(jobs().renew(lease, {}, kLongLease), Standing::kCancel);
+  EXPECT_TRUE(jobs().finish(lease, {}));
+  EXPECT_EQ(jobs().get("", id).state, JobState::kCancelled);
+}
+
+TEST_P(JobConformance, AJobThatWasAskedToStopEndsCancelledWhateverItsOutcome) {
+  for (const Outcome& outcome : {some_mesh(), failure(), failure(true)}) {
+    const std::string id = submit().id;
+    const Lease lease = claimed();
+    jobs().cancel("", id);
+    EXPECT_TRUE(jobs().finish(lease, outcome));
+    const Job job = jobs().get("", id);
+    EXPECT_EQ(job.state, JobState::kCancelled);
+    EXPECT_FALSE(job.mesh || job.error);
+  }
+}
+
+TEST_P(JobConformance, ACancelledJobsMeshIsNamedByNothing) {
+  const std::string key = put_blob("mesh");
+  const Lease lease = (submit(), claimed());
+  jobs().cancel("", lease.id);
+  jobs().finish(lease, mesh_of({{key, 4}}));
+  EXPECT_FALSE(volumes().names(key));
+}
+
+TEST_P(JobConformance, AFinishedJobStaysAsItIs) {
+  const std::string id = submit().id;
+  jobs().finish(claimed(), some_mesh());
+  const Job ended = jobs().get("", id);
+  EXPECT_EQ(jobs().cancel("", id), ended);
+  EXPECT_EQ(jobs().get("", id), ended);
+}
+
+// It was asked to stop before it was put back, and nobody else would do so again.
+TEST_P(JobConformance, ACancelledJobThatIsPutBackEndsCancelled) {
+  const std::string id = submit().id;
+  const Lease lease = claimed();
+  jobs().cancel("", id);
+  EXPECT_TRUE(jobs().put_back(lease, milliseconds(0)));
+  EXPECT_EQ(jobs().get("", id).state, JobState::kCancelled);
+  EXPECT_FALSE(can_claim());
+}
+
+// --- Waiting
+
+TEST_P(JobConformance, WaitReturnsAtOnceForAFinishedJob) {
+  const std::string id = submit().id;
+  jobs().cancel("", id);
+  EXPECT_EQ(jobs().wait("", id, kLong).state, JobState::kCancelled);
+}
+
+TEST_P(JobConformance, WaitIsOverAfterItsTime) {
+  const std::string id = submit().id;
+  EXPECT_EQ(jobs().wait("", id, milliseconds(0)).state, JobState::kQueued);
+  EXPECT_EQ(jobs().wait("", id, milliseconds(5)).state, JobState::kQueued);
+}
+
+TEST_P(JobConformance, WaitWakesWhenTheJobEnds) {
+  const std::string id = submit().id;
+  Job seen;
+  std::jthread waiter([&] { seen = jobs().wait("", id, kLong); });
+  const Lease lease = claimed();
+  jobs().renew(lease, {Stage::kSmooth, 0.5, {}}, kLongLease);
+  jobs().finish(lease, some_mesh());
+  waiter.join();
+  EXPECT_EQ(seen.state, JobState::kSucceeded);
+}
+
+TEST_P(JobConformance, CloseWakesThoseWhoWait) {
+  const std::string id = submit().id;
+  Job seen;
+  std::jthread waiter([&] { seen = jobs().wait("", id, kLong); });
+  std::jthread reader([&] { jobs().events("", "x", 0, kLong); });
+  jobs().close();
+  waiter.join();
+  EXPECT_EQ(seen.state, JobState::kQueued);
+}
+
+TEST_P(JobConformance, NothingIsAcceptedOnceItIsClosed) {
+  EXPECT_FALSE(jobs().is_full());
+  jobs().close();
+  EXPECT_TRUE(jobs().is_full());
+  EXPECT_EQ(jobs().submit({"", parameters(), "", ""}).kind, Submission::Kind::kBusy);
+  EXPECT_EQ(code_thrown_by([&] { submit(); }), ErrorCode::kUnavailable);
+}
+
+// --- Limits
+
+TEST_P(JobConformance, AFullQueueAcceptsNothing) {
+  make({.max_queued = 3});
+  for (int n = 0; n < 3; ++n) submit(unlike(Priority{n}));
+  EXPECT_TRUE(jobs().is_full());
+  const Submission refused = jobs().submit({"", unlike(Priority::kStat), "key", "digest"});
+  EXPECT_EQ(refused.kind, Submission::Kind::kBusy);
+  EXPECT_GT(refused.retry_after.count(), 0);
+  EXPECT_EQ(jobs().list("", {}, "", 10).size(), 3U);
+  claimed();
+  EXPECT_FALSE(jobs().is_full());
+  EXPECT_EQ(jobs().submit({"", unlike(), "key", "digest"}).kind, Submission::Kind::kNew);
+  EXPECT_TRUE(jobs().is_full());
+}
+
+TEST_P(JobConformance, CancellingMakesRoomInTheQueue) {
+  make({.max_queued = 1});
+  jobs().cancel("", submit().id);
+  EXPECT_FALSE(jobs().is_full());
+}
+
+TEST_P(JobConformance, TheDepthIsCountedByPriority) {
+  submit();
+  claimed();
+  for (const Priority priority : {Priority::kStat, Priority::kBulk, Priority::kBulk}) {
+    submit(unlike(priority));
+  }
+  const QueueDepth depth = jobs().depth();
+  EXPECT_THAT(depth.queued, ElementsAre(1U, 0U, 2U));
+  EXPECT_EQ(depth.running, 1U);
+  EXPECT_EQ(depth.all_queued(), 3U);
+}
+
+// --- Listing
+
+TEST_P(JobConformance, ListsTheNewestFirstInPages) {
+  std::vector<std::string> ids;
+  for (int n = 0; n < 25; ++n) ids.push_back(submit().id);
+  const std::vector<std::string> expected(ids.rbegin(), ids.rend());
+  EXPECT_EQ(ids_of(jobs().list("", {}, "", 100)), expected);
+  std::vector<std::string> paged;
+  for (std::string after; paged.size() < expected.size();) {
+    const std::vector<std::string> page = ids_of(jobs().list("", {}, after, 10));
+    ASSERT_THAT(page, testing::Not(IsEmpty()));
+    paged.insert(paged.end(), page.begin(), page.end());
+    after = page.back();
+  }
+  EXPECT_EQ(paged, expected);
+  EXPECT_THAT(jobs().list("", {}, expected.back(), 10), IsEmpty());
+}
+
+TEST_P(JobConformance, ListsByState) {
+  const std::string cancelled = submit().id;
+  jobs().cancel("", cancelled);
+  const std::string running = submit().id;
+  claimed();
+  const std::string queued = submit().id;
+  EXPECT_THAT(ids_of(jobs().list("", JobState::kCancelled, "", 10)), ElementsAre(cancelled));
+  EXPECT_THAT(ids_of(jobs().list("", JobState::kRunning, "", 10)), ElementsAre(running));
+  EXPECT_THAT(ids_of(jobs().list("", JobState::kQueued, "", 10)), ElementsAre(queued));
+  EXPECT_THAT(jobs().list("", JobState::kFailed, "", 10), IsEmpty());
+}
+
+TEST_P(JobConformance, ACursorNeedNotNameAJob) {
+  const std::string id = submit().id;
+  EXPECT_THAT(jobs().list("", {}, "0", 10), IsEmpty());
+  EXPECT_THAT(ids_of(jobs().list("", {}, "~", 10)), ElementsAre(id));
+}
+
+// --- Owners
+
+TEST_P(JobConformance, AnOwnerSeesItsOwnOnly) {
+  const std::string mine = submit(parameters(), "").id;
+  const std::string theirs = submit(parameters(), "other").id;
+  EXPECT_EQ(code_thrown_by([&] { jobs().get("", theirs); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { jobs().cancel("", theirs); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { jobs().wait("", theirs, kLong); }), ErrorCode::kNotFound);
+  EXPECT_THAT(ids_of(jobs().list("other", {}, "", 10)), ElementsAre(theirs));
+  EXPECT_THAT(ids_of(jobs().list(std::nullopt, {}, "", 10)), ElementsAre(theirs, mine));
+  EXPECT_EQ(jobs().get(std::nullopt, theirs).id, theirs);
+  EXPECT_THAT(jobs().events("", theirs, 0, milliseconds(0)), IsEmpty());
+  EXPECT_EQ(jobs().events("other", "", 0, milliseconds(0)).size(), 1U);
+}
+
+TEST_P(JobConformance, AnOwnersVolumeIsNoOthers) {
+  add_volume("other", "theirs");
+  JobParameters stolen = parameters();
+  stolen.volume = "theirs";
+  EXPECT_EQ(code_thrown_by([&] { submit(stolen, ""); }), ErrorCode::kNotFound);
+}
+
+// --- Restarts
+
+TEST_P(JobConformance, QueuedAndFinishedJobsAreThereAfterARestart) {
+  const Job first = submit();
+  jobs().finish(claimed(), some_mesh());
+  const Job done = jobs().get("", first.id);
+  const Job queued = submit(unlike(Priority::kBulk));
+  restart();
+  EXPECT_EQ(jobs().get("", first.id), done);
+  EXPECT_EQ(jobs().get("", queued.id), queued);
+  EXPECT_EQ(claimed().id, queued.id);
+}
+
+TEST_P(JobConformance, AJobThatRanAtACrashIsClaimedAgain) {
+  const std::string id = submit().id;
+  const Lease before = claimed();
+  restart();
+  EXPECT_EQ(jobs().get("", id).state, JobState::kQueued);
+  const Lease after = claimed();
+  EXPECT_EQ(after.attempt, 2);
+  EXPECT_GT(after.fence, before.fence);
+  EXPECT_FALSE(jobs().finish(before, some_mesh()));
+  EXPECT_TRUE(jobs().finish(after, some_mesh()));
+}
+
+TEST_P(JobConformance, ACancelOutlivesACrash) {
+  const std::string id = submit().id;
+  claimed();
+  jobs().cancel("", id);
+  restart();
+  EXPECT_EQ(jobs().get("", id).state, JobState::kCancelled);
+}
+
+}  // namespace
+}  // namespace isomesh::store

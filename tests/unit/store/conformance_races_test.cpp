@@ -1,0 +1,195 @@
+// What several threads do to any engine at a time.
+#include <algorithm>
+#include <atomic>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/errors.h"
+#include "tests/unit/store/engine.h"
+
+namespace isomesh::store {
+namespace {
+
+class RaceConformance : public test::EngineTest {};
+
+INSTANTIATE_TEST_SUITE_P(Engines, RaceConformance, testing::ValuesIn(test::all_engines()),
+                         test::name_of);
+
+TEST_P(RaceConformance, EveryJobIsClaimedByOneWorker) {
+  constexpr int kJobs = 200;
+  std::stop_source stop;
+  std::mutex mutex;
+  std::multiset<std::string> taken;
+  std::vector<std::jthread> workers;
+  for (int worker = 0; worker < 4; ++worker) {
+    workers.emplace_back([&] {
+      while (!stop.stop_requested()) {
+        const auto lease = jobs().claim("worker", kLongLease);
+        if (!lease) {
+          jobs().wait_for_work(stop.get_token(), kLong);
+          continue;
+        }
+        {
+          const std::lock_guard lock(mutex);
+          taken.insert(lease->id);
+        }
+        EXPECT_TRUE(jobs().finish(*lease, some_mesh()));
+      }
+    });
+  }
+  std::set<std::string> submitted;
+  for (int n = 0; n < kJobs; ++n) submitted.insert(submit().id);
+  for (const std::string& id : submitted) {
+    EXPECT_EQ(jobs().wait("", id, kLong).state, JobState::kSucceeded);
+  }
+  stop.request_stop();
+  workers.clear();
+  EXPECT_EQ(taken.size(), submitted.size());
+  EXPECT_TRUE(std::ranges::equal(taken, submitted));
+}
+
+TEST_P(RaceConformance, CancelAgainstFinishGivesOneEnd) {
+  for (int round = 0; round < 100; ++round) {
+    const std::string id = submit().id;
+    const Lease lease = claimed();
+    std::atomic<int> ready = 0;
+    const auto together = [&] {
+      ++ready;
+      while (ready < 2) std::this_thread::yield();
+    };
+    bool finished = false;
+    {
+      std::jthread worker([&] {
+        together();
+        finished = jobs().finish(lease, some_mesh());
+      });
+      std::jthread canceller([&] {
+        together();
+        jobs().cancel("", id);
+      });
+    }
+    EXPECT_TRUE(finished);
+    const Job job = jobs().get("", id);
+    ASSERT_TRUE(is_final(job.state));
+    EXPECT_EQ(job.state == JobState::kSucceeded, job.mesh.has_value());
+    EXPECT_EQ(job.state == JobState::kCancelled, !job.mesh.has_value());
+    EXPECT_FALSE(jobs().finish(lease, {}));
+    EXPECT_EQ(jobs().get("", id), job);
+  }
+}
+
+TEST_P(RaceConformance, CancelAgainstClaimNeverLosesTheRequest) {
+  for (int round = 0; round < 100; ++round) {
+    const std::string id = submit().id;
+    std::atomic<int> ready = 0;
+    std::jthread worker([&] {
+      ++ready;
+      const auto lease = jobs().claim("worker", kLongLease);
+      if (lease) jobs().finish(*lease, some_mesh());
+    });
+    while (ready < 1) std::this_thread::yield();
+    const Job asked = jobs().cancel("", id);
+    const Job ended = jobs().wait("", id, kLong);
+    // Whoever was told that it ran has asked it to stop.
+    if (asked.state == JobState::kRunning) {
+      EXPECT_EQ(ended.state, JobState::kCancelled);
+    } else {
+      EXPECT_EQ(ended.state, asked.state);
+    }
+  }
+}
+
+TEST_P(RaceConformance, AllWaitersWake) {
+  const std::string id = submit().id;
+  std::atomic<int> woken = 0;
+  std::vector<std::jthread> waiters;
+  for (int waiter = 0; waiter < 8; ++waiter) {
+    waiters.emplace_back([&] {
+      if (jobs().wait("", id, kLong).state == JobState::kSucceeded) ++woken;
+    });
+  }
+  jobs().finish(claimed(), some_mesh());
+  waiters.clear();
+  EXPECT_EQ(woken, 8);
+}
+
+TEST_P(RaceConformance, TheQueueNeverGrowsBeyondItsLimit) {
+  make({.max_queued = 50});
+  std::atomic<int> accepted = 0;
+  std::vector<std::jthread> clients;
+  for (int client = 0; client < 8; ++client) {
+    clients.emplace_back([&] {
+      for (int n = 0; n < 20; ++n) {
+        if (jobs().submit({"", parameters(), "", ""}).kind == Submission::Kind::kNew) ++accepted;
+      }
+    });
+  }
+  clients.clear();
+  EXPECT_EQ(accepted, 50);
+  EXPECT_EQ(jobs().list("", {}, "", 1000).size(), 50U);
+}
+
+TEST_P(RaceConformance, TheSameKeyFromEightClientsIsOneJob) {
+  for (int round = 0; round < 20; ++round) {
+    const JobSpec spec = {"", parameters(), "key " + std::to_string(round), "digest"};
+    std::mutex mutex;
+    std::set<std::string> ids;
+    std::atomic<int> created = 0;
+    std::vector<std::jthread> clients;
+    for (int client = 0; client < 8; ++client) {
+      clients.emplace_back([&] {
+        const Submission submission = jobs().submit(spec);
+        if (submission.kind == Submission::Kind::kNew) ++created;
+        const std::lock_guard lock(mutex);
+        ids.insert(submission.job.id);
+      });
+    }
+    clients.clear();
+    EXPECT_EQ(ids.size(), 1U);
+    EXPECT_EQ(created, 1);
+  }
+}
+
+// A reader that goes on after what it saw last misses nothing that is kept.
+TEST_P(RaceConformance, ReadersOfEventsMissNoEnd) {
+  constexpr int kJobs = 60;
+  std::set<std::string> ended;
+  std::jthread reader([&] {
+    std::uint64_t since = 0;
+    while (ended.size() < kJobs) {
+      const auto events = jobs().events("", "", since, kLong);
+      if (events.empty()) return;
+      for (const Event& event : events) {
+        EXPECT_GT(event.id, since);
+        since = event.id;
+        if (event.kind == EventKind::kDone) ended.insert(event.job);
+      }
+    }
+  });
+  std::vector<std::jthread> workers;
+  for (int worker = 0; worker < 3; ++worker) {
+    workers.emplace_back([&, worker] {
+      for (int n = 0; n < kJobs / 3; ++n) {
+        JobParameters own = parameters();
+        own.iso = worker * 1000 + n;
+        submit(own);
+        const auto lease = jobs().claim("worker", kLongLease);
+        ASSERT_TRUE(lease);
+        for (const Stage stage : {Stage::kExtract, Stage::kSmooth, Stage::kEncode}) {
+          jobs().renew(*lease, {stage, 0.5, {}}, kLongLease);
+        }
+        jobs().finish(*lease, some_mesh());
+      }
+    });
+  }
+  workers.clear();
+  reader.join();
+  EXPECT_EQ(ended.size(), static_cast<std::size_t>(kJobs));
+}
+
+}  // namespace
+}  // namespace isomesh::store

@@ -1,0 +1,173 @@
+// What every engine's volumes and blobs do.
+#include <atomic>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "tests/support/errors.h"
+#include "tests/support/files.h"
+#include "tests/unit/store/engine.h"
+
+namespace isomesh::store {
+namespace {
+
+using test::code_thrown_by;
+
+Volume volume_of(const std::string& id, const std::string& created = "2024-01-01T00:00:00.000Z") {
+  Volume volume;
+  volume.id = id;
+  volume.format = "nrrd";
+  volume.dims = {3, 4, 5};
+  volume.type = SampleType::kInt16;
+  volume.geometry.spacing = {0.1, 0.2, 1.0 / 3};
+  volume.range = {-1000, 3000};
+  volume.suggested_iso = 0.1;
+  volume.bytes = 120;
+  volume.created = created;
+  return volume;
+}
+
+class VolumeConformance : public test::EngineTest {
+ protected:
+  VolumeConformance() {
+    volumes().erase("", kVolume);
+    volumes().erase("other", kVolume);
+  }
+
+  std::string order(const std::string& after = {}, std::size_t limit = 100) {
+    std::string ids;
+    for (const Volume& volume : volumes().list("", after, limit)) ids += volume.id;
+    return ids;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Engines, VolumeConformance, testing::ValuesIn(test::all_engines()),
+                         test::name_of);
+
+TEST_P(VolumeConformance, FindsWhatWasAdded) {
+  const Volume volume = volume_of("aa");
+  EXPECT_FALSE(volumes().contains("", "aa"));
+  EXPECT_EQ(code_thrown_by([&] { volumes().get("", "aa"); }), ErrorCode::kNotFound);
+  EXPECT_EQ(volumes().add("", volume), std::pair(volume, true));
+  EXPECT_TRUE(volumes().contains("", "aa"));
+  EXPECT_EQ(volumes().get("", "aa"), volume);
+  restart();
+  EXPECT_EQ(volumes().get("", "aa"), volume);
+}
+
+TEST_P(VolumeConformance, KeepsTheFirstOfTwoWithOneId) {
+  const Volume first = volume_of("aa");
+  volumes().add("", first);
+  EXPECT_EQ(volumes().add("", volume_of("aa", "2025-01-01T00:00:00.000Z")),
+            std::pair(first, false));
+  EXPECT_EQ(volumes().get("", "aa"), first);
+}
+
+TEST_P(VolumeConformance, OwnersHaveRecordsOfTheirOwn) {
+  const Volume mine = volume_of("aa");
+  const Volume theirs = volume_of("aa", "2025-01-01T00:00:00.000Z");
+  EXPECT_TRUE(volumes().add("", mine).second);
+  EXPECT_FALSE(volumes().contains("other", "aa"));
+  EXPECT_TRUE(volumes().add("other", theirs).second);
+  EXPECT_EQ(volumes().get("", "aa"), mine);
+  EXPECT_EQ(volumes().get("other", "aa"), theirs);
+  EXPECT_EQ(volumes().list("other").size(), 1U);
+  volumes().erase("", "aa");
+  EXPECT_EQ(code_thrown_by([&] { volumes().get("", "aa"); }), ErrorCode::kNotFound);
+  EXPECT_EQ(volumes().get("other", "aa"), theirs);
+  EXPECT_TRUE(volumes().names("aa"));
+  volumes().erase("other", "aa");
+  EXPECT_FALSE(volumes().names("aa"));
+}
+
+TEST_P(VolumeConformance, ListsTheOldestFirstInPages) {
+  const Volume second = volume_of("bb", "2024-02-01T00:00:00.000Z");
+  volumes().add("", volume_of("cc", "2024-01-01T00:00:00.000Z"));
+  volumes().add("", volume_of("aa", "2024-03-01T00:00:00.000Z"));
+  volumes().add("", volume_of("dd", "2024-02-01T00:00:00.000Z"));
+  volumes().add("", second);
+  EXPECT_EQ(order(), "ccbbddaa");
+  EXPECT_EQ(order("", 2), "ccbb");
+  EXPECT_EQ(order(cursor_of(second), 1), "dd");
+  EXPECT_EQ(order(cursor_of(second), 9), "ddaa");
+  EXPECT_EQ(order("no cursor", 9), "ccbbddaa");
+}
+
+TEST_P(VolumeConformance, ErasesOnce) {
+  volumes().add("", volume_of("aa"));
+  volumes().erase("", "aa");
+  EXPECT_FALSE(volumes().contains("", "aa"));
+  EXPECT_EQ(code_thrown_by([&] { volumes().erase("", "aa"); }), ErrorCode::kNotFound);
+  EXPECT_TRUE(volumes().add("", volume_of("aa")).second);
+}
+
+TEST_P(VolumeConformance, KeepsWhatAJobNeeds) {
+  volumes().add("", volume_of(kVolume));
+  const std::string id = submit().id;
+  EXPECT_EQ(code_thrown_by([&] { volumes().erase("", kVolume); }), ErrorCode::kNotReady);
+  const Lease lease = claimed();
+  EXPECT_EQ(code_thrown_by([&] { volumes().erase("", kVolume); }), ErrorCode::kNotReady);
+  EXPECT_TRUE(volumes().contains("", kVolume));
+  jobs().finish(lease, some_mesh());
+  volumes().erase("", kVolume);
+  EXPECT_EQ(jobs().get("", id).state, JobState::kSucceeded);
+}
+
+TEST_P(VolumeConformance, AMeshIsNamedByItsJob) {
+  volumes().add("", volume_of(kVolume));
+  submit();
+  const std::string key = put_blob("mesh");
+  EXPECT_FALSE(volumes().names(key));
+  jobs().finish(claimed(), mesh_of({{key, 4}}));
+  EXPECT_TRUE(volumes().names(key));
+}
+
+TEST_P(VolumeConformance, OneOfManyThreadsAddsIt) {
+  std::atomic<int> added = 0;
+  std::vector<std::jthread> threads;
+  for (int thread = 0; thread < 8; ++thread) {
+    threads.emplace_back([&] {
+      if (volumes().add("", volume_of("aa")).second) ++added;
+    });
+  }
+  threads.clear();
+  EXPECT_EQ(added, 1);
+  EXPECT_EQ(volumes().list("").size(), 1U);
+}
+
+// --- Blobs
+
+using BlobConformance = test::EngineTest;
+
+INSTANTIATE_TEST_SUITE_P(Engines, BlobConformance, testing::ValuesIn(test::all_engines()),
+                         test::name_of);
+
+TEST_P(BlobConformance, IsThereWholeAfterItsCommit) {
+  const auto writer = blobs().begin();
+  writer->write(test::as_span("some "));
+  writer->write(test::as_span("bytes"));
+  const Blob blob = writer->commit();
+  EXPECT_EQ(blob.bytes, 10U);
+  const auto reader = blobs().open(blob.key);
+  EXPECT_EQ(reader->size(), 10U);
+  std::string text(4, '?');
+  EXPECT_EQ(reader->read_at(5, std::as_writable_bytes(std::span(text))), 4U);
+  EXPECT_EQ(text, "byte");
+  EXPECT_EQ(reader->read_at(8, std::as_writable_bytes(std::span(text))), 2U);
+  EXPECT_TRUE(blobs().is_intact(blob.key, {}));
+  EXPECT_EQ(test::read_file(blobs().local(blob.key).path), "some bytes");
+}
+
+TEST_P(BlobConformance, WhatIsNotThereIsNotFound) {
+  const std::string key(64, '0');
+  EXPECT_EQ(code_thrown_by([&] { blobs().open(key); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { blobs().local(key); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { blobs().is_intact(key, {}); }), ErrorCode::kNotFound);
+  EXPECT_EQ(blobs().size(key), std::nullopt);
+  blobs().erase(key);
+}
+
+}  // namespace
+}  // namespace isomesh::store

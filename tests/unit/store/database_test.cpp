@@ -1,0 +1,97 @@
+#include "server/store/database.h"
+
+#include <optional>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include "proto/json.h"
+#include "server/store/sqlite_volume_store.h"
+#include "tests/support/errors.h"
+#include "tests/support/files.h"
+
+namespace isomesh::store {
+namespace {
+
+class DatabaseTest : public testing::Test {
+ protected:
+  void write_record(const std::string& name, const std::string& text) {
+    std::filesystem::create_directories(data_.volumes());
+    test::write_file(data_.volumes() / name, text);
+  }
+
+  static Volume some_volume() {
+    Volume volume;
+    volume.id = "aa";
+    volume.format = "nrrd";
+    volume.created = "2024-01-02T03:04:05.678Z";
+    return volume;
+  }
+
+  test::TemporaryFolder folder_;
+  DataFolder data_{folder_ / "data"};
+};
+
+TEST_F(DatabaseTest, IsForItsOwnerOnly) {
+  const Database database(data_);
+  for (const auto* suffix : {"", "-wal", "-shm"}) {
+    struct stat status = {};
+    ASSERT_EQ(::stat((data_.records().string() + suffix).c_str(), &status), 0) << suffix;
+    EXPECT_EQ(status.st_mode & 0777, 0600U) << suffix;
+  }
+}
+
+TEST_F(DatabaseTest, TakesTheRecordsOfTheVersionBeforeIt) {
+  const Volume volume = some_volume();
+  write_record("aa.json", to_json(volume));
+  write_record("bb.json.0011.part", "{\"id\": \"bb\"");
+  {
+    Database database(data_);
+    EXPECT_EQ(SqliteVolumeStore(database).list("", {}, 10), std::vector{volume});
+    EXPECT_TRUE(database.unreadable().empty());
+  }
+  EXPECT_FALSE(std::filesystem::exists(data_.volumes() / "aa.json"));
+  Database again(data_);
+  EXPECT_EQ(SqliteVolumeStore(again).get("", "aa"), volume);
+}
+
+// One record that the disk has spoilt must not cost the others, nor keep the daemon from starting.
+TEST_F(DatabaseTest, LeavesARecordThatCannotBeRead) {
+  write_record("aa.json", to_json(some_volume()));
+  for (const std::string text : {"", "{", "[]", "{}", "{\"id\": \"other\"}"}) {
+    write_record("bb.json", text);
+    Database database(data_);
+    EXPECT_EQ(database.unreadable(), std::vector<std::string>{"bb"}) << text;
+    EXPECT_EQ(test::read_file(data_.volumes() / "bb.json"), text);
+    EXPECT_EQ(SqliteVolumeStore(database).list("", {}, 10).size(), 1U);
+  }
+}
+
+TEST_F(DatabaseTest, OfANewerVersionIsRefusedAndLeftAsItIs) {
+  { const Database database(data_); }
+  { Connection(data_.records(), Connection::Mode::kWrite).script("PRAGMA user_version=99"); }
+  const auto error = test::thrown_by([&] { Database database(data_); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
+  EXPECT_THAT(error->what(), testing::HasSubstr("newer"));
+  EXPECT_THAT(error->what(), testing::HasSubstr("99"));
+}
+
+TEST_F(DatabaseTest, ThatIsNoneIsRefusedWithoutItsPath) {
+  test::write_file(data_.records(), std::string(5000, 'x'));
+  const auto error = test::thrown_by([&] { Database database(data_); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kInternal);
+  EXPECT_EQ(std::string(error->what()).find(folder_.path()), std::string::npos);
+}
+
+TEST(Timestamps, AreReadBack) {
+  EXPECT_EQ(us_of_timestamp("1970-01-01T00:00:01.250Z"), 1'250'000);
+  EXPECT_EQ(us_of_timestamp("2024-01-02T03:04:05.678Z"), 1'704'164'645'678'000);
+  EXPECT_EQ(us_of_timestamp("yesterday"), 0);
+}
+
+}  // namespace
+}  // namespace isomesh::store

@@ -1,0 +1,119 @@
+#include "tests/unit/store/engine.h"
+
+#include <optional>
+
+#include "server/store/database.h"
+#include "server/store/file_blob_store.h"
+#include "server/store/sqlite_job_store.h"
+#include "server/store/sqlite_volume_store.h"
+#include "tests/support/files.h"
+
+namespace isomesh::test {
+namespace {
+
+class SqliteEngine : public Engine {
+ public:
+  explicit SqliteEngine(const EngineOptions& options) : options_(options) { open(); }
+
+  store::JobStore& jobs() override { return *jobs_; }
+  store::VolumeStore& volumes() override { return *volumes_; }
+  store::BlobStore& blobs() override { return blobs_; }
+
+  void restart() override {
+    jobs_.reset();
+    volumes_.reset();
+    database_.reset();
+    open();
+    jobs_->reap_all();
+  }
+
+ private:
+  void open() {
+    database_.emplace(data_);
+    volumes_.emplace(*database_);
+    jobs_.emplace(*database_, blobs_,
+                  store::JobStoreOptions{.max_queued = options_.max_queued,
+                                         .retry_delay = options_.retry_delay,
+                                         .mesher_version = "test"});
+  }
+
+  const EngineOptions options_;
+  TemporaryFolder folder_;
+  store::DataFolder data_{folder_ / "data"};
+  store::FileBlobStore blobs_{data_};
+  std::optional<store::Database> database_;
+  std::optional<store::SqliteVolumeStore> volumes_;
+  std::optional<store::SqliteJobStore> jobs_;
+};
+
+}  // namespace
+
+std::vector<NamedEngine> all_engines() {
+  return {{"Sqlite", [](const EngineOptions& options) -> std::unique_ptr<Engine> {
+             return std::make_unique<SqliteEngine>(options);
+           }}};
+}
+
+void EngineTest::make(const EngineOptions& options) {
+  engine_ = GetParam().make(options);
+  add_volume("", kVolume);
+  add_volume("other", kVolume);
+}
+
+void EngineTest::add_volume(const std::string& owner, const std::string& id) {
+  Volume volume;
+  volume.id = id;
+  volume.format = "raw";
+  volume.created = "2024-01-01T00:00:00.000Z";
+  volumes().add(owner, volume);
+}
+
+JobParameters EngineTest::parameters(Priority priority) {
+  JobParameters result;
+  result.volume = kVolume;
+  result.iso = 60;
+  result.priority = priority;
+  return result;
+}
+
+JobParameters EngineTest::unlike(Priority priority) {
+  JobParameters result = parameters(priority);
+  result.iso = 1000 + ++last_iso_;
+  return result;
+}
+
+Job EngineTest::submit(const JobParameters& parameters, const std::string& owner) {
+  return job_of(jobs().submit({owner, parameters, "", ""}));
+}
+
+store::Lease EngineTest::claimed(std::chrono::milliseconds lease) {
+  return jobs().claim("worker", lease).value();
+}
+
+std::string EngineTest::put_blob(const std::string& text) {
+  const auto writer = blobs().begin();
+  writer->write(as_span(text));
+  return writer->commit().key;
+}
+
+store::Outcome EngineTest::mesh_of(const std::vector<store::Blob>& blobs) {
+  store::Outcome outcome;
+  outcome.mesh.emplace().triangles = 12;
+  for (std::size_t n = 0; n < blobs.size(); ++n) {
+    MeshFile& file = outcome.mesh->files[MeshFormat{static_cast<int>(n)}];
+    file.sha256 = blobs[n].key;
+    file.bytes = blobs[n].bytes;
+  }
+  return outcome;
+}
+
+store::Outcome EngineTest::some_mesh() { return mesh_of({{put_blob("some mesh"), 9}}); }
+
+store::Outcome EngineTest::failure(bool may_retry) {
+  store::Outcome outcome;
+  outcome.error = to_problem(Error(ErrorCode::kTooLarge, "too large"), "/v1/jobs/x");
+  outcome.may_retry = may_retry;
+  return outcome;
+}
+
+}  // namespace isomesh::test

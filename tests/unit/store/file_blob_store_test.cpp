@@ -1,0 +1,224 @@
+#include "server/store/file_blob_store.h"
+
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/errors.h"
+#include "tests/support/files.h"
+
+namespace isomesh::store {
+namespace {
+
+using test::as_span;
+using test::code_thrown_by;
+
+// Of "hello".
+constexpr const char* kHello = "2cf24dba5fb0a30e26e83b2ac5b9e29e1b161e5c1fa7425e73043362938b9824";
+
+class FileBlobStoreTest : public testing::Test {
+ protected:
+  Blob put(std::string_view text) {
+    const auto writer = blobs_.begin();
+    writer->write(as_span(text));
+    return writer->commit();
+  }
+
+  std::string get(const std::string& key) {
+    const auto blob = blobs_.open(key);
+    std::string text(blob->size(), '\0');
+    blob->read_at(0, std::as_writable_bytes(std::span(text)));
+    return text;
+  }
+
+  std::size_t blob_files() { return test::files_below(data_.blobs()).size(); }
+  std::size_t scratch_files() { return test::files_below(data_.scratch()).size(); }
+
+  test::TemporaryFolder folder_;
+  DataFolder data_{folder_ / "data"};
+  FileBlobStore blobs_{data_};
+};
+
+TEST_F(FileBlobStoreTest, ABlobIsNamedByItsBytes) {
+  const Blob blob = put("hello");
+  EXPECT_EQ(blob.key, kHello);
+  EXPECT_EQ(blob.bytes, 5U);
+  EXPECT_EQ(get(kHello), "hello");
+  EXPECT_EQ(test::read_file(blobs_.path_of(kHello)), "hello");
+}
+
+TEST_F(FileBlobStoreTest, IsThereOnlyAfterItsCommit) {
+  const auto writer = blobs_.begin();
+  writer->write(as_span("hel"));
+  writer->write(as_span("lo"));
+  EXPECT_EQ(blob_files(), 0U);
+  EXPECT_EQ(code_thrown_by([&] { blobs_.open(kHello); }), ErrorCode::kNotFound);
+  EXPECT_EQ(writer->commit().key, kHello);
+  EXPECT_EQ(get(kHello), "hello");
+}
+
+TEST_F(FileBlobStoreTest, AWriterThatIsGivenUpLeavesNothing) {
+  {
+    const auto writer = blobs_.begin();
+    writer->write(as_span("hello"));
+    EXPECT_EQ(scratch_files(), 1U);
+  }
+  EXPECT_EQ(scratch_files(), 0U);
+  EXPECT_EQ(blob_files(), 0U);
+}
+
+TEST_F(FileBlobStoreTest, AWriterThatCommitsLeavesTheBlobOnly) {
+  put("hello");
+  EXPECT_EQ(scratch_files(), 0U);
+  EXPECT_EQ(blob_files(), 1U);
+}
+
+TEST_F(FileBlobStoreTest, TheSameBytesAreOneBlob) {
+  EXPECT_EQ(put("hello").key, put("hello").key);
+  EXPECT_EQ(blob_files(), 1U);
+  EXPECT_NE(put("hallo").key, kHello);
+  EXPECT_EQ(blob_files(), 2U);
+}
+
+TEST_F(FileBlobStoreTest, AnEmptyBlobIsABlob) {
+  const Blob blob = put("");
+  EXPECT_EQ(blob.bytes, 0U);
+  EXPECT_EQ(get(blob.key), "");
+}
+
+TEST_F(FileBlobStoreTest, WritersDoNotMeet) {
+  std::vector<std::jthread> threads;
+  for (int thread = 0; thread < 4; ++thread) {
+    threads.emplace_back([this, thread] {
+      for (int n = 0; n < 20; ++n) put("common");
+      for (int n = 0; n < 20; ++n) put(std::to_string(thread * 100 + n));
+    });
+  }
+  threads.clear();
+  EXPECT_EQ(blob_files(), 1U + 4 * 20);
+  EXPECT_EQ(scratch_files(), 0U);
+}
+
+TEST_F(FileBlobStoreTest, AdoptsAFinishedFileByMovingIt) {
+  const std::string text(3 << 20, 'x');
+  test::write_file(data_.scratch() / "made", text);
+  const Blob blob = digest_of(data_.scratch() / "made");
+  blobs_.adopt(data_.scratch() / "made", blob);
+  EXPECT_EQ(blob.bytes, text.size());
+  EXPECT_EQ(blob.key, put(text).key);
+  EXPECT_FALSE(std::filesystem::exists(data_.scratch() / "made"));
+  EXPECT_TRUE(get(blob.key) == text);
+}
+
+TEST_F(FileBlobStoreTest, AdoptingWhatIsNotThereIsRefused) {
+  EXPECT_EQ(code_thrown_by([&] { digest_of(data_.scratch() / "absent"); }), ErrorCode::kNotFound);
+}
+
+TEST_F(FileBlobStoreTest, ErasesABlobAndNothingElse) {
+  put("hello");
+  const std::string other = put("other").key;
+  blobs_.erase(kHello);
+  EXPECT_EQ(code_thrown_by([&] { blobs_.open(kHello); }), ErrorCode::kNotFound);
+  EXPECT_EQ(get(other), "other");
+  blobs_.erase(kHello);
+  EXPECT_EQ(blob_files(), 1U);
+}
+
+TEST_F(FileBlobStoreTest, AnOpenBlobOutlivesItsErasing) {
+  put("hello");
+  const auto blob = blobs_.open(kHello);
+  blobs_.erase(kHello);
+  std::string text(5, '\0');
+  EXPECT_EQ(blob->read_at(0, std::as_writable_bytes(std::span(text))), 5U);
+  EXPECT_EQ(text, "hello");
+}
+
+TEST_F(FileBlobStoreTest, TellsSizesAndPlaces) {
+  put("hello");
+  EXPECT_EQ(blobs_.size(kHello), 5U);
+  EXPECT_EQ(test::read_file(blobs_.local(kHello).path), "hello");
+  blobs_.erase(kHello);
+  EXPECT_EQ(blobs_.size(kHello), std::nullopt);
+  EXPECT_EQ(code_thrown_by([&] { blobs_.local(kHello); }), ErrorCode::kNotFound);
+}
+
+TEST_F(FileBlobStoreTest, KnowsBytesThatAreNotTheKeys) {
+  put("hello");
+  EXPECT_TRUE(blobs_.is_intact(kHello, {}));
+  EXPECT_TRUE(blobs_.is_intact(kHello, {}));
+  test::write_file(blobs_.path_of(kHello), "hallo");
+  EXPECT_FALSE(blobs_.is_intact(kHello, {}));
+  EXPECT_FALSE(blobs_.is_intact(kHello, {}));
+  put("hello");
+  EXPECT_TRUE(blobs_.is_intact(kHello, {}));
+  blobs_.erase(kHello);
+  EXPECT_EQ(code_thrown_by([&] { blobs_.is_intact(kHello, {}); }), ErrorCode::kNotFound);
+}
+
+// A touched file is read again even when size and time of writing are as before.
+TEST_F(FileBlobStoreTest, IsNotDeceivedByAnOldTime) {
+  put("hello");
+  EXPECT_TRUE(blobs_.is_intact(kHello, {}));
+  const auto written = std::filesystem::last_write_time(blobs_.path_of(kHello));
+  test::write_file(blobs_.path_of(kHello), "hallo");
+  std::filesystem::last_write_time(blobs_.path_of(kHello), written);
+  EXPECT_FALSE(blobs_.is_intact(kHello, {}));
+}
+
+TEST_F(FileBlobStoreTest, ACheckEndsWhenItIsStopped) {
+  put("hello");
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_EQ(code_thrown_by([&] { blobs_.is_intact(kHello, stop.get_token()); }),
+            ErrorCode::kCancelled);
+}
+
+class Sweeping : public FileBlobStoreTest {
+ protected:
+  static std::chrono::system_clock::time_point in(std::chrono::hours hours) {
+    return std::chrono::system_clock::now() + hours;
+  }
+};
+
+TEST_F(Sweeping, ErasesWhatIsNotKept) {
+  const std::string other = put("other").key;
+  put("hello");
+  put("more");
+  std::set<std::string> asked;
+  const std::size_t erased = blobs_.sweep(in(std::chrono::hours(1)), [&](const std::string& key) {
+    asked.insert(key);
+    return key == kHello;
+  });
+  EXPECT_EQ(erased, 2U);
+  EXPECT_EQ(asked.size(), 3U);
+  EXPECT_EQ(blob_files(), 1U);
+  EXPECT_EQ(get(kHello), "hello");
+}
+
+TEST_F(Sweeping, LeavesWhatIsYoung) {
+  const auto nothing = [](const std::string&) { return false; };
+  put("hello");
+  EXPECT_EQ(blobs_.sweep(in(std::chrono::hours(-1)), nothing), 0U);
+  EXPECT_EQ(blob_files(), 1U);
+}
+
+// The bytes have lain there for long, but somebody has just stored them again to name them.
+TEST_F(Sweeping, AnOldBlobThatIsStoredAgainIsYoung) {
+  const auto nothing = [](const std::string&) { return false; };
+  put("hello");
+  const auto long_ago = std::filesystem::file_time_type::clock::now() - std::chrono::hours(48);
+  std::filesystem::last_write_time(blobs_.path_of(kHello), long_ago);
+  test::write_file(data_.scratch() / "made", "hello");
+  std::filesystem::last_write_time(data_.scratch() / "made", long_ago);
+  blobs_.adopt(data_.scratch() / "made", {kHello, 5});
+  EXPECT_EQ(blobs_.sweep(in(std::chrono::hours(-1)), nothing), 0U);
+  std::filesystem::last_write_time(blobs_.path_of(kHello), long_ago);
+  EXPECT_EQ(blobs_.sweep(in(std::chrono::hours(-1)), nothing), 1U);
+}
+
+}  // namespace
+}  // namespace isomesh::store
