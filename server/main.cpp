@@ -33,6 +33,7 @@
 #include "server/store/sqlite_job_store.h"
 #include "server/store/sqlite_volume_store.h"
 #include "server/token_command.h"
+#include "server/volume/import_worker.h"
 
 namespace {
 
@@ -55,6 +56,8 @@ struct Options {
   unsigned longest_job_minutes = 60;
   http::ServerOptions http;
   volume::ImportLimits import;
+  volume::RunnerOptions runner;
+  std::int64_t import_seconds = runner.bounds.time.count();
   std::uint64_t job_memory = 0;  // 0: see default_job_memory
 };
 
@@ -153,6 +156,21 @@ void add_options(CLI::App& cli, Options& options) {
       ->envname("ISOMESH_MAX_VOLUME")
       ->transform(CLI::AsSizeValue(false))
       ->capture_default_str();
+  cli.add_option("--imports", options.runner.at_once,
+                 "Uploads that are read at the same time; others wait")
+      ->envname("ISOMESH_IMPORTS")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  cli.add_option("--import-memory", options.runner.bounds.memory_bytes,
+                 "Bytes of memory that reading one upload may take, beside the volume itself")
+      ->envname("ISOMESH_IMPORT_MEMORY")
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::Range(std::uint64_t{64} << 20, std::uint64_t{1} << 50))
+      ->capture_default_str();
+  cli.add_option("--import-seconds", options.import_seconds, "How long reading one upload may take")
+      ->envname("ISOMESH_IMPORT_SECONDS")
+      ->check(CLI::Range(1, 86400))
+      ->capture_default_str();
   cli.add_option("--job-memory", options.job_memory,
                  "Bytes of memory one job may take; 0: its share of three quarters of the machine")
       ->envname("ISOMESH_JOB_MEMORY")
@@ -243,7 +261,9 @@ int run(const Options& options, const sigset_t& signals) {
       std::chrono::duration<double, std::chrono::days::period>(options.keep_days));
   store::Retention retention(folder, database, blobs,
                              {.keep = keep, .max_bytes = options.max_disk});
-  jobs::VolumeLibrary library(folder, blobs, volumes, retention, options.import);
+  volume::RunnerOptions runner = options.runner;
+  runner.bounds.time = std::chrono::seconds(options.import_seconds);
+  jobs::VolumeLibrary library(folder, blobs, volumes, retention, options.import, runner);
   const jobs::PipelineLimits limits = {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
   const jobs::WorkerOptions worker_options = {
@@ -275,6 +295,7 @@ int run(const Options& options, const sigset_t& signals) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  volume::become_import_worker_if_asked(argc, argv);
   try {
     const sigset_t signals = block_signals();
     jobs::keep_freed_memory();

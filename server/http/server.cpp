@@ -249,6 +249,7 @@ void Server::begin_drain() {
 void Server::stop() {
   state_->app.stopping = true;
   state_->app.services.estimator.stop();
+  state_->app.services.library.stop_imports();
   state_->app.services.jobs.close();
   state_->app.http.stop();
 }

@@ -73,7 +73,7 @@ class Server {
   // safe.
   void begin_drain();
 
-  // Ends serve(): no connection is accepted any more, nobody waits for a job, uploads are cut off.
+  // Ends serve(): no connection is accepted any more, nobody waits for a job, uploads and imports are cut off.
   // Thread safe.
   void stop();
 

@@ -9,9 +9,11 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
                                            const volume::ImportOptions& options) {
   const store::ScratchFolder scratch(folder_.scratch());
   const std::filesystem::path canonical = scratch.path() / "canonical";
-  Volume volume =
-      options.raw ? volume::import_raw(upload, *options.raw, limits_, canonical)
-                  : volume::import_file(upload, options.series, scratch.path(), limits_, canonical);
+  Volume volume = runner_.run({.source = upload,
+                               .scratch = scratch.path(),
+                               .target = canonical,
+                               .options = options,
+                               .limits = limits_});
   const store::Blob blob = store::digest_of(canonical);
   const std::lock_guard lock(mutex_);
   if (!volumes_.names(blob.key)) retention_.make_room(blob.bytes);

@@ -11,6 +11,7 @@
 #include "server/store/retention.h"
 #include "server/store/volume_store.h"
 #include "server/volume/import.h"
+#include "server/volume/import_runner.h"
 
 namespace isomesh::jobs {
 
@@ -20,13 +21,21 @@ class VolumeLibrary {
  public:
   VolumeLibrary(const store::DataFolder& folder, const store::BlobStore& blobs,
                 store::VolumeStore& volumes, store::Retention& retention,
-                const volume::ImportLimits& limits)
-      : folder_(folder), blobs_(blobs), volumes_(volumes), retention_(retention), limits_(limits) {}
+                const volume::ImportLimits& limits, const volume::RunnerOptions& runner = {})
+      : folder_(folder),
+        blobs_(blobs),
+        volumes_(volumes),
+        retention_(retention),
+        limits_(limits),
+        runner_(runner) {}
 
-  // Imports an uploaded file. Second: false when the owner had the same samples and geometry
-  // already. Throws what the imports of volume/import.h throw, and kOutOfSpace.
+  // Imports an uploaded file, in a process of its own. Second: false when the owner had the same
+  // samples and geometry already. Throws what ImportRunner::run throws, and kOutOfSpace.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
                               const volume::ImportOptions& options = {});
+
+  // Ends the imports that run or wait, and refuses further ones.
+  void stop_imports() { runner_.stop(); }
 
   // The samples go with the last owner's record. Throws Error kNotFound, kGone, and kNotReady while
   // a job needs the volume.
@@ -38,6 +47,7 @@ class VolumeLibrary {
   store::VolumeStore& volumes_;
   store::Retention& retention_;
   const volume::ImportLimits limits_;
+  volume::ImportRunner runner_;
   std::mutex mutex_;  // held while a blob and its record come or go together
 };
 

@@ -31,6 +31,15 @@ void throw_system_error(std::string_view call, int error_number) {
                                         std::generic_category().message(error_number) + ".");
 }
 
+void write_all(const Descriptor& file, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(file.number(), bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) throw_system_error("write", errno);
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+}
+
 InputFile::InputFile(const std::filesystem::path& path)
     : file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
   if (file_.number() < 0) throw_system_error("open", errno);
@@ -71,13 +80,6 @@ ScratchFile::~ScratchFile() {
   std::filesystem::remove(path_, ignored);
 }
 
-void ScratchFile::write(std::span<const std::byte> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t count = ::write(file_.number(), bytes.data(), bytes.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) throw_system_error("write", errno);
-    bytes = bytes.subspan(static_cast<std::size_t>(count));
-  }
-}
+void ScratchFile::write(std::span<const std::byte> bytes) { write_all(file_, bytes); }
 
 }  // namespace isomesh::volume

@@ -49,6 +49,9 @@ class InputFile {
   std::uint64_t size_ = 0;
 };
 
+// Writes all of `bytes`. Throws Error kOutOfSpace or kInternal.
+void write_all(const Descriptor& file, std::span<const std::byte> bytes);
+
 // A temporary file with a name of its own, removed at the end of its life. Not thread safe.
 class ScratchFile {
  public:

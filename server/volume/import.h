@@ -1,11 +1,14 @@
-// Uploaded bytes -> canonical volume.
+// Uploaded bytes -> canonical volume. What happens here reads untrusted files: the daemon has it
+// done by a process of its own (import_runner.h).
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "proto/types.h"
 
@@ -29,20 +32,24 @@ struct ImportOptions {
   std::string series;                 // UID of the DICOM series to take; empty: the only one
 };
 
+struct ImportTask {
+  std::filesystem::path source;   // what was uploaded
+  std::filesystem::path scratch;  // a folder for temporary files
+  std::filesystem::path target;   // the canonical file to be made, within `scratch`
+  ImportOptions options = {};
+  ImportLimits limits = {};
+};
+
+// Told what is about to be read, as soon as that is known: "nifti", "archive", ...
+using FormatListener = std::function<void(std::string_view format)>;
+
 // What an import tells about the volume beside its canonical file; id and created stay empty.
 // Throws, for the file's sake: Error kUnsupportedMedia when it is no format that we read, kTooLarge
 // when its samples exceed the limits, kUnusableVolume with the reason when it is truncated, corrupt
-// or not a volume of finite scalars on a regular three-dimensional lattice; for the machine's sake:
-// kOutOfSpace, kInternal. Thread safe. `scratch` is a folder for temporary files, `target` the
-// canonical file to be made; both are the caller's to remove when this throws. A `series` where
-// there is no DICOM is kInvalidParameter.
-Volume import_file(const std::filesystem::path& source, const std::string& series,
-                   const std::filesystem::path& scratch, const ImportLimits& limits,
-                   const std::filesystem::path& target);
-
-// The same for raw samples. Throws Error kInvalidParameter when the body's size is not what the
-// description tells.
-Volume import_raw(const std::filesystem::path& source, const RawDescription& description,
-                  const ImportLimits& limits, const std::filesystem::path& target);
+// or not a volume of finite scalars on a regular three-dimensional lattice, kInvalidParameter when
+// it is not what the options say; for the machine's sake: kOutOfSpace, kInternal. Thread safe.
+// Nothing but the target stays in the scratch folder; that is the caller's to remove when this
+// throws.
+Volume import_volume(const ImportTask& task, const FormatListener& listener = {});
 
 }  // namespace isomesh::volume

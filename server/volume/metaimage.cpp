@@ -86,9 +86,29 @@ bool flag(const Fields& fields, std::string_view name, bool otherwise) {
   throw_unusable("The MetaImage header's " + in_quotes(name) + " is neither True nor False.");
 }
 
-void refuse_other_files(const Fields& fields) {
-  if (lower(optional(fields, kLastKey)) == "local") return;
-  throw_unusable("Its samples are in another file; send the volume as one .mha.");
+bool is_detached(const Fields& fields) { return lower(optional(fields, kLastKey)) != "local"; }
+
+// The files that hold the samples: one, or those in the lines behind the header.
+std::vector<std::string> data_names(const InputFile& file, const Header& header) {
+  const std::string_view said = optional(header.fields, kLastKey);
+  if (said.find('%') != std::string_view::npos) {
+    throw_unusable("Its samples are in other files, named by a pattern; LIST them instead.");
+  }
+  if (!said.starts_with("LIST")) return {std::string(said)};
+  const std::string text = file.text(header.bytes, kMostHeaderBytes);
+  const auto names = lines(text);
+  return {names.begin(), names.end()};
+}
+
+Skip data_skip(const Fields& fields) {
+  const std::string_view text = optional(fields, "HeaderSize");
+  if (text.empty()) return 0;
+  const auto bytes = parse_int64(text);
+  if (!bytes || *bytes < -1) {
+    throw_unusable("The MetaImage header's HeaderSize is " + in_quotes(text) + ".");
+  }
+  if (*bytes < 0) return std::nullopt;
+  return static_cast<std::uint64_t>(*bytes);
 }
 
 std::vector<std::uint64_t> sizes_of(const Fields& fields) {
@@ -232,10 +252,10 @@ bool is_metaimage(std::string_view head) {
   return end != std::string_view::npos && is_header_line(head.substr(0, end));
 }
 
-SourceVolume parse_metaimage(const InputFile& file, const std::filesystem::path& scratch) {
+SourceVolume parse_metaimage(const InputFile& file, const Companions& companions,
+                             const std::filesystem::path& scratch) {
   const Header header = read_header(file);
   const Fields& fields = header.fields;
-  refuse_other_files(fields);
   const std::string_view object = optional(fields, "ObjectType");
   if (!object.empty() && object != "Image") {
     throw_unusable("The file holds a MetaIO " + in_quotes(object) + ", not an image.");
@@ -248,7 +268,12 @@ SourceVolume parse_metaimage(const InputFile& file, const std::filesystem::path&
   volume.encoding = encoding_of(fields);
   volume.layout.type = type_of(fields);
   volume.layout.big_endian = is_big_endian(fields);
-  volume.payload = payload_of(file, header, volume);
+  if (is_detached(fields)) {
+    volume.data_files =
+        data_files_of(data_names(file, header), companions, volume, data_skip(fields));
+  } else {
+    volume.payload = payload_of(file, header, volume);
+  }
   volume.geometry =
       read_itk_geometry(FileFormat::kMetaImage, itk_header(fields, sizes.size()), scratch);
   scale_to_millimetres(volume.geometry, optional(fields, "DistanceUnits"));

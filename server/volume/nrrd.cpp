@@ -15,6 +15,7 @@ namespace isomesh::volume {
 namespace {
 
 constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 20;
+constexpr std::string_view kDataFile = "datafile";
 
 // Names in lower case without spaces, because "data file" and "datafile" are the same field.
 using Fields = std::map<std::string, std::string, std::less<>>;
@@ -48,13 +49,24 @@ void add_field(Fields& fields, std::string_view line) {
   }
 }
 
+// The rest of such a header is names of files.
+bool names_list(const Fields& fields) {
+  const auto found = fields.find(kDataFile);
+  return found != fields.end() && found->second.starts_with("LIST");
+}
+
 Header read_header(const InputFile& file) {
   const std::string text = file.text(0, kMostHeaderBytes);
   Header header;
   std::size_t next = 0;
   for (bool first = true;; first = false) {
     const std::size_t end = text.find('\n', next);
-    if (end == std::string::npos) break;
+    // Only a header in a file of its own may end with it.
+    if (end == std::string::npos || names_list(header.fields)) {
+      header.bytes = next;
+      if (header.fields.contains(kDataFile)) return header;
+      break;
+    }
     std::string_view line = std::string_view(text).substr(next, end - next);
     if (line.ends_with('\r')) line.remove_suffix(1);
     next = end + 1;
@@ -218,13 +230,6 @@ std::optional<Space> space_of(const Fields& fields) {
                  " is unknown or has more than three dimensions.");
 }
 
-void refuse_other_files(const Fields& fields) {
-  if (!fields.contains("datafile")) return;
-  throw_unusable(
-      "Its samples are in another file; send the volume as one .nrrd with its header "
-      "attached.");
-}
-
 std::uint64_t skip_lines(const InputFile& file, std::uint64_t offset, std::uint64_t lines) {
   constexpr std::size_t kPieceBytes = std::size_t{1} << 16;
   while (lines > 0) {
@@ -265,6 +270,33 @@ std::uint64_t payload_offset(const InputFile& file, const Header& header,
                                static_cast<std::uint64_t>(bytes);
   if (offset > file.size()) throw_unusable("The file ends before its samples begin.");
   return offset;
+}
+
+// The files that hold the samples: one, or those in the lines behind the header.
+std::vector<std::string> data_names(const InputFile& file, const Header& header) {
+  const std::string_view said = optional(header.fields, kDataFile);
+  if (!names_list(header.fields)) {
+    if (said.find('%') != std::string_view::npos) {
+      throw_unusable("Its samples are in other files, named by a pattern; LIST them instead.");
+    }
+    return {std::string(said)};
+  }
+  const std::string text = file.text(header.bytes, kMostHeaderBytes);
+  const auto names = lines(text);
+  return {names.begin(), names.end()};
+}
+
+std::vector<DataFile> data_files(const InputFile& file, const Header& header,
+                                 const Companions& companions, const SourceVolume& volume) {
+  const std::int64_t bytes = skip_field(header.fields, "byteskip");
+  if (skip_field(header.fields, "lineskip") != 0) {
+    throw_unusable("Skipping lines of a data file is not supported.");
+  }
+  if (bytes != 0 && volume.encoding == Encoding::kDeflate) {
+    throw_unusable("Skipping bytes within gzip data is not supported.");
+  }
+  const Skip skip = bytes < 0 ? Skip() : Skip(static_cast<std::uint64_t>(bytes));
+  return data_files_of(data_names(file, header), companions, volume, skip);
 }
 
 // For ITK every named space is LPS, in which it leaves all numbers as they are.
@@ -321,10 +353,10 @@ bool is_nrrd(std::string_view head) {
          (head[8] == '\n' || head[8] == '\r');
 }
 
-SourceVolume parse_nrrd(const InputFile& file, const std::filesystem::path& scratch) {
+SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
+                        const std::filesystem::path& scratch) {
   const Header header = read_header(file);
   const Fields& fields = header.fields;
-  refuse_other_files(fields);
   const std::vector<std::uint64_t> sizes = sizes_of(fields);
   const std::vector<std::uint64_t> lattice = lattice_sizes(fields, sizes);
   SourceVolume volume;
@@ -334,8 +366,12 @@ SourceVolume parse_nrrd(const InputFile& file, const std::filesystem::path& scra
   volume.encoding = encoding_of(fields);
   volume.layout.type = type_of(fields);
   volume.layout.big_endian = is_big_endian(fields, volume.layout.type, volume.encoding);
-  volume.payload.offset = payload_offset(file, header, volume);
-  volume.payload.bytes = file.size() - volume.payload.offset;
+  if (fields.contains(kDataFile)) {
+    volume.data_files = data_files(file, header, companions, volume);
+  } else {
+    volume.payload.offset = payload_offset(file, header, volume);
+    volume.payload.bytes = file.size() - volume.payload.offset;
+  }
   volume.geometry = read_itk_geometry(FileFormat::kNrrd, itk_header(fields, sizes.size()), scratch);
   if (const auto space = space_of(fields)) turn_into_lps(volume.geometry, *space);
   scale_to_millimetres(volume.geometry, unit_of(fields));

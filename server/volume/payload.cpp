@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/volume/text.h"
+#include "server/volume/vtk_data.h"
 
 namespace isomesh::volume {
 namespace {
@@ -19,25 +20,43 @@ constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
                  " bytes of samples, and " + std::to_string(found) + " are there.");
 }
 
+// Samples that lie in one place, all of them or a share.
+struct Part {
+  const InputFile& file;
+  CompressedRange range;
+  std::uint64_t bytes = 0;  // once decoded
+  StoredType type = StoredType::kUint8;
+};
+
 [[noreturn]] void throw_long(std::uint64_t expected) {
   throw_unusable("The file holds more samples than its header tells, which are " +
                  std::to_string(expected) + " bytes.");
 }
 
-void inflate_payload(const InputFile& file, const SourceVolume& volume, ScratchFile& scratch) {
-  const std::uint64_t expected = volume.stored_bytes();
+void inflate_part(const Part& part, ScratchFile& scratch) {
   const std::uint64_t found =
-      inflate_range(file, volume.payload, expected,
+      inflate_range(part.file, part.range, part.bytes,
                     [&](std::span<const std::byte> piece) { scratch.write(piece); });
-  if (found > expected) throw_long(expected);
-  if (found < expected) throw_short(expected, found);
+  if (found > part.bytes) throw_long(part.bytes);
+  if (found < part.bytes) throw_short(part.bytes, found);
+}
+
+void copy_part(const Part& part, ScratchFile& scratch) {
+  std::vector<std::byte> piece(kPieceBytes);
+  for (std::uint64_t done = 0; done < part.bytes;) {
+    const std::size_t wanted = std::min<std::uint64_t>(piece.size(), part.bytes - done);
+    const std::size_t count =
+        part.file.read(part.range.offset + done, std::span(piece).first(wanted));
+    if (count == 0) throw_short(part.bytes, done);
+    scratch.write(std::span(piece).first(count));
+    done += count;
+  }
 }
 
 // Gathers decoded bytes into pieces worth a system call.
 class Decoded {
  public:
-  Decoded(const SourceVolume& volume, ScratchFile& scratch)
-      : scratch_(scratch), expected_(volume.stored_bytes()) {}
+  Decoded(std::uint64_t expected, ScratchFile& scratch) : scratch_(scratch), expected_(expected) {}
 
   void add(std::span<const std::byte> bytes) {
     if (bytes.size() > expected_ - count_) throw_long(expected_);
@@ -91,19 +110,21 @@ void decode_word(std::string_view word, StoredType type, Decoded& decoded) {
   });
 }
 
-void decode_text(const InputFile& file, const SourceVolume& volume, ScratchFile& scratch) {
+void decode_text(const Part& part, ScratchFile& scratch) {
   constexpr std::size_t kLongestWord = 512;
-  Decoded decoded(volume, scratch);
+  const InputFile& file = part.file;
+  Decoded decoded(part.bytes, scratch);
   std::string rest;
-  for (std::uint64_t next = volume.payload.offset; next < file.size();) {
-    std::string piece = rest + file.text(next, kPieceBytes);
+  const std::uint64_t last = part.range.offset + part.range.bytes;
+  for (std::uint64_t next = part.range.offset; next < last;) {
+    std::string piece = rest + file.text(next, std::min<std::uint64_t>(kPieceBytes, last - next));
     next += piece.size() - rest.size();
-    const std::size_t end = next < file.size() ? piece.find_last_of(" \t\r\n") : piece.size();
+    const std::size_t end = next < last ? piece.find_last_of(" \t\r\n") : piece.size();
     if (end == std::string::npos || piece.size() - end > kLongestWord) {
       throw_unusable("The samples are not numbers between white space.");
     }
     for (const std::string_view word : words(std::string_view(piece).substr(0, end))) {
-      if (word != ",") decode_word(word, volume.layout.type, decoded);
+      if (word != ",") decode_word(word, part.type, decoded);
     }
     rest = piece.substr(end);
   }
@@ -117,12 +138,12 @@ std::optional<unsigned> hex_digit(char letter) {
   return std::nullopt;
 }
 
-void decode_hex(const InputFile& file, const SourceVolume& volume, ScratchFile& scratch) {
-  Decoded decoded(volume, scratch);
+void decode_hex(const Part& part, ScratchFile& scratch) {
+  Decoded decoded(part.bytes, scratch);
   unsigned value = 0;
   bool is_low_digit = false;
-  for (std::uint64_t next = volume.payload.offset; next < file.size();) {
-    const std::string piece = file.text(next, kPieceBytes);
+  for (std::uint64_t next = part.range.offset; next < part.file.size();) {
+    const std::string piece = part.file.text(next, kPieceBytes);
     next += piece.size();
     for (const char letter : piece) {
       if (trim({&letter, 1}).empty()) continue;
@@ -137,32 +158,59 @@ void decode_hex(const InputFile& file, const SourceVolume& volume, ScratchFile& 
   decoded.finish();
 }
 
+void decode_part(const SourceVolume& volume, const Part& part, const std::filesystem::path& folder,
+                 ScratchFile& scratch) {
+  switch (volume.encoding) {
+    case Encoding::kRaw:
+      return copy_part(part, scratch);
+    case Encoding::kDeflate:
+      return inflate_part(part, scratch);
+    case Encoding::kText:
+      return decode_text(part, scratch);
+    case Encoding::kHex:
+      return decode_hex(part, scratch);
+    case Encoding::kVtk:
+      return decode_vtk(part.file, part.range, part.bytes, volume.vtk, folder, scratch);
+  }
+}
+
+// Some programs leave a block's rest behind the samples; a slice more than the header tells is
+// another volume than it describes.
+void check_size(const InputFile& file, const SourceVolume& volume) {
+  constexpr std::uint64_t kBlockBytes = 4096;
+  const std::uint64_t expected = volume.stored_bytes();
+  const std::uint64_t found = file.size() - std::min(volume.payload.offset, file.size());
+  if (found < expected) throw_short(expected, found);
+  const std::uint64_t slice = expected / volume.dims[2];
+  if (found - expected > kBlockBytes && found - expected >= slice) throw_long(expected);
+}
+
 }  // namespace
 
 Payload::Payload(const InputFile& file, const SourceVolume& volume,
                  const std::filesystem::path& scratch)
     : file_(file), layout_(volume.layout) {
-  if (volume.encoding == Encoding::kRaw) {
-    const std::uint64_t expected = volume.stored_bytes();
+  const bool is_raw = volume.encoding == Encoding::kRaw;
+  if (is_raw && volume.data_files.empty()) {
+    check_size(file, volume);
     offset_ = volume.payload.offset;
-    const std::uint64_t found = file.size() - std::min(offset_, file.size());
-    if (found < expected) throw_short(expected, found);
+    return;
+  }
+  if (is_raw && volume.data_files.size() == 1) {
+    decoded_.emplace(volume.data_files[0].path);
+    offset_ = volume.data_files[0].range.offset;
     return;
   }
   scratch_.emplace(scratch, ".samples");
-  switch (volume.encoding) {
-    case Encoding::kRaw:
-      break;
-    case Encoding::kDeflate:
-      inflate_payload(file, volume, *scratch_);
-      break;
-    case Encoding::kText:
-      layout_.big_endian = false;
-      decode_text(file, volume, *scratch_);
-      break;
-    case Encoding::kHex:
-      decode_hex(file, volume, *scratch_);
-      break;
+  if (volume.encoding == Encoding::kText) layout_.big_endian = false;
+  if (volume.data_files.empty()) {
+    decode_part(volume, {file, volume.payload, volume.stored_bytes(), volume.layout.type}, scratch,
+                *scratch_);
+  }
+  for (const DataFile& data : volume.data_files) {
+    const InputFile part(data.path);
+    const std::uint64_t share = volume.stored_bytes() / volume.data_files.size();
+    decode_part(volume, {part, data.range, share, volume.layout.type}, scratch, *scratch_);
   }
   decoded_.emplace(scratch_->path());
 }

@@ -10,8 +10,8 @@
 
 namespace isomesh::volume {
 
-// The plain bytes of a volume's samples: in the file that they came in, or decoded into a scratch
-// file that lives as long as this. Bytes decoded from text are little-endian.
+// The plain bytes of a volume's samples: in the file that they came in, or decoded or put together
+// in a scratch file that lives as long as this. Bytes decoded from text are little-endian.
 class Payload {
  public:
   // Throws Error kUnusableVolume when the file holds fewer samples than its header tells, or, where

@@ -1,8 +1,9 @@
+#include "server/volume/raw.h"
+
 #include <string>
 
 #include "proto/error.h"
 #include "server/volume/geometry.h"
-#include "server/volume/import.h"
 #include "server/volume/source.h"
 #include "server/volume/transfer.h"
 
@@ -33,17 +34,22 @@ void check_size(const InputFile& file, const RawDescription& description, std::u
 
 }  // namespace
 
-Volume import_raw(const std::filesystem::path& source, const RawDescription& description,
-                  const ImportLimits& limits, const std::filesystem::path& target) {
+void check_raw(const RawDescription& description, const ImportLimits& limits) {
   check_dims(description);
   if (const auto fault = find_fault(description.dims, description.geometry)) {
     throw invalid_parameter(fault->field, fault->message);
   }
+  const auto& dims = description.dims;
+  check_limits(std::uint64_t{dims[0]} * dims[1] * dims[2], description.type, limits);
+}
+
+Volume import_raw(const std::filesystem::path& source, const RawDescription& description,
+                  const ImportLimits& limits, const std::filesystem::path& target) {
+  check_raw(description, limits);
   Volume volume;
   volume.format = "raw";
   volume.dims = description.dims;
   volume.geometry = normalised(description.geometry);
-  check_limits(volume.sample_count(), description.type, limits);
   const InputFile file(source);
   check_size(file, description, volume.sample_count());
   return write_canonical(

@@ -4,10 +4,13 @@
 #include <cstring>
 #include <string>
 
+#include "server/volume/archive.h"
+#include "server/volume/dicom.h"
 #include "server/volume/gzip.h"
 #include "server/volume/metaimage.h"
 #include "server/volume/nifti.h"
 #include "server/volume/nrrd.h"
+#include "server/volume/vti.h"
 
 namespace isomesh::volume {
 namespace {
@@ -16,6 +19,9 @@ std::optional<FileFormat> sniff_plain(std::string_view head) {
   if (is_nifti(head)) return FileFormat::kNifti;
   if (is_nrrd(head)) return FileFormat::kNrrd;
   if (is_metaimage(head)) return FileFormat::kMetaImage;
+  if (is_vti(head)) return FileFormat::kVti;
+  if (is_dicom(std::as_bytes(std::span(head)))) return FileFormat::kDicom;
+  if (is_zip(head) || is_tar(head)) return FileFormat::kArchive;
   return std::nullopt;
 }
 
@@ -29,6 +35,12 @@ std::string_view to_string(FileFormat format) {
       return "nrrd";
     case FileFormat::kMetaImage:
       return "metaimage";
+    case FileFormat::kVti:
+      return "vti";
+    case FileFormat::kDicom:
+      return "dicom";
+    case FileFormat::kArchive:
+      return "archive";
   }
   return "";
 }

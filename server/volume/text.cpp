@@ -51,6 +51,17 @@ std::vector<std::string_view> words(std::string_view text) {
   return result;
 }
 
+std::vector<std::string_view> lines(std::string_view text) {
+  std::vector<std::string_view> result;
+  for (std::size_t next = 0; next < text.size();) {
+    const std::size_t end = std::min(text.find('\n', next), text.size());
+    const std::string_view line = trim(text.substr(next, end - next));
+    if (!line.empty()) result.push_back(line);
+    next = end + 1;
+  }
+  return result;
+}
+
 std::optional<double> parse_double(std::string_view text) { return parse<double>(text); }
 std::optional<std::int64_t> parse_int64(std::string_view text) { return parse<std::int64_t>(text); }
 std::optional<std::uint64_t> parse_uint64(std::string_view text) {

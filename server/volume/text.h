@@ -17,6 +17,9 @@ bool has_control_characters(std::string_view text);  // other than tabs
 // The words between white space.
 std::vector<std::string_view> words(std::string_view text);
 
+// The lines that hold more than white space, without what surrounds it.
+std::vector<std::string_view> lines(std::string_view text);
+
 // The whole of `text` as a number; empty when it is anything else.
 std::optional<double> parse_double(std::string_view text);
 std::optional<std::int64_t> parse_int64(std::string_view text);

@@ -72,7 +72,8 @@ struct AxisMap {
 LoadedVolume load_volume(const fs::path& path) {
   const ScratchFolder scratch;
   const fs::path canonical = scratch.path() / "canonical";
-  const Volume description = volume::import_file(path, {}, scratch.path(), {}, canonical);
+  const Volume description =
+      volume::import_volume({.source = path, .scratch = scratch.path(), .target = canonical});
   const volume::CanonicalVolume file(canonical);
   LoadedVolume loaded;
   loaded.suggested_iso = description.suggested_iso;

@@ -63,7 +63,11 @@ Outcome import_bytes(std::string_view bytes, const ImportLimits& limits) {
   const Folder scratch;
   const auto source = folder.write("upload", bytes);
   Outcome outcome = outcome_of(folder, [&](const std::filesystem::path& target) {
-    return import_file(source, {}, scratch.path(""), limits, target);
+    return import_volume({.source = source,
+                          .scratch = scratch.path(""),
+                          .target = target,
+                          .options = {},
+                          .limits = limits});
   });
   if (scratch.entries() != 0) throw std::logic_error("an import left files behind");
   return outcome;
@@ -74,7 +78,11 @@ Outcome import_raw_bytes(std::string_view bytes, const RawDescription& descripti
   const Folder folder;
   const auto source = folder.write("upload", bytes);
   return outcome_of(folder, [&](const std::filesystem::path& target) {
-    return import_raw(source, description, limits, target);
+    return import_volume({.source = source,
+                          .scratch = folder.path(""),
+                          .target = target,
+                          .options = {.raw = description, .series = {}},
+                          .limits = limits});
   });
 }
 

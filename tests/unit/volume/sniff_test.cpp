@@ -29,6 +29,10 @@ TEST(Sniff, KnowsNrrdAndMetaImage) {
   EXPECT_EQ(sniffed("NDims=3\r\nDimSize = 1 1 1\r\n"), FileFormat::kMetaImage);
 }
 
+TEST(Sniff, KnowsDicom) {
+  EXPECT_EQ(sniffed(std::string(128, '\0') + "DICM"), FileFormat::kDicom);
+}
+
 TEST(Sniff, KnowsNothingElse) {
   EXPECT_EQ(sniffed(""), std::nullopt);
   EXPECT_EQ(sniffed("\x1f\x8b\x08"), std::nullopt);
@@ -37,7 +41,6 @@ TEST(Sniff, KnowsNothingElse) {
   EXPECT_EQ(sniffed("NDims: 3\n"), std::nullopt);
   EXPECT_EQ(sniffed("name = value\n"), std::nullopt);
   EXPECT_EQ(sniffed(std::string(4096, '\0')), std::nullopt);
-  EXPECT_EQ(sniffed(std::string(128, '\0') + "DICM"), std::nullopt);
   EXPECT_EQ(sniffed(nifti({.magic = "none"}, kSmallSamples)), std::nullopt);
 }
 
