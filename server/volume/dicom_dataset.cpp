@@ -28,7 +28,7 @@ void inflate(const InputFile& file, std::uint64_t offset, std::uint64_t limit,
 
 }  // namespace
 
-std::string to_text(Tag tag) {
+std::string tag_name(Tag tag) {
   constexpr std::string_view kDigits = "0123456789abcdef";
   std::string text = "(";
   for (int shift = 28; shift >= 0; shift -= 4) {

@@ -18,7 +18,7 @@ namespace isomesh::volume::dicom {
 // Group and element: 0x00280010 is (0028,0010).
 using Tag = std::uint32_t;
 
-std::string to_text(Tag tag);  // "(0028,0010)"
+std::string tag_name(Tag tag);  // "(0028,0010)"
 
 // Values are padded to an even length by a space, those of identifiers by a zero.
 std::string_view without_padding(std::string_view value);

@@ -187,8 +187,9 @@ void silence_gdcm() {
 }
 
 template <class Codec>
-bool decode_by(Codec codec, const gdcm::DataElement& input, const PixelLayout& layout,
+bool decode_by(const gdcm::DataElement& input, const PixelLayout& layout,
                gdcm::DataElement& output) {
+  Codec codec;
   const std::array<unsigned, 3> dimensions = {layout.columns, layout.rows, 1};
   const auto bits = [](unsigned count) { return static_cast<unsigned short>(count); };
   codec.SetNumberOfDimensions(2);
@@ -208,11 +209,11 @@ bool decode_by_gdcm(Family family, const gdcm::DataElement& input, const PixelLa
     case Family::kRle:
       return false;
     case Family::kJpeg:
-      return decode_by(gdcm::JPEGCodec(), input, layout, output);
+      return decode_by<gdcm::JPEGCodec>(input, layout, output);
     case Family::kJpegLs:
-      return decode_by(gdcm::JPEGLSCodec(), input, layout, output);
+      return decode_by<gdcm::JPEGLSCodec>(input, layout, output);
     case Family::kJpeg2000:
-      return decode_by(gdcm::JPEG2000Codec(), input, layout, output);
+      return decode_by<gdcm::JPEG2000Codec>(input, layout, output);
   }
   return false;
 }

@@ -19,7 +19,7 @@ constexpr std::uint64_t kMostFrameBytes = std::uint64_t{1} << 29;
 
 unsigned required(const DataSet& data, Tag tag, std::string_view name) {
   if (const auto number = data.unsigned_number(tag)) return *number;
-  throw_unusable("The DICOM image does not tell its " + std::string(name) + ' ' + to_text(tag) +
+  throw_unusable("The DICOM image does not tell its " + std::string(name) + ' ' + tag_name(tag) +
                  ".");
 }
 
@@ -137,10 +137,10 @@ std::vector<double> required_numbers(const DataSet& data, Tag tag, std::size_t c
   if (numbers.size() == count) return numbers;
   const std::string_view text = data.text(tag);
   if (text.empty()) {
-    throw_unusable("The DICOM image does not tell its " + std::string(name) + ' ' + to_text(tag) +
+    throw_unusable("The DICOM image does not tell its " + std::string(name) + ' ' + tag_name(tag) +
                    ", without which its frames lie nowhere in the patient.");
   }
-  throw_unusable("The DICOM image's " + std::string(name) + ' ' + to_text(tag) + " is " +
+  throw_unusable("The DICOM image's " + std::string(name) + ' ' + tag_name(tag) + " is " +
                  in_quotes(text) + ", not " + std::to_string(count) + " numbers.");
 }
 

@@ -137,7 +137,7 @@ class Parser {
     if (limit >= at_ && bytes <= limit - at_) return;
     const std::string name = is_pixel_data(tag) ? "pixel data"
                              : tag == 0         ? "data set"
-                                                : "element " + to_text(tag);
+                                                : "element " + tag_name(tag);
     const std::string there = std::to_string(limit > at_ ? limit - at_ : 0);
     throw_unusable("The DICOM file is truncated or corrupt: its " + name + " takes " +
                    std::to_string(bytes) + " bytes, and " + there + " are there.");
@@ -154,7 +154,7 @@ class Parser {
     }
     head.vr = window(at_, 2);
     if (!is_letter(head.vr[0]) || !is_letter(head.vr[1])) {
-      throw_unusable("The DICOM file is corrupt: its element " + to_text(head.tag) +
+      throw_unusable("The DICOM file is corrupt: its element " + tag_name(head.tag) +
                      " has no value representation.");
     }
     if (has_short_length(head.vr)) {
@@ -214,7 +214,7 @@ class Parser {
       const Head item = read_head(encoding, end);
       if (item.tag == kSequenceEnd) return;
       if (item.tag != kItem) {
-        throw_unusable("The DICOM file is corrupt: its sequence " + to_text(sequence.tag) +
+        throw_unusable("The DICOM file is corrupt: its sequence " + tag_name(sequence.tag) +
                        " holds something that is no item.");
       }
       DataSet set = read_item(item, encoding, end, depth);
