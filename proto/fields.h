@@ -79,6 +79,11 @@ void visit(Is<DracoParameters> auto& self, auto&& field) {
   field("speed", self.speed);
 }
 
+void visit(Is<ComponentFilter> auto& self, auto&& field) {
+  field("keep", self.keep);
+  field("min_triangles", self.min_triangles);
+}
+
 void visit(Is<JobParameters> auto& self, auto&& field) {
   field("volume", self.volume);
   field("iso", self.iso);
@@ -88,8 +93,10 @@ void visit(Is<JobParameters> auto& self, auto&& field) {
   field("smoothing", self.smoothing);
   field("lambda", self.lambda);
   field("close", self.close);
+  field("components", self.components);
   field("formats", self.formats);
   field("draco", self.draco);
+  field("normals", self.normals);
   field("priority", self.priority);
 }
 
@@ -113,12 +120,40 @@ void visit(Is<MeshSummary::Enclosed> auto& self, auto&& field) {
   field("smoothed", self.smoothed);
 }
 
+void visit(Is<MeshSummary::Dropped> auto& self, auto&& field) {
+  field("components", self.components);
+  field("triangles", self.triangles);
+}
+
+void visit(Is<Distribution> auto& self, auto&& field) {
+  field("mean", self.mean);
+  field("min", self.min);
+  field("histogram", self.histogram);
+}
+
+void visit(Is<MeshQuality::Stages> auto& self, auto&& field) {
+  field("extracted", self.extracted);
+  field("smoothed", self.smoothed);
+}
+
+void visit(Is<MeshQuality> auto& self, auto&& field) {
+  field("closed", self.closed);
+  field("manifold", self.manifold);
+  field("oriented", self.oriented);
+  field("components", self.components);
+  field("genus", self.genus);
+  field("aspect_ratio", self.aspect_ratio);
+  field("smallest_angle_deg", self.smallest_angle_deg);
+}
+
 void visit(Is<MeshSummary> auto& self, auto&& field) {
   field("triangles", self.triangles);
   field("vertices", self.vertices);
   field("boundary_edges", self.boundary_edges);
   field("components", self.components);
   field("euler", self.euler);
+  field("dropped", self.dropped);
+  field("quality", self.quality);
   field("area_mm2", self.area_mm2);
   field("volume_mm3", self.volume_mm3);
   field("bounds", self.bounds);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <nlohmann/json.hpp>
 
@@ -12,8 +13,8 @@ namespace {
 // Collects what is wrong with every member, so that one answer names all of it.
 class RequestReader {
  public:
-  // Faults are named as a query spells them: `format` for `formats`, no `draco.` before its
-  // members.
+  // Faults are named as a query spells them: `format` for `formats`, no `draco.` or `components.`
+  // before their members.
   void name_as_in_query() { as_in_query_ = true; }
 
   // Reads `json` into `value`, whose fields are those of `visit`, and refuses any other.
@@ -115,6 +116,21 @@ class RequestReader {
     }
   }
 
+  void read_member(const Json& json, const std::string& name, std::optional<std::uint32_t>& value) {
+    constexpr double kMost = std::numeric_limits<std::uint32_t>::max();
+    if (json.is_null()) return value.reset();
+    const double number = json.is_number() ? json.get<double>() : 0;
+    if (std::floor(number) != number || !(number >= 1 && number <= kMost)) {
+      return add(name, "must be a whole number from 1 to 4294967295");
+    }
+    value = static_cast<std::uint32_t>(number);
+  }
+
+  void read_member(const Json& json, const std::string& name, ComponentFilter& value) {
+    if (!json.is_object()) return add(name, "must be an object");
+    read_object(json, value, name + ".");
+  }
+
   void read_member(const Json& json, const std::string& name, DracoParameters& value) {
     if (!json.is_object()) return add(name, "must be an object");
     read_object(json, value, name + ".");
@@ -147,6 +163,13 @@ Json list_of(const std::string& text) {
   return list;
 }
 
+// The object that holds a member which a query names without it; empty for the others.
+std::string owner_of(const std::string& name) {
+  if (name == "position_bits" || name == "speed") return "draco";
+  if (name == "keep" || name == "min_triangles") return "components";
+  return "";
+}
+
 JobParameters read_parameters(const Json& json, bool with_volume, RequestReader& reader) {
   JobParameters parameters;
   reader.read_object(json, parameters, "");
@@ -159,9 +182,9 @@ JobParameters read_parameters(const Json& json, bool with_volume, RequestReader&
 }  // namespace
 
 std::string spelled_in_query(const std::string& member) {
-  constexpr std::string_view kDraco = "draco.";
   if (member == "formats") return "format";
-  return member.starts_with(kDraco) ? member.substr(kDraco.size()) : member;
+  const std::size_t owner = member.find('.');
+  return owner == std::string::npos ? member : member.substr(owner + 1);
 }
 
 JobParameters parse_job_parameters(std::string_view body) {
@@ -179,11 +202,12 @@ JobParameters parse_job_parameters(const std::vector<std::pair<std::string, std:
   std::vector<std::string> misplaced;
   Json json = Json::object();
   for (const auto& [name, text] : query) {
-    const bool of_draco = name == "position_bits" || name == "speed";
-    Json& owner = of_draco ? json["draco"] : json;
+    const std::string owner_name = owner_of(name);
+    Json& owner = owner_name.empty() ? json : json[owner_name];
     const std::string member = name == "format" ? "formats" : name;
     const bool is_text = name == "volume" && volume_in == VolumeIn::kQuery;
-    if ((name == "volume" && !is_text) || name == "draco" || name == "formats") {
+    if ((name == "volume" && !is_text) || name == "draco" || name == "components" ||
+        name == "formats") {
       misplaced.push_back(name);
     } else if (owner.contains(member)) {
       reader.add(name, "is given twice");

@@ -119,6 +119,16 @@ struct DracoParameters {
   bool operator==(const DracoParameters&) const = default;
 };
 
+// Which parts of the surface a job keeps. All when empty; with both, the largest of those that are
+// large enough.
+struct ComponentFilter {
+  std::optional<std::uint32_t> keep;           // so many of the largest; at least 1
+  std::optional<std::uint32_t> min_triangles;  // those of so many triangles; at least 1
+
+  bool keeps_all() const { return !keep && !min_triangles; }
+  bool operator==(const ComponentFilter&) const = default;
+};
+
 // What a job is asked to do; the members' ranges are the contract's and are checked by
 // parse_job_parameters (json.h).
 struct JobParameters {
@@ -130,8 +140,10 @@ struct JobParameters {
   Smoothing smoothing = Smoothing::kLaplacian;
   double lambda = 1;
   bool close = false;
+  ComponentFilter components;
   std::vector<MeshFormat> formats = {MeshFormat::kDrc};
   DracoParameters draco;
+  bool normals = false;  // in glb
   Priority priority = Priority::kRoutine;
 
   bool operator==(const JobParameters&) const = default;
@@ -166,6 +178,37 @@ struct MeshFile {
   bool operator==(const MeshFile&) const = default;
 };
 
+// How a quantity is spread over the triangles of a mesh. All zero when there are none.
+struct Distribution {
+  static constexpr std::size_t kBins = 20;
+
+  double mean = 0;
+  double min = 0;
+  std::array<std::uint64_t, kBins> histogram = {};  // triangles in equal bins from zero on
+
+  bool operator==(const Distribution&) const = default;
+};
+
+// How good a mesh is.
+struct MeshQuality {
+  struct Stages {
+    Distribution extracted;
+    Distribution smoothed;
+
+    bool operator==(const Stages&) const = default;
+  };
+
+  bool closed = false;    // no edge belongs to one triangle only
+  bool manifold = false;  // at most two triangles at an edge, one fan of them around a vertex
+  bool oriented = false;  // neighbours run through their edge in opposite directions
+  std::uint64_t components = 0;
+  std::optional<std::int64_t> genus;  // handles, all components together; of a closed manifold
+  Stages aspect_ratio;                // 2 * inradius / circumradius: 1 is equilateral; bins of 0.05
+  Stages smallest_angle_deg;          // of each triangle: 60 is equilateral; bins of 3 degrees
+
+  bool operator==(const MeshQuality&) const = default;
+};
+
 // What a finished job says about its mesh. Lengths in millimetres, after smoothing unless named
 // otherwise.
 struct MeshSummary {
@@ -176,11 +219,21 @@ struct MeshSummary {
     bool operator==(const Enclosed&) const = default;
   };
 
+  // What the filter of components took away.
+  struct Dropped {
+    std::uint64_t components = 0;
+    std::uint64_t triangles = 0;
+
+    bool operator==(const Dropped&) const = default;
+  };
+
   std::uint64_t triangles = 0;
   std::uint64_t vertices = 0;
   std::uint64_t boundary_edges = 0;
   std::uint64_t components = 0;
   std::int64_t euler = 0;
+  Dropped dropped;
+  MeshQuality quality;
   double area_mm2 = 0;
   Enclosed volume_mm3;
   std::array<std::array<double, 3>, 2> bounds = {};  // smallest and largest corner; 0 when empty

@@ -163,10 +163,16 @@ void add_parameters(CLI::App& app, JobParameters& parameters) {
       add_number<double>(app, "--lambda", "How far a pass moves a vertex (default: 1)",
                          [&](double value) { parameters.lambda = value; }),
       app.add_flag("--close", parameters.close, "Cap the surface at the volume's border"),
+      add_number<std::uint32_t>(app, "--keep-components", "Keep only so many of the largest parts",
+                                [&](std::uint32_t value) { parameters.components.keep = value; }),
+      add_number<std::uint32_t>(
+          app, "--min-triangles", "Keep only parts of so many triangles",
+          [&](std::uint32_t value) { parameters.components.min_triangles = value; }),
       add_number<int>(app, "--position-bits", "Of Draco, per coordinate (default: 14)",
                       [&](int value) { parameters.draco.position_bits = value; }),
       add_number<int>(app, "--speed", "Of Draco, 0 smallest to 10 fastest (default: 7)",
                       [&](int value) { parameters.draco.speed = value; }),
+      app.add_flag("--normals", parameters.normals, "Put normals into a GLB"),
       add_name<Priority>(app, "--priority", "stat, routine (the default) or bulk",
                          [&](Priority value) { parameters.priority = value; })};
   for (CLI::Option* option : others) option->group("Job");

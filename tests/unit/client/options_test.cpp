@@ -54,6 +54,11 @@ TEST_F(OptionsTest, ReadsEverythingThatAMeshCanBeAskedFor) {
                                  "--lambda",
                                  "0.5",
                                  "--close",
+                                 "--keep-components",
+                                 "3",
+                                 "--min-triangles",
+                                 "500",
+                                 "--normals",
                                  "--position-bits",
                                  "11",
                                  "--speed",
@@ -77,6 +82,8 @@ TEST_F(OptionsTest, ReadsEverythingThatAMeshCanBeAskedFor) {
   expected.smoothing = Smoothing::kTaubin;
   expected.lambda = 0.5;
   expected.close = true;
+  expected.components = {.keep = 3, .min_triangles = 500};
+  expected.normals = true;
   expected.draco = {.position_bits = 11, .speed = 0};
   expected.priority = Priority::kStat;
   EXPECT_EQ(options.parameters, expected);

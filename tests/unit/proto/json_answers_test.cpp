@@ -71,9 +71,18 @@ JobParameters some_parameters() {
           .smoothing = Smoothing::kTaubin,
           .lambda = 0.3,
           .close = true,
+          .components = {.keep = 4294967295, .min_triangles = {}},
           .formats = {MeshFormat::kStl, MeshFormat::kDrc},
           .draco = {.position_bits = 30, .speed = 0},
+          .normals = true,
           .priority = Priority::kStat};
+}
+
+Distribution some_distribution(double mean) {
+  Distribution distribution = {.mean = mean, .min = 0.25};
+  distribution.histogram[0] = 1;
+  distribution.histogram[19] = 5091319;
+  return distribution;
 }
 
 MeshSummary some_mesh() {
@@ -83,6 +92,14 @@ MeshSummary some_mesh() {
       .boundary_edges = 7,
       .components = 12,
       .euler = -35,
+      .dropped = {.components = 3, .triangles = 48},
+      .quality = {.closed = true,
+                  .manifold = true,
+                  .oriented = false,
+                  .components = 12,
+                  .genus = 29,
+                  .aspect_ratio = {some_distribution(0.5), some_distribution(0.75)},
+                  .smallest_angle_deg = {some_distribution(30), some_distribution(40)}},
       .area_mm2 = 593150.7,
       .volume_mm3 = {.extracted = 2795793.9, .smoothed = 2790000.25},
       .bounds = {{{-1, -2, -3}, {1, 2, 3}}},
@@ -167,8 +184,11 @@ TEST(AnswerJson, SpellsParametersAsTheContractDoes) {
   EXPECT_EQ(json::parse(to_json(some_parameters())),
             json::parse(R"({"volume": "0123abcd", "iso": -0.1, "scheme": 5,
                             "interpolation": "midpoint", "passes": 1000, "smoothing": "taubin",
-                            "lambda": 0.3, "close": true, "formats": ["stl", "drc"],
-                            "draco": {"position_bits": 30, "speed": 0}, "priority": "stat"})"));
+                            "lambda": 0.3, "close": true,
+                            "components": {"keep": 4294967295, "min_triangles": null},
+                            "formats": ["stl", "drc"],
+                            "draco": {"position_bits": 30, "speed": 0}, "normals": true,
+                            "priority": "stat"})"));
 }
 
 TEST(AnswerJson, SpellsAnAbsentIsoAsOtsu) {
@@ -191,13 +211,37 @@ TEST(AnswerJson, SpellsAJobAsTheContractDoes) {
 }
 
 TEST(AnswerJson, SpellsAMeshAsTheContractDoes) {
-  EXPECT_EQ(json::parse(to_json(succeeded_job()))["mesh"], json::parse(R"({
+  json mesh = json::parse(to_json(succeeded_job()))["mesh"];
+  mesh.erase("quality");
+  EXPECT_EQ(mesh, json::parse(R"({
       "triangles": 5091320, "vertices": 2544488, "boundary_edges": 7, "components": 12,
-      "euler": -35, "area_mm2": 593150.7,
+      "euler": -35, "dropped": {"components": 3, "triangles": 48}, "area_mm2": 593150.7,
       "volume_mm3": {"extracted": 2795793.9, "smoothed": 2790000.25},
       "bounds": [[-1, -2, -3], [1, 2, 3]],
       "files": {"drc": {"bytes": 1, "sha256": "aa", "href": "/v1/jobs/7/mesh.drc"},
                 "obj": {"bytes": 2, "sha256": "bb", "href": "/v1/jobs/7/mesh.obj"}}})"));
+}
+
+TEST(AnswerJson, SpellsAMeshsQualityAsTheContractDoes) {
+  json quality = json::parse(to_json(succeeded_job()))["mesh"]["quality"];
+  for (const char* const name : {"aspect_ratio", "smallest_angle_deg"}) {
+    for (const char* const stage : {"extracted", "smoothed"}) {
+      json& histogram = quality[name][stage]["histogram"];
+      EXPECT_EQ(histogram.size(), 20U);
+      EXPECT_EQ(histogram[0], 1);
+      EXPECT_EQ(histogram[19], 5091319);
+      quality[name][stage].erase("histogram");
+    }
+  }
+  EXPECT_EQ(quality, json::parse(R"({
+      "closed": true, "manifold": true, "oriented": false, "components": 12, "genus": 29,
+      "aspect_ratio": {"extracted": {"mean": 0.5, "min": 0.25},
+                       "smoothed": {"mean": 0.75, "min": 0.25}},
+      "smallest_angle_deg": {"extracted": {"mean": 30.0, "min": 0.25},
+                             "smoothed": {"mean": 40.0, "min": 0.25}}})"));
+  Job job = succeeded_job();
+  job.mesh->quality.genus.reset();
+  EXPECT_TRUE(json::parse(to_json(job))["mesh"]["quality"]["genus"].is_null());
 }
 
 TEST(AnswerJson, SpellsAProblemAsRfc9457Does) {

@@ -57,8 +57,8 @@ TEST(JobBody, NeedsAVolumeAndAnIsoOnly) {
 TEST(JobBody, TakesEveryMember) {
   EXPECT_EQ(parse_job_parameters(R"({"volume": "abc", "iso": -1.5e2, "scheme": 5,
       "interpolation": "midpoint", "passes": 17, "smoothing": "taubin", "lambda": 0.25,
-      "close": true, "formats": ["stl", "glb"], "draco": {"position_bits": 11, "speed": 3},
-      "priority": "bulk"})"),
+      "close": true, "components": {"keep": 2, "min_triangles": 100}, "formats": ["stl", "glb"],
+      "draco": {"position_bits": 11, "speed": 3}, "normals": true, "priority": "bulk"})"),
             (JobParameters{.volume = "abc",
                            .iso = -150,
                            .scheme = Scheme::kFive,
@@ -67,8 +67,10 @@ TEST(JobBody, TakesEveryMember) {
                            .smoothing = Smoothing::kTaubin,
                            .lambda = 0.25,
                            .close = true,
+                           .components = {.keep = 2, .min_triangles = 100},
                            .formats = {MeshFormat::kStl, MeshFormat::kGlb},
                            .draco = {.position_bits = 11, .speed = 3},
+                           .normals = true,
                            .priority = Priority::kBulk}));
 }
 
@@ -77,6 +79,7 @@ TEST(JobBody, IsWhatToJsonWrites) {
   parameters.volume = "a";
   EXPECT_EQ(parse_job_parameters(to_json(parameters)), parameters);
   parameters.iso = 0.1;
+  parameters.components.keep = 7;
   parameters.formats = {MeshFormat::kObj, MeshFormat::kPly};
   EXPECT_EQ(parse_job_parameters(to_json(parameters)), parameters);
 }
@@ -88,6 +91,13 @@ TEST(JobBody, OtsuStandsForAnIso) {
 TEST(JobBody, DracoMayBePartial) {
   EXPECT_EQ(parsed(R"("draco": {})").draco, DracoParameters{});
   EXPECT_EQ(parsed(R"("draco": {"speed": 0})").draco, (DracoParameters{14, 0}));
+}
+
+TEST(JobBody, ComponentsMayBePartialAndNull) {
+  EXPECT_EQ(parsed(R"("components": {})").components, ComponentFilter{});
+  EXPECT_EQ(parsed(R"("components": {"keep": 1})").components, (ComponentFilter{1, {}}));
+  EXPECT_EQ(parsed(R"("components": {"keep": null, "min_triangles": 4294967295})").components,
+            (ComponentFilter{{}, 4294967295}));
 }
 
 TEST(JobBody, AFormatNamedTwiceIsMadeOnce) {
@@ -135,7 +145,13 @@ INSTANTIATE_TEST_SUITE_P(
                     Refused{R"("draco": {"position_bits": 7})", "draco.position_bits"},
                     Refused{R"("draco": {"position_bits": 31})", "draco.position_bits"},
                     Refused{R"("draco": {"speed": -1})", "draco.speed"},
-                    Refused{R"("draco": {"speed": 11})", "draco.speed"}));
+                    Refused{R"("draco": {"speed": 11})", "draco.speed"},
+                    Refused{R"("components": {"keep": 0})", "components.keep"},
+                    Refused{R"("components": {"keep": 1.5})", "components.keep"},
+                    Refused{R"("components": {"keep": 4294967296})", "components.keep"},
+                    Refused{R"("components": {"min_triangles": -1})", "components.min_triangles"},
+                    Refused{R"("components": {"min_triangles": 1e300})",
+                            "components.min_triangles"}));
 
 INSTANTIATE_TEST_SUITE_P(
     Types, OneFault,
@@ -149,6 +165,10 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{R"("passes": false)", "passes"}, Refused{R"("passes": null)", "passes"},
         Refused{R"("smoothing": "gauss")", "smoothing"}, Refused{R"("lambda": "1")", "lambda"},
         Refused{R"("lambda": {})", "lambda"}, Refused{R"("close": 1)", "close"},
+        Refused{R"("normals": 1)", "normals"}, Refused{R"("components": 3)", "components"},
+        Refused{R"("components": null)", "components"},
+        Refused{R"("components": {"keep": "1"})", "components.keep"},
+        Refused{R"("components": {"keep": true})", "components.keep"},
         Refused{R"("close": "true")", "close"}, Refused{R"("formats": [])", "formats"},
         Refused{R"("formats": "drc")", "formats"}, Refused{R"("formats": {"drc": 1})", "formats"},
         Refused{R"("formats": ["drc", "exe"])", "formats"},
@@ -277,6 +297,9 @@ TEST(JobQuery, TakesEveryParameter) {
                                        {"smoothing", "taubin"},
                                        {"lambda", "0.25"},
                                        {"close", "true"},
+                                       {"keep", "2"},
+                                       {"min_triangles", "100"},
+                                       {"normals", "true"},
                                        {"format", "stl,glb"},
                                        {"position_bits", "11"},
                                        {"speed", "3"},
@@ -289,8 +312,10 @@ TEST(JobQuery, TakesEveryParameter) {
                            .smoothing = Smoothing::kTaubin,
                            .lambda = 0.25,
                            .close = true,
+                           .components = {.keep = 2, .min_triangles = 100},
                            .formats = {MeshFormat::kStl, MeshFormat::kGlb},
                            .draco = {.position_bits = 11, .speed = 3},
+                           .normals = true,
                            .priority = Priority::kBulk}));
 }
 
@@ -303,23 +328,17 @@ TEST(JobQuery, RefusesByTheQuerysNames) {
   const auto fault = [](const std::string& name, const std::string& value) {
     return faults_in(Query{{"iso", "1"}, {name, value}});
   };
-  for (const auto& [name, value] : Query{{"scheme", "7"},
-                                         {"scheme", ""},
-                                         {"passes", "five"},
-                                         {"passes", "-1"},
-                                         {"lambda", "0"},
-                                         {"close", "yes"},
-                                         {"priority", "urgent"},
-                                         {"format", ""},
-                                         {"format", "exe"},
-                                         {"format", "drc,,stl"},
-                                         {"position_bits", "7"},
-                                         {"speed", "11"},
-                                         {"speed", ""},
-                                         {"volume", "abc"},
-                                         {"formats", "drc"},
-                                         {"draco", "{}"},
-                                         {"isovalue", "3"}}) {
+  for (const auto& [name, value] : Query{{"scheme", "7"},        {"scheme", ""},
+                                         {"passes", "five"},     {"passes", "-1"},
+                                         {"lambda", "0"},        {"close", "yes"},
+                                         {"priority", "urgent"}, {"format", ""},
+                                         {"format", "exe"},      {"format", "drc,,stl"},
+                                         {"position_bits", "7"}, {"speed", "11"},
+                                         {"speed", ""},          {"keep", "0"},
+                                         {"keep", "all"},        {"min_triangles", "1.5"},
+                                         {"normals", "2"},       {"components", "{}"},
+                                         {"volume", "abc"},      {"formats", "drc"},
+                                         {"draco", "{}"},        {"isovalue", "3"}}) {
     EXPECT_THAT(fault(name, value), ElementsAre(name)) << name << '=' << value;
   }
 }
