@@ -67,15 +67,19 @@ template <class T>
 Extraction<T>::Extraction(const Lattice<T>& the_lattice, const ExtractOptions& options,
                           T the_smallest)
     : lattice(the_lattice),
+      margin(margin_of(options)),
+      dims(marched_dims(the_lattice.dims, options)),
       scheme(options.scheme),
       smallest(the_smallest),
       placement(options, the_lattice.dims, the_lattice.to_space),
-      splits(splits_of(options.scheme, the_lattice.to_space.determinant() < 0)) {}
+      splits(splits_of(options.scheme, the_lattice.to_space.determinant() < 0)) {
+  if (options.close) border.emplace(the_lattice, options, the_smallest, placement);
+}
 
 template <class T>
 SurfaceCount count_surface(const Lattice<T>& lattice, const ExtractOptions& options,
                            const Context& context) {
-  const std::uint32_t layers = lattice.dims.z;
+  const std::uint32_t layers = marched_dims(lattice.dims, options).z;
   SurfaceCount count;
   count.layer_vertices.assign(std::size_t{layers} + 1, 0);
   count.layer_triangles.assign(std::size_t{layers} + 1, 0);
@@ -109,17 +113,19 @@ void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
   mesh.layer_triangles = count.layer_triangles;
   mesh.positions.resize_for_overwrite(count.vertices());
   mesh.triangles.resize_for_overwrite(count.triangles());
+  mesh.on_border.assign(options.close ? (count.vertices() + kFlagBits - 1) / kFlagBits : 0, 0);
   const auto smallest = smallest_inside<T>(options.iso);
   if (!lattice.dims.has_cells() || !smallest || count.vertices() == 0) {
     return context.throw_if_stopped();
   }
 
   const Extraction<T> extraction(lattice, options, *smallest);
-  IndexMemory memory(index_memory_size(lattice.dims));
+  const Dims& dims = extraction.dims;
+  IndexMemory memory(index_memory_size(dims));
   // A layer costs its triangles, and its samples even when it is empty.
-  const std::uint64_t samples_cost = std::uint64_t{lattice.dims.x} * lattice.dims.y / 16;
+  const std::uint64_t samples_cost = std::uint64_t{dims.x} * dims.y / 16;
   const auto slabs = cut_slabs(
-      lattice.dims.z, [&](std::uint32_t z) { return count.layer_triangles[z] + z * samples_cost; });
+      dims.z, [&](std::uint32_t z) { return count.layer_triangles[z] + z * samples_cost; });
   parallel_for(context, slabs.size(),
                [&](std::size_t task) { write_slab(extraction, slabs[task], memory, mesh); });
 }

@@ -10,6 +10,11 @@
 // `extract_surface` writes every vertex and triangle to its final place. Nothing is searched,
 // hashed or merged: a vertex is named by the sample that owns its edge and the edge's direction,
 // and its index is a running count.
+//
+// A surface that is to be closed is marched on around the volume, as if one more layer of samples
+// beyond each face were outside; those samples are nowhere in memory. Its caps lie on the border of
+// the volume (border.h). The rest is what it is when it stays open, but for vertices in the faces
+// of the volume's box that are next to a sample of about the iso-value.
 #pragma once
 
 #include <cstdint>
@@ -25,9 +30,11 @@ struct ExtractOptions {
   double iso = 0;  // a sample is inside when its value is >= iso
   Scheme scheme = Scheme::kSix;
   Interpolation interpolation = Interpolation::kLinear;
+  bool close = false;  // cap the surface where it meets the lattice's border
 };
 
-// How large the surface is, layer by layer; layers + 1 running sums each, as in Mesh.
+// How large the surface is, layer by layer; layers + 1 running sums each, as in Mesh. There are as
+// many layers as the lattice has planes, and two more when the surface is closed.
 struct SurfaceCount {
   std::vector<std::uint64_t> layer_vertices = {0};
   std::vector<std::uint64_t> layer_triangles = {0};

@@ -13,18 +13,31 @@ using Vec3 = std::array<float, 3>;              // millimetres, LPS
 using Triangle = std::array<std::uint32_t, 3>;  // vertex indices, counter-clockwise from outside
 
 // Vertices and triangles in the order of the lattice's layers. Layer k holds the vertices on the
-// edges that the samples of plane k own and the triangles of the cells between planes k and k+1.
+// edges that the samples of plane k own and the triangles of the cells between planes k and k+1; of
+// a surface that is closed, plane 0 is the one before the volume's first.
 // A triangle of layer k therefore names only vertices of layers k and k+1: whoever works on a run
 // of layers knows which others can touch it.
 //
 // Every vertex lies on one lattice edge; every lattice edge carries at most one vertex. The surface
-// is an oriented manifold whose boundary lies on the border of the volume.
+// is an oriented manifold whose boundary, if it was not closed, lies on the border of the volume.
+inline constexpr std::size_t kFlagBits = 64;
+
 struct Mesh {
   std::array<double, 3> origin = {0, 0, 0};  // where the sample (0,0,0) lies
   Buffer<Vec3> positions;
   Buffer<Triangle> triangles;
   std::vector<std::uint64_t> layer_vertices;   // layers + 1 offsets into positions
   std::vector<std::uint64_t> layer_triangles;  // layers + 1 offsets into triangles
+
+  // Of a surface that was closed: the vertices of its caps and of their rims, a bit each. They are
+  // all that lie on the border of the volume. Empty when it was not closed: then those are the
+  // vertices of its boundary.
+  std::vector<std::uint64_t> on_border;
+
+  // False where on_border is empty.
+  bool is_on_border(std::size_t vertex) const {
+    return !on_border.empty() && (on_border[vertex / kFlagBits] >> (vertex % kFlagBits) & 1) != 0;
+  }
 
   std::size_t layers() const { return layer_vertices.empty() ? 0 : layer_vertices.size() - 1; }
 };

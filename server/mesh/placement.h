@@ -18,6 +18,12 @@ class Placement {
         midpoint_(options.interpolation == Interpolation::kMidpoint),
         nearest_(nearest_share(dims, to_space)) {}
 
+  // One that keeps another distance from the samples; see nearest_share.
+  Placement(const ExtractOptions& options, double nearest)
+      : iso_(options.iso),
+        midpoint_(options.interpolation == Interpolation::kMidpoint),
+        nearest_(nearest) {}
+
   // The share of the way from a sample of value `from` to one of value `to`, between which the
   // iso-value lies.
   template <class T>
@@ -32,6 +38,8 @@ class Placement {
     }
     return std::min(std::max(f, nearest_), 1 - nearest_);
   }
+
+  double nearest() const { return nearest_; }
 
   // A vertex on a sample that equals the iso-value would coincide with those on the sample's other
   // edges, and their triangles would have no area. So every vertex keeps a distance from the

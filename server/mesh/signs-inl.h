@@ -17,8 +17,7 @@
 
 #include <hwy/highway.h>
 
-#include "server/mesh/lattice.h"
-#include "server/mesh/tetrahedra.h"
+#include "server/mesh/slabs.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
@@ -81,6 +80,33 @@ void classify(const Lattice<T>& lattice, std::uint32_t z, T smallest, SignPlane&
   }
 }
 
+// The same with a phantom on every side of the plane, which is outside. Rows begin one bit later.
+template <class T>
+void classify_with_margin(const Lattice<T>& lattice, std::uint32_t z, T smallest,
+                          SignPlane& plane) {
+  const std::size_t width = lattice.dims.x;
+  const std::size_t words = plane.words();
+  std::fill_n(plane.row(0), words, 0);
+  std::fill_n(plane.row(lattice.dims.y + 1), words, 0);
+  const bool is_phantom = z == 0 || z == lattice.dims.z + 1;
+  for (std::uint32_t y = 0; y < lattice.dims.y; ++y) {
+    Word* row = plane.row(y + 1);
+    if (is_phantom) {
+      std::fill_n(row, words, 0);
+      continue;
+    }
+    const T* samples = lattice.samples + (std::size_t{z - 1} * lattice.dims.y + y) * width;
+    Word carry = 0;
+    for (std::size_t w = 0; w < words; ++w) {
+      const std::size_t begin = std::min(w * kWordBits, width);
+      const Word signs =
+          classify_word(samples + begin, std::min<std::size_t>(kWordBits, width - begin), smallest);
+      row[w] = signs << 1 | carry;
+      carry = signs >> (kWordBits - 1);
+    }
+  }
+}
+
 // The signs of the eight corners of 64 cells of a row: word c holds corner c of each.
 using CornerWords = std::array<Word, 8>;
 
@@ -117,13 +143,14 @@ inline unsigned count_in_tetrahedron(const CornerWords& corners,
 // At the lattice's upper borders the rows beyond are missing; their signs are never used.
 class CellRow {
  public:
-  CellRow(const Dims& dims, Scheme scheme, const SignPlane& low, const SignPlane& high,
+  // `even` are the samples of even parity in a word of the row.
+  CellRow(const Dims& dims, Scheme scheme, Word even, const SignPlane& low, const SignPlane& high,
           std::uint32_t y, std::uint32_t z)
       : last_x_(dims.x - 1),
         has_y_(y + 1 < dims.y),
         has_z_(z + 1 < dims.z),
         five_(scheme == Scheme::kFive),
-        even_(((y + z) & 1) == 0 ? kEvenX : ~kEvenX) {
+        even_(even) {
     const std::uint32_t next = has_y_ ? y + 1 : y;
     rows_[0] = low.row(y);
     rows_[1] = low.row(next);
@@ -198,7 +225,7 @@ class CellRow {
     return any & ~all & has_next(w);
   }
 
-  // How many triangles these 64 cells have; `splits` of cells of even and odd x + y + z.
+  // How many triangles these 64 cells have; `splits` of cells of even and odd parity.
   unsigned count_triangles(std::size_t w, const CornerWords& corners,
                            const std::array<CellSplit, 2>& splits) const {
     const Word cells = crossed_cells(w, corners);
@@ -224,38 +251,44 @@ class CellRow {
   bool has_y_;
   bool has_z_;
   bool five_;
-  Word even_;  // the row's samples of even x + y + z
+  Word even_;
 };
 
 // The signs of the planes around the one that is worked on, each classified once as z rises.
 template <class T>
 class SignWindow {
  public:
-  SignWindow(const Lattice<T>& lattice, T smallest, std::uint32_t first)
-      : lattice_(lattice),
-        smallest_(smallest),
-        planes_{SignPlane(lattice.dims), SignPlane(lattice.dims), SignPlane(lattice.dims)},
+  SignWindow(const Extraction<T>& extraction, std::uint32_t first)
+      : extraction_(extraction),
+        dims_(extraction.dims),
+        planes_{SignPlane(dims_), SignPlane(dims_), SignPlane(dims_)},
         next_(first) {}
 
   std::size_t words() const { return planes_[0].words(); }
 
   // Classifies up to the plane above z. Afterwards rows of z - 1 and z can be asked for.
   void reach(std::uint32_t z) {
-    for (; next_ <= z + 1 && next_ < lattice_.dims.z; ++next_) {
-      classify(lattice_, next_, smallest_, planes_[next_ % kPlanes]);
+    for (; next_ <= z + 1 && next_ < dims_.z; ++next_) {
+      SignPlane& plane = planes_[next_ % kPlanes];
+      if (extraction_.margin == 0) {
+        classify(extraction_.lattice, next_, extraction_.smallest, plane);
+      } else {
+        classify_with_margin(extraction_.lattice, next_, extraction_.smallest, plane);
+      }
     }
   }
 
-  CellRow row(Scheme scheme, std::uint32_t y, std::uint32_t z) const {
-    const std::uint32_t above = std::min(z + 1, lattice_.dims.z - 1);
-    return {lattice_.dims, scheme, planes_[z % kPlanes], planes_[above % kPlanes], y, z};
+  CellRow row(std::uint32_t y, std::uint32_t z) const {
+    const std::uint32_t above = std::min(z + 1, dims_.z - 1);
+    const Word even = extraction_.parity(0, y, z) == 0 ? kEvenX : ~kEvenX;
+    return {dims_, extraction_.scheme, even, planes_[z % kPlanes], planes_[above % kPlanes], y, z};
   }
 
  private:
   static constexpr std::uint32_t kPlanes = 3;
 
-  const Lattice<T>& lattice_;
-  T smallest_;
+  const Extraction<T>& extraction_;
+  const Dims dims_;
   std::array<SignPlane, kPlanes> planes_;
   std::uint32_t next_;
 };

@@ -6,6 +6,7 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "server/mesh/slabs.cpp"
+#include <atomic>
 #include <bit>
 #include <cstring>
 #include <functional>
@@ -98,11 +99,12 @@ class SlabWriter {
   SlabWriter(const Extraction<T>& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh)
       : extraction_(extraction),
         lattice_(extraction.lattice),
+        dims_(extraction.dims),
         slab_(slab),
         mesh_(mesh),
-        signs_(extraction.lattice, extraction.smallest, slab.begin),
-        rows_(extraction.lattice.dims, memory),
-        crossings_((std::size_t{extraction.lattice.dims.x} + 1) * kPlaces) {
+        signs_(extraction, slab.begin),
+        rows_(extraction.dims, memory),
+        crossings_((std::size_t{extraction.dims.x} + 1) * kPlaces) {
     for (unsigned parity = 0; parity < 2; ++parity) {
       for (unsigned direction = 1; direction < 8; ++direction) {
         const EdgeEnds ends = extraction.splits[parity].ends[direction];
@@ -121,12 +123,12 @@ class SlabWriter {
   void write() {
     auto vertex = static_cast<std::uint32_t>(mesh_.layer_vertices[slab_.begin]);
     signs_.reach(slab_.begin);
-    for (std::uint32_t y = 0; y < lattice_.dims.y; ++y) number_row(y, slab_.begin, vertex);
+    for (std::uint32_t y = 0; y < dims_.y; ++y) number_row(y, slab_.begin, vertex);
     Triangle* out = mesh_.triangles.data() + mesh_.layer_triangles[slab_.begin];
-    for (std::uint32_t z = slab_.begin; z < slab_.end && z + 1 < lattice_.dims.z; ++z) {
+    for (std::uint32_t z = slab_.begin; z < slab_.end && z + 1 < dims_.z; ++z) {
       signs_.reach(z + 1);
       number_row(0, z + 1, vertex);
-      for (std::uint32_t y = 0; y + 1 < lattice_.dims.y; ++y) {
+      for (std::uint32_t y = 0; y + 1 < dims_.y; ++y) {
         number_row(y + 1, z + 1, vertex);
         out = write_triangles(y, z, out);
       }
@@ -153,14 +155,14 @@ class SlabWriter {
     for (std::size_t i = 0; i < crossings_found_; ++i) {
       indices[crossings_[i]] = vertex + static_cast<std::uint32_t>(i);
     }
-    if (z < slab_.end) place_vertices(y, z, mesh_.positions.data() + vertex);
+    if (z < slab_.end) place_vertices(y, z, vertex);
     vertex += static_cast<std::uint32_t>(crossings_found_);
   }
 
   // Lists the crossed edges that the row's samples own, in order, each as kPlaces * x + direction.
   // A flat list, because how many a sample has is hard to predict: loops over it are not.
   void find_crossings(std::uint32_t y, std::uint32_t z) {
-    const CellRow row = signs_.row(extraction_.scheme, y, z);
+    const CellRow row = signs_.row(y, z);
     WordCells* cells = rows_.cells(y, z);
     std::uint32_t* next = crossings_.data();
     for (std::size_t w = 0; w < rows_.words(); ++w) {
@@ -175,7 +177,8 @@ class SlabWriter {
         const auto bit = static_cast<unsigned>(std::countr_zero(owners));
         const std::size_t x = w * kWordBits + bit;
         const unsigned directions =
-            extraction_.splits[(x + y + z) & 1].crossed[cells[w].cases[bit]] & row.existing_at(x);
+            extraction_.splits[extraction_.parity(x, y, z)].crossed[cells[w].cases[bit]] &
+            row.existing_at(x);
         // All eight places of the list are written, and only the valid ones kept.
         const auto& members = kMembers[directions];
         for (std::size_t i = 0; i < kPlaces; ++i) {
@@ -187,21 +190,65 @@ class SlabWriter {
     crossings_found_ = static_cast<std::size_t>(next - crossings_.data());
   }
 
-  // Places the vertices of the row's crossings.
-  void place_vertices(std::uint32_t y, std::uint32_t z, Vec3* out) const {
+  // Places the vertices of the row's crossings, the first of which is `vertex`.
+  void place_vertices(std::uint32_t y, std::uint32_t z, std::uint32_t vertex) const {
+    if (extraction_.margin == 0) return place_inner(0, crossings_found_, y, z, vertex);
+    // Edges that lie in a face of the volume's box or leave it have samples here as their owners.
+    const auto is_at_border = [](std::uint32_t at, std::uint32_t samples) {
+      return at <= 1 || at + 2 >= samples;
+    };
+    std::size_t begin = 0;
+    std::size_t end = crossings_found_;
+    if (is_at_border(y, dims_.y) || is_at_border(z, dims_.z)) {
+      begin = end;
+    } else {
+      while (begin < end && is_at_border(crossings_[begin] / kPlaces, dims_.x)) ++begin;
+      while (begin < end && is_at_border(crossings_[end - 1] / kPlaces, dims_.x)) --end;
+    }
+    place_at_border(0, begin, y, z, vertex);
+    place_inner(begin, end, y, z, vertex);
+    place_at_border(end, crossings_found_, y, z, vertex);
+  }
+
+  // Those of the crossings [begin, end), of edges between the lattice's own samples.
+  void place_inner(std::size_t begin, std::size_t end, std::uint32_t y, std::uint32_t z,
+                   std::uint32_t vertex) const {
+    if (begin == end) return;
     const LatticeToSpace& map = lattice_.to_space;
-    const T* samples = lattice_.samples + (std::size_t{z} * lattice_.dims.y + y) * lattice_.dims.x;
-    const Double4 row_at = lanes(map.origin) + lanes(map.step_y) * y + lanes(map.step_z) * z;
+    const std::uint32_t margin = extraction_.margin;
+    const T* samples = lattice_.samples - margin +
+                       (std::size_t{z - margin} * lattice_.dims.y + (y - margin)) * lattice_.dims.x;
+    const Double4 row_at =
+        lanes(map.origin) + lanes(map.step_y) * (y - margin) + lanes(map.step_z) * (z - margin);
     const Double4 step_x = lanes(map.step_x);
-    for (std::size_t i = 0; i < crossings_found_; ++i) {
+    Vec3* out = mesh_.positions.data() + vertex;
+    for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t crossing = crossings_[i];
       const std::uint32_t x = crossing / kPlaces;
-      const EdgeFrame& edge = frames_[(x + y + z) & 1][crossing % kPlaces];
+      const EdgeFrame& edge = frames_[extraction_.parity(x, y, z)][crossing % kPlaces];
       const double share =
           extraction_.placement.share(samples[x + edge.from], samples[x + edge.to]);
-      const Double4 at = row_at + step_x * static_cast<double>(static_cast<std::int32_t>(x));
+      const Double4 at =
+          row_at + step_x * static_cast<double>(static_cast<std::int32_t>(x - margin));
       const Float4 position = __builtin_convertvector(at + edge.start + edge.run * share, Float4);
       std::memcpy(out + i, &position, sizeof *out);
+    }
+  }
+
+  // The same where edges may lie on the border or lead to phantoms.
+  void place_at_border(std::size_t begin, std::size_t end, std::uint32_t y, std::uint32_t z,
+                       std::uint32_t vertex) const {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t x = crossings_[i] / kPlaces;
+      const CellSplit& split = extraction_.splits[extraction_.parity(x, y, z)];
+      const auto placed =
+          extraction_.border->place({std::int64_t{x} - 1, std::int64_t{y} - 1, std::int64_t{z} - 1},
+                                    split.ends[crossings_[i] % kPlaces]);
+      mesh_.positions[vertex + i] = placed.position;
+      if (!placed.on_border) continue;
+      // Another slab may have its vertices' bits in the same word.
+      std::atomic_ref(mesh_.on_border[(vertex + i) / kFlagBits])
+          .fetch_or(Word{1} << ((vertex + i) % kFlagBits), std::memory_order_relaxed);
     }
   }
 
@@ -213,7 +260,8 @@ class SlabWriter {
       for (Word rest = cells[w].crossed; rest != 0; rest &= rest - 1) {
         const auto bit = static_cast<unsigned>(std::countr_zero(rest));
         const std::size_t x = w * kWordBits + bit;
-        const CellCase& cell = extraction_.splits[(x + y + z) & 1].cases[cells[w].cases[bit]];
+        const CellCase& cell =
+            extraction_.splits[extraction_.parity(x, y, z)].cases[cells[w].cases[bit]];
         const std::uint32_t* places = indices + x * kPlaces;
         for (std::size_t t = 0; t < cell.triangles; ++t) {
           const auto& [a, b, c] = cell.edges[t];
@@ -240,24 +288,25 @@ class SlabWriter {
 
   const Extraction<T>& extraction_;
   const Lattice<T>& lattice_;
+  const Dims dims_;
   const Slab slab_;
   Mesh& mesh_;
   SignWindow<T> signs_;
   RowRing rows_;
   std::vector<std::uint32_t> crossings_;  // of the row that is numbered
   std::size_t crossings_found_ = 0;
-  std::array<std::array<EdgeFrame, 8>, 2> frames_ = {};  // by parity of x + y + z, and direction
+  std::array<std::array<EdgeFrame, 8>, 2> frames_ = {};  // by parity and direction
 };
 
 template <class T>
 void count_slab_here(const Extraction<T>& extraction, const Slab& slab, SurfaceCount& count) {
-  SignWindow<T> signs(extraction.lattice, extraction.smallest, slab.begin);
+  SignWindow<T> signs(extraction, slab.begin);
   for (std::uint32_t z = slab.begin; z < slab.end; ++z) {
     signs.reach(z);
     std::uint64_t vertices = 0;
     std::uint64_t triangles = 0;
-    for (std::uint32_t y = 0; y < extraction.lattice.dims.y; ++y) {
-      const CellRow row = signs.row(extraction.scheme, y, z);
+    for (std::uint32_t y = 0; y < extraction.dims.y; ++y) {
+      const CellRow row = signs.row(y, z);
       for (std::size_t w = 0; w < signs.words(); ++w) {
         if (!row.may_cross(w)) continue;
         const CornerWords corners = row.corners(w);

@@ -6,8 +6,10 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
+#include "server/mesh/border.h"
 #include "server/mesh/extract.h"
 #include "server/mesh/placement.h"
 #include "server/mesh/tetrahedra.h"
@@ -20,16 +22,34 @@ struct Slab {
   std::uint32_t end = 0;
 };
 
-// What all slabs of an extraction share. Immutable while they are worked on.
+// How many layers of phantoms are around the volume.
+inline std::uint32_t margin_of(const ExtractOptions& options) { return options.close ? 1 : 0; }
+
+// The samples that are marched over: the lattice's, and the phantoms around them.
+inline Dims marched_dims(const Dims& dims, const ExtractOptions& options) {
+  const std::uint32_t more = 2 * margin_of(options);
+  return {dims.x + more, dims.y + more, dims.z + more};
+}
+
+// What all slabs of an extraction share. Samples are numbered with the phantoms, so the lattice's
+// begin at `margin`. Immutable while slabs are worked on.
 template <class T>
 struct Extraction {
   Extraction(const Lattice<T>& the_lattice, const ExtractOptions& options, T the_smallest);
 
+  // Of the cell or sample there; by the lattice's own numbers, phantoms or not.
+  unsigned parity(std::size_t x, std::size_t y, std::size_t z) const {
+    return (x + y + z + margin) & 1;
+  }
+
   const Lattice<T>& lattice;
+  std::uint32_t margin;
+  Dims dims;  // of what is marched over
   Scheme scheme;
   T smallest;  // the smallest value that is inside
   Placement placement;
-  std::array<CellSplit, 2> splits;  // of cells of even and of odd x + y + z, wound for the lattice
+  std::optional<BorderPlacement<T>> border;  // of a surface that is closed
+  std::array<CellSplit, 2> splits;           // by parity, wound for the lattice
 };
 
 // Memory that slabs work in, lent to one of them at a time: its pages are mapped once a thread, not
@@ -62,7 +82,8 @@ class IndexMemory {
 // Places a sample, by direction, for the indices of the vertices on the edges that it owns.
 inline constexpr std::size_t kPlaces = 8;
 
-// How many indices a slab of such a lattice works with: those of one plane and two rows.
+// How many indices a slab works with that marches over such samples: those of one plane and two
+// rows.
 inline std::size_t index_memory_size(const Dims& dims) {
   return (std::size_t{dims.y} + 2) * dims.x * kPlaces;
 }

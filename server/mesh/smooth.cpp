@@ -50,7 +50,8 @@ void for_each_corner(const VertexSlab& slab, Visit visit) {
 // an oriented manifold the triangles around a vertex name each of its neighbours once as the next
 // corner and once as the previous one, unless the vertex lies on the boundary: then its first
 // neighbour is never a next one and its last never a previous one, and the sums differ.
-std::uint64_t count_neighbors(const VertexSlab& slab, Connectivity& connectivity) {
+std::uint64_t count_neighbors(const Mesh& mesh, const VertexSlab& slab,
+                              Connectivity& connectivity) {
   std::vector<std::uint32_t> balance(slab.size(), 0);
   std::uint32_t* counts = connectivity.offsets.data() + 1;
   std::fill(counts + slab.begin, counts + slab.end, 0);
@@ -60,7 +61,7 @@ std::uint64_t count_neighbors(const VertexSlab& slab, Connectivity& connectivity
   });
   std::uint64_t sum = 0;
   for (std::size_t v = slab.begin; v < slab.end; ++v) {
-    if (balance[v - slab.begin] != 0) counts[v] = 0;
+    if (balance[v - slab.begin] != 0 || mesh.is_on_border(v)) counts[v] = 0;
     sum += counts[v];
   }
   return sum;
@@ -111,7 +112,7 @@ void build_connectivity(const Mesh& mesh, const Context& context, Connectivity& 
   std::vector<std::uint64_t> slab_offsets(slabs + 1, 0);
   const Context quiet{context.stop, nullptr};
   parallel_for(quiet, slabs, [&](std::size_t slab) {
-    slab_offsets[slab + 1] = count_neighbors(VertexSlab(mesh, slab), connectivity);
+    slab_offsets[slab + 1] = count_neighbors(mesh, VertexSlab(mesh, slab), connectivity);
   });
   std::partial_sum(slab_offsets.begin(), slab_offsets.end(), slab_offsets.begin());
   if (slab_offsets.back() > UINT32_MAX) {

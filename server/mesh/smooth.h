@@ -10,8 +10,9 @@
 namespace isomesh::mesh {
 
 // Which vertices each vertex is joined to by an edge, as compressed lists: the neighbours of v are
-// neighbors[offsets[v] .. offsets[v + 1]). A vertex on the boundary has an empty list: smoothing
-// keeps it where it is.
+// neighbors[offsets[v] .. offsets[v + 1]). A vertex on the boundary or, of a closed surface, on the
+// border of the volume has an empty list: smoothing keeps it where it is, so caps stay flat, and
+// closing a surface does not change how the rest of it is smoothed.
 struct Connectivity {
   Buffer<std::uint32_t> offsets;  // vertices + 1
   Buffer<std::uint32_t> neighbors;

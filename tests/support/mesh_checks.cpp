@@ -286,6 +286,7 @@ testing::AssertionResult same_bytes(const mesh::Mesh& a, const mesh::Mesh& b) {
   if (a.layer_vertices != b.layer_vertices || a.layer_triangles != b.layer_triangles) {
     return testing::AssertionFailure() << "the layers differ";
   }
+  if (a.on_border != b.on_border) return testing::AssertionFailure() << "the borders differ";
   if (!equal_bytes(a.positions.data(), a.positions.size(), b.positions.data(),
                    b.positions.size())) {
     return testing::AssertionFailure() << "the positions differ";

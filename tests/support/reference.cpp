@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <numeric>
 #include <span>
 #include <sstream>
 #include <string>
@@ -51,17 +53,32 @@ Point mean_in_space(const std::vector<Sample>& samples, const mesh::LatticeToSpa
   return sum;
 }
 
+std::array<std::uint32_t, 3> counts_of(const mesh::Dims& dims) { return {dims.x, dims.y, dims.z}; }
+
+bool is_phantom(const Sample& s, const ReferenceMesh& mesh) {
+  const auto counts = counts_of(mesh.dims);
+  for (std::size_t axis = 0; axis < 3 && mesh.closed; ++axis) {
+    if (s[axis] == 0 || s[axis] + 1 == counts[axis]) return true;
+  }
+  return false;
+}
+
 template <class T>
 class ReferenceBuilder {
  public:
   ReferenceBuilder(const mesh::Lattice<T>& lattice, const mesh::ExtractOptions& options)
-      : lattice_(lattice), options_(options) {
-    mesh_.dims = lattice.dims;
+      : lattice_(lattice), options_(options), margin_(options.close ? 1 : 0) {
+    mesh_.closed = options.close;
+    mesh_.dims = {lattice.dims.x + 2 * margin_, lattice.dims.y + 2 * margin_,
+                  lattice.dims.z + 2 * margin_};
     mesh_.to_space = lattice.to_space;
+    const double first = -static_cast<double>(margin_);
+    mesh_.to_space.origin = to_space(lattice.to_space, {first, first, first});
   }
 
   ReferenceMesh build() {
-    const mesh::Dims& dims = lattice_.dims;
+    if (!lattice_.dims.has_cells()) return std::move(mesh_);
+    const mesh::Dims& dims = mesh_.dims;
     for (std::uint32_t k = 0; k + 1 < dims.z; ++k) {
       for (std::uint32_t j = 0; j + 1 < dims.y; ++j) {
         for (std::uint32_t i = 0; i + 1 < dims.x; ++i) add_cell({i, j, k});
@@ -73,7 +90,8 @@ class ReferenceBuilder {
  private:
   void add_cell(const Sample& cell) {
     const bool five = options_.scheme == Scheme::kFive;
-    const bool mirrored = five && (cell[0] + cell[1] + cell[2]) % 2 == 1;
+    // By the volume's own numbers, which are `margin_` smaller.
+    const bool mirrored = five && (cell[0] + cell[1] + cell[2] + 3 * margin_) % 2 == 1;
     const std::span<const Tetrahedron> table =
         five ? std::span<const Tetrahedron>(kFiveTetrahedra) : kSixTetrahedra;
     for (const Tetrahedron& tetrahedron : table) {
@@ -132,20 +150,29 @@ class ReferenceBuilder {
   }
 
   double fraction(const Sample& inside, const Sample& outside) const {
+    if (is_phantom(outside)) return std::numeric_limits<double>::quiet_NaN();
     if (options_.interpolation == Interpolation::kMidpoint) return 0.5;
     return static_cast<double>((static_cast<long double>(options_.iso) - value(inside)) /
                                (value(outside) - value(inside)));
   }
 
   std::uint64_t index(const Sample& s) const {
-    return (std::uint64_t{s[2]} * lattice_.dims.y + s[1]) * lattice_.dims.x + s[0];
+    return (std::uint64_t{s[2]} * mesh_.dims.y + s[1]) * mesh_.dims.x + s[0];
   }
 
+  bool is_phantom(const Sample& s) const { return test::is_phantom(s, mesh_); }
+
   // The difference of two large doubles does not overflow a long double.
-  long double value(const Sample& s) const { return lattice_.samples[index(s)]; }
+  long double value(const Sample& s) const {
+    if (is_phantom(s)) return -std::numeric_limits<long double>::infinity();
+    const mesh::Dims& dims = lattice_.dims;
+    return lattice_
+        .samples[((s[2] - margin_) * dims.y + (s[1] - margin_)) * dims.x + s[0] - margin_];
+  }
 
   const mesh::Lattice<T>& lattice_;
   const mesh::ExtractOptions& options_;
+  const std::uint32_t margin_;  // layers of phantoms
   ReferenceMesh mesh_;
   std::map<std::pair<std::uint64_t, std::uint64_t>, std::uint32_t> numbers_;
 };
@@ -265,6 +292,68 @@ testing::AssertionResult match_vertices(const Surface& surface, const ReferenceM
   return testing::AssertionSuccess();
 }
 
+// A closed surface's vertices are near each other on the edges of the box, so they are told apart
+// by their order: that of the samples that own their edges, and at one sample that of the
+// directions.
+std::vector<std::uint32_t> in_order_of_owners(const ReferenceMesh& reference) {
+  const auto key = [&](std::uint32_t v) {
+    const auto& [inside, outside, fraction] = reference.vertices[v];
+    std::array<std::uint32_t, 4> owner_and_direction = {};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      owner_and_direction[2 - axis] = std::min(inside[axis], outside[axis]);
+      owner_and_direction[3] |= (inside[axis] != outside[axis] ? 1U : 0U) << axis;
+    }
+    return owner_and_direction;
+  };
+  std::vector<std::uint32_t> names(reference.vertices.size());
+  std::iota(names.begin(), names.end(), 0U);
+  std::ranges::sort(names, {}, key);
+  return names;
+}
+
+// On the way from the inside sample to the border sample that the phantom is next to; across the
+// other faces of the box that the edge lies in it may have given way by up to a fifth.
+bool cap_place_is_right(const Point& p, const ReferenceVertex& vertex,
+                        const ReferenceMesh& reference, double rounding) {
+  const auto counts = counts_of(reference.dims);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double low = 1;
+    const double high = counts[axis] - 2.0;
+    const double from = vertex.inside[axis];
+    const double to = std::clamp<double>(vertex.outside[axis], low, high);
+    const bool may_give_way = vertex.inside[axis] == vertex.outside[axis];
+    const double least = std::min(from, to) - (may_give_way && from == high ? 0.2 : 0);
+    const double most = std::max(from, to) + (may_give_way && from == low ? 0.2 : 0);
+    if (p[axis] < least - rounding || p[axis] > most + rounding) return false;
+  }
+  return true;
+}
+
+testing::AssertionResult match_closed_vertices(const mesh::Mesh& mesh,
+                                               const ReferenceMesh& reference,
+                                               std::vector<std::uint32_t>& names) {
+  const double rounding = rounding_of(reference);
+  names = in_order_of_owners(reference);
+  const Surface surface = surface_of(mesh);
+  for (std::size_t v = 0; v < names.size(); ++v) {
+    const ReferenceVertex& vertex = reference.vertices[names[v]];
+    const Point p = to_lattice(reference.to_space, surface.points[v]);
+    if (mesh.is_on_border(v) != is_on_border(vertex, reference)) {
+      return testing::AssertionFailure() << "on_border is wrong at " << describe(p);
+    }
+    if (is_phantom(vertex.outside, reference)) {
+      if (cap_place_is_right(p, vertex, reference, rounding)) continue;
+    } else {
+      const EdgeCoordinates place = along_edge(p, vertex);
+      const bool right = place.distance < 3 * rounding &&
+                         fraction_is_right(place.fraction, vertex.fraction, rounding);
+      if (right) continue;
+    }
+    return testing::AssertionFailure() << "the vertex at " << describe(p) << " is in a wrong place";
+  }
+  return testing::AssertionSuccess();
+}
+
 using NamedTriangle = std::array<std::uint32_t, 3>;
 
 // Rotated so that the smallest vertex is first: the winding stays.
@@ -366,6 +455,18 @@ std::uint64_t ReferenceMesh::triangles() const {
   return count;
 }
 
+bool is_on_border(const ReferenceVertex& vertex, const ReferenceMesh& reference) {
+  if (is_phantom(vertex.outside, reference)) return true;
+  const auto counts = counts_of(reference.dims);
+  const std::uint32_t margin = reference.closed ? 1 : 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::uint32_t at = vertex.inside[axis];
+    if (at != vertex.outside[axis]) continue;
+    if (at == margin || at + 1 + margin == counts[axis]) return true;
+  }
+  return false;
+}
+
 Surface ReferenceMesh::surface() const {
   Surface surface;
   for (const ReferenceVertex& vertex : vertices) {
@@ -395,9 +496,9 @@ testing::AssertionResult matches(const mesh::Mesh& mesh, const ReferenceMesh& re
   }
   if (const auto result = layers_are_right(mesh); !result) return result;
   std::vector<std::uint32_t> names;
-  if (const auto result = match_vertices(surface_of(mesh), reference, names); !result) {
-    return result;
-  }
+  const auto vertices_match = reference.closed ? match_closed_vertices(mesh, reference, names)
+                                               : match_vertices(surface_of(mesh), reference, names);
+  if (!vertices_match) return vertices_match;
   if (const auto result = vertices_are_in_their_layers(mesh, reference, names); !result) {
     return result;
   }

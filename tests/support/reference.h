@@ -18,7 +18,8 @@
 namespace isomesh::test {
 
 // A vertex by its lattice edge. `fraction` is the exact share of the way from the inside sample to
-// the outside one: 0 where the inside sample has the iso-value.
+// the outside one: 0 where the inside sample has the iso-value, and NaN where the outside one is a
+// phantom beyond the border, which has no value.
 struct ReferenceVertex {
   std::array<std::uint32_t, 3> inside;
   std::array<std::uint32_t, 3> outside;
@@ -32,7 +33,10 @@ struct ReferencePatch {
   std::uint32_t layer = 0;  // k of its cell
 };
 
+// Of a surface that is closed the samples are those of the volume with one layer of phantoms around
+// it: numbers, dims and map are of that larger lattice.
 struct ReferenceMesh {
+  bool closed = false;
   mesh::Dims dims;
   mesh::LatticeToSpace to_space;
   std::vector<ReferenceVertex> vertices;
@@ -53,9 +57,15 @@ ReferenceMesh reference_surface(const mesh::Lattice<T>& lattice,
 // of the edge. A vertex that is farther from both must be exact up to the rounding of floats.
 inline constexpr double kEndMargin = 1e-3;
 
+// Whether both samples of the vertex's edge are in one face of the volume's box, or one is a
+// phantom.
+bool is_on_border(const ReferenceVertex& vertex, const ReferenceMesh& reference);
+
 // The same surface: every vertex of `mesh` is the reference's vertex of one lattice edge, one to
 // one; every patch is there with the same winding and nothing else is; vertices and triangles are
-// in the layers that mesh.h promises.
+// in the layers that mesh.h promises. Of a closed surface, vertices on edges to phantoms lie
+// between the samples of the border that the edge is next to, and on_border tells them and their
+// rims.
 testing::AssertionResult matches(const mesh::Mesh& mesh, const ReferenceMesh& reference);
 
 }  // namespace isomesh::test
