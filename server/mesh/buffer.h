@@ -25,6 +25,12 @@ class Buffer {
     if (data_) data_[count] = T{};
   }
 
+  // Forgets the elements from `count` on, which is at most size(); the memory is kept.
+  void shrink(std::size_t count) {
+    size_ = count;
+    if (data_) data_[count] = T{};
+  }
+
   std::size_t size() const { return size_; }
   std::size_t capacity_bytes() const { return capacity_ * sizeof(T); }
   T* data() { return data_.get(); }

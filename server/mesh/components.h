@@ -1,0 +1,34 @@
+// The parts of a surface that do not touch, and leaving out the small ones.
+#pragma once
+
+#include <cstdint>
+
+#include "proto/types.h"
+#include "server/mesh/buffer.h"
+#include "server/mesh/context.h"
+#include "server/mesh/mesh.h"
+
+namespace isomesh::mesh {
+
+// The component of each vertex; components are numbered from 0 on in the order of their first
+// vertices. Two vertices are of one component when triangles connect them.
+struct Components {
+  Buffer<std::uint32_t> of_vertex;
+  std::uint32_t count = 0;
+};
+
+// The same for any number of threads. `components`' memory is reused. Throws Error kCancelled.
+void find_components(const Mesh& mesh, const Context& context, Components& components);
+
+struct Dropped {
+  std::uint64_t components = 0;
+  std::uint64_t triangles = 0;
+};
+
+// Leaves only the components that the filter keeps, in place: those of at least
+// `filter.min_triangles`, and of these the `filter.keep` with the most triangles, of equal ones the
+// first. Vertices and triangles keep their order and their layers. The same for any number of
+// threads. Throws Error kCancelled before anything is changed.
+Dropped keep_components(const ComponentFilter& filter, const Context& context, Mesh& mesh);
+
+}  // namespace isomesh::mesh
