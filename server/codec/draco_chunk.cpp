@@ -17,6 +17,7 @@ namespace isomesh::codec {
 namespace {
 
 constexpr int kSequentialSpeed = 10;
+constexpr int kNormalBits = 10;  // of each octahedral coordinate: a tenth of a degree
 
 // Draco's entropy coder counts values in an array of all that there could be, four bytes each: 4
 // GiB at 30 bits. Finer grids than this are stored without it, in up to four bytes a coordinate.
@@ -47,6 +48,7 @@ Bounds bounds_of(std::span<const mesh::Vec3> positions) {
 // Part of a mesh with vertices numbered anew, in the order in which its triangles name them.
 struct Part {
   std::vector<mesh::Vec3> positions;
+  std::vector<mesh::Vec3> normals;  // as many, or none
   std::vector<mesh::Triangle> triangles;
 };
 
@@ -58,7 +60,7 @@ void for_each_triangle(const mesh::Mesh& mesh, const Block& block, Visit visit) 
   }
 }
 
-Part part_of(const mesh::Mesh& mesh, const Block& block) {
+Part part_of(const mesh::Mesh& mesh, const Block& block, std::span<const mesh::Vec3> normals) {
   constexpr std::uint32_t kUnnamed = std::numeric_limits<std::uint32_t>::max();
   std::uint32_t low = kUnnamed;
   std::uint32_t high = 0;
@@ -82,6 +84,7 @@ Part part_of(const mesh::Mesh& mesh, const Block& block) {
       if (vertex == kUnnamed) {
         vertex = static_cast<std::uint32_t>(part.positions.size());
         part.positions.push_back(mesh.positions[triangle[corner]]);
+        if (!normals.empty()) part.normals.push_back(normals[triangle[corner]]);
       }
       renumbered[corner] = vertex;
     }
@@ -89,20 +92,23 @@ Part part_of(const mesh::Mesh& mesh, const Block& block) {
   return part;
 }
 
+// Adds one vector a point. Returns the attribute's id within the stream.
+std::uint32_t add_attribute(draco::Mesh& mesh, draco::GeometryAttribute::Type type,
+                            std::span<const mesh::Vec3> vectors) {
+  draco::GeometryAttribute description;
+  description.Init(type, nullptr, 3, draco::DT_FLOAT32, false, sizeof(mesh::Vec3), 0);
+  draco::PointAttribute* attribute = mesh.attribute(
+      mesh.AddAttribute(description, true, static_cast<std::uint32_t>(vectors.size())));
+  // One write for all: the attribute's buffer has the layout of our vectors.
+  if (!vectors.empty()) attribute->buffer()->Write(0, vectors.data(), vectors.size_bytes());
+  return attribute->unique_id();
+}
+
 // Built from arrays: Draco's soup builder would look for duplicates again.
-std::unique_ptr<draco::Mesh> to_draco(std::span<const mesh::Vec3> positions,
+std::unique_ptr<draco::Mesh> to_draco(std::size_t vertices,
                                       std::span<const mesh::Triangle> triangles) {
   auto result = std::make_unique<draco::Mesh>();
-  const auto vertices = static_cast<std::uint32_t>(positions.size());
-  result->set_num_points(vertices);
-  draco::GeometryAttribute position;
-  position.Init(draco::GeometryAttribute::POSITION, nullptr, 3, draco::DT_FLOAT32, false,
-                sizeof(mesh::Vec3), 0);
-  draco::PointAttribute* attribute =
-      result->attribute(result->AddAttribute(position, true, vertices));
-  // One write for all: the attribute's buffer has the layout of our positions.
-  if (vertices > 0) attribute->buffer()->Write(0, positions.data(), positions.size_bytes());
-
+  result->set_num_points(static_cast<std::uint32_t>(vertices));
   result->SetNumFaces(triangles.size());
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     const auto& [a, b, c] = triangles[t];
@@ -165,17 +171,23 @@ std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_
 
 Block whole_block(const mesh::Mesh& mesh) { return {{0, mesh.triangles.size()}}; }
 
-DracoStream encode_draco(const mesh::Mesh& mesh, const Block& block, const Grid& grid, int speed) {
+DracoStream encode_draco(const mesh::Mesh& mesh, const Block& block, const Grid& grid, int speed,
+                         std::span<const mesh::Vec3> normals) {
   const bool whole =
       block.size() == 1 && block[0].begin == 0 && block[0].end == mesh.triangles.size();
-  const Part part = whole ? Part() : part_of(mesh, block);
+  const Part part = whole ? Part() : part_of(mesh, block, normals);
   const std::span positions = whole ? mesh.positions.span() : std::span(part.positions);
   const std::span triangles = whole ? mesh.triangles.span() : std::span(part.triangles);
 
   DracoStream stream;
-  const std::unique_ptr<draco::Mesh> draco_mesh = to_draco(positions, triangles);
-  stream.position_id = draco_mesh->attribute(0)->unique_id();
+  const std::unique_ptr<draco::Mesh> draco_mesh = to_draco(positions.size(), triangles);
+  stream.position_id = add_attribute(*draco_mesh, draco::GeometryAttribute::POSITION, positions);
   draco::Encoder encoder;
+  if (!normals.empty()) {
+    stream.normal_id = add_attribute(*draco_mesh, draco::GeometryAttribute::NORMAL,
+                                     whole ? normals : std::span(part.normals));
+    encoder.SetAttributeQuantization(draco::GeometryAttribute::NORMAL, kNormalBits);
+  }
   encoder.SetSpeedOptions(speed, speed);
   if (grid.bits > kMostEntropyCodedBits) {
     encoder.options().SetGlobalBool("use_built_in_attribute_compression", false);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "proto/types.h"
@@ -29,8 +30,9 @@ struct DracoStream {
   std::vector<std::byte> bytes;
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
-  std::uint32_t position_id = 0;  // the attribute's id within the stream
-  mesh::Vec3 low = {0, 0, 0};     // bounds of the decoded positions
+  std::uint32_t position_id = 0;  // the attributes' ids within the stream
+  std::uint32_t normal_id = 0;
+  mesh::Vec3 low = {0, 0, 0};  // bounds of the decoded positions
   mesh::Vec3 high = {0, 0, 0};
 };
 
@@ -53,8 +55,10 @@ std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_
 Block whole_block(const mesh::Mesh& mesh);
 
 // Encodes the block's triangles with the vertices they name: by edgebreaker, or for speed 10 (as
-// Draco's own convention has it) and for a mesh without triangles sequentially. Takes one thread.
-// Thread safe. Throws Error kInternal when Draco refuses.
-DracoStream encode_draco(const mesh::Mesh& mesh, const Block& block, const Grid& grid, int speed);
+// Draco's own convention has it) and for a mesh without triangles sequentially. `normals` are those
+// of the mesh's vertices, or none; a normal decodes to the same bits in every stream. Takes one
+// thread. Thread safe. Throws Error kInternal when Draco refuses.
+DracoStream encode_draco(const mesh::Mesh& mesh, const Block& block, const Grid& grid, int speed,
+                         std::span<const mesh::Vec3> normals = {});
 
 }  // namespace isomesh::codec

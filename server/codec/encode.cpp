@@ -1,7 +1,5 @@
 #include "server/codec/encode.h"
 
-#include <string>
-
 namespace isomesh::codec {
 
 void encode(const mesh::Mesh& mesh, MeshFormat format, const Provenance& provenance,
@@ -13,17 +11,12 @@ void encode(const mesh::Mesh& mesh, MeshFormat format, const Provenance& provena
     case MeshFormat::kStl:
       return encode_stl(mesh, context, sink);
     case MeshFormat::kGlb:
-      return encode_glb(mesh, draco, provenance, context, sink);
+      return encode_glb(mesh, provenance, context, sink);
     case MeshFormat::kPly:
+      return encode_ply(mesh, context, sink);
     case MeshFormat::kObj:
-      break;
+      return encode_obj(mesh, context, sink);
   }
-  throw invalid_parameter("formats",
-                          "this version does not write " + std::string(to_string(format)));
-}
-
-bool can_encode(MeshFormat format) {
-  return format == MeshFormat::kDrc || format == MeshFormat::kGlb || format == MeshFormat::kStl;
 }
 
 std::string_view media_type(MeshFormat format) {

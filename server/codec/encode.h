@@ -25,9 +25,20 @@ using Sink = std::function<void(std::span<const std::byte>)>;
 void encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco, const mesh::Context& context,
                 const Sink& sink);
 
+// STL, PLY and OBJ are written as they go, in some megabytes of memory, formatted side by side. The
+// bytes do not depend on the number of threads.
+
 // Binary STL, millimetres in LPS, normals from the winding. Throws Error kTooLarge beyond 2^32 - 1
 // triangles, and kCancelled.
 void encode_stl(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink);
+
+// Binary little-endian PLY, millimetres in LPS: vertices as floats, faces as lists of unsigned
+// 32-bit indices. Throws Error kCancelled.
+void encode_ply(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink);
+
+// OBJ, millimetres in LPS: numbers as the shortest text that reads as the same float. Throws Error
+// kCancelled.
+void encode_obj(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink);
 
 // What a file says about where its mesh comes from.
 struct Provenance {
@@ -39,20 +50,17 @@ struct Provenance {
 
 // Binary glTF 2.0: the mesh as one primitive for each block of some 60 000 triangles, each a Draco
 // stream of its own (KHR_draco_mesh_compression), encoded side by side. All share one quantisation
-// grid, so vertices on a seam between blocks decode to the same bits. Positions are LPS millimetres
-// under a node that turns them into glTF's metres with Y up. The bytes do not depend on the number
-// of threads. Throws Error kTooLarge beyond the 4 GiB that GLB can hold, kInternal when Draco
-// refuses, and kCancelled, looked at before each block.
-void encode_glb(const mesh::Mesh& mesh, const DracoParameters& draco, const Provenance& provenance,
-                const mesh::Context& context, const Sink& sink);
+// grid, so vertices on a seam between blocks decode to the same bits, and so do their normals,
+// which are there when the parameters ask for them. Positions are LPS millimetres under a node that
+// turns them into glTF's metres with Y up. The bytes do not depend on the number of threads. Throws
+// Error kTooLarge beyond the 4 GiB that GLB can hold, kInternal when Draco refuses, and kCancelled,
+// looked at before each block.
+void encode_glb(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
+                const Sink& sink);
 
-// Dispatches on the format; draco parameters are those of the provenance. Throws Error
-// kInvalidParameter for a format that is not supported.
+// Dispatches on the format; parameters are those of the provenance.
 void encode(const mesh::Mesh& mesh, MeshFormat format, const Provenance& provenance,
             const mesh::Context& context, const Sink& sink);
-
-// True for the formats that `encode` writes.
-bool can_encode(MeshFormat format);
 
 // The media type of a mesh file; application/octet-stream where none is registered.
 std::string_view media_type(MeshFormat format);

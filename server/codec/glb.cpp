@@ -10,6 +10,7 @@
 #include "proto/json.h"
 #include "server/codec/draco_chunk.h"
 #include "server/codec/encode.h"
+#include "server/mesh/normals.h"
 
 namespace isomesh::codec {
 namespace {
@@ -30,13 +31,17 @@ constexpr std::uint32_t kVersion = 2;
 constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
 constexpr std::uint32_t kBinaryChunk = 0x004E4942;
 
-std::vector<DracoStream> encode_chunks(const mesh::Mesh& mesh, const DracoParameters& draco,
+std::vector<DracoStream> encode_chunks(const mesh::Mesh& mesh, const JobParameters& parameters,
                                        const mesh::Context& context) {
+  const DracoParameters& draco = parameters.draco;
   const Grid grid = grid_of(mesh, draco.position_bits);
+  // Of the whole mesh, so that they are the same on both sides of a seam.
+  mesh::Buffer<mesh::Vec3> normals;
+  if (parameters.normals) vertex_normals(mesh, {context.stop, nullptr}, normals);
   const std::vector<Block> blocks = cut_blocks(mesh, kTrianglesPerBlock);
   std::vector<DracoStream> chunks(blocks.size());
   mesh::parallel_for(context, blocks.size(), [&](std::size_t i) {
-    chunks[i] = encode_draco(mesh, blocks[i], grid, draco.speed);
+    chunks[i] = encode_draco(mesh, blocks[i], grid, draco.speed, normals.span());
   });
   return chunks;
 }
@@ -44,7 +49,7 @@ std::vector<DracoStream> encode_chunks(const mesh::Mesh& mesh, const DracoParame
 std::size_t padded(std::size_t bytes) { return (bytes + kAlignment - 1) / kAlignment * kAlignment; }
 
 // One primitive, with the accessors and the buffer view that it names.
-void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset) {
+void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset, bool normals) {
   const std::size_t view = gltf["bufferViews"].size();
   gltf["bufferViews"].push_back(
       {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", chunk.bytes.size()}});
@@ -57,13 +62,19 @@ void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset) {
   gltf["accessors"].push_back({{"componentType", kUnsignedInt},
                                {"count", std::size_t{chunk.triangles} * 3},
                                {"type", "SCALAR"}});
+  Json accessors = {{"POSITION", accessor}};
+  Json attributes = {{"POSITION", chunk.position_id}};
+  if (normals) {
+    accessors["NORMAL"] = accessor + 2;
+    attributes["NORMAL"] = chunk.normal_id;
+    gltf["accessors"].push_back(
+        {{"componentType", kFloat}, {"count", chunk.vertices}, {"type", "VEC3"}});
+  }
   gltf["meshes"][0]["primitives"].push_back(
-      {{"attributes", {{"POSITION", accessor}}},
+      {{"attributes", accessors},
        {"indices", accessor + 1},
        {"material", 0},
-       {"extensions",
-        {{kDracoExtension,
-          {{"bufferView", view}, {"attributes", {{"POSITION", chunk.position_id}}}}}}}});
+       {"extensions", {{kDracoExtension, {{"bufferView", view}, {"attributes", attributes}}}}}});
 }
 
 // What the mesh was made with. When its job was to run is no part of it: the bytes of a mesh follow
@@ -112,7 +123,7 @@ Json describe(const std::vector<DracoStream>& chunks, std::size_t binary_bytes,
     gltf["extensionsRequired"] = {kDracoExtension};
     std::size_t offset = 0;
     for (const DracoStream& chunk : chunks) {
-      add_primitive(gltf, chunk, offset);
+      add_primitive(gltf, chunk, offset, provenance.parameters.normals);
       offset += padded(chunk.bytes.size());
     }
   }
@@ -126,9 +137,9 @@ void write_words(const Sink& sink, std::initializer_list<std::uint32_t> words) {
 
 }  // namespace
 
-void encode_glb(const mesh::Mesh& mesh, const DracoParameters& draco, const Provenance& provenance,
-                const mesh::Context& context, const Sink& sink) {
-  const std::vector<DracoStream> chunks = encode_chunks(mesh, draco, context);
+void encode_glb(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
+                const Sink& sink) {
+  const std::vector<DracoStream> chunks = encode_chunks(mesh, provenance.parameters, context);
   std::size_t binary_bytes = 0;
   for (const DracoStream& chunk : chunks) binary_bytes += padded(chunk.bytes.size());
   std::string json = describe(chunks, binary_bytes, provenance).dump();

@@ -1,11 +1,10 @@
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <vector>
 
+#include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
 
 namespace isomesh::codec {
@@ -15,7 +14,6 @@ static_assert(std::endian::native == std::endian::little, "STL is little-endian"
 
 constexpr std::size_t kHeaderBytes = 80;
 constexpr std::size_t kFacetBytes = 50;
-constexpr std::size_t kFacetsPerBlock = 8192;
 
 mesh::Vec3 unit_normal(const mesh::Vec3& a, const mesh::Vec3& b, const mesh::Vec3& c) {
   std::array<double, 3> u;
@@ -58,18 +56,11 @@ void encode_stl(const mesh::Mesh& mesh, const mesh::Context& context, const Sink
   std::memcpy(header.data() + kHeaderBytes, &count, sizeof count);
   sink(header);
 
-  std::vector<std::byte> block(kFacetsPerBlock * kFacetBytes);
-  for (std::size_t begin = 0; begin < triangles; begin += kFacetsPerBlock) {
-    context.throw_if_stopped();
-    const std::size_t facets = std::min(kFacetsPerBlock, triangles - begin);
-    for (std::size_t i = 0; i < facets; ++i) {
-      write_facet(mesh, mesh.triangles[begin + i], block.data() + i * kFacetBytes);
-    }
-    sink(std::span(block).first(facets * kFacetBytes));
-    if (context.progress) {
-      context.progress(static_cast<double>(begin + facets) / static_cast<double>(triangles));
-    }
-  }
+  BlockWriter(context, sink, triangles)
+      .write(triangles, kFacetBytes, [&](std::size_t t, std::byte* out) {
+        write_facet(mesh, mesh.triangles[t], out);
+        return out + kFacetBytes;
+      });
 }
 
 }  // namespace isomesh::codec

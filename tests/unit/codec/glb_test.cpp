@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -16,6 +15,7 @@
 #include "tests/support/mesh_checks.h"
 #include "tests/unit/codec/decode.h"
 #include "tests/unit/codec/meshes.h"
+#include "tests/unit/codec/same_mesh.h"
 
 namespace isomesh::codec {
 namespace {
@@ -23,6 +23,8 @@ namespace {
 using nlohmann::json;
 using test::DecodedMesh;
 using test::encoded;
+using test::several_blocks;
+using test::welded;
 
 std::uint32_t word_at(const std::string& bytes, std::size_t offset) {
   std::uint32_t word = 0;
@@ -76,31 +78,6 @@ std::vector<DecodedMesh> decoded_primitives(const Container& container) {
     }
   }
   return result;
-}
-
-// All primitives as one mesh, in which points of the same bits are one.
-DecodedMesh welded(const std::vector<DecodedMesh>& parts) {
-  DecodedMesh whole;
-  std::map<std::array<float, 3>, std::uint32_t> numbers;
-  for (const DecodedMesh& part : parts) {
-    for (const auto& triangle : part.triangles) {
-      auto& corners = whole.triangles.emplace_back();
-      for (std::size_t corner = 0; corner < 3; ++corner) {
-        const auto& point = part.points[triangle[corner]];
-        const auto [found, is_new] =
-            numbers.emplace(point, static_cast<std::uint32_t>(whole.points.size()));
-        if (is_new) whole.points.push_back(point);
-        corners[corner] = found->second;
-      }
-    }
-  }
-  return whole;
-}
-
-// A closed surface of several blocks; midpoints, so that no two vertices share a place on the grid.
-mesh::Mesh several_blocks() {
-  return test::extracted(test::sample<float>(test::sphere({60, 60, 60}, 55), {121, 121, 121}),
-                         {0, Scheme::kSix, Interpolation::kMidpoint});
 }
 
 TEST(Glb, CarriesTheMeshInBlocksWhoseSeamsFit) {

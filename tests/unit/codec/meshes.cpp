@@ -92,9 +92,19 @@ mesh::Mesh large_mesh() {
                    {0.5, Scheme::kSix, Interpolation::kMidpoint});
 }
 
+mesh::Mesh several_blocks() {
+  return extracted(sample<float>(sphere({60, 60, 60}, 55), {121, 121, 121}),
+                   {0, Scheme::kSix, Interpolation::kMidpoint});
+}
+
 std::string encoded(const mesh::Mesh& mesh, MeshFormat format, const DracoParameters& draco) {
   codec::Provenance provenance;
   provenance.parameters.draco = draco;
+  return encoded(mesh, format, provenance);
+}
+
+std::string encoded(const mesh::Mesh& mesh, MeshFormat format,
+                    const codec::Provenance& provenance) {
   std::string bytes;
   codec::encode(mesh, format, provenance, {}, [&](std::span<const std::byte> piece) {
     bytes.append(reinterpret_cast<const char*>(piece.data()), piece.size());

@@ -23,7 +23,12 @@ std::vector<NamedMesh> meshes_to_encode();
 // A surface of so many triangles that no codec can hold them in one block.
 mesh::Mesh large_mesh();
 
+// A sphere of several of GLB's blocks; midpoints, so that no two vertices share a place on the
+// grid.
+mesh::Mesh several_blocks();
+
 // All bytes that an encoder hands to its sink.
 std::string encoded(const mesh::Mesh& mesh, MeshFormat format, const DracoParameters& draco = {});
+std::string encoded(const mesh::Mesh& mesh, MeshFormat format, const codec::Provenance& provenance);
 
 }  // namespace isomesh::test

@@ -8,7 +8,6 @@
 #include <gtest/gtest.h>
 
 #include "server/codec/encode.h"
-#include "tests/support/errors.h"
 #include "tests/unit/codec/meshes.h"
 
 namespace isomesh::codec {
@@ -99,42 +98,6 @@ TEST(Stl, EveryFacetOfALargeMeshIsInItsPlace) {
       ASSERT_EQ(corners[corner + 1], mesh.positions[mesh.triangles[t][corner]]) << t;
     }
   }
-}
-
-TEST(Stl, ProgressGrowsToOne) {
-  double last = 0;
-  int calls = 0;
-  const auto note = [&](double done) {
-    EXPECT_GT(done, last);
-    last = done;
-    ++calls;
-  };
-  encode_stl(test::large_mesh(), {{}, note}, [](auto) {});
-  EXPECT_EQ(last, 1);
-  EXPECT_GT(calls, 2);
-}
-
-TEST(Stl, StopsOnceItIsCancelled) {
-  std::stop_source source;
-  const mesh::Mesh mesh = test::large_mesh();
-  std::size_t bytes = 0;
-  const auto stop_soon = [&](std::span<const std::byte> piece) {
-    bytes += piece.size();
-    source.request_stop();
-  };
-  EXPECT_EQ(test::code_thrown_by([&] {
-              encode_stl(mesh, {source.get_token(), {}}, stop_soon);
-            }),
-            ErrorCode::kCancelled);
-  EXPECT_LT(bytes, mesh.triangles.size() * kFacetBytes);
-}
-
-TEST(Stl, PassesOnWhatItsSinkThrows) {
-  const auto full = [](std::span<const std::byte>) {
-    throw Error(ErrorCode::kOutOfSpace, "no space");
-  };
-  EXPECT_EQ(test::code_thrown_by([&] { encode_stl(mesh::Mesh{}, {}, full); }),
-            ErrorCode::kOutOfSpace);
 }
 
 }  // namespace

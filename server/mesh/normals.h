@@ -1,0 +1,15 @@
+// Normals at the vertices of a surface mesh, for shading.
+#pragma once
+
+#include "server/mesh/buffer.h"
+#include "server/mesh/context.h"
+#include "server/mesh/mesh.h"
+
+namespace isomesh::mesh {
+
+// Writes the unit normal of each vertex: the mean of its triangles' normals weighted by their
+// areas, which point outside. (0, 0, 1) where that has no direction. The result does not depend on
+// the number of threads. `normals`' memory is reused. Throws Error kCancelled.
+void vertex_normals(const Mesh& mesh, const Context& context, Buffer<Vec3>& normals);
+
+}  // namespace isomesh::mesh

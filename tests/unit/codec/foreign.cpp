@@ -1,0 +1,78 @@
+#include "tests/unit/codec/foreign.h"
+
+#include <cstring>
+#include <span>
+#include <stdexcept>
+
+#include <assimp/cimport.h>
+#include <assimp/scene.h>
+
+#include "tests/support/files.h"
+#include "tests/support/process.h"
+
+namespace isomesh::test {
+namespace {
+
+// Takes whole values off the front of some bytes.
+class Bytes {
+ public:
+  explicit Bytes(const std::string& bytes) : rest_(bytes) {}
+
+  bool empty() const { return rest_.empty(); }
+
+  template <class T>
+  void take(std::span<T> values) {
+    if (rest_.size() < values.size_bytes())
+      throw std::runtime_error("the reader's output is short");
+    std::memcpy(values.data(), rest_.data(), values.size_bytes());
+    rest_.remove_prefix(values.size_bytes());
+  }
+
+ private:
+  std::string_view rest_;
+};
+
+}  // namespace
+
+std::vector<std::array<mesh::Vec3, 3>> read_with_assimp(const std::string& bytes,
+                                                        const std::string& suffix) {
+  const aiScene* scene =
+      aiImportFileFromMemory(bytes.data(), static_cast<unsigned>(bytes.size()), 0, suffix.c_str());
+  if (scene == nullptr) throw std::runtime_error(aiGetErrorString());
+  std::vector<std::array<mesh::Vec3, 3>> triangles;
+  for (const aiMesh* mesh : std::span(scene->mMeshes, scene->mNumMeshes)) {
+    for (const aiFace& face : std::span(mesh->mFaces, mesh->mNumFaces)) {
+      if (face.mNumIndices != 3) throw std::runtime_error("a face has not three corners");
+      auto& corners = triangles.emplace_back();
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        const aiVector3D& at = mesh->mVertices[face.mIndices[corner]];
+        corners[corner] = {at.x, at.y, at.z};
+      }
+    }
+  }
+  aiReleaseImport(scene);
+  return triangles;
+}
+
+std::vector<GlbPrimitive> read_with_node(const std::string& glb) {
+  const TemporaryFolder folder;
+  write_file(folder / "mesh.glb", glb);
+  const Finished finished = run({"node", ISOMESH_READ_GLB, folder / "mesh.glb", folder / "out"});
+  if (finished.status != 0) throw std::runtime_error(finished.errors);
+  const std::string out = read_file(folder / "out");
+  std::vector<GlbPrimitive> primitives;
+  for (Bytes bytes(out); !bytes.empty();) {
+    std::array<std::uint32_t, 3> counts;
+    bytes.take(std::span<std::uint32_t>(counts));
+    GlbPrimitive& primitive = primitives.emplace_back();
+    primitive.mesh.points.resize(counts[0]);
+    primitive.mesh.triangles.resize(counts[1]);
+    primitive.normals.resize(counts[2]);
+    bytes.take(std::span(primitive.mesh.points));
+    bytes.take(std::span(primitive.normals));
+    bytes.take(std::span(primitive.mesh.triangles));
+  }
+  return primitives;
+}
+
+}  // namespace isomesh::test

@@ -1,0 +1,27 @@
+// What readers that are not ours make of mesh files.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "server/mesh/mesh.h"
+#include "tests/support/draco_decoder.h"
+
+namespace isomesh::test {
+
+// The triangles in the file's order, each as its corners' places, as Debian's assimp reads them;
+// `suffix` such as "stl" says the format. Throws std::runtime_error with its words when it refuses.
+std::vector<std::array<mesh::Vec3, 3>> read_with_assimp(const std::string& bytes,
+                                                        const std::string& suffix);
+
+struct GlbPrimitive {
+  DecodedMesh mesh;
+  std::vector<mesh::Vec3> normals;  // of the points, or none
+};
+
+// A GLB file's primitives as draco3d decodes them, once gltf-validator has neither an error nor a
+// warning. Both are npm's and run in node. Throws std::runtime_error with their words.
+std::vector<GlbPrimitive> read_with_node(const std::string& glb);
+
+}  // namespace isomesh::test
