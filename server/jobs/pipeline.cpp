@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "server/codec/encode.h"
+#include "server/mesh/components.h"
 #include "server/mesh/extract.h"
 #include "server/mesh/measure.h"
+#include "server/mesh/quality.h"
 #include "server/volume/canonical.h"
 
 namespace isomesh::jobs {
@@ -99,7 +101,8 @@ void extract_as(const volume::CanonicalVolume& volume, const Request& request,
                                     mesh::lattice_to_space(header.geometry)};
   const mesh::ExtractOptions options = {.iso = request.iso,
                                         .scheme = request.parameters.scheme,
-                                        .interpolation = request.parameters.interpolation};
+                                        .interpolation = request.parameters.interpolation,
+                                        .close = request.parameters.close};
   const mesh::SurfaceCount count = count_surface(lattice, options, progress.context(0, 0.2));
   check_memory(count, request.parameters, request.limits);
   extract_surface(lattice, options, count, progress.context(0.2, 1), mesh);
@@ -125,6 +128,21 @@ void extract(const volume::CanonicalVolume& volume, const Request& request,
     case SampleType::kFloat64:
       return extract_as<double>(volume, request, progress, mesh);
   }
+}
+
+void measure_quality(const mesh::Mesh& mesh, const mesh::Topology& topology,
+                     const mesh::Context& context, MeshQuality& quality) {
+  const mesh::Soundness soundness = check_soundness(mesh, context);
+  quality.closed = soundness.boundary_edges == 0;
+  quality.manifold = soundness.manifold;
+  quality.oriented = soundness.oriented;
+  quality.components = topology.components;
+  if (quality.closed && quality.manifold && quality.oriented) {
+    quality.genus = static_cast<std::int64_t>(topology.components) - topology.euler / 2;
+  }
+  const mesh::Shapes shapes = measure_shapes(mesh, context);
+  quality.aspect_ratio.smoothed = shapes.aspect_ratio;
+  quality.smallest_angle_deg.smoothed = shapes.smallest_angle_deg;
 }
 
 // Encodes every format and measures the mesh, all side by side: a single Draco stream takes one
@@ -153,6 +171,7 @@ void encode_and_measure(const codec::Provenance& provenance, const store::BlobSt
     if (task < formats.size()) return encode(task);
     extent = measure_extent(mesh, progress.quiet());
     topology = measure_topology(mesh, progress.quiet());
+    measure_quality(mesh, topology, progress.quiet(), summary.quality);
   });
   for (std::size_t i = 0; i < formats.size(); ++i) {
     const store::Blob blob = writers[i]->commit();
@@ -190,13 +209,6 @@ void Workspace::trim(std::size_t budget_bytes) {
 }
 
 void check_supported(const JobParameters& parameters) {
-  for (const MeshFormat format : parameters.formats) {
-    if (!codec::can_encode(format)) {
-      throw invalid_parameter(
-          "formats", "this version does not write \"" + std::string(to_string(format)) + '"');
-    }
-  }
-  if (parameters.close) throw invalid_parameter("close", "this version does not close surfaces");
   if (parameters.smoothing != Smoothing::kLaplacian) {
     throw invalid_parameter("smoothing", "this version does not smooth by \"" +
                                              std::string(to_string(parameters.smoothing)) + '"');
@@ -209,6 +221,7 @@ std::uint64_t estimate_memory(std::uint64_t vertices, std::uint64_t triangles,
   // Measured: what Draco takes at its slowest speed, and what GLB's chunks and their bytes add.
   constexpr std::uint64_t kDracoBytesPerTriangle = 100;
   constexpr std::uint64_t kGlbBytesPerTriangle = 15;
+  constexpr std::uint64_t kGlbNormalBytesPerTriangle = 8;
   std::uint64_t bytes = vertices * sizeof(mesh::Vec3) + triangles * sizeof(mesh::Triangle);
   if (parameters.passes > 0) {
     bytes += vertices * (sizeof(mesh::Vec3) + (1 + kNeighborsPerVertex) * sizeof(std::uint32_t));
@@ -216,6 +229,9 @@ std::uint64_t estimate_memory(std::uint64_t vertices, std::uint64_t triangles,
   for (const MeshFormat format : parameters.formats) {
     if (format == MeshFormat::kDrc) bytes += triangles * kDracoBytesPerTriangle;
     if (format == MeshFormat::kGlb) bytes += triangles * kGlbBytesPerTriangle;
+    if (format == MeshFormat::kGlb && parameters.normals) {
+      bytes += vertices * sizeof(mesh::Vec3) + triangles * kGlbNormalBytesPerTriangle;
+    }
   }
   bytes += vertices * 2 * sizeof(std::uint32_t);  // for measuring
   return bytes;
@@ -237,9 +253,16 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
   progress.enter(Stage::kExtract, kExtractShare, &Timing::extract);
   const double iso = parameters.iso.value_or(volume.suggested_iso);
   extract(samples, {parameters, limits, iso}, progress, mesh);
+  if (!parameters.components.keeps_all()) {
+    const mesh::Dropped dropped = keep_components(parameters.components, progress.quiet(), mesh);
+    summary.dropped = {dropped.components, dropped.triangles};
+  }
   summary.triangles = mesh.triangles.size();
   summary.vertices = mesh.positions.size();
   summary.volume_mm3.extracted = measure_extent(mesh, progress.quiet()).volume_mm3;
+  const mesh::Shapes extracted = measure_shapes(mesh, progress.quiet());
+  summary.quality.aspect_ratio.extracted = extracted.aspect_ratio;
+  summary.quality.smallest_angle_deg.extracted = extracted.smallest_angle_deg;
 
   progress.enter(Stage::kSmooth, kSmoothShare, &Timing::smooth);
   if (parameters.passes > 0) {

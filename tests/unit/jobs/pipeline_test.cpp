@@ -220,15 +220,6 @@ TEST_F(PipelineTest, CancelledBetweenTwoFormatsItStoresNothing) {
   }
 }
 
-TEST_F(PipelineTest, AFormatThatCannotBeWrittenStoresNothing) {
-  const Volume volume = add_sphere();
-  const std::size_t before = blob_count();
-  JobParameters parameters = parameters_of(volume, 0);
-  parameters.formats = {MeshFormat::kStl, MeshFormat::kObj};
-  EXPECT_EQ(test::code_thrown_by([&] { run(volume, parameters); }), ErrorCode::kInvalidParameter);
-  EXPECT_EQ(blob_count(), before);
-}
-
 TEST_F(PipelineTest, ALongJobStopsWhenItIsCancelled) {
   const Volume volume = add_much();
   JobParameters parameters = parameters_of(volume, 50);
@@ -266,15 +257,6 @@ TEST(CheckSupported, RefusesTheRestByName) {
     EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
     return test::fields_of(*error);
   };
-  for (int number = 0; !to_string(MeshFormat{number}).empty(); ++number) {
-    if (codec::can_encode(MeshFormat{number})) continue;
-    JobParameters parameters;
-    parameters.formats = {MeshFormat::kDrc, MeshFormat{number}};
-    EXPECT_EQ(fields(parameters), std::vector<std::string>{"formats"});
-  }
-  JobParameters closed;
-  closed.close = true;
-  EXPECT_EQ(fields(closed), std::vector<std::string>{"close"});
   JobParameters taubin;
   taubin.smoothing = Smoothing::kTaubin;
   EXPECT_EQ(fields(taubin), std::vector<std::string>{"smoothing"});
