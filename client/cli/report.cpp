@@ -78,18 +78,24 @@ std::string mesh_report(const MeshSummary& mesh) {
 }
 
 std::string volume_report(const Volume& volume) {
-  return in_columns(
-      {Align::kLeft, Align::kLeft},
-      {{"volume", volume.id},
-       {"format", volume.format},
-       {"samples", dims_of(volume) + " " + std::string(to_string(volume.type)) + ", " +
-                       human_bytes(volume.bytes)},
-       {"spacing", listed(volume.geometry.spacing) + " mm"},
-       {"origin", listed(volume.geometry.origin) + " mm (LPS)"},
-       {"direction", listed(volume.geometry.direction)},
-       {"range", human_number(volume.range[0]) + " to " + human_number(volume.range[1])},
-       {"suggested iso", human_number(volume.suggested_iso)},
-       {"created", volume.created}});
+  Rows rows = {{"volume", volume.id},
+               {"format", volume.format},
+               {"samples", dims_of(volume) + " " + std::string(to_string(volume.type)) + ", " +
+                               human_bytes(volume.bytes)},
+               {"spacing", listed(volume.geometry.spacing) + " mm"},
+               {"origin", listed(volume.geometry.origin) + " mm (LPS)"},
+               {"direction", listed(volume.geometry.direction)},
+               {"range", human_number(volume.range[0]) + " to " + human_number(volume.range[1])},
+               {"suggested iso", human_number(volume.suggested_iso)}};
+  if (volume.modality) rows.push_back({"modality", *volume.modality});
+  for (const Preset& preset : volume.presets) {
+    rows.push_back({"iso of " + preset.name, human_number(preset.iso)});
+  }
+  rows.push_back({"created", volume.created});
+  for (const IgnoredObject& object : volume.ignored) {
+    rows.push_back({"ignored", object.name + ": " + object.reason});
+  }
+  return in_columns({Align::kLeft, Align::kLeft}, rows);
 }
 
 std::string job_report(const Job& job) {

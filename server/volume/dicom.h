@@ -16,8 +16,9 @@ bool is_dicom(std::span<const std::byte> head);
 
 // The one volume that the images among `files` make: of slices in a file each, or of several frames
 // in one. `series` names the SeriesInstanceUID to take; it may be empty when there is only one.
-// Files that are no images are left out and named in the volume's `ignored`, by their names without
-// folders. Temporary files lie beside `target`.
+// Files that are no images, and localisers, are left out and named in the volume's `ignored`. Files
+// are named to the client as they are here, without folders, unless there is only one: it knows
+// them from its upload. Temporary files lie beside `target`.
 //
 // Samples are what the modality means: rescaled by slope and intercept, MONOCHROME1 as it is stored
 // (no inversion), padding too. Integers stay integers where slopes and intercepts are integers.

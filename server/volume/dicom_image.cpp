@@ -5,6 +5,7 @@
 
 #include "server/volume/dicom_decode.h"
 #include "server/volume/dicom_tags.h"
+#include "server/volume/dicom_text.h"
 #include "server/volume/source.h"
 #include "server/volume/text.h"
 
@@ -246,9 +247,8 @@ std::optional<std::string> reason_to_ignore(const DicomFile& file) {
 Image describe_image(const DicomFile& file) {
   const DataSet& data = file.data();
   Image image;
-  image.series_uid = data.text(kSeriesInstanceUid);
   image.frame_of_reference_uid = data.text(kFrameOfReferenceUid);
-  image.modality = data.text(kModality);
+  image.modality = utf8(data, kModality);
   image.photometric = data.text(kPhotometricInterpretation);
   image.instance_number = data.integer(kInstanceNumber);
   const std::uint32_t frames = frame_count(data);

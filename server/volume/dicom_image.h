@@ -53,7 +53,6 @@ struct Frame {
 
 struct Image {
   std::string file_name;  // without folders; empty when the upload is one file
-  std::string series_uid;
   std::string frame_of_reference_uid;
   std::string modality;
   std::string rescale_type;  // the unit of rescaled samples: "HU" of a CT; may be empty

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "server/volume/dicom_tags.h"
+#include "server/volume/dicom_text.h"
 #include "server/volume/source.h"
 
 namespace isomesh::volume::dicom {
@@ -75,7 +76,7 @@ class Parser {
     while (end() - at_ >= 8 && number(at_, 2, false) == 2) {
       const Head head = read_head(encoding, end());
       const std::string stored = read_value(head, end());
-      const std::string_view value = without_padding(stored);
+      const std::string value = printable(without_padding(stored));
       if (head.tag == kTransferSyntaxUid) meta.transfer_syntax = value;
       if (head.tag == kMediaStorageSopClassUid) meta.sop_class_uid = value;
       if (head.tag == kMediaStorageSopInstanceUid) meta.sop_instance_uid = value;

@@ -14,7 +14,9 @@ namespace {
 
 constexpr std::size_t kMostNamedObjects = 100;
 
-std::string name_of(const std::filesystem::path& path) { return path.filename().string(); }
+std::string name_of(const std::filesystem::path& path) {
+  return printable(path.filename().string());
+}
 
 [[noreturn]] void rethrow_for(const std::filesystem::path& path, const Error& error) {
   throw Error(error.code(), "File " + in_quotes(name_of(path)) + ": " + error.what());
@@ -28,8 +30,7 @@ void ignore(Upload& upload, const std::filesystem::path& path, const std::string
 
 // Some anonymisers leave identifiers in the meta information only.
 DicomInstance instance_of(const DicomFile& file) {
-  DicomInstance instance = {std::string(file.data().text(kSopClassUid)),
-                            std::string(file.data().text(kSopInstanceUid))};
+  DicomInstance instance = {utf8(file.data(), kSopClassUid), utf8(file.data(), kSopInstanceUid)};
   if (instance.sop_class_uid.empty()) instance.sop_class_uid = file.meta().sop_class_uid;
   if (instance.sop_instance_uid.empty()) instance.sop_instance_uid = file.meta().sop_instance_uid;
   return instance;
@@ -39,7 +40,7 @@ Source describe_source(const std::filesystem::path& path, const DicomFile& file)
   const DataSet& data = file.data();
   Source source;
   source.path = path;
-  source.series_uid = data.text(kSeriesInstanceUid);
+  source.series_uid = utf8(data, kSeriesInstanceUid);
   source.series_description = utf8(data, kSeriesDescription);
   source.frame_count = std::max<std::int64_t>(data.integer(kNumberOfFrames).value_or(1), 1);
   source.instance = instance_of(file);

@@ -106,18 +106,6 @@ std::string ascii_only(std::string_view text) {
   return result;
 }
 
-std::string without_control_characters(std::string_view text) {
-  std::string result;
-  for (const char letter : text) {
-    if (static_cast<unsigned char>(letter) < ' ' || letter == '\x7f') {
-      result += kReplacement;
-    } else {
-      result += letter;
-    }
-  }
-  return result;
-}
-
 std::string converted(std::string_view text, const char* from) {
   if (from == nullptr) return ascii_only(text);
   const bool has_escapes_of_its_own = std::string_view(from).starts_with("ISO-2022");
@@ -129,10 +117,22 @@ std::string converted(std::string_view text, const char* from) {
 
 }  // namespace
 
+std::string printable(std::string_view text) {
+  std::string result;
+  for (const char letter : text) {
+    if (static_cast<unsigned char>(letter) < ' ' || letter == '\x7f') {
+      result += kReplacement;
+    } else {
+      result += letter;
+    }
+  }
+  return result;
+}
+
 std::string utf8(const DataSet& data, Tag tag) {
   const std::string_view text = data.text(tag);
   if (text.empty()) return {};
-  return without_control_characters(converted(text, character_set(data)));
+  return printable(converted(text, character_set(data)));
 }
 
 }  // namespace isomesh::volume::dicom

@@ -13,4 +13,7 @@ namespace isomesh::volume::dicom {
 // U+FFFD.
 std::string utf8(const DataSet& data, Tag tag);
 
+// A text that is UTF-8, or should be, without control characters.
+std::string printable(std::string_view text);
+
 }  // namespace isomesh::volume::dicom

@@ -225,12 +225,20 @@ Geometry oblique_far_geometry() {
   return {{-250, 180, -1200}, {0.4, 0.4, 0.6}, rotation(axis, 0.3)};
 }
 
+Geometry tilted_geometry() {
+  const double tilt = 20 * std::numbers::pi / 180;
+  return {.origin = {-20, 35, -110},
+          .spacing = {0.75, 0.75, 1.5},
+          .direction = {1, 0, 0, 0, std::cos(tilt), 0, 0, -std::sin(tilt), 1}};
+}
+
 std::vector<NamedGeometry> all_geometries() {
   return {{"identity", {}},
           {"anisotropic", anisotropic_geometry()},
           {"oblique", oblique_geometry()},
           {"left_handed", left_handed_geometry()},
           {"oblique_left_handed", oblique_left_handed_geometry()},
+          {"tilted", tilted_geometry()},
           {"far", far_geometry()},
           {"oblique_far", oblique_far_geometry()}};
 }

@@ -97,7 +97,8 @@ Geometry anisotropic_geometry();
 Geometry oblique_geometry();
 Geometry left_handed_geometry();          // axis aligned, one axis reversed
 Geometry oblique_left_handed_geometry();  // turned, anisotropic and reversed
-Geometry far_geometry();                  // fine samples more than a metre from the origin
+Geometry tilted_geometry();  // sheared: slices of a CT whose gantry is tilted by 20 degrees
+Geometry far_geometry();     // fine samples more than a metre from the origin
 Geometry oblique_far_geometry();
 
 struct NamedGeometry {

@@ -67,6 +67,20 @@ TEST(VolumeReport, NamesWhatTheVolumeIs) {
   EXPECT_THAT(volume_report(volume), HasSubstr("181 x 217 x 181 uint8, 7.1 MB"));
   EXPECT_THAT(volume_report(volume), HasSubstr("0 to 254.5"));
   EXPECT_THAT(volume_list({volume}), HasSubstr("  abc     nifti   181 x 217 x 181  uint8  7.1 MB"));
+  EXPECT_THAT(volume_report(volume), Not(HasSubstr("modality")));
+}
+
+TEST(VolumeReport, NamesWhatDicomTells) {
+  Volume volume;
+  volume.modality = "CT";
+  volume.presets = {{"bone", 250}};
+  volume.ignored = {{"DICOMDIR", "it is a directory of DICOM files"}};
+  volume.dicom.emplace().patient_name = "Doe^John";
+  const std::string report = volume_report(volume);
+  EXPECT_THAT(report, HasSubstr("modality       CT"));
+  EXPECT_THAT(report, HasSubstr("iso of bone    250"));
+  EXPECT_THAT(report, HasSubstr("ignored        DICOMDIR: it is a directory of DICOM files"));
+  EXPECT_THAT(report, Not(HasSubstr("Doe")));  // a terminal may be anybody's
 }
 
 TEST(JobReport, TellsAJobThatRunsFromOneThatFailed) {
