@@ -35,6 +35,14 @@ std::string extent(const MeshSummary& mesh, std::size_t axis) {
   return fixed(mesh.bounds[0][axis], 2) + " to " + fixed(mesh.bounds[1][axis], 2) + " mm";
 }
 
+std::string topology_of(const MeshQuality& quality) {
+  std::string text = quality.closed ? "closed" : "open";
+  text += quality.manifold ? ", manifold" : ", not manifold";
+  text += quality.oriented ? ", oriented" : ", not oriented";
+  if (quality.genus) text += ", genus " + grouped(*quality.genus);
+  return text;
+}
+
 std::string size_of(const MeshFile& file) {
   const std::string exact = grouped(static_cast<std::int64_t>(file.bytes)) + " B";
   return file.bytes < 1000 ? exact : human_bytes(file.bytes) + " (" + exact + ")";
@@ -71,6 +79,18 @@ std::string mesh_report(const MeshSummary& mesh) {
                {"x (LPS)", extent(mesh, 0)},
                {"y", extent(mesh, 1)},
                {"z", extent(mesh, 2)}};
+  if (mesh.dropped.components > 0) {
+    rows.push_back({"dropped", count(mesh.dropped.components) + " components of " +
+                                   count(mesh.dropped.triangles) + " triangles"});
+  }
+  const MeshQuality& quality = mesh.quality;
+  rows.push_back({"topology", topology_of(quality)});
+  rows.push_back({"aspect ratio", fixed(quality.aspect_ratio.extracted.mean, 3) + " extracted, " +
+                                      fixed(quality.aspect_ratio.smoothed.mean, 3) + " smoothed"});
+  rows.push_back({"smallest angle", fixed(quality.smallest_angle_deg.extracted.mean, 1) +
+                                        "° extracted, " +
+                                        fixed(quality.smallest_angle_deg.smoothed.mean, 1) +
+                                        "° smoothed, on average"});
   for (const auto& [format, file] : mesh.files) {
     rows.push_back({"mesh." + std::string(to_string(format)), size_of(file)});
   }

@@ -137,7 +137,7 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   estimate.volume = volume.id;
   estimate.iso = parameters.iso.value_or(volume.suggested_iso);
   estimate.scheme = parameters.scheme;
-  const SurfaceSize surface = count(volume, estimate.iso, parameters.scheme);
+  const SurfaceSize surface = count(volume, estimate.iso, parameters);
   estimate.triangles = surface.triangles;
   estimate.vertices = surface.vertices;
   estimate.memory_bytes = estimate_memory(surface.vertices, surface.triangles, parameters);
@@ -152,11 +152,12 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   return estimate;
 }
 
-SurfaceSize Estimator::count(const Volume& volume, double iso, Scheme scheme) {
-  const auto size = counts_.get({volume.id, iso, scheme}, [&] {
+SurfaceSize Estimator::count(const Volume& volume, double iso, const JobParameters& parameters) {
+  const auto size = counts_.get({volume.id, iso, parameters.scheme, parameters.close}, [&] {
     const store::LocalBlob file = blobs_.local(volume.id);
     const volume::CanonicalVolume canonical(file.path);
-    const mesh::ExtractOptions options = {.iso = iso, .scheme = scheme};
+    const mesh::ExtractOptions options = {
+        .iso = iso, .scheme = parameters.scheme, .close = parameters.close};
     SurfaceSize counted;
     volume::with_sample(volume::stored_type(volume.type), [&](auto sample) {
       using Sample = decltype(sample);

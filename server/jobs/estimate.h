@@ -66,22 +66,22 @@ class Estimator {
             const store::JobStore& jobs, const PipelineLimits& limits)
       : volumes_(volumes), blobs_(blobs), jobs_(jobs), limits_(limits) {}
 
-  // Triangles and vertices are exact; the rest follows from them and from the jobs that this daemon
-  // has finished. Throws Error kNotFound without the volume, kUnavailable when too many wait for an
-  // estimate already or after stop().
+  // Triangles and vertices are exact, before the filter of components; the rest follows from them
+  // and from the jobs that this daemon has finished. Throws Error kNotFound without the volume,
+  // kUnavailable when too many wait for an estimate already or after stop().
   Estimate estimate(const store::Viewer& viewer, const JobParameters& parameters);
 
   // Ends the counting that is under way, for good.
   void stop() { stop_.request_stop(); }
 
  private:
-  // Volume, iso-value, scheme.
-  using Surface = std::tuple<std::string, double, Scheme>;
+  // Volume, iso-value, scheme, whether it is closed.
+  using Surface = std::tuple<std::string, double, Scheme, bool>;
 
   static constexpr std::size_t kSurfaces = 1024;
   static constexpr std::size_t kMostWaiting = 6;
 
-  SurfaceSize count(const Volume& volume, double iso, Scheme scheme);
+  SurfaceSize count(const Volume& volume, double iso, const JobParameters& parameters);
   CostModel model() const;
 
   const store::VolumeStore& volumes_;

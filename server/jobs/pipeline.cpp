@@ -130,7 +130,8 @@ void extract(const volume::CanonicalVolume& volume, const Request& request,
   }
 }
 
-void measure_quality(const mesh::Mesh& mesh, const mesh::Topology& topology,
+// Fills in what is not known from before smoothing.
+void measure_quality(const mesh::Mesh& mesh, const mesh::Topology& topology, bool is_smoothed,
                      const mesh::Context& context, MeshQuality& quality) {
   const mesh::Soundness soundness = check_soundness(mesh, context);
   quality.closed = soundness.boundary_edges == 0;
@@ -140,6 +141,9 @@ void measure_quality(const mesh::Mesh& mesh, const mesh::Topology& topology,
   if (quality.closed && quality.manifold && quality.oriented) {
     quality.genus = static_cast<std::int64_t>(topology.components) - topology.euler / 2;
   }
+  quality.aspect_ratio.smoothed = quality.aspect_ratio.extracted;
+  quality.smallest_angle_deg.smoothed = quality.smallest_angle_deg.extracted;
+  if (!is_smoothed) return;
   const mesh::Shapes shapes = measure_shapes(mesh, context);
   quality.aspect_ratio.smoothed = shapes.aspect_ratio;
   quality.smallest_angle_deg.smoothed = shapes.smallest_angle_deg;
@@ -171,7 +175,8 @@ void encode_and_measure(const codec::Provenance& provenance, const store::BlobSt
     if (task < formats.size()) return encode(task);
     extent = measure_extent(mesh, progress.quiet());
     topology = measure_topology(mesh, progress.quiet());
-    measure_quality(mesh, topology, progress.quiet(), summary.quality);
+    measure_quality(mesh, topology, provenance.parameters.passes > 0, progress.quiet(),
+                    summary.quality);
   });
   for (std::size_t i = 0; i < formats.size(); ++i) {
     const store::Blob blob = writers[i]->commit();

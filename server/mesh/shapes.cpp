@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <vector>
 
 #include "server/mesh/quality.h"
@@ -54,14 +55,45 @@ struct Values {
   alignas(64) Lanes smallest_angle_deg;
 };
 
+// Loading a position as four lanes reads four bytes past it: the next one's, or what Buffer keeps
+// behind the last.
+using Float4 = float __attribute__((vector_size(16)));
+using Int4 = std::int32_t __attribute__((vector_size(16)));
+
+HWY_INLINE Float4 load(const Vec3& position) {
+  Float4 lanes;
+  std::memcpy(&lanes, &position, sizeof lanes);
+  return lanes;
+}
+
+// Four vectors to four of each coordinate.
+HWY_INLINE void store_transposed(const std::array<Float4, 4>& rows, std::size_t at,
+                                 std::array<Lanes, 3>& out) {
+  const Float4 low01 = __builtin_shuffle(rows[0], rows[1], Int4{0, 4, 1, 5});
+  const Float4 low23 = __builtin_shuffle(rows[2], rows[3], Int4{0, 4, 1, 5});
+  const Float4 high01 = __builtin_shuffle(rows[0], rows[1], Int4{2, 6, 3, 7});
+  const Float4 high23 = __builtin_shuffle(rows[2], rows[3], Int4{2, 6, 3, 7});
+  const std::array columns = {__builtin_shuffle(low01, low23, Int4{0, 1, 4, 5}),
+                              __builtin_shuffle(low01, low23, Int4{2, 3, 6, 7}),
+                              __builtin_shuffle(high01, high23, Int4{0, 1, 4, 5})};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::memcpy(&out[axis][at], &columns[axis], sizeof columns[axis]);
+  }
+}
+
+// Four at a time; places behind the last are filled with its sides.
 void load_sides(const Mesh& mesh, std::size_t begin, std::size_t count, Sides& sides) {
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto& [a, b, c] = mesh.triangles[begin + i];
-    const Vec3& corner = mesh.positions[a];
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      sides.u[axis][i] = mesh.positions[b][axis] - corner[axis];
-      sides.v[axis][i] = mesh.positions[c][axis] - corner[axis];
+  for (std::size_t i = 0; i < count; i += 4) {
+    std::array<Float4, 4> u;
+    std::array<Float4, 4> v;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto& [a, b, c] = mesh.triangles[begin + std::min(i + k, count - 1)];
+      const Float4 corner = load(mesh.positions[a]);
+      u[k] = load(mesh.positions[b]) - corner;
+      v[k] = load(mesh.positions[c]) - corner;
     }
+    store_transposed(u, i, sides.u);
+    store_transposed(v, i, sides.v);
   }
 }
 

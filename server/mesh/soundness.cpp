@@ -114,8 +114,8 @@ void check_vertex(std::span<const Corner> corners, Soundness& soundness) {
     neighbors.push_back({.vertex = corner.previous});
   }
   std::ranges::sort(neighbors, {}, &Neighbor::vertex);
-  const auto repeated = std::ranges::unique(neighbors, {}, &Neighbor::vertex);
-  neighbors.erase(repeated.begin(), repeated.end());
+  const auto is_same = [](const Neighbor& a, const Neighbor& b) { return a.vertex == b.vertex; };
+  neighbors.erase(std::unique(neighbors.begin(), neighbors.end(), is_same), neighbors.end());
   const auto find = [&](std::uint32_t vertex) {
     return std::ranges::lower_bound(neighbors, vertex, {}, &Neighbor::vertex);
   };

@@ -24,6 +24,8 @@ struct ReferenceVertex {
   std::array<std::uint32_t, 3> inside;
   std::array<std::uint32_t, 3> outside;
   double fraction = 0;
+
+  Point place() const;  // in units of the lattice
 };
 
 // The piece of the surface in one tetrahedron: three or four corners, counter-clockwise from
@@ -43,6 +45,9 @@ struct ReferenceMesh {
   std::vector<ReferencePatch> patches;
 
   std::uint64_t triangles() const;
+  bool is_phantom(const std::array<std::uint32_t, 3>& sample) const;
+  // Whether both samples of its edge are in one face of the volume's box, or one is a phantom.
+  bool is_on_border(const ReferenceVertex& vertex) const;
   // With vertices at their exact fractions, so triangles may have no area; patches are cut between
   // the first and the third corner.
   Surface surface() const;
@@ -56,10 +61,6 @@ ReferenceMesh reference_surface(const mesh::Lattice<T>& lattice,
 // How far the kernels may keep a vertex away from the samples at the ends of its edge, as a share
 // of the edge. A vertex that is farther from both must be exact up to the rounding of floats.
 inline constexpr double kEndMargin = 1e-3;
-
-// Whether both samples of the vertex's edge are in one face of the volume's box, or one is a
-// phantom.
-bool is_on_border(const ReferenceVertex& vertex, const ReferenceMesh& reference);
 
 // The same surface: every vertex of `mesh` is the reference's vertex of one lattice edge, one to
 // one; every patch is there with the same winding and nothing else is; vertices and triangles are

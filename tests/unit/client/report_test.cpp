@@ -42,6 +42,14 @@ TEST(MeshReport, NamesWhatTheMeshIs) {
   mesh.volume_mm3 = {.extracted = 1000.04, .smoothed = 999.96};
   mesh.bounds = {{{-90, -126, -72}, {90, 90, 108}}};
   mesh.files[MeshFormat::kDrc].bytes = 3510351;
+  mesh.dropped = {.components = 12, .triangles = 3456};
+  mesh.quality = {.closed = true,
+                  .manifold = true,
+                  .oriented = true,
+                  .components = 3,
+                  .genus = 5,
+                  .aspect_ratio = {{.mean = 0.6514}, {.mean = 0.8}},
+                  .smallest_angle_deg = {{.mean = 30.04}, {.mean = 41.96}}};
   EXPECT_EQ(mesh_report(mesh),
             "  triangles       1,234,567\n"
             "  vertices        617,283\n"
@@ -54,6 +62,10 @@ TEST(MeshReport, NamesWhatTheMeshIs) {
             "  x (LPS)         -90.00 to 90.00 mm\n"
             "  y               -126.00 to 90.00 mm\n"
             "  z               -72.00 to 108.00 mm\n"
+            "  dropped         12 components of 3,456 triangles\n"
+            "  topology        closed, manifold, oriented, genus 5\n"
+            "  aspect ratio    0.651 extracted, 0.800 smoothed\n"
+            "  smallest angle  30.0° extracted, 42.0° smoothed, on average\n"
             "  mesh.drc        3.5 MB (3,510,351 B)\n");
 }
 

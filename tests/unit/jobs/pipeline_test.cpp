@@ -1,9 +1,11 @@
 #include "server/jobs/pipeline.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <mutex>
 #include <numbers>
+#include <numeric>
 #include <set>
 #include <string>
 #include <vector>
@@ -218,6 +220,77 @@ TEST_F(PipelineTest, CancelledBetweenTwoFormatsItStoresNothing) {
   } else {
     EXPECT_EQ(blob_count(), before + 2);
   }
+}
+
+TEST_F(PipelineTest, WritesEveryFormatFromOneMesh) {
+  const Volume volume = add_sphere();
+  JobParameters parameters = parameters_of(volume, 0);
+  parameters.formats = {MeshFormat::kDrc, MeshFormat::kGlb, MeshFormat::kStl, MeshFormat::kPly,
+                        MeshFormat::kObj};
+  parameters.normals = true;
+  const PipelineResult result = run(volume, parameters);
+  ASSERT_EQ(result.mesh.files.size(), 5U);
+  const std::string ply = blob(result.mesh.files.at(MeshFormat::kPly).sha256);
+  EXPECT_NE(ply.find("element face " + std::to_string(result.mesh.triangles) + '\n'),
+            std::string::npos);
+  const std::string obj = blob(result.mesh.files.at(MeshFormat::kObj).sha256);
+  EXPECT_EQ(static_cast<std::uint64_t>(std::ranges::count(obj, '\n')),
+            1 + result.mesh.vertices + result.mesh.triangles);
+  EXPECT_NE(blob(result.mesh.files.at(MeshFormat::kGlb).sha256).find("\"NORMAL\""),
+            std::string::npos);
+}
+
+TEST_F(PipelineTest, SaysHowGoodAMeshIs) {
+  const Volume volume = add_sphere();
+  const PipelineResult result = run(volume, parameters_of(volume, 0));
+  const MeshQuality& quality = result.mesh.quality;
+  EXPECT_TRUE(quality.closed && quality.manifold && quality.oriented);
+  EXPECT_EQ(quality.components, 1U);
+  EXPECT_EQ(quality.genus, 0);
+  const auto sum = [](const Distribution& distribution) {
+    return std::accumulate(distribution.histogram.begin(), distribution.histogram.end(),
+                           std::uint64_t{0});
+  };
+  for (const auto& [extracted, smoothed] : {quality.aspect_ratio, quality.smallest_angle_deg}) {
+    EXPECT_EQ(sum(extracted), result.mesh.triangles);
+    EXPECT_EQ(sum(smoothed), result.mesh.triangles);
+    EXPECT_GT(smoothed.mean, extracted.mean) << "smoothing is there for better triangles";
+  }
+}
+
+// All inside: a box of as many cells as there are between the samples.
+TEST_F(PipelineTest, ClosesASurfaceAtTheBorder) {
+  const Volume volume = add(test::constant<std::uint8_t>(7, {5, 4, 3}), SampleType::kUint8);
+  JobParameters parameters = parameters_of(volume, 7);
+  EXPECT_EQ(run(volume, parameters).mesh.triangles, 0U);
+  parameters.close = true;
+  const MeshSummary mesh = run(volume, parameters).mesh;
+  EXPECT_TRUE(mesh.quality.closed);
+  EXPECT_EQ(mesh.quality.genus, 0);
+  EXPECT_EQ(mesh.boundary_edges, 0U);
+  EXPECT_NEAR(mesh.volume_mm3.extracted, 4 * 3 * 2, 1e-5);
+  EXPECT_NEAR(mesh.volume_mm3.smoothed, 4 * 3 * 2, 1e-5);
+}
+
+TEST_F(PipelineTest, LeavesSmallPartsOutAndSaysSo) {
+  const test::Field large = test::sphere({8, 8, 8}, 5);
+  const test::Field small = test::sphere({17, 8, 8}, 2);
+  const Volume volume =
+      add(test::sample<float>([&](const test::Point& p) { return std::max(large(p), small(p)); },
+                              {22, 17, 17}),
+          SampleType::kFloat32);
+  JobParameters parameters = parameters_of(volume, 0);
+  const MeshSummary all = run(volume, parameters).mesh;
+  ASSERT_EQ(all.components, 2U);
+  EXPECT_EQ(all.dropped.components, 0U);
+  parameters.components.keep = 1;
+  const MeshSummary one = run(volume, parameters).mesh;
+  EXPECT_EQ(one.components, 1U);
+  EXPECT_EQ(one.quality.components, 1U);
+  EXPECT_EQ(one.dropped.components, 1U);
+  EXPECT_EQ(one.dropped.triangles, all.triangles - one.triangles);
+  EXPECT_LT(one.bounds[1][0], 14);
+  EXPECT_LT(one.volume_mm3.extracted, all.volume_mm3.extracted);
 }
 
 TEST_F(PipelineTest, ALongJobStopsWhenItIsCancelled) {

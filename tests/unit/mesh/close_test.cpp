@@ -12,12 +12,16 @@
 #include "server/mesh/smooth.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
+#include "tests/support/points.h"
 #include "tests/support/reference.h"
 #include "tests/support/shapes.h"
 
 namespace isomesh::mesh {
 namespace {
 
+using test::cross;
+using test::dot;
+using test::minus;
 using test::SampleVolume;
 using test::Surface;
 
@@ -37,18 +41,6 @@ std::string describe(const Dims& dims, const ExtractOptions& options) {
   text << dims.x << "x" << dims.y << "x" << dims.z << ", iso " << options.iso << ", scheme "
        << static_cast<int>(options.scheme) << ", " << to_string(options.interpolation);
   return text.str();
-}
-
-test::Point minus(const test::Point& a, const test::Point& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-
-test::Point cross(const test::Point& a, const test::Point& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-double dot(const test::Point& a, const test::Point& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 // What every closed mesh is, besides the reference's: sound, without a boundary, and within the
