@@ -160,9 +160,10 @@ std::size_t FileBlobStore::sweep(std::chrono::system_clock::time_point cutoff,
   };
   std::vector<std::string> unnamed;
   std::error_code gone;  // files come and go while we look
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.blobs(), gone)) {
-    const std::string key = entry.path().filename();
-    if (entry.is_regular_file(gone) && is_old(entry.path()) && !keep(key)) unnamed.push_back(key);
+  std::filesystem::recursive_directory_iterator entry(folder_.blobs(), gone);
+  for (; entry != std::filesystem::recursive_directory_iterator(); entry.increment(gone)) {
+    const std::string key = entry->path().filename();
+    if (entry->is_regular_file(gone) && is_old(entry->path()) && !keep(key)) unnamed.push_back(key);
   }
   std::size_t erased = 0;
   for (const std::string& key : unnamed) {

@@ -49,6 +49,12 @@ class Kill : public FaultTest {
     url_ = daemon().url();
   }
 
+  // Whether the daemon lived until its end.
+  static bool is_whole(const Answer& answer) {
+    const std::string length = answer.header("content-length");
+    return answer.status != 0 && !length.empty() && std::stoull(length) == answer.body.size();
+  }
+
   // Until an answer comes: a retry with the same key is what makes it safe.
   Answer insist(const std::string& method, const std::string& target, const std::string& body,
                 const Headers& headers) {
@@ -56,7 +62,7 @@ class Kill : public FaultTest {
     while (std::chrono::steady_clock::now() < deadline) {
       try {
         Answer answer = answer_to(url(), request(method, target, body, headers));
-        if (answer.status != 0 && answer.status < 500) return answer;
+        if (is_whole(answer) && answer.status < 500) return answer;
       } catch (const std::runtime_error&) {
         // Nobody listens at the moment.
       }

@@ -57,11 +57,11 @@ class Soak : public FaultTest {
          std::filesystem::directory_iterator(process + "/fd", gone)) {
       ++sample.descriptors;
     }
-    for (const auto& entry :
-         std::filesystem::recursive_directory_iterator(folder_ / "data", gone)) {
-      if (!entry.is_regular_file(gone)) continue;
-      const auto bytes = entry.file_size(gone);
-      if (!gone) sample.disk_bytes += bytes;
+    for (std::filesystem::recursive_directory_iterator entry(folder_ / "data", gone), end;
+         entry != end; entry.increment(gone)) {
+      std::error_code absent;
+      const auto bytes = entry->is_regular_file(absent) ? entry->file_size(absent) : 0;
+      if (!absent) sample.disk_bytes += bytes;
     }
     return sample;
   }
