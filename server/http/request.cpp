@@ -268,6 +268,17 @@ std::optional<ByteRange> range_of(const httplib::Request& request, std::uint64_t
   return ByteRange{begin, end - begin + 1};
 }
 
+bool accepts_gzip(const httplib::Request& request) {
+  const std::string header = request.get_header_value("Accept-Encoding");
+  for (const std::string_view coding : split(header, ',')) {
+    const std::vector<std::string_view> parts = split(coding, ';');
+    if (parts[0] != "gzip" && parts[0] != "*") continue;
+    const bool weighed = parts.size() > 1 && parts[1].starts_with("q=");
+    return !weighed || number_of<double>(parts[1].substr(2)).value_or(1) > 0;
+  }
+  return false;
+}
+
 bool matches_etag(const httplib::Request& request, std::string_view etag) {
   const std::string header = request.get_header_value("If-None-Match");
   for (std::string_view tag : split(header, ',')) {

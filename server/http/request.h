@@ -77,6 +77,9 @@ struct ByteRange {
 // when the range lies outside of the file.
 std::optional<ByteRange> range_of(const httplib::Request& request, std::uint64_t size);
 
+// True when the client takes answers compressed with gzip (RFC 9110, 12.5.3).
+bool accepts_gzip(const httplib::Request& request);
+
 // True when If-None-Match names the entity tag (quotes included).
 bool matches_etag(const httplib::Request& request, std::string_view etag);
 

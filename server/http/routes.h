@@ -66,6 +66,7 @@ void add_volume_routes(App& app);
 void add_job_routes(App& app);
 void add_mesh_routes(App& app);
 void add_survey_routes(App& app);
+void add_page_routes(App& app);
 void add_service_routes(App& app);
 
 }  // namespace isomesh::http

@@ -201,6 +201,7 @@ Server::Server(const Services& services, const ServerOptions& options)
   add_job_routes(state_->app);
   add_mesh_routes(state_->app);
   add_survey_routes(state_->app);
+  add_page_routes(state_->app);
   add_service_routes(state_->app);
 }
 

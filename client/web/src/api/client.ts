@@ -1,0 +1,120 @@
+// The daemon's routes as functions. Failures are thrown as ApiError.
+import { asApiError, errorOf } from './problem';
+import { Signal } from '../ui/signal';
+import type { Estimate, Histogram, Job, JobParameters, Volume } from './types';
+
+const tokenKey = 'isomesh.token';
+
+// The token that requests carry; empty without one. It lives as long as the tab.
+export const token = new Signal<string>(sessionStorage.getItem(tokenKey) ?? '');
+token.subscribe((value) => {
+  if (value === '') sessionStorage.removeItem(tokenKey);
+  else sessionStorage.setItem(tokenKey, value);
+});
+
+// Whether the last request got through.
+export const connected = new Signal<boolean>(true);
+// Whether the daemon wants a token that we do not have.
+export const unauthorized = new Signal<boolean>(false);
+
+export function headers(more: Record<string, string> = {}): Record<string, string> {
+  return token.value === '' ? more : { ...more, Authorization: `Bearer ${token.value}` };
+}
+
+export async function send(path: string, init: RequestInit = {}): Promise<Response> {
+  let answer: Response;
+  try {
+    answer = await fetch(path, { ...init, headers: headers(init.headers as Record<string, string>) });
+  } catch (error) {
+    if (error instanceof DOMException && error.name === 'AbortError') throw error;
+    connected.value = false;
+    throw asApiError(error);
+  }
+  connected.value = true;
+  if (!answer.ok) {
+    const error = errorOf(answer.status, await answer.text());
+    if (error.status === 401) unauthorized.value = true;
+    throw error;
+  }
+  return answer;
+}
+
+async function json<T>(path: string, init?: RequestInit): Promise<T> {
+  return (await (await send(path, init)).json()) as T;
+}
+
+export async function listVolumes(): Promise<Volume[]> {
+  return (await json<{ volumes: Volume[] }>('/v1/volumes')).volumes;
+}
+
+export function getVolume(id: string): Promise<Volume> {
+  return json(`/v1/volumes/${encodeURIComponent(id)}`);
+}
+
+export async function eraseVolume(id: string): Promise<void> {
+  await send(`/v1/volumes/${encodeURIComponent(id)}`, { method: 'DELETE' });
+}
+
+export function histogramOf(id: string, bins: number, signal?: AbortSignal): Promise<Histogram> {
+  return json(`/v1/volumes/${encodeURIComponent(id)}/histogram?bins=${bins}`, { signal });
+}
+
+// What a job with these parameters would make.
+export function estimateOf(
+  { formats, draco, ...parameters }: JobParameters,
+  signal?: AbortSignal,
+): Promise<Estimate> {
+  const query = new URLSearchParams({ format: formats.join(',') });
+  for (const [name, value] of Object.entries({ ...parameters, ...draco })) {
+    query.set(name, String(value));
+  }
+  return json(`/v1/estimate?${query.toString()}`, { signal });
+}
+
+export type Axis = 'x' | 'y' | 'z';
+
+export async function slicePicture(
+  id: string,
+  axis: Axis,
+  index: number,
+  window: [number, number],
+  signal?: AbortSignal,
+): Promise<Blob> {
+  const query = `axis=${axis}&index=${index}&window=${window[0]},${window[1]}`;
+  const path = `/v1/volumes/${encodeURIComponent(id)}/slice.png?${query}`;
+  return (await send(path, { signal })).blob();
+}
+
+export interface JobPage {
+  jobs: Job[];
+  next: string | null;
+}
+
+export function listJobs(cursor = ''): Promise<JobPage> {
+  return json(`/v1/jobs${cursor === '' ? '' : `?cursor=${encodeURIComponent(cursor)}`}`);
+}
+
+export function getJob(id: string, waitSeconds = 0, signal?: AbortSignal): Promise<Job> {
+  const query = waitSeconds > 0 ? `?wait=${waitSeconds}` : '';
+  return json(`/v1/jobs/${encodeURIComponent(id)}${query}`, { signal });
+}
+
+export function submitJob(parameters: Partial<JobParameters>): Promise<Job> {
+  return json('/v1/jobs', {
+    method: 'POST',
+    headers: { 'Content-Type': 'application/json' },
+    body: JSON.stringify(parameters),
+  });
+}
+
+export function cancelJob(id: string): Promise<Job> {
+  return json(`/v1/jobs/${encodeURIComponent(id)}`, { method: 'DELETE' });
+}
+
+export async function isAlive(): Promise<boolean> {
+  try {
+    return (await fetch('/livez', { cache: 'no-store' })).ok;
+  } catch {
+    return false;
+  }
+}

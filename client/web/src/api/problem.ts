@@ -1,0 +1,85 @@
+import type { FieldFault, Problem } from './types';
+
+// A request that the daemon refused, or (status 0) that never reached it.
+export class ApiError extends Error {
+  constructor(
+    readonly status: number,
+    readonly title: string,
+    readonly detail: string,
+    readonly faults: FieldFault[] = [],
+  ) {
+    super(detail || title);
+    this.name = 'ApiError';
+  }
+
+  get isUnreachable(): boolean {
+    return this.status === 0;
+  }
+}
+
+function isProblem(value: unknown): value is Problem {
+  const problem = value as Problem | null;
+  return typeof problem === 'object' && problem !== null && typeof problem.title === 'string';
+}
+
+export function errorOfProblem(problem: Problem): ApiError {
+  return new ApiError(
+    problem.status,
+    problem.title,
+    problem.detail,
+    Array.isArray(problem.errors) ? problem.errors : [],
+  );
+}
+
+// What a refusal's body says; a proxy before the daemon may answer with anything.
+export function errorOf(status: number, body: string): ApiError {
+  try {
+    const problem: unknown = JSON.parse(body);
+    if (isProblem(problem)) return errorOfProblem({ ...problem, status });
+  } catch {
+    // Not JSON: the status has to do.
+  }
+  return new ApiError(status, `HTTP status ${status}`, `The server answered with status ${status}.`);
+}
+
+export function unreachable(): ApiError {
+  return new ApiError(
+    0,
+    'The server cannot be reached',
+    'The connection was lost. Is isomeshd running, and is the network there?',
+  );
+}
+
+export function asApiError(error: unknown): ApiError {
+  if (error instanceof ApiError) return error;
+  // fetch tells nothing more about a connection that failed.
+  if (error instanceof TypeError) return unreachable();
+  return new ApiError(-1, 'Something went wrong in this page', String(error));
+}
+
+// What a person can do about it, in one sentence; empty when the detail says all.
+export function adviceFor(error: ApiError): string {
+  switch (error.status) {
+    case 0:
+      return 'The page tries again by itself.';
+    case 401:
+    case 403:
+      return 'Enter a token that may do this.';
+    case 404:
+    case 410:
+      return 'It may have been erased; choose another one from the list.';
+    case 413:
+      return 'Crop or resample it, or ask the administrator to raise the limit.';
+    case 415:
+      return 'NIfTI, NRRD, MetaImage and DICOM are read; raw samples need a description.';
+    case 422:
+      return 'Export it again from its source, or choose another series.';
+    case 429:
+    case 503:
+      return 'The server is busy; try again in a moment.';
+    case 507:
+      return 'Erase volumes that are not needed any more, then try again.';
+    default:
+      return '';
+  }
+}

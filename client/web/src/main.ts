@@ -1,0 +1,155 @@
+import './style/base.css';
+import './style/views.css';
+import { connected, isAlive } from './api/client';
+import { ApiError, asApiError } from './api/problem';
+import { button, h, icon, isTyping } from './ui/dom';
+import { showHelp } from './ui/help';
+import { mountNotices, refusal } from './ui/notices';
+import { currentRoute, go, hashOf, type Route } from './ui/route';
+import { Scope } from './ui/signal';
+import { startTheme, toggleTheme } from './ui/theme';
+import { tokenButton, watchToken } from './ui/token_dialog';
+import { prepareView } from './views/prepare';
+import { queueView } from './views/queue';
+import { volumesView } from './views/volumes';
+
+const retryEvery = 2000;
+
+interface Place {
+  title: string;
+  show: (scope: Scope, route: Route) => Promise<HTMLElement>;
+}
+
+// What draws in 3D is only loaded when it is needed.
+function placeOf({ path }: Route): Place {
+  const [name, id] = path;
+  if (name === undefined || (name === 'volumes' && id === undefined)) {
+    return { title: 'Volumes', show: volumesView };
+  }
+  if (name === 'volumes') return { title: 'Choose the surface', show: prepareView };
+  if (name === 'jobs' && id === undefined) return { title: 'Jobs', show: queueView };
+  if (name === 'jobs') {
+    return {
+      title: 'Surface',
+      show: async (scope, route) => (await import('./views/job')).jobView(scope, route),
+    };
+  }
+  if (name === 'compare') {
+    return {
+      title: 'Compare',
+      show: async (scope, route) => (await import('./views/compare')).compareView(scope, route),
+    };
+  }
+  return {
+    title: 'Not found',
+    show: () => Promise.reject(new ApiError(404, 'Not found', 'There is nothing at this address.')),
+  };
+}
+
+const halfDisc = 'M8 2a6 6 0 1 0 0 12A6 6 0 0 0 8 2Zm0 0v12';
+const main = h('main', { id: 'main', tabindex: '-1' });
+const banner = h('div', { class: 'banner', role: 'alert', hidden: true });
+const links = [
+  h('a', { href: hashOf([]), 'data-place': 'volumes' }, 'Volumes'),
+  h('a', { href: hashOf(['jobs']), 'data-place': 'jobs' }, 'Jobs'),
+];
+
+function shell(): HTMLElement[] {
+  return [
+    h('a', { class: 'skip', href: '#main', onClick: (event: Event) => {
+      event.preventDefault();
+      main.focus();
+    } }, 'Skip to the content'),
+    h(
+      'header',
+      { class: 'top' },
+      h('a', { class: 'brand', href: hashOf([]) }, 'isomesh'),
+      h('nav', { 'aria-label': 'Main' }, ...links),
+      h('span', { class: 'grow' }),
+      tokenButton(),
+      button('Keys', showHelp, { class: 'quiet', title: 'Keyboard (?)' }),
+      button(icon(halfDisc), toggleTheme, { class: 'quiet', 'aria-label': 'Light or dark' }),
+    ),
+    banner,
+    main,
+  ];
+}
+
+let scope = new Scope();
+let shownPath = '';
+
+async function show(): Promise<void> {
+  scope.end();
+  const mine = new Scope();
+  scope = mine;
+  const route = currentRoute();
+  const place = placeOf(route);
+  document.title = `${place.title} \u00b7 isomesh`;
+  for (const link of links) {
+    const isHere = link.dataset.place === (route.path[0] ?? 'volumes');
+    if (isHere) link.setAttribute('aria-current', 'page');
+    else link.removeAttribute('aria-current');
+  }
+  const isMove = shownPath !== '' && shownPath !== route.path.join('/');
+  shownPath = route.path.join('/') || '/';
+  main.setAttribute('aria-busy', 'true');
+  const slow = setTimeout(() => main.replaceChildren(h('p', { class: 'loading' }, 'Loading')), 300);
+  try {
+    const view = await place.show(mine, route);
+    if (mine.isOver) return;
+    main.replaceChildren(view);
+    if (isMove) main.focus({ preventScroll: true });
+  } catch (error) {
+    if (mine.isOver) return;
+    const failure = asApiError(error);
+    if (failure.status === -1 && !(error instanceof ApiError)) console.error(error);
+    const again = button('Try again', () => void show());
+    const home = h('a', { class: 'button', href: hashOf([]) }, 'All volumes');
+    main.replaceChildren(h('div', { class: 'page-problem' }, refusal(failure, again, home)));
+    // What failed because nobody answered is tried again when somebody does.
+    if (failure.isUnreachable) {
+      const stop = connected.subscribe((isConnected) => {
+        if (isConnected) void show();
+      });
+      mine.onEnd(stop);
+    }
+  } finally {
+    clearTimeout(slow);
+    if (!mine.isOver) main.removeAttribute('aria-busy');
+  }
+}
+
+function watchConnection(): void {
+  let timer = 0;
+  connected.subscribe((isConnected) => {
+    clearInterval(timer);
+    banner.hidden = isConnected;
+    if (isConnected) return;
+    banner.textContent = 'The connection to the server is lost. This page goes on as soon as it is back.';
+    timer = window.setInterval(() => {
+      void isAlive().then((alive) => {
+        if (alive) connected.value = true;
+      });
+    }, retryEvery);
+  });
+}
+
+function watchKeys(): void {
+  let isGoing = false;
+  window.addEventListener('keydown', (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event)) return;
+    if (isGoing && event.key === 'v') go([]);
+    if (isGoing && event.key === 'j') go(['jobs']);
+    if (event.key === '?') showHelp();
+    isGoing = event.key === 'g';
+  });
+}
+
+startTheme();
+document.body.append(...shell());
+mountNotices(document.body);
+watchConnection();
+watchKeys();
+watchToken(() => void show());
+window.addEventListener('hashchange', () => void show());
+void show();

@@ -1,0 +1,219 @@
+// Arrays of triangles made ready for drawing: blocks of 16-bit indices, normals, borders, and a
+// coarse copy for the time that it is turned.
+
+export interface Triangles {
+  positions: Float32Array<ArrayBuffer>;
+  index: Uint32Array<ArrayBuffer>;
+}
+
+// A block as it is drawn. Transferable.
+export interface Block {
+  positions: Float32Array<ArrayBuffer>;
+  index: Uint16Array<ArrayBuffer>;
+  // Fewer triangles of the same vertices.
+  coarse: Uint16Array<ArrayBuffer>;
+  // Four of 16 bits a vertex, normalised; the fourth fills up.
+  normals: Int16Array<ArrayBuffer>;
+  // Vertices on edges of one triangle, where the neighbouring block goes on, and their normals before
+  // normalisation.
+  border: Uint16Array<ArrayBuffer>;
+  borderNormals: Float32Array<ArrayBuffer>;
+}
+
+const mostVertices = 65_535;
+export const mostTriangles = 65_000;
+// Edge lengths that one cell of the coarse copy spans.
+const coarseness = 4;
+
+// Sums of the triangles' normals times twice their area, three a vertex.
+export function areaNormals({ positions, index }: Triangles): Float32Array<ArrayBuffer> {
+  const sums = new Float32Array(positions.length);
+  for (let i = 0; i + 2 < index.length; i += 3) {
+    const a = 3 * (index[i] as number);
+    const b = 3 * (index[i + 1] as number);
+    const c = 3 * (index[i + 2] as number);
+    const ax = positions[a] as number;
+    const ay = positions[a + 1] as number;
+    const az = positions[a + 2] as number;
+    const ux = (positions[b] as number) - ax;
+    const uy = (positions[b + 1] as number) - ay;
+    const uz = (positions[b + 2] as number) - az;
+    const vx = (positions[c] as number) - ax;
+    const vy = (positions[c + 1] as number) - ay;
+    const vz = (positions[c + 2] as number) - az;
+    const nx = uy * vz - uz * vy;
+    const ny = uz * vx - ux * vz;
+    const nz = ux * vy - uy * vx;
+    for (const vertex of [a, b, c]) {
+      sums[vertex] = (sums[vertex] as number) + nx;
+      sums[vertex + 1] = (sums[vertex + 1] as number) + ny;
+      sums[vertex + 2] = (sums[vertex + 2] as number) + nz;
+    }
+  }
+  return sums;
+}
+
+// Writes one normal; a sum of zero gives one that points up.
+export function packNormal(normals: Int16Array, vertex: number, x: number, y: number, z: number): void {
+  const length = Math.hypot(x, y, z);
+  const scale = length > 0 ? 32_767 / length : 0;
+  normals[4 * vertex] = Math.round(x * scale);
+  normals[4 * vertex + 1] = Math.round(y * scale);
+  normals[4 * vertex + 2] = length > 0 ? Math.round(z * scale) : 32_767;
+}
+
+function packedNormals(sums: Float32Array): Int16Array<ArrayBuffer> {
+  const normals = new Int16Array((sums.length / 3) * 4);
+  for (let vertex = 0; 3 * vertex < sums.length; vertex += 1) {
+    const at = 3 * vertex;
+    packNormal(normals, vertex, sums[at] as number, sums[at + 1] as number, sums[at + 2] as number);
+  }
+  return normals;
+}
+
+// The vertices of edges whose other direction no triangle has. At most 65 535 vertices.
+export function borderVertices(index: ArrayLike<number>, vertices: number): Uint16Array<ArrayBuffer> {
+  let slots = 1024;
+  while (slots < index.length * 2) slots *= 2;
+  const mask = slots - 1;
+  const table = new Uint32Array(slots).fill(0xffff_ffff);
+  const slotOf = (key: number): number => {
+    let slot = (Math.imul(key, 0x9e37_79b1) >>> 7) & mask;
+    while (table[slot] !== 0xffff_ffff && table[slot] !== key) slot = (slot + 1) & mask;
+    return slot;
+  };
+  const next = (i: number): number => (i % 3 === 2 ? i - 2 : i + 1);
+  for (let i = 0; i < index.length; i += 1) {
+    const key = ((index[i] as number) * 65_536 + (index[next(i)] as number)) >>> 0;
+    table[slotOf(key)] = key;
+  }
+  const marked = new Uint8Array(vertices);
+  let count = 0;
+  const mark = (vertex: number): void => {
+    if (marked[vertex] === 0) {
+      marked[vertex] = 1;
+      count += 1;
+    }
+  };
+  for (let i = 0; i < index.length; i += 1) {
+    const a = index[i] as number;
+    const b = index[next(i)] as number;
+    const reverse = (b * 65_536 + a) >>> 0;
+    if (table[slotOf(reverse)] !== reverse) {
+      mark(a);
+      mark(b);
+    }
+  }
+  const border = new Uint16Array(count);
+  let used = 0;
+  marked.forEach((isMarked, vertex) => {
+    if (isMarked === 1) border[used++] = vertex;
+  });
+  return border;
+}
+
+function meanEdge({ positions, index }: Triangles): number {
+  const step = Math.max(1, Math.floor(index.length / 3 / 500));
+  let sum = 0;
+  let count = 0;
+  for (let triangle = 0; 3 * triangle + 1 < index.length; triangle += step) {
+    const a = 3 * (index[3 * triangle] as number);
+    const b = 3 * (index[3 * triangle + 1] as number);
+    sum += Math.hypot(
+      (positions[a] as number) - (positions[b] as number),
+      (positions[a + 1] as number) - (positions[b + 1] as number),
+      (positions[a + 2] as number) - (positions[b + 2] as number),
+    );
+    count += 1;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+// The triangles that are left when all vertices of a cell of that size become the first of them.
+export function clustered({ positions, index }: Triangles, cell: number): Uint16Array<ArrayBuffer> {
+  if (!(cell > 0)) return Uint16Array.from(index);
+  const first = new Map<number, number>();
+  const heads = new Uint16Array(positions.length / 3);
+  for (let vertex = 0; vertex < heads.length; vertex += 1) {
+    // 17 bits an axis; cells that wrap around are too far apart to meet in a block.
+    const key =
+      ((Math.floor((positions[3 * vertex] as number) / cell) & 0x1_ffff) * 0x2_0000 +
+        (Math.floor((positions[3 * vertex + 1] as number) / cell) & 0x1_ffff)) *
+        0x2_0000 +
+      (Math.floor((positions[3 * vertex + 2] as number) / cell) & 0x1_ffff);
+    const head = first.get(key);
+    if (head === undefined) first.set(key, vertex);
+    heads[vertex] = head ?? vertex;
+  }
+  const kept = new Uint16Array(index.length);
+  let used = 0;
+  for (let i = 0; i + 2 < index.length; i += 3) {
+    const a = heads[index[i] as number] as number;
+    const b = heads[index[i + 1] as number] as number;
+    const c = heads[index[i + 2] as number] as number;
+    if (a === b || b === c || a === c) continue;
+    kept[used] = a;
+    kept[used + 1] = b;
+    kept[used + 2] = c;
+    used += 3;
+  }
+  return kept.slice(0, used);
+}
+
+// Consecutive triangles with the vertices that they name, so many that 16 bits number them.
+export function split({ positions, index }: Triangles): Triangles[] {
+  if (index.length <= 3 * mostTriangles && positions.length <= 3 * mostVertices) {
+    return [{ positions, index }];
+  }
+  const parts: Triangles[] = [];
+  const newNumber = new Int32Array(positions.length / 3).fill(-1);
+  const most = Math.floor(mostVertices / 3); // triangles that surely fit
+  let begin = 0;
+  while (begin < index.length) {
+    const names: number[] = [];
+    let end = begin;
+    const limit = Math.min(index.length, begin + 3 * mostTriangles);
+    while (end < limit && (names.length + 3 <= mostVertices || end - begin < 3 * most)) {
+      for (let corner = 0; corner < 3; corner += 1) {
+        const vertex = index[end + corner] as number;
+        if (newNumber[vertex] === -1) {
+          newNumber[vertex] = names.length;
+          names.push(vertex);
+        }
+      }
+      end += 3;
+    }
+    const part: Triangles = {
+      positions: new Float32Array(3 * names.length),
+      index: new Uint32Array(end - begin),
+    };
+    for (let i = begin; i < end; i += 1) {
+      part.index[i - begin] = newNumber[index[i] as number] as number;
+    }
+    names.forEach((vertex, number) => {
+      part.positions.set(positions.subarray(3 * vertex, 3 * vertex + 3), 3 * number);
+      newNumber[vertex] = -1;
+    });
+    parts.push(part);
+    begin = end;
+  }
+  return parts;
+}
+
+export function prepare(triangles: Triangles): Block {
+  const { positions, index } = triangles;
+  const sums = areaNormals(triangles);
+  const border = borderVertices(index, positions.length / 3);
+  const borderNormals = new Float32Array(3 * border.length);
+  border.forEach((vertex, i) => {
+    borderNormals.set(sums.subarray(3 * vertex, 3 * vertex + 3), 3 * i);
+  });
+  return {
+    positions,
+    index: Uint16Array.from(index),
+    coarse: clustered(triangles, coarseness * meanEdge(triangles)),
+    normals: packedNormals(sums),
+    border,
+    borderNormals,
+  };
+}

@@ -1,0 +1,89 @@
+// Decodes Draco streams beside the page and makes blocks of them.
+import create, { type DracoModule } from 'three/examples/jsm/libs/draco/gltf/draco_wasm_wrapper.js';
+import wasmUrl from 'three/examples/jsm/libs/draco/gltf/draco_decoder.wasm?url';
+import { prepare, split, type Block, type Triangles } from './blocks';
+
+export interface DecodeRequest {
+  id: number;
+  bytes: Uint8Array<ArrayBuffer>;
+  // The position attribute's number in the stream; null: the stream's only one.
+  positionId: number | null;
+}
+
+export interface DecodeAnswer {
+  id: number;
+  blocks: Block[];
+  error: string;
+}
+
+interface WorkerScope {
+  onmessage: ((event: MessageEvent<DecodeRequest>) => void) | null;
+  postMessage(message: DecodeAnswer, transfer: Transferable[]): void;
+}
+const scope = self as unknown as WorkerScope;
+
+const ready = fetch(wasmUrl)
+  .then((answer) => {
+    if (!answer.ok) throw new Error('The decoder could not be loaded.');
+    return answer.arrayBuffer();
+  })
+  .then((wasmBinary) => create({ wasmBinary }));
+
+function copyOut<T>(draco: DracoModule, bytes: number, read: (pointer: number) => T): T {
+  const pointer = draco._malloc(bytes);
+  try {
+    return read(pointer);
+  } finally {
+    draco._free(pointer);
+  }
+}
+
+function decode(draco: DracoModule, { bytes, positionId }: DecodeRequest): Triangles {
+  const decoder = new draco.Decoder();
+  const buffer = new draco.DecoderBuffer();
+  const mesh = new draco.Mesh();
+  try {
+    buffer.Init(bytes, bytes.length);
+    const status = decoder.DecodeBufferToMesh(buffer, mesh);
+    if (!status.ok() || mesh.ptr === 0) throw new Error(`Draco: ${status.error_msg()}`);
+    const attribute =
+      positionId === null
+        ? decoder.GetAttribute(mesh, decoder.GetAttributeId(mesh, draco.POSITION))
+        : decoder.GetAttributeByUniqueId(mesh, positionId);
+    if (attribute.ptr === 0) throw new Error('Draco: the stream holds no positions');
+    const corners = 3 * mesh.num_faces();
+    const coordinates = 3 * mesh.num_points();
+    const index = copyOut(draco, 4 * corners, (pointer) => {
+      decoder.GetTrianglesUInt32Array(mesh, 4 * corners, pointer);
+      return draco.HEAPU32.slice(pointer / 4, pointer / 4 + corners) as Uint32Array<ArrayBuffer>;
+    });
+    const positions = copyOut(draco, 4 * coordinates, (pointer) => {
+      decoder.GetAttributeDataArrayForAllPoints(
+        mesh,
+        attribute,
+        draco.DT_FLOAT32,
+        4 * coordinates,
+        pointer,
+      );
+      return draco.HEAPF32.slice(pointer / 4, pointer / 4 + coordinates) as Float32Array<ArrayBuffer>;
+    });
+    return { positions, index };
+  } finally {
+    draco.destroy(mesh);
+    draco.destroy(buffer);
+    draco.destroy(decoder);
+  }
+}
+
+scope.onmessage = (event) => {
+  const request = event.data;
+  ready
+    .then((draco) => {
+      const blocks = split(decode(draco, request)).map(prepare);
+      const buffers = blocks.flatMap((block) => Object.values(block).map((array) => array.buffer));
+      scope.postMessage({ id: request.id, blocks, error: '' }, buffers as Transferable[]);
+    })
+    .catch((error: unknown) => {
+      scope.postMessage({ id: request.id, blocks: [], error: String(error) }, []);
+    });
+};

@@ -1,0 +1,155 @@
+// A GLB file (glTF 2.0) read while it arrives: the description first, then each Draco stream of it as
+// soon as its bytes are there.
+
+const magic = 0x46546c67;
+const jsonChunk = 0x4e4f534a;
+const binaryChunk = 0x004e4942;
+const headerBytes = 20; // of the file and of its first chunk
+const chunkHeaderBytes = 8;
+const largestJson = 256 * 1024 * 1024;
+
+export interface DracoPrimitive {
+  // Place in the binary chunk.
+  offset: number;
+  length: number;
+  positionId: number;
+  triangles: number;
+  vertices: number;
+  low: [number, number, number];
+  high: [number, number, number];
+}
+
+interface Gltf {
+  asset?: { extras?: unknown };
+  meshes?: {
+    primitives: {
+      attributes: Record<string, number>;
+      indices?: number;
+      extensions?: {
+        KHR_draco_mesh_compression?: { bufferView: number; attributes: Record<string, number> };
+      };
+    }[];
+  }[];
+  accessors?: { count: number; min?: number[]; max?: number[] }[];
+  bufferViews?: { byteOffset?: number; byteLength: number }[];
+}
+
+function vector(values: number[] | undefined): [number, number, number] {
+  return [values?.[0] ?? 0, values?.[1] ?? 0, values?.[2] ?? 0];
+}
+
+export function primitivesOf(gltf: Gltf): DracoPrimitive[] {
+  const primitives = (gltf.meshes ?? []).flatMap((mesh) => mesh.primitives);
+  return primitives.map((primitive) => {
+    const draco = primitive.extensions?.KHR_draco_mesh_compression;
+    const view = draco && gltf.bufferViews?.[draco.bufferView];
+    const position = gltf.accessors?.[primitive.attributes.POSITION ?? -1];
+    const indices = gltf.accessors?.[primitive.indices ?? -1];
+    const positionId = draco?.attributes.POSITION;
+    if (!view || !position || !indices || positionId === undefined) {
+      throw new Error('The GLB file holds a part that is not compressed with Draco.');
+    }
+    return {
+      offset: view.byteOffset ?? 0,
+      length: view.byteLength,
+      positionId,
+      triangles: indices.count / 3,
+      vertices: position.count,
+      low: vector(position.min),
+      high: vector(position.max),
+    };
+  });
+}
+
+export interface GlbListener {
+  onPrimitives: (primitives: DracoPrimitive[]) => void;
+  // The bytes are the listener's to keep.
+  onStream: (index: number, bytes: Uint8Array<ArrayBuffer>) => void;
+}
+
+export class GlbReader {
+  private head: Uint8Array = new Uint8Array(0);
+  private jsonBytes = -1;
+  private binary: Uint8Array<ArrayBuffer> | null = null;
+  private filled = 0;
+  private primitives: DracoPrimitive[] = [];
+  // The primitives' numbers as their bytes come.
+  private order: number[] = [];
+  private next = 0;
+
+  constructor(private readonly listener: GlbListener) {}
+
+  // True once every primitive has been handed over.
+  get isComplete(): boolean {
+    return this.jsonBytes >= 0 && this.next === this.primitives.length;
+  }
+
+  take(piece: Uint8Array): void {
+    if (this.binary) {
+      this.fill(piece);
+      return;
+    }
+    this.head = joined(this.head, piece);
+    this.readHead();
+  }
+
+  private readHead(): void {
+    if (this.head.length < headerBytes) return;
+    const view = new DataView(this.head.buffer, this.head.byteOffset, this.head.byteLength);
+    if (this.jsonBytes < 0) {
+      if (view.getUint32(0, true) !== magic || view.getUint32(4, true) !== 2) {
+        throw new Error('This is not a GLB file of version 2.');
+      }
+      const bytes = view.getUint32(12, true);
+      if (view.getUint32(16, true) !== jsonChunk || bytes > largestJson) {
+        throw new Error('The GLB file does not begin with its description.');
+      }
+      if (this.head.length < headerBytes + bytes) return;
+      this.jsonBytes = bytes;
+      const text = new TextDecoder().decode(this.head.subarray(headerBytes, headerBytes + bytes));
+      this.primitives = primitivesOf(JSON.parse(text) as Gltf);
+      const end = (part: number): number => {
+        const { offset, length } = this.primitives[part] ?? { offset: 0, length: 0 };
+        return offset + length;
+      };
+      this.order = this.primitives.map((_, index) => index).sort((a, b) => end(a) - end(b));
+      this.listener.onPrimitives(this.primitives);
+    }
+    const start = headerBytes + this.jsonBytes;
+    if (this.primitives.length === 0 || this.head.length < start + chunkHeaderBytes) return;
+    const bytes = view.getUint32(start, true);
+    if (view.getUint32(start + 4, true) !== binaryChunk) {
+      throw new Error('The GLB file has no binary part.');
+    }
+    if (this.primitives.some((part) => part.offset + part.length > bytes)) {
+      throw new Error('The GLB file names bytes that it does not hold.');
+    }
+    this.binary = new Uint8Array(bytes);
+    const rest = this.head.subarray(start + chunkHeaderBytes);
+    this.head = new Uint8Array(0);
+    this.fill(rest);
+  }
+
+  private fill(piece: Uint8Array): void {
+    const binary = this.binary;
+    if (!binary) return;
+    const wanted = piece.subarray(0, binary.length - this.filled);
+    binary.set(wanted, this.filled);
+    this.filled += wanted.length;
+    for (;;) {
+      const index = this.order[this.next] ?? -1;
+      const part = this.primitives[index];
+      if (!part || part.offset + part.length > this.filled) return;
+      this.listener.onStream(index, binary.slice(part.offset, part.offset + part.length));
+      this.next += 1;
+    }
+  }
+}
+
+function joined(a: Uint8Array, b: Uint8Array): Uint8Array {
+  if (a.length === 0) return b;
+  const all = new Uint8Array(a.length + b.length);
+  all.set(a);
+  all.set(b, a.length);
+  return all;
+}

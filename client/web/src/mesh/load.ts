@@ -1,0 +1,133 @@
+// A finished job's mesh, part by part: downloaded, decoded in workers, and handed over as it comes.
+import { headers, connected } from '../api/client';
+import { ApiError, asApiError, errorOf, unreachable } from '../api/problem';
+import type { Job, MeshFile } from '../api/types';
+import type { Block } from './blocks';
+import { GlbReader } from './glb';
+import { decoders } from './pool';
+
+export interface LoadProgress {
+  bytes: number;
+  totalBytes: number;
+  triangles: number;
+  totalTriangles: number;
+}
+
+export interface LoadTiming {
+  download: number;
+  decode: number;
+}
+
+export interface LoadListener {
+  onBlocks: (blocks: Block[]) => void;
+  onProgress: (progress: LoadProgress) => void;
+}
+
+const mostResumes = 5;
+const resumeDelay = 1000;
+
+// The file that the page can show; null when the job was asked for neither GLB nor Draco.
+export function viewableFile(job: Job): { file: MeshFile; format: 'glb' | 'drc' } | null {
+  const files = job.mesh?.files;
+  if (files?.glb) return { file: files.glb, format: 'glb' };
+  if (files?.drc) return { file: files.drc, format: 'drc' };
+  return null;
+}
+
+function wait(milliseconds: number): Promise<void> {
+  return new Promise((resolve) => setTimeout(resolve, milliseconds));
+}
+
+// Hands over the file's bytes in order. A connection that is lost is taken up where it broke.
+async function download(
+  file: MeshFile,
+  signal: AbortSignal,
+  take: (piece: Uint8Array) => void,
+): Promise<void> {
+  let received = 0;
+  let resumes = 0;
+  while (received < file.bytes) {
+    try {
+      const range: Record<string, string> =
+        received > 0 ? { Range: `bytes=${received}-`, 'If-Range': `"${file.sha256}"` } : {};
+      const answer = await fetch(file.href, { signal, headers: headers(range) });
+      if (!answer.ok) throw errorOf(answer.status, await answer.text());
+      if (received > 0 && answer.status !== 206) {
+        throw new ApiError(-1, 'The mesh changed', 'The file is not the same any more; reload the page.');
+      }
+      connected.value = true;
+      const reader = answer.body?.getReader();
+      if (!reader) throw unreachable();
+      for (;;) {
+        const { done, value } = await reader.read();
+        if (done) break;
+        received += value.length;
+        take(value);
+      }
+      if (received < file.bytes) throw unreachable();
+    } catch (error) {
+      if (signal.aborted) throw error;
+      const failure = asApiError(error);
+      resumes += 1;
+      if (!failure.isUnreachable || resumes > mostResumes) throw failure;
+      connected.value = false;
+      await wait(resumeDelay * resumes);
+    }
+  }
+}
+
+export async function loadMesh(
+  job: Job,
+  signal: AbortSignal,
+  listener: LoadListener,
+): Promise<LoadTiming> {
+  const viewable = viewableFile(job);
+  if (!viewable) throw new Error('The job has no file that can be shown.');
+  const { file, format } = viewable;
+  const progress: LoadProgress = {
+    bytes: 0,
+    totalBytes: file.bytes,
+    triangles: 0,
+    totalTriangles: job.mesh?.triangles ?? 0,
+  };
+  const began = performance.now();
+  const decoding: Promise<void>[] = [];
+  const decode = (bytes: Uint8Array<ArrayBuffer>, positionId: number | null): void => {
+    const done = decoders.decode(bytes, positionId, signal).then((blocks) => {
+      if (signal.aborted) return;
+      for (const block of blocks) progress.triangles += block.index.length / 3;
+      listener.onBlocks(blocks);
+      listener.onProgress({ ...progress });
+    });
+    // Looked at once all are under way; until then a failure must not count as unheard.
+    done.catch(() => undefined);
+    decoding.push(done);
+  };
+
+  if (format === 'glb') {
+    let positionIds: number[] = [];
+    const reader = new GlbReader({
+      onPrimitives: (primitives) => {
+        positionIds = primitives.map((primitive) => primitive.positionId);
+      },
+      onStream: (index, bytes) => decode(bytes, positionIds[index] ?? null),
+    });
+    await download(file, signal, (piece) => {
+      reader.take(piece);
+      progress.bytes += piece.length;
+      listener.onProgress({ ...progress });
+    });
+    if (!reader.isComplete) throw new Error('The GLB file ends before its last part.');
+  } else {
+    const whole = new Uint8Array(file.bytes);
+    await download(file, signal, (piece) => {
+      whole.set(piece, progress.bytes);
+      progress.bytes += piece.length;
+      listener.onProgress({ ...progress });
+    });
+    decode(whole, null);
+  }
+  const downloaded = performance.now();
+  await Promise.all(decoding);
+  return { download: downloaded - began, decode: performance.now() - downloaded };
+}

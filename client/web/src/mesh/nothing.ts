@@ -1,0 +1,2 @@
+// In place of modules of Node that the decoder only asks for outside of a browser.
+export default {};

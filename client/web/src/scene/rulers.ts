@@ -1,0 +1,117 @@
+// Distances between points of the surface.
+import {
+  BufferAttribute,
+  BufferGeometry,
+  LineBasicMaterial,
+  LineSegments,
+  Points,
+  PointsMaterial,
+  Vector3,
+  type Camera,
+  type Object3D,
+} from 'three';
+import { h } from '../ui/dom';
+import { formatNumber } from '../ui/format';
+import type { Vec3 } from '../api/types';
+
+export interface Ruler {
+  from: Vec3;
+  to: Vec3;
+}
+
+export function lengthOf({ from, to }: Ruler): number {
+  return Math.hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
+}
+
+const mostRulers = 32;
+
+export class Rulers {
+  private rulers: Ruler[] = [];
+  private pending: Vec3 | null = null;
+  private readonly geometry = new BufferGeometry();
+  private readonly lineMaterial: LineBasicMaterial;
+  private readonly pointMaterial: PointsMaterial;
+  private readonly labels = h('div', { class: 'ruler-labels', 'aria-hidden': 'true' });
+  private readonly middle = new Vector3();
+
+  constructor(parent: Object3D, host: HTMLElement, colour: string) {
+    const options = { color: colour, depthTest: false, transparent: true };
+    this.lineMaterial = new LineBasicMaterial(options);
+    this.pointMaterial = new PointsMaterial({ ...options, size: 7, sizeAttenuation: false });
+    const lines = new LineSegments(this.geometry, this.lineMaterial);
+    const points = new Points(this.geometry, this.pointMaterial);
+    lines.frustumCulled = false;
+    points.frustumCulled = false;
+    lines.renderOrder = 10;
+    points.renderOrder = 11;
+    parent.add(lines, points);
+    host.append(this.labels);
+    this.rebuild();
+  }
+
+  get all(): readonly Ruler[] {
+    return this.rulers;
+  }
+
+  get isPending(): boolean {
+    return this.pending !== null;
+  }
+
+  // Every second point ends a ruler, which is returned.
+  add(point: Vec3): Ruler | null {
+    if (this.pending === null) {
+      this.pending = point;
+      this.rebuild();
+      return null;
+    }
+    const ruler = { from: this.pending, to: point };
+    this.pending = null;
+    this.rulers = [...this.rulers, ruler].slice(-mostRulers);
+    this.rebuild();
+    return ruler;
+  }
+
+  // Takes back a point that has no partner, else the last ruler.
+  takeBack(): void {
+    if (this.pending === null) this.rulers = this.rulers.slice(0, -1);
+    this.pending = null;
+    this.rebuild();
+  }
+
+  clear(): void {
+    this.pending = null;
+    this.rulers = [];
+    this.rebuild();
+  }
+
+  placeLabels(camera: Camera, width: number, height: number): void {
+    this.rulers.forEach(({ from, to }, index) => {
+      const label = this.labels.children[index] as HTMLElement;
+      this.middle
+        .set((from[0] + to[0]) / 2, (from[1] + to[1]) / 2, (from[2] + to[2]) / 2)
+        .project(camera);
+      const x = ((this.middle.x + 1) / 2) * width;
+      const y = ((1 - this.middle.y) / 2) * height;
+      label.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -130%)`;
+      label.hidden = this.middle.z > 1;
+    });
+  }
+
+  dispose(): void {
+    this.geometry.dispose();
+    this.lineMaterial.dispose();
+    this.pointMaterial.dispose();
+    this.labels.remove();
+  }
+
+  private rebuild(): void {
+    const places = this.rulers.flatMap(({ from, to }) => [...from, ...to]);
+    // A lone point, as a line without length.
+    if (this.pending) places.push(...this.pending, ...this.pending);
+    this.geometry.setAttribute('position', new BufferAttribute(new Float32Array(places), 3));
+    this.geometry.setDrawRange(0, places.length / 3);
+    this.labels.replaceChildren(
+      ...this.rulers.map((ruler) => h('span', {}, `${formatNumber(lengthOf(ruler), 1)} mm`)),
+    );
+  }
+}

@@ -1,0 +1,403 @@
+// A surface in a canvas: blocks of triangles that come one by one, a camera around them, and what is
+// drawn over them. Draws when something changed, never for nothing.
+import {
+  AmbientLight,
+  BufferAttribute,
+  BufferGeometry,
+  DirectionalLight,
+  DoubleSide,
+  Mesh,
+  MeshPhongMaterial,
+  PerspectiveCamera,
+  Raycaster,
+  Scene,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from 'three';
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import type { Vec3 } from '../api/types';
+import type { Block } from '../mesh/blocks';
+import { Seams } from '../mesh/seams';
+import { OrientationCube } from './cube';
+import { Cut } from './cut';
+import { FrameBudget } from './budget';
+import { Rulers } from './rulers';
+import { firstOffset, fitDistance, turned, viewOffsets, type CameraPlace, type ViewName } from './views';
+
+export interface SurfaceStyle {
+  shading: 'smooth' | 'flat';
+  wireframe: boolean;
+  opacity: number;
+}
+
+export const defaultStyle: SurfaceStyle = { shading: 'smooth', wireframe: false, opacity: 1 };
+
+interface DrawnBlock {
+  mesh: Mesh<BufferGeometry, MeshPhongMaterial>;
+  fine: BufferGeometry;
+  coarse: BufferGeometry;
+}
+
+const verticalAngle = 30;
+const fill = 1.04;
+const wiresPerFrame = 4;
+const settleDelay = 180;
+
+export class Surface {
+  readonly canvas: HTMLCanvasElement;
+  readonly rulers: Rulers;
+  readonly cut: Cut;
+  readonly budget = new FrameBudget();
+  onCamera: (() => void) | null = null;
+  onPick: ((point: Vec3) => void) | null = null;
+
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly camera = new PerspectiveCamera(verticalAngle, 1, 1, 1000);
+  private readonly controls: OrbitControls;
+  private readonly cube = new OrientationCube();
+  private readonly material = new MeshPhongMaterial({
+    color: 0xdcd6c8,
+    specular: 0x1c1c1c,
+    shininess: 24,
+    side: DoubleSide,
+  });
+  private readonly blocks: DrawnBlock[] = [];
+  private readonly seams = new Seams();
+  private readonly ray = new Raycaster();
+  private readonly resizing: ResizeObserver;
+  private bounds: [Vec3, Vec3] = [
+    [-1, -1, -1],
+    [1, 1, 1],
+  ];
+  private style = defaultStyle;
+  private scheduled = 0;
+  private settling = 0;
+  private isMoving = false;
+  private isCoarse = false;
+  private isDisposed = false;
+  private press: { x: number; y: number } | null = null;
+
+  constructor(private readonly host: HTMLElement) {
+    this.renderer = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' });
+    this.renderer.localClippingEnabled = true;
+    this.renderer.autoClear = false;
+    this.canvas = this.renderer.domElement;
+    this.canvas.tabIndex = 0;
+    this.canvas.setAttribute('role', 'img');
+    host.prepend(this.canvas);
+
+    this.camera.up.set(0, 0, 1);
+    const headlight = new DirectionalLight(0xffffff, 2.3);
+    headlight.position.set(-0.35, 0.5, 1);
+    headlight.target.position.set(0, 0, -1);
+    this.camera.add(headlight, headlight.target);
+    this.scene.add(this.camera, new AmbientLight(0xffffff, 0.75));
+    this.rulers = new Rulers(this.scene, host, '#17a398');
+    this.cut = new Cut(this.scene);
+
+    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.controls.zoomToCursor = true;
+    this.controls.rotateSpeed = 0.9;
+    this.controls.addEventListener('start', () => this.beginMove());
+    this.controls.addEventListener('end', () => this.endMove());
+    this.controls.addEventListener('change', () => this.cameraChanged());
+    this.canvas.addEventListener('pointerdown', (event) => this.pressed(event));
+    this.canvas.addEventListener('pointerup', (event) => this.released(event));
+    this.canvas.addEventListener('webglcontextrestored', () => this.draw());
+
+    this.resizing = new ResizeObserver(() => this.resize());
+    this.resizing.observe(host);
+    this.resize();
+    this.moveTo({ offset: firstOffset, target: [0, 0, 0] });
+  }
+
+  // The corners of what is shown, known before its first block.
+  setBounds(bounds: [Vec3, Vec3]): void {
+    this.bounds = bounds;
+    this.fit(firstOffset);
+  }
+
+  addBlocks(blocks: Block[]): void {
+    for (const block of blocks) {
+      const position = new BufferAttribute(block.positions, 3);
+      const normal = new BufferAttribute(block.normals, 4, true);
+      const geometry = (index: Uint16Array<ArrayBuffer>): BufferGeometry => {
+        const made = new BufferGeometry();
+        made.setAttribute('position', position);
+        made.setAttribute('normal', normal);
+        made.setIndex(new BufferAttribute(index, 1));
+        return made;
+      };
+      const fine = geometry(block.index);
+      const coarse = geometry(block.coarse);
+      fine.computeBoundingSphere();
+      coarse.boundingSphere = fine.boundingSphere;
+      const mesh = new Mesh(this.isCoarse ? coarse : fine, this.material);
+      mesh.matrixAutoUpdate = false;
+      this.scene.add(mesh);
+      this.blocks.push({ mesh, fine, coarse });
+      this.seams.add(block);
+    }
+    this.budget.soon(() => this.draw());
+  }
+
+  // To be called once the last block has come: light flows over the seams from then on.
+  finish(): void {
+    this.joinSeams(0);
+  }
+
+  get triangles(): number {
+    return this.blocks.reduce((sum, block) => sum + (block.fine.index?.count ?? 0) / 3, 0);
+  }
+
+  setStyle(style: SurfaceStyle): void {
+    const changed = style.shading !== this.style.shading;
+    this.style = style;
+    this.material.flatShading = style.shading === 'flat';
+    this.material.opacity = style.opacity;
+    this.material.transparent = style.opacity < 1;
+    this.material.depthWrite = style.opacity === 1;
+    if (style.wireframe !== this.material.wireframe) this.setWireframe(style.wireframe);
+    if (changed || this.material.transparent) this.material.needsUpdate = true;
+    this.draw();
+  }
+
+  setCut(isCut: boolean): void {
+    this.material.clippingPlanes = isCut ? [this.cut.plane] : null;
+    this.material.needsUpdate = true;
+    this.draw();
+  }
+
+  fit(offset: Vec3 = this.place.offset): void {
+    const [low, high] = this.bounds;
+    const target: Vec3 = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2];
+    const radius = this.radius;
+    const aspect = this.camera.aspect;
+    const distance = fill * fitDistance(radius, (verticalAngle * Math.PI) / 180, aspect);
+    const scale = distance / Math.hypot(...offset);
+    this.moveTo({ offset: [offset[0] * scale, offset[1] * scale, offset[2] * scale], target });
+  }
+
+  look(view: ViewName): void {
+    this.fit(viewOffsets[view]);
+  }
+
+  get place(): CameraPlace {
+    const { x, y, z } = this.controls.target;
+    const from = this.camera.position;
+    return { offset: [from.x - x, from.y - y, from.z - z], target: [x, y, z] };
+  }
+
+  // Moves the camera without telling onCamera: for linked cameras.
+  follow(place: CameraPlace): void {
+    const tell = this.onCamera;
+    this.onCamera = null;
+    this.moveTo(place);
+    this.onCamera = tell;
+  }
+
+  moveTo({ offset, target }: CameraPlace): void {
+    this.controls.target.set(...target);
+    this.camera.position.set(target[0] + offset[0], target[1] + offset[1], target[2] + offset[2]);
+    this.controls.update();
+    this.cameraChanged();
+  }
+
+  turn(azimuth: number, elevation: number): void {
+    const { offset, target } = this.place;
+    this.nudge({ offset: turned(offset, azimuth, elevation), target });
+  }
+
+  zoom(factor: number): void {
+    const { offset, target } = this.place;
+    this.nudge({ offset: [offset[0] * factor, offset[1] * factor, offset[2] * factor], target });
+  }
+
+  // By parts of the view's height.
+  pan(right: number, up: number): void {
+    const { offset, target } = this.place;
+    const height = 2 * Math.hypot(...offset) * Math.tan((verticalAngle * Math.PI) / 360);
+    const shift = new Vector3(right * height, up * height, 0).applyQuaternion(this.camera.quaternion);
+    this.nudge({ offset, target: [target[0] + shift.x, target[1] + shift.y, target[2] + shift.z] });
+  }
+
+  // Asks for a frame.
+  draw(): void {
+    if (this.scheduled !== 0 || this.isDisposed) return;
+    this.scheduled = requestAnimationFrame(() => {
+      this.scheduled = 0;
+      this.render();
+    });
+  }
+
+  // The picture as it is, over that colour.
+  picture(background: string): Promise<Blob> {
+    this.setCoarse(false);
+    this.render();
+    const canvas = document.createElement('canvas');
+    canvas.width = this.canvas.width;
+    canvas.height = this.canvas.height;
+    const context = canvas.getContext('2d');
+    if (!context) return Promise.reject(new Error('The browser has no memory for the picture.'));
+    context.fillStyle = background;
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.drawImage(this.canvas, 0, 0);
+    return new Promise((resolve, reject) => {
+      canvas.toBlob((blob) => {
+        if (blob) resolve(blob);
+        else reject(new Error('The browser could not make the picture.'));
+      }, 'image/png');
+    });
+  }
+
+  dispose(): void {
+    this.isDisposed = true;
+    cancelAnimationFrame(this.scheduled);
+    clearTimeout(this.settling);
+    this.resizing.disconnect();
+    this.controls.dispose();
+    for (const { fine, coarse } of this.blocks) {
+      fine.dispose();
+      coarse.dispose();
+    }
+    this.material.dispose();
+    this.rulers.dispose();
+    this.cut.dispose();
+    this.cube.dispose();
+    this.renderer.dispose();
+    // The browser keeps only some contexts; it must not wait for garbage to be collected.
+    this.renderer.forceContextLoss();
+    this.canvas.remove();
+  }
+
+  private get radius(): number {
+    const [low, high] = this.bounds;
+    return Math.max(1e-3, Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]) / 2);
+  }
+
+  private render(): void {
+    if (this.isDisposed) return;
+    const began = performance.now();
+    const { clientWidth: width, clientHeight: height } = this.host;
+    this.renderer.setViewport(0, 0, width, height);
+    this.renderer.clear();
+    this.renderer.render(this.scene, this.camera);
+    this.cube.render(this.renderer, this.camera);
+    this.rulers.placeLabels(this.camera, width, height);
+    this.budget.drawn(began, this.isMoving);
+    if (this.isMoving && this.budget.isSlow) this.setCoarse(true);
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.host;
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    if (this.scheduled !== 0) cancelAnimationFrame(this.scheduled);
+    this.scheduled = 0;
+    // At once: a canvas of another size is blank.
+    this.render();
+  }
+
+  private cameraChanged(): void {
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    const reach = 4 * this.radius + distance;
+    this.camera.near = Math.max(reach / 5000, distance - 4 * this.radius);
+    this.camera.far = reach;
+    this.camera.updateProjectionMatrix();
+    this.draw();
+    this.onCamera?.();
+  }
+
+  private nudge(place: CameraPlace): void {
+    this.beginMove();
+    this.moveTo(place);
+    this.endMove();
+  }
+
+  private beginMove(): void {
+    clearTimeout(this.settling);
+    this.isMoving = true;
+    if (this.budget.isSlow) this.setCoarse(true);
+  }
+
+  private endMove(): void {
+    clearTimeout(this.settling);
+    this.settling = window.setTimeout(() => {
+      this.isMoving = false;
+      this.setCoarse(false);
+    }, settleDelay);
+  }
+
+  private setCoarse(isCoarse: boolean): void {
+    if (isCoarse === this.isCoarse) return;
+    this.isCoarse = isCoarse;
+    for (const { mesh, fine, coarse } of this.blocks) mesh.geometry = isCoarse ? coarse : fine;
+    this.draw();
+  }
+
+  // Wires are made of a block when it is first drawn with them, so that some blocks at a time turn.
+  private setWireframe(isOn: boolean): void {
+    this.material.wireframe = isOn;
+    if (!isOn) return;
+    for (const { mesh } of this.blocks) mesh.visible = false;
+    const show = (from: number): void => {
+      for (const { mesh } of this.blocks.slice(from, from + wiresPerFrame)) mesh.visible = true;
+      this.draw();
+      if (from < this.blocks.length) requestAnimationFrame(() => show(from + wiresPerFrame));
+    };
+    show(0);
+  }
+
+  private joinSeams(member: number): void {
+    if (this.isDisposed) return;
+    const until = performance.now() + 6;
+    let next = member;
+    while (performance.now() < until) {
+      if (!this.seams.join(next)) {
+        this.draw();
+        return;
+      }
+      const normal = this.blocks[next]?.fine.getAttribute('normal');
+      if (normal) normal.needsUpdate = true;
+      next += 1;
+    }
+    requestAnimationFrame(() => this.joinSeams(next));
+  }
+
+  private pressed(event: PointerEvent): void {
+    this.press = { x: event.clientX, y: event.clientY };
+  }
+
+  // A click is a press that was let go where it began.
+  private released(event: PointerEvent): void {
+    const press = this.press;
+    this.press = null;
+    if (!press || Math.hypot(event.clientX - press.x, event.clientY - press.y) > 4) return;
+    const box = this.canvas.getBoundingClientRect();
+    const x = event.clientX - box.left;
+    const y = event.clientY - box.top;
+    const face = this.cube.faceAt(x, y, box.height);
+    if (face) {
+      this.look(face);
+      return;
+    }
+    if (!this.onPick) return;
+    const point = this.pointAt((2 * x) / box.width - 1, 1 - (2 * y) / box.height);
+    if (point) this.onPick(point);
+  }
+
+  // The nearest point of the surface that is seen there.
+  private pointAt(x: number, y: number): Vec3 | null {
+    this.setCoarse(false);
+    this.ray.setFromCamera(new Vector2(x, y), this.camera);
+    const planes = this.material.clippingPlanes ?? [];
+    const hits = this.ray.intersectObjects(this.blocks.map(({ mesh }) => mesh));
+    const hit = hits.find(({ point }) => planes.every((plane) => plane.distanceToPoint(point) >= 0));
+    return hit ? [hit.point.x, hit.point.y, hit.point.z] : null;
+  }
+}

@@ -1,0 +1,131 @@
+// Elements without a framework.
+
+type Handler = (event: never) => void;
+export type Attribute = string | number | boolean | null | undefined | Handler;
+export type Child = Node | string | null | undefined | false;
+
+function setAttributes(element: Element, attributes: Record<string, Attribute>): void {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (typeof value === 'function') {
+      element.addEventListener(name.replace(/^on/, '').toLowerCase(), value as EventListener);
+    } else if (value === true) {
+      element.setAttribute(name, '');
+    } else if (value !== false && value !== null && value !== undefined) {
+      element.setAttribute(name, String(value));
+    }
+  }
+}
+
+// An element with attributes (functions named onEvent are listeners; true is an empty attribute, false
+// and null none) and children (false and null are left out).
+export function h<K extends keyof HTMLElementTagNameMap>(
+  name: K,
+  attributes: Record<string, Attribute> = {},
+  ...children: Child[]
+): HTMLElementTagNameMap[K] {
+  const element = document.createElement(name);
+  setAttributes(element, attributes);
+  element.append(...children.filter((child): child is Node | string => Boolean(child)));
+  return element;
+}
+
+const svgNamespace = 'http://www.w3.org/2000/svg';
+
+export function svg(
+  name: string,
+  attributes: Record<string, Attribute> = {},
+  ...children: Child[]
+): SVGElement {
+  const element = document.createElementNS(svgNamespace, name);
+  setAttributes(element, attributes);
+  element.append(...children.filter((child): child is Node | string => Boolean(child)));
+  return element;
+}
+
+export function button(
+  text: Child,
+  onClick: () => void,
+  attributes: Record<string, Attribute> = {},
+): HTMLButtonElement {
+  return h('button', { type: 'button', onClick, ...attributes }, text);
+}
+
+// An icon of lines on a grid of 16, for the eye only.
+export function icon(path: string): SVGElement {
+  return svg(
+    'svg',
+    { viewBox: '0 0 16 16', class: 'icon', 'aria-hidden': 'true' },
+    svg('path', { d: path }),
+  );
+}
+
+let lastId = 0;
+
+export function uniqueId(prefix: string): string {
+  lastId += 1;
+  return `${prefix}-${lastId}`;
+}
+
+// A label above its control.
+export function field(label: string, control: HTMLElement, hint = ''): HTMLElement {
+  if (control.id === '') control.id = uniqueId('field');
+  const note = hint === '' ? null : h('p', { class: 'hint', id: `${control.id}-hint` }, hint);
+  if (note) control.setAttribute('aria-describedby', note.id);
+  return h('div', { class: 'field' }, h('label', { for: control.id }, label), control, note);
+}
+
+export interface Choice<T extends string> {
+  value: T;
+  label: string;
+  title?: string;
+}
+
+// A row of buttons of which one is down.
+export function segmented<T extends string>(
+  label: string,
+  choices: readonly Choice<T>[],
+  value: T,
+  onChange: (value: T) => void,
+): HTMLElement {
+  const name = uniqueId('choice');
+  return h(
+    'fieldset',
+    { class: 'segmented' },
+    h('legend', {}, label),
+    h(
+      'div',
+      { class: 'segments' },
+      ...choices.map((choice) =>
+        h(
+          'label',
+          { title: choice.title },
+          h('input', {
+            type: 'radio',
+            name,
+            value: choice.value,
+            checked: choice.value === value,
+            onChange: () => onChange(choice.value),
+          }),
+          h('span', {}, choice.label),
+        ),
+      ),
+    ),
+  );
+}
+
+export function checkbox(
+  label: string,
+  isOn: boolean,
+  onChange: (isOn: boolean) => void,
+  attributes: Record<string, Attribute> = {},
+): HTMLLabelElement {
+  const input = h('input', { type: 'checkbox', checked: isOn, ...attributes });
+  input.addEventListener('change', () => onChange(input.checked));
+  return h('label', { class: 'check' }, input, h('span', {}, label));
+}
+
+// True while keys belong to a control and not to the page.
+export function isTyping(event: KeyboardEvent): boolean {
+  const target = event.target as HTMLElement | null;
+  return target?.closest('input:not([type=checkbox]):not([type=radio]), textarea, select, dialog') != null;
+}

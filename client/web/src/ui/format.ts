@@ -1,0 +1,79 @@
+// Numbers and times for people.
+
+const plain = new Intl.NumberFormat('en', { maximumFractionDigits: 0 });
+
+export function formatCount(value: number): string {
+  return plain.format(value).replaceAll(',', '\u202f');
+}
+
+// At most that many digits after the point.
+export function formatNumber(value: number, digits = 2): string {
+  return new Intl.NumberFormat('en', { maximumFractionDigits: digits })
+    .format(value)
+    .replaceAll(',', '\u202f')
+    .replace('-', '\u2212');
+}
+
+// Four digits that count, for values of any size.
+export function formatValue(value: number): string {
+  if (value === 0) return '0';
+  const size = Math.abs(value);
+  if (size >= 1000) return formatNumber(value, 0);
+  if (size < 1e-4) return value.toExponential(2);
+  return formatNumber(value, Math.max(0, 3 - Math.floor(Math.log10(size))));
+}
+
+const units = ['B', 'KB', 'MB', 'GB', 'TB'];
+
+export function formatBytes(bytes: number): string {
+  let value = bytes;
+  let unit = 0;
+  while (value >= 999.5 && unit < units.length - 1) {
+    value /= 1000;
+    unit += 1;
+  }
+  return `${unit === 0 || value >= 99.95 ? value.toFixed(0) : value.toFixed(1)} ${units[unit] ?? ''}`;
+}
+
+export function formatMilliseconds(milliseconds: number): string {
+  if (milliseconds < 1) return '< 1 ms';
+  if (milliseconds < 1000) return `${milliseconds.toFixed(0)} ms`;
+  if (milliseconds < 60_000) return `${(milliseconds / 1000).toFixed(milliseconds < 10_000 ? 2 : 1)} s`;
+  const minutes = Math.floor(milliseconds / 60_000);
+  return `${minutes} min ${Math.round((milliseconds % 60_000) / 1000)} s`;
+}
+
+export function formatTime(iso: string): string {
+  const date = new Date(iso);
+  if (Number.isNaN(date.getTime())) return iso;
+  const isToday = date.toDateString() === new Date().toDateString();
+  const time = date.toLocaleTimeString('en-GB', { hour: '2-digit', minute: '2-digit' });
+  return isToday
+    ? time
+    : `${date.toLocaleDateString('en-GB', { day: 'numeric', month: 'short', year: 'numeric' })}, ${time}`;
+}
+
+export function formatDims(dims: readonly number[]): string {
+  return dims.join(' \u00d7 ');
+}
+
+export function formatSpacing(spacing: readonly number[]): string {
+  return `${spacing.map((value) => formatNumber(value, 3)).join(' \u00d7 ')} mm`;
+}
+
+export function shortId(id: string): string {
+  return id.length > 12 ? id.slice(-8) : id;
+}
+
+export const formatNames: Record<string, string> = {
+  glb: 'GLB',
+  drc: 'Draco',
+  stl: 'STL',
+  ply: 'PLY',
+  obj: 'OBJ',
+  nifti: 'NIfTI',
+  nrrd: 'NRRD',
+  metaimage: 'MetaImage',
+  raw: 'Raw samples',
+  dicom: 'DICOM',
+};

@@ -1,0 +1,33 @@
+import { button, h } from './dom';
+
+const keys: [string, string][] = [
+  ['g v', 'volumes'],
+  ['g j', 'jobs'],
+  ['?', 'this list'],
+  ['Ctrl Enter', 'make the surface'],
+  ['[', 'go to the line in the histogram'],
+  ['arrows', 'in a slice: next slice; on the line: iso-value; on a surface: turn'],
+  ['Shift arrows', 'in a slice: window and level; on a surface: move'],
+  ['+ \u2212', 'zoom'],
+  ['a p l r s i', 'standard views'],
+  ['f', 'show all'],
+  ['t w', 'flat shading, wires'],
+  ['c m', 'cut, measure'],
+  ['Esc Delete', 'take the last point back, remove all distances'],
+];
+
+export function showHelp(): void {
+  const dialog = h(
+    'dialog',
+    { class: 'dialog help', 'aria-label': 'Keys' },
+    h('h2', {}, 'Keys'),
+    h('dl', {}, ...keys.flatMap(([key, what]) => [
+      h('dt', {}, ...key.split(' ').map((part) => h('kbd', {}, part))),
+      h('dd', {}, what),
+    ])),
+    h('div', { class: 'actions' }, button('Close', () => dialog.close(), { autofocus: true })),
+  );
+  dialog.addEventListener('close', () => dialog.remove());
+  document.body.append(dialog);
+  dialog.showModal();
+}

@@ -1,0 +1,71 @@
+// What the page says: passing messages, refusals in place, questions.
+import { adviceFor, asApiError, type ApiError } from '../api/problem';
+import { button, h, type Child } from './dom';
+
+const shownFor = 6000;
+
+const stack = h('div', { class: 'toasts', role: 'status', 'aria-live': 'polite' });
+
+export function mountNotices(parent: HTMLElement): void {
+  parent.append(stack);
+}
+
+export function tell(text: string): void {
+  const toast = h('div', { class: 'toast' }, text);
+  stack.append(toast);
+  setTimeout(() => toast.remove(), shownFor);
+}
+
+export function tellError(error: unknown): void {
+  if (error instanceof DOMException && error.name === 'AbortError') return;
+  const failure = asApiError(error);
+  const toast = h(
+    'div',
+    { class: 'toast bad', role: 'alert' },
+    h('strong', {}, failure.title),
+    h('span', {}, failure.detail),
+    button('Close', () => toast.remove(), { class: 'quiet' }),
+  );
+  stack.append(toast);
+  setTimeout(() => toast.remove(), 3 * shownFor);
+}
+
+// A refusal with what is at fault and what to do next.
+export function refusal(error: ApiError, ...actions: Child[]): HTMLElement {
+  const advice = adviceFor(error);
+  const faults = error.faults.filter(({ message }) => !error.detail.includes(message));
+  return h(
+    'div',
+    { class: 'refusal', role: 'alert' },
+    h('h3', {}, error.title),
+    h('p', {}, error.detail),
+    faults.length > 0 &&
+      h('ul', {}, ...faults.map(({ field, message }) => h('li', {}, h('b', {}, field), ` ${message}`))),
+    advice !== '' && h('p', { class: 'advice' }, advice),
+    actions.length > 0 && h('div', { class: 'actions' }, ...actions),
+  );
+}
+
+// Resolves with true when the person agrees.
+export function ask(title: string, text: string, action: string): Promise<boolean> {
+  return new Promise((resolve) => {
+    const dialog = h(
+      'dialog',
+      { class: 'dialog', 'aria-label': title },
+      h('h2', {}, title),
+      h('p', {}, text),
+      h(
+        'div',
+        { class: 'actions' },
+        button('Cancel', () => dialog.close(), { autofocus: true }),
+        button(action, () => dialog.close('yes'), { class: 'danger' }),
+      ),
+    );
+    dialog.addEventListener('close', () => {
+      dialog.remove();
+      resolve(dialog.returnValue === 'yes');
+    });
+    document.body.append(dialog);
+    dialog.showModal();
+  });
+}

@@ -1,0 +1,173 @@
+// One job: its way, then its surface. #/jobs/ID
+import { cancelJob, getJob, getVolume } from '../api/client';
+import { follow } from '../api/follow';
+import { asApiError, errorOfProblem } from '../api/problem';
+import { isFinal, type Job, type Volume } from '../api/types';
+import { placeOfText, placeToText } from '../scene/views';
+import { button, h } from '../ui/dom';
+import { formatValue, shortId } from '../ui/format';
+import { refusal, tellError } from '../ui/notices';
+import { noteInAddress, type Route } from '../ui/route';
+import type { Scope } from '../ui/signal';
+import { inWords } from '../volume/parameters';
+import { againSection, changeLink, compareSection, downloads, numbers, quality, section, timings } from './job_panel';
+import { SurfacePane } from './surface_pane';
+
+const stages = ['queue', 'load', 'extract', 'smooth', 'encode'];
+const noteDelay = 300;
+
+// The volume may be gone while its surface is still there.
+async function volumeOf(job: Job): Promise<Volume | null> {
+  try {
+    return await getVolume(job.volume);
+  } catch (error) {
+    if (asApiError(error).isUnreachable) throw error;
+    return null;
+  }
+}
+
+function isoText(job: Job): string {
+  return job.parameters.iso === 'otsu' ? 'Otsu' : formatValue(job.parameters.iso);
+}
+
+function head(job: Job): HTMLElement {
+  return h(
+    'header',
+    { class: 'panel-head' },
+    h('h1', {}, `Surface at ${isoText(job)}`),
+    h('p', {}, inWords(job.parameters)),
+    h(
+      'p',
+      { class: 'links' },
+      h('a', { href: changeLink(job) }, 'Change parameters'),
+      h('span', { class: 'faint' }, `job ${shortId(job.id)}`),
+    ),
+  );
+}
+
+class ProgressPanel {
+  readonly element: HTMLElement;
+  private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Progress of the job' });
+  private readonly text = h('p', { role: 'status', class: 'progress-text' });
+  private readonly steps = new Map<string, HTMLElement>();
+
+  constructor(id: string) {
+    const cancel = button('Cancel', () => {
+      cancel.disabled = true;
+      cancelJob(id).catch((error: unknown) => {
+        cancel.disabled = false;
+        tellError(error);
+      });
+    });
+    for (const name of stages) this.steps.set(name, h('li', {}, name));
+    this.element = h(
+      'section',
+      { class: 'panel-section progress-panel' },
+      h('h2', {}, 'Progress'),
+      h('ol', { class: 'stages' }, ...this.steps.values()),
+      this.bar,
+      this.text,
+      h('div', { class: 'actions' }, cancel),
+    );
+  }
+
+  show(job: Job): void {
+    const now = stages.indexOf(job.stage);
+    stages.forEach((name, place) => {
+      const step = this.steps.get(name);
+      step?.classList.toggle('done', place < now);
+      step?.classList.toggle('now', place === now);
+      if (place === now) step?.setAttribute('aria-current', 'step');
+      else step?.removeAttribute('aria-current');
+    });
+    this.bar.value = job.progress;
+    this.text.textContent =
+      job.state === 'queued'
+        ? `Waiting in the queue as ${job.priority}`
+        : `${job.stage}, ${Math.round(100 * job.progress)} % in all`;
+  }
+}
+
+export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> {
+  const first = await getJob(route.path[1] ?? '');
+  const volume = await volumeOf(first);
+  const stageArea = h('div', { class: 'stage-area' });
+  const panel = h('aside', { class: 'panel', 'aria-label': 'The job' });
+  const element = h('div', { class: 'job', 'data-state': first.state }, stageArea, panel);
+
+  const showEnd = (job: Job): void => {
+    element.dataset.state = job.state;
+    if (job.state === 'succeeded' && job.mesh) showSurface(scope, route, job, volume, stageArea, panel);
+    else showFailure(job, stageArea, panel);
+  };
+  if (isFinal(first.state)) {
+    showEnd(first);
+    return element;
+  }
+
+  const progress = new ProgressPanel(first.id);
+  progress.show(first);
+  stageArea.append(h('div', { class: 'waiting' }, h('p', {}, 'The surface appears here when it is made.')));
+  panel.append(head(first), progress.element);
+  follow(first.id, scope.signal, (job) => {
+    element.dataset.state = job.state;
+    progress.show(job);
+  }).then(
+    (job) => {
+      if (!scope.isOver) showEnd(job);
+    },
+    (error: unknown) => {
+      if (!scope.isOver) panel.replaceChildren(head(first), refusal(asApiError(error)));
+    },
+  );
+  return element;
+}
+
+function showFailure(job: Job, stageArea: HTMLElement, panel: HTMLElement): void {
+  const change = h('a', { href: changeLink(job), class: 'button primary' }, 'Change parameters');
+  const body = job.error
+    ? refusal(errorOfProblem(job.error), change)
+    : h('div', { class: 'refusal' }, h('h3', {}, 'Cancelled'), h('p', {}, 'The job was cancelled and made no surface.'), h('div', { class: 'actions' }, change));
+  stageArea.replaceChildren(h('div', { class: 'waiting' }, body));
+  panel.replaceChildren(head(job), timings(job));
+}
+
+function showSurface(
+  scope: Scope,
+  route: Route,
+  job: Job,
+  volume: Volume | null,
+  stageArea: HTMLElement,
+  panel: HTMLElement,
+): void {
+  const { mesh } = job;
+  if (!mesh) return;
+  const camera = placeOfText(route.query.get('cam') ?? '');
+  const pane = new SurfacePane(scope, job, { hasKeys: true, camera, volume });
+  let noting = 0;
+  pane.onCamera = (place) => {
+    clearTimeout(noting);
+    noting = window.setTimeout(() => noteInAddress({ cam: placeToText(place) }), noteDelay);
+  };
+  scope.onEnd(() => clearTimeout(noting));
+  stageArea.replaceChildren(pane.element);
+  const times = timings(job);
+  panel.replaceChildren(
+    ...[
+      head(job),
+      section('Numbers', numbers(mesh)),
+      times,
+      downloads(job),
+      quality(mesh),
+      compareSection(job),
+      againSection(job),
+    ].filter((part): part is HTMLElement => part !== null),
+  );
+  // The view is in the page before the canvas asks for its size.
+  requestAnimationFrame(() => {
+    if (scope.isOver) return;
+    void pane.load().then((timing) => {
+      if (timing && !scope.isOver) times.replaceWith(timings(job, { ...timing }));
+    });
+  });
+}

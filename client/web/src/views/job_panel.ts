@@ -1,0 +1,254 @@
+// What stands beside a surface: its numbers, timings, files, and how to make others.
+import { submitJob, token } from '../api/client';
+import { meshFormats, type Job, type JobParameters, type MeshFormat, type MeshSummary, type Timing } from '../api/types';
+import { button, h, type Child } from '../ui/dom';
+import { formatBytes, formatCount, formatNames, formatNumber, formatValue, shortId } from '../ui/format';
+import { tell, tellError } from '../ui/notices';
+import { go, hashOf } from '../ui/route';
+import { saveFile } from '../ui/save';
+import { defaultParameters, memorable, queryOfParameters, withGlb } from '../volume/parameters';
+import { commandSnippet, curlSnippet } from '../volume/snippets';
+import { distributionChart, stepsOf, waterfall } from './charts';
+
+export function section(title: string, ...children: Child[]): HTMLElement {
+  return h('section', { class: 'panel-section' }, h('h2', {}, title), ...children);
+}
+
+function definitions(rows: readonly (readonly [string, Child])[]): HTMLElement {
+  return h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
+}
+
+function change(before: number, after: number): string {
+  if (before === 0) return '';
+  const percent = (100 * (after - before)) / Math.abs(before);
+  const sign = percent > 0 ? '+' : '';
+  return ` (${sign}${formatNumber(percent, Math.abs(percent) < 1 ? 2 : 1)} %)`;
+}
+
+function before(value: number, unit: string): string {
+  return `${formatValue(value)} ${unit}`;
+}
+
+export function numbers(mesh: MeshSummary): HTMLElement {
+  const [low, high] = mesh.bounds;
+  const extent = low.map((value, axis) => formatNumber((high[axis as 0] ?? 0) - value, 1)).join(' \u00d7 ');
+  const isClosed = mesh.quality?.closed ?? mesh.boundary_edges === 0;
+  const { extracted, smoothed } = mesh.volume_mm3;
+  const area = typeof mesh.area_mm2 === 'number' ? null : mesh.area_mm2;
+  const rows: [string, Child][] = [
+    ['Triangles', formatCount(mesh.triangles)],
+    ['Vertices', formatCount(mesh.vertices)],
+    [
+      'Volume',
+      h(
+        'span',
+        {},
+        before(smoothed, 'mm\u00b3'),
+        h('span', { class: 'faint' }, `${change(extracted, smoothed)} was ${before(extracted, 'mm\u00b3')}`),
+      ),
+    ],
+    [
+      'Area',
+      area
+        ? h(
+            'span',
+            {},
+            before(area.smoothed, 'mm\u00b2'),
+            h(
+              'span',
+              { class: 'faint' },
+              `${change(area.extracted, area.smoothed)} was ${before(area.extracted, 'mm\u00b2')}`,
+            ),
+          )
+        : before(mesh.area_mm2 as number, 'mm\u00b2'),
+    ],
+    [
+      'Closed',
+      isClosed
+        ? 'yes'
+        : h('span', { class: 'attention' }, `no, ${formatCount(mesh.boundary_edges)} edges on the border`),
+    ],
+    ['Parts', formatCount(mesh.components)],
+    ['Genus', mesh.quality?.genus === undefined ? '' : formatCount(mesh.quality.genus)],
+    ['Extent', `${extent} mm`],
+  ];
+  if (mesh.displacement_mm) {
+    const { mean, max } = mesh.displacement_mm;
+    rows.push(['Moved by smoothing', `mean ${formatNumber(mean, 3)}, most ${formatNumber(max, 3)} mm`]);
+  }
+  if (mesh.dropped && mesh.dropped.components > 0) {
+    rows.push([
+      'Dropped parts',
+      `${formatCount(mesh.dropped.components)} of ${formatCount(mesh.dropped.triangles)} triangles`,
+    ]);
+  }
+  return definitions(rows.filter(([, value]) => value !== ''));
+}
+
+export function quality(mesh: MeshSummary): HTMLElement | null {
+  const { aspect_ratio: aspect, smallest_angle_deg: angle } = mesh.quality ?? {};
+  if (!aspect && !angle) return null;
+  return section(
+    'Triangle quality',
+    h(
+      'div',
+      { class: 'distributions' },
+      aspect && distributionChart('Radius ratio', aspect, 1, ''),
+      angle && distributionChart('Smallest angle', angle, 60, '\u00b0'),
+    ),
+    h('p', { class: 'hint' }, 'Filled: after smoothing. Line: before.'),
+  );
+}
+
+export function timings(job: Job, more: Timing = {}): HTMLElement {
+  return section('Time', waterfall(stepsOf(job.timing, more)));
+}
+
+// Makes the same surface with other parameters, or finds it made already.
+export async function submitVariant(job: Job, variant: Partial<JobParameters>): Promise<Job> {
+  return submitJob(memorable({ ...job.parameters, ...variant }));
+}
+
+export function downloads(job: Job): HTMLElement {
+  const files = job.mesh?.files ?? {};
+  const name = (format: string): string => `surface-${shortId(job.id)}.${format}`;
+  const missing = meshFormats.filter((format) => !files[format]);
+  const make = async (format: MeshFormat): Promise<void> => {
+    try {
+      const variant = await submitVariant(job, { formats: withGlb([...job.parameters.formats, format]) });
+      tell(`A job that makes ${formatNames[format] ?? format} as well was started.`);
+      go(['jobs', variant.id]);
+    } catch (error) {
+      tellError(error);
+    }
+  };
+  return section(
+    'Download',
+    h(
+      'div',
+      { class: 'downloads' },
+      ...meshFormats.flatMap((format) => {
+        const file = files[format];
+        return file
+          ? [
+              button(
+                h('span', {}, h('b', {}, formatNames[format] ?? format), ` ${formatBytes(file.bytes)}`),
+                () => void saveFile(file.href, name(format)).catch(tellError),
+                { 'data-format': format },
+              ),
+            ]
+          : [];
+      }),
+    ),
+    missing.length > 0 &&
+      h(
+        'div',
+        { class: 'make' },
+        h('span', { class: 'faint' }, 'Also make:'),
+        ...missing.map((format) =>
+          button(formatNames[format] ?? format, () => void make(format), { class: 'chip' }),
+        ),
+      ),
+  );
+}
+
+export interface Comparison {
+  title: string;
+  variants: Partial<JobParameters>[];
+}
+
+// Sets that show what a parameter does.
+export const comparisons: readonly Comparison[] = [
+  {
+    title: '5 and 6 tetrahedra, linear and midpoint',
+    variants: [
+      { scheme: 5, interpolation: 'linear' },
+      { scheme: 6, interpolation: 'linear' },
+      { scheme: 5, interpolation: 'midpoint' },
+      { scheme: 6, interpolation: 'midpoint' },
+    ],
+  },
+  { title: '0, 5 and 10 passes', variants: [{ passes: 0 }, { passes: 5 }, { passes: 10 }] },
+  {
+    title: 'Laplacian and Taubin',
+    variants: [{ smoothing: 'laplacian' }, { smoothing: 'taubin' }],
+  },
+];
+
+export function compareSection(job: Job): HTMLElement {
+  const start = async (comparison: Comparison): Promise<void> => {
+    try {
+      const jobs = await Promise.all(
+        comparison.variants.map((variant) =>
+          isSame(job, variant) ? Promise.resolve(job) : submitVariant(job, variant),
+        ),
+      );
+      go(['compare'], new URLSearchParams({ jobs: jobs.map(({ id }) => id).join(',') }));
+    } catch (error) {
+      tellError(error);
+    }
+  };
+  return section(
+    'Compare',
+    h(
+      'div',
+      { class: 'stack' },
+      ...comparisons.map((comparison) => button(comparison.title, () => void start(comparison))),
+    ),
+    h('p', { class: 'hint' }, 'Starts the jobs that are needed. Others can be chosen in the list of jobs.'),
+  );
+}
+
+function isSame(job: Job, variant: Partial<JobParameters>): boolean {
+  return (
+    Object.entries(variant).every(([name, value]) => job.parameters[name as keyof JobParameters] === value) &&
+    job.mesh?.files.glb !== undefined
+  );
+}
+
+function copyButton(text: () => string): HTMLButtonElement {
+  const element = button('Copy', () => {
+    navigator.clipboard.writeText(text()).then(
+      () => {
+        element.textContent = 'Copied';
+        setTimeout(() => (element.textContent = 'Copy'), 1500);
+      },
+      // Without TLS there is no clipboard; the text can be selected.
+      () => tell('The browser does not allow copying here. Select the text instead.'),
+    );
+  });
+  return element;
+}
+
+export function againSection(job: Job): HTMLElement {
+  const hasToken = token.value !== '';
+  const origin = window.location.origin;
+  const texts = {
+    isomesh: commandSnippet(origin, job.parameters, hasToken),
+    curl: curlSnippet(origin, job.parameters, hasToken),
+  };
+  const link = `${origin}/${hashOf(['jobs', job.id])}`;
+  const block = (name: string, text: string): HTMLElement =>
+    h(
+      'details',
+      { class: 'snippet' },
+      h('summary', {}, name),
+      h('pre', { tabindex: '0' }, text),
+      copyButton(() => text),
+    );
+  return section(
+    'The same again',
+    h('div', { class: 'link-row' }, h('input', { readonly: true, value: link, 'aria-label': 'Link to this surface' }), copyButton(() => link)),
+    block('With the isomesh command', texts.isomesh),
+    block('With curl', texts.curl),
+  );
+}
+
+// The address of the volume with this job's parameters chosen.
+export function changeLink(job: Job): string {
+  const defaults = defaultParameters(job.volume, 0);
+  const entries = Object.entries(queryOfParameters(job.parameters, defaults)).filter(
+    ([name, value]) => value !== '' && !(name === 'iso' && value === 'otsu'),
+  );
+  return hashOf(['volumes', job.volume], new URLSearchParams(entries));
+}

@@ -1,0 +1,128 @@
+// The parameters of a job beside its iso-value.
+import { meshFormats, type JobParameters, type MeshFormat, type Priority } from '../api/types';
+import { checkbox, field, h, segmented } from '../ui/dom';
+import { formatNames } from '../ui/format';
+import { withGlb } from '../volume/parameters';
+
+export type Change = Partial<JobParameters>;
+
+function numberInput(
+  value: number,
+  limits: { min: number; max: number; step: number },
+  onChange: (value: number) => void,
+): HTMLInputElement {
+  const input = h('input', { type: 'number', inputmode: 'decimal', value, ...limits });
+  input.addEventListener('input', () => {
+    const isGood = input.value !== '' && input.validity.valid;
+    input.toggleAttribute('aria-invalid', !isGood);
+    if (isGood) onChange(input.valueAsNumber);
+  });
+  return input;
+}
+
+function formatBoxes(formats: readonly MeshFormat[], onChange: (formats: MeshFormat[]) => void): HTMLElement {
+  const chosen = new Set<MeshFormat>(formats);
+  return h(
+    'fieldset',
+    { class: 'boxes' },
+    h('legend', {}, 'Files to make'),
+    ...meshFormats.map((format) =>
+      checkbox(
+        formatNames[format] ?? format,
+        chosen.has(format),
+        (isOn) => {
+          if (isOn) chosen.add(format);
+          else chosen.delete(format);
+          onChange(withGlb([...chosen]));
+        },
+        // The page shows this one.
+        format === 'glb' ? { disabled: true } : {},
+      ),
+    ),
+  );
+}
+
+export function parameterForm(parameters: JobParameters, onChange: (change: Change) => void): HTMLElement {
+  const { draco } = parameters;
+  let bits = draco.position_bits;
+  let speed = draco.speed;
+  const tellDraco = (): void => onChange({ draco: { position_bits: bits, speed } });
+  const lambda = field(
+    'Step of a pass (lambda)',
+    numberInput(parameters.lambda, { min: 0.01, max: 1, step: 0.01 }, (value) => onChange({ lambda: value })),
+    '1 moves a vertex onto the mean of its neighbours.',
+  );
+  return h(
+    'div',
+    { class: 'parameters' },
+    segmented(
+      'Tetrahedra per cell',
+      [
+        { value: '5', label: '5', title: 'Fewer triangles; every second cell is mirrored' },
+        { value: '6', label: '6', title: 'The same split in every cell' },
+      ],
+      String(parameters.scheme) as '5' | '6',
+      (value) => onChange({ scheme: value === '5' ? 5 : 6 }),
+    ),
+    segmented(
+      'Vertices on edges',
+      [
+        { value: 'linear', label: 'Linear', title: 'Where the iso-value lies between two samples' },
+        { value: 'midpoint', label: 'Midpoint', title: 'Half-way between two samples' },
+      ],
+      parameters.interpolation,
+      (interpolation) => onChange({ interpolation }),
+    ),
+    segmented(
+      'Smoothing',
+      [
+        { value: 'laplacian', label: 'Laplacian', title: 'Shrinks a little with every pass' },
+        { value: 'taubin', label: 'Taubin', title: 'Keeps the enclosed volume' },
+      ],
+      parameters.smoothing,
+      (smoothing) => onChange({ smoothing }),
+    ),
+    field(
+      'Passes',
+      numberInput(parameters.passes, { min: 0, max: 1000, step: 1 }, (passes) => onChange({ passes })),
+    ),
+    segmented(
+      'Priority',
+      [
+        { value: 'stat', label: 'Stat', title: 'Before all others' },
+        { value: 'routine', label: 'Routine' },
+        { value: 'bulk', label: 'Bulk', title: 'When nothing else waits' },
+      ],
+      parameters.priority,
+      (priority: Priority) => onChange({ priority }),
+    ),
+    h(
+      'details',
+      { class: 'more' },
+      h('summary', {}, 'More'),
+      lambda,
+      checkbox('Close the surface at the border of the volume', parameters.close, (close) =>
+        onChange({ close }),
+      ),
+      formatBoxes(parameters.formats, (formats) => onChange({ formats })),
+      h(
+        'div',
+        { class: 'pair' },
+        field(
+          'Bits per coordinate',
+          numberInput(bits, { min: 8, max: 30, step: 1 }, (value) => {
+            bits = value;
+            tellDraco();
+          }),
+        ),
+        field(
+          'Encoding speed',
+          numberInput(speed, { min: 0, max: 10, step: 1 }, (value) => {
+            speed = value;
+            tellDraco();
+          }),
+        ),
+      ),
+    ),
+  );
+}

@@ -1,0 +1,310 @@
+// One orthogonal slice: grey samples, the iso-contour over them, and the place of the other two planes.
+import type { Axis } from '../api/client';
+import type { Vec3, Volume } from '../api/types';
+import { h, uniqueId } from '../ui/dom';
+import type { Scope } from '../ui/signal';
+import { contour } from '../volume/contour';
+import { axisIndex, slicePlane, type Plane, type SlicePlane } from '../volume/geometry';
+import { greyTable, inSlice, windowToFetch, type Slice, type SliceSource, type Window } from '../volume/slices';
+
+export interface SliceState {
+  iso: number;
+  window: Window;
+  // The sample where the three planes meet.
+  cursor: Vec3;
+}
+
+export interface SliceHost {
+  volume: Volume;
+  source: SliceSource;
+  commonWindow: Window;
+  state: () => SliceState;
+  setWindow: (window: Window) => void;
+  setCursor: (cursor: Vec3) => void;
+  contourColour: () => string;
+  onError: (error: unknown) => void;
+}
+
+const titles: Record<Plane, string> = { axial: 'Axial', coronal: 'Coronal', sagittal: 'Sagittal' };
+const padding = 14;
+
+export class SliceView {
+  readonly element: HTMLElement;
+  private readonly canvas = h('canvas', { tabindex: '0', role: 'img' });
+  private readonly slider: HTMLInputElement;
+  private readonly place = h('span', { class: 'slice-place' });
+  private readonly layout: SlicePlane;
+  private readonly buffer = document.createElement('canvas');
+  private slice: Slice | null = null;
+  private wanted = '';
+  private scheduled = false;
+
+  constructor(
+    private readonly plane: Plane,
+    private readonly host: SliceHost,
+    private readonly scope: Scope,
+  ) {
+    this.layout = slicePlane(host.volume, plane);
+    const id = uniqueId('slice');
+    this.slider = h('input', {
+      type: 'range',
+      id,
+      min: 0,
+      max: this.count(this.layout.normal) - 1,
+      step: 1,
+      'aria-label': `${titles[plane]} slice`,
+    });
+    this.slider.disabled = this.count(this.layout.normal) === 1;
+    this.slider.addEventListener('input', () => this.goTo(Number(this.slider.value)));
+    this.element = h(
+      'figure',
+      { class: 'slice', 'data-plane': plane },
+      this.canvas,
+      h('figcaption', {}, h('span', { class: 'slice-title' }, titles[plane]), this.slider, this.place),
+    );
+    this.listen();
+    const resizing = new ResizeObserver(() => this.draw());
+    resizing.observe(this.canvas);
+    scope.onEnd(() => resizing.disconnect());
+  }
+
+  // Shows the state as it is now.
+  update(): void {
+    const { iso, window, cursor } = this.host.state();
+    const index = cursor[axisIndex(this.layout.normal)];
+    this.slider.value = String(index);
+    this.place.textContent = `${index + 1} / ${this.count(this.layout.normal)}`;
+    const fetched = windowToFetch(window, iso, this.host.commonWindow);
+    const wanted = `${index}/${fetched.join(',')}`;
+    if (wanted !== this.wanted) {
+      this.wanted = wanted;
+      this.host.source.get(this.layout.normal, index, fetched).then(
+        (slice) => {
+          // Older answers may come late; a slice that is near is better than none.
+          if (this.wanted !== wanted && this.slice !== null) return;
+          this.slice = slice;
+          this.draw();
+        },
+        (error: unknown) => {
+          if (!this.scope.isOver) this.host.onError(error);
+        },
+      );
+    }
+    this.draw();
+  }
+
+  private count(axis: Axis): number {
+    return this.host.volume.dims[axisIndex(axis)];
+  }
+
+  private goTo(index: number): void {
+    const axis = axisIndex(this.layout.normal);
+    const cursor: Vec3 = [...this.host.state().cursor];
+    cursor[axis] = Math.max(0, Math.min(this.count(this.layout.normal) - 1, Math.round(index)));
+    this.host.setCursor(cursor);
+  }
+
+  private step(by: number): void {
+    this.goTo(this.host.state().cursor[axisIndex(this.layout.normal)] + by);
+  }
+
+  // Where the samples lie on the canvas, in its own pixels.
+  private frame(): { x: number; y: number; width: number; height: number } {
+    const { volume } = this.host;
+    const size = (axis: Axis): number => this.count(axis) * volume.spacing[axisIndex(axis)];
+    const across = size(this.layout.right.axis);
+    const along = size(this.layout.down.axis);
+    const room = { width: this.canvas.width, height: this.canvas.height };
+    const edge = padding * (this.canvas.width / (this.canvas.clientWidth || 1));
+    const scale = Math.min((room.width - 2 * edge) / across, (room.height - 2 * edge) / along);
+    const width = Math.max(1, across * scale);
+    const height = Math.max(1, along * scale);
+    return { x: (room.width - width) / 2, y: (room.height - height) / 2, width, height };
+  }
+
+  private draw(): void {
+    if (this.scheduled) return;
+    this.scheduled = true;
+    requestAnimationFrame(() => {
+      this.scheduled = false;
+      if (!this.scope.isOver) this.paint();
+    });
+  }
+
+  private paint(): void {
+    const ratio = window.devicePixelRatio || 1;
+    const width = Math.round(this.canvas.clientWidth * ratio);
+    const height = Math.round(this.canvas.clientHeight * ratio);
+    if (this.canvas.width !== width || this.canvas.height !== height) {
+      this.canvas.width = width;
+      this.canvas.height = height;
+    }
+    const context = this.canvas.getContext('2d');
+    if (!context || width === 0 || height === 0) return;
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.fillStyle = '#000';
+    context.fillRect(0, 0, width, height);
+    if (this.slice) this.paintSlice(context, this.slice, ratio);
+    this.paintLetters(context, ratio);
+    const { iso, cursor } = this.host.state();
+    const index = cursor[axisIndex(this.layout.normal)];
+    this.canvas.setAttribute(
+      'aria-label',
+      `${titles[this.plane]} slice ${index + 1} with the contour at iso-value ${iso}`,
+    );
+  }
+
+  private paintSlice(context: CanvasRenderingContext2D, slice: Slice, ratio: number): void {
+    const frame = this.frame();
+    const { right, down } = this.layout;
+    this.fillBuffer(slice);
+    context.save();
+    // From samples of the picture to the screen: columns may run down, and either way.
+    const isTurned = axisIndex(right.axis) > axisIndex(down.axis);
+    const [acrossCount, downCount] = isTurned
+      ? [slice.height, slice.width]
+      : [slice.width, slice.height];
+    context.translate(frame.x, frame.y);
+    if (right.flipped) context.transform(-1, 0, 0, 1, frame.width, 0);
+    if (down.flipped) context.transform(1, 0, 0, -1, 0, frame.height);
+    context.scale(frame.width / acrossCount, frame.height / downCount);
+    if (isTurned) context.transform(0, 1, 1, 0, 0, 0);
+    context.imageSmoothingEnabled = true;
+    context.drawImage(this.buffer, 0, 0);
+
+    const { iso, cursor } = this.host.state();
+    const segments = contour(slice, inSlice(slice, iso));
+    const [column, row] = this.pictureAxes();
+    context.translate(0.5, 0.5);
+    context.beginPath();
+    context.moveTo(cursor[column], -0.5);
+    context.lineTo(cursor[column], slice.height - 0.5);
+    context.moveTo(-0.5, cursor[row]);
+    context.lineTo(slice.width - 0.5, cursor[row]);
+    strokePixels(context, ratio, 'rgba(255, 255, 255, 0.28)');
+    context.beginPath();
+    for (let i = 0; i + 3 < segments.length; i += 4) {
+      context.moveTo(segments[i] as number, segments[i + 1] as number);
+      context.lineTo(segments[i + 2] as number, segments[i + 3] as number);
+    }
+    strokePixels(context, 1.5 * ratio, this.host.contourColour());
+    context.restore();
+  }
+
+  private pictureAxes(): [0 | 1 | 2, 0 | 1 | 2] {
+    const normal = this.layout.normal;
+    return normal === 'x' ? [1, 2] : normal === 'y' ? [0, 2] : [0, 1];
+  }
+
+  private fillBuffer(slice: Slice): void {
+    this.buffer.width = slice.width;
+    this.buffer.height = slice.height;
+    const context = this.buffer.getContext('2d');
+    if (!context) return;
+    const picture = context.createImageData(slice.width, slice.height);
+    const table = greyTable(slice, this.host.state().window);
+    const pixels = new Uint32Array(picture.data.buffer);
+    const opaque = 0xff00_0000;
+    slice.values.forEach((value, i) => {
+      const grey = table[value] ?? 0;
+      pixels[i] = (opaque | (grey << 16) | (grey << 8) | grey) >>> 0;
+    });
+    context.putImageData(picture, 0, 0);
+  }
+
+  private paintLetters(context: CanvasRenderingContext2D, ratio: number): void {
+    const { width, height } = this.canvas;
+    const { right, down } = this.layout;
+    context.font = `600 ${11 * ratio}px system-ui, sans-serif`;
+    context.fillStyle = 'rgba(255, 255, 255, 0.75)';
+    context.textAlign = 'center';
+    context.textBaseline = 'middle';
+    const edge = (padding / 2) * ratio;
+    context.fillText(right.begin, edge, height / 2);
+    context.fillText(right.end, width - edge, height / 2);
+    context.fillText(down.begin, width / 2, edge);
+    context.fillText(down.end, width / 2, height - edge);
+  }
+
+  // The sample under a point of the screen.
+  private sampleAt(event: PointerEvent | MouseEvent): Vec3 | null {
+    const box = this.canvas.getBoundingClientRect();
+    const scale = this.canvas.width / (box.width || 1);
+    const frame = this.frame();
+    const u = ((event.clientX - box.left) * scale - frame.x) / frame.width;
+    const v = ((event.clientY - box.top) * scale - frame.y) / frame.height;
+    if (u < 0 || u >= 1 || v < 0 || v >= 1) return null;
+    const cursor: Vec3 = [...this.host.state().cursor];
+    const { right, down } = this.layout;
+    const at = (axis: Axis, part: number): number => Math.floor(part * this.count(axis));
+    cursor[axisIndex(right.axis)] = at(right.axis, right.flipped ? 1 - u - 1e-9 : u);
+    cursor[axisIndex(down.axis)] = at(down.axis, down.flipped ? 1 - v - 1e-9 : v);
+    return cursor;
+  }
+
+  private listen(): void {
+    let press: { x: number; y: number; window: Window; moved: boolean } | null = null;
+    const { canvas, scope } = this;
+    scope.listen(canvas, 'pointerdown', (event: PointerEvent) => {
+      if (event.button !== 0 && event.button !== 2) return;
+      canvas.setPointerCapture(event.pointerId);
+      press = { x: event.clientX, y: event.clientY, window: this.host.state().window, moved: false };
+    });
+    scope.listen(canvas, 'pointermove', (event: PointerEvent) => {
+      if (!press) return;
+      const dx = event.clientX - press.x;
+      const dy = event.clientY - press.y;
+      press.moved ||= Math.hypot(dx, dy) > 3;
+      if (press.moved) this.host.setWindow(draggedWindow(press.window, dx, dy));
+    });
+    scope.listen(canvas, 'pointerup', (event: PointerEvent) => {
+      const cursor = press && !press.moved ? this.sampleAt(event) : null;
+      press = null;
+      if (cursor) this.host.setCursor(cursor);
+    });
+    scope.listen(canvas, 'pointercancel', () => (press = null));
+    scope.listen(canvas, 'contextmenu', (event) => event.preventDefault());
+    scope.listen(
+      canvas,
+      'wheel',
+      (event: WheelEvent) => {
+        event.preventDefault();
+        if (event.deltaY !== 0) this.step(Math.sign(event.deltaY));
+      },
+      { passive: false },
+    );
+    scope.listen(canvas, 'keydown', (event: KeyboardEvent) => {
+      const key = event.key;
+      if (event.shiftKey && key.startsWith('Arrow')) {
+        const dx = key === 'ArrowLeft' ? -8 : key === 'ArrowRight' ? 8 : 0;
+        const dy = key === 'ArrowUp' ? -8 : key === 'ArrowDown' ? 8 : 0;
+        this.host.setWindow(draggedWindow(this.host.state().window, dx, dy));
+      } else if (key === 'ArrowUp' || key === 'ArrowRight') this.step(1);
+      else if (key === 'ArrowDown' || key === 'ArrowLeft') this.step(-1);
+      else if (key === 'PageUp') this.step(10);
+      else if (key === 'PageDown') this.step(-10);
+      else return;
+      event.preventDefault();
+    });
+  }
+}
+
+// Strokes the path with a width in pixels, however the samples are stretched.
+function strokePixels(context: CanvasRenderingContext2D, width: number, colour: string): void {
+  context.save();
+  context.setTransform(1, 0, 0, 1, 0, 0);
+  context.lineWidth = width;
+  context.lineCap = 'round';
+  context.strokeStyle = colour;
+  context.stroke();
+  context.restore();
+}
+
+// As on a radiologist's station: to the right widens the window, upwards darkens (raises its level).
+export function draggedWindow([low, high]: Window, dx: number, dy: number): Window {
+  const width = Math.max(1e-6, high - low);
+  const level = (low + high) / 2;
+  const newWidth = width * Math.exp(dx / 250);
+  const newLevel = level - (dy / 400) * width;
+  return [newLevel - newWidth / 2, newLevel + newWidth / 2];
+}

@@ -1,0 +1,57 @@
+// What was dropped or chosen, as one body to upload.
+import { packTar, type NamedFile } from './tar';
+
+// What systems leave in folders beside the slices.
+const litter = /(^|\/)(\.DS_Store|Thumbs\.db|desktop\.ini|\._[^/]*|__MACOSX\/.*)$/i;
+
+function readEntries(reader: FileSystemDirectoryReader): Promise<FileSystemEntry[]> {
+  return new Promise((resolve, reject) => reader.readEntries(resolve, reject));
+}
+
+function fileOf(entry: FileSystemFileEntry): Promise<File> {
+  return new Promise((resolve, reject) => entry.file(resolve, reject));
+}
+
+async function filesBelow(entry: FileSystemEntry): Promise<NamedFile[]> {
+  const path = entry.fullPath.replace(/^\//, '');
+  if (entry.isFile) return [{ path, file: await fileOf(entry as FileSystemFileEntry) }];
+  const reader = (entry as FileSystemDirectoryEntry).createReader();
+  const files: NamedFile[] = [];
+  // A reader gives at most some hundred entries at a time, and none at the end.
+  for (;;) {
+    const entries = await readEntries(reader);
+    if (entries.length === 0) return files;
+    for (const child of entries) files.push(...(await filesBelow(child)));
+  }
+}
+
+// To be called while the drop event is handled: its items are gone afterwards.
+export function filesOfDrop(transfer: DataTransfer): Promise<NamedFile[]> {
+  const entries = [...transfer.items].flatMap((item) => item.webkitGetAsEntry() ?? []);
+  if (entries.length > 0) return Promise.all(entries.map(filesBelow)).then((all) => all.flat());
+  return Promise.resolve(filesOfList(transfer.files));
+}
+
+export function filesOfList(list: FileList): NamedFile[] {
+  return [...list].map((file) => ({ path: file.webkitRelativePath || file.name, file }));
+}
+
+export interface Gathered {
+  name: string;
+  count: number;
+  body: Blob;
+}
+
+// One file goes as it is, several are packed. Null when there is none.
+export function gather(files: NamedFile[]): Gathered | null {
+  const wanted = files.filter(({ path, file }) => !litter.test(path) && file.size > 0);
+  const [first] = wanted;
+  if (first === undefined) return null;
+  if (wanted.length === 1) return { name: first.path, count: 1, body: first.file };
+  const folder = first.path.includes('/') ? first.path.split('/')[0] : undefined;
+  return {
+    name: folder ?? `${wanted.length} files`,
+    count: wanted.length,
+    body: packTar(wanted),
+  };
+}

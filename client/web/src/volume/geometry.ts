@@ -1,0 +1,108 @@
+// Where samples lie in the patient (LPS millimetres), and how slices are turned for the eye.
+import type { Axis } from '../api/client';
+import type { Vec3, Volume } from '../api/types';
+
+type Geometry = Pick<Volume, 'dims' | 'spacing' | 'origin' | 'direction'>;
+
+export const axes: readonly Axis[] = ['x', 'y', 'z'];
+
+export function axisIndex(axis: Axis): 0 | 1 | 2 {
+  return axis === 'x' ? 0 : axis === 'y' ? 1 : 2;
+}
+
+// The unit vector of a volume's axis in LPS.
+export function axisDirection(volume: Pick<Volume, 'direction'>, axis: number): Vec3 {
+  const at = (row: number): number => volume.direction[3 * row + axis] ?? (row === axis ? 1 : 0);
+  return [at(0), at(1), at(2)];
+}
+
+export function toPatient(volume: Geometry, index: Vec3): Vec3 {
+  const point: Vec3 = [...volume.origin];
+  for (let axis = 0; axis < 3; axis += 1) {
+    const direction = axisDirection(volume, axis);
+    const step = index[axis as 0] * volume.spacing[axis as 0];
+    for (let row = 0; row < 3; row += 1) point[row as 0] += direction[row as 0] * step;
+  }
+  return point;
+}
+
+const letters: readonly [string, string][] = [
+  ['L', 'R'],
+  ['P', 'A'],
+  ['S', 'I'],
+];
+
+// The letter of the patient's side that a vector points to most.
+export function sideOf(vector: Vec3): string {
+  const sizes = vector.map(Math.abs);
+  const main = sizes.indexOf(Math.max(...sizes));
+  const pair = letters[main] ?? ['?', '?'];
+  return (vector[main as 0] ?? 0) >= 0 ? pair[0] : pair[1];
+}
+
+export type Plane = 'axial' | 'coronal' | 'sagittal';
+
+// The patient's axis (of L, P, S) that a plane is across.
+const normals: Record<Plane, 0 | 1 | 2> = { sagittal: 0, coronal: 1, axial: 2 };
+// What points right and down on the screen, as radiologists look: the patient's right on the left,
+// the front at the top or left, the head at the top.
+const screens: Record<Plane, { right: Vec3; down: Vec3 }> = {
+  axial: { right: [1, 0, 0], down: [0, 1, 0] },
+  coronal: { right: [1, 0, 0], down: [0, 0, -1] },
+  sagittal: { right: [0, 1, 0], down: [0, 0, -1] },
+};
+
+export interface SliceAxis {
+  axis: Axis;
+  // True when the volume's index runs against the screen's direction.
+  flipped: boolean;
+  // The letters at both of its ends on the screen.
+  begin: string;
+  end: string;
+}
+
+export interface SlicePlane {
+  plane: Plane;
+  normal: Axis;
+  right: SliceAxis;
+  down: SliceAxis;
+}
+
+function dot(a: Vec3, b: Vec3): number {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+function opposite(vector: Vec3): Vec3 {
+  return [-vector[0], -vector[1], -vector[2]];
+}
+
+// Which volume axis runs most along each of the patient's: the best of the six assignments, so that
+// no axis is taken twice however oblique the volume lies.
+export function patientAxes(volume: Pick<Volume, 'direction'>): [Axis, Axis, Axis] {
+  const orders = [
+    [0, 1, 2],
+    [0, 2, 1],
+    [1, 0, 2],
+    [1, 2, 0],
+    [2, 0, 1],
+    [2, 1, 0],
+  ];
+  const fit = (order: number[]): number =>
+    order.reduce((sum, axis, row) => sum + Math.abs(axisDirection(volume, axis)[row as 0]), 0);
+  const best = orders.reduce((a, b) => (fit(b) > fit(a) + 1e-9 ? b : a));
+  return best.map((axis) => axes[axis]) as [Axis, Axis, Axis];
+}
+
+export function slicePlane(volume: Pick<Volume, 'direction'>, plane: Plane): SlicePlane {
+  const along = patientAxes(volume);
+  const { right, down } = screens[plane];
+  const rowOf = (vector: Vec3): 0 | 1 | 2 => vector.findIndex((value) => value !== 0) as 0;
+  const sliceAxis = (screen: Vec3): SliceAxis => {
+    const axis = along[rowOf(screen)];
+    const direction = axisDirection(volume, axisIndex(axis));
+    const flipped = dot(direction, screen) < 0;
+    const towards = flipped ? opposite(direction) : direction;
+    return { axis, flipped, begin: sideOf(opposite(towards)), end: sideOf(towards) };
+  };
+  return { plane, normal: along[normals[plane]], right: sliceAxis(right), down: sliceAxis(down) };
+}

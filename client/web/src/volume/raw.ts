@@ -1,0 +1,21 @@
+// Raw samples: what their size says about them.
+export const sampleBytes: Record<string, number> = {
+  uint8: 1,
+  int8: 1,
+  uint16: 2,
+  int16: 2,
+  uint32: 4,
+  int32: 4,
+  float32: 4,
+  float64: 8,
+};
+
+// What a description misses; empty when it accounts for every byte.
+export function rawFault(size: number, dims: readonly number[], type: string): string {
+  if (dims.length !== 3 || !dims.every((count) => Number.isInteger(count) && count > 0)) {
+    return 'Enter three whole numbers of samples.';
+  }
+  const described = dims.reduce((a, b) => a * b, sampleBytes[type] ?? 1);
+  if (described === size) return '';
+  return `That describes ${described} bytes, but the file has ${size}.`;
+}

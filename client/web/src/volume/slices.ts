@@ -1,0 +1,92 @@
+// Slices of a volume as samples: fetched as pictures of 8 bits over a window, kept while they are near.
+import { slicePicture, type Axis } from '../api/client';
+import type { Volume } from '../api/types';
+
+export type Window = [number, number];
+
+// A slice's samples, of which 0 and 255 are the ends of its window.
+export interface Slice {
+  axis: Axis;
+  index: number;
+  width: number;
+  height: number;
+  values: Uint8Array;
+  window: Window;
+}
+
+const mostSlices = 96;
+
+async function grey(picture: Blob): Promise<{ width: number; height: number; values: Uint8Array }> {
+  const bitmap = await createImageBitmap(picture, { colorSpaceConversion: 'none' });
+  const { width, height } = bitmap;
+  const canvas = document.createElement('canvas');
+  canvas.width = width;
+  canvas.height = height;
+  const context = canvas.getContext('2d', { willReadFrequently: true });
+  if (!context) throw new Error('The browser has no memory for the slice.');
+  context.drawImage(bitmap, 0, 0);
+  bitmap.close();
+  const pixels = context.getImageData(0, 0, width, height).data;
+  const values = new Uint8Array(width * height);
+  for (let i = 0; i < values.length; i += 1) values[i] = pixels[4 * i] ?? 0;
+  return { width, height, values };
+}
+
+export class SliceSource {
+  // The oldest first.
+  private readonly kept = new Map<string, Promise<Slice>>();
+
+  constructor(
+    private readonly volume: Volume,
+    private readonly signal: AbortSignal,
+  ) {}
+
+  get(axis: Axis, index: number, window: Window): Promise<Slice> {
+    const key = `${axis}/${index}/${window.join(',')}`;
+    const found = this.kept.get(key);
+    if (found) {
+      this.kept.delete(key);
+      this.kept.set(key, found);
+      return found;
+    }
+    const slice = slicePicture(this.volume.id, axis, index, window, this.signal)
+      .then(grey)
+      .then((samples) => ({ axis, index, window, ...samples }));
+    this.kept.set(key, slice);
+    slice.catch(() => this.kept.delete(key));
+    for (const oldest of this.kept.keys()) {
+      if (this.kept.size <= mostSlices) break;
+      this.kept.delete(oldest);
+    }
+    return slice;
+  }
+}
+
+// The window to fetch so that both the window shown and the contour at the iso-value are precise: the
+// common one while it is not much wider than what is looked at, else a narrower one.
+export function windowToFetch(shown: Window, iso: number, common: Window): Window {
+  const margin = 0.02 * (common[1] - common[0]);
+  const low = Math.min(shown[0], iso - margin);
+  const high = Math.max(shown[1], iso + margin);
+  const covered = low >= common[0] && high <= common[1];
+  if (covered && common[1] - common[0] <= 4 * (high - low)) return common;
+  return [Number(low.toPrecision(6)), Number(high.toPrecision(6))];
+}
+
+// For each value of a slice the grey of a window.
+export function greyTable(slice: Pick<Slice, 'window'>, shown: Window): Uint8ClampedArray {
+  const table = new Uint8ClampedArray(256);
+  const [low, high] = slice.window;
+  const width = shown[1] - shown[0] || 1;
+  for (let value = 0; value < 256; value += 1) {
+    const sample = low + (value / 255) * (high - low);
+    table[value] = (255 * (sample - shown[0])) / width;
+  }
+  return table;
+}
+
+// An iso-value in the units of a slice's values.
+export function inSlice(slice: Pick<Slice, 'window'>, iso: number): number {
+  const [low, high] = slice.window;
+  return (255 * (iso - low)) / (high - low || 1);
+}

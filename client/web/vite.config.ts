@@ -1,0 +1,18 @@
+import { fileURLToPath } from 'node:url';
+import { defineConfig } from 'vite';
+
+const nothing = fileURLToPath(new URL('src/mesh/nothing.ts', import.meta.url));
+
+export default defineConfig({
+  base: '/',
+  // Draco's wrapper would read its file with these if it ran in Node.
+  resolve: { alias: { fs: nothing, path: nothing } },
+  build: {
+    target: 'es2022',
+    // Files of their own: the content security policy allows no data: addresses.
+    assetsInlineLimit: 0,
+    modulePreload: { polyfill: false },
+    chunkSizeWarningLimit: 900,
+  },
+  worker: { format: 'es' },
+});
