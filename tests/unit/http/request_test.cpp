@@ -33,6 +33,16 @@ httplib::Request with_query(const Pairs& parameters) {
   return request;
 }
 
+TEST(AcceptsGzip, IsWhatTheHeaderSays) {
+  for (const std::string header : {"gzip", "gzip, deflate, br", "br;q=1.0, gzip;q=0.5", "*"}) {
+    EXPECT_TRUE(accepts_gzip(with_header("Accept-Encoding", header))) << header;
+  }
+  for (const std::string header : {"", "identity", "br", "gzip;q=0", "gzip; q=0.0", "gzipped"}) {
+    EXPECT_FALSE(accepts_gzip(with_header("Accept-Encoding", header))) << header;
+  }
+  EXPECT_FALSE(accepts_gzip(httplib::Request()));
+}
+
 // --- Ranges
 // ------------------------------------------------------------------------------------------
 

@@ -61,12 +61,12 @@ export function histogramOf(id: string, bins: number, signal?: AbortSignal): Pro
 
 // What a job with these parameters would make.
 export function estimateOf(
-  { formats, draco, ...parameters }: JobParameters,
+  { formats, draco, components, ...parameters }: JobParameters,
   signal?: AbortSignal,
 ): Promise<Estimate> {
   const query = new URLSearchParams({ format: formats.join(',') });
-  for (const [name, value] of Object.entries({ ...parameters, ...draco })) {
-    query.set(name, String(value));
+  for (const [name, value] of Object.entries({ ...parameters, ...draco, ...components })) {
+    if (value !== null && value !== undefined) query.set(name, String(value));
   }
   return json(`/v1/estimate?${query.toString()}`, { signal });
 }

@@ -83,3 +83,13 @@ export function adviceFor(error: ApiError): string {
       return '';
   }
 }
+
+// The series that a refusal offers to choose from.
+export function seriesOf(error: ApiError): { uid: string; text: string }[] {
+  return error.faults
+    .filter(({ field }) => field === 'series')
+    .flatMap(({ message }) => {
+      const uid = /\d+(\.\d+)+/.exec(message)?.[0];
+      return uid === undefined ? [] : [{ uid, text: message }];
+    });
+}

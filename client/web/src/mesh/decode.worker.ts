@@ -55,7 +55,7 @@ function decode(draco: DracoModule, { bytes, positionId }: DecodeRequest): Trian
     const coordinates = 3 * mesh.num_points();
     const index = copyOut(draco, 4 * corners, (pointer) => {
       decoder.GetTrianglesUInt32Array(mesh, 4 * corners, pointer);
-      return draco.HEAPU32.slice(pointer / 4, pointer / 4 + corners) as Uint32Array<ArrayBuffer>;
+      return draco.HEAPU32.slice(pointer / 4, pointer / 4 + corners);
     });
     const positions = copyOut(draco, 4 * coordinates, (pointer) => {
       decoder.GetAttributeDataArrayForAllPoints(
@@ -65,7 +65,7 @@ function decode(draco: DracoModule, { bytes, positionId }: DecodeRequest): Trian
         4 * coordinates,
         pointer,
       );
-      return draco.HEAPF32.slice(pointer / 4, pointer / 4 + coordinates) as Float32Array<ArrayBuffer>;
+      return draco.HEAPF32.slice(pointer / 4, pointer / 4 + coordinates);
     });
     return { positions, index };
   } finally {
@@ -80,8 +80,10 @@ scope.onmessage = (event) => {
   ready
     .then((draco) => {
       const blocks = split(decode(draco, request)).map(prepare);
-      const buffers = blocks.flatMap((block) => Object.values(block).map((array) => array.buffer));
-      scope.postMessage({ id: request.id, blocks, error: '' }, buffers as Transferable[]);
+      const buffers = blocks.flatMap((block) =>
+        Object.values<{ buffer: ArrayBuffer }>({ ...block }).map((array) => array.buffer),
+      );
+      scope.postMessage({ id: request.id, blocks, error: '' }, buffers);
     })
     .catch((error: unknown) => {
       scope.postMessage({ id: request.id, blocks: [], error: String(error) }, []);

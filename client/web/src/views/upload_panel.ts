@@ -1,6 +1,6 @@
 // Where volumes are dropped: one file, a folder of slices, or several files.
 import { upload, type RawDescription } from '../api/upload';
-import { ApiError, asApiError } from '../api/problem';
+import { ApiError, asApiError, seriesOf } from '../api/problem';
 import type { Volume } from '../api/types';
 import { button, field, h, icon } from '../ui/dom';
 import { formatBytes } from '../ui/format';
@@ -14,16 +14,6 @@ const arrow = 'M8 11V2.5M4.5 6 8 2.5 11.5 6M2.5 10.5v3h11v-3';
 
 export interface UploadPanel {
   element: HTMLElement;
-}
-
-// The series that a refusal offers to choose from.
-export function seriesOf(error: ApiError): { uid: string; text: string }[] {
-  return error.faults
-    .filter(({ field: name }) => name === 'series')
-    .flatMap(({ message }) => {
-      const uid = /\d+(\.\d+)+/.exec(message)?.[0];
-      return uid === undefined ? [] : [{ uid, text: message }];
-    });
 }
 
 export function uploadPanel(scope: Scope, onVolume: (volume: Volume, isNew: boolean) => void): UploadPanel {

@@ -1,0 +1,353 @@
+// The page as a person uses it: a real volume comes in, its surface goes out.
+import { createHash } from 'node:crypto';
+import { readFileSync } from 'node:fs';
+import type { Browser, Page } from 'playwright-core';
+import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from 'vitest';
+import {
+  ballNrrd,
+  Daemon,
+  noiseNrrd,
+  openPage,
+  silhouette,
+  startBrowser,
+  surfaceLoaded,
+  type JobAnswer,
+} from './support';
+
+const brain = '/usr/share/mricron/templates/ch2.nii.gz';
+
+let browser: Browser;
+let daemon: Daemon;
+let page: Page;
+let faults: string[];
+
+beforeAll(async () => {
+  browser = await startBrowser();
+  daemon = await Daemon.start();
+});
+
+afterAll(async () => {
+  await browser?.close();
+  await daemon?.remove();
+});
+
+beforeEach(async () => {
+  ({ page, faults } = await openPage(browser, daemon.url));
+});
+
+afterEach(async () => {
+  await page.close();
+  expect(faults).toEqual([]);
+});
+
+// As if files were dropped from the system.
+async function drop(files: { name: string; bytes: Buffer }[]): Promise<void> {
+  const transfer = await page.evaluateHandle((given) => {
+    const made = new DataTransfer();
+    for (const { name, text } of given) {
+      made.items.add(new File([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))], name));
+    }
+    return made;
+  }, files.map(({ name, bytes }) => ({ name, text: bytes.toString('base64') })));
+  await page.dispatchEvent('.drop', 'drop', { dataTransfer: transfer });
+}
+
+function query(): URLSearchParams {
+  return new URLSearchParams(new URL(page.url()).hash.split('?')[1] ?? '');
+}
+
+async function job(): Promise<JobAnswer> {
+  const id = /#\/jobs\/([^?]+)/.exec(page.url())?.[1] ?? '';
+  return daemon.json(`/v1/jobs/${id}`);
+}
+
+// Pixels of a slice that have the contour's colour.
+function contourPixels(plane: string): Promise<number> {
+  return page.evaluate((name) => {
+    const canvas = document.querySelector<HTMLCanvasElement>(`[data-plane=${name}] canvas`);
+    const pixels = canvas?.getContext('2d')?.getImageData(0, 0, canvas.width, canvas.height).data ?? [];
+    let count = 0;
+    for (let i = 0; i < pixels.length; i += 4) {
+      // Grey has equal parts; the contour is green and blue.
+      if ((pixels[i + 1] ?? 0) - (pixels[i] ?? 0) > 60) count += 1;
+    }
+    return count;
+  }, plane);
+}
+
+describe('a real volume', () => {
+  it('is dropped, looked at, meshed, turned, downloaded, and still there after a reload', async () => {
+    await page.goto(daemon.url);
+    await drop([{ name: 'ch2.nii.gz', bytes: readFileSync(brain) }]);
+    await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
+    await expect.poll(() => contourPixels('axial')).toBeGreaterThan(200);
+
+    // The line moves by keyboard and by pointer; contour, address and estimate go with it.
+    const line = page.getByRole('slider', { name: 'Iso-value' });
+    await line.focus();
+    const before = await contourPixels('axial');
+    await page.keyboard.press('Shift+ArrowRight');
+    await page.keyboard.press('Shift+ArrowRight');
+    await expect.poll(() => contourPixels('axial')).not.toBe(before);
+    const byKeys = Number(query().get('iso'));
+    const box = await line.boundingBox();
+    if (!box) throw new Error('the histogram is not shown');
+    await page.mouse.move(box.x + box.width * 0.5, box.y + 30);
+    await page.mouse.down();
+    await page.mouse.move(box.x + box.width * 0.25, box.y + 30, { steps: 4 });
+    await page.mouse.up();
+    const byPointer = Number(query().get('iso'));
+    expect(byPointer).toBeLessThan(byKeys);
+    await page.getByLabel('Iso-value', { exact: true }).nth(0).fill('60');
+    await expect.poll(() => query().get('iso')).toBe('60');
+    await expect.poll(() => page.locator('.estimate').innerText()).toMatch(/Triangles\s+\d/);
+    const estimated = Number(/Triangles\s+([\d\u202f]+)/.exec(await page.locator('.estimate').innerText())?.[1]?.replaceAll('\u202f', ''));
+
+    await page.getByRole('button', { name: 'Make the surface' }).click();
+    await page.waitForURL(/#\/jobs\//);
+    await surfaceLoaded(page);
+    const { mesh } = await job();
+    if (!mesh) throw new Error('the job made no mesh');
+    expect(mesh.triangles).toBe(estimated);
+
+    // From the front: as wide and high as its bounds say.
+    await page.getByRole('button', { name: /^Anterior/ }).click();
+    await page.waitForTimeout(600);
+    const front = await silhouette(page, page.locator('.viewport'));
+    expect(front.part).toBeGreaterThan(0.1);
+    expect(front.colours).toBeGreaterThan(50);
+    const [low, high] = mesh.bounds;
+    const view = await page.locator('.viewport').boundingBox();
+    if (!view) throw new Error('there is no viewport');
+    const seen = (front.width * view.width) / (front.height * view.height);
+    const real = (high[0] - low[0]) / (high[2] - low[2]);
+    // Perspective shows what is nearer larger, and the depths of its edges differ.
+    expect(seen / real).toBeGreaterThan(0.85);
+    expect(seen / real).toBeLessThan(1.15);
+
+    // Turning it changes the picture, and the address keeps the place.
+    await page.locator('.viewport canvas').focus();
+    for (let i = 0; i < 6; i += 1) await page.keyboard.press('ArrowRight');
+    await expect.poll(() => query().get('cam') ?? '').not.toBe('');
+    const camera = query().get('cam');
+
+    const download = page.waitForEvent('download');
+    await page.locator('[data-format=glb]').click();
+    const file = readFileSync(await (await download).path());
+    expect(createHash('sha256').update(file).digest('hex')).toBe(mesh.files.glb?.sha256);
+
+    await page.reload();
+    await surfaceLoaded(page);
+    expect(query().get('cam')).toBe(camera);
+    expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
+    await page.goBack();
+    await page.waitForURL(/#\/volumes\//);
+    await expect.poll(() => contourPixels('sagittal')).toBeGreaterThan(200);
+    expect(query().get('iso')).toBe('60');
+  });
+});
+
+describe('a surface', () => {
+  let ball: string;
+  let made: JobAnswer;
+
+  beforeAll(async () => {
+    ball = await daemon.upload(ballNrrd(48, 18));
+    made = await daemon.submit({ volume: ball, iso: 100, passes: 2, formats: ['glb', 'drc', 'stl'] }, 30);
+  });
+
+  it('of a ball is a disc from every side', async () => {
+    await page.goto(`${daemon.url}/#/jobs/${made.id}`);
+    await surfaceLoaded(page);
+    for (const key of ['a', 'l', 's']) {
+      await page.keyboard.press(key);
+      await page.waitForTimeout(400);
+      const disc = await silhouette(page, page.locator('.viewport'));
+      expect(disc.filling, key).toBeGreaterThan(Math.PI / 4 - 0.02);
+      expect(disc.filling, key).toBeLessThan(Math.PI / 4 + 0.02);
+    }
+  });
+
+  it('is cut in half by the plane, which shows the slice', async () => {
+    await page.goto(`${daemon.url}/#/jobs/${made.id}`);
+    await surfaceLoaded(page);
+    await page.keyboard.press('a');
+    await page.waitForTimeout(300);
+    const whole = await silhouette(page, page.locator('.viewport'));
+    const slice = page.waitForResponse(/slice\.png/);
+    await page.keyboard.press('c');
+    await slice;
+    await page.waitForTimeout(500);
+    await page.keyboard.press('s');
+    await page.waitForTimeout(500);
+    // From above the slice covers all of the volume, also where the ball is not.
+    const above = await silhouette(page, page.locator('.viewport'));
+    expect(above.filling).toBeGreaterThan(0.95);
+    expect(above.part).toBeGreaterThan(whole.part);
+  });
+
+  it('is measured in millimetres', async () => {
+    await page.goto(`${daemon.url}/#/jobs/${made.id}`);
+    await surfaceLoaded(page);
+    await page.keyboard.press('a');
+    await page.keyboard.press('m');
+    await page.waitForTimeout(400);
+    const view = await page.locator('.viewport').boundingBox();
+    if (!view) throw new Error('there is no viewport');
+    const disc = await silhouette(page, page.locator('.viewport'));
+    // Two points at 0.8 of the radius, left and right of the middle: 1.6 radii apart.
+    const radius = (disc.height * view.height) / 2;
+    const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };
+    await page.mouse.click(middle.x - 0.8 * radius, middle.y);
+    await page.mouse.click(middle.x + 0.8 * radius, middle.y);
+    const label = page.locator('.ruler-labels span');
+    await expect.poll(() => label.count()).toBe(1);
+    const millimetres = Number.parseFloat(await label.innerText());
+    expect(millimetres).toBeGreaterThan(1.6 * 18 * 0.97);
+    expect(millimetres).toBeLessThan(1.6 * 18 * 1.03);
+  });
+
+  it('made as Draco alone is shown as well', async () => {
+    const draco = await daemon.submit({ volume: ball, iso: 100, formats: ['drc'] }, 30);
+    await page.goto(`${daemon.url}/#/jobs/${draco.id}`);
+    await surfaceLoaded(page);
+    expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
+  });
+
+  it('is compared with others by linked cameras', async () => {
+    await page.goto(`${daemon.url}/#/jobs/${made.id}`);
+    await page.getByRole('button', { name: '0, 5 and 10 passes' }).click();
+    await page.waitForURL(/#\/compare/);
+    await surfaceLoaded(page, 3);
+    const titles = await page.locator('.cell h2').allInnerTexts();
+    expect(titles).toEqual(['0 passes', '5 passes', '10 passes']);
+    const third = page.locator('.cell .viewport').nth(2);
+    const before = await third.screenshot();
+    const first = await page.locator('.cell .viewport canvas').first().boundingBox();
+    if (!first) throw new Error('there is no canvas');
+    await page.mouse.move(first.x + 150, first.y + 200);
+    await page.mouse.down();
+    await page.mouse.move(first.x + 230, first.y + 220, { steps: 4 });
+    await page.mouse.up();
+    await page.waitForTimeout(600);
+    expect(before.equals(await third.screenshot())).toBe(false);
+    for (const cell of await page.locator('.cell .viewport').all()) {
+      expect((await silhouette(page, cell)).part).toBeGreaterThan(0.05);
+    }
+  });
+});
+
+describe('a job', () => {
+  it('is cancelled while it runs', async () => {
+    const volume = await daemon.upload(noiseNrrd(96));
+    const { id } = await daemon.submit({ volume, iso: 128, passes: 1000, formats: ['glb'] });
+    await page.goto(`${daemon.url}/#/jobs/${id}`);
+    await expect.poll(() => page.locator('.progress-text').innerText()).toMatch(/%/);
+    await page.getByRole('button', { name: 'Cancel' }).click();
+    await expect.poll(() => page.locator('.job').getAttribute('data-state')).toBe('cancelled');
+    expect(await page.locator('.refusal').innerText()).toMatch(/Cancelled/);
+    expect((await job()).state).toBe('cancelled');
+  });
+
+  it('is shown as lost when nobody answers, and goes on when somebody does', async () => {
+    const other = await Daemon.start();
+    try {
+      const volume = await other.upload(ballNrrd(24, 8));
+      faults.length = 0;
+      const { page: mine, faults: none } = await openPage(browser, other.url);
+      await mine.goto(`${other.url}/#/jobs`);
+      await expect.poll(() => mine.getByRole('heading', { name: 'Jobs' }).count()).toBe(1);
+      const { host } = new URL(other.url);
+      await other.kill();
+      await expect.poll(() => mine.locator('.banner').isVisible(), { timeout: 15_000 }).toBe(true);
+      const again = await Daemon.start(other.data, host);
+      try {
+        await expect.poll(() => mine.locator('.banner').isVisible(), { timeout: 15_000 }).toBe(false);
+        await mine.goto(`${other.url}/#/volumes/${volume}`);
+        await expect.poll(() => mine.locator('.slice').count()).toBe(3);
+      } finally {
+        await again.kill();
+      }
+      await mine.close();
+      expect(none).toEqual([]);
+    } finally {
+      await other.remove();
+    }
+  });
+});
+
+describe('a refused file', () => {
+  it('says why, and what to do next', async () => {
+    await page.goto(daemon.url);
+    const whole = readFileSync(brain);
+    await drop([{ name: 'half.nii.gz', bytes: whole.subarray(0, whole.length / 2) }]);
+    await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/\w{4}/);
+    expect(await page.locator('.refusal .advice').innerText()).not.toBe('');
+    await page.getByRole('button', { name: 'Choose another' }).click();
+    await expect.poll(() => page.getByRole('button', { name: 'Choose files' }).isVisible()).toBe(true);
+  });
+
+  it('that holds raw samples is taken with a description', async () => {
+    await page.goto(daemon.url);
+    await drop([{ name: 'samples.raw', bytes: ballNrrd(20, 7).subarray(-8000) }]);
+    const submit = page.getByRole('button', { name: 'Upload as raw samples' });
+    await expect.poll(() => submit.count()).toBe(1);
+    expect(await submit.isDisabled()).toBe(true);
+    for (const axis of ['x', 'y', 'z']) await page.getByLabel(`Samples along ${axis}`).fill('20');
+    await page.getByLabel('Type').selectOption('uint8');
+    await submit.click();
+    await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
+    await expect.poll(() => contourPixels('coronal')).toBeGreaterThan(50);
+  });
+});
+
+describe('the page', () => {
+  it('is small, compressed and nobody else can serve or frame it', async () => {
+    const answer = await fetch(daemon.url);
+    const policy = answer.headers.get('content-security-policy') ?? '';
+    expect(policy).toContain("default-src 'none'");
+    expect(policy).not.toContain('unsafe-inline');
+    expect(policy).toContain("frame-ancestors 'none'");
+    let bytes = 0;
+    page.on('response', (response) => {
+      const { pathname } = new URL(response.url());
+      if (pathname === '/' || pathname.startsWith('/assets/')) {
+        bytes += Number(response.headers()['content-length']);
+        if (/\.(js|css)$/.test(pathname)) expect(response.headers()['content-encoding'], pathname).toBe('gzip');
+      }
+    });
+    // With a surface, so that what draws is counted; its decoder is not.
+    const volume = await daemon.upload(ballNrrd(16, 5));
+    const { id } = await daemon.submit({ volume, iso: 100, formats: ['stl'] }, 30);
+    await page.goto(`${daemon.url}/#/jobs/${id}`);
+    await expect.poll(() => page.locator('.overlay.message').count()).toBe(1);
+    expect(bytes).toBeGreaterThan(50_000);
+    expect(bytes).toBeLessThan(400_000);
+  });
+
+  it('can be used by keyboard, and every control has a name', async () => {
+    await page.goto(daemon.url);
+    await expect.poll(() => page.locator('.drop').count()).toBe(1);
+    for (const place of ['', '#/jobs', `#/volumes/${await daemon.upload(ballNrrd(16, 5))}`]) {
+      await page.goto(`${daemon.url}/${place}`);
+      await expect.poll(() => page.locator('main[aria-busy]').count()).toBe(0);
+      const nameless = await page.evaluate(() =>
+        [...document.querySelectorAll<HTMLElement>('button, a, input:not([hidden]), select, [role=slider]')]
+          .filter((control) => control.offsetParent !== null)
+          .filter((control) => {
+            const labels = (control as HTMLInputElement).labels;
+            const label = labels && labels.length > 0 ? labels[0]?.textContent : '';
+            const name = control.getAttribute('aria-label') ?? (control.textContent?.trim() || label);
+            return !name?.trim();
+          })
+          .map((control) => control.outerHTML.slice(0, 120)),
+      );
+      expect(nameless).toEqual([]);
+    }
+    await page.keyboard.press('g');
+    await page.keyboard.press('j');
+    await page.waitForURL(/#\/jobs$/);
+    await page.keyboard.press('?');
+    await expect.poll(() => page.locator('dialog.help').count()).toBe(1);
+  });
+});

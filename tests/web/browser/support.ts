@@ -1,0 +1,226 @@
+// A daemon of the test's own and Chromium in front of it.
+import { spawn, type ChildProcess } from 'node:child_process';
+import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { createInterface } from 'node:readline';
+import { chromium, type Browser, type Locator, type Page } from 'playwright-core';
+import { expect } from 'vitest';
+
+function fromEnvironment(name: string): string {
+  const value = process.env[name];
+  if (value === undefined || !existsSync(value)) throw new Error(`${name} has to be the path of a program`);
+  return value;
+}
+
+export class Daemon {
+  private constructor(
+    private readonly process: ChildProcess,
+    readonly data: string,
+    readonly url: string,
+  ) {}
+
+  static async start(data = mkdtempSync(join(tmpdir(), 'isomesh-web-')), listen = '127.0.0.1:0'): Promise<Daemon> {
+    const child = spawn(fromEnvironment('ISOMESHD'), ['--listen', listen, '--data', data, '--log-level', 'error'], {
+      stdio: ['ignore', 'pipe', 'inherit'],
+    });
+    const line = await new Promise<string>((resolve, reject) => {
+      createInterface({ input: child.stdout }).once('line', resolve);
+      child.once('error', reject);
+      child.once('exit', (status) => reject(new Error(`the daemon ended with ${status}`)));
+    });
+    return new Daemon(child, data, line.replace('listening on ', ''));
+  }
+
+  // Ends it at once, as a failing machine would; its data stay.
+  async kill(): Promise<void> {
+    if (this.process.exitCode !== null || this.process.signalCode !== null) return;
+    const ended = new Promise((resolve) => this.process.once('exit', resolve));
+    this.process.kill('SIGKILL');
+    await ended;
+  }
+
+  async remove(): Promise<void> {
+    await this.kill();
+    rmSync(this.data, { recursive: true, force: true });
+  }
+
+  async json<T>(path: string, init?: RequestInit): Promise<T> {
+    const answer = await fetch(this.url + path, init);
+    if (!answer.ok) throw new Error(`${path}: ${answer.status} ${await answer.text()}`);
+    return (await answer.json()) as T;
+  }
+
+  async upload(body: Buffer | Uint8Array): Promise<string> {
+    return (await this.json<{ id: string }>('/v1/volumes', { method: 'POST', body })).id;
+  }
+
+  submit(parameters: Record<string, unknown>, waitSeconds = 0): Promise<JobAnswer> {
+    return this.json(`/v1/jobs?wait=${waitSeconds}`, { method: 'POST', body: JSON.stringify(parameters) });
+  }
+}
+
+export interface JobAnswer {
+  id: string;
+  state: string;
+  mesh: {
+    triangles: number;
+    bounds: [[number, number, number], [number, number, number]];
+    files: Record<string, { bytes: number; sha256: string }>;
+  } | null;
+}
+
+export function startBrowser(): Promise<Browser> {
+  return chromium.launch({
+    executablePath: fromEnvironment('CHROMIUM'),
+    args: [
+      '--no-sandbox',
+      '--use-gl=angle',
+      '--use-angle=swiftshader',
+      '--enable-unsafe-swiftshader',
+      '--disable-quic',
+      '--no-first-run',
+      '--disable-background-networking',
+      '--disable-component-update',
+      '--disable-sync',
+    ],
+  });
+}
+
+export interface OpenPage {
+  page: Page;
+  // Faults that no test provokes: exceptions, what the content policy blocked, foreign hosts.
+  faults: string[];
+}
+
+export async function openPage(
+  browser: Browser,
+  origin: string,
+  options: Parameters<Browser['newPage']>[0] = {},
+): Promise<OpenPage> {
+  const page = await browser.newPage({ viewport: { width: 1180, height: 760 }, ...options });
+  const faults: string[] = [];
+  page.on('pageerror', (error) => faults.push(String(error)));
+  page.on('console', (message) => {
+    if (/Content.Security.Policy|Refused to/i.test(message.text())) faults.push(message.text());
+  });
+  page.on('request', (request) => {
+    const { url } = { url: request.url() };
+    if (!url.startsWith(origin) && !url.startsWith('blob:')) faults.push(`asked for ${url}`);
+  });
+  return { page, faults };
+}
+
+// A ball of that radius in a cube of samples, as NRRD: 100 on its surface, more inside.
+export function ballNrrd(size: number, radius: number, seed = 0): Buffer {
+  const middle = (size - 1) / 2;
+  const samples = Buffer.alloc(size ** 3);
+  let at = 0;
+  for (let z = 0; z < size; z += 1) {
+    for (let y = 0; y < size; y += 1) {
+      for (let x = 0; x < size; x += 1) {
+        const distance = Math.hypot(x - middle, y - middle, z - middle);
+        samples[at] = Math.max(0, Math.min(255, 100 + 8 * (radius - distance)));
+        at += 1;
+      }
+    }
+  }
+  samples[0] = seed;
+  return Buffer.concat([Buffer.from(nrrdHeader(size)), samples]);
+}
+
+// Noise, whose surface takes long to smooth.
+export function noiseNrrd(size: number): Buffer {
+  const samples = Buffer.alloc(size ** 3);
+  let state = 1;
+  for (let i = 0; i < samples.length; i += 1) {
+    state = (Math.imul(state, 1_103_515_245) + 12_345) >>> 0;
+    samples[i] = state >>> 24;
+  }
+  return Buffer.concat([Buffer.from(nrrdHeader(size)), samples]);
+}
+
+function nrrdHeader(size: number): string {
+  return [
+    'NRRD0004',
+    'type: uint8',
+    'dimension: 3',
+    'space: left-posterior-superior',
+    `sizes: ${size} ${size} ${size}`,
+    'space directions: (1,0,0) (0,1,0) (0,0,1)',
+    'space origin: (0,0,0)',
+    'encoding: raw',
+    '',
+    '',
+  ].join('\n');
+}
+
+export interface Silhouette {
+  // The part of the picture that differs from its background.
+  part: number;
+  // The box around what differs, in parts of the picture.
+  width: number;
+  height: number;
+  // The part of that box that differs.
+  filling: number;
+  // Distinct colours in it: a flat patch has one.
+  colours: number;
+}
+
+// What stands out in a picture of an element, the outer strip with its tools left out.
+export async function silhouette(page: Page, element: Locator, tolerance = 24): Promise<Silhouette> {
+  const picture = (await element.screenshot()).toString('base64');
+  return page.evaluate(
+    async ({ text, most }) => {
+      const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+      const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+      const canvas = document.createElement('canvas');
+      canvas.width = bitmap.width;
+      canvas.height = bitmap.height;
+      const context = canvas.getContext('2d');
+      if (!context) throw new Error('no canvas');
+      context.drawImage(bitmap, 0, 0);
+      const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+      const top = 60; // below the tools
+      const corner = 116; // the orientation cube
+      const seen = { count: 0, left: Infinity, right: -1, top: Infinity, bottom: -1 };
+      const colours = new Set<number>();
+      for (let y = top; y < bitmap.height; y += 1) {
+        // The background is a gradient from top to bottom, so that every row has its own.
+        const edge = 4 * (y * bitmap.width + bitmap.width - 3);
+        for (let x = 0; x < bitmap.width; x += 1) {
+          if (x < corner && y > bitmap.height - corner) continue;
+          const at = 4 * (y * bitmap.width + x);
+          const difference =
+            Math.abs((data[at] ?? 0) - (data[edge] ?? 0)) +
+            Math.abs((data[at + 1] ?? 0) - (data[edge + 1] ?? 0)) +
+            Math.abs((data[at + 2] ?? 0) - (data[edge + 2] ?? 0));
+          if (difference <= most) continue;
+          seen.count += 1;
+          seen.left = Math.min(seen.left, x);
+          seen.right = Math.max(seen.right, x);
+          seen.top = Math.min(seen.top, y);
+          seen.bottom = Math.max(seen.bottom, y);
+          colours.add(((data[at] ?? 0) << 16) | ((data[at + 1] ?? 0) << 8) | (data[at + 2] ?? 0));
+        }
+      }
+      const width = Math.max(0, seen.right - seen.left + 1);
+      const height = Math.max(0, seen.bottom - seen.top + 1);
+      return {
+        part: seen.count / (bitmap.width * bitmap.height),
+        width: width / bitmap.width,
+        height: height / bitmap.height,
+        filling: seen.count / Math.max(1, width * height),
+        colours: colours.size,
+      };
+    },
+    { text: picture, most: tolerance },
+  );
+}
+
+// Waits until all parts of the surfaces are there and drawn.
+export async function surfaceLoaded(page: Page, count = 1): Promise<void> {
+  await expect.poll(() => page.locator('.pane[data-loaded]').count(), { timeout: 60_000 }).toBe(count);
+  await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+  await page.waitForTimeout(300);
+}

@@ -1,0 +1,77 @@
+import { describe, expect, it } from 'vitest';
+import { EventParser } from '@/api/events';
+import { merged } from '@/api/follow';
+import { adviceFor, ApiError, asApiError, errorOf, seriesOf } from '@/api/problem';
+import type { Job } from '@/api/types';
+import { uploadPath } from '@/api/upload';
+
+describe('errorOf', () => {
+  it('takes a problem by its words', () => {
+    const body = JSON.stringify({
+      type: 'urn:isomesh:problem:unusable-volume',
+      title: 'Unusable volume',
+      status: 422,
+      detail: 'slice 41 of 93 is missing',
+      errors: [{ field: 'series', message: '1.2.840.1: head, 93 slices' }],
+    });
+    const error = errorOf(422, body);
+    expect(error).toMatchObject({ status: 422, title: 'Unusable volume', detail: 'slice 41 of 93 is missing' });
+    expect(seriesOf(error)).toEqual([{ uid: '1.2.840.1', text: '1.2.840.1: head, 93 slices' }]);
+  });
+
+  it('says the status of a proxy that answers with a page of its own', () => {
+    for (const body of ['<html>502</html>', '', 'null', '[]', '{"title": 5}']) {
+      expect(errorOf(502, body)).toMatchObject({ status: 502, title: 'HTTP status 502' });
+    }
+  });
+
+  it('knows a connection that failed, and leaves faults of its own apart', () => {
+    expect(asApiError(new TypeError('Failed to fetch')).isUnreachable).toBe(true);
+    expect(asApiError(new RangeError('x')).isUnreachable).toBe(false);
+    const known = new ApiError(404, 'Not found', '');
+    expect(asApiError(known)).toBe(known);
+  });
+
+  it('says what to do next', () => {
+    for (const status of [0, 401, 404, 413, 415, 422, 503, 507]) {
+      expect(adviceFor(new ApiError(status, '', '')), String(status)).not.toBe('');
+    }
+    expect(adviceFor(new ApiError(400, '', ''))).toBe('');
+  });
+});
+
+describe('EventParser', () => {
+  const stream = ': ping\n\nevent: stage\ndata: {"stage":"smooth"}\n\r\nevent: done\r\ndata: a\r\ndata: b\r\n\r\n';
+
+  it('finds the events, however the text comes', () => {
+    for (const size of [1, 2, 5, stream.length]) {
+      const parser = new EventParser();
+      const events = [];
+      for (let i = 0; i < stream.length; i += size) events.push(...parser.take(stream.slice(i, i + size)));
+      expect(events, `pieces of ${size}`).toEqual([
+        { name: 'stage', data: '{"stage":"smooth"}' },
+        { name: 'done', data: 'a\nb' },
+      ]);
+    }
+  });
+});
+
+describe('merged', () => {
+  const job = { id: 'a', state: 'running', stage: 'load', progress: 0 } as Job;
+
+  it('takes over what an event says, and nothing of another job', () => {
+    expect(merged(job, '{"stage":"smooth","progress":0.5}')).toMatchObject({ id: 'a', stage: 'smooth', progress: 0.5 });
+    expect(merged(job, '{"job":{"id":"a","stage":"encode"}}').stage).toBe('encode');
+    expect(merged(job, '{"id":"b","stage":"encode"}')).toBe(job);
+    expect(merged(job, 'null')).toBe(job);
+  });
+});
+
+describe('uploadPath', () => {
+  it('describes raw samples and the series', () => {
+    expect(uploadPath({})).toBe('/v1/volumes');
+    expect(uploadPath({ series: '1.2.3' })).toBe('/v1/volumes?series=1.2.3');
+    const raw = { dims: [2, 3, 4] as [number, number, number], type: 'int16', spacing: [1, 1, 0.5] as [number, number, number], byteOrder: 'big' as const };
+    expect(decodeURIComponent(uploadPath({ raw }))).toBe('/v1/volumes?dims=2,3,4&type=int16&spacing=1,1,0.5&byte_order=big');
+  });
+});

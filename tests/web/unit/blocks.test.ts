@@ -1,0 +1,97 @@
+import { describe, expect, it } from 'vitest';
+import { borderVertices, clustered, mostTriangles, prepare, split, type Triangles } from '@/mesh/blocks';
+import { Seams } from '@/mesh/seams';
+
+// A bumpy sheet of n x n squares over [x0, x0 + n] x [0, n].
+function sheet(n: number, x0 = 0): Triangles {
+  const positions: number[] = [];
+  const index: number[] = [];
+  for (let y = 0; y <= n; y += 1) {
+    for (let x = 0; x <= n; x += 1) positions.push(x0 + x, y, Math.sin((x0 + x) / 3) + Math.cos(y / 4));
+  }
+  for (let y = 0; y < n; y += 1) {
+    for (let x = 0; x < n; x += 1) {
+      const a = y * (n + 1) + x;
+      index.push(a, a + 1, a + n + 2, a, a + n + 2, a + n + 1);
+    }
+  }
+  return { positions: new Float32Array(positions), index: new Uint32Array(index) };
+}
+
+function area({ positions, index }: { positions: Float32Array; index: ArrayLike<number> }): number {
+  let sum = 0;
+  const at = (corner: number): number[] => [0, 1, 2].map((axis) => positions[3 * (index[corner] as number) + axis] as number);
+  for (let i = 0; i < index.length; i += 3) {
+    const [a, b, c] = [at(i), at(i + 1), at(i + 2)] as [number[], number[], number[]];
+    const u = b.map((value, axis) => value - (a[axis] as number)) as [number, number, number];
+    const v = c.map((value, axis) => value - (a[axis] as number)) as [number, number, number];
+    sum += Math.hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
+  }
+  return sum;
+}
+
+describe('blocks', () => {
+  it('finds the border of a sheet and none of a closed surface', () => {
+    const { positions, index } = sheet(10);
+    expect(borderVertices(index, positions.length / 3).length).toBe(40);
+    const tetrahedron = [0, 1, 2, 0, 3, 1, 1, 3, 2, 2, 3, 0];
+    expect(borderVertices(tetrahedron, 4).length).toBe(0);
+  });
+
+  it('splits into parts that 16 bits number, without losing a triangle', () => {
+    const whole = sheet(300);
+    const parts = split(whole);
+    expect(parts.length).toBeGreaterThan(2);
+    for (const part of parts) {
+      expect(part.index.length).toBeLessThanOrEqual(3 * mostTriangles);
+      expect(part.positions.length / 3).toBeLessThanOrEqual(65_535);
+    }
+    expect(parts.reduce((sum, part) => sum + part.index.length, 0)).toBe(whole.index.length);
+    expect(parts.reduce((sum, part) => sum + area(part), 0)).toBeCloseTo(area(whole), 1);
+  });
+
+  it('splits triangles that share no vertex', () => {
+    const count = 70_000;
+    const soup: Triangles = {
+      positions: new Float32Array(9 * count),
+      index: Uint32Array.from({ length: 3 * count }, (_, i) => i),
+    };
+    const parts = split(soup);
+    expect(parts.reduce((sum, part) => sum + part.index.length, 0)).toBe(3 * count);
+    expect(Math.max(...parts.map((part) => part.positions.length / 3))).toBeLessThanOrEqual(65_535);
+  });
+
+  it('keeps the shape with a tenth of the triangles while it is turned', () => {
+    const whole = sheet(100);
+    const coarse = prepare(whole).coarse;
+    expect(coarse.length).toBeLessThan(whole.index.length / 8);
+    expect(area({ positions: whole.positions, index: coarse }) / area(whole)).toBeGreaterThan(0.85);
+    expect(clustered(whole, 0).length).toBe(whole.index.length);
+  });
+
+  it('has normals that point away from the outside of the winding', () => {
+    const flat: Triangles = { positions: new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0]), index: new Uint32Array([0, 1, 2]) };
+    expect([...prepare(flat).normals.subarray(0, 3)]).toEqual([0, 0, 32_767]);
+  });
+});
+
+describe('Seams', () => {
+  it('makes the light flow over a seam as if there were none', () => {
+    const left = prepare(sheet(20));
+    const right = prepare(sheet(20, 20));
+    const seams = new Seams();
+    seams.add(left);
+    seams.add(right);
+    const at = (block: typeof left, vertex: number): number[] => [...block.normals.subarray(4 * vertex, 4 * vertex + 3)];
+    const place = 10 * 21;
+    expect(at(left, place + 20)).not.toEqual(at(right, place));
+    expect(seams.join(0)).toBe(left);
+    expect(seams.join(1)).toBe(right);
+    expect(seams.join(2)).toBe(null);
+    expect(at(left, place + 20)).toEqual(at(right, place));
+    // The true normal of z = sin(x / 3) + cos(y / 4) at (20, 10).
+    const slope = [-Math.cos(20 / 3) / 3, Math.sin(10 / 4) / 4, 1] as const;
+    const cosine = at(right, place).reduce((sum, value, axis) => sum + (value / 32_767) * (slope[axis as 0]), 0) / Math.hypot(...slope);
+    expect(cosine).toBeGreaterThan(0.995);
+  });
+});

@@ -1,0 +1,103 @@
+import { describe, expect, it } from 'vitest';
+import { GlbReader } from '@/mesh/glb';
+
+// A GLB whose primitives hold these bytes, in this order.
+function glb(streams: number[][], change: (gltf: Record<string, unknown>) => void = () => undefined): Uint8Array {
+  let offset = 0;
+  const views = streams.map((bytes) => {
+    const view = { buffer: 0, byteOffset: offset, byteLength: bytes.length };
+    offset += Math.ceil(bytes.length / 4) * 4;
+    return view;
+  });
+  const gltf: Record<string, unknown> = {
+    asset: { version: '2.0' },
+    bufferViews: views,
+    accessors: streams.flatMap(() => [
+      { count: 4, min: [0, 0, 0], max: [1, 2, 3] },
+      { count: 6 },
+    ]),
+    meshes: [
+      {
+        primitives: streams.map((_, i) => ({
+          attributes: { POSITION: 2 * i },
+          indices: 2 * i + 1,
+          extensions: { KHR_draco_mesh_compression: { bufferView: i, attributes: { POSITION: 7 } } },
+        })),
+      },
+    ],
+  };
+  change(gltf);
+  let json = JSON.stringify(gltf);
+  json += ' '.repeat((4 - (json.length % 4)) % 4);
+  const text = new TextEncoder().encode(json);
+  const file = new Uint8Array(12 + 8 + text.length + 8 + offset);
+  const view = new DataView(file.buffer);
+  [0x46546c67, 2, file.length, text.length, 0x4e4f534a].forEach((word, i) => view.setUint32(4 * i, word, true));
+  file.set(text, 20);
+  view.setUint32(20 + text.length, offset, true);
+  view.setUint32(24 + text.length, 0x004e4942, true);
+  streams.forEach((bytes, i) => file.set(bytes, 28 + text.length + (views[i]?.byteOffset ?? 0)));
+  return file;
+}
+
+function read(file: Uint8Array, pieceBytes: number): { streams: number[][]; at: number[]; complete: boolean } {
+  const streams: number[][] = [];
+  const at: number[] = [];
+  let received = 0;
+  const reader = new GlbReader({
+    onPrimitives: () => undefined,
+    onStream: (index, bytes) => {
+      streams[index] = [...bytes];
+      at[index] = received;
+    },
+  });
+  for (let begin = 0; begin < file.length; begin += pieceBytes) {
+    received = Math.min(file.length, begin + pieceBytes);
+    reader.take(file.subarray(begin, received));
+  }
+  return { streams, at, complete: reader.isComplete };
+}
+
+const three = [[1, 2, 3], [4, 5, 6, 7, 8], [9]];
+
+describe('GlbReader', () => {
+  it('hands over every stream, however the bytes come', () => {
+    const file = glb(three);
+    for (const piece of [1, 3, 19, 64, file.length]) {
+      expect(read(file, piece)).toMatchObject({ streams: three, complete: true });
+    }
+  });
+
+  it('hands over a stream as soon as its last byte is there', () => {
+    const file = glb(three);
+    const { at } = read(file, 1);
+    expect(at[0]).toBe(file.length - 16 + 3);
+    expect(at[1]).toBe(file.length - 16 + 4 + 5);
+  });
+
+  it('says what a primitive holds', () => {
+    let found: unknown;
+    const reader = new GlbReader({ onPrimitives: (parts) => (found = parts), onStream: () => undefined });
+    reader.take(glb([[1]]));
+    expect(found).toEqual([{ offset: 0, length: 1, positionId: 7, triangles: 2, vertices: 4, low: [0, 0, 0], high: [1, 2, 3] }]);
+  });
+
+  it('is not complete while bytes are missing', () => {
+    const file = glb(three);
+    expect(read(file.subarray(0, file.length - 4), 16).complete).toBe(false);
+    expect(read(file.subarray(0, 10), 4).complete).toBe(false);
+  });
+
+  it('refuses what is no GLB, or names bytes that it does not hold', () => {
+    expect(() => read(new TextEncoder().encode('solid surface, or anything else'), 8)).toThrow(/not a GLB/);
+    const beyond = glb(three, (gltf) => {
+      (gltf.bufferViews as { byteLength: number }[]).forEach((view) => (view.byteLength += 1000));
+    });
+    expect(() => read(beyond, 64)).toThrow(/does not hold/);
+    const bare = glb(three, (gltf) => {
+      const [mesh] = gltf.meshes as { primitives: { extensions?: unknown }[] }[];
+      delete mesh?.primitives[0]?.extensions;
+    });
+    expect(() => read(bare, 64)).toThrow(/not compressed/);
+  });
+});

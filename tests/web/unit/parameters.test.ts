@@ -1,0 +1,142 @@
+import { describe, expect, it } from 'vitest';
+import type { JobParameters } from '@/api/types';
+import { parseRoute, hashOf } from '@/ui/route';
+import { formatBytes, formatCount, formatMilliseconds, formatValue } from '@/ui/format';
+import { defaultParameters, memorable, parametersOfQuery, queryOfParameters } from '@/volume/parameters';
+import { commandSnippet, curlSnippet } from '@/volume/snippets';
+import { rawFault } from '@/volume/raw';
+import { draggedWindow } from '@/views/slice_view';
+import { inSlice, windowToFetch } from '@/volume/slices';
+import { fitDistance, placeOfText, placeToText, turned } from '@/scene/views';
+
+const defaults = defaultParameters('v'.repeat(64), 60);
+const other: JobParameters = {
+  ...defaults,
+  iso: -300.5,
+  scheme: 5,
+  interpolation: 'midpoint',
+  passes: 0,
+  smoothing: 'taubin',
+  lambda: 0.5,
+  close: true,
+  formats: ['glb', 'stl'],
+  draco: { position_bits: 11, speed: 3 },
+  priority: 'stat',
+};
+
+describe('parameters in the address', () => {
+  it('come back as they were', () => {
+    const query = new URLSearchParams(queryOfParameters(other, defaults));
+    expect(parametersOfQuery(query, defaults)).toEqual(other);
+  });
+
+  it('are left out where they are the defaults, but for the iso-value', () => {
+    const said = Object.entries(queryOfParameters(defaults, defaults)).filter(([, value]) => value !== '');
+    expect(said).toEqual([['iso', '60']]);
+  });
+
+  it('do no harm when they were typed wrongly', () => {
+    const query = new URLSearchParams(
+      'iso=abc&scheme=7&passes=-1&lambda=0&close=1&formats=exe&position_bits=99&speed=1.5&priority=now&smoothing=x&interpolation=',
+    );
+    expect(parametersOfQuery(query, defaults)).toEqual(defaults);
+  });
+});
+
+describe('routes', () => {
+  it('come back as they were', () => {
+    const query = new URLSearchParams({ iso: '60', at: '1,2,3' });
+    const route = parseRoute(hashOf(['volumes', 'a/b c'], query));
+    expect(route.path).toEqual(['volumes', 'a/b c']);
+    expect(route.query.get('at')).toBe('1,2,3');
+    expect(parseRoute('').path).toEqual([]);
+    expect(parseRoute('#/%E0%A4%A').path).toEqual(['%E0%A4%A']);
+  });
+});
+
+describe('snippets', () => {
+  it('say what is not the default, and nothing else', () => {
+    expect(memorable(defaults)).toEqual({ volume: defaults.volume, iso: 60, formats: ['glb'] });
+    const text = commandSnippet('http://h:1', other, true);
+    for (const option of ['--iso -300.5', '--scheme 5', '--passes 0', '--lambda 0.5', '--close', '--format glb,stl', '--token']) {
+      expect(text).toContain(option);
+    }
+    expect(commandSnippet('http://h:1', defaults, false)).not.toContain('--scheme');
+  });
+
+  it('hold a body that is the job', () => {
+    const text = curlSnippet('http://h:1', other, false);
+    const body = /-d '(.*)'$/m.exec(text)?.[1] ?? '';
+    expect(JSON.parse(body)).toEqual(memorable(other));
+    expect(text).not.toContain('Authorization');
+  });
+});
+
+describe('slices', () => {
+  it('are fetched over the common window while that is precise enough', () => {
+    const common: [number, number] = [0, 1000];
+    expect(windowToFetch([100, 900], 300, common)).toEqual(common);
+    expect(windowToFetch([300, 350], 320, common)).toEqual([300, 350]);
+    // The contour is drawn from the same values, so that they reach the iso-value.
+    const [low, high] = windowToFetch([300, 350], 400, common);
+    expect(low).toBe(300);
+    expect(high).toBeGreaterThan(400);
+    expect(windowToFetch([-500, 900], 300, common)[0]).toBe(-500);
+  });
+
+  it('measure the iso-value in their own values', () => {
+    expect(inSlice({ window: [-100, 155] }, 0)).toBe(100);
+  });
+
+  it('widen and move the window by dragging', () => {
+    const wider = draggedWindow([0, 100], 100, 0);
+    expect(wider[1] - wider[0]).toBeGreaterThan(100);
+    expect((wider[0] + wider[1]) / 2).toBeCloseTo(50);
+    expect(draggedWindow([0, 100], 0, -40)[0]).toBeCloseTo(10);
+  });
+});
+
+describe('cameras', () => {
+  it('come back from an address', () => {
+    const place = { offset: [1, -2, 3.5] as [number, number, number], target: [0, 0, 7] as [number, number, number] };
+    expect(placeOfText(placeToText(place))).toEqual(place);
+    expect(placeOfText('1,2,3')).toBe(null);
+    expect(placeOfText('0,0,0,1,1,1')).toBe(null);
+    expect(placeOfText('')).toBe(null);
+  });
+
+  it('turn around the middle and stop at the poles', () => {
+    const [x, y, z] = turned([0, -10, 0], Math.PI / 2, 0);
+    expect([x, y, z].map((value) => Math.round(value))).toEqual([10, 0, 0]);
+    expect(turned([0, -10, 0], 0, 5)[2]).toBeCloseTo(10, 3);
+    expect(Math.hypot(...turned([3, 4, 0], 1, 1))).toBeCloseTo(5);
+  });
+
+  it('stand back far enough in narrow views too', () => {
+    const angle = Math.PI / 6;
+    expect(fitDistance(1, angle, 1)).toBeCloseTo(1 / Math.sin(angle / 2));
+    expect(fitDistance(1, angle, 0.5)).toBeGreaterThan(fitDistance(1, angle, 2));
+  });
+});
+
+describe('formats for people', () => {
+  it('are short and whole', () => {
+    expect(formatBytes(999)).toBe('999 B');
+    expect(formatBytes(1_234_567)).toBe('1.2 MB');
+    expect(formatBytes(999_999)).toBe('1.0 MB');
+    expect(formatCount(1234567)).toBe('1\u202f234\u202f567');
+    expect(formatValue(0.25)).toBe('0.25');
+    expect(formatValue(-300)).toBe('\u2212300');
+    expect(formatMilliseconds(0.2)).toBe('< 1 ms');
+    expect(formatMilliseconds(1234)).toBe('1.23 s');
+    expect(formatMilliseconds(125_000)).toBe('2 min 5 s');
+  });
+});
+
+describe('raw samples', () => {
+  it('have to account for every byte', () => {
+    expect(rawFault(48, [2, 3, 4], 'int16')).toBe('');
+    expect(rawFault(47, [2, 3, 4], 'int16')).toMatch(/48 bytes/);
+    expect(rawFault(48, [2, 3, Number.NaN], 'int16')).toMatch(/three whole/);
+  });
+});
