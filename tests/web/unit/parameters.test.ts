@@ -112,10 +112,14 @@ describe('cameras', () => {
     expect(Math.hypot(...turned([3, 4, 0], 1, 1))).toBeCloseTo(5);
   });
 
-  it('stand back far enough in narrow views too', () => {
+  it('stand back just as far as a box needs, in narrow views too', () => {
     const angle = Math.PI / 6;
-    expect(fitDistance(1, angle, 1)).toBeCloseTo(1 / Math.sin(angle / 2));
-    expect(fitDistance(1, angle, 0.5)).toBeGreaterThan(fitDistance(1, angle, 2));
+    const tangent = Math.tan(angle / 2);
+    // Seen from the front, its near face fills the view.
+    expect(fitDistance([2, 4, 3], [0, -5, 0], angle, 1)).toBeCloseTo(2 + 1.5 / tangent);
+    expect(fitDistance([2, 4, 3], [0, -1, 0], angle, 0.25)).toBeCloseTo(2 + 1 / (0.25 * tangent));
+    expect(fitDistance([2, 4, 3], [1e-9, 0, 7], angle, 1)).toBeCloseTo(1.5 + 2 / tangent);
+    expect(fitDistance([0, 0, 0], [0, -1, 0], angle, 1)).toBeGreaterThan(0);
   });
 });
 

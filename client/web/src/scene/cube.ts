@@ -16,7 +16,8 @@ import type { ViewName } from './views';
 
 // The order of a box's materials: +x -x +y -y +z -z.
 const faces: readonly ViewName[] = ['L', 'R', 'P', 'A', 'S', 'I'];
-const faceTurns: Record<ViewName, number> = { L: 90, R: -90, P: 180, A: 0, S: 180, I: 0 };
+// In degrees clockwise, from the box's own texture directions to letters that stand upright.
+const faceTurns: Record<ViewName, number> = { L: -90, R: 90, P: 180, A: 0, S: 180, I: 180 };
 const texturePixels = 128;
 export const cubePixels = 92;
 const margin = 10;

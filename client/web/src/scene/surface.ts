@@ -40,7 +40,7 @@ interface DrawnBlock {
 }
 
 const verticalAngle = 30;
-const fill = 1.04;
+const fill = 1.12; // what the tools above take
 const wiresPerFrame = 4;
 const settleDelay = 180;
 
@@ -89,11 +89,11 @@ export class Surface {
     host.prepend(this.canvas);
 
     this.camera.up.set(0, 0, 1);
-    const headlight = new DirectionalLight(0xffffff, 2.3);
+    const headlight = new DirectionalLight(0xffffff, 2.5);
     headlight.position.set(-0.35, 0.5, 1);
     headlight.target.position.set(0, 0, -1);
     this.camera.add(headlight, headlight.target);
-    this.scene.add(this.camera, new AmbientLight(0xffffff, 0.75));
+    this.scene.add(this.camera, new AmbientLight(0xffffff, 0.6));
     this.rulers = new Rulers(this.scene, host, '#17a398');
     this.cut = new Cut(this.scene);
 
@@ -173,9 +173,9 @@ export class Surface {
   fit(offset: Vec3 = this.place.offset): void {
     const [low, high] = this.bounds;
     const target: Vec3 = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2];
-    const radius = this.radius;
-    const aspect = this.camera.aspect;
-    const distance = fill * fitDistance(radius, (verticalAngle * Math.PI) / 180, aspect);
+    const size: Vec3 = [high[0] - low[0], high[1] - low[1], high[2] - low[2]];
+    const angle = (verticalAngle * Math.PI) / 180;
+    const distance = fill * fitDistance(size, offset, angle, this.camera.aspect);
     const scale = distance / Math.hypot(...offset);
     this.moveTo({ offset: [offset[0] * scale, offset[1] * scale, offset[2] * scale], target });
   }

@@ -47,10 +47,27 @@ export function turned(offset: Vec3, azimuth: number, elevation: number): Vec3 {
   ];
 }
 
-// How far the camera has to be for a sphere to fill its view, angles in radians.
-export function fitDistance(radius: number, verticalAngle: number, aspect: number): number {
-  const horizontalAngle = 2 * Math.atan(Math.tan(verticalAngle / 2) * aspect);
-  return radius / Math.sin(Math.min(verticalAngle, horizontalAngle) / 2);
+// How far from the middle of a box the camera has to be to see all of it, with its head up; the angle
+// is the vertical one, in radians.
+export function fitDistance(size: Vec3, offset: Vec3, verticalAngle: number, aspect: number): number {
+  const length = Math.hypot(...offset);
+  const back: Vec3 = [offset[0] / length, offset[1] / length, offset[2] / length];
+  const flat = Math.hypot(back[0], back[1]) || 1;
+  const right: Vec3 = [-back[1] / flat, back[0] / flat, 0];
+  const up: Vec3 = [-back[2] * right[1], back[2] * right[0], back[0] * right[1] - back[1] * right[0]];
+  const dot = (a: Vec3, b: Vec3): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const tangent = Math.tan(verticalAngle / 2);
+  let distance = 0;
+  for (let corner = 0; corner < 8; corner += 1) {
+    const sign = (bit: number): number => ((corner >> bit) & 1) - 0.5;
+    const point: Vec3 = [size[0] * sign(0), size[1] * sign(1), size[2] * sign(2)];
+    const side = Math.max(
+      Math.abs(dot(point, up)) / tangent,
+      Math.abs(dot(point, right)) / (tangent * aspect),
+    );
+    distance = Math.max(distance, dot(point, back) + side);
+  }
+  return Math.max(distance, 1e-3);
 }
 
 export function placeToText({ offset, target }: CameraPlace): string {

@@ -33,7 +33,7 @@ export function waterfall(steps: readonly Step[]): HTMLElement {
     { class: 'waterfall' },
     h('caption', { class: 'sr-only' }, 'How long each stage took'),
     ...steps.map(({ name, begin, duration }) => {
-      const bar = h('span', { class: `bar ${name}` });
+      const bar = h('span', { class: `bar of-${name}` });
       bar.style.marginLeft = `${(100 * begin) / total}%`;
       bar.style.width = `${Math.max(0.6, (100 * duration) / total)}%`;
       return h(

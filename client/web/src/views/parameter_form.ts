@@ -55,36 +55,44 @@ export function parameterForm(parameters: JobParameters, onChange: (change: Chan
   return h(
     'div',
     { class: 'parameters' },
-    segmented(
-      'Tetrahedra per cell',
-      [
-        { value: '5', label: '5', title: 'Fewer triangles; every second cell is mirrored' },
-        { value: '6', label: '6', title: 'The same split in every cell' },
-      ],
-      String(parameters.scheme) as '5' | '6',
-      (value) => onChange({ scheme: value === '5' ? 5 : 6 }),
+    h(
+      'div',
+      { class: 'pair' },
+      segmented(
+        'Tetrahedra per cell',
+        [
+          { value: '5', label: '5', title: 'Fewer triangles; every second cell is mirrored' },
+          { value: '6', label: '6', title: 'The same split in every cell' },
+        ],
+        String(parameters.scheme) as '5' | '6',
+        (value) => onChange({ scheme: value === '5' ? 5 : 6 }),
+      ),
+      segmented(
+        'Vertices on edges',
+        [
+          { value: 'linear', label: 'Linear', title: 'Where the iso-value lies between two samples' },
+          { value: 'midpoint', label: 'Midpoint', title: 'Half-way between two samples' },
+        ],
+        parameters.interpolation,
+        (interpolation) => onChange({ interpolation }),
+      ),
     ),
-    segmented(
-      'Vertices on edges',
-      [
-        { value: 'linear', label: 'Linear', title: 'Where the iso-value lies between two samples' },
-        { value: 'midpoint', label: 'Midpoint', title: 'Half-way between two samples' },
-      ],
-      parameters.interpolation,
-      (interpolation) => onChange({ interpolation }),
-    ),
-    segmented(
-      'Smoothing',
-      [
-        { value: 'laplacian', label: 'Laplacian', title: 'Shrinks a little with every pass' },
-        { value: 'taubin', label: 'Taubin', title: 'Keeps the enclosed volume' },
-      ],
-      parameters.smoothing,
-      (smoothing) => onChange({ smoothing }),
-    ),
-    field(
-      'Passes',
-      numberInput(parameters.passes, { min: 0, max: 1000, step: 1 }, (passes) => onChange({ passes })),
+    h(
+      'div',
+      { class: 'pair uneven' },
+      segmented(
+        'Smoothing',
+        [
+          { value: 'laplacian', label: 'Laplacian', title: 'Shrinks a little with every pass' },
+          { value: 'taubin', label: 'Taubin', title: 'Keeps the enclosed volume' },
+        ],
+        parameters.smoothing,
+        (smoothing) => onChange({ smoothing }),
+      ),
+      field(
+        'Passes',
+        numberInput(parameters.passes, { min: 0, max: 1000, step: 1 }, (passes) => onChange({ passes })),
+      ),
     ),
     segmented(
       'Priority',
