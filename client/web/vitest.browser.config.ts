@@ -10,6 +10,8 @@ export default defineConfig({
     dir: here('../../tests/web'),
     include: ['**/browser/**/*.test.ts'],
     fileParallelism: false,
+    // Software draws, on machines that have other things to do.
+    expect: { poll: { timeout: 20_000, interval: 100 } },
     testTimeout: 120_000,
     hookTimeout: 120_000,
   },

@@ -51,7 +51,8 @@ export class Daemon {
     return (await answer.json()) as T;
   }
 
-  async upload(body: Buffer | Uint8Array): Promise<string> {
+  async upload(bytes: Buffer): Promise<string> {
+    const body = new Blob([new Uint8Array(bytes)]);
     return (await this.json<{ id: string }>('/v1/volumes', { method: 'POST', body })).id;
   }
 
@@ -167,9 +168,19 @@ export interface Silhouette {
   colours: number;
 }
 
-// What stands out in a picture of an element, the outer strip with its tools left out.
+function showTools(page: Page, isShown: boolean): Promise<void> {
+  return page.evaluate((visibility) => {
+    for (const tools of document.querySelectorAll<HTMLElement>('.toolbar, .cut-controls')) {
+      tools.style.visibility = visibility;
+    }
+  }, isShown ? '' : 'hidden');
+}
+
+// What stands out in a picture of a view, without the tools over it.
 export async function silhouette(page: Page, element: Locator, tolerance = 24): Promise<Silhouette> {
+  await showTools(page, false);
   const picture = (await element.screenshot()).toString('base64');
+  await showTools(page, true);
   return page.evaluate(
     async ({ text, most }) => {
       const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -181,11 +192,10 @@ export async function silhouette(page: Page, element: Locator, tolerance = 24): 
       if (!context) throw new Error('no canvas');
       context.drawImage(bitmap, 0, 0);
       const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
-      const top = 60; // below the tools
       const corner = 116; // the orientation cube
       const seen = { count: 0, left: Infinity, right: -1, top: Infinity, bottom: -1 };
       const colours = new Set<number>();
-      for (let y = top; y < bitmap.height; y += 1) {
+      for (let y = 0; y < bitmap.height; y += 1) {
         // The background is a gradient from top to bottom, so that every row has its own.
         const edge = 4 * (y * bitmap.width + bitmap.width - 3);
         for (let x = 0; x < bitmap.width; x += 1) {

@@ -11,7 +11,6 @@ import {
   type Object3D,
 } from 'three';
 import { h } from '../ui/dom';
-import { formatNumber } from '../ui/format';
 import type { Vec3 } from '../api/types';
 
 export interface Ruler {
@@ -111,7 +110,7 @@ export class Rulers {
     this.geometry.setAttribute('position', new BufferAttribute(new Float32Array(places), 3));
     this.geometry.setDrawRange(0, places.length / 3);
     this.labels.replaceChildren(
-      ...this.rulers.map((ruler) => h('span', {}, `${formatNumber(lengthOf(ruler), 1)} mm`)),
+      ...this.rulers.map((ruler) => h('span', {}, `${lengthOf(ruler).toFixed(1)} mm`)),
     );
   }
 }

@@ -40,7 +40,7 @@ interface DrawnBlock {
 }
 
 const verticalAngle = 30;
-const fill = 1.12; // what the tools above take
+const fill = 1.02;
 const wiresPerFrame = 4;
 const settleDelay = 180;
 

@@ -23,8 +23,13 @@ import { HistogramView } from './histogram_view';
 import { parameterForm } from './parameter_form';
 import { SliceView, type SliceHost } from './slice_view';
 
-const bins = 1024;
+const mostBins = 1024;
 const estimateDelay = 300;
+
+// NIfTI and DICOM scale whole samples to values that are not.
+function isInteger({ type, range }: Volume): boolean {
+  return !type.startsWith('float') && range.every(Number.isInteger);
+}
 
 function windowOfQuery(query: URLSearchParams): Window | null {
   const [low, high] = (query.get('window') ?? '').split(',').map(Number);
@@ -43,7 +48,9 @@ function cursorOfQuery(query: URLSearchParams, volume: Volume): Vec3 {
 
 export async function prepareView(scope: Scope, route: Route): Promise<HTMLElement> {
   const volume = await getVolume(route.path[1] ?? '');
-  const histogram = await histogramOf(volume.id, bins, scope.signal);
+  // A bin for each value where there are few: empty ones between would look like a comb.
+  const values = isInteger(volume) ? volume.range[1] - volume.range[0] + 1 : mostBins;
+  const histogram = await histogramOf(volume.id, Math.min(mostBins, values), scope.signal);
   return new Prepare(scope, route, volume, histogram).element;
 }
 
@@ -90,8 +97,7 @@ class Prepare {
       contourColour: () => cssColour('--contour'),
       onError: (error) => this.sliceFailed(error),
     };
-    const isInteger = !volume.type.startsWith('float');
-    this.histogram = new HistogramView(counts, isInteger, (iso) => this.setIso(iso), scope);
+    this.histogram = new HistogramView(counts, isInteger(volume), (iso) => this.setIso(iso), scope);
     this.slices = (['axial', 'coronal', 'sagittal'] as const).map(
       (plane) => new SliceView(plane, host, scope),
     );

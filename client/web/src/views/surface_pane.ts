@@ -7,7 +7,7 @@ import { lengthOf } from '../scene/rulers';
 import { defaultStyle, Surface, type SurfaceStyle } from '../scene/surface';
 import { viewNames, viewTitles, type CameraPlace } from '../scene/views';
 import { button, checkbox, h, isTyping } from '../ui/dom';
-import { formatCount, formatNumber, shortId } from '../ui/format';
+import { formatCount, shortId } from '../ui/format';
 import { refusal, tell, tellError } from '../ui/notices';
 import { saveBlob } from '../ui/save';
 import { Scope } from '../ui/signal';
@@ -176,7 +176,7 @@ export class SurfacePane {
       const ruler = surface.rulers.add(point);
       surface.draw();
       this.announcement.textContent = ruler
-        ? `${formatNumber(lengthOf(ruler), 1)} millimetres`
+        ? `${lengthOf(ruler).toFixed(1)} millimetres`
         : 'First point set';
     };
     this.element.append(this.toolbar(surface), this.cutControls);
