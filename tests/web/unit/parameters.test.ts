@@ -19,6 +19,8 @@ const other: JobParameters = {
   smoothing: 'taubin',
   lambda: 0.5,
   close: true,
+  components: { keep: 2, min_triangles: null },
+  max_displacement_mm: 0.25,
   formats: ['glb', 'stl'],
   draco: { position_bits: 11, speed: 3 },
   priority: 'stat',
@@ -58,10 +60,17 @@ describe('snippets', () => {
   it('say what is not the default, and nothing else', () => {
     expect(memorable(defaults)).toEqual({ volume: defaults.volume, iso: 60, formats: ['glb'] });
     const text = commandSnippet('http://h:1', other, true);
-    for (const option of ['--iso -300.5', '--scheme 5', '--passes 0', '--lambda 0.5', '--close', '--format glb,stl', '--token']) {
+    for (const option of ['--iso -300.5', '--scheme 5', '--passes 0', '--lambda 0.5', '--close', '--keep-components 2', '--format glb,stl', '--token']) {
       expect(text).toContain(option);
     }
     expect(commandSnippet('http://h:1', defaults, false)).not.toContain('--scheme');
+  });
+
+  it('leave a step to the method unless it was chosen', () => {
+    expect(memorable({ ...defaults, lambda: 1 }).lambda).toBe(undefined);
+    expect(memorable({ ...defaults, lambda: 0.5 }).lambda).toBe(0.5);
+    expect(memorable({ ...defaults, smoothing: 'taubin' })).toMatchObject({ smoothing: 'taubin' });
+    expect('components' in memorable(defaults)).toBe(false);
   });
 
   it('hold a body that is the job', () => {

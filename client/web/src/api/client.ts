@@ -61,7 +61,7 @@ export function histogramOf(id: string, bins: number, signal?: AbortSignal): Pro
 
 // What a job with these parameters would make.
 export function estimateOf(
-  { formats, draco, components, ...parameters }: JobParameters,
+  { formats = [], draco, components, ...parameters }: Partial<JobParameters>,
   signal?: AbortSignal,
 ): Promise<Estimate> {
   const query = new URLSearchParams({ format: formats.join(',') });

@@ -58,13 +58,21 @@ export interface JobParameters {
   interpolation: 'linear' | 'midpoint';
   passes: number;
   smoothing: 'laplacian' | 'taubin';
-  lambda: number;
+  // Null: the method's own.
+  lambda: number | null;
   close: boolean;
   formats: MeshFormat[];
   draco: { position_bits: number; speed: number };
   priority: Priority;
-  components?: { keep: number | null; min_triangles: number | null };
+  components?: ComponentFilter;
+  pass_band?: number;
   max_displacement_mm?: number | null;
+}
+
+// Which parts of a surface are kept; null: all.
+export interface ComponentFilter {
+  keep: number | null;
+  min_triangles: number | null;
 }
 
 export type JobState = 'queued' | 'running' | 'succeeded' | 'failed' | 'cancelled';
@@ -108,7 +116,7 @@ export interface MeshQuality {
   manifold?: boolean;
   oriented?: boolean;
   components?: number;
-  genus?: number;
+  genus?: number | null;
   aspect_ratio?: Stages<Distribution>;
   smallest_angle_deg?: Stages<Distribution>;
 }
@@ -119,7 +127,8 @@ export interface MeshSummary {
   boundary_edges: number;
   components: number;
   euler: number;
-  area_mm2: number | Stages<number>;
+  area_mm2: number;
+  area_extracted_mm2?: number;
   volume_mm3: Stages<number>;
   bounds: [Vec3, Vec3];
   files: Partial<Record<MeshFormat, MeshFile>>;

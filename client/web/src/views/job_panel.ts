@@ -25,7 +25,7 @@ function change(before: number, after: number): string {
   return ` (${sign}${formatNumber(percent, Math.abs(percent) < 1 ? 2 : 1)} %)`;
 }
 
-function before(value: number, unit: string): string {
+function sized(value: number, unit: string): string {
   return `${formatValue(value)} ${unit}`;
 }
 
@@ -34,7 +34,6 @@ export function numbers(mesh: MeshSummary): HTMLElement {
   const extent = low.map((value, axis) => formatNumber((high[axis as 0] ?? 0) - value, 1)).join(' \u00d7 ');
   const isClosed = mesh.quality?.closed ?? mesh.boundary_edges === 0;
   const { extracted, smoothed } = mesh.volume_mm3;
-  const area = typeof mesh.area_mm2 === 'number' ? null : mesh.area_mm2;
   const rows: [string, Child][] = [
     ['Triangles', formatCount(mesh.triangles)],
     ['Vertices', formatCount(mesh.vertices)],
@@ -43,24 +42,23 @@ export function numbers(mesh: MeshSummary): HTMLElement {
       h(
         'span',
         {},
-        before(smoothed, 'mm\u00b3'),
-        h('span', { class: 'faint' }, `${change(extracted, smoothed)} was ${before(extracted, 'mm\u00b3')}`),
+        sized(smoothed, 'mm\u00b3'),
+        h('span', { class: 'faint' }, `${change(extracted, smoothed)} was ${sized(extracted, 'mm\u00b3')}`),
       ),
     ],
     [
       'Area',
-      area
-        ? h(
+      h(
+        'span',
+        {},
+        sized(mesh.area_mm2, 'mm\u00b2'),
+        mesh.area_extracted_mm2 !== undefined &&
+          h(
             'span',
-            {},
-            before(area.smoothed, 'mm\u00b2'),
-            h(
-              'span',
-              { class: 'faint' },
-              `${change(area.extracted, area.smoothed)} was ${before(area.extracted, 'mm\u00b2')}`,
-            ),
-          )
-        : before(mesh.area_mm2 as number, 'mm\u00b2'),
+            { class: 'faint' },
+            `${change(mesh.area_extracted_mm2, mesh.area_mm2)} was ${sized(mesh.area_extracted_mm2, 'mm\u00b2')}`,
+          ),
+      ),
     ],
     [
       'Closed',
@@ -69,7 +67,7 @@ export function numbers(mesh: MeshSummary): HTMLElement {
         : h('span', { class: 'attention' }, `no, ${formatCount(mesh.boundary_edges)} edges on the border`),
     ],
     ['Parts', formatCount(mesh.components)],
-    ['Genus', mesh.quality?.genus === undefined ? '' : formatCount(mesh.quality.genus)],
+    ['Genus', mesh.quality?.genus == null ? '' : formatCount(mesh.quality.genus)],
     ['Extent', `${extent} mm`],
   ];
   if (mesh.displacement_mm) {
@@ -171,7 +169,10 @@ export const comparisons: readonly Comparison[] = [
   { title: '0, 5 and 10 passes', variants: [{ passes: 0 }, { passes: 5 }, { passes: 10 }] },
   {
     title: 'Laplacian and Taubin',
-    variants: [{ smoothing: 'laplacian' }, { smoothing: 'taubin' }],
+    variants: [
+      { smoothing: 'laplacian', lambda: null },
+      { smoothing: 'taubin', lambda: null },
+    ],
   },
 ];
 
@@ -201,7 +202,9 @@ export function compareSection(job: Job): HTMLElement {
 
 function isSame(job: Job, variant: Partial<JobParameters>): boolean {
   return (
-    Object.entries(variant).every(([name, value]) => job.parameters[name as keyof JobParameters] === value) &&
+    Object.entries(variant).every(
+      ([name, value]) => value === null || job.parameters[name as keyof JobParameters] === value,
+    ) &&
     job.mesh?.files.glb !== undefined
   );
 }

@@ -20,6 +20,20 @@ function numberInput(
   return input;
 }
 
+// Empty means null: no limit, or the default.
+function optionalInput(
+  value: number | null | undefined,
+  limits: { min: number; max?: number; step: number | 'any' },
+  onChange: (value: number | null) => void,
+): HTMLInputElement {
+  const input = h('input', { type: 'number', inputmode: 'decimal', value: value ?? '', ...limits });
+  input.addEventListener('input', () => {
+    input.toggleAttribute('aria-invalid', !input.validity.valid);
+    if (input.validity.valid) onChange(input.value === '' ? null : input.valueAsNumber);
+  });
+  return input;
+}
+
 function formatBoxes(formats: readonly MeshFormat[], onChange: (formats: MeshFormat[]) => void): HTMLElement {
   const chosen = new Set<MeshFormat>(formats);
   return h(
@@ -47,11 +61,11 @@ export function parameterForm(parameters: JobParameters, onChange: (change: Chan
   let bits = draco.position_bits;
   let speed = draco.speed;
   const tellDraco = (): void => onChange({ draco: { position_bits: bits, speed } });
-  const lambda = field(
-    'Step of a pass (lambda)',
-    numberInput(parameters.lambda, { min: 0.01, max: 1, step: 0.01 }, (value) => onChange({ lambda: value })),
-    '1 moves a vertex onto the mean of its neighbours.',
-  );
+  let components = parameters.components ?? { keep: null, min_triangles: null };
+  const tellComponents = (change: Partial<typeof components>): void => {
+    components = { ...components, ...change };
+    onChange({ components });
+  };
   return h(
     'div',
     { class: 'parameters' },
@@ -108,7 +122,31 @@ export function parameterForm(parameters: JobParameters, onChange: (change: Chan
       'details',
       { class: 'more' },
       h('summary', {}, 'More'),
-      lambda,
+      h(
+        'div',
+        { class: 'pair' },
+        field(
+          'Step of a pass (0 to 1)',
+          optionalInput(parameters.lambda, { min: 0.01, max: 1, step: 0.01 }, (lambda) => onChange({ lambda })),
+        ),
+        field(
+          'Move at most, in mm',
+          optionalInput(parameters.max_displacement_mm, { min: 0, step: 'any' }, (value) =>
+            onChange({ max_displacement_mm: value }),
+          ),
+        ),
+        field(
+          'Keep the largest parts',
+          optionalInput(components.keep, { min: 1, step: 1 }, (keep) => tellComponents({ keep })),
+        ),
+        field(
+          'Parts of at least, triangles',
+          optionalInput(components.min_triangles, { min: 1, step: 1 }, (value) =>
+            tellComponents({ min_triangles: value }),
+          ),
+        ),
+      ),
+      h('p', { class: 'hint' }, 'Empty: the default step, no limit, all parts.'),
       checkbox('Close the surface at the border of the volume', parameters.close, (close) =>
         onChange({ close }),
       ),

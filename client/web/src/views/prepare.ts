@@ -17,7 +17,8 @@ import { go, noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { cssColour, theme } from '../ui/theme';
 import { defaultWindow } from '../volume/histogram';
-import { defaultParameters, parametersOfQuery, queryOfParameters } from '../volume/parameters';
+import { volumeName } from '../volume/names';
+import { defaultParameters, memorable, parametersOfQuery, queryOfParameters } from '../volume/parameters';
 import { SliceSource, type Window } from '../volume/slices';
 import { HistogramView } from './histogram_view';
 import { parameterForm } from './parameter_form';
@@ -54,6 +55,17 @@ export async function prepareView(scope: Scope, route: Route): Promise<HTMLEleme
   return new Prepare(scope, route, volume, histogram).element;
 }
 
+// What of an upload was left out, because a person may miss it.
+function ignoredNote({ ignored = [] }: Volume): HTMLElement | null {
+  if (ignored.length === 0) return null;
+  return h(
+    'details',
+    { class: 'more' },
+    h('summary', {}, ignored.length === 1 ? '1 file was left out' : `${ignored.length} files were left out`),
+    h('ul', {}, ...ignored.map(({ name, reason }) => h('li', {}, h('b', {}, name), `: ${reason}`))),
+  );
+}
+
 class Prepare {
   readonly element: HTMLElement;
   private parameters: JobParameters;
@@ -66,6 +78,7 @@ class Prepare {
   private readonly estimate = h('div', { class: 'estimate', 'aria-live': 'polite' });
   private readonly run: HTMLButtonElement;
   private readonly problem = h('div');
+  private readonly windowText = h('span', { class: 'window-text faint' });
   private estimating: AbortController | null = null;
   private estimateTimer = 0;
 
@@ -145,8 +158,9 @@ class Prepare {
         h(
           'div',
           { class: 'slice-help' },
-          h('h1', {}, 'Choose the surface'),
+          h('h1', {}, volumeName(volume)),
           h('p', { class: 'facts' }, facts.filter(Boolean).join(' \u00b7 ')),
+          ignoredNote(volume),
           h(
             'ul',
             {},
@@ -162,6 +176,7 @@ class Prepare {
               this.window = common;
               this.update();
             }),
+            this.windowText,
           ),
         ),
       ),
@@ -208,6 +223,8 @@ class Prepare {
   private update(): void {
     for (const view of this.slices) view.update();
     this.histogram.show(this.iso, this.window);
+    const [low, high] = this.window;
+    this.windowText.textContent = `window ${formatValue(high - low)}, level ${formatValue((low + high) / 2)}`;
     if (document.activeElement !== this.isoInput) this.isoInput.value = String(this.iso);
     noteInAddress({
       ...queryOfParameters(this.parameters, this.defaults),
@@ -228,7 +245,7 @@ class Prepare {
     this.estimateTimer = window.setTimeout(() => {
       const controller = new AbortController();
       this.estimating = controller;
-      estimateOf(this.parameters, controller.signal).then(
+      estimateOf(memorable(this.parameters), controller.signal).then(
         (estimate) => this.showEstimate(estimate),
         (error: unknown) => {
           if (!controller.signal.aborted) this.showNoEstimate(asApiError(error));
@@ -286,7 +303,7 @@ class Prepare {
     this.run.disabled = true;
     this.problem.replaceChildren();
     try {
-      const job = await submitJob(this.parameters);
+      const job = await submitJob(memorable(this.parameters));
       go(['jobs', job.id]);
     } catch (error) {
       const failure = asApiError(error);

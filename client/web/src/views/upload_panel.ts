@@ -16,7 +16,7 @@ export interface UploadPanel {
   element: HTMLElement;
 }
 
-export function uploadPanel(scope: Scope, onVolume: (volume: Volume, isNew: boolean) => void): UploadPanel {
+export function uploadPanel(scope: Scope, onVolume: (volume: Volume, isNew: boolean, name: string) => void): UploadPanel {
   const body = h('div', { class: 'drop-body' });
   const zone = h('section', { class: 'drop', 'aria-label': 'Upload a volume' }, body);
   let running: AbortController | null = null;
@@ -94,7 +94,7 @@ export function uploadPanel(scope: Scope, onVolume: (volume: Volume, isNew: bool
       });
       if (scope.isOver) return;
       showIdle();
-      onVolume(volume, isNew);
+      onVolume(volume, isNew, gathered.name);
     } catch (error) {
       if (scope.isOver) return;
       if (error instanceof DOMException && error.name === 'AbortError') showIdle();

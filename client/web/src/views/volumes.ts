@@ -5,8 +5,6 @@ import { button, h } from '../ui/dom';
 import {
   formatBytes,
   formatCount,
-  formatDims,
-  formatNames,
   formatSpacing,
   formatTime,
   formatValue,
@@ -16,6 +14,7 @@ import { ask, tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { axisIndex, slicePlane } from '../volume/geometry';
+import { rememberName, volumeKind, volumeName } from '../volume/names';
 import { inWords } from '../volume/parameters';
 import { uploadPanel } from './upload_panel';
 
@@ -67,11 +66,6 @@ function thumbnail(volume: Volume, scope: Scope): HTMLElement {
   return canvas;
 }
 
-export function volumeName(volume: Volume): string {
-  const kind = volume.modality ?? formatNames[volume.format] ?? volume.format;
-  return `${kind}, ${formatDims(volume.dims)}`;
-}
-
 function volumeCard(volume: Volume, scope: Scope, onErased: () => void): HTMLElement {
   const erase = async (): Promise<void> => {
     const sure = await ask(
@@ -99,8 +93,8 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void): HTMLEle
         'span',
         { class: 'card-text' },
         h('strong', {}, volumeName(volume)),
-        h('span', {}, formatSpacing(volume.spacing)),
-        h('span', {}, `${volume.type}, ${formatBytes(volume.bytes)}`),
+        h('span', {}, volumeKind(volume)),
+        h('span', {}, `${formatSpacing(volume.spacing)}, ${formatBytes(volume.bytes)}`),
         h('span', { class: 'faint' }, `${formatTime(volume.created)} \u00b7 ${shortId(volume.id)}`),
       ),
     ),
@@ -151,7 +145,8 @@ export async function volumesView(scope: Scope): Promise<HTMLElement> {
     surfaces.replaceChildren(...jobs.map(surfaceRow));
     if (jobs.length === 0) surfaces.append(h('li', { class: 'empty' }, 'No surfaces yet.'));
   };
-  const panel = uploadPanel(scope, (volume, isNew) => {
+  const panel = uploadPanel(scope, (volume, isNew, name) => {
+    rememberName(volume.id, name);
     if (!isNew) tell('This volume was there already.');
     go(['volumes', volume.id]);
   });

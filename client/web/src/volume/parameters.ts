@@ -10,7 +10,9 @@ export function defaultParameters(volume: string, iso: number): JobParameters {
     interpolation: 'linear',
     passes: 5,
     smoothing: 'laplacian',
-    lambda: 1,
+    lambda: null,
+    max_displacement_mm: null,
+    components: { keep: null, min_triangles: null },
     close: false,
     formats: ['glb'],
     draco: { position_bits: 14, speed: 7 },
@@ -22,7 +24,8 @@ const within = (value: number, low: number, high: number): boolean => value >= l
 
 // Takes over what the query says and is valid; a link that was typed wrongly does no harm.
 export function parametersOfQuery(query: URLSearchParams, defaults: JobParameters): JobParameters {
-  const result: JobParameters = { ...defaults, draco: { ...defaults.draco } };
+  const components = { keep: null, min_triangles: null, ...defaults.components };
+  const result: JobParameters = { ...defaults, draco: { ...defaults.draco }, components };
   const number = (name: string, accept: (value: number) => boolean, set: (value: number) => void): void => {
     const text = query.get(name);
     if (text === null || text.trim() === '') return;
@@ -35,6 +38,9 @@ export function parametersOfQuery(query: URLSearchParams, defaults: JobParameter
   number('scheme', whole(5, 6), (value) => (result.scheme = value === 5 ? 5 : 6));
   number('passes', whole(0, 1000), (value) => (result.passes = value));
   number('lambda', (value) => value > 0 && value <= 1, (value) => (result.lambda = value));
+  number('max_displacement_mm', (value) => value >= 0, (value) => (result.max_displacement_mm = value));
+  number('keep', whole(1, 4_294_967_295), (value) => (components.keep = value));
+  number('min_triangles', whole(1, 4_294_967_295), (value) => (components.min_triangles = value));
   number('position_bits', whole(8, 30), (value) => (result.draco.position_bits = value));
   number('speed', whole(0, 10), (value) => (result.draco.speed = value));
   const interpolation = query.get('interpolation');
@@ -65,7 +71,10 @@ export function queryOfParameters(
     interpolation: value.interpolation,
     passes: String(value.passes),
     smoothing: value.smoothing,
-    lambda: String(value.lambda),
+    lambda: String(value.lambda ?? ''),
+    max_displacement_mm: String(value.max_displacement_mm ?? ''),
+    keep: String(value.components?.keep ?? ''),
+    min_triangles: String(value.components?.min_triangles ?? ''),
     close: String(value.close),
     formats: value.formats.join(','),
     position_bits: String(value.draco.position_bits),
@@ -79,28 +88,29 @@ export function queryOfParameters(
   );
 }
 
-// The members of a job that are worth saying: those that are not the contract's defaults.
+// The members of a job that have to be said: those that are not the contract's defaults.
 export function memorable(parameters: JobParameters): Partial<JobParameters> {
+  const { scheme, interpolation, passes, smoothing, lambda, close, draco, priority } = parameters;
+  const { components, pass_band, max_displacement_mm } = parameters;
   const standard = defaultParameters('', 0);
-  const isStandard = (name: keyof JobParameters): boolean =>
-    JSON.stringify(parameters[name]) === JSON.stringify(standard[name]);
-  const members: Partial<Record<keyof JobParameters, unknown>> = {
-    volume: parameters.volume,
-    iso: parameters.iso,
-  };
-  for (const name of Object.keys(parameters) as (keyof JobParameters)[]) {
-    if (!(name in standard) || name === 'formats') continue;
-    if (!isStandard(name)) members[name] = parameters[name];
-  }
-  const { components } = parameters;
+  const members: Partial<JobParameters> = { volume: parameters.volume, iso: parameters.iso };
+  if (scheme !== standard.scheme) members.scheme = scheme;
+  if (interpolation !== standard.interpolation) members.interpolation = interpolation;
+  if (passes !== standard.passes) members.passes = passes;
+  if (smoothing !== standard.smoothing) members.smoothing = smoothing;
+  if (lambda !== null && (smoothing !== 'laplacian' || lambda !== 1)) members.lambda = lambda;
+  if (pass_band !== undefined && smoothing === 'taubin') members.pass_band = pass_band;
+  if (max_displacement_mm != null) members.max_displacement_mm = max_displacement_mm;
+  if (close) members.close = close;
   if (components && (components.keep !== null || components.min_triangles !== null)) {
     members.components = components;
   }
-  if (parameters.max_displacement_mm != null) {
-    members.max_displacement_mm = parameters.max_displacement_mm;
+  if (draco.position_bits !== standard.draco.position_bits || draco.speed !== standard.draco.speed) {
+    members.draco = draco;
   }
+  if (priority !== standard.priority) members.priority = priority;
   members.formats = parameters.formats;
-  return members as Partial<JobParameters>;
+  return members;
 }
 
 // In a few words, for titles: 6 tetrahedra, linear, 5 passes.

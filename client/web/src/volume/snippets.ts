@@ -28,7 +28,12 @@ export function commandSnippet(origin: string, parameters: JobParameters, hasTok
   if (say.passes !== undefined) job.push(`--passes ${say.passes}`);
   if (say.smoothing !== undefined) job.push(`--smoothing ${say.smoothing}`);
   if (say.lambda !== undefined) job.push(`--lambda ${say.lambda}`);
+  if (say.max_displacement_mm != null) job.push(`--max-displacement ${say.max_displacement_mm}`);
   if (say.close) job.push('--close');
+  if (say.components?.keep != null) job.push(`--keep-components ${say.components.keep}`);
+  if (say.components?.min_triangles != null) {
+    job.push(`--min-triangles ${say.components.min_triangles}`);
+  }
   if (say.draco) {
     job.push(`--position-bits ${say.draco.position_bits}`, `--speed ${say.draco.speed}`);
   }
