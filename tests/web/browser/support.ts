@@ -106,8 +106,8 @@ export async function openPage(
     if (/Content.Security.Policy|Refused to/i.test(message.text())) faults.push(message.text());
   });
   page.on('request', (request) => {
-    const { url } = { url: request.url() };
-    if (!url.startsWith(origin) && !url.startsWith('blob:')) faults.push(`asked for ${url}`);
+    const url = request.url();
+    if (![origin, 'blob:', 'about:'].some((start) => url.startsWith(start))) faults.push(`asked for ${url}`);
   });
   return { page, faults };
 }
@@ -170,7 +170,7 @@ export interface Silhouette {
 
 function showTools(page: Page, isShown: boolean): Promise<void> {
   return page.evaluate((visibility) => {
-    for (const tools of document.querySelectorAll<HTMLElement>('.toolbar, .cut-controls')) {
+    for (const tools of document.querySelectorAll<HTMLElement>('.tools')) {
       tools.style.visibility = visibility;
     }
   }, isShown ? '' : 'hidden');

@@ -19,7 +19,7 @@ const faces: readonly ViewName[] = ['L', 'R', 'P', 'A', 'S', 'I'];
 // In degrees clockwise, from the box's own texture directions to letters that stand upright.
 const faceTurns: Record<ViewName, number> = { L: -90, R: 90, P: 180, A: 0, S: 180, I: 180 };
 const texturePixels = 128;
-export const cubePixels = 92;
+const largest = 92;
 const margin = 10;
 
 function faceTexture(name: ViewName): CanvasTexture {
@@ -46,6 +46,10 @@ function faceTexture(name: ViewName): CanvasTexture {
   return texture;
 }
 
+function sizeIn(height: number): number {
+  return Math.min(largest, height / 5);
+}
+
 export class OrientationCube {
   private readonly scene = new Scene();
   private readonly camera = new PerspectiveCamera(28, 1, 0.1, 10);
@@ -59,13 +63,14 @@ export class OrientationCube {
     this.camera.up.set(0, 0, 1);
   }
 
-  // Draws in the lower left corner over what is there.
-  render(renderer: WebGLRenderer, looker: Camera): void {
+  // Draws in the lower left corner over what is there; the height is the canvas's, in pixels.
+  render(renderer: WebGLRenderer, looker: Camera, height: number): void {
+    const pixels = sizeIn(height);
     this.camera.quaternion.copy(looker.quaternion);
     this.camera.position.set(0, 0, 1).applyQuaternion(looker.quaternion).multiplyScalar(3.9);
     renderer.setScissorTest(true);
-    renderer.setViewport(margin, margin, cubePixels, cubePixels);
-    renderer.setScissor(margin, margin, cubePixels, cubePixels);
+    renderer.setViewport(margin, margin, pixels, pixels);
+    renderer.setScissor(margin, margin, pixels, pixels);
     renderer.clearDepth();
     renderer.render(this.scene, this.camera);
     renderer.setScissorTest(false);
@@ -73,8 +78,8 @@ export class OrientationCube {
 
   // The face at a point of the canvas, in pixels from its upper left corner.
   faceAt(x: number, y: number, height: number): ViewName | null {
-    const u = (x - margin) / cubePixels;
-    const v = (height - y - margin) / cubePixels;
+    const u = (x - margin) / sizeIn(height);
+    const v = (height - y - margin) / sizeIn(height);
     if (u < 0 || u > 1 || v < 0 || v > 1) return null;
     this.camera.updateMatrixWorld();
     this.ray.setFromCamera(new Vector2(2 * u - 1, 2 * v - 1), this.camera);

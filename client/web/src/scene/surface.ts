@@ -284,7 +284,7 @@ export class Surface {
     this.renderer.setViewport(0, 0, width, height);
     this.renderer.clear();
     this.renderer.render(this.scene, this.camera);
-    this.cube.render(this.renderer, this.camera);
+    this.cube.render(this.renderer, this.camera, height);
     this.rulers.placeLabels(this.camera, width, height);
     this.budget.drawn(began, this.isMoving);
     if (this.isMoving && this.budget.isSlow) this.setCoarse(true);

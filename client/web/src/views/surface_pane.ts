@@ -179,7 +179,7 @@ export class SurfacePane {
         ? `${lengthOf(ruler).toFixed(1)} millimetres`
         : 'First point set';
     };
-    this.element.append(this.toolbar(surface), this.cutControls);
+    this.element.append(h('div', { class: 'tools' }, this.toolbar(surface), this.cutControls));
     this.scope.listen(surface.canvas, 'keydown', (event: KeyboardEvent) => this.moveKey(event, surface));
     if (this.options.hasKeys) {
       this.scope.listen(window, 'keydown', (event: KeyboardEvent) => this.toolKey(event, surface));

@@ -2,14 +2,7 @@
 import { eraseVolume, listJobs, listVolumes, slicePicture } from '../api/client';
 import type { Job, Volume } from '../api/types';
 import { button, h } from '../ui/dom';
-import {
-  formatBytes,
-  formatCount,
-  formatSpacing,
-  formatTime,
-  formatValue,
-  shortId,
-} from '../ui/format';
+import { formatBytes, formatCount, formatSpacing, formatTime, formatValue } from '../ui/format';
 import { ask, tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
@@ -82,6 +75,8 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void): HTMLEle
       tellError(error);
     }
   };
+  const name = volumeName(volume);
+  const kind = volumeKind(volume);
   return h(
     'li',
     { class: 'card', 'data-volume': volume.id },
@@ -92,10 +87,10 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void): HTMLEle
       h(
         'span',
         { class: 'card-text' },
-        h('strong', {}, volumeName(volume)),
-        h('span', {}, volumeKind(volume)),
-        h('span', {}, `${formatSpacing(volume.spacing)}, ${formatBytes(volume.bytes)}`),
-        h('span', { class: 'faint' }, `${formatTime(volume.created)} \u00b7 ${shortId(volume.id)}`),
+        h('strong', { title: name }, name),
+        h('span', {}, name === kind ? volume.type : kind),
+        h('span', {}, formatSpacing(volume.spacing)),
+        h('span', { class: 'faint' }, `${formatTime(volume.created)}, ${formatBytes(volume.bytes)}`),
       ),
     ),
     button('Erase', () => void erase(), { class: 'quiet', 'aria-label': `Erase ${volumeName(volume)}` }),

@@ -1,0 +1,137 @@
+// Pictures of each view, of real volumes, for README. They go to the folder ISOMESH_PICTURES, or are
+// looked at and thrown away.
+import { execFileSync } from 'node:child_process';
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import type { Browser, Page } from 'playwright-core';
+import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import { encodePng } from './png';
+import { Daemon, openPage, silhouette, startBrowser, surfaceLoaded } from './support';
+
+const brain = '/usr/share/mricron/templates/ch2.nii.gz';
+const head = '/usr/share/doc/invesalius-examples/examples/Cranium.inv3';
+const mostBytes = 150_000;
+
+const scratch = mkdtempSync(join(tmpdir(), 'isomesh-pictures-'));
+const folder = process.env.ISOMESH_PICTURES ?? scratch;
+
+let browser: Browser;
+let daemon: Daemon;
+
+beforeAll(async () => {
+  mkdirSync(folder, { recursive: true });
+  browser = await startBrowser();
+  daemon = await Daemon.start();
+});
+
+afterAll(async () => {
+  await browser?.close();
+  await daemon?.remove();
+  rmSync(scratch, { recursive: true, force: true });
+});
+
+// The CT of a head in InVesalius' example project: int16, z slowest, its slices from the feet up and
+// their rows from the back to the front.
+async function uploadHead(): Promise<string> {
+  const inside = mkdtempSync(join(scratch, 'head-'));
+  execFileSync('tar', ['-xzf', head, '-C', inside, '--strip-components=1', '--wildcards', '*/main.plist', '*/matrix.dat']);
+  const plist = readFileSync(join(inside, 'main.plist'), 'utf8');
+  const numbers = (key: string): number[] => {
+    const array = new RegExp(`<key>${key}</key>\\s*<array>([^]*?)</array>`).exec(plist)?.[1] ?? '';
+    return [...array.matchAll(/>([-\d.]+)</g)].map((match) => Number(match[1]));
+  };
+  const dims = numbers('shape').reverse();
+  const query = new URLSearchParams({
+    dims: dims.join(','),
+    type: 'int16',
+    spacing: numbers('spacing').join(','),
+    direction: '1,0,0,0,-1,0,0,0,1',
+  });
+  const { id } = await daemon.json<{ id: string }>(`/v1/volumes?${query.toString()}`, {
+    method: 'POST',
+    body: new Blob([new Uint8Array(readFileSync(join(inside, 'matrix.dat')))]),
+  });
+  return id;
+}
+
+async function take(page: Page, name: string): Promise<void> {
+  const { width, height, text } = await pixelsOf(page, await page.screenshot());
+  const bytes = encodePng(width, height, new Uint8Array(Buffer.from(text, 'base64')));
+  writeFileSync(join(folder, `${name}.png`), bytes);
+  expect(bytes.length, name).toBeLessThan(mostBytes);
+  expect(bytes.length, name).toBeGreaterThan(10_000);
+}
+
+function pixelsOf(
+  page: Page,
+  picture: Buffer,
+): Promise<{ width: number; height: number; text: string }> {
+  return page.evaluate(async (given) => {
+    const bytes = Uint8Array.from(atob(given), (letter) => letter.charCodeAt(0));
+    const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+    const { width, height } = bitmap;
+    const canvas = document.createElement('canvas');
+    canvas.width = width;
+    canvas.height = height;
+    const context = canvas.getContext('2d');
+    if (!context) throw new Error('no canvas');
+    context.drawImage(bitmap, 0, 0);
+    const { data } = context.getImageData(0, 0, width, height);
+    let text = '';
+    for (let i = 0; i < data.length; i += 8192) text += String.fromCharCode(...data.subarray(i, i + 8192));
+    return { width, height, text: btoa(text) };
+  }, picture.toString('base64'));
+}
+
+describe('pictures', () => {
+  it('are taken of every view', async () => {
+    const body = new Blob([new Uint8Array(readFileSync(brain))]);
+    const { id: volume } = await daemon.json<{ id: string }>('/v1/volumes', { method: 'POST', body });
+    const skull = await uploadHead();
+    const { page, faults } = await openPage(browser, daemon.url, { viewport: { width: 1120, height: 680 } });
+
+    await page.goto(`${daemon.url}/#/volumes/${skull}?iso=250`);
+    await expect.poll(() => page.locator('.estimate dd').count()).toBeGreaterThan(2);
+    await page.waitForTimeout(1500);
+    await take(page, 'iso-value');
+
+    // A fresh page each, so that no surface of the last one is taken for the next.
+    const show = async (place: string, surfaces: number): Promise<void> => {
+      await page.goto('about:blank');
+      await page.goto(`${daemon.url}/#/${place}`);
+      await surfaceLoaded(page, surfaces);
+      await page.waitForTimeout(1000);
+    };
+    const bone = await daemon.submit({ volume: skull, iso: 250, formats: ['glb'] }, 30);
+    await show(`jobs/${bone.id}`, 1);
+    expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
+    await take(page, 'surface');
+
+    const cut = await daemon.submit({ volume, iso: 60, formats: ['glb'] }, 30);
+    await page.emulateMedia({ colorScheme: 'dark' });
+    await show(`jobs/${cut.id}`, 1);
+    const slice = page.waitForResponse(/slice\.png/);
+    await page.keyboard.press('c');
+    await slice;
+    await page.waitForTimeout(1500);
+    await take(page, 'cut');
+    await page.emulateMedia({ colorScheme: 'light' });
+
+    // Small enough for four at once under software rendering.
+    const jobs = [];
+    for (const scheme of [5, 6]) {
+      for (const interpolation of ['linear', 'midpoint']) {
+        jobs.push((await daemon.submit({ volume: skull, iso: 250, scheme, interpolation, formats: ['glb'] }, 30)).id);
+      }
+    }
+    await show(`compare?jobs=${jobs.join(',')}`, 4);
+    await take(page, 'compare');
+
+    await page.goto(daemon.url);
+    await expect.poll(() => page.locator('.card').count()).toBe(2);
+    await page.waitForTimeout(1500);
+    await take(page, 'volumes');
+    expect(faults).toEqual([]);
+  }, 400_000);
+});
