@@ -12,7 +12,9 @@ namespace {
 
 constexpr std::uint32_t kUndefinedLength = 0xFFFFFFFF;
 constexpr unsigned kDeepestSequence = 32;
-constexpr std::size_t kMostElements = std::size_t{1} << 21;
+// Of elements, items and fragments together, and of the bytes of elements that are kept.
+constexpr std::size_t kMostParts = std::size_t{1} << 21;
+constexpr std::size_t kMostKeptBytes = std::size_t{1} << 28;
 constexpr std::size_t kWindowBytes = std::size_t{1} << 16;
 
 // The two ways in which data sets are written.
@@ -177,11 +179,19 @@ class Parser {
     return value;
   }
 
+  // Throws when there are more parts than any scanner writes, which would fill the memory.
+  void count_part() {
+    if (++parts_ <= kMostParts) return;
+    throw_unusable("The DICOM file has more than " + std::to_string(kMostParts) + " elements.");
+  }
+
   void keep(DataSet& set, Element element) {
     if (is_private(element.tag)) return;
-    if (++kept_ > kMostElements) {
-      throw_unusable("The DICOM file has more than " + std::to_string(kMostElements) +
-                     " elements.");
+    count_part();
+    kept_bytes_ += element.value.size();
+    if (kept_bytes_ > kMostKeptBytes) {
+      throw_unusable("The DICOM file's elements take more than " + std::to_string(kMostKeptBytes) +
+                     " bytes.");
     }
     set.elements.push_back(std::move(element));
   }
@@ -190,6 +200,10 @@ class Parser {
                     DataSet& set) {
     Element element;
     element.tag = head.tag;
+    if (is_pixel_data(head.tag) && head.has_undefined_length()) {
+      read_fragments(encoding, limit);  // of an icon
+      return;
+    }
     const bool is_sequence =
         head.vr == "SQ" || head.has_undefined_length() || is_needed_sequence(head.tag);
     if (is_sequence) {
@@ -218,6 +232,7 @@ class Parser {
         throw_unusable("The DICOM file is corrupt: its sequence " + tag_name(sequence.tag) +
                        " holds something that is no item.");
       }
+      count_part();
       DataSet set = read_item(item, encoding, end, depth);
       if (!is_private(sequence.tag)) sequence.items.push_back(std::move(set));
     }
@@ -248,20 +263,28 @@ class Parser {
       pixels.native = {at_, head.length};
       return pixels;
     }
-    for (bool is_table = true;; is_table = false) {
-      const Head item = read_head(encoding, end());
-      if (item.tag == kSequenceEnd) return pixels;
+    pixels.fragments = read_fragments(encoding, end());
+    if (pixels.fragments.empty()) return pixels;
+    const Extent table = pixels.fragments.front();
+    pixels.fragments.erase(pixels.fragments.begin());
+    for (std::uint64_t at = 0; at + 4 <= table.bytes && at / 4 < kMostParts; at += 4) {
+      pixels.frame_offsets.push_back(number(table.offset + at, 4, false));
+    }
+    return pixels;
+  }
+
+  // The items of compressed pixels, of which the first is a table of offsets.
+  std::vector<Extent> read_fragments(const Encoding& encoding, std::uint64_t limit) {
+    std::vector<Extent> fragments;
+    for (;;) {
+      const Head item = read_head(encoding, limit);
+      if (item.tag == kSequenceEnd) return fragments;
       if (item.tag != kItem || item.has_undefined_length()) {
         throw_unusable("The DICOM file is corrupt: its compressed pixel data is not in items.");
       }
-      require(item.length, end(), kPixelData);
-      if (is_table) {
-        for (std::uint64_t next = at_; next + 4 <= at_ + item.length; next += 4) {
-          pixels.frame_offsets.push_back(number(next, 4, false));
-        }
-      } else {
-        pixels.fragments.push_back({at_, item.length});
-      }
+      require(item.length, limit, kPixelData);
+      count_part();
+      fragments.push_back({at_, item.length});
       at_ += item.length;
     }
   }
@@ -270,7 +293,8 @@ class Parser {
   std::uint64_t at_;
   std::string window_;
   std::uint64_t window_begin_ = 0;
-  std::size_t kept_ = 0;
+  std::size_t parts_ = 0;
+  std::size_t kept_bytes_ = 0;
 };
 
 }  // namespace

@@ -166,6 +166,19 @@ TEST(DicomFragments, ThatAreMissingAreNoticed) {
   EXPECT_THAT(error_of({stream, stream, stream, stream}), HasSubstr("cannot be told apart"));
 }
 
+TEST(DicomFragments, OfAnIconAreNoPixels) {
+  const DicomSeries series = compressible({16, 12, false});
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    DicomObject icon;
+    icon.fragments({std::string("\xff\xd8\xff\xe0 icon", 10)}, {0});
+    files.emplace_back(std::to_string(k), series.slice(k).items(0x00880200, {icon}).file());
+  }
+  const Outcome outcome = import_objects(files);
+  EXPECT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.canonical, import_objects(series.files()).canonical);
+}
+
 TEST(DicomSyntaxes, ThatAreNotReadAreNamed) {
   const DicomSeries series;
   EXPECT_THAT(import_objects(
