@@ -83,6 +83,9 @@ CREATE TABLE expired(         -- ids of jobs and volumes that were there
   PRIMARY KEY(id, owner)
 ) WITHOUT ROWID;
 CREATE INDEX expired_by_time ON expired(at);
+)sql",
+                                  R"sql(
+ALTER TABLE jobs ADD COLUMN interruptions INTEGER NOT NULL DEFAULT 0;
 )sql"};
 
 constexpr auto kNewest = static_cast<std::int64_t>(kVersions.size());

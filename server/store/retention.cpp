@@ -44,7 +44,33 @@ std::vector<Item> oldest(Connection& connection, std::int64_t cutoff, bool with_
   return items;
 }
 
-void expire(Connection& connection, const Item& item) {
+bool is_named(Connection& connection, const std::string& blob) {
+  Query query = connection.query(
+      "SELECT EXISTS(SELECT 1 FROM volumes WHERE id = ?1) OR EXISTS(SELECT 1 FROM meshes WHERE "
+      "blob = ?1)",
+      blob);
+  query.next();
+  return query.integer(0) != 0;
+}
+
+std::vector<Blob> blobs_of(Connection& connection, const Item& item) {
+  const auto read = [](Query&& query) {
+    std::vector<Blob> blobs;
+    while (query.next()) {
+      blobs.push_back({query.text(0), static_cast<std::uint64_t>(query.integer(1))});
+    }
+    return blobs;
+  };
+  if (item.is_job) {
+    return read(connection.query("SELECT blob, bytes FROM meshes WHERE job = ?", item.id));
+  }
+  return read(connection.query("SELECT id, bytes FROM volumes WHERE id = ? AND owner = ?", item.id,
+                               item.owner));
+}
+
+// Returns how many bytes nothing names any more.
+std::uint64_t expire(Connection& connection, const Item& item) {
+  const std::vector<Blob> blobs = blobs_of(connection, item);
   if (item.is_job) {
     connection.run("DELETE FROM events WHERE job = ?", item.id);
     connection.run("DELETE FROM jobs WHERE id = ?", item.id);
@@ -52,6 +78,9 @@ void expire(Connection& connection, const Item& item) {
     connection.run("DELETE FROM volumes WHERE owner = ? AND id = ?", item.owner, item.id);
   }
   connection.run("INSERT OR REPLACE INTO expired VALUES(?, ?, ?)", item.id, item.owner, now_us());
+  std::uint64_t freed = 0;
+  for (const Blob& blob : blobs) freed += is_named(connection, blob.key) ? 0 : blob.bytes;
+  return freed;
 }
 
 std::uint64_t bytes_named(Connection& connection) {
@@ -68,11 +97,7 @@ void count(Retention::Gone& gone, const Item& item) { ++(item.is_job ? gone.jobs
 
 Retention::Gone Retention::enforce() {
   Gone gone = expire_old();
-  if (options_.max_bytes > 0) {
-    const Gone more = expire_beyond(options_.max_bytes);
-    gone.jobs += more.jobs;
-    gone.volumes += more.volumes;
-  }
+  if (options_.max_bytes > 0) expire_beyond(options_.max_bytes, gone);
   forget();
   gone.blobs = sweep_blobs();
   sweep_scratch();
@@ -81,10 +106,8 @@ Retention::Gone Retention::enforce() {
 
 void Retention::make_room(std::uint64_t bytes) {
   if (options_.max_bytes == 0) return;
-  if (bytes <= options_.max_bytes) {
-    expire_beyond(options_.max_bytes - bytes);
-    if (named_bytes() + bytes <= options_.max_bytes) return;
-  }
+  Gone gone;
+  if (bytes <= options_.max_bytes && expire_beyond(options_.max_bytes - bytes, gone)) return;
   throw Error(ErrorCode::kOutOfSpace, "the room for volumes and meshes is used up");
 }
 
@@ -108,16 +131,21 @@ Retention::Gone Retention::expire_old() {
   }
 }
 
-Retention::Gone Retention::expire_beyond(std::uint64_t max_bytes) {
-  Gone gone;
+bool Retention::expire_beyond(std::uint64_t max_bytes, Gone& gone) {
   while (true) {
     Transaction transaction(database_.writer());
-    if (bytes_named(transaction.connection()) <= max_bytes) return gone;
-    // One at a time: several jobs may name the same mesh, and only the last frees its bytes.
-    const std::vector<Item> items = oldest(transaction.connection(), now_us() + 1, true, 1);
-    if (items.empty()) return gone;
-    expire(transaction.connection(), items.front());
-    count(gone, items.front());
+    const std::uint64_t named = bytes_named(transaction.connection());
+    if (named <= max_bytes) return true;
+    const std::vector<Item> items =
+        oldest(transaction.connection(), now_us() + 1, true, kMostAtOnce);
+    if (items.empty()) return false;
+    // Several jobs may name the same mesh, of which only the last one's end frees the bytes.
+    std::uint64_t freed = 0;
+    for (const Item& item : items) {
+      if (named - freed <= max_bytes) break;
+      freed += expire(transaction.connection(), item);
+      count(gone, item);
+    }
     transaction.commit();
   }
 }
@@ -134,18 +162,13 @@ std::size_t Retention::sweep_blobs() {
           std::min(cutoff, query.integer(0) - std::chrono::microseconds(options_.grace).count());
     }
   }
-  const auto is_named = [&](const std::string& key) {
+  const auto is_kept = [&](const std::string& key) {
     const Reading reading(database_.reader());
-    Query query = reading->query(
-        "SELECT EXISTS(SELECT 1 FROM volumes WHERE id = ?1) OR EXISTS(SELECT 1 FROM meshes WHERE "
-        "blob = ?1)",
-        key);
-    query.next();
-    return query.integer(0) != 0 ||
+    return is_named(reading.connection(), key) ||
            std::ranges::count(database_.unreadable(), key) > 0;  // a person is to look at it
   };
   return blobs_.sweep(std::chrono::system_clock::time_point(std::chrono::microseconds(cutoff)),
-                      is_named);
+                      is_kept);
 }
 
 void Retention::sweep_scratch() {

@@ -47,7 +47,8 @@ class Retention {
 
  private:
   Gone expire_old();
-  Gone expire_beyond(std::uint64_t max_bytes);
+  // False when what live jobs need is more than that.
+  bool expire_beyond(std::uint64_t max_bytes, Gone& gone);
   std::size_t sweep_blobs();
   void sweep_scratch();
   void forget();

@@ -11,6 +11,9 @@ namespace {
 
 constexpr std::chrono::milliseconds kBetweenProgressEvents{100};
 constexpr std::chrono::seconds kRetryAfter{1};
+// A process that dies under several jobs says little about each of them, and one that is killed
+// from outside says nothing. But a job that is there every time is not run for ever.
+constexpr int kMostInterruptions = 10;
 
 std::int64_t microseconds(std::chrono::milliseconds time) {
   return std::chrono::microseconds(time).count();
@@ -53,7 +56,9 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
                                         "idempotency_key = ?",
                                     spec.owner, spec.idempotency_key);
       if (earlier.next()) {
-        if (earlier.text(8) != spec.request_digest) return {Submission::Kind::kConflict, {}, {}};
+        constexpr int kAfterTheRow = 9;
+        if (earlier.text(kAfterTheRow) != spec.request_digest)
+          return {Submission::Kind::kConflict, {}, {}};
         return {Submission::Kind::kExisting, with_progress(row_of(earlier)), {}};
       }
     }
@@ -71,9 +76,9 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
     const std::optional<std::string> key =
         spec.idempotency_key.empty() ? std::nullopt : std::optional(spec.idempotency_key);
     change->run(
-        "INSERT INTO jobs VALUES(?1, ?2, 0, ?3, ?4, ?5, ?6, NULL, 0, 0, 0, NULL, NULL, NULL, 0, "
-        "?7, "
-        "?8, ?9)",
+        "INSERT INTO jobs(id, owner, state, priority, volume, result_key, accepted, not_before, "
+        "attempts, fence, cancelling, idempotency_key, request_digest, record) "
+        "VALUES(?, ?, 0, ?, ?, ?, ?, 0, 0, 0, 0, ?, ?, ?)",
         row.job.id, row.owner, spec.parameters.priority, spec.parameters.volume, row.result_key,
         row.accepted, key, spec.request_digest, to_json(row.job));
     if (mesh) {
@@ -203,8 +208,8 @@ std::size_t SqliteJobStore::reap() {
     for (Row& row : rows) {
       if (row.cancelling) {
         end(change, row, JobState::kCancelled);
-      } else if (row.attempts >= options_.attempts) {
-        row.job.error = lost_worker(row.job, row.attempts);
+      } else if (row.attempts >= options_.attempts || row.interruptions >= kMostInterruptions) {
+        row.job.error = lost_worker(row.job, row.attempts + row.interruptions);
         end(change, row, JobState::kFailed);
       } else {
         queue_again(change, row, std::chrono::milliseconds(0));
@@ -221,7 +226,12 @@ std::size_t SqliteJobStore::reap() {
 std::size_t SqliteJobStore::reap_all() {
   {
     Transaction transaction(database_.writer());
-    transaction->run("UPDATE jobs SET lease_until = 0 WHERE state = 1");
+    const int running = transaction->run("UPDATE jobs SET lease_until = 0 WHERE state = 1");
+    if (running > 1) {
+      transaction->run(
+          "UPDATE jobs SET attempts = attempts - 1, interruptions = interruptions + 1 WHERE state "
+          "= 1");
+    }
     transaction.commit();
   }
   return reap();

@@ -14,6 +14,7 @@ struct SqliteJobStore::Row {
   std::string result_key;
   std::int64_t accepted = 0;
   int attempts = 0;
+  int interruptions = 0;  // runs that ended with their process and that count as no attempt
   std::uint64_t fence = 0;
   std::int64_t lease_until = 0;
   bool cancelling = false;
@@ -46,7 +47,7 @@ class SqliteJobStore::Change {
 
 // The columns that row_of() reads.
 inline constexpr const char* kRowColumns =
-    "record, owner, result_key, accepted, attempts, fence, lease_until, cancelling";
+    "record, owner, result_key, accepted, attempts, fence, lease_until, cancelling, interruptions";
 
 // How many jobs wait.
 std::size_t count_queued(Connection& connection);

@@ -168,6 +168,7 @@ SqliteJobStore::Row SqliteJobStore::row_of(const Query& query) {
   row.fence = static_cast<std::uint64_t>(query.integer(5));
   row.lease_until = query.integer(6);
   row.cancelling = query.integer(7) != 0;
+  row.interruptions = static_cast<int>(query.integer(8));
   return row;
 }
 

@@ -29,7 +29,8 @@ class SqliteJobStore : public JobStore {
   SqliteJobStore(Database& database, const BlobStore& blobs, JobStoreOptions options);
 
   // Ends all leases, for the process that has just taken the data folder's lock: whoever held them
-  // is gone. Returns how many there were.
+  // is gone. That counts as an attempt of a job that ran alone; of several nobody knows which one
+  // it was, so none is charged until it was there ten times. Returns how many there were.
   std::size_t reap_all();
 
   Submission submit(const JobSpec& spec) override;

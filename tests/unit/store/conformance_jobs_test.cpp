@@ -398,6 +398,19 @@ TEST_P(JobConformance, AJobThatRanAtACrashIsClaimedAgain) {
   EXPECT_TRUE(jobs().finish(after, some_mesh()));
 }
 
+// Which of several it was that ended the process, nobody knows; killed from outside, it was none.
+TEST_P(JobConformance, ACrashUnderSeveralJobsIsChargedToNoneUntilTheTenth) {
+  const std::vector<std::string> ids = {submit().id, submit().id};
+  for (int crash = 1; crash <= 10; ++crash) {
+    EXPECT_EQ(claimed().attempt, 1);
+    EXPECT_EQ(claimed().attempt, 1);
+    restart();
+    for (const std::string& id : ids) {
+      EXPECT_EQ(jobs().get("", id).state, crash < 10 ? JobState::kQueued : JobState::kFailed);
+    }
+  }
+}
+
 TEST_P(JobConformance, ACancelOutlivesACrash) {
   const std::string id = submit().id;
   claimed();
