@@ -44,7 +44,7 @@ int status_of(const Job& job) {
 }
 
 Volume upload(Client& client, const Options& options, ProgressBar& bar) {
-  UploadOptions how{.raw = options.raw, .digest = options.digest};
+  UploadOptions how{.raw = options.raw, .series = options.series, .digest = options.digest};
   how.progress = [&](std::uint64_t done, std::uint64_t total) {
     bar.transfer(done < total ? "upload" : "check", done, total);
   };

@@ -96,14 +96,15 @@ void add_file(CLI::App& app, Options& options) {
          [&](const std::string& text) {
            options.file = text;
            std::error_code error;
-           if (std::filesystem::is_directory(options.file, error)) {
-             refuse("FILE", text + " is a directory; give one file");
-           }
            if (!std::filesystem::exists(options.file, error))
              refuse("FILE", text + " is not there");
          },
-         "NIfTI, NRRD, MetaImage, or raw samples with --dims and --type")
+         "NIfTI, NRRD, MetaImage, VTI, DICOM, a folder or archive of one, or raw samples with "
+         "--dims and --type")
       ->required();
+  add(app, "--series", "UID", "The DICOM series to take, where there are several",
+      [&](const std::string& text) { options.series = text; })
+      ->group("Upload");
   app.add_flag("--digest", options.digest, "Have the server check the file's SHA-256")
       ->group("Upload");
 }

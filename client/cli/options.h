@@ -38,6 +38,7 @@ struct Options {
 
   std::filesystem::path file;  // mesh, upload
   bool digest = false;         // mesh, upload
+  std::string series;          // mesh, upload
   std::optional<RawDescription> raw;
   std::string id;                 // of a job or, for submit and info, of a volume
   JobParameters parameters;       // mesh, submit

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/isomesh/file.h"
+#include "client/isomesh/package.h"
 #include "client/isomesh/sha256.h"
 #include "client/isomesh/transport.h"
 #include "client/isomesh/url.h"
@@ -108,19 +109,26 @@ std::string joined(const std::array<double, N>& values) {
   return text;
 }
 
-std::string raw_query(const RawDescription& raw) {
+using Query = std::vector<std::pair<std::string, std::string>>;
+
+void add_raw(const RawDescription& raw, Query& pairs) {
   const auto& [x, y, z] = raw.dims;
-  std::vector<std::pair<std::string, std::string>> pairs = {
-      {"dims", std::to_string(x) + "," + std::to_string(y) + "," + std::to_string(z)},
-      {"type", std::string(to_string(raw.type))}};
+  pairs.emplace_back("dims", std::to_string(x) + "," + std::to_string(y) + "," + std::to_string(z));
+  pairs.emplace_back("type", to_string(raw.type));
   if (raw.spacing) pairs.emplace_back("spacing", joined(*raw.spacing));
   if (raw.origin) pairs.emplace_back("origin", joined(*raw.origin));
   if (raw.direction) pairs.emplace_back("direction", joined(*raw.direction));
   if (raw.big_endian) pairs.emplace_back("byte_order", "big");
-  return query_string(pairs);
 }
 
-std::string digest_of(const InputFile& file) {
+std::string upload_query(const UploadOptions& options) {
+  Query pairs;
+  if (options.raw) add_raw(*options.raw, pairs);
+  if (!options.series.empty()) pairs.emplace_back("series", options.series);
+  return pairs.empty() ? std::string() : query_string(pairs);
+}
+
+std::string digest_of(const UploadBody& file) {
   Sha256 sha256;
   std::vector<char> piece(kDigestBytes);
   for (std::uint64_t offset = 0; offset < file.size(); offset += piece.size()) {
@@ -246,9 +254,8 @@ Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
 
 Volume Client::upload(const std::filesystem::path& path, const UploadOptions& options) {
-  const InputFile file(path);
-  Exchange exchange{.method = "POST", .target = "/v1/volumes"};
-  if (options.raw) exchange.target += raw_query(*options.raw);
+  const UploadBody file(path);
+  Exchange exchange{.method = "POST", .target = "/v1/volumes" + upload_query(options)};
   exchange.headers = {{"Content-Type", "application/octet-stream"}};
   if (options.digest) {
     exchange.headers.emplace_back("Content-Digest", "sha-256=:" + to_base64(digest_of(file)) + ":");

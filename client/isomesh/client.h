@@ -58,6 +58,7 @@ struct RawDescription {
 
 struct UploadOptions {
   std::optional<RawDescription> raw = {};  // empty: the file says itself what it is
+  std::string series = {};  // UID of the DICOM series to take, where the upload holds several
   // Sends the file's SHA-256 ahead, so that the server refuses a body that changed on the way.
   // Costs a second reading of the file.
   bool digest = false;
@@ -88,8 +89,9 @@ class Client {
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
 
-  // Sends the file from disk in pieces. The same samples again give the same volume.
-  Volume upload(const std::filesystem::path& file, const UploadOptions& options = {});
+  // Sends a file from disk in pieces; a folder, or a header (.mhd, .nhdr) with the data that it
+  // names, as a TAR that is made on the way. The same samples again give the same volume.
+  Volume upload(const std::filesystem::path& path, const UploadOptions& options = {});
   Volume volume(const std::string& id);
   std::vector<Volume> volumes();
   void erase_volume(const std::string& id);

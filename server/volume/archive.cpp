@@ -75,12 +75,18 @@ class Reader {
 
   // Null at the end.
   archive_entry* next() {
+    // What was not read of the last member stands before the end, too.
+    if (in_member_ && ::archive_read_data_skip(archive_.get()) != ARCHIVE_OK) {
+      throw_damaged(archive_.get());
+    }
     before_next_ = static_cast<std::uint64_t>(::archive_filter_bytes(archive_.get(), 0));
     archive_entry* entry = nullptr;
     const int status = ::archive_read_next_header(archive_.get(), &entry);
+    in_member_ = false;
     if (status == ARCHIVE_EOF) return nullptr;
     // A warning is a name that this machine cannot spell.
     if (status != ARCHIVE_OK && status != ARCHIVE_WARN) throw_damaged(archive_.get());
+    in_member_ = true;
     return entry;
   }
 
@@ -91,13 +97,13 @@ class Reader {
     return static_cast<std::size_t>(count);
   }
 
-  // At the end of a TAR stand zeros, at least a block of them, and nothing else. Without them it
+  // At the end of a TAR stand zeros, at least two blocks of them, and nothing else. Without them it
   // may have been cut between two members, which is no error to the library.
   void require_end() const {
     const int format = ::archive_format(archive_.get()) & ARCHIVE_FORMAT_BASE_MASK;
     if (format != ARCHIVE_FORMAT_TAR) return;
     std::uint64_t at = (before_next_ + kTarBlock - 1) / kTarBlock * kTarBlock;
-    if (file_.size() < at + kTarBlock) {
+    if (file_.size() < at + 2 * kTarBlock) {
       throw_unusable("The archive is truncated: its end is missing.");
     }
     std::vector<std::byte> piece(std::size_t{1} << 17);
@@ -118,6 +124,7 @@ class Reader {
   const InputFile& file_;
   std::unique_ptr<archive, Free> archive_;
   std::uint64_t before_next_ = 0;
+  bool in_member_ = false;
 };
 
 std::string name_of(archive_entry* entry, std::size_t number) {
@@ -182,8 +189,7 @@ class Unpacker {
                                             std::to_string(limits_.max_bytes) +
                                             " bytes that are accepted.");
     }
-    const std::uint64_t most = std::max(kNeverABomb, file_.size() * kMostUnpackedPerByte);
-    if (total_ + further > most) {
+    if (total_ + further > most_unpacked_bytes(file_.size())) {
       throw_unusable("The archive unpacks to more than " + std::to_string(kMostUnpackedPerByte) +
                      " times its size, as only bombs do.");
     }
@@ -217,6 +223,10 @@ bool is_tar(std::string_view head) {
     sum += in_checksum ? ' ' : static_cast<unsigned char>(head[at]);
   }
   return octal(head.substr(kChecksumAt, kChecksumBytes)) == sum;
+}
+
+std::uint64_t most_unpacked_bytes(std::uint64_t archive_bytes) {
+  return std::max(kNeverABomb, archive_bytes * kMostUnpackedPerByte);
 }
 
 std::string_view folder_of(std::string_view name) {

@@ -13,6 +13,9 @@ namespace isomesh::volume {
 bool is_zip(std::string_view head);
 bool is_tar(std::string_view head);
 
+// Beyond it an archive of this size is taken for a bomb.
+std::uint64_t most_unpacked_bytes(std::uint64_t archive_bytes);
+
 struct ArchiveLimits {
   std::uint64_t max_bytes = 0;  // of all members, unpacked
   std::size_t max_members = 20000;

@@ -221,7 +221,8 @@ class Import {
     if (is_compressed(file)) {
       // As a whole first, because the checksum of all of it comes last.
       ScratchFile plain(task_.scratch, ".tar");
-      gunzip(file, limits.max_bytes + kHeadroomBytes, plain);
+      gunzip(file, std::min(limits.max_bytes + kHeadroomBytes, most_unpacked_bytes(file.size())),
+             plain);
       members = unpack(plain.path(), folder.path(), limits);
     } else {
       members = unpack(task_.source, folder.path(), limits);
@@ -236,7 +237,7 @@ class Import {
                                                     std::to_string(members.size()) +
                                                     " files is a volume of a format that is read.");
     }
-    if (std::ranges::all_of(volumes, is_dicom_file)) return import_all_dicom(members);
+    if (std::ranges::any_of(volumes, is_dicom_file)) return import_all_dicom(members);
     if (volumes.size() > 1) {
       throw_unusable("The archive holds " + std::to_string(volumes.size()) +
                      " volumes, where one is needed: " + names_of(volumes) + ".");
@@ -245,7 +246,8 @@ class Import {
     return import_one(member.path, format, companions_of(member, members));
   }
 
-  // With what lies among the slices and is no DICOM: that is said in the answer.
+  // With what lies among the slices and is no DICOM, be it a volume that somebody has made of them:
+  // that it was left out is said in the answer.
   Volume import_all_dicom(const std::vector<ArchiveMember>& members) const {
     tell(to_string(FileFormat::kDicom));
     std::vector<std::filesystem::path> files;

@@ -92,7 +92,7 @@ bool is_detached(const Fields& fields) { return lower(optional(fields, kLastKey)
 std::vector<std::string> data_names(const InputFile& file, const Header& header) {
   const std::string_view said = optional(header.fields, kLastKey);
   if (said.find('%') != std::string_view::npos) {
-    throw_unusable("Its samples are in other files, named by a pattern; LIST them instead.");
+    throw_unusable("Its samples are in another file or several, named by a pattern; LIST them.");
   }
   if (!said.starts_with("LIST")) return {std::string(said)};
   const std::string text = file.text(header.bytes, kMostHeaderBytes);

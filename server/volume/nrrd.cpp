@@ -277,7 +277,7 @@ std::vector<std::string> data_names(const InputFile& file, const Header& header)
   const std::string_view said = optional(header.fields, kDataFile);
   if (!names_list(header.fields)) {
     if (said.find('%') != std::string_view::npos) {
-      throw_unusable("Its samples are in other files, named by a pattern; LIST them instead.");
+      throw_unusable("Its samples are in another file or several, named by a pattern; LIST them.");
     }
     return {std::string(said)};
   }

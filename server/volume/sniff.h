@@ -10,8 +10,8 @@ namespace isomesh::volume {
 // kArchive is a ZIP or TAR, of whatever.
 enum class FileFormat { kNifti, kNrrd, kMetaImage, kVti, kDicom, kArchive };
 
-// The name that the API uses for the format: "nifti", "nrrd", "metaimage", "vti", "dicom"; "archive" is none
-// of a volume.
+// The name that the API uses for the format: "nifti", "nrrd", "metaimage", "vti", "dicom";
+// "archive" is none of a volume.
 std::string_view to_string(FileFormat format);
 
 // How many leading bytes are enough for `sniff`.

@@ -332,6 +332,14 @@ void check_text(const InputFile& file, const CompressedRange& text) {
   }
 }
 
+// What is appended is no XML, so that nothing else tells whether the file is whole.
+void check_end(const InputFile& file) {
+  constexpr std::uint64_t kTailBytes = 256;
+  const std::string tail = file.text(file.size() - std::min(kTailBytes, file.size()), kTailBytes);
+  if (trim(tail).ends_with("</VTKFile>")) return;
+  throw_unusable("The file is truncated: it does not end as VTK files do.");
+}
+
 CompressedRange appended_range(const InputFile& file, const Document& document,
                                const Array& array) {
   constexpr std::size_t kMostSpace = 4096;
@@ -374,6 +382,7 @@ void place_samples(const InputFile& file, const Document& document, const Array&
   if (format != "appended") {
     throw_unusable("The VTK array's format " + in_quotes(format) + " is unknown.");
   }
+  check_end(file);
   volume.payload = appended_range(file, document, array);
   volume.vtk.base64 = appended_is_base64(document);
 }

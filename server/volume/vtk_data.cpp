@@ -126,10 +126,11 @@ std::size_t block_count(std::span<const std::byte> counts, std::uint64_t expecte
                         const VtkEncoding& encoding) {
   // A block of VTK's own is 32 KiB or more; that many sizes are read into memory.
   constexpr std::uint64_t kMostBlocks = std::uint64_t{1} << 24;
+  constexpr std::uint64_t kLargestBlock = std::uint64_t{1} << 40;
   const std::uint64_t count = count_at(counts, 0, encoding);
   const std::uint64_t bytes = count_at(counts, 1, encoding);
   const std::uint64_t last = count_at(counts, 2, encoding);
-  if (count == 0 || count > kMostBlocks || bytes == 0 || bytes > expected || last > bytes) {
+  if (count == 0 || count > kMostBlocks || bytes == 0 || bytes > kLargestBlock || last > bytes) {
     throw_unusable("The VTK array's counts of compressed blocks are not believable.");
   }
   if (count - 1 > expected / bytes) {

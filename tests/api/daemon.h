@@ -31,6 +31,7 @@ class Daemon {
   // SIGTERM, and its exit status.
   int stop();
   void send_signal(int number) { process_.send_signal(number); }
+  pid_t pid() const { return process_.pid(); }
   void terminate() { process_.send_signal(SIGTERM); }
   int wait() { return process_.wait(); }
   pid_t process_id() const { return process_.id(); }

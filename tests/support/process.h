@@ -34,6 +34,7 @@ class Process {
   pid_t id() const { return pid_; }
 
   void send_signal(int number) const;
+  pid_t pid() const { return pid_; }
 
   // Its exit status; 128 and the signal's number when a signal ended it. Throws std::runtime_error
   // after kLongest.

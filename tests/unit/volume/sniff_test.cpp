@@ -29,9 +29,7 @@ TEST(Sniff, KnowsNrrdAndMetaImage) {
   EXPECT_EQ(sniffed("NDims=3\r\nDimSize = 1 1 1\r\n"), FileFormat::kMetaImage);
 }
 
-TEST(Sniff, KnowsDicom) {
-  EXPECT_EQ(sniffed(std::string(128, '\0') + "DICM"), FileFormat::kDicom);
-}
+TEST(Sniff, KnowsDicom) { EXPECT_EQ(sniffed(std::string(128, '\0') + "DICM"), FileFormat::kDicom); }
 
 TEST(Sniff, KnowsNothingElse) {
   EXPECT_EQ(sniffed(""), std::nullopt);

@@ -1,0 +1,228 @@
+#include "client/isomesh/package.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "proto/error.h"
+
+namespace isomesh {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostFiles = 20000;  // as many as the server unpacks
+constexpr std::size_t kBlock = 512;
+
+std::string lower(std::string text) {
+  std::ranges::transform(text, text.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return text;
+}
+
+std::string trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r\n";
+  const std::size_t first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return std::string(text.substr(first, text.find_last_not_of(kBlank) - first + 1));
+}
+
+// --- Which files ---------------------------------------------------------------------------------
+
+bool is_hidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
+
+std::vector<PackedFile> files_below(const fs::path& folder) {
+  std::vector<PackedFile> files;
+  std::error_code error;
+  fs::recursive_directory_iterator at(folder, error);
+  for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
+    if (is_hidden(at->path())) {
+      if (at->is_directory()) at.disable_recursion_pending();
+      continue;
+    }
+    if (at->is_symlink() || !at->is_regular_file()) continue;
+    files.push_back({at->path().lexically_relative(folder).generic_string(), at->path()});
+    if (files.size() > kMostFiles) {
+      throw Error(ErrorCode::kInvalidParameter,
+                  folder.string() + ": holds more than " + std::to_string(kMostFiles) + " files");
+    }
+  }
+  if (error) throw Error(ErrorCode::kInvalidParameter, folder.string() + ": " + error.message());
+  if (files.empty()) {
+    throw Error(ErrorCode::kInvalidParameter, folder.string() + ": holds no files to send");
+  }
+  std::ranges::sort(files, {}, &PackedFile::name);
+  return files;
+}
+
+// The beginning of a header, which is text and has what names its data in the first megabyte.
+std::vector<std::string> lines_of(const fs::path& path) {
+  constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 20;
+  const InputFile file(path);
+  std::string text(static_cast<std::size_t>(std::min(file.size(), kMostBytes)), '\0');
+  file.read(0, text);
+  std::vector<std::string> lines;
+  for (std::size_t next = 0; next < text.size();) {
+    const std::size_t end = std::min(text.find('\n', next), text.size());
+    lines.push_back(trimmed(std::string_view(text).substr(next, end - next)));
+    next = end + 1;
+  }
+  return lines;
+}
+
+// What the field `name` of a line "Name = value" or "name: value" says.
+std::optional<std::string> field(const std::string& line, char sign, std::string_view name) {
+  const std::size_t at = line.find(sign);
+  if (at == std::string::npos) return std::nullopt;
+  std::string found = lower(trimmed(line.substr(0, at)));
+  std::erase(found, ' ');
+  if (found != name) return std::nullopt;
+  return trimmed(line.substr(at + 1));
+}
+
+std::vector<PackedFile> header_and_data(const fs::path& path, char sign, std::string_view name) {
+  std::vector<PackedFile> files = {{path.filename().string(), path}};
+  const auto add = [&](const std::string& data) {
+    // The server follows names, and says so where a header has a path or a pattern.
+    const bool plain = !data.empty() && data.find_first_of("/\\%") == std::string::npos;
+    if (plain && data != files.front().name) files.push_back({data, path.parent_path() / data});
+  };
+  const std::vector<std::string> lines = lines_of(path);
+  for (std::size_t at = 0; at < lines.size(); ++at) {
+    const auto data = field(lines[at], sign, name);
+    if (!data || lower(*data) == "local") continue;
+    if (data->starts_with("LIST")) {
+      for (const auto& line : std::span(lines).subspan(at + 1)) add(line);
+    } else {
+      add(*data);
+    }
+    break;
+  }
+  return files;
+}
+
+// --- TAR (POSIX.1-2001, pax) ---------------------------------------------------------------------
+
+struct Member {
+  std::string name;
+  char kind = '0';  // a regular file
+  std::uint64_t bytes = 0;
+};
+
+// The header's block. What its fields cannot hold stands in a pax record ahead of it.
+std::string header_of(const Member& member) {
+  constexpr std::size_t kLongestName = 100;
+  std::string block(kBlock, '\0');
+  const auto put = [&](std::size_t at, std::string_view text) {
+    std::ranges::copy(text, block.begin() + static_cast<std::ptrdiff_t>(at));
+  };
+  const auto octal = [](std::uint64_t value, int digits) {
+    std::array<char, 24> text = {};
+    std::snprintf(text.data(), text.size(), "%0*llo", digits,
+                  static_cast<unsigned long long>(value));
+    return std::string(text.data());
+  };
+  constexpr std::uint64_t kLargest = (std::uint64_t{1} << 33) - 1;
+  put(0, member.name.substr(0, kLongestName));
+  put(100, "0000644");
+  put(108, "0000000");
+  put(116, "0000000");
+  put(124, octal(std::min(member.bytes, kLargest), 11));
+  put(136, octal(0, 11));
+  put(148, "        ");
+  block[156] = member.kind;
+  put(257, std::string_view("ustar\00000", 8));
+  unsigned sum = 0;
+  for (const char byte : block) sum += static_cast<unsigned char>(byte);
+  put(148, octal(sum, 6) + std::string(1, '\0'));
+  return block;
+}
+
+std::string padded(std::string text) {
+  text.resize((text.size() + kBlock - 1) / kBlock * kBlock, '\0');
+  return text;
+}
+
+// "30 path=...\n", where the number counts itself.
+std::string pax_record(const std::string& key, const std::string& value) {
+  const std::string rest = " " + key + "=" + value + "\n";
+  std::size_t length = rest.size() + 1;
+  while (std::to_string(length).size() + rest.size() != length) ++length;
+  return std::to_string(length) + rest;
+}
+
+// All that stands ahead of a member's bytes.
+std::string lead_of(const Member& member) {
+  const std::string records =
+      pax_record("path", member.name) + pax_record("size", std::to_string(member.bytes));
+  return header_of({"pax", 'x', records.size()}) + padded(records) + header_of(member);
+}
+
+}  // namespace
+
+std::vector<PackedFile> files_of_upload(const std::filesystem::path& path) {
+  if (fs::is_directory(path)) return files_below(path);
+  const std::string suffix = lower(path.extension().string());
+  if (suffix == ".mhd") return header_and_data(path, '=', "elementdatafile");
+  if (suffix == ".nhdr") return header_and_data(path, ':', "datafile");
+  return {{path.filename().string(), path}};
+}
+
+UploadBody::UploadBody(const std::filesystem::path& path) {
+  const std::vector<PackedFile> files = files_of_upload(path);
+  if (files.size() == 1 && !fs::is_directory(path)) {
+    add_file(files.front().path, InputFile(files.front().path).size());
+    return;
+  }
+  for (const PackedFile& file : files) add_member(file);
+  add_text(std::string(2 * kBlock, '\0'));
+}
+
+void UploadBody::add_text(std::string text) {
+  const std::uint64_t bytes = text.size();
+  parts_.push_back({size_, bytes, std::move(text), {}});
+  size_ += bytes;
+}
+
+void UploadBody::add_file(const std::filesystem::path& path, std::uint64_t bytes) {
+  parts_.push_back({size_, bytes, {}, path});
+  size_ += bytes;
+}
+
+void UploadBody::add_member(const PackedFile& file) {
+  const std::uint64_t bytes = InputFile(file.path).size();
+  add_text(lead_of({.name = file.name, .bytes = bytes}));
+  add_file(file.path, bytes);
+  add_text(std::string((kBlock - bytes % kBlock) % kBlock, '\0'));
+}
+
+void UploadBody::read(std::uint64_t offset, std::span<char> target) const {
+  auto part = std::ranges::upper_bound(parts_, offset, {}, &Part::offset);
+  for (--part; !target.empty() && part != parts_.end(); ++part) {
+    const std::uint64_t from = offset - part->offset;
+    const std::size_t count = std::min<std::uint64_t>(part->bytes - from, target.size());
+    read_part(static_cast<std::size_t>(part - parts_.begin()), from, target.first(count));
+    target = target.subspan(count);
+    offset += count;
+  }
+}
+
+void UploadBody::read_part(std::size_t index, std::uint64_t offset, std::span<char> target) const {
+  const Part& part = parts_[index];
+  if (target.empty()) return;
+  if (part.path.empty()) {
+    std::ranges::copy(std::string_view(part.text).substr(offset, target.size()), target.begin());
+    return;
+  }
+  if (!open_file_ || open_part_ != index) {
+    open_file_ = std::make_unique<InputFile>(part.path);
+    open_part_ = index;
+  }
+  open_file_->read(offset, target);
+}
+
+}  // namespace isomesh

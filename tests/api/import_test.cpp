@@ -1,0 +1,118 @@
+// Uploads that take more than one file, and what they leave in the daemon.
+#include <fstream>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include "proto/json.h"
+#include "tests/api/daemon.h"
+
+namespace isomesh::test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::string_view kHeader =
+    "ObjectType = Image\nNDims = 3\nDimSize = 4 3 2\nElementType = MET_UCHAR\n"
+    "ElementSpacing = 1 2 3\nElementDataFile = head.raw\n";
+
+std::string trimmed(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  return text;
+}
+
+TEST(Import, AFolderAndAHeaderArePackedOnTheWay) {
+  const Daemon daemon;
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "volume");
+  write_file(folder / "volume/head.mhd", kHeader);
+  write_file(folder / "volume/head.raw", "abcdefghijklmnopqrstuvwx");
+  write_file(folder / "volume/README", "what this is");
+  const Finished of_folder = daemon.command({"upload", folder / "volume"});
+  EXPECT_EQ(of_folder.status, 0) << of_folder.errors;
+  const Finished of_header = daemon.command({"upload", folder / "volume/head.mhd"});
+  EXPECT_EQ(of_header.status, 0) << of_header.errors;
+  EXPECT_EQ(of_folder.output, of_header.output);
+  const Volume volume = daemon.client().volume(trimmed(of_folder.output));
+  EXPECT_EQ(volume.format, "metaimage");
+  EXPECT_EQ(volume.geometry.spacing, (std::array<double, 3>{1, 2, 3}));
+  const Finished meshed =
+      daemon.command({"mesh", folder / "volume", "--iso", "105", "-o", folder / "out.stl"});
+  EXPECT_EQ(meshed.status, 0) << meshed.errors;
+}
+
+TEST(Import, AFolderWithoutFilesIsRefusedByTheCommand) {
+  const Daemon daemon;
+  const TemporaryFolder folder;
+  const Finished result = daemon.command({"upload", folder.path()});
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.errors, HasSubstr("holds no files"));
+}
+
+TEST(Import, ASeriesIsChosenOnlyWhereThereIsOne) {
+  const Daemon daemon;
+  const TemporaryFolder folder;
+  write_file(folder / "head.mhd", kHeader);
+  write_file(folder / "head.raw", "abcdefghijklmnopqrstuvwx");
+  const Finished result = daemon.command({"upload", folder / "head.mhd", "--series", "1.2.3"});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_THAT(result.errors, HasSubstr("series"));
+  EXPECT_EQ(daemon.send("POST", "/v1/volumes?series=nonsense", "x").status, 400);
+}
+
+TEST(Import, LimitsAreThoseThatAreConfigured) {
+  const Daemon daemon({"--imports", "1", "--import-seconds", "1", "--import-memory", "64MiB"});
+  EXPECT_EQ(upload(daemon, sphere_upload()).format, "raw");
+}
+
+// The sanitizers keep freed memory to find uses of it.
+#if !defined(__SANITIZE_ADDRESS__)
+
+std::size_t resident_bytes(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/status");
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    std::string name;
+    std::size_t kibibytes = 0;
+    if (words >> name >> kibibytes && name == "VmRSS:") return kibibytes * 1024;
+  }
+  throw std::runtime_error("the daemon's memory is not told");
+}
+
+std::string gzipped(const std::string& bytes) {
+  z_stream stream = {};
+  deflateInit2(&stream, 1, Z_DEFLATED, MAX_WBITS + 16, 8, Z_DEFAULT_STRATEGY);
+  std::string result(deflateBound(&stream, bytes.size()) + 64, '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = reinterpret_cast<Bytef*>(result.data());
+  stream.avail_out = static_cast<uInt>(result.size());
+  deflate(&stream, Z_FINISH);
+  result.resize(stream.total_out);
+  deflateEnd(&stream);
+  return result;
+}
+
+TEST(Import, AGreatUploadLeavesLittleInTheDaemon) {
+  constexpr std::size_t kMost = std::size_t{24} << 20;
+  const std::string samples(std::size_t{96} << 20, '\x07');
+  const std::string header =
+      "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 512 512 384\nspacings: 1 1 1\n"
+      "encoding: raw\n\n";
+  const Daemon daemon;
+  upload(daemon, sphere_upload());  // what the first one allocates for good
+  const std::size_t before = resident_bytes(daemon.pid());
+  const Answer raw = daemon.send("POST", "/v1/volumes?dims=512,512,384&type=uint8", samples);
+  EXPECT_EQ(raw.status, 201) << raw.body;
+  EXPECT_LT(resident_bytes(daemon.pid()), before + kMost);
+  const Answer packed = daemon.send("POST", "/v1/volumes", gzipped(header + samples));
+  EXPECT_EQ(packed.status, 200) << packed.body;
+  EXPECT_LT(resident_bytes(daemon.pid()), before + kMost);
+}
+
+#endif
+
+}  // namespace
+}  // namespace isomesh::test

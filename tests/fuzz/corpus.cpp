@@ -1,0 +1,148 @@
+#include <cstring>
+
+#include "proto/json.h"
+#include "server/volume/canonical.h"
+#include "server/volume/import_message.h"
+#include "tests/fuzz/targets.h"
+#include "tests/unit/volume/archives.h"
+#include "tests/unit/volume/files.h"
+#include "tests/unit/volume/vti_writer.h"
+#include "tests/unit/volume/writers.h"
+
+namespace isomesh::fuzz {
+namespace {
+
+using namespace volume::test;
+
+const std::string kSamples(kSmallSamples);
+
+std::vector<std::string> nifti_files() {
+  return {nifti({}, kSamples), nifti({.version = 2, .big_endian = true}, kSamples),
+          gzip(nifti({.qform_code = 1, .sform_code = 0}, kSamples)),
+          nifti({.dim = {3, 2, 3, 2, 1, 1, 1, 1}, .datatype = 512, .bitpix = 16, .slope = 2},
+                kSamples)};
+}
+
+std::vector<std::string> nrrd_files() {
+  const auto encoded = [](const std::string& encoding, const std::string& payload) {
+    return nrrd(with(small_nrrd(), "encoding", encoding), payload);
+  };
+  std::string digits;
+  for (int at = 0; at < 24; ++at) digits += std::to_string(at) + " ";
+  return {nrrd(small_nrrd(), kSamples), encoded("gzip", gzip(kSamples)), encoded("ascii", digits),
+          encoded("hex", std::string(48, 'a')), gzip(nrrd(small_nrrd(), kSamples))};
+}
+
+std::vector<std::string> metaimage_files() {
+  return {
+      metaimage(small_metaimage(), kSamples),
+      metaimage(with(small_metaimage(), "CompressedData", "True"), zlib(kSamples)),
+      metaimage(with(with(small_metaimage(), "BinaryData", "False"), "DimSize", "2 1 1"), "1 2")};
+}
+
+std::vector<std::string> vti_files() {
+  std::vector<std::string> files;
+  for (const VtiForm form : {VtiForm::kBinary, VtiForm::kAppendedRaw, VtiForm::kAppendedBase64}) {
+    for (const bool compressed : {false, true}) {
+      files.push_back(vti({.form = form, .compressed = compressed}, kSamples));
+    }
+  }
+  files.push_back(vti({.form = VtiForm::kAscii, .extent = "0 1 0 0 0 1"}, "1 2 3 4"));
+  return files;
+}
+
+std::vector<std::string> archive_files() {
+  const std::string mhd = metaimage(with(small_metaimage(), "ElementDataFile", "a.raw"), "");
+  const std::string nhdr = nrrd(with(small_nrrd(), "data file", "a.raw"), "");
+  return {zip({{"a.mhd", mhd}, {"a.raw", kSamples}}), tar({{"a.nhdr", nhdr}, {"a.raw", kSamples}}),
+          gzip(tar({{"a.nii", nifti({}, kSamples)}})),
+          zip({{"a.nii.gz", gzip(nifti({}, kSamples))}, {"README", "text"}})};
+}
+
+std::vector<std::string> raw_files() {
+  std::string file = {'\x04', '\x03', '\x02', '\0', '\0', '\0', '\0', '\0'};
+  const std::vector<double> geometry = {0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  return {file + bytes_of(geometry) + kSamples};
+}
+
+// An element of Explicit VR Little Endian.
+std::string element(unsigned group, unsigned number, const std::string& vr, std::string value) {
+  if (value.size() % 2 != 0) value += vr == "UI" ? '\0' : ' ';
+  const auto little = [](unsigned n) {
+    return bytes_of(std::vector{static_cast<std::uint16_t>(n)});
+  };
+  const bool is_long = vr == "OW" || vr == "OB" || vr == "SQ";
+  const std::string length =
+      is_long
+          ? std::string(2, '\0') + bytes_of(std::vector{static_cast<std::uint32_t>(value.size())})
+          : little(static_cast<unsigned>(value.size()));
+  return little(group) + little(number) + vr + length + value;
+}
+
+std::string dicom_file(const std::string& syntax) {
+  const auto number = [](std::uint16_t n) { return bytes_of(std::vector{n}); };
+  const std::string meta = element(2, 2, "UI", "1.2.840.10008.5.1.4.1.1.2") +
+                           element(2, 3, "UI", "1.2.3.4") + element(2, 0x10, "UI", syntax);
+  return std::string(128, '\0') + "DICM" +
+         element(2, 0, "UL", bytes_of(std::vector{static_cast<std::uint32_t>(meta.size())})) +
+         meta + element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") +
+         element(8, 0x18, "UI", "1.2.3.4") + element(8, 0x60, "CS", "CT") +
+         element(0x10, 0x10, "PN", "A^B") + element(0x20, 0xd, "UI", "1.2") +
+         element(0x20, 0xe, "UI", "1.3") + element(0x20, 0x32, "DS", "0\\0\\0") +
+         element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + element(0x28, 2, "US", number(1)) +
+         element(0x28, 4, "CS", "MONOCHROME2") + element(0x28, 0x10, "US", number(3)) +
+         element(0x28, 0x11, "US", number(4)) + element(0x28, 0x30, "DS", "1\\1") +
+         element(0x28, 0x100, "US", number(16)) + element(0x28, 0x101, "US", number(16)) +
+         element(0x28, 0x102, "US", number(15)) + element(0x28, 0x103, "US", number(1)) +
+         element(0x28, 0x1052, "DS", "-1024") + element(0x28, 0x1053, "DS", "1") +
+         element(0x7fe0, 0x10, "OW", kSamples);
+}
+
+std::vector<std::string> dicom_files() {
+  return {dicom_file("1.2.840.10008.1.2.1"), dicom_file("1.2.840.10008.1.2.5"),
+          dicom_file("1.2.840.10008.1.2.4.70"), dicom_file("1.2.840.10008.1.2.4.80"),
+          dicom_file("1.2.840.10008.1.2.4.90")};
+}
+
+std::vector<std::string> canonical_files() { return {import_bytes(nifti({}, kSamples)).canonical}; }
+
+std::vector<std::string> report_texts() {
+  volume::ImportOrder order;
+  order.task.options.raw = volume::RawDescription{};
+  const Error error(ErrorCode::kUnusableVolume, "why", {{"field", "message"}});
+  return {volume::reading_message("nifti") + volume::volume_message(Volume{}),
+          volume::error_message(error), volume::to_message(order)};
+}
+
+std::vector<std::string> json_texts() {
+  return {R"({"volume": "a", "iso": 60, "scheme": 5, "passes": 3, "formats": ["drc", "stl"],)"
+          R"( "draco": {"position_bits": 11, "speed": 0}})",
+          to_json(Volume{}),
+          to_json(Job{}),
+          to_json(std::vector{Volume{}}),
+          to_json(std::vector{Job{}}),
+          to_json(Problem{.title = "a", .detail = "b", .errors = {{"c", "d"}}})};
+}
+
+}  // namespace
+
+std::vector<std::string> corpus(std::string_view name) {
+  if (name == "nifti") return nifti_files();
+  if (name == "nrrd") return nrrd_files();
+  if (name == "metaimage") return metaimage_files();
+  if (name == "vti") return vti_files();
+  if (name == "dicom") return dicom_files();
+  if (name == "archive") return archive_files();
+  if (name == "raw") return raw_files();
+  if (name == "canonical") return canonical_files();
+  if (name == "report") return report_texts();
+  if (name == "json") return json_texts();
+  std::vector<std::string> all;
+  for (const Target& target : targets()) {
+    if (target.name == name) continue;
+    for (const std::string& file : corpus(target.name)) all.push_back(file);
+  }
+  return all;
+}
+
+}  // namespace isomesh::fuzz

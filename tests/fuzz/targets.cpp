@@ -1,0 +1,175 @@
+#include "tests/fuzz/targets.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include <unistd.h>
+
+#include "proto/error.h"
+#include "proto/json.h"
+#include "server/volume/canonical.h"
+#include "server/volume/import.h"
+#include "server/volume/import_message.h"
+#include "server/volume/sniff.h"
+
+namespace isomesh::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+using Bytes = std::span<const std::byte>;
+using volume::FileFormat;
+
+std::string_view text_of(Bytes bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+[[noreturn]] void fail(const std::string& what) {
+  std::fprintf(stderr, "finding: %s\n", what.c_str());
+  std::abort();
+}
+
+// A folder of the process, in memory where there is one, emptied between inputs by the imports.
+const fs::path& folder() {
+  static const fs::path path = [] {
+    const fs::path memory = "/dev/shm";
+    std::string name =
+        ((fs::is_directory(memory) ? memory : fs::temp_directory_path()) / "isomesh-fuzz-XXXXXX");
+    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp failed");
+    static const struct Remove {
+      fs::path path;
+      ~Remove() {
+        std::error_code ignored;
+        fs::remove_all(path, ignored);
+      }
+    } remove{name};
+    return fs::path(name);
+  }();
+  return path;
+}
+
+void write(const fs::path& path, Bytes bytes) {
+  std::ofstream file(path, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
+}
+
+void expect_volume(const Volume& found, const fs::path& canonical) {
+  const volume::CanonicalVolume file(canonical);
+  if (file.header().dims != found.dims || file.header().type != found.type ||
+      file.samples().size() != found.bytes) {
+    fail("the volume is not what its canonical file holds");
+  }
+}
+
+void import(Bytes bytes, const volume::ImportOptions& options) {
+  const fs::path source = folder() / "upload";
+  write(source, bytes);
+  const fs::path scratch = folder() / "scratch";
+  fs::create_directory(scratch);
+  const volume::ImportTask task = {.source = source,
+                                   .scratch = scratch,
+                                   .target = scratch / "canonical",
+                                   .options = options,
+                                   .limits = {.max_sample_bytes = std::uint64_t{1} << 20}};
+  try {
+    expect_volume(volume::import_volume(task), task.target);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kInternal) fail(error.what());
+  }
+  fs::remove(task.target);
+  if (!fs::is_empty(scratch)) fail("an import left files behind");
+}
+
+template <FileFormat kFormat>
+void import_only(Bytes bytes) {
+  if (volume::sniff(bytes.first(std::min(bytes.size(), volume::kSniffBytes))) != kFormat) return;
+  import(bytes, {});
+}
+
+void import_anything(Bytes bytes) { import(bytes, {}); }
+
+// The description comes first, byte for byte, and then the samples.
+void import_raw(Bytes bytes) {
+  constexpr std::size_t kTypes = 8;
+  struct Head {
+    std::uint8_t dims[3];
+    std::uint8_t type;
+    std::uint8_t big_endian;
+    double geometry[15];
+  } head = {};
+  if (bytes.size() < sizeof head) return;
+  std::memcpy(&head, bytes.data(), sizeof head);
+  volume::RawDescription raw;
+  std::copy_n(head.dims, 3, raw.dims.begin());
+  raw.type = static_cast<SampleType>(head.type % kTypes);
+  raw.big_endian = head.big_endian % 2 != 0;
+  std::copy_n(head.geometry, 3, raw.geometry.origin.begin());
+  std::copy_n(head.geometry + 3, 3, raw.geometry.spacing.begin());
+  std::copy_n(head.geometry + 6, 9, raw.geometry.direction.begin());
+  import(bytes.subspan(sizeof head), {.raw = raw, .series = {}});
+}
+
+void open_canonical(Bytes bytes) {
+  const fs::path path = folder() / "canonical";
+  write(path, bytes);
+  try {
+    const volume::CanonicalVolume file(path);
+    if (file.samples().size() != file.header().sample_bytes()) fail("samples of another size");
+  } catch (const Error&) {
+    return;
+  }
+}
+
+template <class Read>
+void read_text(Bytes bytes, const Read& read) {
+  try {
+    read(text_of(bytes));
+  } catch (const Error&) {
+    return;
+  }
+}
+
+void read_report(Bytes bytes) {
+  read_text(bytes, [](std::string_view text) { volume::report_from(text); });
+  read_text(bytes, [](std::string_view text) { volume::order_from(text); });
+}
+
+void read_json(Bytes bytes) {
+  read_text(bytes, [](std::string_view text) { parse_job_parameters(text); });
+  read_text(bytes, [](std::string_view text) { volume_from_json(text); });
+  read_text(bytes, [](std::string_view text) { job_from_json(text); });
+  read_text(bytes, [](std::string_view text) { problem_from_json(text); });
+  read_text(bytes, [](std::string_view text) { volumes_from_json(text); });
+  read_text(bytes, [](std::string_view text) { jobs_from_json(text); });
+}
+
+constexpr Target kTargets[] = {
+    {"upload", import_anything},
+    {"nifti", import_only<FileFormat::kNifti>},
+    {"nrrd", import_only<FileFormat::kNrrd>},
+    {"metaimage", import_only<FileFormat::kMetaImage>},
+    {"vti", import_only<FileFormat::kVti>},
+    {"dicom", import_only<FileFormat::kDicom>},
+    {"archive", import_only<FileFormat::kArchive>},
+    {"raw", import_raw},
+    {"canonical", open_canonical},
+    {"report", read_report},
+    {"json", read_json},
+};
+
+}  // namespace
+
+std::span<const Target> targets() { return kTargets; }
+
+const Target& target(std::string_view name) {
+  const auto* found = std::ranges::find(kTargets, name, &Target::name);
+  if (found == std::end(kTargets)) throw std::out_of_range("no such target");
+  return *found;
+}
+
+}  // namespace isomesh::fuzz

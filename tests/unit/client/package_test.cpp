@@ -1,0 +1,134 @@
+#include "client/isomesh/package.h"
+
+#include <algorithm>
+#include <map>
+
+#include <archive.h>
+#include <archive_entry.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/client/support.h"
+
+namespace isomesh {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Pair;
+
+std::vector<std::string> names_of(const fs::path& path) {
+  std::vector<std::string> names;
+  for (const PackedFile& file : files_of_upload(path)) names.push_back(file.name);
+  return names;
+}
+
+std::string read_all(const UploadBody& body, std::size_t piece_bytes) {
+  std::string text(static_cast<std::size_t>(body.size()), '?');
+  for (std::size_t at = 0; at < text.size(); at += piece_bytes) {
+    const std::span<char> rest = std::span(text).subspan(at);
+    body.read(at, rest.first(std::min(piece_bytes, rest.size())));
+  }
+  return text;
+}
+
+// What libarchive finds in it, in order.
+std::vector<std::pair<std::string, std::string>> members_of(const std::string& tar) {
+  std::vector<std::pair<std::string, std::string>> members;
+  archive* reader = ::archive_read_new();
+  ::archive_read_support_format_tar(reader);
+  EXPECT_EQ(::archive_read_open_memory(reader, tar.data(), tar.size()), ARCHIVE_OK);
+  archive_entry* entry = nullptr;
+  while (::archive_read_next_header(reader, &entry) == ARCHIVE_OK) {
+    std::string bytes(static_cast<std::size_t>(::archive_entry_size(entry)), '\0');
+    EXPECT_EQ(::archive_read_data(reader, bytes.data(), bytes.size()),
+              static_cast<la_ssize_t>(bytes.size()));
+    members.emplace_back(::archive_entry_pathname_utf8(entry), bytes);
+  }
+  EXPECT_EQ(::archive_errno(reader), 0);
+  ::archive_read_free(reader);
+  return members;
+}
+
+TEST(UploadBody, OfAFileIsTheFile) {
+  const test::TemporaryFolder folder;
+  test::write_file(folder / "head.nii", "volume");
+  EXPECT_EQ(read_all(UploadBody(folder / "head.nii"), 4), "volume");
+  test::write_file(folder / "empty", "");
+  EXPECT_EQ(UploadBody(folder / "empty").size(), 0U);
+}
+
+TEST(UploadBody, OfAFolderIsATarOfItsFiles) {
+  const test::TemporaryFolder folder;
+  const fs::path root = folder / "series";
+  fs::create_directories(root / "b" / ".hidden");
+  const std::string long_name(150, 'n');
+  test::write_file(root / "z.dcm", std::string(1000, 'z'));
+  test::write_file(root / "a.dcm", std::string(512, 'a'));
+  test::write_file(root / "b" / "\xc3\xa4.dcm", "b");
+  test::write_file(root / "b" / long_name, "");
+  test::write_file(root / ".DS_Store", "hidden");
+  test::write_file(root / "b" / ".hidden" / "c", "hidden");
+  fs::create_symlink("/etc/passwd", root / "link");
+  const std::string tar = read_all(UploadBody(root), 100'000);
+  EXPECT_EQ(tar.size() % 512, 0U);
+  EXPECT_THAT(members_of(tar),
+              ElementsAre(Pair("a.dcm", std::string(512, 'a')), Pair("b/" + long_name, ""),
+                          Pair("b/\xc3\xa4.dcm", "b"), Pair("z.dcm", std::string(1000, 'z'))));
+  for (const std::size_t piece : {1U, 7U, 512U, 513U}) {
+    EXPECT_EQ(read_all(UploadBody(root), piece), tar) << piece;
+  }
+}
+
+TEST(UploadBody, OfAnEmptyFolderIsRefused) {
+  const test::TemporaryFolder folder;
+  fs::create_directories(folder / "empty" / "more");
+  test::write_file(folder / "empty" / ".hidden", "x");
+  const Error error = test::error_of([&] { UploadBody body(folder / "empty"); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
+  EXPECT_THAT(error.what(), HasSubstr("holds no files"));
+}
+
+TEST(UploadBody, OfAHeaderTakesItsDataAlong) {
+  const test::TemporaryFolder folder;
+  for (const char* name : {"head.raw", "1.raw", "2.raw", "a b.raw"})
+    test::write_file(folder / name, "x");
+  const auto names = [&](const std::string& name, const std::string& text) {
+    test::write_file(folder / name, text);
+    return names_of(folder / name);
+  };
+  EXPECT_THAT(names("h.mhd", "NDims = 3\nElementDataFile = head.raw\n"),
+              ElementsAre("h.mhd", "head.raw"));
+  EXPECT_THAT(names("h.mhd", "ElementDataFile = a b.raw\r\n"), ElementsAre("h.mhd", "a b.raw"));
+  EXPECT_THAT(names("h.mhd", "ElementDataFile = LIST\n1.raw\n2.raw\n"),
+              ElementsAre("h.mhd", "1.raw", "2.raw"));
+  EXPECT_THAT(names("h.MHD", "ElementDataFile = LOCAL\n1.raw\n"), ElementsAre("h.MHD"));
+  EXPECT_THAT(names("h.nhdr", "NRRD0004\nData File: head.raw\n"),
+              ElementsAre("h.nhdr", "head.raw"));
+  EXPECT_THAT(names("h.nhdr", "NRRD0004\ndatafile: LIST\n1.raw\n2.raw"),
+              ElementsAre("h.nhdr", "1.raw", "2.raw"));
+  // The server tells what is wrong with these.
+  EXPECT_THAT(names("h.mhd", "ElementDataFile = ../head.raw\n"), ElementsAre("h.mhd"));
+  EXPECT_THAT(names("h.mhd", "ElementDataFile = s%d.raw 1 2 1\n"), ElementsAre("h.mhd"));
+}
+
+TEST(UploadBody, DataThatIsNotThereIsNamed) {
+  const test::TemporaryFolder folder;
+  test::write_file(folder / "h.mhd", "ElementDataFile = absent.raw\n");
+  const Error error = test::error_of([&] { UploadBody body(folder / "h.mhd"); });
+  EXPECT_THAT(error.what(), HasSubstr("absent.raw"));
+}
+
+TEST(UploadBody, AFileThatWasCutMeanwhileIsNamed) {
+  const test::TemporaryFolder folder;
+  fs::create_directories(folder / "d");
+  test::write_file(folder / "d" / "a", std::string(1000, 'a'));
+  const UploadBody body(folder / "d");
+  test::write_file(folder / "d" / "a", "short");
+  const Error error = test::error_of([&] { read_all(body, 4096); });
+  EXPECT_THAT(error.what(), HasSubstr("shorter"));
+}
+
+}  // namespace
+}  // namespace isomesh
