@@ -198,11 +198,10 @@ TEST(Refusals, KeepTheServersCodeReasonAndFields) {
 TEST(Refusals, OfSomethingInFrontOfTheServerAreToldByTheirStatus) {
   const std::vector<std::pair<int, ErrorCode>> expectations = {
       {413, ErrorCode::kTooLarge},    {401, ErrorCode::kUnauthorized},
-      {403, ErrorCode::kForbidden},
-      {404, ErrorCode::kNotFound},    {502, ErrorCode::kUnreachable},
-      {503, ErrorCode::kUnavailable}, {504, ErrorCode::kUnreachable},
-      {507, ErrorCode::kOutOfSpace},  {302, ErrorCode::kInternal},
-      {500, ErrorCode::kInternal}};
+      {403, ErrorCode::kForbidden},   {404, ErrorCode::kNotFound},
+      {502, ErrorCode::kUnreachable}, {503, ErrorCode::kUnavailable},
+      {504, ErrorCode::kUnreachable}, {507, ErrorCode::kOutOfSpace},
+      {302, ErrorCode::kInternal},    {500, ErrorCode::kInternal}};
   for (const auto& [status, code] : expectations) {
     FakeServer server;
     server.http.Get("/v1/volumes",

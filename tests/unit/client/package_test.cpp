@@ -40,13 +40,16 @@ std::vector<std::pair<std::string, std::string>> members_of(const std::string& t
   ::archive_read_support_format_tar(reader);
   EXPECT_EQ(::archive_read_open_memory(reader, tar.data(), tar.size()), ARCHIVE_OK);
   archive_entry* entry = nullptr;
-  while (::archive_read_next_header(reader, &entry) == ARCHIVE_OK) {
+  int status = ARCHIVE_OK;
+  // A warning is a name that the test's locale cannot spell.
+  while ((status = ::archive_read_next_header(reader, &entry)) == ARCHIVE_OK ||
+         status == ARCHIVE_WARN) {
     std::string bytes(static_cast<std::size_t>(::archive_entry_size(entry)), '\0');
     EXPECT_EQ(::archive_read_data(reader, bytes.data(), bytes.size()),
               static_cast<la_ssize_t>(bytes.size()));
     members.emplace_back(::archive_entry_pathname_utf8(entry), bytes);
   }
-  EXPECT_EQ(::archive_errno(reader), 0);
+  EXPECT_EQ(status, ARCHIVE_EOF);
   ::archive_read_free(reader);
   return members;
 }
