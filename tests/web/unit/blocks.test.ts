@@ -61,12 +61,28 @@ describe('blocks', () => {
     expect(Math.max(...parts.map((part) => part.positions.length / 3))).toBeLessThanOrEqual(65_535);
   });
 
-  it('keeps the shape with a tenth of the triangles while it is turned', () => {
+  it('keeps shape and border with far fewer triangles while it is turned', () => {
     const whole = sheet(100);
-    const coarse = prepare(whole).coarse;
-    expect(coarse.length).toBeLessThan(whole.index.length / 8);
+    const { coarse, border } = prepare(whole);
+    expect(coarse.length).toBeLessThan(whole.index.length / 4);
     expect(area({ positions: whole.positions, index: coarse }) / area(whole)).toBeGreaterThan(0.85);
-    expect(clustered(whole, 0).length).toBe(whole.index.length);
+    const named = new Set(coarse);
+    expect([...border].every((vertex) => named.has(vertex))).toBe(true);
+    expect(clustered(whole, new Float32Array(whole.positions.length), border, 0).length).toBe(whole.index.length);
+  });
+
+  it('keeps both sides of a wall that is thinner than a cell', () => {
+    const front = sheet(40);
+    const vertices = front.positions.length / 3;
+    const back = front.positions.map((value, i) => (i % 3 === 2 ? value - 0.2 : value));
+    const wall: Triangles = {
+      positions: Float32Array.from([...front.positions, ...back]),
+      index: Uint32Array.from([...front.index, ...[...front.index].reverse().map((vertex) => vertex + vertices)]),
+    };
+    const { coarse } = prepare(wall);
+    const behind = [...coarse].filter((vertex) => vertex >= vertices).length;
+    expect(behind / coarse.length).toBeGreaterThan(0.4);
+    expect(behind / coarse.length).toBeLessThan(0.6);
   });
 
   it('has normals that point away from the outside of the winding', () => {

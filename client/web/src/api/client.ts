@@ -99,12 +99,30 @@ export function getJob(id: string, waitSeconds = 0, signal?: AbortSignal): Promi
   return json(`/v1/jobs/${encodeURIComponent(id)}${query}`, { signal });
 }
 
-export function submitJob(parameters: Partial<JobParameters>): Promise<Job> {
-  return json('/v1/jobs', {
-    method: 'POST',
-    headers: { 'Content-Type': 'application/json' },
-    body: JSON.stringify(parameters),
-  });
+// Not randomUUID, which browsers only have behind TLS.
+function randomKey(): string {
+  return [...crypto.getRandomValues(new Uint8Array(16))]
+    .map((byte) => byte.toString(16).padStart(2, '0'))
+    .join('');
+}
+
+const submitRetries = 3;
+
+// The key makes trying again safe: when only the answer was lost, it is the same job.
+export async function submitJob(parameters: Partial<JobParameters>): Promise<Job> {
+  const key = randomKey();
+  for (let attempt = 1; ; attempt += 1) {
+    try {
+      return await json<Job>('/v1/jobs', {
+        method: 'POST',
+        headers: { 'Content-Type': 'application/json', 'Idempotency-Key': key },
+        body: JSON.stringify(parameters),
+      });
+    } catch (error) {
+      if (attempt > submitRetries || !asApiError(error).isUnreachable) throw error;
+      await new Promise((resolve) => setTimeout(resolve, 500 * attempt));
+    }
+  }
 }
 
 export function cancelJob(id: string): Promise<Job> {

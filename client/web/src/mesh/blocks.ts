@@ -23,7 +23,7 @@ export interface Block {
 const mostVertices = 65_535;
 export const mostTriangles = 65_000;
 // Edge lengths that one cell of the coarse copy spans.
-const coarseness = 4;
+const coarseness = 3.5;
 
 // Sums of the triangles' normals times twice their area, three a vertex.
 export function areaNormals({ positions, index }: Triangles): Float32Array<ArrayBuffer> {
@@ -129,22 +129,30 @@ function meanEdge({ positions, index }: Triangles): number {
   return count > 0 ? sum / count : 0;
 }
 
-// The triangles that are left when all vertices of a cell of that size become the first of them.
-export function clustered({ positions, index }: Triangles, cell: number): Uint16Array<ArrayBuffer> {
+// The triangles that are left when the vertices of a cell of that size become one, apart for each
+// octant that their normals point into, so that both sides of a thin wall stay. Vertices on the border
+// stay as well: the neighbouring block goes on there.
+export function clustered(
+  { positions, index }: Triangles,
+  normals: Float32Array,
+  border: Uint16Array,
+  cell: number,
+): Uint16Array<ArrayBuffer> {
   if (!(cell > 0)) return Uint16Array.from(index);
   const first = new Map<number, number>();
   const heads = new Uint16Array(positions.length / 3);
+  // 15 bits an axis; cells that wrap around are too far apart to meet in a block.
+  const place = (at: number): number => Math.floor((positions[at] as number) / cell) & 0x7fff;
+  const side = (at: number): number => ((normals[at] as number) < 0 ? 1 : 0);
   for (let vertex = 0; vertex < heads.length; vertex += 1) {
-    // 17 bits an axis; cells that wrap around are too far apart to meet in a block.
-    const key =
-      ((Math.floor((positions[3 * vertex] as number) / cell) & 0x1_ffff) * 0x2_0000 +
-        (Math.floor((positions[3 * vertex + 1] as number) / cell) & 0x1_ffff)) *
-        0x2_0000 +
-      (Math.floor((positions[3 * vertex + 2] as number) / cell) & 0x1_ffff);
+    const at = 3 * vertex;
+    const octant = 4 * side(at) + 2 * side(at + 1) + side(at + 2);
+    const key = ((place(at) * 0x8000 + place(at + 1)) * 0x8000 + place(at + 2)) * 8 + octant;
     const head = first.get(key);
     if (head === undefined) first.set(key, vertex);
     heads[vertex] = head ?? vertex;
   }
+  for (const vertex of border) heads[vertex] = vertex;
   const kept = new Uint16Array(index.length);
   let used = 0;
   for (let i = 0; i + 2 < index.length; i += 3) {
@@ -211,7 +219,7 @@ export function prepare(triangles: Triangles): Block {
   return {
     positions,
     index: Uint16Array.from(index),
-    coarse: clustered(triangles, coarseness * meanEdge(triangles)),
+    coarse: clustered(triangles, sums, border, coarseness * meanEdge(triangles)),
     normals: packedNormals(sums),
     border,
     borderNormals,

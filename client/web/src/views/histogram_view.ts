@@ -13,7 +13,7 @@ const baseline = 82;
 export class HistogramView {
   readonly element: HTMLElement;
   private readonly line = svg('line', { class: 'iso-line', y1: 0, y2: baseline });
-  private readonly grip = svg('path', { class: 'iso-grip', d: 'M-5 0 H5 V8 L0 13 L-5 8 Z' });
+  private readonly grip = h('span', { class: 'iso-grip' });
   private readonly band = svg('rect', { class: 'window-band', y: 0, height: baseline });
   private readonly thumb: HTMLElement;
   // What is shown: outliers make most of some volumes' range, and are left out.
@@ -59,8 +59,8 @@ export class HistogramView {
           }),
         ),
         this.line,
-        this.grip,
       ),
+      this.grip,
       h(
         'div',
         { class: 'ticks', 'aria-hidden': 'true' },
@@ -80,7 +80,7 @@ export class HistogramView {
     const x = Math.max(0, Math.min(width, this.toX(iso)));
     this.line.setAttribute('x1', String(x));
     this.line.setAttribute('x2', String(x));
-    this.grip.setAttribute('transform', `translate(${x} 0)`);
+    this.grip.style.left = `${(100 * x) / width}%`;
     const left = Math.max(0, Math.min(width, this.toX(window[0])));
     const right = Math.max(0, Math.min(width, this.toX(window[1])));
     this.band.setAttribute('x', String(left));

@@ -210,16 +210,17 @@ function isSame(job: Job, variant: Partial<JobParameters>): boolean {
 }
 
 function copyButton(text: () => string): HTMLButtonElement {
-  const element = button('Copy', () => {
-    navigator.clipboard.writeText(text()).then(
-      () => {
-        element.textContent = 'Copied';
-        setTimeout(() => (element.textContent = 'Copy'), 1500);
-      },
-      // Without TLS there is no clipboard; the text can be selected.
-      () => tell('The browser does not allow copying here. Select the text instead.'),
-    );
-  });
+  const copy = async (): Promise<void> => {
+    try {
+      await navigator.clipboard.writeText(text());
+      element.textContent = 'Copied';
+      setTimeout(() => (element.textContent = 'Copy'), 1500);
+    } catch {
+      // Without TLS there is no clipboard.
+      tell('The browser does not allow copying here. Select the text instead.');
+    }
+  };
+  const element = button('Copy', () => void copy());
   return element;
 }
 

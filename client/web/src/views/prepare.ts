@@ -1,5 +1,5 @@
 // A volume and the iso-value to be chosen in it: #/volumes/ID.
-import { estimateOf, getVolume, histogramOf, submitJob } from '../api/client';
+import { estimateOf, getVolume, histogramOf, listJobs, submitJob } from '../api/client';
 import { asApiError, type ApiError } from '../api/problem';
 import type { Estimate, JobParameters, Vec3, Volume } from '../api/types';
 import { button, field, h, isTyping } from '../ui/dom';
@@ -13,12 +13,12 @@ import {
   formatValue,
 } from '../ui/format';
 import { refusal, tellError } from '../ui/notices';
-import { go, noteInAddress, type Route } from '../ui/route';
+import { go, hashOf, noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { cssColour, theme } from '../ui/theme';
 import { defaultWindow } from '../volume/histogram';
 import { volumeName } from '../volume/names';
-import { defaultParameters, memorable, parametersOfQuery, queryOfParameters } from '../volume/parameters';
+import { defaultParameters, inWords, memorable, parametersOfQuery, queryOfParameters } from '../volume/parameters';
 import { SliceSource, type Window } from '../volume/slices';
 import { HistogramView } from './histogram_view';
 import { parameterForm } from './parameter_form';
@@ -26,6 +26,7 @@ import { SliceView, type SliceHost } from './slice_view';
 
 const mostBins = 1024;
 const estimateDelay = 300;
+const shownSurfaces = 3;
 
 // NIfTI and DICOM scale whole samples to values that are not.
 function isInteger({ type, range }: Volume): boolean {
@@ -78,6 +79,7 @@ class Prepare {
   private readonly estimate = h('div', { class: 'estimate', 'aria-live': 'polite' });
   private readonly run: HTMLButtonElement;
   private readonly problem = h('div');
+  private readonly surfaces = h('div', { class: 'made' });
   private readonly windowText = h('span', { class: 'window-text faint' });
   private estimating: AbortController | null = null;
   private estimateTimer = 0;
@@ -120,6 +122,7 @@ class Prepare {
     });
     this.run = button('Make the surface', () => void this.start(), { class: 'primary' });
     this.element = this.layout(common);
+    this.showSurfaces();
     scope.onEnd(() => {
       clearTimeout(this.estimateTimer);
       this.estimating?.abort();
@@ -178,6 +181,7 @@ class Prepare {
             }),
             this.windowText,
           ),
+          this.surfaces,
         ),
       ),
       h(
@@ -207,6 +211,32 @@ class Prepare {
         this.problem,
         h('div', { class: 'run' }, this.run, h('span', { class: 'hint' }, 'Ctrl + Enter')),
       ),
+    );
+  }
+
+  // What was made of this volume lately, to go back to. Nothing is missed without it.
+  private showSurfaces(): void {
+    listJobs().then(
+      ({ jobs }) => {
+        const made = jobs.filter(({ volume, mesh }) => volume === this.volume.id && mesh).slice(0, shownSurfaces);
+        if (made.length === 0) return;
+        this.surfaces.replaceChildren(
+          h('h2', {}, 'Surfaces of it'),
+          h(
+            'ul',
+            {},
+            ...made.map(({ id, parameters }) =>
+              h(
+                'li',
+                {},
+                h('a', { href: hashOf(['jobs', id]) }, `iso ${parameters.iso === 'otsu' ? 'Otsu' : formatValue(parameters.iso)}`),
+                ` ${inWords(parameters)}`,
+              ),
+            ),
+          ),
+        );
+      },
+      () => undefined,
     );
   }
 
