@@ -1,5 +1,13 @@
 import './style/base.css';
-import './style/views.css';
+import './style/controls.css';
+import './style/shell.css';
+import './style/common.css';
+import './style/volumes.css';
+import './style/prepare.css';
+import './style/surface.css';
+import './style/jobs.css';
+import './style/compare.css';
+import './style/small.css';
 import { connected, isAlive } from './api/client';
 import { ApiError, asApiError } from './api/problem';
 import { button, h, icon, isTyping } from './ui/dom';
