@@ -14,11 +14,18 @@ using testing::HasSubstr;
 
 class Folder : public FaultTest {
  protected:
-  void run_sql(const std::string& sql) {
+  // Returns the first column of the last row.
+  std::string run_sql(const std::string& sql) {
     sqlite3* handle = nullptr;
+    std::string answer;
+    const auto take = [](void* text, int, char** columns, char**) {
+      *static_cast<std::string*>(text) = columns[0];
+      return 0;
+    };
     sqlite3_open((folder_ / "data/isomesh.sqlite").c_str(), &handle);
-    EXPECT_EQ(sqlite3_exec(handle, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(handle, sql.c_str(), take, &answer, nullptr), SQLITE_OK);
     sqlite3_close(handle);
+    return answer;
   }
 };
 
@@ -26,11 +33,12 @@ TEST_F(Folder, OfANewerVersionIsRefusedAndLeftAsItIs) {
   start();
   small_volume();
   EXPECT_EQ(daemon().stop(), 0);
+  const std::string version = run_sql("PRAGMA user_version");
   run_sql("PRAGMA user_version=99");
   const Finished refused = run({ISOMESHD, "--data", folder_ / "data", "--listen", "127.0.0.1:0"});
   EXPECT_EQ(refused.status, 1);
   EXPECT_THAT(refused.errors, HasSubstr("newer isomeshd"));
-  run_sql("PRAGMA user_version=1");
+  run_sql("PRAGMA user_version=" + version);
   start();
   EXPECT_EQ(daemon().client().volumes().size(), 1U);
 }
