@@ -76,7 +76,7 @@ TEST_F(JobsTest, AnIdempotencyKeyMakesARetrySafe) {
   EXPECT_EQ(job_from_json(again.body).id, first.id);
   EXPECT_TRUE(is_problem(post_with("\"passes\": 1", key), ErrorCode::kKeyReused));
   EXPECT_NE(job_from_json(post_with("\"passes\": 1").body).id, first.id);
-  for (const std::string wrong : {"a b", "", std::string(256, 'k').c_str()}) {
+  for (const std::string& wrong : {std::string("a b"), std::string(256, 'k')}) {
     EXPECT_TRUE(blames(post_with("", {{"Idempotency-Key", wrong}}), "Idempotency-Key"));
   }
 }
