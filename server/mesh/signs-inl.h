@@ -51,7 +51,7 @@ inline std::uint8_t pack_byte(const std::uint8_t* flags) {
 
 // The signs of up to 64 samples; bits beyond `count` are zero.
 template <class T>
-Word classify_word(const T* samples, std::size_t count, T smallest) {
+HWY_INLINE Word classify_word(const T* samples, std::size_t count, T smallest) {
   std::array<std::uint8_t, kWordBits> flags = {};
   if (count == kWordBits) {  // a constant count, which the compiler turns into wide compares
     for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = samples[x] >= smallest ? 1 : 0;

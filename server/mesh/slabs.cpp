@@ -163,6 +163,7 @@ class SlabWriter {
   // A flat list, because how many a sample has is hard to predict: loops over it are not.
   void find_crossings(std::uint32_t y, std::uint32_t z) {
     const CellRow row = signs_.row(y, z);
+    const unsigned row_parity = extraction_.parity(0, y, z);
     WordCells* cells = rows_.cells(y, z);
     std::uint32_t* next = crossings_.data();
     for (std::size_t w = 0; w < rows_.words(); ++w) {
@@ -177,7 +178,7 @@ class SlabWriter {
         const auto bit = static_cast<unsigned>(std::countr_zero(owners));
         const std::size_t x = w * kWordBits + bit;
         const unsigned directions =
-            extraction_.splits[extraction_.parity(x, y, z)].crossed[cells[w].cases[bit]] &
+            extraction_.splits[(x + row_parity) & 1].crossed[cells[w].cases[bit]] &
             row.existing_at(x);
         // All eight places of the list are written, and only the valid ones kept.
         const auto& members = kMembers[directions];
@@ -192,7 +193,7 @@ class SlabWriter {
 
   // Places the vertices of the row's crossings, the first of which is `vertex`.
   void place_vertices(std::uint32_t y, std::uint32_t z, std::uint32_t vertex) const {
-    if (extraction_.margin == 0) return place_inner(0, crossings_found_, y, z, vertex);
+    if (extraction_.margin == 0) return place_inner<0>(0, crossings_found_, y, z, vertex);
     // Edges that lie in a face of the volume's box or leave it have samples here as their owners.
     const auto is_at_border = [](std::uint32_t at, std::uint32_t samples) {
       return at <= 1 || at + 2 >= samples;
@@ -206,30 +207,32 @@ class SlabWriter {
       while (begin < end && is_at_border(crossings_[end - 1] / kPlaces, dims_.x)) --end;
     }
     place_at_border(0, begin, y, z, vertex);
-    place_inner(begin, end, y, z, vertex);
+    place_inner<1>(begin, end, y, z, vertex);
     place_at_border(end, crossings_found_, y, z, vertex);
   }
 
   // Those of the crossings [begin, end), of edges between the lattice's own samples.
+  template <std::uint32_t kMargin>
   void place_inner(std::size_t begin, std::size_t end, std::uint32_t y, std::uint32_t z,
                    std::uint32_t vertex) const {
     if (begin == end) return;
     const LatticeToSpace& map = lattice_.to_space;
-    const std::uint32_t margin = extraction_.margin;
-    const T* samples = lattice_.samples - margin +
-                       (std::size_t{z - margin} * lattice_.dims.y + (y - margin)) * lattice_.dims.x;
+    const T* samples =
+        lattice_.samples - kMargin +
+        (std::size_t{z - kMargin} * lattice_.dims.y + (y - kMargin)) * lattice_.dims.x;
     const Double4 row_at =
-        lanes(map.origin) + lanes(map.step_y) * (y - margin) + lanes(map.step_z) * (z - margin);
+        lanes(map.origin) + lanes(map.step_y) * (y - kMargin) + lanes(map.step_z) * (z - kMargin);
     const Double4 step_x = lanes(map.step_x);
+    const unsigned row_parity = extraction_.parity(0, y, z);
     Vec3* out = mesh_.positions.data() + vertex;
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t crossing = crossings_[i];
       const std::uint32_t x = crossing / kPlaces;
-      const EdgeFrame& edge = frames_[extraction_.parity(x, y, z)][crossing % kPlaces];
+      const EdgeFrame& edge = frames_[(x + row_parity) & 1][crossing % kPlaces];
       const double share =
           extraction_.placement.share(samples[x + edge.from], samples[x + edge.to]);
       const Double4 at =
-          row_at + step_x * static_cast<double>(static_cast<std::int32_t>(x - margin));
+          row_at + step_x * static_cast<double>(static_cast<std::int32_t>(x - kMargin));
       const Float4 position = __builtin_convertvector(at + edge.start + edge.run * share, Float4);
       std::memcpy(out + i, &position, sizeof *out);
     }
@@ -256,12 +259,12 @@ class SlabWriter {
     const std::uint32_t* indices = rows_.indices(y, z);
     const WordCells* cells = rows_.cells(y, z);
     const auto offsets = index_offsets(y, z);
+    const unsigned row_parity = extraction_.parity(0, y, z);
     for (std::size_t w = 0; w < rows_.words(); ++w) {
       for (Word rest = cells[w].crossed; rest != 0; rest &= rest - 1) {
         const auto bit = static_cast<unsigned>(std::countr_zero(rest));
         const std::size_t x = w * kWordBits + bit;
-        const CellCase& cell =
-            extraction_.splits[extraction_.parity(x, y, z)].cases[cells[w].cases[bit]];
+        const CellCase& cell = extraction_.splits[(x + row_parity) & 1].cases[cells[w].cases[bit]];
         const std::uint32_t* places = indices + x * kPlaces;
         for (std::size_t t = 0; t < cell.triangles; ++t) {
           const auto& [a, b, c] = cell.edges[t];

@@ -27,6 +27,8 @@ using test::decode_in_process;
 using test::DecodedMesh;
 using test::encoded;
 using test::expect_same_mesh;
+using test::Grid;
+using test::grid_of;
 
 class Drc : public testing::TestWithParam<DracoParameters> {};
 

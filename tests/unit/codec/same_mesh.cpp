@@ -11,15 +11,6 @@
 #include <gtest/gtest.h>
 
 namespace isomesh::test {
-namespace {
-
-// The grid that the header promises: it starts at the mesh's lowest corner and its cube's side is
-// the mesh's longest extent.
-struct Grid {
-  std::array<double, 3> low = {};
-  double step = 0;
-  double float_error = 0;  // what single precision costs, which counts from 20 bits on
-};
 
 Grid grid_of(const mesh::Mesh& mesh, int position_bits) {
   Grid grid;
@@ -40,6 +31,8 @@ Grid grid_of(const mesh::Mesh& mesh, int position_bits) {
   grid.float_error = 4 * (largest + side) * std::numeric_limits<float>::epsilon();
   return grid;
 }
+
+namespace {
 
 // A triangle by where its corners lie, from the smallest one on in its own sense of rotation.
 using Place = std::array<float, 3>;

@@ -47,9 +47,9 @@ TEST_F(EstimateTest, CountsWhatTheJobMakes) {
 TEST_F(EstimateTest, CountsTheCapsOfASurfaceThatIsClosed) {
   const Volume volume = add(test::constant<std::uint8_t>(7, {5, 4, 3}), SampleType::kUint8);
   JobParameters parameters = parameters_of(volume, 7);
-  EXPECT_EQ(estimator_.estimate(parameters).triangles, 0U);
+  EXPECT_EQ(estimator_.estimate("", parameters).triangles, 0U);
   parameters.close = true;
-  const Estimate estimate = estimator_.estimate(parameters);
+  const Estimate estimate = estimator_.estimate("", parameters);
   const Job job = run(parameters);
   ASSERT_TRUE(job.mesh);
   EXPECT_GT(estimate.triangles, 0U);
