@@ -387,7 +387,11 @@ TEST_P(CloseShape, ABoxWithATunnel) {
     return std::hypot(p[0] - 0.03, p[1] + 0.02) - radius;
   };
   const double disc = std::numbers::pi * radius * radius;
-  expect_quadratic(outside_of_cylinder, 24 - 2 * disc + 4 * disc / radius, 8 - 2 * disc, 0);
+  // The errors of the discs and of the tunnel's wall nearly cancel, so they show no order.
+  const test::ExtentFacts extent = closed_extent(outside_of_cylinder, 49, 0);
+  const double area = 24 - 2 * disc + 4 * disc / radius;
+  EXPECT_NEAR(extent.area, area, 2e-3 * area);
+  EXPECT_NEAR(extent.volume, 8 - 2 * disc, 2e-3 * 8);
 }
 
 // Gyroid and noise have no simple numbers, but a surface without a boundary has an even Euler
