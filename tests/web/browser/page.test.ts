@@ -5,7 +5,10 @@ import type { Browser, Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from 'vitest';
 import {
   ballNrrd,
+  brain,
+  contourPixels,
   Daemon,
+  drop,
   noiseNrrd,
   openPage,
   silhouette,
@@ -13,8 +16,6 @@ import {
   surfaceLoaded,
   type JobAnswer,
 } from './support';
-
-const brain = '/usr/share/mricron/templates/ch2.nii.gz';
 
 let browser: Browser;
 let daemon: Daemon;
@@ -40,18 +41,6 @@ afterEach(async () => {
   expect(faults).toEqual([]);
 });
 
-// As if files were dropped from the system.
-async function drop(files: { name: string; bytes: Buffer }[]): Promise<void> {
-  const transfer = await page.evaluateHandle((given) => {
-    const made = new DataTransfer();
-    for (const { name, text } of given) {
-      made.items.add(new File([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))], name));
-    }
-    return made;
-  }, files.map(({ name, bytes }) => ({ name, text: bytes.toString('base64') })));
-  await page.dispatchEvent('.drop', 'drop', { dataTransfer: transfer });
-}
-
 function query(): URLSearchParams {
   return new URLSearchParams(new URL(page.url()).hash.split('?')[1] ?? '');
 }
@@ -61,34 +50,20 @@ async function job(): Promise<JobAnswer> {
   return daemon.json(`/v1/jobs/${id}`);
 }
 
-// Pixels of a slice that have the contour's colour.
-function contourPixels(plane: string): Promise<number> {
-  return page.evaluate((name) => {
-    const canvas = document.querySelector<HTMLCanvasElement>(`[data-plane=${name}] canvas`);
-    const pixels = canvas?.getContext('2d')?.getImageData(0, 0, canvas.width, canvas.height).data ?? [];
-    let count = 0;
-    for (let i = 0; i < pixels.length; i += 4) {
-      // Grey has equal parts; the contour is green and blue.
-      if ((pixels[i + 1] ?? 0) - (pixels[i] ?? 0) > 60) count += 1;
-    }
-    return count;
-  }, plane);
-}
-
 describe('a real volume', () => {
   it('is dropped, looked at, meshed, turned, downloaded, and still there after a reload', async () => {
     await page.goto(daemon.url);
-    await drop([{ name: 'ch2.nii.gz', bytes: readFileSync(brain) }]);
+    await drop(page, [{ name: 'ch2.nii.gz', bytes: readFileSync(brain) }]);
     await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
-    await expect.poll(() => contourPixels('axial')).toBeGreaterThan(200);
+    await expect.poll(() => contourPixels(page, 'axial')).toBeGreaterThan(200);
 
     // The line moves by keyboard and by pointer; contour, address and estimate go with it.
     const line = page.getByRole('slider', { name: 'Iso-value' });
     await line.focus();
-    const before = await contourPixels('axial');
+    const before = await contourPixels(page, 'axial');
     await page.keyboard.press('Shift+ArrowRight');
     await page.keyboard.press('Shift+ArrowRight');
-    await expect.poll(() => contourPixels('axial')).not.toBe(before);
+    await expect.poll(() => contourPixels(page, 'axial')).not.toBe(before);
     const byKeys = Number(query().get('iso'));
     const box = await line.boundingBox();
     if (!box) throw new Error('the histogram is not shown');
@@ -142,7 +117,7 @@ describe('a real volume', () => {
     expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
     await page.goBack();
     await page.waitForURL(/#\/volumes\//);
-    await expect.poll(() => contourPixels('sagittal')).toBeGreaterThan(200);
+    await expect.poll(() => contourPixels(page, 'sagittal')).toBeGreaterThan(200);
     expect(query().get('iso')).toBe('60');
   });
 });
@@ -274,31 +249,6 @@ describe('a job', () => {
     } finally {
       await other.remove();
     }
-  });
-});
-
-describe('a refused file', () => {
-  it('says why, and what to do next', async () => {
-    await page.goto(daemon.url);
-    const whole = readFileSync(brain);
-    await drop([{ name: 'half.nii.gz', bytes: whole.subarray(0, whole.length / 2) }]);
-    await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/\w{4}/);
-    expect(await page.locator('.refusal .advice').innerText()).not.toBe('');
-    await page.getByRole('button', { name: 'Choose another' }).click();
-    await expect.poll(() => page.getByRole('button', { name: 'Choose files' }).isVisible()).toBe(true);
-  });
-
-  it('that holds raw samples is taken with a description', async () => {
-    await page.goto(daemon.url);
-    await drop([{ name: 'samples.raw', bytes: ballNrrd(20, 7).subarray(-8000) }]);
-    const submit = page.getByRole('button', { name: 'Upload as raw samples' });
-    await expect.poll(() => submit.count()).toBe(1);
-    expect(await submit.isDisabled()).toBe(true);
-    for (const axis of ['x', 'y', 'z']) await page.getByLabel(`Samples along ${axis}`).fill('20');
-    await page.getByLabel('Type').selectOption('uint8');
-    await submit.click();
-    await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
-    await expect.poll(() => contourPixels('coronal')).toBeGreaterThan(50);
   });
 });
 

@@ -7,9 +7,8 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { encodePng } from './png';
-import { Daemon, openPage, silhouette, startBrowser, surfaceLoaded } from './support';
+import { brain, Daemon, openPage, silhouette, startBrowser, surfaceLoaded } from './support';
 
-const brain = '/usr/share/mricron/templates/ch2.nii.gz';
 const head = '/usr/share/doc/invesalius-examples/examples/Cranium.inv3';
 const mostBytes = 150_000;
 

@@ -1,11 +1,14 @@
 // A daemon of the test's own and Chromium in front of it.
-import { spawn, type ChildProcess } from 'node:child_process';
+import { execFileSync, spawn, type ChildProcess } from 'node:child_process';
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { createInterface } from 'node:readline';
 import { chromium, type Browser, type Locator, type Page } from 'playwright-core';
 import { expect } from 'vitest';
+
+// The head of one person in magnetic resonance, of Debian's mricron-data.
+export const brain = '/usr/share/mricron/templates/ch2.nii.gz';
 
 function fromEnvironment(name: string): string {
   const value = process.env[name];
@@ -20,10 +23,13 @@ export class Daemon {
     readonly url: string,
   ) {}
 
-  static async start(data = mkdtempSync(join(tmpdir(), 'isomesh-web-')), listen = '127.0.0.1:0'): Promise<Daemon> {
-    const child = spawn(fromEnvironment('ISOMESHD'), ['--listen', listen, '--data', data, '--log-level', 'error'], {
-      stdio: ['ignore', 'pipe', 'inherit'],
-    });
+  static async start(
+    data = mkdtempSync(join(tmpdir(), 'isomesh-web-')),
+    listen = '127.0.0.1:0',
+    more: string[] = [],
+  ): Promise<Daemon> {
+    const options = ['--listen', listen, '--data', data, '--log-level', 'error', ...more];
+    const child = spawn(fromEnvironment('ISOMESHD'), options, { stdio: ['ignore', 'pipe', 'inherit'] });
     const line = await new Promise<string>((resolve, reject) => {
       createInterface({ input: child.stdout }).once('line', resolve);
       child.once('error', reject);
@@ -59,6 +65,11 @@ export class Daemon {
   submit(parameters: Record<string, unknown>, waitSeconds = 0): Promise<JobAnswer> {
     return this.json(`/v1/jobs?wait=${waitSeconds}`, { method: 'POST', body: JSON.stringify(parameters) });
   }
+}
+
+// A new token, whose hash is in that file then.
+export function makeToken(file: string): string {
+  return execFileSync(fromEnvironment('ISOMESHD'), ['token', 'page', '--into', file]).toString().trim();
 }
 
 export interface JobAnswer {
@@ -154,6 +165,32 @@ function nrrdHeader(size: number): string {
     '',
     '',
   ].join('\n');
+}
+
+// As if files were dropped from the system.
+export async function drop(page: Page, files: { name: string; bytes: Buffer }[]): Promise<void> {
+  const transfer = await page.evaluateHandle((given) => {
+    const made = new DataTransfer();
+    for (const { name, text } of given) {
+      made.items.add(new File([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))], name));
+    }
+    return made;
+  }, files.map(({ name, bytes }) => ({ name, text: bytes.toString('base64') })));
+  await page.dispatchEvent('.drop', 'drop', { dataTransfer: transfer });
+}
+
+// Pixels of a slice that have the contour's colour.
+export function contourPixels(page: Page, plane: string): Promise<number> {
+  return page.evaluate((name) => {
+    const canvas = document.querySelector<HTMLCanvasElement>(`[data-plane=${name}] canvas`);
+    const pixels = canvas?.getContext('2d')?.getImageData(0, 0, canvas.width, canvas.height).data ?? [];
+    let count = 0;
+    for (let i = 0; i < pixels.length; i += 4) {
+      // Grey has equal parts; the contour is green and blue.
+      if ((pixels[i + 1] ?? 0) - (pixels[i] ?? 0) > 60) count += 1;
+    }
+    return count;
+  }, plane);
 }
 
 export interface Silhouette {

@@ -1,0 +1,157 @@
+// What comes in: several files, refused ones, and those of people with a token.
+import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import type { Browser, Page } from 'playwright-core';
+import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from 'vitest';
+import {
+  ballNrrd,
+  brain,
+  contourPixels,
+  Daemon,
+  drop,
+  makeToken,
+  openPage,
+  startBrowser,
+  surfaceLoaded,
+} from './support';
+
+let browser: Browser;
+let daemon: Daemon;
+let page: Page;
+let faults: string[];
+
+beforeAll(async () => {
+  browser = await startBrowser();
+  daemon = await Daemon.start();
+});
+
+afterAll(async () => {
+  await browser?.close();
+  await daemon?.remove();
+});
+
+beforeEach(async () => {
+  ({ page, faults } = await openPage(browser, daemon.url));
+});
+
+afterEach(async () => {
+  await page.close();
+  expect(faults).toEqual([]);
+});
+
+describe('several files', () => {
+  it('are packed in the browser and come as one volume', async () => {
+    await page.goto(daemon.url);
+    const header = [
+      'ObjectType = Image',
+      'NDims = 3',
+      'DimSize = 20 20 20',
+      'ElementSpacing = 1 1 2',
+      'ElementType = MET_UCHAR',
+      'ElementDataFile = ball.raw',
+      '',
+    ].join('\n');
+    await drop(page, [
+      { name: 'ball.mhd', bytes: Buffer.from(header) },
+      { name: 'ball.raw', bytes: ballNrrd(20, 7).subarray(-8000) },
+    ]);
+    await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
+    expect(await page.locator('.facts').innerText()).toMatch(/MetaImage.*20 \u00d7 20 \u00d7 20.*1 \u00d7 1 \u00d7 2 mm/);
+  });
+
+  it('of more than one series let a person choose', async () => {
+    // The daemon's own tests hold real series; here it matters what the page does with the refusal.
+    const asked: string[] = [];
+    await page.route('**/v1/volumes*', async (route) => {
+      const url = new URL(route.request().url());
+      if (route.request().method() !== 'POST') return route.continue();
+      asked.push(url.searchParams.get('series') ?? '');
+      if (url.searchParams.has('series')) return route.continue({ url: `${daemon.url}/v1/volumes` });
+      return route.fulfill({
+        status: 422,
+        contentType: 'application/problem+json',
+        body: JSON.stringify({
+          type: 'urn:isomesh:problem:unusable-volume',
+          title: 'Unusable volume',
+          status: 422,
+          detail: 'the upload holds 2 series',
+          errors: [
+            { field: 'series', message: '1.2.840.1 "head", 93 slices' },
+            { field: 'series', message: '1.2.840.2 "chest", 40 slices' },
+          ],
+        }),
+      });
+    });
+    await page.goto(daemon.url);
+    await drop(page, [{ name: 'study.nrrd', bytes: ballNrrd(16, 5, 3) }]);
+    const choice = page.getByLabel('Series to read');
+    await choice.selectOption({ label: '1.2.840.2 "chest", 40 slices' });
+    await page.getByRole('button', { name: 'Upload this series' }).click();
+    await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
+    expect(asked).toEqual(['', '1.2.840.2']);
+  });
+});
+
+describe('a server with tokens', () => {
+  it('is entered with one, and with none but one', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'isomesh-tokens-'));
+    const file = join(folder, 'tokens');
+    const token = makeToken(file);
+    const guarded = await Daemon.start(undefined, '127.0.0.1:0', ['--tokens', file]);
+    try {
+      const { page: mine, faults: none } = await openPage(browser, guarded.url);
+      await mine.goto(guarded.url);
+      const field = mine.getByLabel('Token', { exact: true }).and(mine.locator('input'));
+      await field.fill('wrong');
+      await mine.getByRole('button', { name: 'Continue' }).click();
+      await expect.poll(() => mine.locator('dialog').innerText()).toMatch(/not valid/);
+      await field.fill(token);
+      await mine.getByRole('button', { name: 'Continue' }).click();
+      await expect.poll(() => mine.getByRole('button', { name: 'Choose files' }).isVisible()).toBe(true);
+
+      // Slices, meshes and downloads go with it too.
+      await mine.setInputFiles('[data-pick=files]', { name: 'ball.nrrd', mimeType: '', buffer: ballNrrd(24, 8) });
+      await mine.waitForURL(/#\/volumes\//);
+      await mine.keyboard.press('Control+Enter');
+      await mine.waitForURL(/#\/jobs\//);
+      await surfaceLoaded(mine);
+      const download = mine.waitForEvent('download');
+      await mine.locator('[data-format=glb]').click();
+      expect(readFileSync(await (await download).path()).subarray(0, 4).toString()).toBe('glTF');
+      await mine.reload();
+      await surfaceLoaded(mine);
+      expect(mine.url()).not.toContain(token);
+      await mine.close();
+      expect(none).toEqual([]);
+    } finally {
+      await guarded.remove();
+      rmSync(folder, { recursive: true });
+    }
+  });
+});
+
+describe('a refused file', () => {
+  it('says why, and what to do next', async () => {
+    await page.goto(daemon.url);
+    const whole = readFileSync(brain);
+    await drop(page, [{ name: 'half.nii.gz', bytes: whole.subarray(0, whole.length / 2) }]);
+    await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/\w{4}/);
+    expect(await page.locator('.refusal .advice').innerText()).not.toBe('');
+    await page.getByRole('button', { name: 'Choose another' }).click();
+    await expect.poll(() => page.getByRole('button', { name: 'Choose files' }).isVisible()).toBe(true);
+  });
+
+  it('that holds raw samples is taken with a description', async () => {
+    await page.goto(daemon.url);
+    await drop(page, [{ name: 'samples.raw', bytes: ballNrrd(20, 7).subarray(-8000) }]);
+    const submit = page.getByRole('button', { name: 'Upload as raw samples' });
+    await expect.poll(() => submit.count()).toBe(1);
+    expect(await submit.isDisabled()).toBe(true);
+    for (const axis of ['x', 'y', 'z']) await page.getByLabel(`Samples along ${axis}`).fill('20');
+    await page.getByLabel('Type').selectOption('uint8');
+    await submit.click();
+    await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
+    await expect.poll(() => contourPixels(page, 'coronal')).toBeGreaterThan(50);
+  });
+});
