@@ -195,10 +195,7 @@ class Prepare {
             'div',
             { class: 'presets', role: 'group', 'aria-label': 'Presets' },
             ...presets.map(({ name, iso }) =>
-              button(name, () => this.setIso(iso), {
-                class: 'chip',
-                title: `${name}: ${formatValue(iso)}`,
-              }),
+              button(`${name} ${formatValue(iso)}`, () => this.setIso(iso), { class: 'chip' }),
             ),
           ),
         ),
