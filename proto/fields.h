@@ -92,6 +92,8 @@ void visit(Is<JobParameters> auto& self, auto&& field) {
   field("passes", self.passes);
   field("smoothing", self.smoothing);
   field("lambda", self.lambda);
+  field("pass_band", self.pass_band);
+  field("max_displacement_mm", self.max_displacement_mm);
   field("close", self.close);
   field("components", self.components);
   field("formats", self.formats);
@@ -146,6 +148,11 @@ void visit(Is<MeshQuality> auto& self, auto&& field) {
   field("smallest_angle_deg", self.smallest_angle_deg);
 }
 
+void visit(Is<MeshSummary::Displacement> auto& self, auto&& field) {
+  field("mean", self.mean);
+  field("max", self.max);
+}
+
 void visit(Is<MeshSummary> auto& self, auto&& field) {
   field("triangles", self.triangles);
   field("vertices", self.vertices);
@@ -155,7 +162,9 @@ void visit(Is<MeshSummary> auto& self, auto&& field) {
   field("dropped", self.dropped);
   field("quality", self.quality);
   field("area_mm2", self.area_mm2);
+  field("area_extracted_mm2", self.area_extracted_mm2);
   field("volume_mm3", self.volume_mm3);
+  field("displacement_mm", self.displacement_mm);
   field("bounds", self.bounds);
   field("files", self.files);
 }

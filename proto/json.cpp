@@ -24,14 +24,11 @@ Json write_optional(const std::optional<T>& value) {
   return value ? write(*value) : Json(nullptr);
 }
 
-// An empty iso-value in the parameters means "let Otsu choose".
-void write_field(Json& object, const char* name, const std::optional<double>& iso) {
-  object[name] = iso ? Json(*iso) : Json("otsu");
-}
-
 template <class T>
 void write_field(Json& object, const char* name, const std::optional<T>& value) {
-  object[name] = write_optional(value);
+  // An empty iso-value in the parameters means "let Otsu choose".
+  const bool is_otsu = !value && std::string_view(name) == "iso";
+  object[name] = is_otsu ? Json("otsu") : write_optional(value);
 }
 
 template <class T>

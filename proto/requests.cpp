@@ -55,12 +55,11 @@ class RequestReader {
     value = json.get<std::string>();
   }
 
-  void read_member(const Json& json, const std::string& name, std::optional<double>& iso) {
-    if (json == "otsu") return iso.reset();
-    if (!json.is_number() || !std::isfinite(json.get<double>())) {
-      return add(name, "must be a finite number or \"otsu\"");
-    }
-    iso = json.get<double>();
+  void read_member(const Json& json, const std::string& name, std::optional<double>& value) {
+    if (json == (name == "iso" ? Json("otsu") : Json(nullptr))) return value.reset();
+    double number = 0;
+    read_member(json, name, number);
+    value = number;
   }
 
   void read_member(const Json& json, const std::string& name, Scheme& value) {
@@ -90,11 +89,19 @@ class RequestReader {
     value = static_cast<int>(json.get<double>());
   }
 
-  void read_member(const Json& json, const std::string& name, double& lambda) {
-    if (!json.is_number() || !(json.get<double>() > 0 && json.get<double>() <= 1)) {
-      return add(name, "must be a number above 0 and at most 1");
+  void read_member(const Json& json, const std::string& name, double& value) {
+    const double number = json.is_number() ? json.get<double>() : std::nan("");
+    if (name == "lambda" && !(number > 0 && number <= 1)) {
+      add(name, "must be a number above 0 and at most 1");
+    } else if (name == "pass_band" && !(number > 0 && number <= 0.5)) {
+      add(name, "must be a number above 0 and at most 0.5");
+    } else if (name == "max_displacement_mm" && !(std::isfinite(number) && number >= 0)) {
+      add(name, "must be a finite number of at least 0");
+    } else if (!std::isfinite(number)) {
+      add(name, "must be a finite number or \"otsu\"");  // the iso-value
+    } else {
+      value = number;
     }
-    lambda = json.get<double>();
   }
 
   void read_member(const Json& json, const std::string& name, bool& value) {
@@ -175,7 +182,13 @@ JobParameters read_parameters(const Json& json, bool with_volume, RequestReader&
   reader.read_object(json, parameters, "");
   if (with_volume && !json.contains("volume")) reader.add("volume", "is required");
   if (!json.contains("iso")) reader.add("iso", "is required");
+  // With more, what varies fastest would grow with every pass, whatever the pass-band.
+  constexpr double kMostOfTaubin = 0.66;
+  if (parameters.smoothing == Smoothing::kTaubin && parameters.lambda > kMostOfTaubin) {
+    reader.add("lambda", "must be at most 0.66 for \"taubin\"");
+  }
   reader.throw_if_any();
+  if (!parameters.lambda) parameters.lambda = default_lambda(parameters.smoothing);
   return parameters;
 }
 

@@ -138,7 +138,9 @@ struct JobParameters {
   Interpolation interpolation = Interpolation::kLinear;
   int passes = 5;
   Smoothing smoothing = Smoothing::kLaplacian;
-  double lambda = 1;
+  std::optional<double> lambda;               // empty: default_lambda(smoothing)
+  double pass_band = 0.1;                     // of Taubin's smoothing
+  std::optional<double> max_displacement_mm;  // empty: no vertex is held back
   bool close = false;
   ComponentFilter components;
   std::vector<MeshFormat> formats = {MeshFormat::kDrc};
@@ -148,6 +150,9 @@ struct JobParameters {
 
   bool operator==(const JobParameters&) const = default;
 };
+
+// The share of the way to the mean of its neighbours that a vertex goes, unless the client says.
+double default_lambda(Smoothing smoothing);
 
 enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };
 enum class Stage { kQueue, kLoad, kExtract, kSmooth, kEncode, kDone };
@@ -227,6 +232,14 @@ struct MeshSummary {
     bool operator==(const Dropped&) const = default;
   };
 
+  // How far smoothing moved the vertices.
+  struct Displacement {
+    double mean = 0;
+    double max = 0;
+
+    bool operator==(const Displacement&) const = default;
+  };
+
   std::uint64_t triangles = 0;
   std::uint64_t vertices = 0;
   std::uint64_t boundary_edges = 0;
@@ -235,7 +248,9 @@ struct MeshSummary {
   Dropped dropped;
   MeshQuality quality;
   double area_mm2 = 0;
+  double area_extracted_mm2 = 0;
   Enclosed volume_mm3;
+  Displacement displacement_mm;
   std::array<std::array<double, 3>, 2> bounds = {};  // smallest and largest corner; 0 when empty
   std::map<MeshFormat, MeshFile> files;
 

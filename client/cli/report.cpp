@@ -73,9 +73,12 @@ std::string mesh_report(const MeshSummary& mesh) {
                {"boundary edges", count(mesh.boundary_edges)},
                {"components", count(mesh.components)},
                {"Euler number", count(mesh.euler)},
-               {"area", fixed(mesh.area_mm2, 1) + " mm²"},
+               {"area", fixed(mesh.area_extracted_mm2, 1) + " mm² extracted"},
+               {"", fixed(mesh.area_mm2, 1) + " mm² smoothed"},
                {"volume", fixed(mesh.volume_mm3.extracted, 1) + " mm³ extracted"},
                {"", fixed(mesh.volume_mm3.smoothed, 1) + " mm³ smoothed"},
+               {"displacement", fixed(mesh.displacement_mm.mean, 3) + " mm on average, " +
+                                    fixed(mesh.displacement_mm.max, 3) + " mm at most"},
                {"x (LPS)", extent(mesh, 0)},
                {"y", extent(mesh, 1)},
                {"z", extent(mesh, 2)}};

@@ -9,7 +9,6 @@
 #include <httplib.h>
 #include <openssl/evp.h>
 
-#include "server/jobs/pipeline.h"
 #include "server/store/files.h"
 
 namespace isomesh::http {
@@ -106,19 +105,6 @@ void check_known(const httplib::Request& request, const std::set<std::string>& k
     }
   }
   if (!errors.empty()) throw invalid_parameters(std::move(errors));
-}
-
-JobParameters job_parameters_of(const std::vector<std::pair<std::string, std::string>>& query,
-                                VolumeIn volume_in) {
-  JobParameters parameters = parse_job_parameters(query, volume_in);
-  try {
-    jobs::check_supported(parameters);
-  } catch (const Error& error) {
-    std::vector<FieldError> fields = error.fields();
-    for (FieldError& field : fields) field.field = spelled_in_query(field.field);
-    throw invalid_parameters(std::move(fields));
-  }
-  return parameters;
 }
 
 std::chrono::milliseconds wait_of(const httplib::Request& request) {

@@ -28,11 +28,6 @@ std::vector<std::pair<std::string, std::string>> query_of(const httplib::Request
 // Refuses parameters that are not among `known`.
 void check_known(const httplib::Request& request, const std::set<std::string>& known);
 
-// A job's parameters from a query, as parse_job_parameters (proto/json.h) reads them; refuses also
-// what this version does not serve.
-JobParameters job_parameters_of(const std::vector<std::pair<std::string, std::string>>& query,
-                                VolumeIn volume_in);
-
 // How long the answer may wait: `?wait=N` or `Prefer: wait=N` in seconds, at most 30.
 std::chrono::milliseconds wait_of(const httplib::Request& request);
 

@@ -4,7 +4,6 @@
 #include "server/http/request.h"
 #include "server/http/routes.h"
 #include "server/http/upload.h"
-#include "server/jobs/pipeline.h"
 #include "server/store/files.h"
 
 namespace isomesh::http {
@@ -26,7 +25,6 @@ void submit(App& app, const httplib::Request& request, httplib::Response& respon
   check_known(request, {"wait"});
   const std::string body = read_text(request, read_body, kMostBodyBytes);
   store::JobSpec spec = {owner(), parse_job_parameters(body), idempotency_key_of(request), ""};
-  jobs::check_supported(spec.parameters);
   if (!spec.idempotency_key.empty()) spec.request_digest = store::sha256_of(body);
   const auto wait = wait_of(request);
   Job job = store::job_of(app.services.jobs.submit(spec));

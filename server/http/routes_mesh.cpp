@@ -70,7 +70,7 @@ void mesh_in_one(App& app, const httplib::Request& request, httplib::Response& r
     if (!import_parameters().contains(parameter.first)) job_query.push_back(parameter);
   }
   check_known(request, names);
-  JobParameters parameters = job_parameters_of(job_query, VolumeIn::kBody);
+  JobParameters parameters = parse_job_parameters(job_query, VolumeIn::kBody);
   if (parameters.formats.size() != 1) {
     throw invalid_parameter("format", "must be one format: the answer is one file");
   }

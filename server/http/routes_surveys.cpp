@@ -82,7 +82,7 @@ void slice(App& app, const httplib::Request& request, httplib::Response& respons
 }
 
 void estimate(App& app, const httplib::Request& request, httplib::Response& response) {
-  const JobParameters parameters = job_parameters_of(query_of(request), VolumeIn::kQuery);
+  const JobParameters parameters = parse_job_parameters(query_of(request), VolumeIn::kQuery);
   answer_json(response, 200, to_json(app.services.estimator.estimate(viewer(), parameters)));
 }
 

@@ -95,8 +95,7 @@ SurfaceSize count_as(const volume::CanonicalVolume& canonical, const mesh::Extra
   const mesh::Lattice<T> lattice = {reinterpret_cast<const T*>(canonical.samples().data()),
                                     {header.dims[0], header.dims[1], header.dims[2]},
                                     mesh::lattice_to_space(header.geometry)};
-  const mesh::SurfaceCount count = count_surface(lattice, options, {stop, nullptr});
-  return {count.triangles(), count.vertices()};
+  return size_of(count_surface(lattice, options, {stop, nullptr}));
 }
 
 }  // namespace
@@ -137,10 +136,11 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   estimate.volume = volume.id;
   estimate.iso = parameters.iso.value_or(volume.suggested_iso);
   estimate.scheme = parameters.scheme;
-  const SurfaceSize surface = count(volume, estimate.iso, parameters);
+  const SurfaceSize surface =
+      count(volume, {.iso = estimate.iso, .scheme = parameters.scheme, .close = parameters.close});
   estimate.triangles = surface.triangles;
   estimate.vertices = surface.vertices;
-  estimate.memory_bytes = estimate_memory(surface.vertices, surface.triangles, parameters);
+  estimate.memory_bytes = estimate_memory(surface, parameters);
   estimate.fits = estimate.memory_bytes <= limits_.memory_bytes;
   const CostModel costs = model();
   estimate.milliseconds = costs.milliseconds(surface, volume.sample_count(), parameters);
@@ -152,12 +152,10 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   return estimate;
 }
 
-SurfaceSize Estimator::count(const Volume& volume, double iso, const JobParameters& parameters) {
-  const auto size = counts_.get({volume.id, iso, parameters.scheme, parameters.close}, [&] {
+SurfaceSize Estimator::count(const Volume& volume, const mesh::ExtractOptions& options) {
+  const auto size = counts_.get({volume.id, options.iso, options.scheme, options.close}, [&] {
     const store::LocalBlob file = blobs_.local(volume.id);
     const volume::CanonicalVolume canonical(file.path);
-    const mesh::ExtractOptions options = {
-        .iso = iso, .scheme = parameters.scheme, .close = parameters.close};
     SurfaceSize counted;
     volume::with_sample(volume::stored_type(volume.type), [&](auto sample) {
       using Sample = decltype(sample);

@@ -16,11 +16,7 @@
 
 namespace isomesh::jobs {
 
-// The size of a surface without its vertices.
-struct SurfaceSize {
-  std::uint64_t triangles = 0;
-  std::uint64_t vertices = 0;
-};
+using mesh::SurfaceSize;
 
 // How a job's time and files follow from its surface: first guesses, corrected by the jobs that
 // have finished. Plain values.
@@ -81,7 +77,7 @@ class Estimator {
   static constexpr std::size_t kSurfaces = 1024;
   static constexpr std::size_t kMostWaiting = 6;
 
-  SurfaceSize count(const Volume& volume, double iso, const JobParameters& parameters);
+  SurfaceSize count(const Volume& volume, const mesh::ExtractOptions& options);
   CostModel model() const;
 
   const store::VolumeStore& volumes_;

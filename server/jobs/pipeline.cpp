@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <numeric>
 #include <string>
@@ -13,6 +14,7 @@
 #include "server/mesh/extract.h"
 #include "server/mesh/measure.h"
 #include "server/mesh/quality.h"
+#include "server/mesh/smooth.h"
 #include "server/volume/canonical.h"
 
 namespace isomesh::jobs {
@@ -73,9 +75,19 @@ class Progress {
   Clock::time_point began_;
 };
 
+mesh::SmoothOptions smooth_options(const JobParameters& parameters) {
+  const bool is_taubin = parameters.smoothing == Smoothing::kTaubin;
+  const double lambda = parameters.lambda.value_or(default_lambda(parameters.smoothing));
+  return {.passes = parameters.passes,
+          .lambda = lambda,
+          .mu = is_taubin ? mesh::taubin_mu(lambda, parameters.pass_band) : 0,
+          .max_displacement_mm =
+              parameters.max_displacement_mm.value_or(std::numeric_limits<double>::infinity())};
+}
+
 void check_memory(const mesh::SurfaceCount& count, const JobParameters& parameters,
                   const PipelineLimits& limits) {
-  const std::uint64_t needed = estimate_memory(count.vertices(), count.triangles(), parameters);
+  const std::uint64_t needed = estimate_memory(size_of(count), parameters);
   if (needed <= limits.memory_bytes) return;
   constexpr std::uint64_t kMebibyte = 1 << 20;
   throw Error(ErrorCode::kTooLarge,
@@ -169,11 +181,9 @@ void encode_and_measure(const codec::Provenance& provenance, const store::BlobSt
     codec::encode(mesh, formats[i], provenance, context,
                   [&](std::span<const std::byte> bytes) { writers[i]->write(bytes); });
   };
-  mesh::Extent extent;
   mesh::Topology topology;
   mesh::parallel_for(progress.quiet(), formats.size() + 1, [&](std::size_t task) {
     if (task < formats.size()) return encode(task);
-    extent = measure_extent(mesh, progress.quiet());
     topology = measure_topology(mesh, progress.quiet());
     measure_quality(mesh, topology, provenance.parameters.passes > 0, progress.quiet(),
                     summary.quality);
@@ -185,9 +195,6 @@ void encode_and_measure(const codec::Provenance& provenance, const store::BlobSt
   summary.boundary_edges = topology.boundary_edges;
   summary.components = topology.components;
   summary.euler = topology.euler;
-  summary.area_mm2 = extent.area_mm2;
-  summary.volume_mm3.smoothed = extent.volume_mm3;
-  summary.bounds = {extent.low, extent.high};
 }
 
 // The volume's file, once its bytes are known to be those that its id names: a mesh of samples that
@@ -207,39 +214,27 @@ store::LocalBlob checked_file(const Volume& volume, const store::BlobStore& blob
 }  // namespace
 
 void Workspace::trim(std::size_t budget_bytes) {
-  const std::size_t held = mesh.positions.capacity_bytes() + mesh.triangles.capacity_bytes() +
-                           connectivity.offsets.capacity_bytes() +
-                           connectivity.neighbors.capacity_bytes() + scratch.capacity_bytes();
+  const std::size_t held = mesh.positions.capacity_bytes() + mesh.triangles.capacity_bytes();
   if (held > budget_bytes) *this = {};
 }
 
-void check_supported(const JobParameters& parameters) {
-  if (parameters.smoothing != Smoothing::kLaplacian) {
-    throw invalid_parameter("smoothing", "this version does not smooth by \"" +
-                                             std::string(to_string(parameters.smoothing)) + '"');
-  }
-}
-
-std::uint64_t estimate_memory(std::uint64_t vertices, std::uint64_t triangles,
-                              const JobParameters& parameters) {
-  constexpr std::uint64_t kNeighborsPerVertex = 6;  // on average, in a surface of triangles
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const JobParameters& parameters) {
   // Measured: what Draco takes at its slowest speed, and what GLB's chunks and their bytes add.
   constexpr std::uint64_t kDracoBytesPerTriangle = 100;
   constexpr std::uint64_t kGlbBytesPerTriangle = 15;
   constexpr std::uint64_t kGlbNormalBytesPerTriangle = 8;
-  std::uint64_t bytes = vertices * sizeof(mesh::Vec3) + triangles * sizeof(mesh::Triangle);
-  if (parameters.passes > 0) {
-    bytes += vertices * (sizeof(mesh::Vec3) + (1 + kNeighborsPerVertex) * sizeof(std::uint32_t));
-  }
+  std::uint64_t encoding = surface.vertices * 2 * sizeof(std::uint32_t);  // measured meanwhile
   for (const MeshFormat format : parameters.formats) {
-    if (format == MeshFormat::kDrc) bytes += triangles * kDracoBytesPerTriangle;
-    if (format == MeshFormat::kGlb) bytes += triangles * kGlbBytesPerTriangle;
+    if (format == MeshFormat::kDrc) encoding += surface.triangles * kDracoBytesPerTriangle;
+    if (format == MeshFormat::kGlb) encoding += surface.triangles * kGlbBytesPerTriangle;
     if (format == MeshFormat::kGlb && parameters.normals) {
-      bytes += vertices * sizeof(mesh::Vec3) + triangles * kGlbNormalBytesPerTriangle;
+      encoding +=
+          surface.vertices * sizeof(mesh::Vec3) + surface.triangles * kGlbNormalBytesPerTriangle;
     }
   }
-  bytes += vertices * 2 * sizeof(std::uint32_t);  // for measuring
-  return bytes;
+  const std::uint64_t smoothing = smoothing_memory(smooth_options(parameters), surface);
+  return surface.vertices * sizeof(mesh::Vec3) + surface.triangles * sizeof(mesh::Triangle) +
+         smoothing + encoding;
 }
 
 PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
@@ -264,18 +259,17 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
   }
   summary.triangles = mesh.triangles.size();
   summary.vertices = mesh.positions.size();
-  summary.volume_mm3.extracted = measure_extent(mesh, progress.quiet()).volume_mm3;
   const mesh::Shapes extracted = measure_shapes(mesh, progress.quiet());
   summary.quality.aspect_ratio.extracted = extracted.aspect_ratio;
   summary.quality.smallest_angle_deg.extracted = extracted.smallest_angle_deg;
 
   progress.enter(Stage::kSmooth, kSmoothShare, &Timing::smooth);
-  if (parameters.passes > 0) {
-    build_connectivity(mesh, progress.quiet(), workspace.connectivity);
-    smooth_laplacian(workspace.connectivity,
-                     {.passes = parameters.passes, .lambda = parameters.lambda}, progress.context(),
-                     mesh, workspace.scratch);
-  }
+  const mesh::SmoothingEffect effect = smooth(smooth_options(parameters), progress.context(), mesh);
+  summary.area_mm2 = effect.after.area_mm2;
+  summary.area_extracted_mm2 = effect.before.area_mm2;
+  summary.displacement_mm = {effect.mean_displacement_mm, effect.max_displacement_mm};
+  summary.volume_mm3 = {effect.before.volume_mm3, effect.after.volume_mm3};
+  summary.bounds = {effect.after.low, effect.after.high};
 
   progress.enter(Stage::kEncode, kEncodeShare, &Timing::encode);
   encode_and_measure({parameters, iso, volume.dims, volume.geometry}, blobs, progress, mesh,

@@ -6,8 +6,8 @@
 #include <stop_token>
 
 #include "proto/types.h"
+#include "server/mesh/extract.h"
 #include "server/mesh/mesh.h"
-#include "server/mesh/smooth.h"
 #include "server/store/blob_store.h"
 
 namespace isomesh::jobs {
@@ -16,8 +16,6 @@ namespace isomesh::jobs {
 // mapped already. Not thread safe.
 struct Workspace {
   mesh::Mesh mesh;
-  mesh::Connectivity connectivity;
-  mesh::Buffer<mesh::Vec3> scratch;
 
   // Gives memory back when it exceeds `budget_bytes`: one giant job must not keep it for ever.
   void trim(std::size_t budget_bytes);
@@ -32,14 +30,9 @@ struct PipelineResult {
   Timing timing;     // load, extract, smooth and encode
 };
 
-// Refuses parameters that are valid by the contract but that this version does not serve, with
-// Error kInvalidParameter.
-void check_supported(const JobParameters& parameters);
-
 // How much memory a job with a surface of that size takes at its peak, beside its mapped volume:
-// mesh, connectivity, encoders. An upper estimate.
-std::uint64_t estimate_memory(std::uint64_t vertices, std::uint64_t triangles,
-                              const JobParameters& parameters);
+// mesh, smoothing, encoders. An upper estimate.
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const JobParameters& parameters);
 
 struct PipelineLimits {
   std::uint64_t memory_bytes = std::uint64_t{8} << 30;  // of one job

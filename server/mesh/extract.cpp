@@ -63,6 +63,17 @@ std::vector<Slab> cut_slabs(std::uint32_t layers, RunningCost cost) {
 
 }  // namespace
 
+SurfaceSize size_of(const SurfaceCount& count) {
+  SurfaceSize size = {.triangles = count.triangles(),
+                      .vertices = count.vertices(),
+                      .layers = count.layer_vertices.size() - 1};
+  for (std::size_t k = 0; k < size.layers; ++k) {
+    size.largest_layer =
+        std::max(size.largest_layer, count.layer_vertices[k + 1] - count.layer_vertices[k]);
+  }
+  return size;
+}
+
 template <class T>
 Extraction<T>::Extraction(const Lattice<T>& the_lattice, const ExtractOptions& options,
                           T the_smallest)

@@ -43,6 +43,16 @@ struct SurfaceCount {
   std::uint64_t triangles() const { return layer_triangles.back(); }
 };
 
+// What memory follows from.
+struct SurfaceSize {
+  std::uint64_t triangles = 0;
+  std::uint64_t vertices = 0;
+  std::uint64_t layers = 0;
+  std::uint64_t largest_layer = 0;  // in vertices
+};
+
+SurfaceSize size_of(const SurfaceCount& count);
+
 // Counts without writing; exact. A lattice without cells, or an iso-value outside the samples'
 // range, has an empty surface. Thread safe. Throws Error kCancelled.
 template <class T>

@@ -1,145 +1,128 @@
 #include "server/mesh/measure.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <numeric>
-#include <utility>
+#include <span>
 #include <vector>
+
+#include "server/mesh/extent-inl.h"
 
 namespace isomesh::mesh {
 namespace {
 
-constexpr std::size_t kTrianglesPerChunk = 65536;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Layers that a task works on: of measure_topology more, because it looks at one of them twice.
+constexpr std::size_t kLayersPerExtent = 4;
+constexpr std::size_t kLayersPerTopology = 16;
 
-using Point = std::array<double, 3>;
-
-Point operator-(const Vec3& a, const Vec3& b) {
-  return {double{a[0]} - b[0], double{a[1]} - b[1], double{a[2]} - b[2]};
-}
-
-Point cross(const Point& a, const Point& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-struct PartialExtent {
-  double area = 0;
-  double volume = 0;
-  Point low = {kInfinity, kInfinity, kInfinity};
-  Point high = {-kInfinity, -kInfinity, -kInfinity};
-};
-
-PartialExtent measure_chunk(const Mesh& mesh, std::size_t begin, std::size_t end) {
-  PartialExtent part;
-  for (std::size_t t = begin; t < end; ++t) {
-    const auto& [a, b, c] = mesh.triangles[t];
-    const Vec3& corner = mesh.positions[a];
-    const Point normal = cross(mesh.positions[b] - corner, mesh.positions[c] - corner);
-    const Point to_corner = {corner[0] - mesh.origin[0], corner[1] - mesh.origin[1],
-                             corner[2] - mesh.origin[2]};
-    part.area +=
-        std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]) / 2;
-    part.volume +=
-        (to_corner[0] * normal[0] + to_corner[1] * normal[1] + to_corner[2] * normal[2]) / 6;
-    for (const std::uint32_t vertex : {a, b, c}) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double at = mesh.positions[vertex][axis];
-        part.low[axis] = std::min(part.low[axis], at);
-        part.high[axis] = std::max(part.high[axis], at);
-      }
-    }
-  }
-  return part;
-}
-
-// Disjoint sets of vertices, each named by its smallest member.
+// Disjoint sets of vertices, each known by its smallest member. Different threads may work on
+// vertices that no set has in common.
 class Components {
  public:
-  explicit Components(std::size_t vertices) : parent_(vertices) {
-    std::iota(parent_.begin(), parent_.end(), 0U);
+  explicit Components(std::size_t vertices) { parents_.resize_for_overwrite(vertices); }
+
+  // Each of the vertices [begin, end) becomes a set of its own.
+  void begin_sets(std::uint64_t begin, std::uint64_t end) {
+    std::iota(parents_.begin() + begin, parents_.begin() + end, static_cast<std::uint32_t>(begin));
   }
 
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    if (a == b) return;
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
-  std::uint64_t count() const {
-    std::uint64_t roots = 0;
-    for (std::uint32_t v = 0; v < parent_.size(); ++v) roots += parent_[v] == v ? 1 : 0;
-    return roots;
+  // Makes one set of the triangles' corners, for each triangle; returns how many sets fewer there
+  // are then.
+  std::uint64_t join(std::span<const Triangle> triangles) {
+    std::uint64_t joined = 0;
+    for (const auto& [a, b, c] : triangles) {
+      const std::uint32_t parent = parents_[a];
+      if (parents_[b] == parent && parents_[c] == parent) continue;
+      const std::uint32_t root_a = root(a);
+      const std::uint32_t root_b = root(b);
+      const std::uint32_t root_c = root(c);
+      const std::uint32_t first = std::min({root_a, root_b, root_c});
+      joined += (root_a != root_b ? 1 : 0) + (root_c != root_a && root_c != root_b ? 1 : 0);
+      for (const std::uint32_t vertex : {root_a, root_b, root_c, a, b, c}) parents_[vertex] = first;
+    }
+    return joined;
   }
 
  private:
   std::uint32_t root(std::uint32_t vertex) {
-    while (parent_[vertex] != vertex) {
-      parent_[vertex] = parent_[parent_[vertex]];
-      vertex = parent_[vertex];
+    while (parents_[vertex] != vertex) {
+      parents_[vertex] = parents_[parents_[vertex]];
+      vertex = parents_[vertex];
     }
     return vertex;
   }
 
-  std::vector<std::uint32_t> parent_;
+  Buffer<std::uint32_t> parents_;
 };
 
-using DirectedEdge = std::pair<std::uint32_t, std::uint32_t>;
+std::span<const Triangle> triangles_of(const Mesh& mesh, std::size_t begin, std::size_t end) {
+  const std::uint64_t first = mesh.layer_triangles[begin];
+  return mesh.triangles.span().subspan(first, mesh.layer_triangles[end] - first);
+}
 
-// The directed edges that no triangle runs through the other way. Only vertices whose next and
-// previous corners do not balance lie on the boundary (see smooth.cpp), which leaves few to search.
-std::uint64_t count_boundary_edges(const Mesh& mesh) {
-  std::vector<std::uint32_t> balance(mesh.positions.size(), 0);
-  for (const auto& [a, b, c] : mesh.triangles) {
-    balance[a] += b - c;
-    balance[b] += c - a;
-    balance[c] += a - b;
+// How many vertices of the layers lie on the boundary. In an oriented manifold the triangles around
+// a vertex name each of its neighbours once as the next corner and once as the previous one, unless
+// the vertex lies on the boundary: then the sums of both differ.
+std::uint64_t count_boundary_vertices(const Mesh& mesh, std::size_t begin, std::size_t end) {
+  const std::uint64_t first = mesh.layer_vertices[begin];
+  std::vector<std::uint32_t> balance(mesh.layer_vertices[end] - first, 0);
+  const auto add = [&](std::uint32_t vertex, std::uint32_t difference) {
+    const std::uint64_t index = vertex - first;  // beyond the end for vertices before the first
+    if (index < balance.size()) balance[index] += difference;
+  };
+  for (const auto& [a, b, c] : triangles_of(mesh, begin == 0 ? 0 : begin - 1, end)) {
+    add(a, b - c);
+    add(b, c - a);
+    add(c, a - b);
   }
-  std::vector<DirectedEdge> edges;
-  for (const auto& [a, b, c] : mesh.triangles) {
-    for (const auto& [from, to] : {DirectedEdge{a, b}, DirectedEdge{b, c}, DirectedEdge{c, a}}) {
-      if (balance[from] != 0 && balance[to] != 0) edges.emplace_back(from, to);
-    }
-  }
-  std::ranges::sort(edges);
-  return static_cast<std::uint64_t>(std::ranges::count_if(edges, [&](const DirectedEdge& edge) {
-    return !std::ranges::binary_search(edges, DirectedEdge{edge.second, edge.first});
-  }));
+  return balance.size() - static_cast<std::uint64_t>(std::ranges::count(balance, std::uint32_t{0}));
 }
 
 }  // namespace
 
 Extent measure_extent(const Mesh& mesh, const Context& context) {
-  const std::size_t triangles = mesh.triangles.size();
-  if (triangles == 0) return {};
-  std::vector<PartialExtent> parts((triangles + kTrianglesPerChunk - 1) / kTrianglesPerChunk);
-  parallel_for(context, parts.size(), [&](std::size_t chunk) {
-    const std::size_t begin = chunk * kTrianglesPerChunk;
-    parts[chunk] = measure_chunk(mesh, begin, std::min(triangles, begin + kTrianglesPerChunk));
-  });
-  PartialExtent whole;
-  for (const PartialExtent& part : parts) {
-    whole.area += part.area;
-    whole.volume += part.volume;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      whole.low[axis] = std::min(whole.low[axis], part.low[axis]);
-      whole.high[axis] = std::max(whole.high[axis], part.high[axis]);
+  std::vector<LayerExtent> layers(mesh.layers());
+  const std::size_t tasks = (layers.size() + kLayersPerExtent - 1) / kLayersPerExtent;
+  parallel_for(context, tasks, [&](std::size_t task) {
+    const std::size_t end = std::min(layers.size(), (task + 1) * kLayersPerExtent);
+    for (std::size_t layer = task * kLayersPerExtent; layer < end; ++layer) {
+      for (std::size_t v = mesh.layer_vertices[layer]; v < mesh.layer_vertices[layer + 1]; ++v) {
+        layers[layer].add_vertex(load(mesh.positions[v]));
+      }
+      add_triangles(mesh, layer, layers[layer]);
     }
-  }
-  return {whole.area, whole.volume, whole.low, whole.high};
+  });
+  LayerExtent whole;
+  for (const LayerExtent& layer : layers) whole.add(layer);
+  return whole.extent();
 }
 
 Topology measure_topology(const Mesh& mesh, const Context& context) {
-  Topology topology;
-  topology.boundary_edges = count_boundary_edges(mesh);
-  context.throw_if_stopped();
+  const std::size_t layers = mesh.layers();
+  const std::size_t tasks = (layers + kLayersPerTopology - 1) / kLayersPerTopology;
+  const auto end_of = [&](std::size_t task) {
+    return std::min(layers, (task + 1) * kLayersPerTopology);
+  };
   Components components(mesh.positions.size());
-  for (const auto& [a, b, c] : mesh.triangles) {
-    components.join(a, b);
-    components.join(a, c);
+  std::vector<std::uint64_t> joined(tasks);
+  std::vector<std::uint64_t> boundary(tasks);
+  parallel_for(context, tasks, [&](std::size_t task) {
+    const std::size_t begin = task * kLayersPerTopology;
+    const std::size_t end = end_of(task);
+    components.begin_sets(mesh.layer_vertices[begin], mesh.layer_vertices[end]);
+    // All triangles that name no vertex of the next task's.
+    joined[task] = components.join(triangles_of(mesh, begin, end == layers ? end : end - 1));
+    boundary[task] = count_boundary_vertices(mesh, begin, end);
+  });
+
+  Topology topology;
+  topology.components = mesh.positions.size();
+  for (std::size_t task = 0; task < tasks; ++task) {
+    const std::size_t end = end_of(task);
+    if (end < layers) joined[task] += components.join(triangles_of(mesh, end - 1, end));
+    topology.components -= joined[task];
+    // Of a manifold's boundary, as many edges leave every vertex as reach it: one.
+    topology.boundary_edges += boundary[task];
   }
-  topology.components = components.count();
   const std::uint64_t edges = (3 * mesh.triangles.size() + topology.boundary_edges) / 2;
   topology.euler = static_cast<std::int64_t>(mesh.positions.size()) -
                    static_cast<std::int64_t>(edges) +

@@ -1,156 +1,208 @@
 #include "server/mesh/smooth.h"
 
 #include <algorithm>
-#include <cstring>
-#include <memory>
-#include <numeric>
-#include <utility>
+#include <atomic>
+#include <cmath>
 #include <vector>
+
+#include "server/mesh/sweep.h"
 
 namespace isomesh::mesh {
 namespace {
 
-constexpr std::size_t kLayersPerSlab = 4;
-constexpr std::size_t kVerticesPerChunk = 16384;
+// More steps at once save little: what each walk costs anew is about one step.
+constexpr std::size_t kUsualSteps = 6;
 
-// The vertices of a run of layers, and the triangles that can name them: those of the same layers
-// and of the one below.
-struct VertexSlab {
-  VertexSlab(const Mesh& mesh, std::size_t slab)
-      : VertexSlab(mesh, slab * kLayersPerSlab,
-                   std::min(mesh.layers(), (slab + 1) * kLayersPerSlab)) {}
+std::size_t steps_of(const SmoothOptions& options) {
+  return static_cast<std::size_t>(options.passes) * (options.mu == 0 ? 1 : 2);
+}
 
-  VertexSlab(const Mesh& mesh, std::size_t first_layer, std::size_t end_layer)
-      : begin(mesh.layer_vertices[first_layer]),
-        end(mesh.layer_vertices[end_layer]),
-        triangles(mesh.triangles.span().subspan(
-            mesh.layer_triangles[first_layer == 0 ? 0 : first_layer - 1],
-            mesh.layer_triangles[end_layer] -
-                mesh.layer_triangles[first_layer == 0 ? 0 : first_layer - 1])) {}
+// How the work is cut up: a number of rounds of almost equally many steps, in each of which every
+// slab is one task.
+struct Plan {
+  std::size_t slabs = 1;
+  std::size_t rounds = 1;
+  std::uint64_t bytes = 0;
 
-  bool contains(std::uint32_t vertex) const { return vertex >= begin && vertex < end; }
-  std::size_t size() const { return end - begin; }
-
-  std::uint64_t begin;
-  std::uint64_t end;
-  std::span<const Triangle> triangles;
+  // Steps before the round begins.
+  std::size_t first_step(std::size_t round, std::size_t steps) const {
+    return steps * round / rounds;
+  }
 };
 
-// Calls visit(vertex, next, previous) for the corners of the slab's vertices.
-template <class Visit>
-void for_each_corner(const VertexSlab& slab, Visit visit) {
-  for (const auto& [a, b, c] : slab.triangles) {
-    if (slab.contains(a)) visit(a, b, c);
-    if (slab.contains(b)) visit(b, c, a);
-    if (slab.contains(c)) visit(c, a, b);
+// Slabs cost the steps around their cuts twice: as few as keep the threads busy, and on a deep
+// volume twice that, so that they end together.
+std::size_t count_slabs(std::size_t layers) {
+  constexpr std::size_t kFewestLayers = 16;
+  constexpr std::size_t kManyLayers = 64;
+  const auto threads = static_cast<std::size_t>(thread_count());
+  return std::max({std::size_t{1}, std::min(threads, layers / kFewestLayers),
+                   std::min(2 * threads, layers / kManyLayers)});
+}
+
+// Many steps in one round need many layers at a time, more rounds a copy of all positions, to know
+// at the end how far they moved: whichever is less.
+Plan plan_for(const SmoothOptions& options, const SurfaceSize& size) {
+  const std::size_t steps = steps_of(options);
+  Plan plan = {.slabs = count_slabs(size.layers)};
+  const auto bytes_with = [&](std::size_t steps_at_once) {
+    const auto at_once = std::min(plan.slabs, static_cast<std::size_t>(thread_count()));
+    const std::uint64_t copied = plan.slabs * 2 * steps_at_once * sizeof(Vec3);
+    return size.largest_layer * (at_once * sweep_bytes_per_vertex(steps_at_once) + copied);
+  };
+  const std::size_t rounds = (steps + kUsualSteps - 1) / kUsualSteps;
+  const std::uint64_t several =
+      bytes_with((steps + rounds - 1) / rounds) + size.vertices * sizeof(Vec3);
+  const bool slabs_are_deep = plan.slabs == 1 || 4 * steps <= size.layers / plan.slabs;
+  const bool once = rounds == 1 || (slabs_are_deep && bytes_with(steps) <= several);
+  plan.rounds = once ? 1 : rounds;
+  plan.bytes = once ? bytes_with(steps) : several;
+  return plan;
+}
+
+// Cuts the layers into runs of about as many vertices.
+std::vector<LayerRange> cut_slabs(const Mesh& mesh, std::size_t slabs) {
+  std::vector<LayerRange> result;
+  LayerRange slab;
+  const auto layers = static_cast<std::ptrdiff_t>(mesh.layers());
+  for (slab.end = 1; slab.end <= layers; ++slab.end) {
+    const std::uint64_t goal = mesh.layer_vertices.back() * (result.size() + 1) / slabs;
+    if (slab.end < layers && mesh.layer_vertices[slab.end] < goal) continue;
+    result.push_back(slab);
+    slab.begin = slab.end;
   }
+  return result;
 }
 
-// Writes the number of neighbours of the slab's vertices to offsets[v + 1]; returns their sum. In
-// an oriented manifold the triangles around a vertex name each of its neighbours once as the next
-// corner and once as the previous one, unless the vertex lies on the boundary: then its first
-// neighbour is never a next one and its last never a previous one, and the sums differ.
-std::uint64_t count_neighbors(const Mesh& mesh, const VertexSlab& slab,
-                              Connectivity& connectivity) {
-  std::vector<std::uint32_t> balance(slab.size(), 0);
-  std::uint32_t* counts = connectivity.offsets.data() + 1;
-  std::fill(counts + slab.begin, counts + slab.end, 0);
-  for_each_corner(slab, [&](std::uint32_t vertex, std::uint32_t next, std::uint32_t previous) {
-    ++counts[vertex];
-    balance[vertex - slab.begin] += next - previous;
-  });
-  std::uint64_t sum = 0;
-  for (std::size_t v = slab.begin; v < slab.end; ++v) {
-    if (balance[v - slab.begin] != 0 || mesh.is_on_border(v)) counts[v] = 0;
-    sum += counts[v];
-  }
-  return sum;
+LayerCopy copy_of(const Mesh& mesh, const LayerRange& layers) {
+  if (layers.begin >= layers.end) return {layers, {}};
+  const auto vertices = mesh.positions.span().subspan(
+      mesh.layer_vertices[layers.begin],
+      mesh.layer_vertices[layers.end] - mesh.layer_vertices[layers.begin]);
+  return {layers, {vertices.begin(), vertices.end()}};
 }
 
-void fill_neighbors(const VertexSlab& slab, Connectivity& connectivity) {
-  const std::uint32_t* offsets = connectivity.offsets.data();
-  std::vector<std::uint32_t> cursor(offsets + slab.begin, offsets + slab.end);
-  for_each_corner(slab, [&](std::uint32_t vertex, std::uint32_t next, std::uint32_t /*previous*/) {
-    const bool on_boundary = offsets[vertex] == offsets[vertex + 1];
-    if (!on_boundary) connectivity.neighbors[cursor[vertex - slab.begin]++] = next;
-  });
+Extent sum_of(const std::vector<LayerExtent>& layers) {
+  LayerExtent whole;
+  for (const LayerExtent& layer : layers) whole.add(layer);
+  return whole.extent();
 }
 
-// A position and one idle lane. Loading it reads four bytes past the position: the next one's, or
-// what Buffer keeps behind the last.
-using Float4 = float __attribute__((vector_size(16)));
-
-Float4 load(const Vec3& position) {
-  Float4 lanes;
-  std::memcpy(&lanes, &position, sizeof lanes);
-  return lanes;
-}
-
-void smooth_chunk(const Connectivity& connectivity, float lambda, std::size_t begin,
-                  std::size_t end, const Vec3* from, Vec3* to) {
-  const std::uint32_t* offsets = connectivity.offsets.data();
-  const std::uint32_t* neighbors = connectivity.neighbors.data();
-  for (std::size_t v = begin; v < end; ++v) {
-    const std::uint32_t first = offsets[v];
-    const std::uint32_t last = offsets[v + 1];
-    Float4 position = load(from[v]);
-    if (first != last) {
-      Float4 sum = {};
-      for (std::uint32_t n = first; n < last; ++n) sum += load(from[neighbors[n]]);
-      const Float4 mean = sum * (1 / static_cast<float>(last - first));
-      position = lambda == 1 ? mean : position + (mean - position) * lambda;
+class Smoother {
+ public:
+  Smoother(const SmoothOptions& options, const Context& context, Mesh& mesh)
+      : options_(options),
+        context_(context),
+        quiet_{context.stop, nullptr},
+        mesh_(mesh),
+        plan_(plan_for(options, size_of({mesh.layer_vertices, mesh.layer_triangles}))),
+        slabs_(cut_slabs(mesh, plan_.slabs)),
+        before_(mesh.layers()),
+        after_(mesh.layers()),
+        displacements_(mesh.layers()) {
+    for (std::size_t step = 0; step < steps_of(options); ++step) {
+      const bool is_second = options.mu != 0 && step % 2 == 1;
+      shares_.push_back(static_cast<float>(is_second ? options.mu : options.lambda));
     }
-    std::memcpy(&to[v], &position, sizeof to[v]);
   }
-}
+
+  SmoothingEffect run() {
+    if (plan_.rounds > 1) {
+      extracted_.resize_for_overwrite(mesh_.positions.size());
+      parallel_for(quiet_, slabs_.size(), [&](std::size_t i) { keep_extracted(slabs_[i]); });
+    }
+    for (std::size_t round = 0; round < plan_.rounds; ++round) run_round(round);
+    return summary();
+  }
+
+ private:
+  void keep_extracted(const LayerRange& slab) {
+    const Vec3* from = mesh_.positions.data();
+    std::copy(from + mesh_.layer_vertices[slab.begin], from + mesh_.layer_vertices[slab.end],
+              extracted_.data() + mesh_.layer_vertices[slab.begin]);
+  }
+
+  void run_round(std::size_t number) {
+    const std::size_t first = plan_.first_step(number, shares_.size());
+    const std::size_t last = plan_.first_step(number + 1, shares_.size());
+    const bool is_last = number + 1 == plan_.rounds;
+    const Round round = {.mesh = mesh_,
+                         .shares = std::span(shares_).subspan(first, last - first),
+                         .max_displacement_mm = options_.max_displacement_mm,
+                         .extracted = plan_.rounds > 1 ? extracted_.data() : nullptr,
+                         .before = number == 0 ? before_.data() : nullptr,
+                         .after = is_last ? after_.data() : nullptr,
+                         .displacements = displacements_.data()};
+
+    std::vector<LayerCopy> below(slabs_.size());
+    std::vector<LayerCopy> above(slabs_.size());
+    parallel_for(quiet_, slabs_.size(), [&](std::size_t i) {
+      const LayerRange all = with_halo(round, slabs_[i], round.steps());
+      below[i] = copy_of(mesh_, {all.begin, slabs_[i].begin});
+      above[i] = copy_of(mesh_, {slabs_[i].end, all.end});
+      if (number == 0) measure_seam(i, before_);
+    });
+    parallel_for(quiet_, slabs_.size(), [&](std::size_t i) {
+      sweep(round, slabs_[i], below[i], above[i], [&] { report_layer(); });
+    });
+    if (is_last)
+      parallel_for(quiet_, slabs_.size(), [&](std::size_t i) { measure_seam(i, after_); });
+  }
+
+  // Of the triangles that name vertices of this slab and of the next.
+  void measure_seam(std::size_t slab, std::vector<LayerExtent>& extents) {
+    const auto layer = static_cast<std::size_t>(slabs_[slab].end) - 1;
+    if (layer + 1 < mesh_.layers()) add_triangles(mesh_, layer, extents[layer]);
+  }
+
+  void report_layer() {
+    context_.throw_if_stopped();
+    if (!context_.progress) return;
+    const std::size_t done = layers_done_.fetch_add(1, std::memory_order_relaxed) + 1;
+    context_.progress(static_cast<double>(done) /
+                      static_cast<double>(plan_.rounds * mesh_.layers()));
+  }
+
+  SmoothingEffect summary() const {
+    SmoothingEffect result = {.before = sum_of(before_), .after = sum_of(after_)};
+    for (const LayerDisplacement& layer : displacements_) {
+      result.mean_displacement_mm += layer.sum;
+      result.max_displacement_mm = std::max(result.max_displacement_mm, layer.largest);
+    }
+    if (mesh_.positions.size() > 0) {
+      result.mean_displacement_mm /= static_cast<double>(mesh_.positions.size());
+    }
+    return result;
+  }
+
+  const SmoothOptions& options_;
+  const Context& context_;
+  const Context quiet_;
+  Mesh& mesh_;
+  const Plan plan_;
+  const std::vector<LayerRange> slabs_;
+  std::vector<float> shares_;
+  Buffer<Vec3> extracted_;  // of several rounds
+  std::vector<LayerExtent> before_;
+  std::vector<LayerExtent> after_;
+  std::vector<LayerDisplacement> displacements_;
+  std::atomic<std::size_t> layers_done_ = 0;
+};
 
 }  // namespace
 
-void build_connectivity(const Mesh& mesh, const Context& context, Connectivity& connectivity) {
-  const std::size_t slabs = (mesh.layers() + kLayersPerSlab - 1) / kLayersPerSlab;
-  connectivity.offsets.resize_for_overwrite(mesh.positions.size() + 1);
-  std::vector<std::uint64_t> slab_offsets(slabs + 1, 0);
-  const Context quiet{context.stop, nullptr};
-  parallel_for(quiet, slabs, [&](std::size_t slab) {
-    slab_offsets[slab + 1] = count_neighbors(mesh, VertexSlab(mesh, slab), connectivity);
-  });
-  std::partial_sum(slab_offsets.begin(), slab_offsets.end(), slab_offsets.begin());
-  if (slab_offsets.back() > UINT32_MAX) {
-    throw Error(ErrorCode::kTooLarge, "the surface has more edges than 32 bits can index");
-  }
+double taubin_mu(double lambda, double pass_band) { return 1 / (pass_band - 1 / lambda); }
 
-  connectivity.neighbors.resize_for_overwrite(slab_offsets.back());
-  connectivity.offsets[0] = 0;
-  parallel_for(quiet, slabs, [&](std::size_t task) {
-    const VertexSlab slab(mesh, task);
-    auto running = static_cast<std::uint32_t>(slab_offsets[task]);
-    for (std::size_t v = slab.begin; v < slab.end; ++v) {
-      running += connectivity.offsets[v + 1];
-      connectivity.offsets[v + 1] = running;
-    }
-  });
-  parallel_for(context, slabs,
-               [&](std::size_t slab) { fill_neighbors(VertexSlab(mesh, slab), connectivity); });
+SmoothingEffect smooth(const SmoothOptions& options, const Context& context, Mesh& mesh) {
+  if (steps_of(options) == 0 || mesh.positions.size() == 0) {
+    const Extent extent = measure_extent(mesh, context);
+    return {.before = extent, .after = extent};
+  }
+  return Smoother(options, context, mesh).run();
 }
 
-void smooth_laplacian(const Connectivity& connectivity, const SmoothOptions& options,
-                      const Context& context, Mesh& mesh, Buffer<Vec3>& scratch) {
-  const std::size_t vertices = mesh.positions.size();
-  const std::size_t chunks = (vertices + kVerticesPerChunk - 1) / kVerticesPerChunk;
-  const auto lambda = static_cast<float>(options.lambda);
-  if (options.passes > 0) scratch.resize_for_overwrite(vertices);
-  for (int pass = 0; pass < options.passes; ++pass) {
-    Context of_pass{context.stop, nullptr};
-    if (context.progress) {
-      of_pass.progress = [&](double done) { context.progress((pass + done) / options.passes); };
-    }
-    parallel_for(of_pass, chunks, [&](std::size_t chunk) {
-      const std::size_t begin = chunk * kVerticesPerChunk;
-      const std::size_t end = std::min(vertices, begin + kVerticesPerChunk);
-      smooth_chunk(connectivity, lambda, begin, end, mesh.positions.data(), scratch.data());
-    });
-    std::swap(mesh.positions, scratch);
-  }
+std::uint64_t smoothing_memory(const SmoothOptions& options, const SurfaceSize& size) {
+  return steps_of(options) == 0 || size.vertices == 0 ? 0 : plan_for(options, size).bytes;
 }
 
 }  // namespace isomesh::mesh

@@ -1,37 +1,54 @@
-// Laplacian smoothing of a surface mesh.
+// Smoothing of a surface mesh: Laplacian and Taubin's.
+//
+// A step moves every free vertex by a share of the way to the mean of its neighbours, all from the
+// positions that the step before left. A triangle of layer k names only vertices of layers k and
+// k + 1, so a step needs of the step before no more than the layers next to the one that it moves:
+// several steps go through the layers together, each one layer behind the one before it, and only
+// what is between the first and the last is held beside the mesh.
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
-#include "server/mesh/buffer.h"
 #include "server/mesh/context.h"
+#include "server/mesh/extract.h"
+#include "server/mesh/measure.h"
 #include "server/mesh/mesh.h"
 
 namespace isomesh::mesh {
 
-// Which vertices each vertex is joined to by an edge, as compressed lists: the neighbours of v are
-// neighbors[offsets[v] .. offsets[v + 1]). A vertex on the boundary or, of a closed surface, on the
-// border of the volume has an empty list: smoothing keeps it where it is, so caps stay flat, and
-// closing a surface does not change how the rest of it is smoothed.
-struct Connectivity {
-  Buffer<std::uint32_t> offsets;  // vertices + 1
-  Buffer<std::uint32_t> neighbors;
-};
-
-// Builds the lists from the triangles of an oriented manifold; deterministic. `connectivity`'s
-// memory is reused. Throws Error kCancelled.
-void build_connectivity(const Mesh& mesh, const Context& context, Connectivity& connectivity);
-
 struct SmoothOptions {
   int passes = 5;
   double lambda = 1;  // (0, 1]: the share of the way to the mean of the neighbours
+  // Of a second step in every pass, away from the mean: negative, see taubin_mu. 0: no second step.
+  double mu = 0;
+  // No vertex is ever farther than this from where it was extracted. Millimetres, 0 or more.
+  double max_displacement_mm = std::numeric_limits<double>::infinity();
 };
 
-// Moves every vertex that is not on the boundary by `lambda` towards the mean of its neighbours,
-// `passes` times (the paper's section 3). All vertices of a pass move from the positions of the
-// last one, so the result depends neither on their order nor on the number of threads. `scratch`
-// holds the other half of the positions; its memory is reused. Throws Error kCancelled.
-void smooth_laplacian(const Connectivity& connectivity, const SmoothOptions& options,
-                      const Context& context, Mesh& mesh, Buffer<Vec3>& scratch);
+// The second step's share for a first step of `lambda` and a pass-band frequency: what varies more
+// slowly along the surface than `pass_band` is kept, what varies faster is smoothed away. 1/lambda
+// + 1/mu = pass_band (G. Taubin, "A signal processing approach to fair surface design", SIGGRAPH
+// 1995). For 0 < pass_band < 1/lambda.
+double taubin_mu(double lambda, double pass_band);
+
+// What smoothing did to a surface.
+struct SmoothingEffect {
+  Extent before;
+  Extent after;
+  double mean_displacement_mm = 0;  // of all vertices, fixed ones too
+  double max_displacement_mm = 0;
+};
+
+// Smooths the mesh, an oriented manifold, in place. A vertex on the boundary stays where it is
+// and, of a closed surface, one on the border of the volume: caps stay flat, and closing a surface
+// does not change how the rest of it is smoothed. The result is the same to the byte for any number
+// of threads. Throws Error kCancelled; the positions are indeterminate then.
+SmoothingEffect smooth(const SmoothOptions& options, const Context& context, Mesh& mesh);
+
+// An upper bound of what `smooth` takes beside the mesh, in bytes, on the present number of
+// threads: some layers' positions for each thread, or, where there are too many steps for that,
+// those and one copy of all positions.
+std::uint64_t smoothing_memory(const SmoothOptions& options, const SurfaceSize& size);
 
 }  // namespace isomesh::mesh

@@ -196,7 +196,8 @@ TEST_F(MeshInOne, GivesTheMeshOfTheJob) {
 
 TEST_F(MeshInOne, TakesEveryParameter) {
   const Answer answer = post(
-      "iso=100&scheme=5&interpolation=midpoint&passes=2&smoothing=laplacian&lambda=0.5"
+      "iso=100&scheme=5&interpolation=midpoint&passes=2&smoothing=taubin&lambda=0.5"
+      "&pass_band=0.05&max_displacement_mm=0.25"
       "&close=false&format=stl&position_bits=11&speed=5&priority=stat&spacing=1,1,2");
   ASSERT_EQ(answer.status, 200) << answer.body;
   EXPECT_EQ(answer.header("content-type"), "model/stl");
@@ -204,7 +205,11 @@ TEST_F(MeshInOne, TakesEveryParameter) {
   EXPECT_EQ(job.parameters.scheme, Scheme::kFive);
   EXPECT_EQ(job.parameters.interpolation, Interpolation::kMidpoint);
   EXPECT_EQ(job.parameters.passes, 2);
+  EXPECT_EQ(job.parameters.smoothing, Smoothing::kTaubin);
   EXPECT_EQ(job.parameters.lambda, 0.5);
+  EXPECT_EQ(job.parameters.pass_band, 0.05);
+  EXPECT_EQ(job.parameters.max_displacement_mm, 0.25);
+  EXPECT_LE(job.mesh->displacement_mm.max, 0.25);
   EXPECT_EQ(job.parameters.draco, (DracoParameters{11, 5}));
   EXPECT_EQ(job.parameters.priority, Priority::kStat);
 }

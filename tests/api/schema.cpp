@@ -13,8 +13,8 @@ using nlohmann::json;
 using Faults = std::vector<std::string>;
 
 // What says nothing about the value, and what is looked at beside another keyword.
-const std::set<std::string> silent_keywords = {"description", "example",  "examples",  "default",
-                                               "format",      "x-served", "properties"};
+const std::set<std::string> silent_keywords = {"description", "example", "examples",
+                                               "default",     "format",  "properties"};
 
 bool has_type(const json& value, const std::string& type) {
   if (type == "object") return value.is_object();

@@ -46,7 +46,7 @@ TEST(PaperWay, SmoothsLikeTheKernelsWithAnyNumberOfSubTables) {
   Stages stages(field, kSurface);
   stages.extract();
   const Soup soup = soup_of(stages.positions(), stages.triangles());
-  stages.smooth_from_scratch(kPasses);
+  stages.smooth(kPasses);
   for (const std::size_t sub_tables : {1, 3, 1000}) {
     IndexedMesh mesh = find_unique(soup, sub_tables);
     smooth(find_neighbors(mesh), kPasses, mesh);

@@ -80,7 +80,7 @@ struct StageCase {
 
 void make_smooth_mesh(Stages& stages) {
   stages.extract();
-  stages.smooth_from_scratch(kPasses);
+  stages.smooth(kPasses);
 }
 
 template <class Void>
@@ -93,11 +93,6 @@ std::function<std::uint64_t(Stages&)> without_bytes(Void stage) {
 
 std::vector<StageCase> stage_cases() {
   const auto extract = [](Stages& stages) { stages.extract(); };
-  const auto connect = [](Stages& stages) { stages.build_connectivity(); };
-  const auto extract_and_connect = [](Stages& stages) {
-    stages.extract();
-    stages.build_connectivity();
-  };
   std::vector<StageCase> cases = {
       {.name = "count",
        .run = without_bytes([](Stages& stages) { benchmark::DoNotOptimize(stages.count()); }),
@@ -110,15 +105,9 @@ std::vector<StageCase> stage_cases() {
        .run = without_bytes(extract),
        .prepare = [](Stages& stages) { stages.release_memory(); },
        .midpoint = StageCase::Midpoint::kAlways},
-      {.name = "connectivity", .run = without_bytes(connect), .set_up = extract_and_connect},
       // Every run starts from the extracted positions.
-      {.name = "passes",
+      {.name = "smooth",
        .run = without_bytes([](Stages& stages) { stages.smooth(kPasses); }),
-       .set_up = extract_and_connect,
-       .prepare = extract,
-       .passes = kPasses},
-      {.name = "connectivity_and_passes",
-       .run = without_bytes([](Stages& stages) { stages.smooth_from_scratch(kPasses); }),
        .set_up = make_smooth_mesh,
        .prepare = extract,
        .passes = kPasses},

@@ -54,7 +54,7 @@ SurfaceFigures measure_surface(const Samples& samples, const Surface& surface) {
   figures.extracted = quality_of(stages.positions(), stages.triangles());
   figures.extracted_mm3 = stages.volume_mm3();
   figures.smooth_ms =
-      median_ms({[&] { stages.smooth_from_scratch(kPasses); }, [&] { stages.extract(); }}, kRuns);
+      median_ms({[&] { stages.smooth(kPasses); }, [&] { stages.extract(); }}, kRuns);
   figures.smoothed = quality_of(stages.positions(), stages.triangles());
   figures.smoothed_mm3 = stages.volume_mm3();
   figures.drc_bytes = stages.encode(Encoding::kEdgebreakerWhole);
@@ -95,7 +95,7 @@ std::vector<PassesFigures> measure_passes(const Samples& samples, double iso,
     PassesFigures figures{.passes = count};
     figures.ours_ms = median_ms({[&] {
                                   stages.extract();
-                                  stages.smooth_from_scratch(count);
+                                  stages.smooth(count);
                                 }},
                                 kRuns);
     if (peers) {
@@ -143,10 +143,10 @@ GrowthFigures measure_growth(std::uint32_t size, int threads) {
     {
       Stages stages(field, {.iso = kFieldIso});
       stages.extract();
-      stages.smooth_from_scratch(kPasses);
+      stages.smooth(kPasses);
       figures.extract_ms = median_ms({[&] { stages.extract(); }}, kRuns);
-      figures.smooth_ms = median_ms(
-          {[&] { stages.smooth_from_scratch(kPasses); }, [&] { stages.extract(); }}, kRuns);
+      figures.smooth_ms =
+          median_ms({[&] { stages.smooth(kPasses); }, [&] { stages.extract(); }}, kRuns);
       figures.job_ms = median_ms({[&] { stages.run_job(kPasses, MeshFormat::kDrc); }}, kJobRuns);
       figures.mesh = stages.size();
       figures.work = field.dims.samples() + figures.mesh.triangles;

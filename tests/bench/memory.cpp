@@ -49,7 +49,7 @@ std::uint64_t run_stage(const std::string& stage, const Samples& field) {
   Stages stages(field, surface);
   if (stage == kJobStage) return stages.run_job(kPasses, MeshFormat::kDrc);
   stages.extract();
-  if (stage == kSmoothStage) stages.smooth_from_scratch(kPasses);
+  if (stage == kSmoothStage) stages.smooth(kPasses);
   return stages.mesh_bytes();
 }
 

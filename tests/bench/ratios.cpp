@@ -80,7 +80,7 @@ class Comparison {
   }
 
   void compare_smoothing() {
-    const Timed ours = {[&] { stages_.smooth_from_scratch(kPasses); }, [&] { stages_.extract(); }};
+    const Timed ours = {[&] { stages_.smooth(kPasses); }, [&] { stages_.extract(); }};
     const std::string what = "smoothing, 5 passes with connectivity";
     if (!peers_available()) {
       const double ms = median_ms(ours, kPairs);
@@ -133,7 +133,7 @@ Finding growth_of_time(const std::vector<std::uint32_t>& sizes) {
     constexpr int kRuns = 5;
     const double ms = median_ms({[&] {
                                   stages.extract();
-                                  stages.smooth_from_scratch(kPasses);
+                                  stages.smooth(kPasses);
                                 }},
                                 kRuns);
     points.push_back({static_cast<double>(field.dims.samples() + stages.size().triangles), ms});

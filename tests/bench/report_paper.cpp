@@ -105,9 +105,8 @@ std::vector<Series> level_lines(const Samples& samples, double iso) {
   };
   Stages stages(samples, {.iso = iso});
   stages.extract();
-  std::vector<Series> lines = {
-      line("isomesh, " + grouped(stages.size().triangles) + " triangles",
-           median_ms({[&] { stages.smooth_from_scratch(kPasses); }}, kRuns))};
+  std::vector<Series> lines = {line("isomesh, " + grouped(stages.size().triangles) + " triangles",
+                                    median_ms({[&] { stages.smooth(kPasses); }}, kRuns))};
   if (peers_available()) {
     Peers peers(samples, iso);
     peers.flying_edges();

@@ -5,6 +5,7 @@
 #include "server/codec/encode.h"
 #include "server/mesh/extract.h"
 #include "server/mesh/measure.h"
+#include "server/mesh/smooth.h"
 
 namespace isomesh::bench {
 namespace {
@@ -69,22 +70,9 @@ void Stages::extract() {
   });
 }
 
-void Stages::build_connectivity() { mesh::build_connectivity(mesh_, {}, connectivity_); }
+void Stages::smooth(int passes) { mesh::smooth({.passes = passes}, {}, mesh_); }
 
-void Stages::smooth(int passes) {
-  mesh::smooth_laplacian(connectivity_, {.passes = passes}, {}, mesh_, scratch_);
-}
-
-void Stages::smooth_from_scratch(int passes) {
-  if (passes == 0) return;
-  build_connectivity();
-  smooth(passes);
-}
-
-void Stages::measure() const {
-  mesh::measure_extent(mesh_, {});
-  mesh::measure_topology(mesh_, {});
-}
+void Stages::measure() const { mesh::measure_topology(mesh_, {}); }
 
 std::uint64_t Stages::encode_as(MeshFormat format, int speed) const {
   codec::Provenance provenance;
@@ -115,8 +103,7 @@ std::uint64_t Stages::encode(Encoding encoding) const {
 
 std::uint64_t Stages::run_job(int passes, MeshFormat format) {
   extract();
-  mesh::measure_extent(mesh_, {});
-  smooth_from_scratch(passes);
+  smooth(passes);
   std::uint64_t bytes = 0;
   mesh::parallel_for({}, 2, [&](std::size_t task) {
     if (task == 0) {
@@ -130,8 +117,6 @@ std::uint64_t Stages::run_job(int passes, MeshFormat format) {
 
 void Stages::release_memory() {
   mesh_ = {};
-  connectivity_ = {};
-  scratch_ = {};
   malloc_trim(0);  // or smaller blocks stay mapped
 }
 

@@ -9,7 +9,6 @@
 
 #include "proto/types.h"
 #include "server/mesh/mesh.h"
-#include "server/mesh/smooth.h"
 #include "tests/bench/samples.h"
 
 namespace isomesh::bench {
@@ -47,19 +46,17 @@ bool is_parallel(Encoding encoding);
 void set_threads(int threads);
 
 // One volume's way through the stages, in memory that is kept from run to run as a worker of the
-// daemon keeps it. Stages must run in order: extract, build_connectivity, smooth; measure and
-// encode take whatever mesh there is. Not thread safe. Keeps a reference to the samples.
+// daemon keeps it. Extract comes first; the others take whatever mesh there is. Not thread safe.
+// Keeps a reference to the samples.
 class Stages {
  public:
   Stages(const Samples& samples, const Surface& surface) : samples_(samples), surface_(surface) {}
 
   MeshSize count() const;
   void extract();  // counts first
-  void build_connectivity();
+  // With area, volume and bounds before and after, as a job has it.
   void smooth(int passes);
-  // Connectivity and passes, the way a job does it.
-  void smooth_from_scratch(int passes);
-  // Area, volume, bounds and topology.
+  // Topology.
   void measure() const;
   // The number of bytes.
   std::uint64_t encode(Encoding encoding) const;
@@ -83,8 +80,6 @@ class Stages {
   const Samples& samples_;
   Surface surface_;
   mesh::Mesh mesh_;
-  mesh::Connectivity connectivity_;
-  mesh::Buffer<mesh::Vec3> scratch_;
 };
 
 }  // namespace isomesh::bench

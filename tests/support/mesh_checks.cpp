@@ -315,10 +315,10 @@ std::vector<std::vector<std::uint32_t>> free_neighbors(const Surface& surface) {
   return lists;
 }
 
-Surface naively_smoothed(const Surface& surface, int passes, double lambda) {
+Surface naively_smoothed(const Surface& surface, const std::vector<double>& shares) {
   const auto neighbors = free_neighbors(surface);
   Surface result = surface;
-  for (int pass = 0; pass < passes; ++pass) {
+  for (const double share : shares) {
     const std::vector<Point> last = result.points;
     for (std::size_t v = 0; v < last.size(); ++v) {
       if (neighbors[v].empty()) continue;
@@ -326,8 +326,7 @@ Surface naively_smoothed(const Surface& surface, int passes, double lambda) {
         double sum = 0;
         for (const std::uint32_t n : neighbors[v]) sum += last[n][axis];
         const double mean = sum / static_cast<double>(neighbors[v].size());
-        result.points[v][axis] =
-            static_cast<float>(last[v][axis] + lambda * (mean - last[v][axis]));
+        result.points[v][axis] = static_cast<float>(last[v][axis] + share * (mean - last[v][axis]));
       }
     }
   }

@@ -74,8 +74,9 @@ testing::AssertionResult same_bytes(const mesh::Mesh& a, const mesh::Mesh& b);
 // The neighbours of every vertex in ascending order; none for one that lies on the boundary.
 std::vector<std::vector<std::uint32_t>> free_neighbors(const Surface& surface);
 
-// Laplacian smoothing over sets of neighbours: all points move from the last pass's, boundary
-// points stay. Positions are rounded to float after each pass, as the kernels keep them.
-Surface naively_smoothed(const Surface& surface, int passes, double lambda);
+// Smoothing over sets of neighbours, one step for each share of the way to their mean: all points
+// move from the last step's, boundary points stay. Positions are rounded to float after each step,
+// as the kernels keep them.
+Surface naively_smoothed(const Surface& surface, const std::vector<double>& shares);
 
 }  // namespace isomesh::test

@@ -113,7 +113,7 @@ TEST(BoundaryIsOnBorder, TellsInnerEdgesFromThoseOnAFace) {
 TEST(NaivelySmoothed, MovesOnlyWhatIsFree) {
   const Surface pyramid = {{{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}, {1, 1, 8}},
                            {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}}};
-  const Surface half = naively_smoothed(pyramid, 1, 0.5);
+  const Surface half = naively_smoothed(pyramid, {0.5});
   EXPECT_EQ(half.points[4], (Point{1.5, 1.5, 4}));
   for (std::size_t v = 0; v < 4; ++v) EXPECT_EQ(half.points[v], pyramid.points[v]);
 }

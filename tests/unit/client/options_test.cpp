@@ -53,6 +53,10 @@ TEST_F(OptionsTest, ReadsEverythingThatAMeshCanBeAskedFor) {
                                  "taubin",
                                  "--lambda",
                                  "0.5",
+                                 "--pass-band",
+                                 "0.05",
+                                 "--max-displacement",
+                                 "0.75",
                                  "--close",
                                  "--keep-components",
                                  "3",
@@ -81,6 +85,8 @@ TEST_F(OptionsTest, ReadsEverythingThatAMeshCanBeAskedFor) {
   expected.passes = 20;
   expected.smoothing = Smoothing::kTaubin;
   expected.lambda = 0.5;
+  expected.pass_band = 0.05;
+  expected.max_displacement_mm = 0.75;
   expected.close = true;
   expected.components = {.keep = 3, .min_triangles = 500};
   expected.normals = true;

@@ -39,6 +39,8 @@ TEST(MeshReport, NamesWhatTheMeshIs) {
   mesh.vertices = 617283;
   mesh.euler = -4;
   mesh.area_mm2 = 123456.78;
+  mesh.area_extracted_mm2 = 130000;
+  mesh.displacement_mm = {.mean = 0.0512, .max = 1.25};
   mesh.volume_mm3 = {.extracted = 1000.04, .smoothed = 999.96};
   mesh.bounds = {{{-90, -126, -72}, {90, 90, 108}}};
   mesh.files[MeshFormat::kDrc].bytes = 3510351;
@@ -56,9 +58,11 @@ TEST(MeshReport, NamesWhatTheMeshIs) {
             "  boundary edges  0\n"
             "  components      0\n"
             "  Euler number    -4\n"
-            "  area            123,456.8 mm²\n"
+            "  area            130,000.0 mm² extracted\n"
+            "                  123,456.8 mm² smoothed\n"
             "  volume          1,000.0 mm³ extracted\n"
             "                  1,000.0 mm³ smoothed\n"
+            "  displacement    0.051 mm on average, 1.250 mm at most\n"
             "  x (LPS)         -90.00 to 90.00 mm\n"
             "  y               -126.00 to 90.00 mm\n"
             "  z               -72.00 to 108.00 mm\n"

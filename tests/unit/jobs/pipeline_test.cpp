@@ -78,6 +78,28 @@ TEST_F(PipelineTest, NoPassesLeaveTheVolumeAsExtracted) {
   parameters.passes = 0;
   const PipelineResult result = run(volume, parameters);
   EXPECT_EQ(result.mesh.volume_mm3.extracted, result.mesh.volume_mm3.smoothed);
+  EXPECT_EQ(result.mesh.area_extracted_mm2, result.mesh.area_mm2);
+  EXPECT_EQ(result.mesh.displacement_mm.max, 0);
+}
+
+TEST_F(PipelineTest, SaysHowSmoothingChangedTheSurface) {
+  const Volume volume = add_sphere();
+  JobParameters parameters = parameters_of(volume, 0);
+  const MeshSummary laplacian = run(volume, parameters).mesh;
+  EXPECT_LT(laplacian.area_mm2, laplacian.area_extracted_mm2);
+  EXPECT_GT(laplacian.displacement_mm.mean, 0);
+  EXPECT_GT(laplacian.displacement_mm.max, laplacian.displacement_mm.mean);
+
+  parameters.smoothing = Smoothing::kTaubin;
+  const MeshSummary taubin = run(volume, parameters).mesh;
+  EXPECT_EQ(taubin.volume_mm3.extracted, laplacian.volume_mm3.extracted);
+  EXPECT_GT(taubin.volume_mm3.smoothed, 0.998 * taubin.volume_mm3.extracted);
+  EXPECT_LT(laplacian.volume_mm3.smoothed, 0.98 * laplacian.volume_mm3.extracted);
+
+  parameters.max_displacement_mm = taubin.displacement_mm.max / 2;
+  const MeshSummary held = run(volume, parameters).mesh;
+  EXPECT_LE(held.displacement_mm.max, *parameters.max_displacement_mm);
+  EXPECT_GT(held.displacement_mm.max, 0.9 * *parameters.max_displacement_mm);
 }
 
 TEST_F(PipelineTest, WithoutAnIsoItTakesTheVolumesOwn) {
@@ -310,29 +332,6 @@ TEST_F(PipelineTest, AVolumeWhoseSamplesAreGoneIsUnusable) {
   blobs_.erase(volume.id);
   EXPECT_EQ(test::code_thrown_by([&] { run(volume, parameters_of(volume, 0)); }),
             ErrorCode::kUnusableVolume);
-}
-
-TEST(CheckSupported, TakesWhatThisVersionServes) {
-  JobParameters parameters;
-  parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl};
-  parameters.scheme = Scheme::kFive;
-  parameters.interpolation = Interpolation::kMidpoint;
-  parameters.passes = 1000;
-  parameters.lambda = 0.1;
-  parameters.priority = Priority::kBulk;
-  check_supported(parameters);
-}
-
-TEST(CheckSupported, RefusesTheRestByName) {
-  const auto fields = [](const JobParameters& parameters) {
-    const auto error = test::thrown_by([&] { check_supported(parameters); });
-    if (!error) return std::vector<std::string>{"nothing was refused"};
-    EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
-    return test::fields_of(*error);
-  };
-  JobParameters taubin;
-  taubin.smoothing = Smoothing::kTaubin;
-  EXPECT_EQ(fields(taubin), std::vector<std::string>{"smoothing"});
 }
 
 TEST(Workspace, GivesBackWhatIsBeyondItsBudget) {

@@ -274,10 +274,7 @@ TEST(Close, DoesNotChangeWhatIsNotOnTheBorder) {
     for (const int passes : {0, 3}) {
       SCOPED_TRACE(passes);
       for (Mesh* const mesh : {&open, &closed}) {
-        Connectivity connectivity;
-        Buffer<Vec3> scratch;
-        build_connectivity(*mesh, {}, connectivity);
-        smooth_laplacian(connectivity, {.passes = passes}, {}, *mesh, scratch);
+        smooth({.passes = passes}, {}, *mesh);
       }
       std::vector<Vec3> inner_of_open;
       for (std::size_t v = 0; v < open.positions.size(); ++v) {

@@ -70,6 +70,8 @@ JobParameters some_parameters() {
           .passes = 1000,
           .smoothing = Smoothing::kTaubin,
           .lambda = 0.3,
+          .pass_band = 0.2,
+          .max_displacement_mm = 1.5,
           .close = true,
           .components = {.keep = 4294967295, .min_triangles = {}},
           .formats = {MeshFormat::kStl, MeshFormat::kDrc},
@@ -101,7 +103,9 @@ MeshSummary some_mesh() {
                   .aspect_ratio = {some_distribution(0.5), some_distribution(0.75)},
                   .smallest_angle_deg = {some_distribution(30), some_distribution(40)}},
       .area_mm2 = 593150.7,
+      .area_extracted_mm2 = 600000.5,
       .volume_mm3 = {.extracted = 2795793.9, .smoothed = 2790000.25},
+      .displacement_mm = {.mean = 0.25, .max = 1.75},
       .bounds = {{{-1, -2, -3}, {1, 2, 3}}},
       .files = {{MeshFormat::kDrc, {.bytes = 1, .sha256 = "aa", .href = "/v1/jobs/7/mesh.drc"}},
                 {MeshFormat::kObj, {.bytes = 2, .sha256 = "bb", .href = "/v1/jobs/7/mesh.obj"}}}};
@@ -184,7 +188,8 @@ TEST(AnswerJson, SpellsParametersAsTheContractDoes) {
   EXPECT_EQ(json::parse(to_json(some_parameters())),
             json::parse(R"({"volume": "0123abcd", "iso": -0.1, "scheme": 5,
                             "interpolation": "midpoint", "passes": 1000, "smoothing": "taubin",
-                            "lambda": 0.3, "close": true,
+                            "lambda": 0.3, "pass_band": 0.2, "max_displacement_mm": 1.5,
+                            "close": true,
                             "components": {"keep": 4294967295, "min_triangles": null},
                             "formats": ["stl", "drc"],
                             "draco": {"position_bits": 30, "speed": 0}, "normals": true,
@@ -193,6 +198,10 @@ TEST(AnswerJson, SpellsParametersAsTheContractDoes) {
 
 TEST(AnswerJson, SpellsAnAbsentIsoAsOtsu) {
   EXPECT_EQ(json::parse(to_json(JobParameters{}))["iso"], "otsu");
+}
+
+TEST(AnswerJson, SpellsAnAbsentLimitAsNull) {
+  EXPECT_TRUE(json::parse(to_json(JobParameters{}))["max_displacement_mm"].is_null());
 }
 
 TEST(AnswerJson, SpellsAJobAsTheContractDoes) {
@@ -215,8 +224,10 @@ TEST(AnswerJson, SpellsAMeshAsTheContractDoes) {
   mesh.erase("quality");
   EXPECT_EQ(mesh, json::parse(R"({
       "triangles": 5091320, "vertices": 2544488, "boundary_edges": 7, "components": 12,
-      "euler": -35, "dropped": {"components": 3, "triangles": 48}, "area_mm2": 593150.7,
+      "euler": -35, "dropped": {"components": 3, "triangles": 48},
+      "area_mm2": 593150.7, "area_extracted_mm2": 600000.5,
       "volume_mm3": {"extracted": 2795793.9, "smoothed": 2790000.25},
+      "displacement_mm": {"mean": 0.25, "max": 1.75},
       "bounds": [[-1, -2, -3], [1, 2, 3]],
       "files": {"drc": {"bytes": 1, "sha256": "aa", "href": "/v1/jobs/7/mesh.drc"},
                 "obj": {"bytes": 2, "sha256": "bb", "href": "/v1/jobs/7/mesh.obj"}}})"));

@@ -48,6 +48,7 @@ TEST(JobBody, NeedsAVolumeAndAnIsoOnly) {
   JobParameters expected;
   expected.volume = "a";
   expected.iso = 60;
+  expected.lambda = 1;
   EXPECT_EQ(parsed(""), expected);
   EXPECT_THAT(faults_in("{}"), UnorderedElementsAre("volume", "iso"));
   EXPECT_THAT(faults_in(R"({"volume": "a"})"), ElementsAre("iso"));
@@ -57,6 +58,7 @@ TEST(JobBody, NeedsAVolumeAndAnIsoOnly) {
 TEST(JobBody, TakesEveryMember) {
   EXPECT_EQ(parse_job_parameters(R"({"volume": "abc", "iso": -1.5e2, "scheme": 5,
       "interpolation": "midpoint", "passes": 17, "smoothing": "taubin", "lambda": 0.25,
+      "pass_band": 0.05, "max_displacement_mm": 0.5,
       "close": true, "components": {"keep": 2, "min_triangles": 100}, "formats": ["stl", "glb"],
       "draco": {"position_bits": 11, "speed": 3}, "normals": true, "priority": "bulk"})"),
             (JobParameters{.volume = "abc",
@@ -66,6 +68,8 @@ TEST(JobBody, TakesEveryMember) {
                            .passes = 17,
                            .smoothing = Smoothing::kTaubin,
                            .lambda = 0.25,
+                           .pass_band = 0.05,
+                           .max_displacement_mm = 0.5,
                            .close = true,
                            .components = {.keep = 2, .min_triangles = 100},
                            .formats = {MeshFormat::kStl, MeshFormat::kGlb},
@@ -77,6 +81,7 @@ TEST(JobBody, TakesEveryMember) {
 TEST(JobBody, IsWhatToJsonWrites) {
   JobParameters parameters;
   parameters.volume = "a";
+  parameters.lambda = 0.5;
   EXPECT_EQ(parse_job_parameters(to_json(parameters)), parameters);
   parameters.iso = 0.1;
   parameters.components.keep = 7;
@@ -86,6 +91,17 @@ TEST(JobBody, IsWhatToJsonWrites) {
 
 TEST(JobBody, OtsuStandsForAnIso) {
   EXPECT_EQ(parse_job_parameters(R"({"volume": "a", "iso": "otsu"})").iso, std::nullopt);
+}
+
+TEST(JobBody, WithoutALambdaTheSmoothingHasItsOwn) {
+  EXPECT_EQ(parsed("").lambda, 1);
+  EXPECT_EQ(parsed(R"("smoothing": "taubin")").lambda, default_lambda(Smoothing::kTaubin));
+  EXPECT_EQ(parsed(R"("smoothing": "taubin", "lambda": null)").lambda, 0.33);
+  EXPECT_EQ(parsed(R"("lambda": null)").lambda, 1);
+}
+
+TEST(JobBody, NullIsNoLimit) {
+  EXPECT_EQ(parsed(R"("max_displacement_mm": null)").max_displacement_mm, std::nullopt);
 }
 
 TEST(JobBody, DracoMayBePartial) {
@@ -111,6 +127,9 @@ TEST(JobBody, TakesTheEdgesOfEveryRange) {
   EXPECT_EQ(parsed(R"("passes": 5.0)").passes, 5);
   EXPECT_EQ(parsed(R"("lambda": 1)").lambda, 1);
   EXPECT_EQ(parsed(R"("lambda": 5e-324)").lambda, 5e-324);
+  EXPECT_EQ(parsed(R"("smoothing": "taubin", "lambda": 0.66)").lambda, 0.66);
+  EXPECT_EQ(parsed(R"("pass_band": 0.5)").pass_band, 0.5);
+  EXPECT_EQ(parsed(R"("max_displacement_mm": 0)").max_displacement_mm, 0);
   EXPECT_EQ(parsed(R"("draco": {"position_bits": 8, "speed": 10})").draco,
             (DracoParameters{8, 10}));
   EXPECT_EQ(parsed(R"("draco": {"position_bits": 30, "speed": 0})").draco,
@@ -140,6 +159,10 @@ INSTANTIATE_TEST_SUITE_P(
                     Refused{R"("passes": 18446744073709551621)", "passes"},
                     Refused{R"("lambda": 0)", "lambda"}, Refused{R"("lambda": -0.5)", "lambda"},
                     Refused{R"("lambda": 1.0000000000000002)", "lambda"},
+                    Refused{R"("smoothing": "taubin", "lambda": 0.67)", "lambda"},
+                    Refused{R"("pass_band": 0)", "pass_band"},
+                    Refused{R"("pass_band": 0.51)", "pass_band"},
+                    Refused{R"("max_displacement_mm": -0.1)", "max_displacement_mm"},
                     Refused{R"("scheme": 4)", "scheme"}, Refused{R"("scheme": 7)", "scheme"},
                     Refused{R"("scheme": 5.5)", "scheme"},
                     Refused{R"("draco": {"position_bits": 7})", "draco.position_bits"},
@@ -164,9 +187,10 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{R"("interpolation": "")", "interpolation"}, Refused{R"("passes": "5")", "passes"},
         Refused{R"("passes": false)", "passes"}, Refused{R"("passes": null)", "passes"},
         Refused{R"("smoothing": "gauss")", "smoothing"}, Refused{R"("lambda": "1")", "lambda"},
-        Refused{R"("lambda": {})", "lambda"}, Refused{R"("close": 1)", "close"},
-        Refused{R"("normals": 1)", "normals"}, Refused{R"("components": 3)", "components"},
-        Refused{R"("components": null)", "components"},
+        Refused{R"("lambda": {})", "lambda"}, Refused{R"("pass_band": null)", "pass_band"},
+        Refused{R"("max_displacement_mm": "otsu")", "max_displacement_mm"},
+        Refused{R"("close": 1)", "close"}, Refused{R"("normals": 1)", "normals"},
+        Refused{R"("components": 3)", "components"}, Refused{R"("components": null)", "components"},
         Refused{R"("components": {"keep": "1"})", "components.keep"},
         Refused{R"("components": {"keep": true})", "components.keep"},
         Refused{R"("close": "true")", "close"}, Refused{R"("formats": [])", "formats"},
@@ -285,6 +309,7 @@ TEST(JobBody, MembersOfNonUtf8NamesAreRefusedWithoutThem) {
 TEST(JobQuery, NeedsAnIsoOnly) {
   JobParameters expected;
   expected.iso = 60;
+  expected.lambda = 1;
   EXPECT_EQ(parse_job_parameters(Query{{"iso", "60"}}), expected);
   EXPECT_THAT(faults_in(Query{}), ElementsAre("iso"));
 }
@@ -296,6 +321,8 @@ TEST(JobQuery, TakesEveryParameter) {
                                        {"passes", "17"},
                                        {"smoothing", "taubin"},
                                        {"lambda", "0.25"},
+                                       {"pass_band", "0.05"},
+                                       {"max_displacement_mm", "0.5"},
                                        {"close", "true"},
                                        {"keep", "2"},
                                        {"min_triangles", "100"},
@@ -311,6 +338,8 @@ TEST(JobQuery, TakesEveryParameter) {
                            .passes = 17,
                            .smoothing = Smoothing::kTaubin,
                            .lambda = 0.25,
+                           .pass_band = 0.05,
+                           .max_displacement_mm = 0.5,
                            .close = true,
                            .components = {.keep = 2, .min_triangles = 100},
                            .formats = {MeshFormat::kStl, MeshFormat::kGlb},

@@ -83,7 +83,9 @@ TEST(JobParameters, HaveTheContractsDefaults) {
   EXPECT_EQ(parameters.interpolation, Interpolation::kLinear);
   EXPECT_EQ(parameters.passes, 5);
   EXPECT_EQ(parameters.smoothing, Smoothing::kLaplacian);
-  EXPECT_EQ(parameters.lambda, 1);
+  EXPECT_EQ(parameters.lambda.value_or(default_lambda(parameters.smoothing)), 1);
+  EXPECT_EQ(parameters.pass_band, 0.1);
+  EXPECT_EQ(parameters.max_displacement_mm, std::nullopt);
   EXPECT_FALSE(parameters.close);
   EXPECT_EQ(parameters.formats, std::vector{MeshFormat::kDrc});
   EXPECT_EQ(parameters.draco, (DracoParameters{.position_bits = 14, .speed = 7}));
