@@ -121,7 +121,7 @@ std::vector<std::string> json_texts() {
           to_json(Job{}),
           to_json(std::vector{Volume{}}),
           to_json(std::vector{Job{}}),
-          to_json(Problem{.title = "a", .detail = "b", .errors = {{"c", "d"}}})};
+          to_json(Problem{"", "a", 0, "b", "", {{"c", "d"}}})};
 }
 
 }  // namespace
