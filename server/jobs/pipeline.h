@@ -2,11 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <stop_token>
 
 #include "proto/types.h"
-#include "server/mesh/extract.h"
+#include "server/jobs/make_mesh.h"
 #include "server/mesh/mesh.h"
 #include "server/store/blob_store.h"
 
@@ -21,18 +20,10 @@ struct Workspace {
   void trim(std::size_t budget_bytes);
 };
 
-// Called as a job goes on, from several threads, with the share of the whole job that is done and
-// the milliseconds of the stages that have ended.
-using Report = std::function<void(Stage stage, double progress, const Timing& timing)>;
-
 struct PipelineResult {
   MeshSummary mesh;  // the files' hrefs are empty
   Timing timing;     // load, extract, smooth and encode
 };
-
-// How much memory a job with a surface of that size takes at its peak, beside its mapped volume:
-// mesh, smoothing, encoders. An upper estimate.
-std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const JobParameters& parameters);
 
 struct PipelineLimits {
   std::uint64_t memory_bytes = std::uint64_t{8} << 30;  // of one job

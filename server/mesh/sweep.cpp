@@ -69,27 +69,27 @@ class Links {
 
 // A layer's vertices while their neighbours are listed.
 struct LayerLinks {
-  std::uint32_t first = 0;  // vertex
-  Place first_place = 0;
-  Links* links = nullptr;
+  std::uint32_t first = 0;      // vertex
+  Place first_place = 0;        // in every ring
+  std::size_t first_index = 0;  // in the array of links
   std::vector<MoreNeighbor>* more = nullptr;
 };
 
 // Lists, for the vertices of two layers, the corners that follow them in the triangles that name
-// both layers' vertices.
+// both layers' vertices. The differences below are modulo 2^32 and 2^64.
 void add_neighbors(std::span<const Triangle> triangles, const LayerLinks& lower,
-                   const LayerLinks& upper) {
+                   const LayerLinks& upper, Links* links) {
+  const Place upper_shift = upper.first_place - upper.first * kPlacesPerPosition;
+  const Place lower_shift = lower.first_place - lower.first * kPlacesPerPosition;
   const auto place_of = [&](std::uint32_t vertex) {
-    const bool is_upper = vertex >= upper.first;
-    return (is_upper ? upper.first_place - upper.first * kPlacesPerPosition
-                     : lower.first_place - lower.first * kPlacesPerPosition) +
-           vertex * kPlacesPerPosition;
+    return vertex * kPlacesPerPosition + (vertex >= upper.first ? upper_shift : lower_shift);
   };
   const auto add = [&](std::uint32_t vertex, std::uint32_t next, std::uint32_t previous,
                        Place next_place) {
     const bool is_upper = vertex >= upper.first;
-    Links* links = (is_upper ? upper.links - upper.first : lower.links - lower.first) + vertex;
-    if (links->add(next, previous, next_place)) return;
+    const std::size_t index =
+        vertex + (is_upper ? upper.first_index - upper.first : lower.first_index - lower.first);
+    if (links[index].add(next, previous, next_place)) return;
     const LayerLinks& layer = is_upper ? upper : lower;
     layer.more->push_back({vertex - layer.first, next_place});
   };
@@ -195,7 +195,7 @@ class Sweep {
     return {
         .first = static_cast<std::uint32_t>(round_.first_vertex(layer)),
         .first_place = static_cast<Place>(turn(layer, kRingLayers) * width_ * kPlacesPerPosition),
-        .links = links(layer),
+        .first_index = static_cast<std::size_t>(links(layer) - links_.data()),
         .more = &more_neighbors(layer)};
   }
   Place place_of_zero() const {
@@ -251,7 +251,7 @@ class Sweep {
     const std::uint64_t first = round_.mesh.layer_triangles[layer];
     add_neighbors(
         round_.mesh.triangles.span().subspan(first, round_.mesh.layer_triangles[layer + 1] - first),
-        layer_links(layer), upper);
+        layer_links(layer), upper, links_.data());
     weigh(layer);
     auto& more = more_neighbors(layer);
     std::ranges::stable_sort(more, {}, &MoreNeighbor::vertex);

@@ -1,8 +1,11 @@
 #include "tests/bench/stages.h"
 
+#include <limits>
+
 #include <malloc.h>
 
 #include "server/codec/encode.h"
+#include "server/jobs/make_mesh.h"
 #include "server/mesh/extract.h"
 #include "server/mesh/measure.h"
 #include "server/mesh/smooth.h"
@@ -102,17 +105,20 @@ std::uint64_t Stages::encode(Encoding encoding) const {
 }
 
 std::uint64_t Stages::run_job(int passes, MeshFormat format) {
-  extract();
-  smooth(passes);
-  std::uint64_t bytes = 0;
-  mesh::parallel_for({}, 2, [&](std::size_t task) {
-    if (task == 0) {
-      bytes = encode_as(format, kDefaultSpeed);
-    } else {
-      measure();
-    }
-  });
-  return bytes;
+  JobParameters parameters;
+  parameters.scheme = surface_.scheme;
+  parameters.interpolation = surface_.interpolation;
+  parameters.passes = passes;
+  parameters.formats = {format};
+  CountingSink counting;
+  const std::array sinks = {counting.sink()};
+  const jobs::Report nobody = [](Stage, double, const Timing&) {};
+  jobs::Progress progress({}, nobody);
+  const auto& [x, y, z] = samples_.dims;
+  jobs::make_mesh({samples_.type, {x, y, z}, samples_.geometry, samples_.bytes.data()},
+                  {parameters, surface_.iso, std::numeric_limits<std::uint64_t>::max()}, sinks,
+                  progress, mesh_);
+  return counting.bytes;
 }
 
 void Stages::release_memory() {

@@ -1,0 +1,195 @@
+#include "server/jobs/make_mesh.h"
+
+#include <atomic>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "server/mesh/components.h"
+#include "server/mesh/measure.h"
+#include "server/mesh/quality.h"
+#include "server/mesh/smooth.h"
+
+namespace isomesh::jobs {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kExtractShare = 0.05;
+constexpr double kSmoothShare = 0.08;
+constexpr double kEncodeShare = 1 - kLoadShare - kExtractShare - kSmoothShare;
+
+mesh::SmoothOptions smooth_options(const JobParameters& parameters) {
+  const bool is_taubin = parameters.smoothing == Smoothing::kTaubin;
+  const double lambda = parameters.lambda.value_or(default_lambda(parameters.smoothing));
+  return {.passes = parameters.passes,
+          .lambda = lambda,
+          .mu = is_taubin ? mesh::taubin_mu(lambda, parameters.pass_band) : 0,
+          .max_displacement_mm =
+              parameters.max_displacement_mm.value_or(std::numeric_limits<double>::infinity())};
+}
+
+void check_memory(const mesh::SurfaceCount& count, const JobParameters& parameters,
+                  std::uint64_t allowed) {
+  const std::uint64_t needed = estimate_memory(size_of(count), parameters);
+  if (needed <= allowed) return;
+  constexpr std::uint64_t kMebibyte = 1 << 20;
+  throw Error(ErrorCode::kTooLarge,
+              "the surface has " + std::to_string(count.triangles()) + " triangles and " +
+                  std::to_string(count.vertices()) + " vertices; the job would take about " +
+                  std::to_string(needed / kMebibyte) + " MiB of memory, and " +
+                  std::to_string(allowed / kMebibyte) + " MiB are allowed");
+}
+
+template <class T>
+void extract_as(const SampleArray& samples, const MeshRequest& request, const Progress& progress,
+                mesh::Mesh& mesh) {
+  const mesh::Lattice<T> lattice = {reinterpret_cast<const T*>(samples.bytes),
+                                    {samples.dims[0], samples.dims[1], samples.dims[2]},
+                                    mesh::lattice_to_space(samples.geometry)};
+  const mesh::ExtractOptions options = {.iso = request.iso,
+                                        .scheme = request.parameters.scheme,
+                                        .interpolation = request.parameters.interpolation,
+                                        .close = request.parameters.close};
+  const mesh::SurfaceCount count = count_surface(lattice, options, progress.context(0, 0.2));
+  check_memory(count, request.parameters, request.memory_bytes);
+  extract_surface(lattice, options, count, progress.context(0.2, 1), mesh);
+}
+
+void extract(const SampleArray& samples, const MeshRequest& request, const Progress& progress,
+             mesh::Mesh& mesh) {
+  switch (samples.type) {
+    case SampleType::kUint8:
+      return extract_as<std::uint8_t>(samples, request, progress, mesh);
+    case SampleType::kInt8:
+      return extract_as<std::int8_t>(samples, request, progress, mesh);
+    case SampleType::kUint16:
+      return extract_as<std::uint16_t>(samples, request, progress, mesh);
+    case SampleType::kInt16:
+      return extract_as<std::int16_t>(samples, request, progress, mesh);
+    case SampleType::kUint32:
+      return extract_as<std::uint32_t>(samples, request, progress, mesh);
+    case SampleType::kInt32:
+      return extract_as<std::int32_t>(samples, request, progress, mesh);
+    case SampleType::kFloat32:
+      return extract_as<float>(samples, request, progress, mesh);
+    case SampleType::kFloat64:
+      return extract_as<double>(samples, request, progress, mesh);
+  }
+}
+
+// Fills in what is not known from before smoothing.
+void measure_quality(const mesh::Mesh& mesh, const mesh::Topology& topology, bool is_smoothed,
+                     const mesh::Context& context, MeshQuality& quality) {
+  const mesh::Soundness soundness = check_soundness(mesh, context);
+  quality.closed = soundness.boundary_edges == 0;
+  quality.manifold = soundness.manifold;
+  quality.oriented = soundness.oriented;
+  quality.components = topology.components;
+  if (quality.closed && quality.manifold && quality.oriented) {
+    quality.genus = static_cast<std::int64_t>(topology.components) - topology.euler / 2;
+  }
+  quality.aspect_ratio.smoothed = quality.aspect_ratio.extracted;
+  quality.smallest_angle_deg.smoothed = quality.smallest_angle_deg.extracted;
+  if (!is_smoothed) return;
+  const mesh::Shapes shapes = measure_shapes(mesh, context);
+  quality.aspect_ratio.smoothed = shapes.aspect_ratio;
+  quality.smallest_angle_deg.smoothed = shapes.smallest_angle_deg;
+}
+
+// Encodes every format and measures the mesh, all side by side: a single Draco stream takes one
+// thread.
+void encode_and_measure(const codec::Provenance& provenance, std::span<const codec::Sink> sinks,
+                        const Progress& progress, const mesh::Mesh& mesh, MeshSummary& summary) {
+  const std::vector<MeshFormat>& formats = provenance.parameters.formats;
+  std::vector<std::atomic<double>> done(formats.size());
+  const mesh::Context stage = progress.context();
+  const auto encode = [&](std::size_t i) {
+    const mesh::Context context = {stage.stop, [&, i](double share) {
+                                     done[i] = share;
+                                     const double sum =
+                                         std::accumulate(done.begin(), done.end(), 0.0);
+                                     stage.progress(sum / static_cast<double>(formats.size()));
+                                   }};
+    codec::encode(mesh, formats[i], provenance, context, sinks[i]);
+  };
+  mesh::Topology topology;
+  mesh::parallel_for(progress.quiet(), formats.size() + 1, [&](std::size_t task) {
+    if (task < formats.size()) return encode(task);
+    topology = measure_topology(mesh, progress.quiet());
+    measure_quality(mesh, topology, provenance.parameters.passes > 0, progress.quiet(),
+                    summary.quality);
+  });
+  summary.boundary_edges = topology.boundary_edges;
+  summary.components = topology.components;
+  summary.euler = topology.euler;
+}
+
+}  // namespace
+
+void Progress::enter(Stage stage, double share, double Timing::*elapsed) {
+  end_stage();
+  stage_ = stage;
+  done_before_ += share_;
+  share_ = share;
+  elapsed_ = elapsed;
+  began_ = Clock::now();
+  report_(stage_, done_before_, timing_);
+}
+
+void Progress::end_stage() {
+  if (elapsed_ == nullptr) return;
+  timing_.*elapsed_ = std::chrono::duration<double, std::milli>(Clock::now() - began_).count();
+}
+
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const JobParameters& parameters) {
+  // Measured: what Draco takes at its slowest speed, and what GLB's chunks and their bytes add.
+  constexpr std::uint64_t kDracoBytesPerTriangle = 100;
+  constexpr std::uint64_t kGlbBytesPerTriangle = 15;
+  constexpr std::uint64_t kGlbNormalBytesPerTriangle = 8;
+  std::uint64_t encoding = surface.vertices * 2 * sizeof(std::uint32_t);  // measured meanwhile
+  for (const MeshFormat format : parameters.formats) {
+    if (format == MeshFormat::kDrc) encoding += surface.triangles * kDracoBytesPerTriangle;
+    if (format == MeshFormat::kGlb) encoding += surface.triangles * kGlbBytesPerTriangle;
+    if (format == MeshFormat::kGlb && parameters.normals) {
+      encoding +=
+          surface.vertices * sizeof(mesh::Vec3) + surface.triangles * kGlbNormalBytesPerTriangle;
+    }
+  }
+  const std::uint64_t smoothing = smoothing_memory(smooth_options(parameters), surface);
+  return surface.vertices * sizeof(mesh::Vec3) + surface.triangles * sizeof(mesh::Triangle) +
+         smoothing + encoding;
+}
+
+MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
+                      std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh) {
+  const JobParameters& parameters = request.parameters;
+  MeshSummary summary;
+  progress.enter(Stage::kExtract, kExtractShare, &Timing::extract);
+  extract(samples, request, progress, mesh);
+  if (!parameters.components.keeps_all()) {
+    const mesh::Dropped dropped = keep_components(parameters.components, progress.quiet(), mesh);
+    summary.dropped = {dropped.components, dropped.triangles};
+  }
+  summary.triangles = mesh.triangles.size();
+  summary.vertices = mesh.positions.size();
+  const mesh::Shapes extracted = measure_shapes(mesh, progress.quiet());
+  summary.quality.aspect_ratio.extracted = extracted.aspect_ratio;
+  summary.quality.smallest_angle_deg.extracted = extracted.smallest_angle_deg;
+
+  progress.enter(Stage::kSmooth, kSmoothShare, &Timing::smooth);
+  const mesh::SmoothingEffect effect = smooth(smooth_options(parameters), progress.context(), mesh);
+  summary.area_mm2 = effect.after.area_mm2;
+  summary.area_extracted_mm2 = effect.before.area_mm2;
+  summary.displacement_mm = {effect.mean_displacement_mm, effect.max_displacement_mm};
+  summary.volume_mm3 = {effect.before.volume_mm3, effect.after.volume_mm3};
+  summary.bounds = {effect.after.low, effect.after.high};
+
+  progress.enter(Stage::kEncode, kEncodeShare, &Timing::encode);
+  encode_and_measure({parameters, request.iso, samples.dims, samples.geometry}, sinks, progress,
+                     mesh, summary);
+  return summary;
+}
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,85 @@
+// What a job does between the samples of its volume and the bytes of its files, without disks.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <stop_token>
+
+#include "proto/types.h"
+#include "server/codec/encode.h"
+#include "server/mesh/extract.h"
+#include "server/mesh/mesh.h"
+
+namespace isomesh::jobs {
+
+// Called as a job goes on, from several threads, with the share of the whole job that is done and
+// the milliseconds of the stages that have ended.
+using Report = std::function<void(Stage stage, double progress, const Timing& timing)>;
+
+// The share of a typical job that loading the volume takes, for its progress.
+inline constexpr double kLoadShare = 0.02;
+
+// Follows a job through its stages: times each, reports its progress, passes cancellation on.
+class Progress {
+ public:
+  Progress(std::stop_token stop, const Report& report) : stop_(std::move(stop)), report_(report) {}
+
+  // Ends the stage before and starts this one, which takes `share` of the whole job.
+  void enter(Stage stage, double share, double Timing::*elapsed);
+  void end_stage();
+
+  // The context of the part [from, to] of the present stage.
+  mesh::Context context(double from = 0, double to = 1) const {
+    return {stop_, [this, from, to](double done) {
+              report_(stage_, done_before_ + share_ * (from + (to - from) * done), timing_);
+            }};
+  }
+
+  // One that cancels but does not report.
+  mesh::Context quiet() const { return {stop_, nullptr}; }
+
+  const Timing& timing() const { return timing_; }
+
+ private:
+  std::stop_token stop_;
+  const Report& report_;
+  Timing timing_;
+  Stage stage_ = Stage::kQueue;
+  double done_before_ = 0;
+  double share_ = 0;
+  double Timing::*elapsed_ = nullptr;
+  std::chrono::steady_clock::time_point began_;
+};
+
+// A volume in memory, as Volume describes it.
+struct SampleArray {
+  SampleType type = SampleType::kUint8;
+  std::array<std::uint32_t, 3> dims = {0, 0, 0};
+  Geometry geometry;
+  const std::byte* bytes = nullptr;
+};
+
+// What a mesh is to be made of and what it may take.
+struct MeshRequest {
+  const JobParameters& parameters;
+  double iso;  // whatever the parameters say of it
+  std::uint64_t memory_bytes;
+};
+
+// How much memory a job with a surface of that size takes at its peak, beside its mapped volume:
+// mesh, smoothing, encoders. An upper estimate.
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const JobParameters& parameters);
+
+// Extracts, smooths, measures and encodes; `sinks` has one for each of the parameters' formats, in
+// their order. The files of the summary are empty. `mesh` is worked in, and left as it was encoded.
+// `progress` enters the stages; the caller ends the last one, when the bytes are where they belong.
+// Throws Error kCancelled, kTooLarge with the estimate when the job would take more than it may
+// (told before memory is taken), and kInternal.
+MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
+                      std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh);
+
+}  // namespace isomesh::jobs
