@@ -86,6 +86,7 @@ CREATE INDEX expired_by_time ON expired(at);
 )sql",
                                   R"sql(
 ALTER TABLE jobs ADD COLUMN interruptions INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE jobs ADD COLUMN is_long INTEGER NOT NULL DEFAULT 0;  -- its run has lasted a while
 )sql"};
 
 constexpr auto kNewest = static_cast<std::int64_t>(kVersions.size());

@@ -56,7 +56,7 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
                                         "idempotency_key = ?",
                                     spec.owner, spec.idempotency_key);
       if (earlier.next()) {
-        constexpr int kAfterTheRow = 9;
+        constexpr int kAfterTheRow = 11;
         if (earlier.text(kAfterTheRow) != spec.request_digest)
           return {Submission::Kind::kConflict, {}, {}};
         return {Submission::Kind::kExisting, with_progress(row_of(earlier)), {}};
@@ -117,9 +117,9 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   row.job.started = timestamp();
   row.job.timing.queue = milliseconds_since(row.accepted);
   change->run(
-      "UPDATE jobs SET state = 1, attempts = ?, fence = ?, claimed = ?, lease_until = ?, worker = "
+      "UPDATE jobs SET state = 1, attempts = ?, fence = ?, claimed = ?, is_long = 0, lease_until = "
       "?, "
-      "record = ? WHERE id = ?",
+      "worker = ?, record = ? WHERE id = ?",
       row.attempts, row.fence, now, now + microseconds(lease), worker, to_json(row.job),
       row.job.id);
   change.announce(row, EventKind::kStage);
@@ -137,12 +137,13 @@ Standing SqliteJobStore::renew(const Lease& lease, const Progress& progress,
   if (!row) return Standing::kLost;
   tell(lease, progress);
   const std::int64_t now = now_us();
-  if (row->lease_until - now < microseconds(length) * 2 / 3) {
+  const bool is_long = now - row->claimed >= microseconds(options_.short_run);
+  if (row->lease_until - now < microseconds(length) * 2 / 3 || is_long != row->is_long) {
     Change change(*this, Durability::kProcess);
     const int held = change->run(
-        "UPDATE jobs SET lease_until = ? WHERE id = ? AND fence = ? AND state = 1 AND "
+        "UPDATE jobs SET lease_until = ?, is_long = ? WHERE id = ? AND fence = ? AND state = 1 AND "
         "lease_until >= ?",
-        now + microseconds(length), lease.id, lease.fence, now);
+        now + microseconds(length), is_long ? 1 : 0, lease.id, lease.fence, now);
     if (held == 0) return Standing::kLost;
     change.commit();
   }
@@ -227,11 +228,11 @@ std::size_t SqliteJobStore::reap_all() {
   {
     Transaction transaction(database_.writer());
     const int running = transaction->run("UPDATE jobs SET lease_until = 0 WHERE state = 1");
-    if (running > 1) {
-      transaction->run(
-          "UPDATE jobs SET attempts = attempts - 1, interruptions = interruptions + 1 WHERE state "
-          "= 1");
-    }
+    transaction->run(
+        "UPDATE jobs SET attempts = attempts - 1, interruptions = interruptions + 1 WHERE state = "
+        "1 "
+        "AND (is_long = 0 OR ? > 1)",
+        running);
     transaction.commit();
   }
   return reap();

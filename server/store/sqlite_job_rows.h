@@ -15,6 +15,8 @@ struct SqliteJobStore::Row {
   std::int64_t accepted = 0;
   int attempts = 0;
   int interruptions = 0;  // runs that ended with their process and that count as no attempt
+  std::int64_t claimed = 0;
+  bool is_long = false;  // its run has lasted the store's short_run
   std::uint64_t fence = 0;
   std::int64_t lease_until = 0;
   bool cancelling = false;
@@ -47,7 +49,8 @@ class SqliteJobStore::Change {
 
 // The columns that row_of() reads.
 inline constexpr const char* kRowColumns =
-    "record, owner, result_key, accepted, attempts, fence, lease_until, cancelling, interruptions";
+    "record, owner, result_key, accepted, attempts, fence, lease_until, cancelling, interruptions, "
+    "claimed, is_long";
 
 // How many jobs wait.
 std::size_t count_queued(Connection& connection);

@@ -169,6 +169,8 @@ SqliteJobStore::Row SqliteJobStore::row_of(const Query& query) {
   row.lease_until = query.integer(6);
   row.cancelling = query.integer(7) != 0;
   row.interruptions = static_cast<int>(query.integer(8));
+  row.claimed = query.integer(9);
+  row.is_long = query.integer(10) != 0;
   return row;
 }
 

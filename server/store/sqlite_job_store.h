@@ -18,7 +18,9 @@ struct JobStoreOptions {
   std::size_t max_queued = 1000;  // a longer queue accepts nothing
   int attempts = 3;               // how often a job is begun that fails or ends its worker
   std::chrono::milliseconds retry_delay{1000};  // after the first attempt; four times it after each
-  std::string mesher_version = {};              // results of another one are not reused
+  std::chrono::milliseconds short_run{
+      1000};                        // a run that its process did not outlive is charged after it
+  std::string mesher_version = {};  // results of another one are not reused
 };
 
 // Jobs in the database of a data folder. Leases follow the system's clock. What changes wakes
@@ -29,8 +31,9 @@ class SqliteJobStore : public JobStore {
   SqliteJobStore(Database& database, const BlobStore& blobs, JobStoreOptions options);
 
   // Ends all leases, for the process that has just taken the data folder's lock: whoever held them
-  // is gone. That counts as an attempt of a job that ran alone; of several nobody knows which one
-  // it was, so none is charged until it was there ten times. Returns how many there were.
+  // is gone. That counts as an attempt of a job that ran alone and had run for a while; of several
+  // nobody knows which one it was, and what ends a daemon as soon as it begins is seldom the job,
+  // so then none is charged until it was there ten times. Returns how many there were.
   std::size_t reap_all();
 
   Submission submit(const JobSpec& spec) override;

@@ -126,6 +126,7 @@ class Validator {
 
   void check_size(const json& value, const std::string& keyword, const YAML::Node& says,
                   const std::string& where) {
+    if (value.is_null()) return;  // limits bind numbers and lists only
     const auto limit = says.as<double>();
     const double number = value.is_number() ? value.get<double>() : 0;
     const auto count = static_cast<double>(value.size());

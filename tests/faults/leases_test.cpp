@@ -17,6 +17,9 @@ using testing::HasSubstr;
 
 class Leases : public FaultTest {};
 
+// How long a job has to run for its daemon's death to be charged to it.
+constexpr std::chrono::milliseconds kLongRun{2000};
+
 TEST_F(Leases, KilledRightAfterEachAcceptanceAllFinish) {
   start();
   const Volume volume = small_volume();
@@ -68,6 +71,7 @@ TEST_F(Leases, AJobThatEndsItsDaemonThreeTimesFailsAndOthersGoOn) {
   const std::string other = submit(daemon(), small_volume(), 100).id;
   for (int death = 1; death <= 3; ++death) {
     ASSERT_TRUE(comes_to(deadly.id, JobState::kRunning)) << death;
+    std::this_thread::sleep_for(kLongRun);
     kill();
     start({"--workers", "1"});
   }

@@ -327,6 +327,7 @@ TEST(Jobs, AreSubmittedListedAndCancelled) {
   parameters.iso = -600.5;
   parameters.formats = {MeshFormat::kGlb, MeshFormat::kStl};
   EXPECT_EQ(client.submit(parameters).id, "7");
+  parameters.lambda = default_lambda(parameters.smoothing);  // what a request that names none means
   EXPECT_EQ(asked, parameters);
   const JobPage first = client.jobs(JobState::kSucceeded);
   EXPECT_EQ(first.jobs.size(), 1U);

@@ -36,6 +36,7 @@ class OpenApi : public testing::Test {
     add_job_routes(app_);
     add_mesh_routes(app_);
     add_survey_routes(app_);
+    add_page_routes(app_);
     add_service_routes(app_);
   }
 

@@ -392,10 +392,21 @@ TEST_P(JobConformance, AJobThatRanAtACrashIsClaimedAgain) {
   restart();
   EXPECT_EQ(jobs().get("", id).state, JobState::kQueued);
   const Lease after = claimed();
-  EXPECT_EQ(after.attempt, 2);
   EXPECT_GT(after.fence, before.fence);
   EXPECT_FALSE(jobs().finish(before, some_mesh()));
   EXPECT_TRUE(jobs().finish(after, some_mesh()));
+}
+
+// A run is held to be a while old, and charged, once its lease was renewed that late.
+TEST_P(JobConformance, ACrashUnderAJobThatHadJustBegunIsNoAttempt) {
+  submit();
+  claimed();
+  restart();
+  const Lease second = claimed();
+  EXPECT_EQ(second.attempt, 1);
+  EXPECT_EQ(jobs().renew(second, {Stage::kSmooth, 0.5, {}}, kLongLease), Standing::kOk);
+  restart();
+  EXPECT_EQ(claimed().attempt, 2);
 }
 
 // Which of several it was that ended the process, nobody knows; killed from outside, it was none.

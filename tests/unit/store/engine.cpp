@@ -34,6 +34,7 @@ class SqliteEngine : public Engine {
     jobs_.emplace(*database_, blobs_,
                   store::JobStoreOptions{.max_queued = options_.max_queued,
                                          .retry_delay = options_.retry_delay,
+                                         .short_run = std::chrono::milliseconds(0),
                                          .mesher_version = "test"});
   }
 
