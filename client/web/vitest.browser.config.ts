@@ -12,7 +12,7 @@ export default defineConfig({
     fileParallelism: false,
     // Software draws, on machines that have other things to do.
     expect: { poll: { timeout: 20_000, interval: 100 } },
-    testTimeout: 120_000,
+    testTimeout: 240_000,
     hookTimeout: 120_000,
   },
 });

@@ -6,6 +6,7 @@ import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from
 import {
   ballNrrd,
   brain,
+  brainHull,
   contourPixels,
   Daemon,
   drop,
@@ -53,7 +54,7 @@ async function job(): Promise<JobAnswer> {
 describe('a real volume', () => {
   it('is dropped, looked at, meshed, turned, downloaded, and still there after a reload', async () => {
     await page.goto(daemon.url);
-    await drop(page, [{ name: 'ch2.nii.gz', bytes: readFileSync(brain) }]);
+    await drop(page, [{ name: 'ch2bet.nii.gz', bytes: readFileSync(brain) }]);
     await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
     await expect.poll(() => contourPixels(page, 'axial')).toBeGreaterThan(200);
 
@@ -73,8 +74,8 @@ describe('a real volume', () => {
     await page.mouse.up();
     const byPointer = Number(query().get('iso'));
     expect(byPointer).toBeLessThan(byKeys);
-    await page.getByLabel('Iso-value', { exact: true }).nth(0).fill('60');
-    await expect.poll(() => query().get('iso')).toBe('60');
+    await page.getByLabel('Iso-value', { exact: true }).nth(0).fill(String(brainHull));
+    await expect.poll(() => query().get('iso')).toBe(String(brainHull));
     await expect.poll(() => page.locator('.estimate:not(.stale)').count()).toBe(1);
     const estimated = Number(/Triangles\s+([\d\u202f]+)/.exec(await page.locator('.estimate').innerText())?.[1]?.replaceAll('\u202f', ''));
 
@@ -118,7 +119,7 @@ describe('a real volume', () => {
     await page.goBack();
     await page.waitForURL(/#\/volumes\//);
     await expect.poll(() => contourPixels(page, 'sagittal')).toBeGreaterThan(200);
-    expect(query().get('iso')).toBe('60');
+    expect(query().get('iso')).toBe(String(brainHull));
   });
 });
 

@@ -7,9 +7,9 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { encodePng } from './png';
-import { brain, Daemon, openPage, silhouette, startBrowser, surfaceLoaded } from './support';
+import { brain, brainHull, Daemon, openPage, silhouette, startBrowser, surfaceLoaded } from './support';
 
-const head = '/usr/share/doc/invesalius-examples/examples/Cranium.inv3';
+const skullProject = '/usr/share/doc/invesalius-examples/examples/Cranium.inv3';
 const mostBytes = 150_000;
 
 const scratch = mkdtempSync(join(tmpdir(), 'isomesh-pictures-'));
@@ -34,7 +34,7 @@ afterAll(async () => {
 // their rows from the back to the front.
 async function uploadHead(): Promise<string> {
   const inside = mkdtempSync(join(scratch, 'head-'));
-  execFileSync('tar', ['-xzf', head, '-C', inside, '--strip-components=1', '--wildcards', '*/main.plist', '*/matrix.dat']);
+  execFileSync('tar', ['-xzf', skullProject, '-C', inside, '--strip-components=1', '--wildcards', '*/main.plist', '*/matrix.dat']);
   const plist = readFileSync(join(inside, 'main.plist'), 'utf8');
   const numbers = (key: string): number[] => {
     const array = new RegExp(`<key>${key}</key>\\s*<array>([^]*?)</array>`).exec(plist)?.[1] ?? '';
@@ -107,7 +107,7 @@ describe('pictures', () => {
     expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
     await take(page, 'surface');
 
-    const cut = await daemon.submit({ volume, iso: 60, formats: ['glb'] }, 30);
+    const cut = await daemon.submit({ volume, iso: brainHull, formats: ['glb'] }, 30);
     await page.emulateMedia({ colorScheme: 'dark' });
     await show(`jobs/${cut.id}`, 1);
     const slice = page.waitForResponse(/slice\.png/);
@@ -121,7 +121,7 @@ describe('pictures', () => {
     const jobs = [];
     for (const scheme of [5, 6]) {
       for (const interpolation of ['linear', 'midpoint']) {
-        jobs.push((await daemon.submit({ volume: skull, iso: 250, scheme, interpolation, formats: ['glb'] }, 30)).id);
+        jobs.push((await daemon.submit({ volume, iso: brainHull, scheme, interpolation, formats: ['glb'] }, 30)).id);
       }
     }
     await show(`compare?jobs=${jobs.join(',')}`, 4);
