@@ -113,6 +113,7 @@ describe('a server with tokens', () => {
       // Slices, meshes and downloads go with it too.
       await mine.setInputFiles('[data-pick=files]', { name: 'ball.nrrd', mimeType: '', buffer: ballNrrd(24, 8) });
       await mine.waitForURL(/#\/volumes\//);
+      await mine.getByRole('button', { name: 'Make the surface' }).waitFor();
       await mine.keyboard.press('Control+Enter');
       await mine.waitForURL(/#\/jobs\//);
       await surfaceLoaded(mine);
