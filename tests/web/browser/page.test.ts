@@ -102,10 +102,14 @@ describe('a real volume', () => {
     expect(seen / real).toBeLessThan(1.15);
 
     // Turning it changes the picture, and the address keeps the place.
+    await expect.poll(() => query().get('cam') ?? '').not.toBe('');
+    const fromFront = query().get('cam');
     await page.locator('.viewport canvas').focus();
     for (let i = 0; i < 6; i += 1) await page.keyboard.press('ArrowRight');
-    await expect.poll(() => query().get('cam') ?? '').not.toBe('');
+    // It is noted once the camera rests.
+    await page.waitForTimeout(2000);
     const camera = query().get('cam');
+    expect(camera).not.toBe(fromFront);
 
     const download = page.waitForEvent('download');
     await page.locator('[data-format=glb]').click();
