@@ -35,6 +35,10 @@ constexpr std::array kDescriptions = {
     ErrorDescription{ErrorCode::kUnavailable, 503, "unavailable", "Unavailable"},
     ErrorDescription{ErrorCode::kOutOfSpace, 507, "out-of-space", "Out of space"},
     ErrorDescription{ErrorCode::kCancelled, 409, "cancelled", "Cancelled"},
+    ErrorDescription{ErrorCode::kRequestTimeout, 408, "request-timeout", "Request timeout"},
+    ErrorDescription{ErrorCode::kPreconditionFailed, 412, "precondition-failed",
+                     "Precondition failed"},
+    ErrorDescription{ErrorCode::kHeadersTooLarge, 431, "headers-too-large", "Headers too large"},
     ErrorDescription{ErrorCode::kUnreachable, 503, "unreachable", "The server is not reachable"},
 };
 

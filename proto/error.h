@@ -30,6 +30,9 @@ enum class ErrorCode {
   kUnavailable,          // 503: full or draining
   kOutOfSpace,           // 507
   kCancelled,            // the job was cancelled; 409 where it reaches a client
+  kRequestTimeout,       // 408: a request or a body that came too slowly
+  kPreconditionFailed,   // 412: what If-Match names is not what is there
+  kHeadersTooLarge,      // 431
   kUnreachable,          // client side only: no answer from the server
 };
 

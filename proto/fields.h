@@ -205,6 +205,12 @@ void visit(Is<Job> auto& self, auto&& field) {
   field("reused", self.reused);
 }
 
+void visit(Is<JobEvent> auto& self, auto&& field) {
+  field("state", self.state);
+  field("stage", self.stage);
+  field("progress", self.progress);
+}
+
 void visit(Is<Histogram> auto& self, auto&& field) {
   field("volume", self.volume);
   field("range", self.range);

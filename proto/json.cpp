@@ -65,6 +65,11 @@ std::string to_text(const T& value) {
   return write(value).dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
+std::string page(const char* name, Json items, const std::string& next) {
+  return Json{{name, std::move(items)}, {"next", next.empty() ? Json(nullptr) : Json(next)}}.dump(
+      -1, ' ', false, Json::error_handler_t::replace);
+}
+
 // --- Reading answers -----------------------------------------------------------------------------
 
 template <class T>
@@ -180,24 +185,22 @@ std::string to_json(const JobParameters& parameters) { return to_text(parameters
 std::string to_json(const Problem& problem) { return to_text(problem); }
 std::string to_json(const Histogram& histogram) { return to_text(histogram); }
 std::string to_json(const Estimate& estimate) { return to_text(estimate); }
+std::string to_json(const JobEvent& event) { return to_text(event); }
 
-std::string to_json(const std::vector<Volume>& volumes) {
-  return Json{{"volumes", write(volumes)}}.dump(-1, ' ', false, Json::error_handler_t::replace);
+std::string to_json(const std::vector<Volume>& volumes, const std::string& next) {
+  return page("volumes", write(volumes), next);
 }
 
 std::string to_json(const std::vector<Job>& jobs, const std::string& next) {
-  return Json{{"jobs", write(jobs)}, {"next", next.empty() ? Json(nullptr) : Json(next)}}.dump(
-      -1, ' ', false, Json::error_handler_t::replace);
+  return page("jobs", write(jobs), next);
 }
-
-Volume volume_from_record(std::string_view text) { return from_record<Volume>(text); }
-Job job_from_record(std::string_view text) { return from_record<Job>(text); }
 
 Volume volume_from_json(std::string_view text) { return from_text<Volume>(text); }
 Job job_from_json(std::string_view text) { return from_text<Job>(text); }
 Problem problem_from_json(std::string_view text) { return from_text<Problem>(text); }
 Histogram histogram_from_json(std::string_view text) { return from_text<Histogram>(text); }
 Estimate estimate_from_json(std::string_view text) { return from_text<Estimate>(text); }
+JobEvent job_event_from_json(std::string_view text) { return from_text<JobEvent>(text); }
 
 std::vector<Volume> volumes_from_json(std::string_view text) {
   return from_text<std::vector<Volume>>(text, "volumes");

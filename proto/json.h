@@ -20,8 +20,10 @@ std::string to_json(const JobParameters& parameters);
 std::string to_json(const Problem& problem);
 std::string to_json(const Histogram& histogram);
 std::string to_json(const Estimate& estimate);
-std::string to_json(const std::vector<Volume>& volumes);  // {"volumes": [...]}
-// {"jobs": [...], "next": cursor}; `next` is null on the last page.
+std::string to_json(const JobEvent& event);
+// {"volumes": [...], "next": cursor}; `next` is null on the last page.
+std::string to_json(const std::vector<Volume>& volumes, const std::string& next = "");
+// The same with "jobs".
 std::string to_json(const std::vector<Job>& jobs, const std::string& next = "");
 
 // Reads an answer of the server. Throws Error kInternal when it is not what the API says.
@@ -30,6 +32,7 @@ Job job_from_json(std::string_view text);
 Problem problem_from_json(std::string_view text);
 Histogram histogram_from_json(std::string_view text);
 Estimate estimate_from_json(std::string_view text);
+JobEvent job_event_from_json(std::string_view text);
 std::vector<Volume> volumes_from_json(std::string_view text);
 std::vector<Job> jobs_from_json(std::string_view text);
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include <nlohmann/json.hpp>
 
@@ -29,13 +30,14 @@ class RequestReader {
     });
     for (const auto& [name, unused] : json.items()) {
       if (std::ranges::find(known, name) == known.end()) {
-        add(prefix + name.substr(0, kLongestName), "is not a known member");
+        add(prefix + name, "is not a known member");
       }
     }
   }
 
   void add(const std::string& field, const std::string& message) {
-    if (errors_.size() < kMostErrors) errors_.push_back({spelled(field), message});
+    if (errors_.size() >= kMostErrors) return;
+    errors_.push_back({spelled(field.substr(0, kLongestName)), message});
   }
 
   void throw_if_any() {
@@ -153,6 +155,27 @@ class RequestReader {
   std::vector<FieldError> errors_;
 };
 
+// Members that an object has twice: readers differ in which one they take.
+class Repetitions {
+ public:
+  void see(Json::parse_event_t event, const Json& parsed) {
+    if (event == Json::parse_event_t::object_start) {
+      open_.emplace_back();
+    } else if (event == Json::parse_event_t::object_end) {
+      open_.pop_back();
+    } else if (event == Json::parse_event_t::key) {
+      const auto name = parsed.get<std::string>();
+      if (!open_.back().insert(name).second) names_.push_back(name);
+    }
+  }
+
+  const std::vector<std::string>& names() const { return names_; }
+
+ private:
+  std::vector<std::set<std::string>> open_;
+  std::vector<std::string> names_;
+};
+
 // A query's text as the JSON value that the member would have had in a body.
 Json value_of(const std::string& text) {
   const Json parsed = Json::parse(text, nullptr, false);
@@ -201,11 +224,19 @@ std::string spelled_in_query(const std::string& member) {
 }
 
 JobParameters parse_job_parameters(std::string_view body) {
-  const Json json = Json::parse(body, nullptr, false);
+  RequestReader reader;
+  Repetitions repetitions;
+  const Json json = Json::parse(
+      body,
+      [&](int, Json::parse_event_t event, const Json& parsed) {
+        repetitions.see(event, parsed);
+        return true;
+      },
+      false);
   if (!json.is_object()) {
     throw Error(ErrorCode::kInvalidParameter, "the body must be one JSON object");
   }
-  RequestReader reader;
+  for (const std::string& name : repetitions.names()) reader.add(name, "is given twice");
   return read_parameters(json, true, reader);
 }
 

@@ -306,6 +306,15 @@ struct Estimate {
   bool operator==(const Estimate&) const = default;
 };
 
+// How far a job is, as a stream of events tells it.
+struct JobEvent {
+  JobState state = JobState::kQueued;
+  Stage stage = Stage::kQueue;
+  double progress = 0;
+
+  bool operator==(const JobEvent&) const = default;
+};
+
 // The names that the API uses for the values of the enumerations above.
 std::string_view to_string(SampleType value);
 std::string_view to_string(Interpolation value);

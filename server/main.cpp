@@ -151,6 +151,20 @@ void add_options(CLI::App& cli, Options& options) {
       ->envname("ISOMESH_MAX_UPLOAD")
       ->transform(CLI::AsSizeValue(false))
       ->capture_default_str();
+  cli.add_option("--upload-places", options.http.upload_places,
+                 "Uploads at the same time; more get 503")
+      ->envname("ISOMESH_UPLOAD_PLACES")
+      ->check(CLI::Range(1, 24))
+      ->capture_default_str();
+  cli.add_option(
+         "--cors-origin", options.http.cors_origins,
+         "Origins whose pages may use the service, such as https://viewer.example; * for all")
+      ->envname("ISOMESH_CORS_ORIGIN")
+      ->delimiter(',');
+  cli.add_option("--allow-host", options.http.hosts,
+                 "Names of this service beside those of loopback, for requests without tokens")
+      ->envname("ISOMESH_ALLOW_HOST")
+      ->delimiter(',');
   cli.add_option("--max-volume", options.import.max_sample_bytes,
                  "Bytes of one volume's samples, unpacked")
       ->envname("ISOMESH_MAX_VOLUME")

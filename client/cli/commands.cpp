@@ -156,10 +156,18 @@ int upload(const Options& options, const std::stop_token& stop) {
   return kDone;
 }
 
+int estimate(const Options& options, const std::stop_token& stop) {
+  JobParameters parameters = options.parameters;
+  parameters.volume = options.id;
+  const Estimate estimate = client_of(options, stop).estimate(parameters);
+  std::cout << (options.json ? to_json(estimate) + '\n' : estimate_report(estimate));
+  return kDone;
+}
+
 int submit(const Options& options, const std::stop_token& stop) {
   JobParameters parameters = options.parameters;
   parameters.volume = options.id;
-  const Job job = client_of(options, stop).submit(parameters);
+  const Job job = client_of(options, stop).submit(parameters, options.key);
   std::cout << (options.json ? to_json(job) : job.id) << '\n';
   return kDone;
 }
@@ -226,8 +234,14 @@ int list(const Options& options, const std::stop_token& stop) {
 }
 
 int info(const Options& options, const std::stop_token& stop) {
-  const Volume volume = client_of(options, stop).volume(options.id);
-  std::cout << (options.json ? to_json(volume) + '\n' : volume_report(volume));
+  Client client = client_of(options, stop);
+  const Volume volume = client.volume(options.id);
+  if (options.json) {
+    std::cout << to_json(volume) << '\n';
+  } else {
+    constexpr std::uint32_t kColumns = 64;
+    std::cout << volume_report(volume) << histogram_report(client.histogram(options.id, kColumns));
+  }
   return kDone;
 }
 
@@ -237,6 +251,8 @@ int dispatch(const Options& options, const std::stop_token& stop) {
       return mesh(options, stop);
     case Command::kUpload:
       return upload(options, stop);
+    case Command::kEstimate:
+      return estimate(options, stop);
     case Command::kSubmit:
       return submit(options, stop);
     case Command::kStatus:

@@ -258,6 +258,16 @@ class Parser {
     add_id(submit, options_, "VOLUME");
     add_parameters(submit, options_.parameters);
     add_formats(submit, options_.parameters);
+    submit
+        .add_option("--key", options_.key,
+                    "Idempotency key: the same one gives the same job again (default: a new one)")
+        ->type_name("KEY");
+
+    CLI::App& estimate =
+        command(Command::kEstimate, "estimate", "Say what a job would make and take");
+    add_id(estimate, options_, "VOLUME");
+    add_parameters(estimate, options_.parameters);
+    add_formats(estimate, options_.parameters);
 
     add_id(command(Command::kStatus, "status", "Show a job"), options_, "JOB");
     add_id(command(Command::kWait, "wait", "Wait for a job and show it"), options_, "JOB");

@@ -15,6 +15,7 @@ namespace isomesh::cli {
 enum class Command {
   kMesh,
   kUpload,
+  kEstimate,
   kSubmit,
   kStatus,
   kWait,
@@ -41,7 +42,8 @@ struct Options {
   std::string series;          // mesh, upload
   std::optional<RawDescription> raw;
   std::string id;                 // of a job or, for submit and info, of a volume
-  JobParameters parameters;       // mesh, submit
+  JobParameters parameters;       // mesh, submit, estimate
+  std::string key;                // submit
   std::vector<Output> outputs;    // mesh, fetch
   std::optional<JobState> state;  // list
   std::string cursor;             // list

@@ -1,5 +1,9 @@
 #include "client/cli/report.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+
 #include <nlohmann/json.hpp>
 
 #include "client/cli/text.h"
@@ -118,6 +122,37 @@ std::string volume_report(const Volume& volume) {
   for (const IgnoredObject& object : volume.ignored) {
     rows.push_back({"ignored", object.name + ": " + object.reason});
   }
+  return in_columns({Align::kLeft, Align::kLeft}, rows);
+}
+
+std::string histogram_report(const Histogram& histogram) {
+  constexpr std::array kBars = {" ",      "\u2581", "\u2582", "\u2583", "\u2584",
+                                "\u2585", "\u2586", "\u2587", "\u2588"};
+  double most = 0;
+  for (const std::uint64_t count : histogram.counts) {
+    most = std::max(most, std::log1p(static_cast<double>(count)));
+  }
+  std::string bars;
+  for (const std::uint64_t count : histogram.counts) {
+    const double share = most > 0 ? std::log1p(static_cast<double>(count)) / most : 0;
+    // Whatever is there is seen.
+    bars += kBars.at(static_cast<std::size_t>(std::ceil(share * (kBars.size() - 1))));
+  }
+  return "\n  " + bars + "\n  " + human_number(histogram.range[0]) + " to " +
+         human_number(histogram.range[1]) + ", logarithms of the numbers of samples\n";
+}
+
+std::string estimate_report(const Estimate& estimate) {
+  Rows rows = {{"triangles", grouped(static_cast<std::int64_t>(estimate.triangles))},
+               {"vertices", grouped(static_cast<std::int64_t>(estimate.vertices))}};
+  for (const auto& [format, bytes] : estimate.bytes) {
+    rows.push_back({std::string(to_string(format)), "about " + human_bytes(bytes)});
+  }
+  rows.push_back({"memory", "about " + human_bytes(estimate.memory_bytes) +
+                                (estimate.fits ? "" : ", more than a job may take")});
+  rows.push_back({"time", "about " + fixed(estimate.milliseconds / 1000, 1) + " s"});
+  rows.push_back({"queue", std::to_string(estimate.queue.queued) + " waiting, " +
+                               std::to_string(estimate.queue.running) + " running"});
   return in_columns({Align::kLeft, Align::kLeft}, rows);
 }
 

@@ -21,6 +21,9 @@ std::string timing_report(const Timing& timing, const ClientTiming& client);
 
 std::string mesh_report(const MeshSummary& mesh);
 std::string volume_report(const Volume& volume);
+// A line of bars under the range; their heights are logarithms, because air outnumbers everything.
+std::string histogram_report(const Histogram& histogram);
+std::string estimate_report(const Estimate& estimate);
 std::string job_report(const Job& job);
 
 // One line each under a heading.

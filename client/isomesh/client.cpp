@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iterator>
+#include <random>
 #include <thread>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "client/isomesh/event_reader.h"
 #include "client/isomesh/file.h"
 #include "client/isomesh/package.h"
 #include "client/isomesh/sha256.h"
@@ -56,8 +59,12 @@ ErrorCode code_of_status(int status) {
       return ErrorCode::kNotReady;
     case 410:
       return ErrorCode::kGone;
+    case 408:
+      return ErrorCode::kRequestTimeout;
     case 411:
       return ErrorCode::kLengthRequired;
+    case 412:
+      return ErrorCode::kPreconditionFailed;
     case 413:
       return ErrorCode::kTooLarge;
     case 414:
@@ -68,6 +75,8 @@ ErrorCode code_of_status(int status) {
       return ErrorCode::kUnusableVolume;
     case 429:
       return ErrorCode::kTooManyRequests;
+    case 431:
+      return ErrorCode::kHeadersTooLarge;
     case 502:
     case 504:
       return ErrorCode::kUnreachable;
@@ -208,6 +217,40 @@ class Download {
   std::uint64_t received_ = 0;
 };
 
+std::string random_key() {
+  std::random_device random;
+  std::string key;
+  for (int n = 0; n < 4; ++n) {
+    std::array<char, 8> digits{};
+    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), random(), 16).ptr;
+    key.append(digits.data(), end).append("-");
+  }
+  return key;
+}
+
+// A job's parameters as a query, by the members that its JSON has.
+std::vector<std::pair<std::string, std::string>> query_of(const JobParameters& parameters) {
+  std::vector<std::pair<std::string, std::string>> query;
+  const std::function<void(const std::string&, const nlohmann::json&)> add =
+      [&](const std::string& name, const nlohmann::json& value) {
+        if (value.is_object()) {
+          for (const auto& [member, inner] : value.items()) add(name + '.' + member, inner);
+        } else if (value.is_array()) {
+          std::string list;
+          for (const auto& item : value)
+            list += (list.empty() ? "" : ",") + item.get<std::string>();
+          query.emplace_back(spelled_in_query(name), list);
+        } else if (!value.is_null()) {
+          query.emplace_back(spelled_in_query(name),
+                             value.is_string() ? value.get<std::string>() : value.dump());
+        }
+      };
+  for (const auto& [name, value] : nlohmann::json::parse(to_json(parameters)).items()) {
+    add(name, value);
+  }
+  return query;
+}
+
 }  // namespace
 
 class Client::Impl {
@@ -222,8 +265,8 @@ class Client::Impl {
     return std::move(answer.body);
   }
 
-  // The same for a GET, which may be sent again. `before` runs ahead of every try.
-  std::string get(const Exchange& exchange, const std::function<void()>& before = {}) const {
+  // The same for a request that may be sent again. `before` runs ahead of every try.
+  std::string repeat(const Exchange& exchange, const std::function<void()>& before = {}) const {
     for (int attempt = 1;; ++attempt) {
       try {
         if (before) before();
@@ -272,38 +315,72 @@ Volume Client::upload(const std::filesystem::path& path, const UploadOptions& op
 }
 
 Volume Client::volume(const std::string& id) {
-  return volume_from_json(impl_->get({.target = volume_path(id)}));
+  return volume_from_json(impl_->repeat({.target = volume_path(id)}));
 }
 
 std::vector<Volume> Client::volumes() {
-  return volumes_from_json(impl_->get({.target = "/v1/volumes"}));
+  std::vector<Volume> all;
+  std::string cursor;
+  do {
+    std::vector<std::pair<std::string, std::string>> query;
+    if (!cursor.empty()) query.emplace_back("cursor", cursor);
+    const std::string body = impl_->repeat({.target = "/v1/volumes" + query_string(query)});
+    std::vector<Volume> page = volumes_from_json(body);
+    cursor = page.empty() ? "" : next_of(body);
+    std::ranges::move(page, std::back_inserter(all));
+  } while (!cursor.empty());
+  return all;
 }
 
 void Client::erase_volume(const std::string& id) {
   impl_->send({.method = "DELETE", .target = volume_path(id)});
 }
 
-Job Client::submit(const JobParameters& parameters) {
-  return job_from_json(impl_->send({.method = "POST",
-                                    .target = "/v1/jobs",
-                                    .headers = {{"Content-Type", "application/json"}},
-                                    .body = to_json(parameters)}));
+Histogram Client::histogram(const std::string& id, std::uint32_t bins) {
+  const std::string query = query_string({{"bins", std::to_string(bins)}});
+  return histogram_from_json(impl_->repeat({.target = volume_path(id) + "/histogram" + query}));
+}
+
+void Client::slice(const std::string& id, const SliceOptions& options,
+                   const std::filesystem::path& target) {
+  std::vector<std::pair<std::string, std::string>> query = {{"axis", options.axis}};
+  if (options.index) query.emplace_back("index", std::to_string(*options.index));
+  if (options.window) query.emplace_back("window", joined(*options.window));
+  PartFile file(target);
+  Exchange exchange{.target = volume_path(id) + "/slice.png" + query_string(query)};
+  exchange.sink = [&](std::string_view piece) { file.write(piece); };
+  impl_->repeat(exchange, [&] { file.restart(); });
+  file.publish();
+}
+
+Estimate Client::estimate(const JobParameters& parameters) {
+  const std::string query = query_string(query_of(parameters));
+  return estimate_from_json(impl_->repeat({.target = "/v1/estimate" + query}));
+}
+
+Job Client::submit(const JobParameters& parameters, const std::string& idempotency_key) {
+  const std::string key = idempotency_key.empty() ? random_key() : idempotency_key;
+  return job_from_json(
+      impl_->repeat({.method = "POST",
+                     .target = "/v1/jobs",
+                     .headers = {{"Content-Type", "application/json"}, {"Idempotency-Key", key}},
+                     .body = to_json(parameters)}));
 }
 
 Job Client::job(const std::string& id) {
-  return job_from_json(impl_->get({.target = job_path(id)}));
+  return job_from_json(impl_->repeat({.target = job_path(id)}));
 }
 
 Job Client::job(const std::string& id, seconds wait) {
   const std::string query = query_string({{"wait", std::to_string(wait.count())}});
-  return job_from_json(impl_->get({.target = job_path(id) + query, .patience = wait}));
+  return job_from_json(impl_->repeat({.target = job_path(id) + query, .patience = wait}));
 }
 
 JobPage Client::jobs(std::optional<JobState> state, const std::string& cursor) {
   std::vector<std::pair<std::string, std::string>> query;
   if (state) query.emplace_back("state", to_string(*state));
   if (!cursor.empty()) query.emplace_back("cursor", cursor);
-  const std::string body = impl_->get({.target = "/v1/jobs" + query_string(query)});
+  const std::string body = impl_->repeat({.target = "/v1/jobs" + query_string(query)});
   return {.jobs = jobs_from_json(body), .next = next_of(body)};
 }
 
@@ -324,13 +401,26 @@ Job Client::wait(const std::string& id, const JobProgress& progress) {
   }
 }
 
+Job Client::follow(const std::string& id, const JobListener& listener) {
+  EventReader events(listener);
+  Exchange exchange{.target = job_path(id) + "/events"};
+  exchange.sink = [&](std::string_view piece) { events.take(piece); };
+  impl_->repeat(exchange, [&] {
+    events.restart();
+    exchange.headers.clear();
+    if (!events.last_id().empty()) exchange.headers = {{"Last-Event-ID", events.last_id()}};
+  });
+  // A stream that ended early, or one that a proxy has cut, leaves the question to be asked.
+  return events.job() ? *events.job() : wait(id);
+}
+
 void Client::fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,
                    const TransferProgress& progress) {
   const Job done = job(id);
   Download download(file_of(done, format), target, progress);
   Exchange exchange{.target = job_path(id) + "/mesh." + std::string(to_string(format))};
   exchange.sink = [&](std::string_view piece) { download.take(piece); };
-  impl_->get(exchange, [&] { download.restart(); });
+  impl_->repeat(exchange, [&] { download.restart(); });
   download.publish();
 }
 

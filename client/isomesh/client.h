@@ -65,6 +65,17 @@ struct UploadOptions {
   TransferProgress progress = {};
 };
 
+// Which slice of a volume, and how its samples become grey; what is left out is the server's
+// choice.
+struct SliceOptions {
+  std::string axis = "z";                            // the index that is the same in the slice
+  std::optional<std::uint32_t> index = {};           // the middle
+  std::optional<std::array<double, 2>> window = {};  // black and white: the volume's range
+};
+
+// What happens to a job, as it happens.
+using JobListener = std::function<void(const JobEvent& event)>;
+
 struct JobPage {
   std::vector<Job> jobs;
   std::string next;  // the cursor of the page after this one; empty on the last
@@ -76,8 +87,8 @@ struct JobPage {
 // that a progress callback throws ends the exchange and comes out unchanged.
 //
 // Every exchange has a connection of its own: a Client may be used from several threads. Callbacks
-// run on the calling thread. A GET whose connection broke is tried again, three times at most;
-// nothing else is, and neither is a server that cannot be connected to.
+// run on the calling thread. A GET, or the submission of a job, whose connection broke is tried
+// again, three times at most; nothing else is, and neither is a server that cannot be connected to.
 //
 // Writing to an https server that went away raises SIGPIPE: a program that uses one ignores it.
 class Client {
@@ -93,10 +104,20 @@ class Client {
   // names, as a TAR that is made on the way. The same samples again give the same volume.
   Volume upload(const std::filesystem::path& path, const UploadOptions& options = {});
   Volume volume(const std::string& id);
+  // All of them, the oldest first.
   std::vector<Volume> volumes();
   void erase_volume(const std::string& id);
+  Histogram histogram(const std::string& id, std::uint32_t bins = 256);
+  // Writes the picture, a PNG, to `target`.
+  void slice(const std::string& id, const SliceOptions& options,
+             const std::filesystem::path& target);
 
-  Job submit(const JobParameters& parameters);
+  // What a job with these parameters would make and take.
+  Estimate estimate(const JobParameters& parameters);
+
+  // The same key gives the same job again, also after the program was restarted; without one each
+  // call makes its own, so that trying again is safe.
+  Job submit(const JobParameters& parameters, const std::string& idempotency_key = {});
   Job job(const std::string& id);
   // The job when it is done, or as it is after `wait` (whole seconds, the server allows 30).
   Job job(const std::string& id, std::chrono::seconds wait);
@@ -107,6 +128,10 @@ class Client {
   // Returns the job in its final state, whichever that is. With a callback the job is looked at
   // once a second at least, and the callback also sees the final state.
   Job wait(const std::string& id, const JobProgress& progress = {});
+
+  // Returns the job in its final state, and tells what happens on the way without asking for it
+  // time and again. A stream that breaks is taken up where it broke.
+  Job follow(const std::string& id, const JobListener& listener);
 
   // Writes the mesh of a finished job to `target`, which appears only when all of its bytes have
   // come and have the SHA-256 that the job states. Throws kNotReady when the job is not done, the

@@ -60,7 +60,7 @@ store::Viewer viewer() {
 void begin_request(const App& app, const httplib::Request& request, httplib::Response& response) {
   CurrentRequest& current = current_request();
   current = {};
-  current.began = std::chrono::steady_clock::now();
+  current.began = Exchange::current()->began();
   current.trace = continue_trace(request.get_header_value("traceparent"));
   response.set_header("X-Request-Id", current.trace.request_id());
   if (app.tokens == nullptr) return;
@@ -78,7 +78,9 @@ void begin_request(const App& app, const httplib::Request& request, httplib::Res
 }
 
 void end_request(App& app, const httplib::Request& request, const httplib::Response& response) {
-  const CurrentRequest& current = current_request();
+  if (Exchange::current()->parking()) return;  // it is answered later
+  CurrentRequest& current = current_request();
+  current.bytes_in = Exchange::current()->received();
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - current.began;
   const std::uint64_t bytes_out = request.method == "HEAD" ? 0 : length_of(response);
   app.metrics.count({.method = request.method,

@@ -8,6 +8,7 @@
 
 #include <httplib.h>
 #include <openssl/evp.h>
+#include <strings.h>
 
 #include "server/store/files.h"
 
@@ -58,26 +59,58 @@ std::array<Number, N> numbers_of(const std::string& name, std::string_view text)
   return numbers;
 }
 
-// The seconds of a preference `wait=N` (RFC 7240), among others in the header.
-std::optional<std::string> preferred_wait(const httplib::Request& request) {
-  const std::string header = request.get_header_value("Prefer");
+// The seconds of a preference `wait=N` (RFC 7240), among others in the header and before what may
+// describe it.
+std::optional<std::string_view> preferred_wait(std::string_view header) {
   for (const std::string_view preference : split(header, ',')) {
-    constexpr std::string_view kWait = "wait=";
-    if (preference.starts_with(kWait)) return std::string(preference.substr(kWait.size()));
+    const std::size_t equals = preference.find('=');
+    const std::string_view name = trimmed(preference.substr(0, equals));
+    if (name.size() != 4 || ::strncasecmp(name.data(), "wait", 4) != 0) continue;
+    if (equals == std::string_view::npos) return "";
+    return trimmed(split(preference.substr(equals + 1), ';').front());
   }
   return std::nullopt;
 }
 
+constexpr std::size_t kSha256InBase64 = 44;  // 32 bytes, and one character that fills up
+
 std::string hex_of_base64(std::string_view text) {
   std::array<unsigned char, 48> bytes = {};
-  // 32 bytes are 44 characters, of which one fills up.
-  const bool right_length = text.size() == 44 && text[43] == '=' && text[42] != '=';
+  const bool right_length = text.size() == kSha256InBase64 && text[43] == '=' && text[42] != '=';
   if (!right_length ||
       EVP_DecodeBlock(bytes.data(), reinterpret_cast<const unsigned char*>(text.data()),
                       static_cast<int>(text.size())) < 0) {
     throw invalid_parameter("Content-Digest", "sha-256 must be 32 bytes in base64 between colons");
   }
   return store::to_hex({bytes.data(), store::Sha256::kBytes});
+}
+
+unsigned char nibble(char digit) {
+  return static_cast<unsigned char>(digit <= '9' ? digit - '0' : digit - 'a' + 10);
+}
+
+// A member of a digest header: an algorithm's name and bytes in base64 between colons (RFC 9530).
+std::pair<std::string_view, std::string_view> digest_member(std::string_view member) {
+  const std::size_t equals = member.find('=');
+  const std::string_view name = member.substr(0, equals);
+  const std::string_view value = equals == std::string_view::npos ? "" : member.substr(equals + 1);
+  constexpr std::string_view kBase64 =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/=";
+  const bool is_bytes =
+      value.size() >= 2 && value.front() == ':' && value.back() == ':' &&
+      value.substr(1, value.size() - 2).find_first_not_of(kBase64) == std::string_view::npos;
+  if (name.empty() || !is_bytes) {
+    throw invalid_parameter("Content-Digest", "must be NAME=:BASE64:, such as sha-256=:...:");
+  }
+  return {name, value.substr(1, value.size() - 2)};
+}
+
+bool names_etag(std::string_view header, std::string_view etag) {
+  for (std::string_view tag : split(header, ',')) {
+    if (tag.starts_with("W/")) tag.remove_prefix(2);
+    if (tag == "*" || tag == etag) return true;
+  }
+  return false;
 }
 
 bool is_uid(std::string_view text) {
@@ -109,13 +142,15 @@ void check_known(const httplib::Request& request, const std::set<std::string>& k
 
 std::chrono::milliseconds wait_of(const httplib::Request& request) {
   const bool in_query = request.has_param("wait");
-  const std::optional<std::string> text =
-      in_query ? request.get_param_value("wait") : preferred_wait(request);
+  const std::string header = request.get_header_value("Prefer");
+  const std::string parameter = request.get_param_value("wait");
+  const std::optional<std::string_view> text = in_query ? parameter : preferred_wait(header);
   if (!text) return std::chrono::milliseconds(0);
   const auto seconds = number_of<double>(*text);
-  if (!seconds || !(*seconds >= 0)) {
-    if (!in_query) return std::chrono::milliseconds(0);  // a preference that we cannot follow
-    throw invalid_parameter("wait", "must be a number of seconds, at least 0");
+  if (!seconds || !std::isfinite(*seconds) || *seconds < 0) {
+    throw invalid_parameter(in_query ? "wait" : "Prefer",
+                            in_query ? "must be a number of seconds, at least 0"
+                                     : "wait must be a number of seconds, at least 0");
   }
   return std::chrono::milliseconds(
       static_cast<std::int64_t>(std::min<double>(*seconds, kLongestWaitSeconds) * 1000));
@@ -135,18 +170,27 @@ std::string idempotency_key_of(const httplib::Request& request) {
 }
 
 std::optional<std::string> sha256_of_content_digest(const httplib::Request& request) {
+  if (!request.has_header("Content-Digest")) return std::nullopt;
   const std::string header = request.get_header_value("Content-Digest");
-  for (const std::string_view digest : split(header, ',')) {
-    constexpr std::string_view kSha256 = "sha-256=";
-    if (!digest.starts_with(kSha256)) continue;
-    std::string_view value = digest.substr(kSha256.size());
-    if (value.size() < 2 || value.front() != ':' || value.back() != ':') {
-      throw invalid_parameter("Content-Digest", "sha-256 must be base64 between colons");
-    }
-    value = value.substr(1, value.size() - 2);
-    return hex_of_base64(value);
+  std::optional<std::string> sha256;
+  for (const std::string_view member : split(header, ',')) {
+    const auto [name, value] = digest_member(member);
+    if (name != "sha-256") continue;
+    if (sha256) throw invalid_parameter("Content-Digest", "names sha-256 twice");
+    sha256 = hex_of_base64(value);
   }
-  return std::nullopt;
+  return sha256;
+}
+
+std::string digest_header(std::string_view sha256) {
+  std::array<unsigned char, store::Sha256::kBytes> bytes = {};
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    bytes.at(i) =
+        static_cast<unsigned char>(nibble(sha256[2 * i]) << 4 | nibble(sha256[2 * i + 1]));
+  }
+  std::array<unsigned char, kSha256InBase64 + 1> text = {};
+  EVP_EncodeBlock(text.data(), bytes.data(), static_cast<int>(bytes.size()));
+  return "sha-256=:" + std::string(reinterpret_cast<const char*>(text.data())) + ':';
 }
 
 const std::set<std::string>& raw_description_parameters() {
@@ -266,12 +310,55 @@ bool accepts_gzip(const httplib::Request& request) {
 }
 
 bool matches_etag(const httplib::Request& request, std::string_view etag) {
-  const std::string header = request.get_header_value("If-None-Match");
-  for (std::string_view tag : split(header, ',')) {
-    if (tag.starts_with("W/")) tag.remove_prefix(2);
-    if (tag == "*" || tag == etag) return true;
+  return names_etag(request.get_header_value("If-None-Match"), etag);
+}
+
+void check_if_match(const httplib::Request& request, std::string_view etag) {
+  if (!request.has_header("If-Match")) return;
+  if (names_etag(request.get_header_value("If-Match"), etag)) return;
+  throw Error(ErrorCode::kPreconditionFailed, "what If-Match names is not what is there");
+}
+
+std::string cursor_after(std::string_view kind, std::string_view id) {
+  std::string text = std::string(kind) + ':' + std::string(id);
+  std::string cursor;
+  for (const char c : text) {
+    constexpr std::string_view kDigits = "0123456789abcdef";
+    const auto byte = static_cast<unsigned char>(c);
+    cursor += kDigits[byte >> 4];
+    cursor += kDigits[byte & 15];
   }
-  return false;
+  return cursor;
+}
+
+std::string id_after(const httplib::Request& request, std::string_view kind) {
+  if (!request.has_param("cursor")) return {};
+  const std::string cursor = request.get_param_value("cursor");
+  const bool is_hex =
+      cursor.size() % 2 == 0 && cursor.find_first_not_of("0123456789abcdef") == std::string::npos;
+  std::string text;
+  for (std::size_t i = 0; is_hex && i < cursor.size(); i += 2) {
+    text += static_cast<char>(nibble(cursor[i]) << 4 | nibble(cursor[i + 1]));
+  }
+  constexpr std::size_t kLongest = 128;
+  const std::string prefix = std::string(kind) + ':';
+  const bool is_ours = text.size() > prefix.size() && text.size() <= kLongest &&
+                       text.starts_with(prefix) &&
+                       std::ranges::all_of(text, [](char c) { return c >= ' ' && c <= '~'; });
+  if (!is_ours) throw wrong_cursor();
+  return text.substr(prefix.size());
+}
+
+Error wrong_cursor() {
+  return invalid_parameter("cursor", "must be the `next` of another page of this list");
+}
+
+std::optional<std::uint64_t> last_event_id(const httplib::Request& request) {
+  if (!request.has_header("Last-Event-ID")) return std::nullopt;
+  const auto number = number_of<std::uint64_t>(request.get_header_value("Last-Event-ID"));
+  if (!number)
+    throw invalid_parameter("Last-Event-ID", "must be the id of an event of this stream");
+  return *number;
 }
 
 }  // namespace isomesh::http

@@ -28,14 +28,18 @@ std::vector<std::pair<std::string, std::string>> query_of(const httplib::Request
 // Refuses parameters that are not among `known`.
 void check_known(const httplib::Request& request, const std::set<std::string>& known);
 
-// How long the answer may wait: `?wait=N` or `Prefer: wait=N` in seconds, at most 30.
+// How long the answer may wait: `?wait=N` or `Prefer: wait=N` in seconds; more than 30 are 30.
 std::chrono::milliseconds wait_of(const httplib::Request& request);
 
 // The Idempotency-Key header, as it is; empty without one. At most 255 printable characters.
 std::string idempotency_key_of(const httplib::Request& request);
 
-// The SHA-256 that Content-Digest names (RFC 9530), as hex; empty when it names none.
+// The SHA-256 that Content-Digest names (RFC 9530), as hex; empty when it names none, but only
+// other algorithms.
 std::optional<std::string> sha256_of_content_digest(const httplib::Request& request);
+
+// The same as the value of a digest header, from hex.
+std::string digest_header(std::string_view sha256);
 
 // Raw samples' description from `dims`, `type` and the rest; empty without `dims`.
 std::optional<volume::RawDescription> raw_description_of(const httplib::Request& request);
@@ -77,5 +81,20 @@ bool accepts_gzip(const httplib::Request& request);
 
 // True when If-None-Match names the entity tag (quotes included).
 bool matches_etag(const httplib::Request& request, std::string_view etag);
+
+// Throws Error kPreconditionFailed when there is an If-Match that does not name the entity tag.
+void check_if_match(const httplib::Request& request, std::string_view etag);
+
+// What stands for the rest of a list after that id; lists of another kind do not take it.
+std::string cursor_after(std::string_view kind, std::string_view id);
+
+// The `id` in the parameter `cursor`, printable ASCII; empty without one.
+std::string id_after(const httplib::Request& request, std::string_view kind);
+
+// What a cursor that is none is refused with.
+Error wrong_cursor();
+
+// Of a client that comes back to a stream of events.
+std::optional<std::uint64_t> last_event_id(const httplib::Request& request);
 
 }  // namespace isomesh::http

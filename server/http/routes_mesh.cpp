@@ -9,11 +9,12 @@
 #include "server/codec/encode.h"
 #include "server/http/request.h"
 #include "server/http/routes.h"
+#include "server/http/sources.h"
 
 namespace isomesh::http {
 namespace {
 
-constexpr std::size_t kBlockBytes = 256 * 1024;
+constexpr std::chrono::hours kLongestJob{24};
 
 std::string server_timing(const Timing& timing) {
   std::string text;
@@ -27,22 +28,6 @@ std::string server_timing(const Timing& timing) {
     text += entry.data();
   }
   return text;
-}
-
-// Streams part of a blob; the provider is asked for pieces of it and must not trust the bounds.
-void stream(httplib::Response& response, std::shared_ptr<store::BlobReader> blob,
-            const ByteRange& range, const std::string& media_type) {
-  response.set_content_provider(
-      range.length, media_type,
-      [blob, range, block = std::vector<std::byte>(kBlockBytes)](
-          std::size_t offset, std::size_t length, httplib::DataSink& sink) mutable {
-        if (offset >= range.length) return false;
-        const std::size_t wanted =
-            std::min({length, block.size(), static_cast<std::size_t>(range.length) - offset});
-        const std::size_t count =
-            blob->read_at(range.first + offset, std::span(block).first(wanted));
-        return count > 0 && sink.write(reinterpret_cast<const char*>(block.data()), count);
-      });
 }
 
 // The part that a GET asks for; a 416 tells how long the whole is.
@@ -60,9 +45,9 @@ std::optional<ByteRange> part_of(const httplib::Request& request, httplib::Respo
   }
 }
 
-// One request: the volume is the body, the mesh the answer.
-void mesh_in_one(App& app, const httplib::Request& request, httplib::Response& response,
-                 const httplib::ContentReader& read_body) {
+// The job of a request whose volume is its body.
+Job submit_with_volume(App& app, const httplib::Request& request, httplib::Response& response,
+                       const httplib::ContentReader& read_body) {
   std::vector<std::pair<std::string, std::string>> job_query;
   std::set<std::string> names;  // so far only checked for being there once
   for (const auto& parameter : query_of(request)) {
@@ -75,19 +60,27 @@ void mesh_in_one(App& app, const httplib::Request& request, httplib::Response& r
     throw invalid_parameter("format", "must be one format: the answer is one file");
   }
   const volume::ImportOptions options = import_options_of(request);
-  const auto place = app.uploads.try_take();
-  if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
-  {
-    const Upload file(app.services.folder, app.options.upload, app.stopping, request, read_body);
-    parameters.volume = app.services.library.add(owner(), file.path(), options).first.id;
-  }
-  Job job = store::job_of(app.services.jobs.submit({owner(), parameters, "", ""}));
+  const std::string key = idempotency_key_of(request);
+  const Slots::Place place = place_for_upload(app);
+  const Upload file(app.services.folder, app.options.upload, app.stopping, request, read_body);
+  parameters.volume = app.services.library.add(owner(), file.path(), options).first.id;
+  // The volume's id stands for the body. A job of POST /v1/jobs is another request.
+  const std::string digest = key.empty() ? "" : store::sha256_of("mesh " + to_json(parameters));
+  return submitted(app, {owner(), parameters, key, digest}, response);
+}
+
+// One request: the volume is the body, the mesh the answer.
+void mesh_in_one(App& app, const httplib::Request& request, httplib::Response& response,
+                 const httplib::ContentReader& read_body) {
+  const auto& resumed = Exchange::current()->resumed();
+  const Job job = resumed ? app.services.jobs.get(viewer(), resumed->job)
+                          : submit_with_volume(app, request, response, read_body);
+  if (wait_for_end(app, job, kLongestJob)) return;
   response.set_header("Location", "/v1/jobs/" + job.id);
-  while (!is_final(job.state)) {
-    if (app.stopping) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
-    job = app.services.jobs.wait(viewer(), job.id, std::chrono::seconds(1));
+  if (!is_final(job.state) && app.stopping) {
+    throw Error(ErrorCode::kUnavailable, "the service is shutting down");
   }
-  answer_mesh(app, request, response, job, parameters.formats.front());
+  answer_mesh(app, request, response, job, job.parameters.formats.front());
 }
 
 }  // namespace
@@ -109,8 +102,11 @@ void answer_mesh(const App& app, const httplib::Request& request, httplib::Respo
   }
   const MeshFile& file = found->second;
   const std::string etag = '"' + file.sha256 + '"';
-  const bool unchanged = matches_etag(request, etag);
+  const bool is_read = request.method != "POST";
+  if (is_read) check_if_match(request, etag);
+  const bool unchanged = is_read && matches_etag(request, etag);
   response.set_header("ETag", etag);
+  response.set_header("Repr-Digest", digest_header(file.sha256));
   const auto part = unchanged ? std::nullopt : part_of(request, response, etag, file.bytes);
   response.set_header("Cache-Control", "private, immutable");
   response.set_header("Server-Timing", server_timing(job.timing));
@@ -127,8 +123,10 @@ void answer_mesh(const App& app, const httplib::Request& request, httplib::Respo
                                              std::to_string(file.bytes));
   }
   response.set_header("Content-Disposition", "attachment; filename=\"mesh." + name + '"');
-  stream(response, app.services.blobs.open(file.sha256), range,
-         std::string(codec::media_type(format)));
+  set_body(response, {.source = blob_source(app.services.blobs.open(file.sha256), range),
+                      .media_type = std::string(codec::media_type(format)),
+                      .framing = Framing::kLength,
+                      .length = range.length});
 }
 
 void add_mesh_routes(App& app) {

@@ -6,6 +6,7 @@
 #include "proto/json.h"
 #include "server/http/request.h"
 #include "server/http/routes.h"
+#include "server/http/sources.h"
 #include "server/volume/slice.h"
 
 namespace isomesh::http {
@@ -21,6 +22,7 @@ constexpr const char* kForever = "private, max-age=31536000, immutable";
 // complete.
 bool is_known(const httplib::Request& request, httplib::Response& response,
               const std::string& etag) {
+  check_if_match(request, etag);
   response.set_header("ETag", etag);
   response.set_header("Cache-Control", kForever);
   if (!matches_etag(request, etag)) return false;
@@ -67,18 +69,13 @@ void slice(App& app, const httplib::Request& request, httplib::Response& respons
   if (is_known(request, response, etag)) return;
   const auto canonical =
       std::make_shared<const volume::CanonicalVolume>(app.services.blobs.local(volume.id).path);
-  const auto picture = std::make_shared<volume::SlicePng>(canonical, choice);
+  auto picture = std::make_unique<volume::SlicePng>(canonical, choice);
+  const bool in_chunks = request.version != "HTTP/1.0";
   response.status = 200;
   response.set_header("Accept-Ranges", "none");
-  response.set_chunked_content_provider("image/png",
-                                        [picture](std::size_t /*offset*/, httplib::DataSink& sink) {
-                                          const std::string_view bytes = picture->next();
-                                          if (bytes.empty()) {
-                                            sink.done();
-                                            return true;
-                                          }
-                                          return sink.write(bytes.data(), bytes.size());
-                                        });
+  set_body(response, {.source = slice_source(std::move(picture), in_chunks),
+                      .media_type = "image/png",
+                      .framing = in_chunks ? Framing::kChunks : Framing::kUntilConnectionEnds});
 }
 
 void estimate(App& app, const httplib::Request& request, httplib::Response& response) {

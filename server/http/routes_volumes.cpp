@@ -6,17 +6,57 @@ namespace isomesh::http {
 namespace {
 
 const std::string kVolumes = "/v1/volumes";
+constexpr const char* kVolumeCursor = "volumes";
 
 void upload(App& app, const httplib::Request& request, httplib::Response& response,
             const httplib::ContentReader& read_body) {
   check_known(request, import_parameters());
   const volume::ImportOptions options = import_options_of(request);
-  const auto place = app.uploads.try_take();
-  if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
+  const Slots::Place place = place_for_upload(app);
   const Upload file(app.services.folder, app.options.upload, app.stopping, request, read_body);
   const auto [volume, is_new] = app.services.library.add(owner(), file.path(), options);
   response.set_header("Location", kVolumes + '/' + volume.id);
   answer_json(response, is_new ? 201 : 200, to_json(volume));
+}
+
+// What store::cursor_of makes: a time and an id.
+bool is_place(const std::string& text) {
+  constexpr std::size_t kTime = std::string_view("2026-11-20T07:00:00.000").size();
+  const std::size_t space = text.find(' ');
+  return space != std::string::npos && space > kTime && text[10] == 'T' && text[space - 1] == 'Z' &&
+         text.find_first_not_of("0123456789-T:.Z", 0) == space;
+}
+
+void list(App& app, const httplib::Request& request, httplib::Response& response) {
+  check_known(request, {"cursor", "limit"});
+  const std::string after = id_after(request, kVolumeCursor);
+  if (!after.empty() && !is_place(after)) throw wrong_cursor();
+  const std::size_t limit = whole_number_of(request, "limit", kPageSizes, kUsualPageSize);
+  std::vector<Volume> volumes = app.services.volumes.list(viewer(), after, limit + 1);
+  std::string next;
+  if (volumes.size() > limit) {
+    volumes.pop_back();
+    next = cursor_after(kVolumeCursor, store::cursor_of(volumes.back()));
+  }
+  // A hundred volumes of a thousand slices would fill it with their identifiers.
+  for (Volume& volume : volumes) volume.dicom.reset();
+  answer_json(response, 200, to_json(volumes, next));
+}
+
+void get(App& app, const httplib::Request& request, httplib::Response& response) {
+  check_known(request, {});
+  const Volume volume = app.services.volumes.get(viewer(), id_of(request));
+  answer_tagged_json(request, response, to_json(volume));
+}
+
+void erase(App& app, const httplib::Request& request, httplib::Response& response) {
+  check_known(request, {});
+  const std::string id = id_of(request);
+  if (request.has_header("If-Match")) {
+    check_if_match(request, etag_of(to_json(app.services.volumes.get(viewer(), id))));
+  }
+  app.services.library.erase(owner(), id);
+  response.status = 204;
 }
 
 }  // namespace
@@ -25,22 +65,12 @@ void add_volume_routes(App& app) {
   add_post(app, kVolumes, [&app](const auto& request, auto& response, const auto& read_body) {
     upload(app, request, response, read_body);
   });
-  add_get(app, kVolumes, [&app](const auto& request, auto& response) {
-    check_known(request, {});
-    std::vector<Volume> volumes = app.services.volumes.list(viewer());
-    // A hundred volumes of a thousand slices would fill it with their identifiers.
-    for (Volume& volume : volumes) volume.dicom.reset();
-    answer_json(response, 200, to_json(volumes));
-  });
-  add_get(app, kVolumes + '/' + kId, [&app](const auto& request, auto& response) {
-    check_known(request, {});
-    answer_json(response, 200, to_json(app.services.volumes.get(viewer(), id_of(request))));
-  });
-  add_delete(app, kVolumes + '/' + kId, [&app](const auto& request, auto& response) {
-    check_known(request, {});
-    app.services.library.erase(owner(), id_of(request));
-    response.status = 204;
-  });
+  add_get(app, kVolumes,
+          [&app](const auto& request, auto& response) { list(app, request, response); });
+  add_get(app, kVolumes + '/' + kId,
+          [&app](const auto& request, auto& response) { get(app, request, response); });
+  add_delete(app, kVolumes + '/' + kId,
+             [&app](const auto& request, auto& response) { erase(app, request, response); });
 }
 
 }  // namespace isomesh::http

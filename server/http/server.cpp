@@ -4,25 +4,24 @@
 #include <charconv>
 #include <chrono>
 #include <regex>
+#include <thread>
 
 #include <arpa/inet.h>
 #include <spdlog/spdlog.h>
-#include <strings.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "server/http/routes.h"
-#include "server/http/task_queue.h"
 
 namespace isomesh::http {
 namespace {
 
 constexpr std::size_t kLongestPath = 256;
 constexpr std::size_t kLongestTarget = 4096;
-constexpr std::size_t kMostHeaders = 100;
-constexpr std::chrono::seconds kReadTimeout{10};
-constexpr std::chrono::seconds kWriteTimeout{10};
+constexpr std::chrono::seconds kLongestWatch{1};
+// How long answers may still be sent when the service ends.
+constexpr std::chrono::seconds kLastAnswers{5};
 
 // Text that cannot forge a line of the log.
 std::string printable(std::string text) {
@@ -31,76 +30,48 @@ std::string printable(std::string text) {
   return text;
 }
 
-// Two readings of where a body ends are how requests are smuggled past a proxy (RFC 9112, 6.3).
-void check_framing(const httplib::Request& request) {
-  const std::string length = request.get_header_value("Content-Length");
-  const bool digits_only =
-      std::ranges::all_of(length, [](unsigned char c) { return c >= '0' && c <= '9'; });
-  if (request.get_header_value_count("Content-Length") > 1 || !digits_only) {
-    throw invalid_parameter("Content-Length", "must be one whole number");
-  }
-  if (!request.has_header("Transfer-Encoding")) return;
-  if (request.has_header("Content-Length") ||
-      ::strcasecmp(request.get_header_value("Transfer-Encoding").c_str(), "chunked") != 0) {
-    throw invalid_parameter("Transfer-Encoding",
-                            "must be \"chunked\", and without a Content-Length");
-  }
-}
-
-bool has_body_length(const httplib::Request& request) {
-  return request.has_header("Content-Length") ||
-         ::strcasecmp(request.get_header_value("Transfer-Encoding").c_str(), "chunked") == 0;
-}
-
-// What must be refused before the library looks for a route or reads a body. The reasons are in the
-// library's own behaviour: its regular expressions recurse over long paths, it waits for bodies
-// that have no length, and its handling of ranges reads beyond the content.
-void check_request(httplib::Request& request) {
-  request.ranges.clear();
+// What must be refused before the library looks for a route or reads a body: its regular
+// expressions recurse over long paths, and it waits for bodies that have no length.
+void check_request(const httplib::Request& request) {
   if (request.path.size() > kLongestPath || request.target.size() > kLongestTarget) {
     throw Error(ErrorCode::kUriTooLong, "the request's path or query is too long");
   }
-  if (request.headers.size() > kMostHeaders) {
-    throw Error(ErrorCode::kInvalidParameter, "the request has too many headers");
-  }
-  check_framing(request);
   const bool needs_body =
       request.method == "POST" || request.method == "PUT" || request.method == "PATCH";
-  if (needs_body && !has_body_length(request)) {
+  const bool has_length =
+      request.has_header("Content-Length") || request.has_header("Transfer-Encoding");
+  if (needs_body && !has_length) {
     throw Error(ErrorCode::kLengthRequired, "the request needs a Content-Length");
   }
 }
 
-// A path that is known for other methods is not "not found".
-Error unknown_route(const App& app, const httplib::Request& request, httplib::Response& response) {
-  if (request.path.size() <= kLongestPath) {
-    for (const auto& [pattern, methods] : app.methods) {
-      if (methods.contains(request.method) ||
-          !std::regex_match(request.path, std::regex(pattern))) {
-        continue;
-      }
-      std::string allowed;
-      for (const std::string& method : methods) allowed += (allowed.empty() ? "" : ", ") + method;
-      response.set_header("Allow", allowed);
-      return {ErrorCode::kMethodNotAllowed, "this resource knows " + allowed};
-    }
+// The methods of the route at that path, with commas between. Throws Error kNotFound.
+std::string methods_at(const App& app, const std::string& path) {
+  for (const auto& [pattern, route] : app.routes) {
+    if (!std::regex_match(path, route.path)) continue;
+    current_request().route = route.label;
+    std::string all;
+    for (const std::string& method : route.methods) all += (all.empty() ? "" : ", ") + method;
+    return all;
   }
-  return {ErrorCode::kNotFound, "there is nothing at this path"};
+  throw Error(ErrorCode::kNotFound, "there is nothing at this path");
+}
+
+// Refuses what no route takes, so that the library reads no body for it. A path that is known for
+// other methods is not "not found".
+void check_route(const App& app, const httplib::Request& request, httplib::Response& response) {
+  const std::string methods = methods_at(app, request.path);
+  if ((", " + methods + ',').find(", " + request.method + ',') != std::string::npos) return;
+  response.set_header("Allow", methods);
+  throw Error(ErrorCode::kMethodNotAllowed, "this resource knows " + methods);
 }
 
 // Fills the answers that the library makes by itself.
-void complete_error(const App& app, const httplib::Request& request, httplib::Response& response) {
+void complete_error(const httplib::Request& request, httplib::Response& response) {
   if (!response.body.empty()) return;
   switch (response.status) {
-    case 404:
-      return answer_problem(request, response, unknown_route(app, request, response));
     case 413:
       return answer_problem(request, response, {ErrorCode::kTooLarge, "the body is too large"});
-    case 414:
-      return answer_problem(request, response, {ErrorCode::kUriTooLong, "the target is too long"});
-    case 416:
-      return answer_problem(request, response,
-                            {ErrorCode::kRangeNotSatisfiable, "the range is malformed"});
     case 500:
       return answer_problem(request, response, {ErrorCode::kInternal, ""});
     default:
@@ -111,36 +82,34 @@ void complete_error(const App& app, const httplib::Request& request, httplib::Re
 
 void configure(App& app) {
   httplib::Server& http = app.http;
-  http.new_task_queue = [&app] {
-    return new BoundedTaskQueue(app.options.threads, app.options.backlog);
-  };
   // The default lets a second daemon bind the same port and take half of the connections.
-  http.set_socket_options([&app](socket_t socket) {
+  http.set_socket_options([](socket_t socket) {
     const int yes = 1;
     ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-    app.listening = socket;
   });
   http.set_tcp_nodelay(true);
-  http.set_read_timeout(kReadTimeout);
-  http.set_write_timeout(kWriteTimeout);
-  // One request a connection: the body of a refused one would be read as the next request.
-  http.set_keep_alive_max_count(1);
   http.set_payload_max_length(app.options.upload.max_bytes);
   http.set_default_headers({{"X-Content-Type-Options", "nosniff"}});
   http.set_pre_routing_handler(
       [&app](const httplib::Request& request, httplib::Response& response) {
         try {
+          allow_reading(app.rules, request, response);
+          check_origin(app.rules, request);
           begin_request(app, request, response);
-          // The library hands its own request over as constant; the guard has to clear its ranges.
-          check_request(const_cast<httplib::Request&>(request));
+          check_request(request);
+          if (is_preflight(app.rules, request)) {
+            answer_preflight(methods_at(app, request.path), response);
+            return httplib::Server::HandlerResponse::Handled;
+          }
+          check_route(app, request, response);
           return httplib::Server::HandlerResponse::Unhandled;
         } catch (const Error& error) {
           answer_problem(request, response, error);
           return httplib::Server::HandlerResponse::Handled;
         }
       });
-  http.set_error_handler([&app](const httplib::Request& request, httplib::Response& response) {
-    complete_error(app, request, response);
+  http.set_error_handler([](const httplib::Request& request, httplib::Response& response) {
+    complete_error(request, response);
   });
   http.set_exception_handler(
       [](const httplib::Request& request, httplib::Response& response, const std::exception_ptr&) {
@@ -152,9 +121,32 @@ void configure(App& app) {
   });
 }
 
-// The library lets five connections wait to be accepted; the next ones in a burst would be dropped,
-// and try again a second later.
-void widen_backlog(const App& app) { ::listen(app.listening, SOMAXCONN); }
+bool has_ended(const App& app, const std::string& job) {
+  try {
+    return is_final(app.services.jobs.get(std::nullopt, job).state);
+  } catch (const Error&) {
+    return true;  // it is not there any more
+  }
+}
+
+// Tells those who wait what happens to jobs, until the service stops.
+void watch_jobs(App& app) {
+  std::uint64_t last = 0;
+  while (!app.stopping) {
+    try {
+      const auto events = app.services.jobs.events(std::nullopt, "", last, kLongestWatch);
+      for (const store::Event& event : events) {
+        last = event.id;
+        app.events.publish(event);
+        if (event.kind == store::EventKind::kDone) app.http.job_ended(event.job);
+      }
+      if (!events.empty()) app.http.something_happened();
+    } catch (const Error& error) {
+      spdlog::error("events of jobs cannot be read: {}", error.what());
+      std::this_thread::sleep_for(kLongestWatch);
+    }
+  }
+}
 
 }  // namespace
 
@@ -192,6 +184,7 @@ struct Server::State {
 
   App app;
   Address address;
+  std::atomic<bool> is_over = false;
 };
 
 Server::Server(const Services& services, const ServerOptions& options)
@@ -212,6 +205,10 @@ Server::~Server() {
 }
 
 std::string Server::bind(const Address& address) {
+  OriginRules& rules = state_->app.rules;
+  rules.check_host = address.is_loopback() && !address.is_unix() && state_->app.tokens == nullptr;
+  rules.hosts.push_back(address.host);
+  for (std::string& host : rules.hosts) host = host_of(host);
   httplib::Server& http = state_->app.http;
   const Error cannot(ErrorCode::kUnavailable, "cannot listen there: is the address in use?");
   if (address.is_unix()) {
@@ -224,7 +221,6 @@ std::string Server::bind(const Address& address) {
     constexpr int kUnusedPort = 80;
     if (!http.bind_to_port(address.unix_path, kUnusedPort)) throw cannot;
     state_->address = address;
-    widen_backlog(state_->app);
     // For a reverse proxy in the same group.
     ::chmod(address.unix_path.c_str(), 0660);
     return "unix:" + address.unix_path.string();
@@ -233,12 +229,19 @@ std::string Server::bind(const Address& address) {
                        ? http.bind_to_any_port(address.host)
                        : (http.bind_to_port(address.host, address.port) ? address.port : -1);
   if (port < 0) throw cannot;
-  widen_backlog(state_->app);
   const bool is_v6 = address.host.find(':') != std::string::npos;
   return "http://" + (is_v6 ? '[' + address.host + ']' : address.host) + ':' + std::to_string(port);
 }
 
-void Server::serve() { state_->app.http.listen_after_bind(); }
+void Server::serve() {
+  App& app = state_->app;
+  app.http.open([&app](const std::string& job) { return has_ended(app, job); });
+  {
+    const std::jthread watching([&app] { watch_jobs(app); });
+    state_->is_over.wait(false);
+  }
+  app.http.close(kLastAnswers);
+}
 
 Metrics& Server::metrics() { return state_->app.metrics; }
 
@@ -252,7 +255,8 @@ void Server::stop() {
   state_->app.services.estimator.stop();
   state_->app.services.library.stop_imports();
   state_->app.services.jobs.close();
-  state_->app.http.stop();
+  state_->is_over = true;
+  state_->is_over.notify_all();
 }
 
 }  // namespace isomesh::http

@@ -1,9 +1,11 @@
 // The HTTP side of the daemon: routes and their guards.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "server/http/auth.h"
 #include "server/http/metrics.h"
@@ -31,12 +33,15 @@ struct Address {
 Address parse_address(const std::string& text);
 
 struct ServerOptions {
-  std::size_t threads = 32;   // connections that are served at once
-  std::size_t backlog = 256;  // connections that wait for a thread
-  // Of the threads, how many may hold uploads, and how many may wait for jobs.
-  std::size_t upload_places = 8;
-  std::size_t wait_places = 12;
+  std::size_t threads = 32;       // requests that are worked on at once
+  std::size_t backlog = 256;      // requests that wait for a thread
+  std::size_t upload_places = 8;  // of the threads, how many may hold uploads
+  // How long a connection may take to send its request, up to a small body.
+  std::chrono::milliseconds request_time{10'000};
+  std::size_t event_streams = 256;
   UploadLimits upload;
+  std::vector<std::string> cors_origins;  // pages of which origins may use the service, `*` for all
+  std::vector<std::string> hosts;         // names of this service beside loopback's, without ports
 };
 
 // What the routes call.

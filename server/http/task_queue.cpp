@@ -11,13 +11,16 @@ BoundedTaskQueue::BoundedTaskQueue(std::size_t threads, std::size_t capacity)
   }
 }
 
-BoundedTaskQueue::~BoundedTaskQueue() { BoundedTaskQueue::shutdown(); }
+BoundedTaskQueue::~BoundedTaskQueue() { shutdown(); }
 
-void BoundedTaskQueue::enqueue(std::function<void()> task) {
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return queue_.size() < capacity_ || closed_; });
-  queue_.push_back(std::move(task));
-  changed_.notify_all();
+bool BoundedTaskQueue::try_enqueue(std::function<void()>&& task) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (closed_ || queue_.size() >= capacity_) return false;
+    queue_.push_back(std::move(task));
+  }
+  changed_.notify_one();
+  return true;
 }
 
 void BoundedTaskQueue::shutdown() {
@@ -38,7 +41,6 @@ void BoundedTaskQueue::work() {
       if (queue_.empty()) return;
       task = std::move(queue_.front());
       queue_.pop_front();
-      changed_.notify_all();
     }
     task();
   }

@@ -7,21 +7,21 @@
 #include <thread>
 #include <vector>
 
-#include <httplib.h>
-
 namespace isomesh::http {
 
-// The library's pool grows its queue without end. This one holds the accepting thread back when its
-// queue is full, so that connections wait in the system's backlog, which is bounded. Thread safe.
-class BoundedTaskQueue : public httplib::TaskQueue {
+// A number of threads and a bounded queue before them. Thread safe.
+class BoundedTaskQueue {
  public:
   BoundedTaskQueue(std::size_t threads, std::size_t capacity);
-  ~BoundedTaskQueue() override;
+  ~BoundedTaskQueue();
+  BoundedTaskQueue(const BoundedTaskQueue&) = delete;
+  BoundedTaskQueue& operator=(const BoundedTaskQueue&) = delete;
 
-  void enqueue(std::function<void()> task) override;
+  // False, and nothing happens, when the queue is full or shut down. Never waits.
+  bool try_enqueue(std::function<void()>&& task);
 
   // Tasks that were accepted are still run.
-  void shutdown() override;
+  void shutdown();
 
  private:
   void work();

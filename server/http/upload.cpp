@@ -3,6 +3,7 @@
 #include <exception>
 #include <optional>
 
+#include "server/http/exchange.h"
 #include "server/http/request.h"
 #include "server/store/files.h"
 
@@ -29,6 +30,29 @@ void check_length(const httplib::Request& request, std::uint64_t max_bytes) {
   }
 }
 
+Error other_digest() {
+  return {ErrorCode::kDigestMismatch,
+          "the body's SHA-256 is not the one that Content-Digest names"};
+}
+
+Error incomplete() {
+  const Exchange* exchange = Exchange::current();
+  if (exchange != nullptr && exchange->was_too_slow()) {
+    return {ErrorCode::kRequestTimeout, "the body came too slowly"};
+  }
+  return {ErrorCode::kInvalidParameter, "the body ended before its length"};
+}
+
+// Before any of it has come, when its length is known: nothing is gained by filling the disk.
+void check_room(const store::DataFolder& folder, const httplib::Request& request) {
+  if (!request.has_header("Content-Length")) return;
+  std::error_code error;
+  const auto space = std::filesystem::space(folder.scratch(), error);
+  if (!error && request.get_header_value<std::uint64_t>("Content-Length") > space.available) {
+    throw Error(ErrorCode::kOutOfSpace, "there is no room for this upload");
+  }
+}
+
 // Receives the pieces of a body. An exception must not cross the library, so it is kept and the
 // reading ended.
 class Receiver {
@@ -43,7 +67,7 @@ class Receiver {
       if (bytes_ > limits_.max_bytes) throw too_large(limits_.max_bytes);
       if (std::chrono::steady_clock::now() > deadline_) {
         throw Error(
-            ErrorCode::kTooLarge,
+            ErrorCode::kRequestTimeout,
             "the upload took longer than " + std::to_string(limits_.max_time.count()) + " seconds");
       }
       const auto piece = std::as_bytes(std::span(data, size));
@@ -69,7 +93,9 @@ class Receiver {
   // Throws what ended the reading.
   void check(bool complete, bool is_form) const {
     if (failure_) std::rethrow_exception(failure_);
-    if (!complete) throw Error(ErrorCode::kInvalidParameter, "the body ended before its length");
+    if (!complete && stopping_)
+      throw Error(ErrorCode::kUnavailable, "the service is shutting down");
+    if (!complete) throw incomplete();
     if (is_form && parts_ == 0) {
       throw invalid_parameter("file", "the form has no field `file`");
     }
@@ -98,6 +124,7 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
     : scratch_(folder.scratch()), path_(scratch_.path() / "upload") {
   refuse_encoded(request);
   check_length(request, limits.max_bytes);
+  check_room(folder, request);
   const std::optional<std::string> expected = sha256_of_content_digest(request);
   const bool is_form = request.is_multipart_form_data();
   if (is_form && expected) {
@@ -113,10 +140,7 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
                 take)
           : read_body(take);
   receiver.check(complete, is_form);
-  if (expected && receiver.digest() != *expected) {
-    throw Error(ErrorCode::kDigestMismatch,
-                "the body's SHA-256 is not the one that Content-Digest names");
-  }
+  if (expected && receiver.digest() != *expected) throw other_digest();
 }
 
 std::string read_text(const httplib::Request& request, const httplib::ContentReader& read_body,
@@ -134,7 +158,9 @@ std::string read_text(const httplib::Request& request, const httplib::ContentRea
     return fits;
   });
   if (!fits) throw too_large(max_bytes);
-  if (!complete) throw Error(ErrorCode::kInvalidParameter, "the body ended before its length");
+  if (!complete) throw incomplete();
+  const auto expected = sha256_of_content_digest(request);
+  if (expected && store::sha256_of(text) != *expected) throw other_digest();
   return text;
 }
 

@@ -22,7 +22,7 @@ class Upload {
  public:
   // Receives the body, or the one field `file` of a form. Throws Error kTooLarge, kDigestMismatch,
   // kUnsupportedMedia for an encoded body, kInvalidParameter for a broken or empty one,
-  // kOutOfSpace, and kUnavailable once `stopping` is true.
+  // kRequestTimeout, kOutOfSpace, and kUnavailable once `stopping` is true.
   Upload(const store::DataFolder& folder, const UploadLimits& limits,
          const std::atomic<bool>& stopping, const httplib::Request& request,
          const httplib::ContentReader& read_body);
@@ -35,7 +35,7 @@ class Upload {
 };
 
 // A small body, whole in memory. Throws Error kTooLarge beyond `max_bytes`, kUnsupportedMedia,
-// kInvalidParameter.
+// kInvalidParameter, kRequestTimeout.
 std::string read_text(const httplib::Request& request, const httplib::ContentReader& read_body,
                       std::size_t max_bytes);
 

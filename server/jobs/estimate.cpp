@@ -73,11 +73,13 @@ double guessed_bytes(MeshFormat format, const SurfaceSize& surface,
   // A bit more for a coordinate is about a bit more for each coordinate of each vertex.
   const double more_bits = 3 * (parameters.draco.position_bits - kUsualPositionBits) / 8;
   constexpr double kSmallestPerVertex = 1;
+  constexpr double kNormalPerVertex = 1.5;
   switch (format) {
     case MeshFormat::kDrc:
-      return 100 + vertices * std::max(kSmallestPerVertex, 3.2 + more_bits);
+      return 100 + vertices * std::max(kSmallestPerVertex, 2.6 + more_bits);
     case MeshFormat::kGlb:
-      return 2000 + vertices * std::max(kSmallestPerVertex, 3.3 + more_bits);
+      return 2000 + vertices * (std::max(kSmallestPerVertex, 2.7 + more_bits) +
+                                (parameters.normals ? kNormalPerVertex : 0));
     case MeshFormat::kStl:
       return 84 + 50 * triangles;
     case MeshFormat::kPly:

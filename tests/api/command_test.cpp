@@ -115,12 +115,22 @@ TEST_F(CommandTest, MeshPassesEveryOptionOn) {
   EXPECT_EQ(json::parse(result.output)["outputs"][0], (folder_ / "out.drc").string());
 }
 
+TEST_F(CommandTest, AKeyIsOneJob) {
+  EXPECT_EQ(submit({"--key", "a"}), submit({"--key", "a"}));
+  EXPECT_NE(submit(), submit());
+}
+
 TEST_F(CommandTest, StepByStep) {
   const std::string volume = upload();
   EXPECT_EQ(upload(), volume);
   const Finished info = daemon_.command({"info", volume});
   EXPECT_EQ(info.status, 0);
   EXPECT_THAT(info.output, HasSubstr("21 x 20 x 19"));
+  EXPECT_THAT(info.output, HasSubstr("\u2588"));  // the histogram's highest bar
+  const Finished estimate =
+      daemon_.command({"estimate", volume, "--iso", "100", "--format", "stl"});
+  EXPECT_EQ(estimate.status, 0) << estimate.errors;
+  EXPECT_THAT(estimate.output, HasSubstr("triangles"));
 
   const std::string job = submit({"--format", "drc,stl"});
   const Finished wait = daemon_.command({"wait", job});

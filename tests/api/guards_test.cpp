@@ -1,5 +1,8 @@
 // Requests that no honest client sends, and the guards that httplib needs against them. Whatever is
 // sent, the daemon answers the next request.
+#include <algorithm>
+#include <chrono>
+#include <deque>
 #include <string>
 #include <vector>
 
@@ -24,18 +27,18 @@ class GuardsTest : public testing::Test {
 
 TEST_F(GuardsTest, ABodyWithoutALengthIsRefusedAtOnce) {
   const Connection connection(daemon_.url());
-  connection.send("POST /v1/volumes HTTP/1.1\r\nHost: test\r\n\r\n");
+  connection.send("POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\n\r\n");
   // The connection stays open on this side: a server that waited for a body would not answer.
   EXPECT_TRUE(is_problem(connection.receive(), ErrorCode::kLengthRequired));
   for (const std::string method : {"POST", "PUT", "PATCH"}) {
-    EXPECT_TRUE(is_problem(answer_to(method + " /v1/jobs HTTP/1.1\r\nHost: test\r\n\r\n"),
+    EXPECT_TRUE(is_problem(answer_to(method + " /v1/jobs HTTP/1.1\r\nHost: localhost\r\n\r\n"),
                            ErrorCode::kLengthRequired));
   }
 }
 
 TEST_F(GuardsTest, ADeleteNeedsNoBody) {
   const Connection connection(daemon_.url());
-  connection.send("DELETE /v1/jobs/0123 HTTP/1.1\r\nHost: test\r\n\r\n");
+  connection.send("DELETE /v1/jobs/0123 HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_TRUE(is_problem(connection.receive(), ErrorCode::kNotFound));
 }
 
@@ -56,20 +59,20 @@ TEST_F(GuardsTest, ALongPathIsRefusedBeforeItIsMatched) {
   }
   EXPECT_TRUE(
       is_problem(daemon_.get("/v1/jobs?cursor=" + std::string(5000, 'a')), ErrorCode::kUriTooLong));
-  EXPECT_EQ(daemon_.get('/' + std::string(100'000, 'a')).status, 414);
+  EXPECT_TRUE(is_problem(daemon_.get('/' + std::string(100'000, 'a')), ErrorCode::kUriTooLong));
   EXPECT_TRUE(is_problem(daemon_.get("/v1/jobs/" + std::string(200, 'a')), ErrorCode::kNotFound));
 }
 
 TEST_F(GuardsTest, ALongHeaderIsRefused) {
   EXPECT_TRUE(is_problem(daemon_.get("/livez", {{"X-Long", std::string(10'000, 'a')}}),
-                         ErrorCode::kInvalidParameter));
+                         ErrorCode::kHeadersTooLarge));
   EXPECT_EQ(daemon_.get("/livez", {{"X-Long", std::string(4'000, 'a')}}).status, 200);
 }
 
 TEST_F(GuardsTest, ManyHeadersAreRefused) {
   Headers headers;
   for (int n = 0; n < 150; ++n) headers.emplace_back("X-" + std::to_string(n), "y");
-  EXPECT_TRUE(is_problem(daemon_.get("/livez", headers), ErrorCode::kInvalidParameter));
+  EXPECT_TRUE(is_problem(daemon_.get("/livez", headers), ErrorCode::kHeadersTooLarge));
   headers.resize(60);
   EXPECT_EQ(daemon_.get("/livez", headers).status, 200);
 }
@@ -87,12 +90,16 @@ TEST_F(GuardsTest, OtherMethodsAreNotAllowed) {
         Wrong{"PATCH", "/v1/volumes/0123", "DELETE, GET, HEAD"},
         Wrong{"DELETE", "/v1/jobs/0123/mesh.drc", "GET, HEAD"}, Wrong{"GET", "/v1/mesh", "POST"},
         Wrong{"HEAD", "/v1/mesh", "POST"}, Wrong{"OPTIONS", "/v1/jobs", "GET, HEAD, POST"},
-        Wrong{"POST", "/livez", "GET, HEAD"}}) {
-    const Answer answer = daemon_.send(wrong.method, wrong.path);
-    EXPECT_EQ(answer.status, 405) << wrong.method << ' ' << wrong.path;
-    EXPECT_EQ(answer.header("allow"), wrong.allowed) << wrong.method << ' ' << wrong.path;
-    if (wrong.method != "HEAD") {
-      EXPECT_TRUE(is_problem(answer, ErrorCode::kMethodNotAllowed));
+        Wrong{"POST", "/livez", "GET, HEAD"}, Wrong{"TRACE", "/livez", "GET, HEAD"},
+        Wrong{"CONNECT", "/livez", "GET, HEAD"}, Wrong{"PRI", "/livez", "GET, HEAD"},
+        Wrong{"FETCH", "/livez", "GET, HEAD"}}) {
+    for (const std::string body : {"", "a body"}) {
+      const Answer answer = daemon_.send(wrong.method, wrong.path, body);
+      EXPECT_EQ(answer.status, 405) << wrong.method << ' ' << wrong.path;
+      EXPECT_EQ(answer.header("allow"), wrong.allowed) << wrong.method << ' ' << wrong.path;
+      if (wrong.method != "HEAD") {
+        EXPECT_TRUE(is_problem(answer, ErrorCode::kMethodNotAllowed));
+      }
     }
   }
 }
@@ -137,30 +144,100 @@ TEST_F(GuardsTest, ASpoofedAddressDoesNoHarm) {
 TEST_F(GuardsTest, LengthsThatAreNoneAreRefused) {
   for (const std::string length : {"-1", "18446744073709551616", "99999999999999999999999999"}) {
     const Answer answer = answer_to(
-        "POST /v1/volumes HTTP/1.1\r\nHost: test\r\nContent-Length: " + length + "\r\n\r\n");
+        "POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + length + "\r\n\r\n");
     EXPECT_TRUE(answer.status == 400 || answer.status == 413) << length << ": " << answer.status;
   }
 }
 
-TEST_F(GuardsTest, SlowClientsDoNotStarveOthers) {
-  std::vector<std::unique_ptr<Connection>> slow;
-  for (int n = 0; n < 16; ++n) {
-    slow.push_back(std::make_unique<Connection>(daemon_.url()));
-    slow.back()->send("GET /livez HTTP/1.1\r\nX-Slow: ");
+// Two readings of where a body ends are how requests are smuggled past a proxy.
+TEST_F(GuardsTest, ABodyHasOneLength) {
+  for (const std::string headers :
+       {"Content-Length: 3\r\nContent-Length: 3", "Content-Length: 3\r\nTransfer-Encoding: chunked",
+        "Transfer-Encoding: gzip, chunked", "Transfer-Encoding : chunked", "Content-Length: +3"}) {
+    const Answer answer =
+        answer_to("POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n\r\nabc");
+    EXPECT_TRUE(is_problem(answer, ErrorCode::kInvalidParameter)) << headers;
   }
-  EXPECT_EQ(daemon_.get("/livez").status, 200);
 }
 
-TEST_F(GuardsTest, WaitersDoNotStarveOthers) {
+// The library would make line breaks of them, in the log and in answers.
+TEST_F(GuardsTest, HeadersAreTakenAsTheyAre) {
+  const Job job = finished_job(daemon_);
+  const Answer answer = daemon_.get("/v1/jobs/" + job.id + "/events", {{"Last-Event-ID", "%31"}});
+  EXPECT_TRUE(blames(answer, "Last-Event-ID"));
+}
+
+TEST_F(GuardsTest, ARequestNamesItsHost) {
+  EXPECT_TRUE(blames(answer_to("GET /livez HTTP/1.1\r\n\r\n"), "Host"));
+  EXPECT_TRUE(blames(answer_to("GET /livez HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n"),
+                     "Host"));
+  EXPECT_EQ(answer_to("GET /livez HTTP/1.0\r\n\r\n").status, 200);
+}
+
+// The machine may have other things to do: one prompt answer of some shows that nothing was in the
+// way but those.
+bool answers_within(const Daemon& daemon, const std::string& path,
+                    std::chrono::milliseconds longest) {
+  for (int n = 0; n < 20; ++n) {
+    const auto began = std::chrono::steady_clock::now();
+    EXPECT_EQ(daemon.get(path).status, 200);
+    if (std::chrono::steady_clock::now() - began < longest) return true;
+  }
+  return false;
+}
+
+TEST_F(GuardsTest, ClientsThatHangOnDoNotStarveOthers) {
+  const Job done = finished_job(daemon_, R"("formats": ["stl"])");
   const Job job = long_job(daemon_);
-  std::vector<std::unique_ptr<Connection>> waiting;
+  const std::string path = "/v1/jobs/" + job.id;
+  std::deque<Connection> hanging;
+  const auto hang_on = [&](int count, const std::string& bytes) {
+    for (int n = 0; n < count; ++n) hanging.emplace_back(daemon_.url()).send(bytes);
+  };
+  hang_on(200, "");
+  hang_on(64, "GET /livez HTTP/1.1\r\nX-Slow: ");
+  hang_on(64, "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n\r\n{");
+  hang_on(64,
+          "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n1\r\n");
+  hang_on(64, "POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100000\r\n\r\nslow");
+  hang_on(64, request("GET", path + "/events"));
+  hang_on(64, request("GET", path + "?wait=30"));
+  hang_on(64, request("GET", "/v1/jobs/" + done.id + "/mesh.stl"));
+  EXPECT_TRUE(answers_within(daemon_, path, std::chrono::milliseconds(50)));
+  daemon_.client().cancel(job.id);
+}
+
+TEST_F(GuardsTest, WaitersAreAnsweredTogether) {
+  const Job job = long_job(daemon_);
+  std::deque<Connection> waiting;
   for (int n = 0; n < 40; ++n) {
-    waiting.push_back(std::make_unique<Connection>(daemon_.url()));
-    waiting.back()->send(request("GET", "/v1/jobs/" + job.id + "?wait=30"));
+    waiting.emplace_back(daemon_.url()).send(request("GET", "/v1/jobs/" + job.id + "?wait=30"));
   }
   EXPECT_EQ(daemon_.get("/livez").status, 200);
   daemon_.client().cancel(job.id);
-  for (const auto& connection : waiting) EXPECT_EQ(connection->receive().status, 200);
+  for (const Connection& connection : waiting) EXPECT_EQ(connection.receive().status, 200);
+}
+
+TEST(UploadPlaces, AreBounded) {
+  const Daemon daemon(std::vector<std::string>{"--upload-places", "2"});
+  const RawUpload sphere = sphere_upload();
+  const std::string target = "/v1/volumes?" + sphere.query;
+  std::deque<Connection> slow;
+  for (int n = 0; n < 2; ++n) {
+    slow.emplace_back(daemon.url())
+        .send("POST " + target +
+              " HTTP/1.1\r\nHost: localhost\r\n"
+              "Content-Length: 100000\r\n\r\n");
+  }
+  Answer refused;
+  ASSERT_TRUE(eventually([&] {
+    refused = daemon.send("POST", target, sphere.bytes);
+    return refused.status == 503;
+  }));
+  EXPECT_TRUE(is_problem(refused, ErrorCode::kUnavailable));
+  EXPECT_FALSE(refused.header("retry-after").empty());
+  slow.clear();
+  EXPECT_TRUE(eventually([&] { return daemon.send("POST", target, sphere.bytes).status < 300; }));
 }
 
 TEST_F(GuardsTest, NothingHalfSentIsAnswered) {

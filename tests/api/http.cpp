@@ -92,6 +92,14 @@ bool Connection::send(std::string_view bytes) const {
 
 void Connection::finish_sending() const { ::shutdown(socket_, SHUT_WR); }
 
+std::string Connection::receive_some() const {
+  std::string block(4096, '\0');
+  const ssize_t count = ::recv(socket_, block.data(), block.size(), 0);
+  if (count < 0) throw std::runtime_error("the daemon does not answer");
+  block.resize(static_cast<std::size_t>(count));
+  return block;
+}
+
 Answer Connection::receive() const {
   std::string text;
   std::string block(1 << 16, '\0');
@@ -107,7 +115,7 @@ Answer Connection::receive() const {
 
 std::string request(const std::string& method, const std::string& target, const std::string& body,
                     const Headers& headers) {
-  std::string text = method + ' ' + target + " HTTP/1.1\r\nHost: test\r\n";
+  std::string text = method + ' ' + target + " HTTP/1.1\r\nHost: localhost\r\n";
   for (const auto& [name, value] : headers) text += name + ": " + value + "\r\n";
   if (method == "POST" || method == "PUT" || method == "PATCH" || !body.empty()) {
     text += "Content-Length: " + std::to_string(body.size()) + "\r\n";

@@ -93,7 +93,11 @@ TEST_F(JobsTest, AWaitThatIsNoNumberIsRefused) {
   EXPECT_TRUE(blames(daemon_.get(path + "?wait=soon"), "wait"));
   EXPECT_TRUE(blames(daemon_.get(path + "?wait=-1"), "wait"));
   EXPECT_EQ(daemon_.get(path + "?wait=0.5").status, 200);
-  EXPECT_EQ(daemon_.get(path, {{"Prefer", "wait=soon"}}).status, 200);
+  for (const std::string wrong : {"inf", "nan", "1e999", ""}) {
+    EXPECT_TRUE(blames(daemon_.get(path + "?wait=" + wrong), "wait")) << wrong;
+    EXPECT_TRUE(blames(daemon_.get(path, {{"Prefer", "wait=" + wrong}}), "Prefer")) << wrong;
+  }
+  EXPECT_EQ(daemon_.get(path, {{"Prefer", "respond-async, wait=1; x=y"}}).status, 200);
 }
 
 TEST_F(JobsTest, AWaitEndsWhenItsTimeIsOver) {
@@ -165,7 +169,7 @@ TEST_F(JobsTest, ABodyThatIsTooLargeIsRefused) {
   EXPECT_EQ(post_with("\"passes\": 0" + padding).status, 202);
   EXPECT_TRUE(is_problem(post_with("\"passes\": 0" + padding + padding), ErrorCode::kTooLarge));
   EXPECT_TRUE(is_problem(answer_to(daemon_.url(),
-                                   "POST /v1/jobs HTTP/1.1\r\nHost: test\r\n"
+                                   "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\n"
                                    "Transfer-Encoding: chunked\r\n\r\n" +
                                        chunked(padding + padding, 1000)),
                          ErrorCode::kTooLarge));
@@ -250,6 +254,115 @@ TEST(FullQueue, AnswersLater) {
             JobState::kCancelled);
   EXPECT_EQ(daemon.get("/readyz").status, 200);
   daemon.client().cancel(running.id);
+}
+
+// --- What HTTP lets one say
+
+TEST_F(JobsTest, OneKeyOfManyClientsIsOneJob) {
+  const Volume volume = upload(daemon_, sphere_upload());
+  const std::string body = "{\"volume\": \"" + volume.id + "\", \"iso\": 77}";
+  std::vector<std::string> ids(8);
+  {
+    std::vector<std::jthread> clients;
+    for (std::string& id : ids) {
+      clients.emplace_back([&] {
+        id = job_from_json(daemon_.send("POST", "/v1/jobs", body, {{"Idempotency-Key", "k"}}).body)
+                 .id;
+      });
+    }
+  }
+  EXPECT_THAT(ids, testing::Each(ids[0]));
+  EXPECT_EQ(daemon_.client().jobs().jobs.size(), 1U);
+}
+
+TEST_F(JobsTest, AKeyOfTheWholeMeshIsOneJobToo) {
+  const RawUpload sphere = sphere_upload();
+  const std::string target = "/v1/mesh?" + sphere.query + "&iso=";
+  const Headers key = {{"Idempotency-Key", "k"}};
+  const Answer first = daemon_.send("POST", target + "100", sphere.bytes, key);
+  ASSERT_EQ(first.status, 200);
+  const Answer again = daemon_.send("POST", target + "100", sphere.bytes, key);
+  EXPECT_EQ(again.header("location"), first.header("location"));
+  EXPECT_TRUE(again.body == first.body);
+  EXPECT_TRUE(
+      is_problem(daemon_.send("POST", target + "101", sphere.bytes, key), ErrorCode::kKeyReused));
+}
+
+TEST_F(JobsTest, OnlyJsonIsTakenForJson) {
+  for (const std::string type : {"text/plain", "application/x-www-form-urlencoded",
+                                 "multipart/form-data; boundary=x", "application/jsonx"}) {
+    EXPECT_TRUE(is_problem(daemon_.send("POST", "/v1/jobs", "{}", {{"Content-Type", type}}),
+                           ErrorCode::kUnsupportedMedia))
+        << type;
+  }
+  for (const std::string type : {"application/json", "Application/JSON; charset=utf-8"}) {
+    EXPECT_TRUE(blames(daemon_.send("POST", "/v1/jobs", "{}", {{"Content-Type", type}}), "volume"));
+  }
+  EXPECT_TRUE(
+      blames(daemon_.send("POST", "/v1/jobs", R"({"iso": 1, "iso": 2, "volume": "a"})"), "iso"));
+  EXPECT_TRUE(
+      is_problem(daemon_.send("POST", "/v1/jobs", "{}",
+                              {{"Content-Digest", "sha-256=:" + std::string(43, 'A') + "=:"}}),
+                 ErrorCode::kDigestMismatch));
+}
+
+TEST_F(JobsTest, AnUnchangedJobIsNotSentAgain) {
+  const Job job = finished_job(daemon_);
+  const std::string path = "/v1/jobs/" + job.id;
+  const std::string etag = daemon_.get(path).header("etag");
+  ASSERT_FALSE(etag.empty());
+  const Answer again = daemon_.get(path, {{"If-None-Match", etag}});
+  EXPECT_EQ(again.status, 304);
+  EXPECT_TRUE(again.body.empty());
+  EXPECT_EQ(daemon_.get(path, {{"If-None-Match", "\"other\""}}).status, 200);
+  EXPECT_TRUE(
+      is_problem(daemon_.get(path, {{"If-Match", "\"other\""}}), ErrorCode::kPreconditionFailed));
+  EXPECT_TRUE(is_problem(daemon_.send("DELETE", path, {}, {{"If-Match", "\"other\""}}),
+                         ErrorCode::kPreconditionFailed));
+  EXPECT_EQ(daemon_.send("DELETE", path, {}, {{"If-Match", etag}}).status, 200);
+}
+
+// Every item once, in the order of the whole list, whatever the page's size.
+template <class Item>
+void expect_pages(const Daemon& daemon, const std::string& list, const std::vector<Item>& whole,
+                  std::vector<Item> (*items_of)(std::string_view)) {
+  for (const std::size_t limit : {1U, 2U, 3U, 1000U}) {
+    std::vector<Item> all;
+    std::string cursor;
+    do {
+      const Answer answer = daemon.get(list + "?limit=" + std::to_string(limit) +
+                                       (cursor.empty() ? "" : "&cursor=" + cursor));
+      ASSERT_EQ(answer.status, 200) << answer.body;
+      const std::vector<Item> page = items_of(answer.body);
+      EXPECT_LE(page.size(), limit);
+      all.insert(all.end(), page.begin(), page.end());
+      const auto next = nlohmann::json::parse(answer.body)["next"];
+      cursor = next.is_null() ? "" : next.get<std::string>();
+    } while (!cursor.empty() && all.size() < 100);
+    EXPECT_EQ(all, whole) << limit;
+  }
+  for (const std::string wrong :
+       {"", "x", "00", "6a6f62733a", "766f6c756d65733a78", "6a6f62733a0a"}) {
+    EXPECT_TRUE(blames(daemon.get(list + "?cursor=" + wrong), "cursor")) << wrong;
+  }
+  for (const std::string wrong : {"0", "1001", "-1", "x", ""}) {
+    EXPECT_TRUE(blames(daemon.get(list + "?limit=" + wrong), "limit")) << wrong;
+  }
+}
+
+TEST_F(JobsTest, ListsComeInPages) {
+  for (int n = 0; n < 5; ++n) finished_job(daemon_, "\"passes\": " + std::to_string(n));
+  expect_pages<Job>(daemon_, "/v1/jobs", daemon_.client().jobs().jobs, jobs_from_json);
+  for (char c = 'a'; c < 'e'; ++c) {
+    daemon_.send("POST", "/v1/volumes?dims=10,10,10&type=uint8", std::string(1000, c));
+  }
+  const auto volumes = volumes_from_json(daemon_.get("/v1/volumes").body);
+  EXPECT_EQ(volumes.size(), 5U);
+  expect_pages<Volume>(daemon_, "/v1/volumes", volumes, volumes_from_json);
+  // A cursor of one list is none of the other.
+  const Answer jobs = daemon_.get("/v1/jobs?limit=1");
+  const auto next = nlohmann::json::parse(jobs.body)["next"].get<std::string>();
+  EXPECT_TRUE(blames(daemon_.get("/v1/volumes?cursor=" + next), "cursor"));
 }
 
 }  // namespace

@@ -212,7 +212,8 @@ TEST(Drain, FinishesTheMeshOfOneRequest) {
 TEST(Drain, ATricklingUploadDoesNotHoldItUp) {
   Daemon daemon(std::vector<std::string>{"--drain-seconds", "0"});
   const Connection connection(daemon.url());
-  connection.send("POST /v1/volumes HTTP/1.1\r\nHost: test\r\nContent-Length: 99999999\r\n\r\n");
+  connection.send(
+      "POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999\r\n\r\n");
   ASSERT_TRUE(eventually([&] { return !files_below(daemon.data() / "scratch").empty(); }));
   std::jthread trickle([&](const std::stop_token& stop) {
     while (!stop.stop_requested() && connection.send("x")) {

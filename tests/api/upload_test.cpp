@@ -7,10 +7,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <openssl/evp.h>
 
 #include "proto/json.h"
 #include "tests/api/daemon.h"
+#include "tests/api/digest.h"
 #include "tests/api/problems.h"
 #include "tests/support/nifti.h"
 
@@ -20,15 +20,6 @@ namespace {
 using namespace test;
 using testing::ElementsAre;
 using testing::IsEmpty;
-
-std::string digest_of(const std::string& bytes) {
-  std::array<unsigned char, 32> digest = {};
-  unsigned size = digest.size();
-  EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr);
-  std::array<unsigned char, 48> base64 = {};
-  EVP_EncodeBlock(base64.data(), digest.data(), static_cast<int>(digest.size()));
-  return "sha-256=:" + std::string(reinterpret_cast<const char*>(base64.data())) + ":";
-}
 
 // A field of a form and the file in it.
 std::string form(const std::string& name, const std::string& bytes) {
@@ -98,7 +89,7 @@ TEST_F(UploadTest, TakesTheWholeDescriptionOfRawSamples) {
 
 TEST_F(UploadTest, ComesChunkedAsWell) {
   const Answer answer = answer_to(daemon_.url(), "POST " + target_ +
-                                                     " HTTP/1.1\r\nHost: test\r\n"
+                                                     " HTTP/1.1\r\nHost: localhost\r\n"
                                                      "Transfer-Encoding: chunked\r\n\r\n" +
                                                      chunked(sphere_.bytes, 1000));
   ASSERT_EQ(answer.status, 201) << answer.body;
@@ -108,7 +99,7 @@ TEST_F(UploadTest, ComesChunkedAsWell) {
 // The names of transfer codings are case-insensitive (RFC 9112, 7).
 TEST_F(UploadTest, ComesChunkedInAnyCase) {
   const Answer answer = answer_to(daemon_.url(), "POST " + target_ +
-                                                     " HTTP/1.1\r\nHost: test\r\n"
+                                                     " HTTP/1.1\r\nHost: localhost\r\n"
                                                      "Transfer-Encoding: Chunked\r\n\r\n" +
                                                      chunked(sphere_.bytes, 1000));
   EXPECT_EQ(answer.status, 201) << answer.body;
@@ -210,8 +201,9 @@ TEST_F(UploadTest, CutAtHalfLeavesNothing) {
 TEST_F(UploadTest, CutInTheMiddleOfAChunkLeavesNothing) {
   {
     const Connection connection(daemon_.url());
-    connection.send("POST " + target_ +
-                    " HTTP/1.1\r\nHost: test\r\nTransfer-Encoding: chunked\r\n\r\n1000\r\nabc");
+    connection.send(
+        "POST " + target_ +
+        " HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n1000\r\nabc");
     ASSERT_TRUE(eventually([&] { return !files_left().empty(); }));
   }
   EXPECT_TRUE(eventually([&] { return files_left().empty(); }));
@@ -220,8 +212,9 @@ TEST_F(UploadTest, CutInTheMiddleOfAChunkLeavesNothing) {
 
 TEST_F(UploadTest, ABrokenChunkIsRefused) {
   const Connection connection(daemon_.url());
-  connection.send("POST " + target_ +
-                  " HTTP/1.1\r\nHost: test\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\nabc\r\n");
+  connection.send(
+      "POST " + target_ +
+      " HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\nabc\r\n");
   EXPECT_TRUE(is_problem(connection.receive(), ErrorCode::kInvalidParameter));
   EXPECT_TRUE(eventually([&] { return files_left().empty(); }));
 }
@@ -248,15 +241,16 @@ TEST(UploadLimit, HoldsForEveryWayToSend) {
   const std::string target = "/v1/volumes?" + sphere.query;
   EXPECT_TRUE(is_problem(daemon.send("POST", target, sphere.bytes), ErrorCode::kTooLarge));
   EXPECT_TRUE(is_problem(
-      answer_to(daemon.url(), "POST " + target +
-                                  " HTTP/1.1\r\nHost: test\r\nTransfer-Encoding: chunked\r\n\r\n" +
-                                  chunked(sphere.bytes, 100)),
+      answer_to(daemon.url(),
+                "POST " + target +
+                    " HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n" +
+                    chunked(sphere.bytes, 100)),
       ErrorCode::kTooLarge));
   EXPECT_TRUE(is_problem(daemon.send("POST", target, form("file", sphere.bytes) + kFormEnd, kForm),
                          ErrorCode::kTooLarge));
   // Refused for what it announces, before any of it has come.
   EXPECT_TRUE(is_problem(answer_to(daemon.url(), "POST " + target +
-                                                     " HTTP/1.1\r\nHost: test\r\n"
+                                                     " HTTP/1.1\r\nHost: localhost\r\n"
                                                      "Content-Length: 99999999999999\r\n\r\n"),
                          ErrorCode::kTooLarge));
   EXPECT_EQ(

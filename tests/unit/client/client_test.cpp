@@ -250,10 +250,28 @@ TEST(Reachability, TriesEndAndChangesAreNotRepeated) {
   Client client({.server = server.url()});
   EXPECT_EQ(error_of([&] { client.job("1"); }).code(), ErrorCode::kUnreachable);
   EXPECT_EQ(server.connections(), 4);
-  EXPECT_EQ(error_of([&] { client.submit({}); }).code(), ErrorCode::kUnreachable);
-  EXPECT_EQ(server.connections(), 5);
   EXPECT_EQ(error_of([&] { client.cancel("1"); }).code(), ErrorCode::kUnreachable);
-  EXPECT_EQ(server.connections(), 6);
+  EXPECT_EQ(server.connections(), 5);
+}
+
+// The key makes it one job, however often it is sent.
+TEST(Reachability, ASubmissionIsRepeatedWithItsKey) {
+  std::vector<std::string> keys;
+  test::SocketServer server([&](int socket) {
+    const std::string head = test::read_head(socket);
+    const std::string name = "Idempotency-Key: ";
+    const std::size_t begin = head.find(name) + name.size();
+    keys.push_back(head.substr(begin, head.find("\r\n", begin) - begin));
+  });
+  Client client({.server = server.url()});
+  EXPECT_EQ(error_of([&] { client.submit({}); }).code(), ErrorCode::kUnreachable);
+  ASSERT_EQ(keys.size(), 4U);
+  EXPECT_GE(keys[0].size(), 16U);
+  EXPECT_THAT(keys, testing::Each(keys[0]));
+  EXPECT_EQ(error_of([&] { client.submit({}); }).code(), ErrorCode::kUnreachable);
+  EXPECT_NE(keys[4], keys[0]);
+  EXPECT_EQ(error_of([&] { client.submit({}, "mine"); }).code(), ErrorCode::kUnreachable);
+  EXPECT_EQ(keys[8], "mine");
 }
 
 TEST(Reachability, SpeaksOverASocketOfThisMachine) {
@@ -337,6 +355,91 @@ TEST(Jobs, AreSubmittedListedAndCancelled) {
   EXPECT_EQ(cursor, "a&b");
   client.cancel("7");
   EXPECT_EQ(cancelled, "/v1/jobs/7");
+}
+
+TEST(Volumes, AreAskedForPageByPage) {
+  FakeServer server;
+  server.http.Get("/v1/volumes", [&](const httplib::Request& request, httplib::Response& response) {
+    const bool is_first = !request.has_param("cursor");
+    EXPECT_EQ(request.get_param_value("cursor"), is_first ? "" : "a&b");
+    response.set_content(to_json(std::vector{some_volume()}, is_first ? "a&b" : ""), kJson);
+  });
+  Client client({.server = server.start()});
+  EXPECT_EQ(client.volumes().size(), 2U);
+}
+
+TEST(Volumes, AreLookedAtBeforeAJob) {
+  TemporaryFolder folder;
+  FakeServer server;
+  httplib::Params asked;
+  server.http.Get("/v1/volumes/7/histogram",
+                  [&](const httplib::Request& request, httplib::Response& response) {
+                    asked = request.params;
+                    response.set_content(to_json(Histogram{"7", {0, 9}, {1, 2}}), kJson);
+                  });
+  server.http.Get("/v1/volumes/7/slice.png",
+                  [&](const httplib::Request& request, httplib::Response& response) {
+                    asked = request.params;
+                    response.set_content("a picture", "image/png");
+                  });
+  server.http.Get("/v1/estimate",
+                  [&](const httplib::Request& request, httplib::Response& response) {
+                    asked = request.params;
+                    Estimate estimate;
+                    estimate.triangles = 11;
+                    response.set_content(to_json(estimate), kJson);
+                  });
+  Client client({.server = server.start()});
+  const auto value = [&](const std::string& name) {
+    const auto found = asked.find(name);
+    return found == asked.end() ? "none" : found->second;
+  };
+
+  EXPECT_EQ(client.histogram("7", 2).counts, (std::vector<std::uint64_t>{1, 2}));
+  EXPECT_EQ(value("bins"), "2");
+  client.slice("7", {.axis = "x", .index = 3, .window = std::array{-160.0, 240.5}},
+               folder / "slice.png");
+  EXPECT_EQ(test::read_file(folder / "slice.png"), "a picture");
+  EXPECT_EQ(value("axis") + ' ' + value("index") + ' ' + value("window"), "x 3 -160,240.5");
+  JobParameters parameters;
+  parameters.volume = "7";
+  parameters.iso = 60;
+  parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl};
+  parameters.draco.speed = 3;
+  parameters.components.keep = 2;
+  EXPECT_EQ(client.estimate(parameters).triangles, 11U);
+  EXPECT_EQ(parse_job_parameters({asked.begin(), asked.end()}, VolumeIn::kQuery), parameters);
+}
+
+TEST(Follow, TellsEventsAndComesBackWhereItWas) {
+  FakeServer server;
+  std::vector<std::string> last_ids;
+  const std::string stage =
+      "id: 4\nevent: stage\ndata: " + to_json(JobEvent{JobState::kRunning, Stage::kLoad, 0.5}) +
+      "\n\n";
+  server.http.Get(
+      "/v1/jobs/7/events", [&](const httplib::Request& request, httplib::Response& response) {
+        last_ids.push_back(request.get_header_value("Last-Event-ID"));
+        if (last_ids.size() == 1) {
+          // Less comes than was announced: the connection has broken.
+          response.set_content_provider(
+              1000, "text/event-stream", [&](std::size_t, std::size_t, httplib::DataSink& sink) {
+                const std::string begin = "retry: 1\n\n: hello\n\n" + stage + "id: 5\nev";
+                sink.write(begin.data(), begin.size());
+                return false;
+              });
+        } else {
+          response.set_content(
+              "id: 6\nevent: done\ndata: " + to_json(finished_job("7", "mesh")) + "\n\n",
+              "text/event-stream");
+        }
+      });
+  Client client({.server = server.start()});
+  std::vector<JobEvent> seen;
+  const Job job = client.follow("7", [&](const JobEvent& event) { seen.push_back(event); });
+  EXPECT_EQ(job.id, "7");
+  EXPECT_THAT(last_ids, ElementsAre("", "4"));
+  EXPECT_THAT(seen, ElementsAre(JobEvent{JobState::kRunning, Stage::kLoad, 0.5}));
 }
 
 TEST(Wait, LooksUntilTheJobIsDoneAndShowsEveryStep) {

@@ -70,14 +70,14 @@ class OpenApi : public testing::Test {
 };
 
 TEST_F(OpenApi, DescribesEveryRouteWithItsMethods) {
-  for (const auto& [pattern, methods] : app_.methods) {
+  for (const auto& [pattern, route] : app_.routes) {
     Methods described;
     for (const auto& path : description_["paths"]) {
       if (matches(example_of(path.first.as<std::string>()), pattern)) {
         described.merge(methods_of(path.second));
       }
     }
-    EXPECT_EQ(described, methods) << pattern;
+    EXPECT_EQ(described, route.methods) << pattern;
   }
 }
 
@@ -85,7 +85,7 @@ TEST_F(OpenApi, DescribesNoOtherPath) {
   for (const auto& path : description_["paths"]) {
     const std::string example = example_of(path.first.as<std::string>());
     int routes = 0;
-    for (const auto& [pattern, methods] : app_.methods) {
+    for (const auto& [pattern, route] : app_.routes) {
       routes += matches(example, pattern) ? 1 : 0;
     }
     EXPECT_EQ(routes, 1) << example;

@@ -25,6 +25,8 @@ int status_in_the_contract(ErrorCode code) {
       return 404;
     case ErrorCode::kMethodNotAllowed:
       return 405;
+    case ErrorCode::kRequestTimeout:
+      return 408;
     case ErrorCode::kNotReady:
     case ErrorCode::kCancelled:
       return 409;
@@ -32,6 +34,8 @@ int status_in_the_contract(ErrorCode code) {
       return 410;
     case ErrorCode::kLengthRequired:
       return 411;
+    case ErrorCode::kPreconditionFailed:
+      return 412;
     case ErrorCode::kTooLarge:
       return 413;
     case ErrorCode::kUriTooLong:
@@ -45,6 +49,8 @@ int status_in_the_contract(ErrorCode code) {
       return 422;
     case ErrorCode::kTooManyRequests:
       return 429;
+    case ErrorCode::kHeadersTooLarge:
+      return 431;
     case ErrorCode::kInternal:
       return 500;
     case ErrorCode::kUnavailable:
