@@ -84,6 +84,8 @@ void visit(Is<ComponentFilter> auto& self, auto&& field) {
   field("min_triangles", self.min_triangles);
 }
 
+void visit(Is<Callback> auto& self, auto&& field) { field("url", self.url); }
+
 void visit(Is<JobParameters> auto& self, auto&& field) {
   field("volume", self.volume);
   field("iso", self.iso);
@@ -100,6 +102,9 @@ void visit(Is<JobParameters> auto& self, auto&& field) {
   field("draco", self.draco);
   field("normals", self.normals);
   field("priority", self.priority);
+  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? self.callback.has_value() : true) {
+    field("callback", self.callback);
+  }
 }
 
 void visit(Is<Timing> auto& self, auto&& field) {

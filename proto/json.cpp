@@ -195,6 +195,9 @@ std::string to_json(const std::vector<Job>& jobs, const std::string& next) {
   return page("jobs", write(jobs), next);
 }
 
+Volume volume_from_record(std::string_view text) { return from_record<Volume>(text); }
+Job job_from_record(std::string_view text) { return from_record<Job>(text); }
+
 Volume volume_from_json(std::string_view text) { return from_text<Volume>(text); }
 Job job_from_json(std::string_view text) { return from_text<Job>(text); }
 Problem problem_from_json(std::string_view text) { return from_text<Problem>(text); }

@@ -145,6 +145,13 @@ class RequestReader {
     read_object(json, value, name + ".");
   }
 
+  void read_member(const Json& json, const std::string& name, std::optional<Callback>& value) {
+    if (json.is_null()) return value.reset();
+    if (!json.is_object()) return add(name, "must be an object");
+    read_object(json, value.emplace(), name + ".");
+    if (!json.contains("url")) add(name + ".url", "is required");
+  }
+
   static std::pair<int, int> range_of(const std::string& name) {
     if (name == "passes") return {0, 1000};
     if (name == "draco.position_bits") return {8, 30};
@@ -251,7 +258,7 @@ JobParameters parse_job_parameters(const std::vector<std::pair<std::string, std:
     const std::string member = name == "format" ? "formats" : name;
     const bool is_text = name == "volume" && volume_in == VolumeIn::kQuery;
     if ((name == "volume" && !is_text) || name == "draco" || name == "components" ||
-        name == "formats") {
+        name == "formats" || name == "callback") {
       misplaced.push_back(name);
     } else if (owner.contains(member)) {
       reader.add(name, "is given twice");

@@ -129,6 +129,13 @@ struct ComponentFilter {
   bool operator==(const ComponentFilter&) const = default;
 };
 
+// Whom to tell that a job has ended.
+struct Callback {
+  std::string url;
+
+  bool operator==(const Callback&) const = default;
+};
+
 // What a job is asked to do; the members' ranges are the contract's and are checked by
 // parse_job_parameters (json.h).
 struct JobParameters {
@@ -147,6 +154,7 @@ struct JobParameters {
   DracoParameters draco;
   bool normals = false;  // in glb
   Priority priority = Priority::kRoutine;
+  std::optional<Callback> callback = {};
 
   bool operator==(const JobParameters&) const = default;
 };

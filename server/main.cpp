@@ -6,11 +6,13 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <spdlog/spdlog.h>
@@ -18,7 +20,13 @@
 
 #include "server/http/auth.h"
 #include "server/http/log.h"
+#include "server/http/metrics.h"
+#include "server/http/records.h"
 #include "server/http/server.h"
+#include "server/http/tls.h"
+#include "server/jobs/callback_signature.h"
+#include "server/jobs/callback_targets.h"
+#include "server/jobs/callbacks.h"
 #include "server/jobs/estimate.h"
 #include "server/jobs/histograms.h"
 #include "server/jobs/housekeeper.h"
@@ -29,6 +37,7 @@
 #include "server/store/data_folder.h"
 #include "server/store/database.h"
 #include "server/store/file_blob_store.h"
+#include "server/store/outbox.h"
 #include "server/store/retention.h"
 #include "server/store/sqlite_job_store.h"
 #include "server/store/sqlite_volume_store.h"
@@ -49,6 +58,12 @@ struct Options {
   http::LogLevel log_level = http::LogLevel::kInfo;
   http::LogFormat log_format = http::LogFormat::kText;
   std::filesystem::path tokens;  // empty: requests are not authenticated
+  std::filesystem::path tls_certificate;
+  std::filesystem::path tls_key;
+  std::vector<std::string> callback_targets;
+  std::filesystem::path callback_secrets;
+  std::filesystem::path callback_authorities;
+  double callback_retry_seconds = 5;
   store::JobStoreOptions jobs;
   double keep_days = 30;
   std::uint64_t max_disk = 0;
@@ -100,6 +115,35 @@ void add_security_options(CLI::App& cli, Options& options) {
                  "File of tokens that requests must have; `isomeshd token` makes them. SIGHUP "
                  "reads it again")
       ->envname("ISOMESH_TOKENS");
+  auto* certificate =
+      cli.add_option("--tls-cert", options.tls_certificate,
+                     "File of the certificate (PEM) to listen with https; SIGHUP reads it again")
+          ->envname("ISOMESH_TLS_CERT");
+  cli.add_option("--tls-key", options.tls_key, "File of the certificate's key (PEM)")
+      ->envname("ISOMESH_TLS_KEY")
+      ->needs(certificate);
+}
+
+void add_callback_options(CLI::App& cli, Options& options) {
+  cli.add_option(
+         "--callback-allow", options.callback_targets,
+         "Beginning of URLs that jobs may call back, such as https://ris.example.org/hooks; "
+         "may be repeated; private: before it lets its name lead to private addresses")
+      ->envname("ISOMESH_CALLBACK_ALLOW")
+      ->type_name("URL")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  cli.add_option("--callback-secret-file", options.callback_secrets,
+                 "File of the key that signs callbacks; SIGHUP reads it again")
+      ->envname("ISOMESH_CALLBACK_SECRET_FILE");
+  cli.add_option("--callback-ca", options.callback_authorities,
+                 "File of the certificate authorities that callbacks trust; the system's otherwise")
+      ->envname("ISOMESH_CALLBACK_CA");
+  cli.add_option("--callback-retry-seconds", options.callback_retry_seconds,
+                 "Pause after a callback's first failure; it doubles up to an hour")
+      ->envname("ISOMESH_CALLBACK_RETRY_SECONDS")
+      ->check(CLI::Range(0.01, 3600.0))
+      ->capture_default_str();
 }
 
 // Every option also as ISOMESH_... in the environment and by its name in the file of --config.
@@ -198,6 +242,7 @@ void add_options(CLI::App& cli, Options& options) {
       ->envname("ISOMESH_OPEN_NETWORK");
   add_log_options(cli, options);
   add_security_options(cli, options);
+  add_callback_options(cli, options);
 }
 
 CLI::App& add_token_command(CLI::App& cli, TokenRequest& request) {
@@ -225,37 +270,71 @@ sigset_t block_signals() {
   return signals;
 }
 
-// Reads again what may change while the daemon runs. What cannot be read stays as it was.
-void reload(http::Tokens* tokens) {
+// What SIGHUP reads again; null where there is none.
+struct Files {
+  std::unique_ptr<http::Tokens> tokens;
+  std::unique_ptr<http::TlsFiles> tls;
+};
+
+Files open_files(const Options& options, const http::Address& address) {
+  Files files;
+  if (!options.tokens.empty()) files.tokens = std::make_unique<http::Tokens>(options.tokens);
+  if (!options.tls_certificate.empty() && !address.is_unix()) {
+    files.tls = std::make_unique<http::TlsFiles>(options.tls_certificate, options.tls_key);
+  }
+  return files;
+}
+
+void check_reach(const Options& options, const http::Address& address, const Files& files) {
+  if (address.is_loopback()) return;
+  if (!files.tokens && !options.open_network) {
+    throw invalid_parameter("listen",
+                            "requests are not authenticated, so only loopback or a Unix socket is "
+                            "listened on; --tokens or --open-network allow other addresses");
+  }
+  if (files.tokens && !files.tls) {
+    spdlog::warn("tokens and volumes cross the network in plain: --tls-cert encrypts them");
+  }
+}
+
+std::vector<std::string> callback_secrets(const Options& options) {
+  if (!options.callback_secrets.empty()) {
+    return jobs::read_callback_secrets(options.callback_secrets);
+  }
+  if (options.callback_targets.empty()) return {};
+  throw invalid_parameter("callback-secret-file",
+                          "callbacks are signed, so it is needed with "
+                          "--callback-allow");
+}
+
+jobs::CallbackOptions callback_options(const Options& options) {
+  return {.secrets = callback_secrets(options),
+          .authorities = options.callback_authorities,
+          .first_delay = std::chrono::round<std::chrono::milliseconds>(
+              std::chrono::duration<double>(options.callback_retry_seconds))};
+}
+
+// What cannot be read stays as it was.
+void reload_one(const std::function<void()>& read) {
   try {
-    if (tokens != nullptr) {
-      tokens->reload();
-      spdlog::info("{} tokens are known now", tokens->count());
-    }
+    read();
   } catch (const Error& error) {
     spdlog::error("{}; what was there before stays", error.what());
   }
 }
 
-// Returns the signal that ends the daemon.
-int wait_for_end(const sigset_t& signals, http::Tokens* tokens) {
-  while (true) {
-    int signal = 0;
-    ::sigwait(&signals, &signal);
-    if (signal != SIGHUP) return signal;
-    reload(tokens);
-  }
+void reload(const Options& options, const Files& files, jobs::Callbacks& callbacks) {
+  spdlog::info("signal {}: reading files again", SIGHUP);
+  if (files.tokens) reload_one([&] { files.tokens->reload(); });
+  if (files.tls) reload_one([&] { files.tls->reload(); });
+  reload_one([&] { callbacks.set_secrets(callback_secrets(options)); });
 }
 
 int run(const Options& options, const sigset_t& signals) {
   const http::Address address = http::parse_address(options.listen);
-  std::unique_ptr<http::Tokens> tokens;
-  if (!options.tokens.empty()) tokens = std::make_unique<http::Tokens>(options.tokens);
-  if (!address.is_loopback() && !tokens && !options.open_network) {
-    throw invalid_parameter("listen",
-                            "requests are not authenticated, so only loopback or a Unix socket is "
-                            "listened on; --tokens or --open-network allow other addresses");
-  }
+  const Files files = open_files(options, address);
+  check_reach(options, address, files);
+  const jobs::CallbackTargets targets(options.callback_targets);
   if (options.threads > 0) mesh::set_thread_count(options.threads);
 
   const store::DataFolder folder(options.data);
@@ -278,6 +357,10 @@ int run(const Options& options, const sigset_t& signals) {
   volume::RunnerOptions runner = options.runner;
   runner.bounds.time = std::chrono::seconds(options.import_seconds);
   jobs::VolumeLibrary library(folder, blobs, volumes, retention, options.import, runner);
+  http::Metrics metrics;
+  store::Outbox outbox(database);
+  jobs::Callbacks callbacks(outbox, targets, callback_options(options),
+                            http::callback_recorder(metrics));
   const jobs::PipelineLimits limits = {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
   const jobs::WorkerOptions worker_options = {
@@ -289,14 +372,19 @@ int run(const Options& options, const sigset_t& signals) {
   const jobs::Housekeeper housekeeper(retention, housekeeping_interval(keep));
   jobs::Histograms histograms(blobs);
   jobs::Estimator estimator(volumes, blobs, jobs, limits);
-  http::Server server({folder, blobs, volumes, jobs, library, histograms, estimator, tokens.get()},
-                      options.http);
+  http::ServerOptions server_options = options.http;
+  server_options.tls = files.tls.get();
+  const http::Services services = {folder,     blobs,     volumes,           jobs,    library,
+                                   histograms, estimator, retention,         metrics, outbox,
+                                   callbacks,  targets,   files.tokens.get()};
+  http::Server server(services, server_options);
 
   const std::string url = server.bind(address);
   std::cout << "listening on " << url << std::endl;
   std::jthread serving([&] { server.serve(); });
 
-  const int signal = wait_for_end(signals, tokens.get());
+  int signal = 0;
+  while (::sigwait(&signals, &signal) == 0 && signal == SIGHUP) reload(options, files, callbacks);
   spdlog::info("signal {}: draining", signal);
   server.begin_drain();
   if (!workers.drain(std::chrono::seconds(options.drain_seconds))) {

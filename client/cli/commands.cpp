@@ -26,7 +26,10 @@ class Stopwatch {
 };
 
 Client client_of(const Options& options, const std::stop_token& stop) {
-  return Client({.server = options.server, .token = options.token, .stop = stop});
+  return Client({.server = options.server,
+                 .token = options.token,
+                 .authorities = options.authorities,
+                 .stop = stop});
 }
 
 void complain(const std::string& message) { std::cerr << "isomesh: " << message << '\n'; }
@@ -72,6 +75,7 @@ Job wait(Client& client, const std::string& id, ProgressBar& bar) {
 void cancel_after_stop(const Options& options, const std::string& id) {
   Client client({.server = options.server,
                  .token = options.token,
+                 .authorities = options.authorities,
                  .connect_timeout = std::chrono::seconds{2},
                  .silence_timeout = std::chrono::seconds{5}});
   try {

@@ -180,7 +180,9 @@ void add_parameters(CLI::App& app, JobParameters& parameters) {
                       [&](int value) { parameters.draco.speed = value; }),
       app.add_flag("--normals", parameters.normals, "Put normals into a GLB"),
       add_name<Priority>(app, "--priority", "stat, routine (the default) or bulk",
-                         [&](Priority value) { parameters.priority = value; })};
+                         [&](Priority value) { parameters.priority = value; }),
+      add(app, "--callback", "URL", "Have the server tell this address when the job has ended",
+          [&](const std::string& text) { parameters.callback = Callback{text}; })};
   for (CLI::Option* option : others) option->group("Job");
 }
 
@@ -242,6 +244,11 @@ class Parser {
     app_.add_option("--token", options_.token, "The bearer token, where the server wants one")
         ->envname("ISOMESH_TOKEN")
         ->type_name("TOKEN");
+    app_.add_option("--ca", options_.authorities,
+                    "File of the certificate authorities to trust, where the system's do not do")
+        ->envname("ISOMESH_CA")
+        ->type_name("FILE")
+        ->check(CLI::ExistingFile);
     app_.add_flag("--json", options_.json, "JSON on standard output");
 
     CLI::App& mesh = command(Command::kMesh, "mesh", "Upload a volume, mesh it, download the mesh");

@@ -35,6 +35,7 @@ struct Options {
   Command command = Command::kMesh;
   std::string server = "http://127.0.0.1:8080";
   std::string token;
+  std::filesystem::path authorities;  // of an https server; empty: the system's
   bool json = false;
 
   std::filesystem::path file;  // mesh, upload

@@ -37,6 +37,7 @@ TransportOptions transport_options(ClientOptions&& options) {
   return {.server = parse_server_address(options.server),
           .server_url = options.server,
           .token = std::move(options.token),
+          .authorities = std::move(options.authorities),
           .connect_timeout = options.connect_timeout,
           .silence_timeout = options.silence_timeout,
           .stop = std::move(options.stop)};

@@ -25,11 +25,13 @@
 namespace isomesh {
 
 struct ClientOptions {
-  // `http://HOST:PORT`, `https://HOST:PORT` (the system's certificate authorities are trusted) or
-  // `unix:PATH`.
+  // `http://HOST:PORT`, `https://HOST:PORT` or `unix:PATH`. A certificate that is not valid for the
+  // host, or that no trusted authority has signed, is refused.
   std::string server = "http://127.0.0.1:8080";
   // Sent as `Authorization: Bearer`; empty: none is sent.
   std::string token = {};
+  // A file of the certificate authorities (PEM) to trust; empty: the system's.
+  std::filesystem::path authorities = {};
 
   std::chrono::milliseconds connect_timeout{10'000};
   // The longest silence in the middle of an exchange. After the last byte of an upload the server

@@ -171,9 +171,12 @@ std::unique_ptr<httplib::ClientImpl> connect_to(const TransportOptions& options,
     case ServerAddress::Kind::kHttp:
       client = std::make_unique<Plain>(server.host, server.port, wire);
       break;
-    case ServerAddress::Kind::kHttps:
-      client = std::make_unique<Tls>(server.host, server.port, wire);
+    case ServerAddress::Kind::kHttps: {
+      auto tls = std::make_unique<Tls>(server.host, server.port, wire);
+      if (!options.authorities.empty()) tls->set_ca_cert_path(options.authorities);
+      client = std::move(tls);
       break;
+    }
     case ServerAddress::Kind::kUnix:
       client = std::make_unique<Plain>(server.host, server.port, wire);
       client->set_address_family(AF_UNIX);
@@ -197,9 +200,9 @@ std::string reason_of(httplib::Error error, const Wire& wire) {
     case httplib::Error::SSLConnection:
       return "it does not speak TLS";
     case httplib::Error::SSLLoadingCerts:
-      return "no certificate authorities are installed on this machine";
+      return "the certificate authorities to trust cannot be read";
     case httplib::Error::SSLServerVerification:
-      return "its certificate is not one that this machine trusts";
+      return "its certificate is not one that is trusted here";
     default:
       return wire.failure.empty() ? "what answers there does not speak this API" : wire.failure;
   }

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <span>
 #include <stop_token>
@@ -55,6 +56,7 @@ struct TransportOptions {
   ServerAddress server;
   std::string server_url;  // as messages name it
   std::string token;
+  std::filesystem::path authorities;  // empty: the system's
   std::chrono::milliseconds connect_timeout{0};
   std::chrono::milliseconds silence_timeout{0};
   std::stop_token stop;

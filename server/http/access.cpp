@@ -79,22 +79,22 @@ void begin_request(const App& app, const httplib::Request& request, httplib::Res
 
 void end_request(App& app, const httplib::Request& request, const httplib::Response& response) {
   if (Exchange::current()->parking()) return;  // it is answered later
-  CurrentRequest& current = current_request();
-  current.bytes_in = Exchange::current()->received();
+  const CurrentRequest& current = current_request();
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - current.began;
+  const std::uint64_t bytes_in = Exchange::current()->received();
   const std::uint64_t bytes_out = request.method == "HEAD" ? 0 : length_of(response);
   app.metrics.count({.method = request.method,
                      .route = current.route,
                      .status = response.status,
                      .seconds = elapsed.count(),
-                     .bytes_in = current.bytes_in,
+                     .bytes_in = bytes_in,
                      .bytes_out = bytes_out});
   LogLine line("request");
   line.add("id", current.trace.request_id())
       .add("method", request.method)
       .add("route", current.route)
       .add("status", response.status)
-      .add("in", current.bytes_in)
+      .add("in", bytes_in)
       .add("out", bytes_out)
       .add("ms", elapsed.count() * 1000);
   if (!current.caller.name.empty()) line.add("token", current.caller.name);

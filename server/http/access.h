@@ -23,7 +23,6 @@ struct CurrentRequest {
   Trace trace;
   Caller caller;
   std::string_view route = kNoRoute;  // lives as long as the server
-  std::uint64_t bytes_in = 0;         // of the body, as far as it was read
 };
 
 // Thread safe: every thread has its own.

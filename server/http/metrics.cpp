@@ -39,18 +39,6 @@ constexpr std::array kStages = {
     TimedStage{"extract", &Timing::extract}, TimedStage{"smooth", &Timing::smooth},
     TimedStage{"encode", &Timing::encode},   TimedStage{"total", &Timing::total}};
 
-std::string_view name_of(CallbackResult result) {
-  switch (result) {
-    case CallbackResult::kDelivered:
-      return "delivered";
-    case CallbackResult::kRetried:
-      return "retried";
-    case CallbackResult::kGivenUp:
-      break;
-  }
-  return "given_up";
-}
-
 std::string_view known_method(std::string_view method) {
   for (const std::string_view known :
        {"GET", "HEAD", "POST", "DELETE", "OPTIONS", "PUT", "PATCH"}) {
@@ -110,6 +98,18 @@ std::string to_openmetrics(const std::string& text) {
 
 }  // namespace
 
+std::string_view name_of(jobs::CallbackOutcome outcome) {
+  switch (outcome) {
+    case jobs::CallbackOutcome::kDelivered:
+      return "delivered";
+    case jobs::CallbackOutcome::kRetried:
+      return "retried";
+    case jobs::CallbackOutcome::kGivenUp:
+      break;
+  }
+  return "given_up";
+}
+
 struct Metrics::State {
   prometheus::Registry registry;
 
@@ -157,8 +157,8 @@ Metrics::Metrics() : state_(std::make_unique<State>()) {
   for (const TimedStage& stage : kStages) {
     state_->stages.Add(label("stage", stage.name), kStageSeconds);
   }
-  for (const auto result :
-       {CallbackResult::kDelivered, CallbackResult::kRetried, CallbackResult::kGivenUp}) {
+  for (const auto result : {jobs::CallbackOutcome::kDelivered, jobs::CallbackOutcome::kRetried,
+                            jobs::CallbackOutcome::kGivenUp}) {
     state_->callbacks.Add(label("result", name_of(result)));
   }
 }
@@ -196,8 +196,8 @@ void Metrics::count_refused(ErrorCode reason) {
   state_->refused.Add(label("reason", describe(reason).name)).Increment();
 }
 
-void Metrics::count(CallbackResult result) {
-  state_->callbacks.Add(label("result", name_of(result))).Increment();
+void Metrics::count(jobs::CallbackOutcome outcome) {
+  state_->callbacks.Add(label("result", name_of(outcome))).Increment();
 }
 
 std::string Metrics::text(const Levels& levels) const {

@@ -12,6 +12,7 @@
 
 #include "proto/error.h"
 #include "proto/types.h"
+#include "server/jobs/callbacks.h"
 
 namespace isomesh::http {
 
@@ -27,7 +28,7 @@ struct RequestRecord {
 
 inline constexpr std::string_view kNoRoute = "none";
 
-enum class CallbackResult { kDelivered, kRetried, kGivenUp };
+std::string_view name_of(jobs::CallbackOutcome outcome);
 
 // What is measured when somebody asks.
 struct Levels {
@@ -52,7 +53,7 @@ class Metrics {
   void count_ended(const Job& job);
   // A volume that was refused.
   void count_refused(ErrorCode reason);
-  void count(CallbackResult result);
+  void count(jobs::CallbackOutcome outcome);
 
   // Everything that was counted, those levels, and the process's own memory, threads and files.
   std::string text(const Levels& levels) const;

@@ -47,6 +47,9 @@ FrontOptions front_options(App& app) {
   front.threads = app.options.threads;
   front.backlog = app.options.backlog;
   front.doorman.head_time = app.options.request_time;
+  if (const TlsFiles* tls = app.options.tls) {
+    front.stream_of = [tls](int socket) { return tls->accept(socket); };
+  }
   front.on_turned_away = [&app](const std::string& address, const Error& error) {
     const int status = describe(error.code()).status;
     app.metrics.count({.method = "", .route = kNoRoute, .status = status});

@@ -20,6 +20,7 @@
 #include "server/http/request.h"
 #include "server/http/server.h"
 #include "server/http/slots.h"
+#include "server/store/database.h"
 
 namespace isomesh::http {
 
@@ -47,11 +48,12 @@ struct App {
   Services services;
   ServerOptions options;
   const Tokens* tokens = services.tokens;  // null: everybody may do everything
-  Metrics metrics;
+  Metrics& metrics = services.metrics;
   Slots uploads;
   Slots streams;  // of events
   Broadcaster events;
   OriginRules rules;                   // constant once the server is bound
+  const std::uint64_t began_us = static_cast<std::uint64_t>(store::now_us());
   std::atomic<bool> draining = false;  // running jobs are finished, others are not accepted
   std::atomic<bool> stopping = false;  // nobody is waited for any more
   Front http;
@@ -107,5 +109,6 @@ void add_mesh_routes(App& app);
 void add_survey_routes(App& app);
 void add_page_routes(App& app);
 void add_service_routes(App& app);
+void add_metrics_route(App& app);
 
 }  // namespace isomesh::http

@@ -56,6 +56,8 @@ void submit(App& app, const httplib::Request& request, httplib::Response& respon
   check_is_json(request);
   const std::string body = small_body(app, request, read_body);
   store::JobSpec spec = {owner(), parse_job_parameters(body), idempotency_key_of(request), ""};
+  const auto& callback = spec.parameters.callback;
+  if (callback) app.services.callback_targets.check(callback->url);
   if (!spec.idempotency_key.empty()) spec.request_digest = store::sha256_of(body);
   const Job job = submitted(app, spec, response);
   if (wait_for_end(app, job, wait)) return;

@@ -7,6 +7,7 @@
 
 #include "proto/json.h"
 #include "server/codec/encode.h"
+#include "server/http/records.h"
 #include "server/http/request.h"
 #include "server/http/routes.h"
 #include "server/http/sources.h"
@@ -63,7 +64,8 @@ Job submit_with_volume(App& app, const httplib::Request& request, httplib::Respo
   const std::string key = idempotency_key_of(request);
   const Slots::Place place = place_for_upload(app);
   const Upload file(app.services.folder, app.options.upload, app.stopping, request, read_body);
-  parameters.volume = app.services.library.add(owner(), file.path(), options).first.id;
+  const auto add = [&] { return app.services.library.add(owner(), file.path(), options); };
+  parameters.volume = recording_refusals(app, add).first.id;
   // The volume's id stands for the body. A job of POST /v1/jobs is another request.
   const std::string digest = key.empty() ? "" : store::sha256_of("mesh " + to_json(parameters));
   return submitted(app, {owner(), parameters, key, digest}, response);

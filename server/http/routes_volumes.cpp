@@ -1,4 +1,5 @@
 #include "proto/json.h"
+#include "server/http/records.h"
 #include "server/http/request.h"
 #include "server/http/routes.h"
 
@@ -14,7 +15,8 @@ void upload(App& app, const httplib::Request& request, httplib::Response& respon
   const volume::ImportOptions options = import_options_of(request);
   const Slots::Place place = place_for_upload(app);
   const Upload file(app.services.folder, app.options.upload, app.stopping, request, read_body);
-  const auto [volume, is_new] = app.services.library.add(owner(), file.path(), options);
+  const auto [volume, is_new] = recording_refusals(
+      app, [&] { return app.services.library.add(owner(), file.path(), options); });
   response.set_header("Location", kVolumes + '/' + volume.id);
   answer_json(response, is_new ? 201 : 200, to_json(volume));
 }

@@ -12,6 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "server/http/records.h"
 #include "server/http/routes.h"
 
 namespace isomesh::http {
@@ -131,14 +132,18 @@ bool has_ended(const App& app, const std::string& job) {
 
 // Tells those who wait what happens to jobs, until the service stops.
 void watch_jobs(App& app) {
-  std::uint64_t last = 0;
+  // What ended before this process began was told by another.
+  std::uint64_t last = app.began_us;
   while (!app.stopping) {
     try {
       const auto events = app.services.jobs.events(std::nullopt, "", last, kLongestWatch);
       for (const store::Event& event : events) {
         last = event.id;
         app.events.publish(event);
-        if (event.kind == store::EventKind::kDone) app.http.job_ended(event.job);
+        if (event.kind != store::EventKind::kDone) continue;
+        app.http.job_ended(event.job);
+        app.services.callbacks.wake();
+        record_ended(app, event.job);
       }
       if (!events.empty()) app.http.something_happened();
     } catch (const Error& error) {
@@ -196,6 +201,7 @@ Server::Server(const Services& services, const ServerOptions& options)
   add_survey_routes(state_->app);
   add_page_routes(state_->app);
   add_service_routes(state_->app);
+  add_metrics_route(state_->app);
 }
 
 Server::~Server() {
@@ -229,8 +235,9 @@ std::string Server::bind(const Address& address) {
                        ? http.bind_to_any_port(address.host)
                        : (http.bind_to_port(address.host, address.port) ? address.port : -1);
   if (port < 0) throw cannot;
+  const std::string scheme = state_->app.options.tls == nullptr ? "http://" : "https://";
   const bool is_v6 = address.host.find(':') != std::string::npos;
-  return "http://" + (is_v6 ? '[' + address.host + ']' : address.host) + ':' + std::to_string(port);
+  return scheme + (is_v6 ? '[' + address.host + ']' : address.host) + ':' + std::to_string(port);
 }
 
 void Server::serve() {
@@ -242,8 +249,6 @@ void Server::serve() {
   }
   app.http.close(kLastAnswers);
 }
-
-Metrics& Server::metrics() { return state_->app.metrics; }
 
 void Server::begin_drain() {
   state_->app.draining = true;

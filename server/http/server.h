@@ -9,12 +9,16 @@
 
 #include "server/http/auth.h"
 #include "server/http/metrics.h"
+#include "server/http/tls.h"
 #include "server/http/upload.h"
+#include "server/jobs/callbacks.h"
 #include "server/jobs/estimate.h"
 #include "server/jobs/histograms.h"
 #include "server/jobs/volume_library.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
+#include "server/store/outbox.h"
+#include "server/store/retention.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh::http {
@@ -42,6 +46,7 @@ struct ServerOptions {
   UploadLimits upload;
   std::vector<std::string> cors_origins;  // pages of which origins may use the service, `*` for all
   std::vector<std::string> hosts;         // names of this service beside loopback's, without ports
+  const TlsFiles* tls = nullptr;  // null: connections are plain
 };
 
 // What the routes call.
@@ -53,6 +58,11 @@ struct Services {
   jobs::VolumeLibrary& library;
   jobs::Histograms& histograms;
   jobs::Estimator& estimator;
+  store::Retention& retention;
+  Metrics& metrics;
+  const store::Outbox& outbox;
+  jobs::Callbacks& callbacks;
+  const jobs::CallbackTargets& callback_targets;
   const Tokens* tokens = nullptr;  // null: requests are not authenticated
 };
 
@@ -70,9 +80,6 @@ class Server {
 
   // Serves until stop(); to be called once, after bind.
   void serve();
-
-  // What is counted; those who count beside the routes add to it. Thread safe.
-  Metrics& metrics();
 
   // Ready says 503 from now on, so that a balancer looks elsewhere, and no job is accepted. Thread
   // safe.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <optional>
@@ -10,7 +11,12 @@ namespace isomesh::http {
 // Thread safe.
 class Slots {
  public:
-  explicit Slots(std::size_t count) : free_(static_cast<std::ptrdiff_t>(count)) {}
+  explicit Slots(std::size_t count) : count_(count), free_(static_cast<std::ptrdiff_t>(count)) {}
+
+  // How many are taken at the moment.
+  std::size_t taken() const {
+    return count_ - static_cast<std::size_t>(std::max<std::ptrdiff_t>(free_, 0));
+  }
 
   // A place, given back when it goes.
   class Place {
@@ -36,6 +42,7 @@ class Slots {
   }
 
  private:
+  const std::size_t count_;
   std::atomic<std::ptrdiff_t> free_;
 };
 

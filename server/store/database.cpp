@@ -87,6 +87,18 @@ CREATE INDEX expired_by_time ON expired(at);
                                   R"sql(
 ALTER TABLE jobs ADD COLUMN interruptions INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE jobs ADD COLUMN is_long INTEGER NOT NULL DEFAULT 0;  -- its run has lasted a while
+)sql",
+                                  R"sql(
+CREATE TABLE callbacks(       -- of jobs that have ended, until they are delivered or given up
+  job TEXT NOT NULL PRIMARY KEY,
+  receiver TEXT NOT NULL,     -- scheme, host and port
+  url TEXT NOT NULL,
+  body TEXT NOT NULL,
+  attempts INTEGER NOT NULL,  -- that failed
+  created INTEGER NOT NULL,
+  next INTEGER NOT NULL       -- when it is due
+) WITHOUT ROWID;
+CREATE INDEX callbacks_by_time ON callbacks(next);
 )sql"};
 
 constexpr auto kNewest = static_cast<std::int64_t>(kVersions.size());

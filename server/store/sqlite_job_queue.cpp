@@ -3,6 +3,7 @@
 
 #include "proto/json.h"
 #include "server/store/files.h"
+#include "server/store/outbox.h"
 #include "server/store/sqlite_job_rows.h"
 #include "server/store/sqlite_job_store.h"
 
@@ -286,6 +287,7 @@ void SqliteJobStore::end(Change& change, Row& row, JobState state) const {
       now, to_json(row.job), row.job.id);
   change->run("UPDATE volumes SET used = ? WHERE owner = ? AND id = ?", now, row.owner,
               row.job.parameters.volume);
+  Outbox::add(change.connection(), row.job);
   change.announce(row, EventKind::kDone);
 }
 

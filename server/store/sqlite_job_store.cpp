@@ -234,6 +234,7 @@ const Job& job_of(const Submission& submission) {
 std::string result_key(const JobParameters& parameters, const std::string& mesher_version) {
   JobParameters what = parameters;
   what.priority = Priority::kRoutine;
+  what.callback.reset();
   return sha256_of(mesher_version + '\n' + to_json(what));
 }
 

@@ -53,6 +53,23 @@ TEST_F(LogTest, EveryRequestIsOneLine) {
   EXPECT_GT(lines[0]["ms"], 0);
 }
 
+TEST_F(LogTest, SoIsEveryJobThatEndsAndEveryVolumeThatIsRefused) {
+  const Job job = finished_job(daemon_);
+  daemon_.send("POST", "/v1/volumes", "garbage");
+  const std::string metrics = daemon_.get("/metrics").body;
+  EXPECT_THAT(metrics,
+              HasSubstr("isomesh_imports_refused_total{reason=\"unsupported-media\"} 1\n"));
+  const auto jobs = lines_of("job");
+  ASSERT_EQ(jobs.size(), 1U);
+  EXPECT_EQ(jobs[0]["id"], job.id);
+  EXPECT_EQ(jobs[0]["state"], "succeeded");
+  EXPECT_EQ(jobs[0]["triangles"], job.mesh->triangles);
+  EXPECT_GT(jobs[0]["total_ms"], 0);
+  const auto refused = lines_of("import_refused");
+  ASSERT_EQ(refused.size(), 1U);
+  EXPECT_EQ(refused[0]["reason"], "unsupported-media");
+}
+
 TEST_F(LogTest, ATraceGoesOn) {
   const std::string trace = "4bf92f3577b34da6a3ce929d0e0e4736";
   const Answer answer =

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/json.h"
 #include "tests/api/daemon.h"
 #include "tests/api/problems.h"
 
@@ -68,6 +69,47 @@ TEST_F(TokensTest, ARoleReachesAsFarAsItSays) {
   EXPECT_TRUE(is_problem(daemon_.get("/v1/jobs", bearer(probe_)), ErrorCode::kForbidden));
   EXPECT_TRUE(is_problem(daemon_.get("/metrics"), ErrorCode::kUnauthorized));
   EXPECT_TRUE(is_problem(daemon_.get("/metrics", bearer(ct_)), ErrorCode::kForbidden));
+  for (const std::string& token : {boss_, probe_}) {
+    const Answer metrics = daemon_.get("/metrics", bearer(token));
+    EXPECT_EQ(metrics.status, 200);
+    EXPECT_THAT(metrics.header("content-type"), HasSubstr("application/openmetrics-text"));
+    EXPECT_THAT(metrics.body, HasSubstr("isomesh_running_jobs 0\n"));
+  }
+}
+
+// Of what is another's, not even that it is there is told.
+TEST_F(TokensTest, ATokenSeesItsOwnAloneAndAnAdministratorAll) {
+  Client ct({.server = daemon_.url(), .token = ct_});
+  const RawUpload sphere = sphere_upload();
+  const Answer uploaded =
+      daemon_.send("POST", "/v1/volumes?" + sphere.query, sphere.bytes, bearer(ct_));
+  ASSERT_EQ(uploaded.status, 201) << uploaded.body;
+  JobParameters parameters;
+  parameters.volume = volume_from_json(uploaded.body).id;
+  parameters.iso = 100;
+  const Job job = ct.wait(ct.submit(parameters).id);
+  const std::string of_job = "/v1/jobs/" + job.id;
+  const std::string of_volume = "/v1/volumes/" + parameters.volume;
+  for (const std::string& path : {of_job, of_job + "/mesh.drc", of_job + "/events", of_volume,
+                                  of_volume + "/histogram", of_volume + "/slice.png"}) {
+    EXPECT_TRUE(is_problem(daemon_.get(path, bearer(mr_)), ErrorCode::kNotFound)) << path;
+    EXPECT_EQ(daemon_.get(path, bearer(ct_)).status, 200) << path;
+    EXPECT_EQ(daemon_.get(path, bearer(boss_)).status, 200) << path;
+  }
+  EXPECT_THAT(daemon_.get("/v1/jobs", bearer(mr_)).body, Not(HasSubstr(job.id)));
+  EXPECT_THAT(daemon_.get("/v1/volumes", bearer(mr_)).body, Not(HasSubstr(parameters.volume)));
+  EXPECT_THAT(daemon_.get("/v1/jobs", bearer(boss_)).body, HasSubstr(job.id));
+  for (const std::string& path : {of_job, of_volume}) {
+    EXPECT_TRUE(is_problem(daemon_.send("DELETE", path, "", bearer(mr_)), ErrorCode::kNotFound));
+  }
+  EXPECT_TRUE(is_problem(
+      daemon_.send("POST", "/v1/jobs", R"({"volume": ")" + parameters.volume + R"(", "iso": 1})",
+                   bearer(mr_)),
+      ErrorCode::kNotFound));
+  // The same samples again are the other's own then.
+  EXPECT_EQ(daemon_.send("POST", "/v1/volumes?" + sphere.query, sphere.bytes, bearer(mr_)).status,
+            201);
+  EXPECT_EQ(daemon_.get(of_volume, bearer(mr_)).status, 200);
 }
 
 TEST_F(TokensTest, TheCommandSendsItAndSaysWhatIsMissing) {

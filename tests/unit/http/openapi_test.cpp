@@ -38,6 +38,7 @@ class OpenApi : public testing::Test {
     add_survey_routes(app_);
     add_page_routes(app_);
     add_service_routes(app_);
+    add_metrics_route(app_);
   }
 
   // A path as a client would send it.
@@ -64,7 +65,12 @@ class OpenApi : public testing::Test {
   jobs::VolumeLibrary library_{data_, blobs_, volumes_, retention_, volume::ImportLimits{}};
   jobs::Histograms histograms_{blobs_};
   jobs::Estimator estimator_{volumes_, blobs_, jobs_, jobs::PipelineLimits{}};
-  App app_{Services{data_, blobs_, volumes_, jobs_, library_, histograms_, estimator_},
+  Metrics metrics_;
+  store::Outbox outbox_{database_};
+  const jobs::CallbackTargets targets_{{}};
+  jobs::Callbacks callbacks_{outbox_, targets_, {}, {}};
+  App app_{Services{data_, blobs_, volumes_, jobs_, library_, histograms_, estimator_, retention_,
+                    metrics_, outbox_, callbacks_, targets_},
            ServerOptions{}};
   const YAML::Node description_ = YAML::LoadFile(ISOMESH_OPENAPI);
 };

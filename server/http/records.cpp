@@ -1,0 +1,65 @@
+#include "server/http/records.h"
+
+#include "server/http/log.h"
+#include "server/http/routes.h"
+
+namespace isomesh::http {
+namespace {
+
+void log_ended(const Job& job) {
+  LogLine line("job");
+  line.add("id", job.id)
+      .add("state", to_string(job.state))
+      .add("priority", to_string(job.parameters.priority))
+      .add("queue_ms", job.timing.queue)
+      .add("load_ms", job.timing.load)
+      .add("extract_ms", job.timing.extract)
+      .add("smooth_ms", job.timing.smooth)
+      .add("encode_ms", job.timing.encode)
+      .add("total_ms", job.timing.total);
+  if (job.mesh) line.add("triangles", job.mesh->triangles);
+  // The code alone: a detail may quote what stands in a volume's header.
+  if (job.error) line.add("reason", describe(to_error(*job.error).code()).name);
+}
+
+}  // namespace
+
+void record_ended(App& app, const std::string& id) {
+  Job job;
+  try {
+    job = app.services.jobs.get(std::nullopt, id);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kGone || error.code() == ErrorCode::kNotFound) return;
+    throw;
+  }
+  app.metrics.count_ended(job);
+  log_ended(job);
+}
+
+jobs::CallbackObserver callback_recorder(Metrics& metrics) {
+  return [&metrics](const store::Delivery& delivery, jobs::CallbackOutcome outcome,
+                    const std::string& reason) {
+    metrics.count(outcome);
+    const bool is_lost = outcome == jobs::CallbackOutcome::kGivenUp;
+    LogLine line("callback", is_lost ? LogLevel::kError : LogLevel::kInfo);
+    line.add("job", delivery.job)
+        .add("result", name_of(outcome))
+        .add("attempt", delivery.attempts + 1);
+    if (!reason.empty()) line.add("reason", reason);
+  };
+}
+
+std::pair<Volume, bool> recording_refusals(App& app,
+                                           const std::function<std::pair<Volume, bool>()>& add) {
+  try {
+    return add();
+  } catch (const Error& error) {
+    app.metrics.count_refused(error.code());
+    LogLine("import_refused")
+        .add("id", current_request().trace.request_id())
+        .add("reason", describe(error.code()).name);
+    throw;
+  }
+}
+
+}  // namespace isomesh::http

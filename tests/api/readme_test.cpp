@@ -1,0 +1,54 @@
+// The table of options in README.md is what the daemon's --help says.
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/files.h"
+#include "tests/support/process.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+
+// Of "  --workers UINT:INT in [1 - 64]=2 (Env:ISOMESH_WORKERS)".
+std::string default_of(const std::string& line) {
+  const std::size_t end = std::min(line.find(" (Env:"), line.size());
+  const std::size_t begin = line.rfind('=', end);
+  const bool is_of_a_unit = begin != std::string::npos && line.find(')', begin) < end;
+  return begin == std::string::npos || is_of_a_unit
+             ? ""
+             : '`' + line.substr(begin + 1, end - begin - 1) + '`';
+}
+
+// The rows of the table, as Markdown.
+std::string table_of(const std::string& help) {
+  std::istringstream lines(help);
+  std::string table;
+  std::string line;
+  while (std::getline(lines, line)) {
+    const std::size_t begin = line.find_first_not_of(' ');
+    if (begin == std::string::npos || !line.substr(begin).starts_with("--")) continue;
+    const std::string name = line.substr(begin, line.find_first_of(" \n", begin) - begin);
+    if (name == "--version" || name == "--config") continue;
+    std::string meaning;
+    std::getline(lines, meaning);
+    meaning.erase(0, meaning.find_first_not_of(' '));
+    table += "| `" + name + "` | " + default_of(line) + " | " + meaning + " |\n";
+  }
+  return table;
+}
+
+TEST(Readme, ItsTableOfOptionsIsTheHelpsOwn) {
+  const Finished help = run({ISOMESHD, "--help"});
+  ASSERT_EQ(help.status, 0);
+  const std::string table = table_of(help.output);
+  ASSERT_NE(table.find("| `--workers` | `2` |"), std::string::npos) << table;
+  EXPECT_NE(read_file(ISOMESH_README).find("|---|---|---|\n" + table + '\n'), std::string::npos)
+      << "README.md must hold these rows and no others:\n"
+      << table;
+}
+
+}  // namespace
+}  // namespace isomesh
