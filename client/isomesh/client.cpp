@@ -246,9 +246,8 @@ std::vector<std::pair<std::string, std::string>> query_of(const JobParameters& p
                              value.is_string() ? value.get<std::string>() : value.dump());
         }
       };
-  for (const auto& [name, value] : nlohmann::json::parse(to_json(parameters)).items()) {
-    add(name, value);
-  }
+  const auto members = nlohmann::json::parse(to_json(parameters));
+  for (const auto& [name, value] : members.items()) add(name, value);
   return query;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -331,6 +332,8 @@ std::string cursor_after(std::string_view kind, std::string_view id) {
   return cursor;
 }
 
+bool is_of_an_id(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-'; }
+
 std::string id_after(const httplib::Request& request, std::string_view kind) {
   if (!request.has_param("cursor")) return {};
   const std::string cursor = request.get_param_value("cursor");
@@ -344,7 +347,7 @@ std::string id_after(const httplib::Request& request, std::string_view kind) {
   const std::string prefix = std::string(kind) + ':';
   const bool is_ours = text.size() > prefix.size() && text.size() <= kLongest &&
                        text.starts_with(prefix) &&
-                       std::ranges::all_of(text, [](char c) { return c >= ' ' && c <= '~'; });
+                       std::ranges::all_of(text.substr(prefix.size()), is_of_an_id);
   if (!is_ours) throw wrong_cursor();
   return text.substr(prefix.size());
 }
@@ -358,7 +361,8 @@ std::optional<std::uint64_t> last_event_id(const httplib::Request& request) {
   const auto number = number_of<std::uint64_t>(request.get_header_value("Last-Event-ID"));
   if (!number)
     throw invalid_parameter("Last-Event-ID", "must be the id of an event of this stream");
-  return *number;
+  constexpr std::uint64_t kLargest = std::numeric_limits<std::int64_t>::max();  // the store's
+  return std::min(*number, kLargest);
 }
 
 }  // namespace isomesh::http

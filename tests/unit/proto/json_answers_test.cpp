@@ -282,7 +282,8 @@ TEST(AnswerJson, NothingYetIsNull) {
 TEST(AnswerJson, ListsSayWhereTheNextPageIs) {
   EXPECT_EQ(json::parse(to_json(std::vector<Job>{})), json::parse(R"({"jobs": [], "next": null})"));
   EXPECT_EQ(json::parse(to_json(std::vector<Job>{queued_job()}, "018f"))["next"], "018f");
-  EXPECT_EQ(json::parse(to_json(std::vector<Volume>{})), json::parse(R"({"volumes": []})"));
+  EXPECT_EQ(json::parse(to_json(std::vector<Volume>{})),
+            json::parse(R"({"volumes": [], "next": null})"));
 }
 
 // --- Round trips ---------------------------------------------------------------------------------
