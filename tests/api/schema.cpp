@@ -130,13 +130,14 @@ class Validator {
     const auto limit = says.as<double>();
     const double number = value.is_number() ? value.get<double>() : 0;
     const auto count = static_cast<double>(value.size());
-    const bool fits = keyword == "minimum"            ? number >= limit
-                      : keyword == "maximum"          ? number <= limit
-                      : keyword == "exclusiveMinimum" ? number > limit
-                      : keyword == "minItems"         ? count >= limit
-                      : keyword == "maxItems"
-                          ? count <= limit
-                          : throw std::runtime_error("the unknown keyword " + keyword);
+    const bool fits =
+        keyword == "minimum"            ? number >= limit
+        : keyword == "maximum"          ? number <= limit
+        : keyword == "exclusiveMinimum" ? number > limit
+        : keyword == "maxLength"        ? value.get<std::string>().size() <= says.as<std::size_t>()
+        : keyword == "minItems"         ? count >= limit
+        : keyword == "maxItems"         ? count <= limit
+                                : throw std::runtime_error("the unknown keyword " + keyword);
     if (!fits) fault(where, value.dump() + " breaks " + keyword);
   }
 
