@@ -227,7 +227,8 @@ TEST(UploadPlaces, AreBounded) {
     slow.emplace_back(daemon.url())
         .send("POST " + target +
               " HTTP/1.1\r\nHost: localhost\r\n"
-              "Content-Length: 100000\r\n\r\n");
+              "Content-Length: 10000000\r\n\r\n" +
+              std::string(1'000'000, 'x'));
   }
   Answer refused;
   ASSERT_TRUE(eventually([&] {
