@@ -52,7 +52,7 @@ struct App {
   Slots uploads;
   Slots streams;  // of events
   Broadcaster events;
-  OriginRules rules;                   // constant once the server is bound
+  OriginRules rules;  // constant once the server is bound
   const std::uint64_t began_us = static_cast<std::uint64_t>(store::now_us());
   std::atomic<bool> draining = false;  // running jobs are finished, others are not accepted
   std::atomic<bool> stopping = false;  // nobody is waited for any more

@@ -46,7 +46,7 @@ struct ServerOptions {
   UploadLimits upload;
   std::vector<std::string> cors_origins;  // pages of which origins may use the service, `*` for all
   std::vector<std::string> hosts;         // names of this service beside loopback's, without ports
-  const TlsFiles* tls = nullptr;  // null: connections are plain
+  const TlsFiles* tls = nullptr;          // null: connections are plain
 };
 
 // What the routes call.
@@ -85,8 +85,8 @@ class Server {
   // safe.
   void begin_drain();
 
-  // Ends serve(): no connection is accepted any more, nobody waits for a job, uploads and imports are cut off.
-  // Thread safe.
+  // Ends serve(): no connection is accepted any more, nobody waits for a job, uploads and imports
+  // are cut off. Thread safe.
   void stop();
 
  private:
