@@ -238,8 +238,10 @@ std::vector<std::pair<std::string, std::string>> query_of(const JobParameters& p
           for (const auto& [member, inner] : value.items()) add(name + '.' + member, inner);
         } else if (value.is_array()) {
           std::string list;
-          for (const auto& item : value)
-            list += (list.empty() ? "" : ",") + item.get<std::string>();
+          for (const auto& item : value) {
+            if (!list.empty()) list += ',';
+            list += item.get<std::string>();
+          }
           query.emplace_back(spelled_in_query(name), list);
         } else if (!value.is_null()) {
           query.emplace_back(spelled_in_query(name),
