@@ -24,6 +24,7 @@ class Bytes {
   void take(std::span<T> values) {
     if (rest_.size() < values.size_bytes())
       throw std::runtime_error("the reader's output is short");
+    if (values.empty()) return;  // its data may be null, which memcpy does not take
     std::memcpy(values.data(), rest_.data(), values.size_bytes());
     rest_.remove_prefix(values.size_bytes());
   }
