@@ -55,7 +55,9 @@ export class Daemon {
   }
 
   async json<T>(path: string, init?: RequestInit): Promise<T> {
-    const answer = await fetch(this.url + path, init);
+    const isJson = typeof init?.body === 'string';
+    const headers = isJson ? { 'Content-Type': 'application/json' } : undefined;
+    const answer = await fetch(this.url + path, { headers, ...init });
     if (!answer.ok) throw new Error(`${path}: ${answer.status} ${await answer.text()}`);
     return (await answer.json()) as T;
   }
