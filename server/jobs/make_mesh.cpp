@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "server/mesh/components.h"
-#include "server/mesh/measure.h"
 #include "server/mesh/quality.h"
 #include "server/mesh/smooth.h"
+#include "server/mesh/topology.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -80,12 +80,16 @@ void extract(const SampleArray& samples, const MeshRequest& request, const Progr
 }
 
 // Fills in what is not known from before smoothing.
-void measure_quality(const mesh::Mesh& mesh, const mesh::Topology& topology, bool is_smoothed,
-                     const mesh::Context& context, MeshQuality& quality) {
-  const mesh::Soundness soundness = check_soundness(mesh, context);
-  quality.closed = soundness.boundary_edges == 0;
-  quality.manifold = soundness.manifold;
-  quality.oriented = soundness.oriented;
+void measure_quality(const mesh::Mesh& mesh, bool is_smoothed, const mesh::Context& context,
+                     MeshSummary& summary) {
+  const mesh::Topology topology = measure_topology(mesh, context);
+  summary.boundary_edges = topology.boundary_edges;
+  summary.components = topology.components;
+  summary.euler = topology.euler;
+  MeshQuality& quality = summary.quality;
+  quality.closed = topology.boundary_edges == 0;
+  quality.manifold = topology.manifold;
+  quality.oriented = topology.oriented;
   quality.components = topology.components;
   if (quality.closed && quality.manifold && quality.oriented) {
     quality.genus = static_cast<std::int64_t>(topology.components) - topology.euler / 2;
@@ -114,16 +118,10 @@ void encode_and_measure(const codec::Provenance& provenance, std::span<const cod
                                    }};
     codec::encode(mesh, formats[i], provenance, context, sinks[i]);
   };
-  mesh::Topology topology;
   mesh::parallel_for(progress.quiet(), formats.size() + 1, [&](std::size_t task) {
     if (task < formats.size()) return encode(task);
-    topology = measure_topology(mesh, progress.quiet());
-    measure_quality(mesh, topology, provenance.parameters.passes > 0, progress.quiet(),
-                    summary.quality);
+    measure_quality(mesh, provenance.parameters.passes > 0, progress.quiet(), summary);
   });
-  summary.boundary_edges = topology.boundary_edges;
-  summary.components = topology.components;
-  summary.euler = topology.euler;
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <span>
 #include <vector>
 
 namespace isomesh::mesh {
@@ -9,23 +10,36 @@ namespace {
 
 constexpr std::size_t kLayersPerSlab = 16;
 
-// Disjoint sets of vertices as a forest. Every vertex but a set's smallest points to a smaller one.
+// Disjoint sets of vertices as a forest: every vertex points to a smaller one of its set, the
+// smallest to itself. Different threads may work on vertices that no set has in common.
 class Forest {
  public:
-  explicit Forest(std::uint32_t* parents) : parents_(parents) {}
+  // The memory is the caller's, one number a vertex.
+  explicit Forest(std::span<std::uint32_t> parents) : parents_(parents) {}
 
-  void join(const Triangle& triangle) {
-    join(triangle[0], triangle[1]);
-    join(triangle[0], triangle[2]);
+  // Each of the vertices [begin, end) becomes a set of its own.
+  void begin_sets(std::uint64_t begin, std::uint64_t end) {
+    const auto sets = parents_.subspan(begin, end - begin);
+    std::iota(sets.begin(), sets.end(), static_cast<std::uint32_t>(begin));
+  }
+
+  // Makes one set of each triangle's corners; returns how many sets fewer there are then.
+  std::uint64_t join(std::span<const Triangle> triangles) {
+    std::uint64_t joined = 0;
+    for (const auto& [a, b, c] : triangles) {
+      const std::uint32_t parent = parents_[a];
+      if (parents_[b] == parent && parents_[c] == parent) continue;
+      const std::uint32_t root_a = root(a);
+      const std::uint32_t root_b = root(b);
+      const std::uint32_t root_c = root(c);
+      const std::uint32_t first = std::min({root_a, root_b, root_c});
+      joined += (root_a != root_b ? 1 : 0) + (root_c != root_a && root_c != root_b ? 1 : 0);
+      for (const std::uint32_t vertex : {root_a, root_b, root_c, a, b, c}) parents_[vertex] = first;
+    }
+    return joined;
   }
 
  private:
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    if (a != b) parents_[std::max(a, b)] = std::min(a, b);
-  }
-
   std::uint32_t root(std::uint32_t vertex) {
     while (parents_[vertex] != vertex) {
       parents_[vertex] = parents_[parents_[vertex]];
@@ -34,8 +48,31 @@ class Forest {
     return vertex;
   }
 
-  std::uint32_t* parents_;
+  std::span<std::uint32_t> parents_;
 };
+
+// Makes `parents` the forest of the mesh's components. Returns how many there are.
+std::uint64_t join_vertices(const Mesh& mesh, const Context& context,
+                            std::span<std::uint32_t> parents) {
+  Forest forest(parents);
+  const std::size_t layers = mesh.layers();
+  const std::size_t slabs = (layers + kLayersPerSlab - 1) / kLayersPerSlab;
+  // First what names no vertex of the next slab's, slabs side by side; then what does.
+  std::vector<std::uint64_t> joined(slabs);
+  parallel_for(context, slabs, [&](std::size_t slab) {
+    const std::size_t begin = slab * kLayersPerSlab;
+    const std::size_t end = std::min(layers, begin + kLayersPerSlab);
+    forest.begin_sets(mesh.layer_vertices[begin], mesh.layer_vertices[end]);
+    joined[slab] = forest.join(mesh.triangles_of(begin, end == layers ? end : end - 1));
+  });
+  std::uint64_t components = parents.size();
+  for (std::size_t slab = 0; slab < slabs; ++slab) {
+    const std::size_t end = (slab + 1) * kLayersPerSlab;
+    if (end < layers) joined[slab] += forest.join(mesh.triangles_of(end - 1, end));
+    components -= joined[slab];
+  }
+  return components;
+}
 
 // Which components stay.
 std::vector<bool> kept_by(const ComponentFilter& filter,
@@ -85,38 +122,20 @@ void keep_vertices(const std::vector<bool>& kept, Buffer<std::uint32_t>& of_vert
 
 }  // namespace
 
+std::uint64_t count_components(const Mesh& mesh, const Context& context) {
+  Buffer<std::uint32_t> parents;
+  parents.resize_for_overwrite(mesh.positions.size());
+  return join_vertices(mesh, context, parents.span());
+}
+
 void find_components(const Mesh& mesh, const Context& context, Components& components) {
-  const std::size_t vertices = mesh.positions.size();
-  components.of_vertex.resize_for_overwrite(vertices);
-  std::uint32_t* const parents = components.of_vertex.data();
-  const std::size_t slabs = (mesh.layers() + kLayersPerSlab - 1) / kLayersPerSlab;
-  // First what lies within a slab, slabs side by side; then the triangles between two slabs.
-  std::vector<std::vector<Triangle>> between(slabs);
-  parallel_for(context, slabs, [&](std::size_t slab) {
-    const std::size_t first_layer = slab * kLayersPerSlab;
-    const std::size_t end_layer = std::min(mesh.layers(), first_layer + kLayersPerSlab);
-    const std::size_t begin = mesh.layer_vertices[first_layer];
-    const std::size_t end = mesh.layer_vertices[end_layer];
-    std::iota(parents + begin, parents + end, static_cast<std::uint32_t>(begin));
-    Forest forest(parents);
-    for (std::size_t t = mesh.layer_triangles[first_layer]; t < mesh.layer_triangles[end_layer];
-         ++t) {
-      const Triangle& triangle = mesh.triangles[t];
-      if (std::ranges::max(triangle) < end) {
-        forest.join(triangle);
-      } else {
-        between[slab].push_back(triangle);
-      }
-    }
-  });
-  Forest forest(parents);
-  for (const auto& triangles : between) {
-    for (const Triangle& triangle : triangles) forest.join(triangle);
-  }
+  components.of_vertex.resize_for_overwrite(mesh.positions.size());
+  const std::span<std::uint32_t> numbers = components.of_vertex.span();
+  join_vertices(mesh, context, numbers);
   // A parent is smaller, so it has become its component's number already.
   components.count = 0;
-  for (std::uint32_t v = 0; v < vertices; ++v) {
-    parents[v] = parents[v] == v ? components.count++ : parents[parents[v]];
+  for (std::uint32_t v = 0; v < numbers.size(); ++v) {
+    numbers[v] = numbers[v] == v ? components.count++ : numbers[numbers[v]];
   }
 }
 

@@ -20,6 +20,9 @@ struct Components {
 // The same for any number of threads. `components`' memory is reused. Throws Error kCancelled.
 void find_components(const Mesh& mesh, const Context& context, Components& components);
 
+// As many as find_components finds. Throws Error kCancelled.
+std::uint64_t count_components(const Mesh& mesh, const Context& context);
+
 struct Dropped {
   std::uint64_t components = 0;
   std::uint64_t triangles = 0;

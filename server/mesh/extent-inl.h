@@ -102,10 +102,8 @@ class LayerExtent {
 };
 
 inline void add_triangles(const Mesh& mesh, std::size_t layer, LayerExtent& extent) {
-  const std::uint64_t first = mesh.layer_triangles[layer];
-  extent.add_triangles(
-      mesh.triangles.span().subspan(first, mesh.layer_triangles[layer + 1] - first), mesh.origin,
-      [&](std::uint32_t vertex) { return load(mesh.positions[vertex]); });
+  extent.add_triangles(mesh.triangles_of(layer, layer + 1), mesh.origin,
+                       [&](std::uint32_t vertex) { return load(mesh.positions[vertex]); });
 }
 
 }  // namespace isomesh::mesh

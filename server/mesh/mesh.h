@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "server/mesh/buffer.h"
@@ -37,6 +38,12 @@ struct Mesh {
   // False where on_border is empty.
   bool is_on_border(std::size_t vertex) const {
     return !on_border.empty() && (on_border[vertex / kFlagBits] >> (vertex % kFlagBits) & 1) != 0;
+  }
+
+  // Those of the layers [begin, end).
+  std::span<const Triangle> triangles_of(std::size_t begin, std::size_t end) const {
+    const std::uint64_t first = layer_triangles[begin];
+    return triangles.span().subspan(first, layer_triangles[end] - first);
   }
 
   std::size_t layers() const { return layer_vertices.empty() ? 0 : layer_vertices.size() - 1; }

@@ -32,10 +32,10 @@ void write_normals(const Mesh& mesh, std::size_t first_layer, std::size_t end_la
   const std::size_t begin = mesh.layer_vertices[first_layer];
   const std::size_t end = mesh.layer_vertices[end_layer];
   std::fill(normals + begin, normals + end, Vec3{0, 0, 0});
-  const std::size_t first = mesh.layer_triangles[first_layer == 0 ? 0 : first_layer - 1];
-  for (std::size_t t = first; t < mesh.layer_triangles[end_layer]; ++t) {
-    const Vec3 normal = normal_of(mesh, mesh.triangles[t]);
-    for (const std::uint32_t vertex : mesh.triangles[t]) {
+  for (const Triangle& triangle :
+       mesh.triangles_of(first_layer == 0 ? 0 : first_layer - 1, end_layer)) {
+    const Vec3 normal = normal_of(mesh, triangle);
+    for (const std::uint32_t vertex : triangle) {
       if (vertex < begin || vertex >= end) continue;
       for (std::size_t axis = 0; axis < 3; ++axis) normals[vertex][axis] += normal[axis];
     }

@@ -1,7 +1,5 @@
-// How good a mesh is: the shapes of its triangles, and whether it is what a surface must be.
+// How good the triangles of a mesh are.
 #pragma once
-
-#include <cstdint>
 
 #include "proto/types.h"
 #include "server/mesh/context.h"
@@ -21,16 +19,5 @@ struct Shapes {
 
 // The same for any number of threads and on every processor. Throws Error kCancelled.
 Shapes measure_shapes(const Mesh& mesh, const Context& context);
-
-// What is found on the triangles alone, whoever made them; only the layers must be as mesh.h has
-// them. Edges are those of the triangles.
-struct Soundness {
-  std::uint64_t boundary_edges = 0;  // of one triangle only
-  bool manifold = true;  // at most two triangles at an edge, and one fan of them around a vertex
-  bool oriented = true;  // no two triangles run through an edge in the same direction
-};
-
-// The same for any number of threads. Throws Error kCancelled.
-Soundness check_soundness(const Mesh& mesh, const Context& context);
 
 }  // namespace isomesh::mesh

@@ -248,10 +248,8 @@ class Sweep {
       begin_links(layer + 1);
       upper = layer_links(layer + 1);
     }
-    const std::uint64_t first = round_.mesh.layer_triangles[layer];
-    add_neighbors(
-        round_.mesh.triangles.span().subspan(first, round_.mesh.layer_triangles[layer + 1] - first),
-        layer_links(layer), upper, links_.data());
+    add_neighbors(round_.mesh.triangles_of(layer, layer + 1), layer_links(layer), upper,
+                  links_.data());
     weigh(layer);
     auto& more = more_neighbors(layer);
     std::ranges::stable_sort(more, {}, &MoreNeighbor::vertex);

@@ -35,22 +35,35 @@ bool reset_peak() {
   return static_cast<bool>(file);
 }
 
-// Runs a stage and returns the size of its output.
-std::uint64_t run_stage(const std::string& stage, const Samples& field) {
+// Runs a stage. Returns the sizes that are known from it; the peak is not.
+PeakMemory run_stage(const std::string& stage, const Samples& field) {
+  PeakMemory memory = {.input_bytes = field.bytes.size()};
   const Surface surface = {.iso = kFieldIso};
   if (stage == kPeerExtractStage || stage == kPeerJobStage) {
     Peers peers(field, surface.iso);
-    if (stage == kPeerJobStage) return peers.pipeline();
+    if (stage == kPeerJobStage) {
+      memory.output_bytes = peers.pipeline();
+      return memory;
+    }
     peers.flying_edges();
     constexpr std::uint64_t kVertexBytes = 12;
     constexpr std::uint64_t kTriangleBytes = 12;  // as we count our own, whatever VTK takes
-    return peers.size().vertices * kVertexBytes + peers.size().triangles * kTriangleBytes;
+    memory.output_bytes =
+        peers.size().vertices * kVertexBytes + peers.size().triangles * kTriangleBytes;
+    return memory;
   }
   Stages stages(field, surface);
-  if (stage == kJobStage) return stages.run_job(kPasses, MeshFormat::kDrc);
+  if (stage == kJobStage) {
+    memory.output_bytes = stages.run_job(kPasses, MeshFormat::kDrc);
+    return memory;
+  }
   stages.extract();
-  if (stage == kSmoothStage) stages.smooth(kPasses);
-  return stages.mesh_bytes();
+  if (stage == kSmoothStage) {
+    stages.smooth(kPasses);
+    memory.layer_bytes = stages.smoothing_memory(kPasses);
+  }
+  memory.output_bytes = stages.mesh_bytes();
+  return memory;
 }
 
 std::string own_path() {
@@ -99,7 +112,10 @@ std::optional<PeakMemory> measure_memory(const std::string& stage, std::uint32_t
   std::istringstream answer(
       run_self({kMemoryCommand, stage, std::to_string(size), std::to_string(threads)}));
   PeakMemory memory;
-  if (answer >> memory.peak_bytes >> memory.input_bytes >> memory.output_bytes) return memory;
+  if (answer >> memory.peak_bytes >> memory.input_bytes >> memory.output_bytes >>
+      memory.layer_bytes) {
+    return memory;
+  }
   std::cerr << "isomesh-bench: the memory of " << stage << " at " << size
             << "^3 could not be measured\n";
   return std::nullopt;
@@ -111,9 +127,10 @@ int run_memory_command(const std::string& stage, std::uint32_t size, int threads
   const Samples field = synthetic_field(size);
   if (!reset_peak()) return 1;
   const std::uint64_t before = own_status("VmRSS");
-  const std::uint64_t output = run_stage(stage, field);
-  const std::uint64_t peak = own_status("VmHWM") - before + field.bytes.size();
-  std::cout << peak << ' ' << field.bytes.size() << ' ' << output << '\n';
+  const PeakMemory memory = run_stage(stage, field);
+  const std::uint64_t peak = own_status("VmHWM") - before + memory.input_bytes;
+  std::cout << peak << ' ' << memory.input_bytes << ' ' << memory.output_bytes << ' '
+            << memory.layer_bytes << '\n';
   return 0;
 }
 

@@ -20,6 +20,7 @@ struct PeakMemory {
   std::uint64_t peak_bytes = 0;  // samples included
   std::uint64_t input_bytes = 0;
   std::uint64_t output_bytes = 0;  // the mesh, or what was encoded
+  std::uint64_t layer_bytes = 0;   // the bound that smoothing gives of its own memory
 
   double ratio() const {
     return static_cast<double>(peak_bytes) / static_cast<double>(input_bytes + output_bytes);

@@ -149,14 +149,15 @@ Finding growth_of_time(const std::vector<std::uint32_t>& sizes) {
 }
 
 // Peak over input + output + O(slice): what each thread may hold of planes while it walks through
-// them, and a little that does not grow at all.
+// them, what smoothing says that it takes of layers, and a little that does not grow at all.
 std::optional<Finding> memory_of(const std::string& stage, int threads) {
   const auto memory = measure_memory(stage, kMemorySize, threads);
   if (!memory) return std::nullopt;
   constexpr std::uint64_t kBytesPerPlaneSample = 16;
   constexpr std::uint64_t kConstant = 4 << 20;
-  const std::uint64_t slices =
+  std::uint64_t slices =
       static_cast<std::uint64_t>(threads) * kBytesPerPlaneSample * kMemorySize * kMemorySize;
+  if (stage == kSmoothStage) slices += memory->layer_bytes;
   const auto allowed =
       static_cast<double>(memory->input_bytes + memory->output_bytes + slices + kConstant);
   return Finding{"ratio/memory_" + stage,

@@ -7,8 +7,8 @@
 #include "server/codec/encode.h"
 #include "server/jobs/make_mesh.h"
 #include "server/mesh/extract.h"
-#include "server/mesh/measure.h"
 #include "server/mesh/smooth.h"
+#include "server/mesh/topology.h"
 
 namespace isomesh::bench {
 namespace {
@@ -74,6 +74,13 @@ void Stages::extract() {
 }
 
 void Stages::smooth(int passes) { mesh::smooth({.passes = passes}, {}, mesh_); }
+
+std::uint64_t Stages::smoothing_memory(int passes) const {
+  return visit_samples(samples_, [&](const auto* data) {
+    const auto count = mesh::count_surface(lattice_of(samples_, data), options_of(surface_), {});
+    return mesh::smoothing_memory({.passes = passes}, size_of(count));
+  });
+}
 
 void Stages::measure() const { mesh::measure_topology(mesh_, {}); }
 

@@ -56,6 +56,9 @@ class Stages {
   void extract();  // counts first
   // With area, volume and bounds before and after, as a job has it.
   void smooth(int passes);
+
+  // What smoothing says that it takes beside the mesh, in bytes.
+  std::uint64_t smoothing_memory(int passes) const;
   // Topology.
   void measure() const;
   // The number of bytes.

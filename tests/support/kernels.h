@@ -1,6 +1,9 @@
 // Short ways for tests to run the kernels.
 #pragma once
 
+#include <algorithm>
+#include <vector>
+
 #include "server/mesh/context.h"
 #include "server/mesh/extract.h"
 #include "server/mesh/mesh.h"
@@ -21,6 +24,19 @@ template <class T>
 mesh::Mesh extracted(const SampleVolume<T>& volume, const mesh::ExtractOptions& options) {
   mesh::Mesh mesh;
   extract_into(mesh, volume, options);
+  return mesh;
+}
+
+// A mesh of one layer.
+inline mesh::Mesh mesh_of(const std::vector<mesh::Vec3>& positions,
+                          const std::vector<mesh::Triangle>& triangles) {
+  mesh::Mesh mesh;
+  mesh.positions.resize_for_overwrite(positions.size());
+  std::ranges::copy(positions, mesh.positions.begin());
+  mesh.triangles.resize_for_overwrite(triangles.size());
+  std::ranges::copy(triangles, mesh.triangles.begin());
+  mesh.layer_vertices = {0, positions.size()};
+  mesh.layer_triangles = {0, triangles.size()};
   return mesh;
 }
 

@@ -55,18 +55,6 @@ mesh::Mesh flat_sheet(std::size_t axis) {
 
 }  // namespace
 
-mesh::Mesh mesh_of(const std::vector<mesh::Vec3>& positions,
-                   const std::vector<mesh::Triangle>& triangles) {
-  mesh::Mesh mesh;
-  mesh.positions.resize_for_overwrite(positions.size());
-  std::ranges::copy(positions, mesh.positions.begin());
-  mesh.triangles.resize_for_overwrite(triangles.size());
-  std::ranges::copy(triangles, mesh.triangles.begin());
-  mesh.layer_vertices = {0, positions.size()};
-  mesh.layer_triangles = {0, triangles.size()};
-  return mesh;
-}
-
 std::vector<NamedMesh> meshes_to_encode() {
   std::vector<NamedMesh> meshes;
   const auto add = [&](const std::string& name, mesh::Mesh mesh) {

@@ -14,9 +14,6 @@ struct NamedMesh {
   mesh::Mesh mesh;
 };
 
-mesh::Mesh mesh_of(const std::vector<mesh::Vec3>& positions,
-                   const std::vector<mesh::Triangle>& triangles);
-
 // Closed and open, of one piece and of many, flat, tiny, far from the origin.
 std::vector<NamedMesh> meshes_to_encode();
 

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/mesh/topology.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/nifti.h"

@@ -19,18 +19,7 @@
 namespace isomesh::mesh {
 namespace {
 
-Mesh mesh_of(const std::vector<Vec3>& positions, const std::vector<Triangle>& triangles) {
-  Mesh mesh;
-  mesh.positions.resize_for_overwrite(positions.size());
-  std::ranges::copy(positions, mesh.positions.begin());
-  mesh.triangles.resize_for_overwrite(triangles.size());
-  std::ranges::copy(triangles, mesh.triangles.begin());
-  mesh.layer_vertices = {0, positions.size()};
-  mesh.layer_triangles = {0, triangles.size()};
-  return mesh;
-}
-
-// ---- Shapes
+using test::mesh_of;
 
 // Ratio and smallest angle in degrees by their definitions, in double precision.
 std::pair<double, double> shape_of(const test::Surface& surface, const Triangle& triangle) {
@@ -146,131 +135,12 @@ TEST(Shapes, AreTheSameOnAnyNumberOfThreads) {
   EXPECT_EQ(first.smallest_angle_deg, other.smallest_angle_deg);
 }
 
-// ---- Soundness
-
-// What the checks of the tests, which share no code, say of it.
-void expect_as_checked(const Mesh& mesh) {
-  const test::TopologyFacts facts = test::topology_of(test::surface_of(mesh));
-  const Soundness soundness = check_soundness(mesh, {});
-  EXPECT_EQ(soundness.boundary_edges, facts.boundary_edges.size());
-  EXPECT_EQ(soundness.manifold, facts.crowded_edges == 0 && facts.pinched_vertices == 0 &&
-                                    facts.repeating_triangles == 0);
-}
-
-TEST(Soundness, OfExtractedMeshesIsWhatAPlainCheckFinds) {
-  for (const bool close : {false, true}) {
-    for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
-      const Mesh mesh = test::extracted(test::noise<std::uint8_t>({0, 1}, {21, 19, 45}, 4),
-                                        {0.5, scheme, Interpolation::kLinear, close});
-      expect_as_checked(mesh);
-      const Soundness soundness = check_soundness(mesh, {});
-      EXPECT_TRUE(soundness.manifold);
-      EXPECT_TRUE(soundness.oriented);
-      EXPECT_EQ(soundness.boundary_edges == 0, close);
-    }
-  }
-}
-
-const std::vector<Vec3> kPoints = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1},
-                                   {1, 1, 1}, {2, 0, 0}, {0, 2, 0}};
-const std::vector<Triangle> kTetrahedron = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
-
-TEST(Soundness, FindsNoFaultWhereThereIsNone) {
-  const Soundness soundness = check_soundness(mesh_of(kPoints, kTetrahedron), {});
-  EXPECT_TRUE(soundness.manifold);
-  EXPECT_TRUE(soundness.oriented);
-  EXPECT_EQ(soundness.boundary_edges, 0U);
-}
-
-TEST(Soundness, FindsABoundary) {
-  const Mesh mesh = mesh_of(kPoints, {kTetrahedron.begin(), kTetrahedron.begin() + 3});
-  const Soundness soundness = check_soundness(mesh, {});
-  EXPECT_TRUE(soundness.manifold);
-  EXPECT_TRUE(soundness.oriented);
-  EXPECT_EQ(soundness.boundary_edges, 3U);
-  expect_as_checked(mesh);
-}
-
-TEST(Soundness, FindsATriangleThatIsTurnedOver) {
-  std::vector<Triangle> triangles = kTetrahedron;
-  std::swap(triangles[3][1], triangles[3][2]);
-  const Soundness soundness = check_soundness(mesh_of(kPoints, triangles), {});
-  EXPECT_FALSE(soundness.oriented);
-  EXPECT_TRUE(soundness.manifold);
-}
-
-TEST(Soundness, FindsAnEdgeOfThreeTriangles) {
-  std::vector<Triangle> triangles = kTetrahedron;
-  triangles.push_back({0, 1, 4});
-  EXPECT_FALSE(check_soundness(mesh_of(kPoints, triangles), {}).manifold);
-  expect_as_checked(mesh_of(kPoints, triangles));
-}
-
-TEST(Soundness, FindsAnEdgeOfFourTrianglesThatBalance) {
-  std::vector<Triangle> triangles = kTetrahedron;
-  for (const auto& [a, b, c] : {Triangle{0, 4, 1}, {0, 1, 5}, {0, 5, 4}, {1, 4, 5}}) {
-    triangles.push_back({a, b, c});
-  }
-  const Soundness soundness = check_soundness(mesh_of(kPoints, triangles), {});
-  EXPECT_FALSE(soundness.manifold);
-  EXPECT_EQ(soundness.boundary_edges, 0U);
-  expect_as_checked(mesh_of(kPoints, triangles));
-}
-
-TEST(Soundness, FindsTwoFansAtOneVertex) {
-  std::vector<Triangle> triangles = kTetrahedron;
-  for (const auto& [a, b, c] : {Triangle{0, 5, 4}, {0, 4, 6}, {0, 6, 5}, {4, 5, 6}}) {
-    triangles.push_back({a, b, c});
-  }
-  const Soundness soundness = check_soundness(mesh_of(kPoints, triangles), {});
-  EXPECT_FALSE(soundness.manifold);
-  EXPECT_TRUE(soundness.oriented);
-  EXPECT_EQ(soundness.boundary_edges, 0U);
-  expect_as_checked(mesh_of(kPoints, triangles));
-}
-
-TEST(Soundness, FindsATriangleTwice) {
-  std::vector<Triangle> triangles = kTetrahedron;
-  triangles.push_back(triangles[1]);
-  const Soundness soundness = check_soundness(mesh_of(kPoints, triangles), {});
-  EXPECT_FALSE(soundness.manifold);
-  EXPECT_FALSE(soundness.oriented);
-}
-
-TEST(Soundness, FindsATriangleThatNamesAVertexTwice) {
-  EXPECT_FALSE(check_soundness(mesh_of(kPoints, {{0, 1, 1}}), {}).manifold);
-}
-
-// One corner changed anywhere in a large mesh, also between slabs, does not go unseen.
-TEST(Soundness, FindsAnyCornerThatIsWrong) {
-  const Mesh sound = test::extracted(test::sample<float>(test::gyroid(7), {15, 14, 30}),
-                                     {0, Scheme::kSix, Interpolation::kLinear, true});
-  ASSERT_EQ(check_soundness(sound, {}).boundary_edges, 0U);
-  for (std::size_t layer = 1; layer + 2 < sound.layers(); ++layer) {
-    Mesh mesh = test::extracted(test::sample<float>(test::gyroid(7), {15, 14, 30}),
-                                {0, Scheme::kSix, Interpolation::kLinear, true});
-    const std::size_t first = mesh.layer_triangles[layer];
-    const std::size_t t = first + (mesh.layer_triangles[layer + 1] - first) / 2;
-    std::uint32_t& corner = mesh.triangles[t][layer % 3];
-    corner = static_cast<std::uint32_t>(
-        corner == mesh.layer_vertices[layer] ? corner + 1 : mesh.layer_vertices[layer]);
-    EXPECT_GT(check_soundness(mesh, {}).boundary_edges, 0U) << layer;
-  }
-}
-
-TEST(Soundness, OfNothingIsSound) {
-  const Soundness soundness = check_soundness(Mesh{}, {});
-  EXPECT_TRUE(soundness.manifold && soundness.oriented);
-  EXPECT_EQ(soundness.boundary_edges, 0U);
-}
-
 TEST(Quality, StopsWhenItIsCancelled) {
   std::stop_source stop;
   stop.request_stop();
   const Context stopped = {stop.get_token(), {}};
-  const Mesh mesh = mesh_of(kPoints, kTetrahedron);
+  const Mesh mesh = mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});
   EXPECT_EQ(test::code_thrown_by([&] { measure_shapes(mesh, stopped); }), ErrorCode::kCancelled);
-  EXPECT_EQ(test::code_thrown_by([&] { check_soundness(mesh, stopped); }), ErrorCode::kCancelled);
 }
 
 }  // namespace

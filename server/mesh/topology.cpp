@@ -1,14 +1,17 @@
+#include "server/mesh/topology.h"
+
 #include <algorithm>
 #include <array>
 #include <span>
 #include <vector>
 
-#include "server/mesh/quality.h"
+#include "server/mesh/components.h"
 
 namespace isomesh::mesh {
 namespace {
 
-constexpr std::size_t kLayersPerSlab = 8;
+// Larger slabs look at fewer layers twice, smaller ones keep more of their lists in the cache.
+constexpr std::size_t kLayersPerSlab = 4;
 
 // What a triangle looks like from one of its corners: it runs on to `next` and comes from
 // `previous`.
@@ -25,9 +28,7 @@ class CornerLists {
       : begin_(mesh.layer_vertices[first_layer]),
         size_(mesh.layer_vertices[end_layer] - begin_),
         ends_(size_ + 1, 0) {
-    const std::size_t first = mesh.layer_triangles[first_layer == 0 ? 0 : first_layer - 1];
-    const auto triangles =
-        mesh.triangles.span().subspan(first, mesh.layer_triangles[end_layer] - first);
+    const auto triangles = mesh.triangles_of(first_layer == 0 ? 0 : first_layer - 1, end_layer);
     // Shifted by one: while the lists are filled, an end is where its list goes on.
     for (const Triangle& triangle : triangles) {
       for (const std::uint32_t vertex : triangle) {
@@ -70,26 +71,32 @@ class FanWalk {
   // True when the corners are one closed fan in which every neighbour is next once and previous
   // once. False also where that was not to be found out at once.
   bool is_closed(std::span<const Corner> corners) {
-    const auto count = corners.size();
+    const std::size_t count = corners.size();
     if (count < 3 || count > kMostCorners) return false;
     for (std::size_t i = 0; i < count; ++i) {
       by_previous_[slot(corners[i].previous)] = static_cast<std::uint8_t>(i);
     }
-    // A walk from corner to corner that first comes back to where it began after as many steps as
-    // there are corners has been at each once.
-    std::size_t at = 0;
-    for (std::size_t step = 1; step <= count; ++step) {
-      const std::size_t following = by_previous_[slot(corners[at].next)];
-      if (following >= count || corners[following].previous != corners[at].next) return false;
-      at = following;
-      if (at == 0) return step == count;
+    // Which corner follows each, found for all independently of each other: four bits a corner.
+    std::uint64_t following = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t found = by_previous_[slot(corners[i].next)];
+      if (found >= count || corners[found].previous != corners[i].next) return false;
+      following |= std::uint64_t{found} << (kBits * i);
     }
-    return false;
+    // A walk that first comes back to where it began after as many steps as there are corners has
+    // been at each once.
+    std::size_t at = 0;
+    for (std::size_t step = 1; step < count; ++step) {
+      at = following >> (kBits * at) & (kMostCorners - 1);
+      if (at == 0) return false;
+    }
+    return (following >> (kBits * at) & (kMostCorners - 1)) == 0;
   }
 
  private:
-  static constexpr std::size_t kMostCorners = 64;
-  static constexpr std::size_t kSlots = 1024;
+  static constexpr std::size_t kBits = 4;
+  static constexpr std::size_t kMostCorners = 1 << kBits;
+  static constexpr std::size_t kSlots = 4096;
 
   static std::size_t slot(std::uint32_t vertex) { return vertex % kSlots; }
 
@@ -107,7 +114,7 @@ struct Neighbor {
 };
 
 // The definitions, one by one.
-void check_vertex(std::span<const Corner> corners, Soundness& soundness) {
+void check_vertex(std::span<const Corner> corners, Topology& topology) {
   std::vector<Neighbor> neighbors;
   for (const Corner& corner : corners) {
     neighbors.push_back({.vertex = corner.next});
@@ -125,7 +132,7 @@ void check_vertex(std::span<const Corner> corners, Soundness& soundness) {
     const auto previous = find(corner.previous);
     ++next->next;
     ++previous->previous;
-    if (next == previous) soundness.manifold = false;  // the triangle names a vertex twice
+    if (next == previous) topology.manifold = false;  // the triangle names a vertex twice
     const std::size_t joined = std::min(next->fan, previous->fan);
     const std::size_t other = std::max(next->fan, previous->fan);
     for (Neighbor& neighbor : neighbors) {
@@ -133,39 +140,43 @@ void check_vertex(std::span<const Corner> corners, Soundness& soundness) {
     }
   }
   for (const Neighbor& neighbor : neighbors) {
-    if (neighbor.next + neighbor.previous > 2 || neighbor.fan != 0) soundness.manifold = false;
-    if (neighbor.next > 1 || neighbor.previous > 1) soundness.oriented = false;
+    if (neighbor.next + neighbor.previous > 2 || neighbor.fan != 0) topology.manifold = false;
+    if (neighbor.next > 1 || neighbor.previous > 1) topology.oriented = false;
     // From the end that the edge runs from; the other end does not count it.
-    if (neighbor.next == 1 && neighbor.previous == 0) ++soundness.boundary_edges;
+    if (neighbor.next == 1 && neighbor.previous == 0) ++topology.boundary_edges;
   }
 }
 
-Soundness check_layers(const Mesh& mesh, std::size_t first_layer, std::size_t end_layer) {
-  Soundness soundness;
+Topology check_layers(const Mesh& mesh, std::size_t first_layer, std::size_t end_layer) {
+  Topology topology;
   FanWalk walk;
   const CornerLists lists(mesh, first_layer, end_layer);
   for (std::size_t v = 0; v < lists.size(); ++v) {
     const auto corners = lists.of(v);
-    if (!walk.is_closed(corners)) check_vertex(corners, soundness);
+    if (!walk.is_closed(corners)) check_vertex(corners, topology);
   }
-  return soundness;
+  return topology;
 }
 
 }  // namespace
 
-Soundness check_soundness(const Mesh& mesh, const Context& context) {
+Topology measure_topology(const Mesh& mesh, const Context& context) {
   const std::size_t slabs = (mesh.layers() + kLayersPerSlab - 1) / kLayersPerSlab;
-  std::vector<Soundness> parts(slabs);
+  std::vector<Topology> parts(slabs);
   parallel_for(context, slabs, [&](std::size_t slab) {
     const std::size_t first = slab * kLayersPerSlab;
     parts[slab] = check_layers(mesh, first, std::min(mesh.layers(), first + kLayersPerSlab));
   });
-  Soundness whole;
-  for (const Soundness& part : parts) {
+  Topology whole;
+  for (const Topology& part : parts) {
     whole.boundary_edges += part.boundary_edges;
     whole.manifold = whole.manifold && part.manifold;
     whole.oriented = whole.oriented && part.oriented;
   }
+  whole.components = count_components(mesh, context);
+  const std::uint64_t edges = (3 * mesh.triangles.size() + whole.boundary_edges) / 2;
+  whole.euler = static_cast<std::int64_t>(mesh.positions.size()) -
+                static_cast<std::int64_t>(edges) + static_cast<std::int64_t>(mesh.triangles.size());
   return whole;
 }
 
