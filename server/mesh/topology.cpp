@@ -37,7 +37,7 @@ class CornerLists {
     }
     std::uint32_t sum = 0;
     for (std::uint32_t& end : ends_) end = sum += end;
-    corners_.resize(sum);
+    corners_.resize_for_overwrite(sum);
     for (const auto& [a, b, c] : triangles) {
       add(a, {b, c});
       add(b, {c, a});
@@ -62,7 +62,7 @@ class CornerLists {
   const std::uint64_t begin_;
   const std::uint64_t size_;
   std::vector<std::uint32_t> ends_;
-  std::vector<Corner> corners_;
+  Buffer<Corner> corners_;
 };
 
 // Walks around vertices whose corners follow each other in one closed fan, as nearly all do.

@@ -51,6 +51,7 @@ class Comparison {
     if (!peers_available()) return;
     if (wanted("extract_reused_memory")) compare_extraction("extract_reused_memory", false);
     if (wanted("extract_fresh_memory")) compare_extraction("extract_fresh_memory", true);
+    if (wanted("stages_glb")) compare_stages();
     for (const MeshFormat format : {MeshFormat::kDrc, MeshFormat::kGlb}) {
       const std::string name = "job_" + std::string(to_string(format));
       if (wanted(name)) compare_job(name, format);
@@ -104,6 +105,19 @@ class Comparison {
   void add_rate(const std::string& what, double our_rate) {
     findings_.push_back({full("smooth_rate"), what + ", Mvertex-passes/s, " + samples_.name,
                          rate_text(our_rate), "", our_rate, kSmoothRateGoal});
+  }
+
+  // What the peers' pipeline does and no more: a job measures quality besides.
+  void compare_stages() {
+    Peers peers(samples_, iso_);
+    const Timed ours = {[&] {
+      stages_.extract();
+      stages_.smooth(kPasses);
+      stages_.encode(Encoding::kEdgebreakerChunks);
+    }};
+    const Timed theirs = {[&] { peers.pipeline(); }, [&] { peers.release(); }};
+    add("stages_glb", "extraction + smoothing + glb / Flying Edges + windowed sinc (20) + Draco",
+        time_in_pairs(ours, theirs), kJobGoal);
   }
 
   void compare_job(const std::string& name, MeshFormat format) {
