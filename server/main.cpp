@@ -3,12 +3,10 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <functional>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -34,6 +32,7 @@
 #include "server/jobs/volume_library.h"
 #include "server/jobs/workers.h"
 #include "server/mesh/context.h"
+#include "server/options.h"
 #include "server/store/data_folder.h"
 #include "server/store/database.h"
 #include "server/store/file_blob_store.h"
@@ -48,34 +47,6 @@ namespace {
 
 using namespace isomesh;
 
-struct Options {
-  std::string listen = "127.0.0.1:8080";
-  std::filesystem::path data = "isomesh-data";
-  std::size_t workers = 2;
-  int threads = 0;  // of the kernels; 0: one a processor
-  bool open_network = false;
-  unsigned drain_seconds = 30;
-  http::LogLevel log_level = http::LogLevel::kInfo;
-  http::LogFormat log_format = http::LogFormat::kText;
-  std::filesystem::path tokens;  // empty: requests are not authenticated
-  std::filesystem::path tls_certificate;
-  std::filesystem::path tls_key;
-  std::vector<std::string> callback_targets;
-  std::filesystem::path callback_secrets;
-  std::filesystem::path callback_authorities;
-  double callback_retry_seconds = 5;
-  store::JobStoreOptions jobs;
-  double keep_days = 30;
-  std::uint64_t max_disk = 0;
-  unsigned lease_seconds = 30;
-  unsigned longest_job_minutes = 60;
-  http::ServerOptions http;
-  volume::ImportLimits import;
-  volume::RunnerOptions runner;
-  std::int64_t import_seconds = runner.bounds.time.count();
-  std::uint64_t job_memory = 0;  // 0: see default_job_memory
-};
-
 // Three quarters of the machine, shared by the jobs that run at the same time.
 std::uint64_t default_job_memory(std::size_t workers) {
   const auto pages = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES));
@@ -87,162 +58,6 @@ std::uint64_t default_job_memory(std::size_t workers) {
 std::chrono::milliseconds housekeeping_interval(std::chrono::milliseconds keep) {
   return std::clamp<std::chrono::milliseconds>(keep / 4, std::chrono::seconds(1),
                                                std::chrono::seconds(30));
-}
-
-void add_log_options(CLI::App& cli, Options& options) {
-  using http::LogFormat;
-  using http::LogLevel;
-  const std::map<std::string, LogLevel> levels = {{"debug", LogLevel::kDebug},
-                                                  {"info", LogLevel::kInfo},
-                                                  {"warn", LogLevel::kWarn},
-                                                  {"error", LogLevel::kError},
-                                                  {"off", LogLevel::kOff}};
-  const std::map<std::string, LogFormat> formats = {{"text", LogFormat::kText},
-                                                    {"json", LogFormat::kJson}};
-  cli.add_option("--log-level", options.log_level, "debug, info, warn, error or off")
-      ->envname("ISOMESH_LOG_LEVEL")
-      ->transform(CLI::CheckedTransformer(levels).description(""))
-      ->default_str("info");
-  cli.add_option("--log-format", options.log_format,
-                 "The form of the log's lines on standard error: text or json")
-      ->envname("ISOMESH_LOG_FORMAT")
-      ->transform(CLI::CheckedTransformer(formats).description(""))
-      ->default_str("text");
-}
-
-void add_security_options(CLI::App& cli, Options& options) {
-  cli.add_option("--tokens", options.tokens,
-                 "File of tokens that requests must have; `isomeshd token` makes them. SIGHUP "
-                 "reads it again")
-      ->envname("ISOMESH_TOKENS");
-  auto* certificate =
-      cli.add_option("--tls-cert", options.tls_certificate,
-                     "File of the certificate (PEM) to listen with https; SIGHUP reads it again")
-          ->envname("ISOMESH_TLS_CERT");
-  cli.add_option("--tls-key", options.tls_key, "File of the certificate's key (PEM)")
-      ->envname("ISOMESH_TLS_KEY")
-      ->needs(certificate);
-}
-
-void add_callback_options(CLI::App& cli, Options& options) {
-  cli.add_option(
-         "--callback-allow", options.callback_targets,
-         "Beginning of URLs that jobs may call back, such as https://ris.example.org/hooks; "
-         "may be repeated; private: before it lets its name lead to private addresses")
-      ->envname("ISOMESH_CALLBACK_ALLOW")
-      ->type_name("URL")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  cli.add_option("--callback-secret-file", options.callback_secrets,
-                 "File of the key that signs callbacks; SIGHUP reads it again")
-      ->envname("ISOMESH_CALLBACK_SECRET_FILE");
-  cli.add_option("--callback-ca", options.callback_authorities,
-                 "File of the certificate authorities that callbacks trust; the system's otherwise")
-      ->envname("ISOMESH_CALLBACK_CA");
-  cli.add_option("--callback-retry-seconds", options.callback_retry_seconds,
-                 "Pause after a callback's first failure; it doubles up to an hour")
-      ->envname("ISOMESH_CALLBACK_RETRY_SECONDS")
-      ->check(CLI::Range(0.01, 3600.0))
-      ->capture_default_str();
-}
-
-// Every option also as ISOMESH_... in the environment and by its name in the file of --config.
-void add_options(CLI::App& cli, Options& options) {
-  cli.set_version_flag("--version", ISOMESH_VERSION);
-  const char* config = std::getenv("ISOMESH_CONFIG");
-  cli.set_config("--config", config == nullptr ? "" : config,
-                 "Read options from this file (TOML or INI); also ISOMESH_CONFIG",
-                 config != nullptr);
-  cli.add_option("--listen", options.listen, "HOST:PORT, HOST:0 for a free port, or unix:PATH")
-      ->envname("ISOMESH_LISTEN")
-      ->capture_default_str();
-  cli.add_option("--data", options.data, "Folder for volumes and meshes; created when missing")
-      ->envname("ISOMESH_DATA")
-      ->capture_default_str();
-  cli.add_option("--workers", options.workers, "Jobs that run at the same time")
-      ->envname("ISOMESH_WORKERS")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
-  cli.add_option("--threads", options.threads, "Threads that all jobs share; 0: one a processor")
-      ->envname("ISOMESH_THREADS")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
-  cli.add_option("--max-queue", options.jobs.max_queued, "Jobs that may wait; more get 503")
-      ->envname("ISOMESH_MAX_QUEUE")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  cli.add_option("--keep-days", options.keep_days,
-                 "How long finished jobs are kept with their meshes, and volumes that none used")
-      ->envname("ISOMESH_KEEP_DAYS")
-      ->check(CLI::Range(0.0, 100000.0))
-      ->capture_default_str();
-  cli.add_option("--max-disk", options.max_disk,
-                 "Bytes of all volumes and meshes; the oldest go first; 0: what the disk holds")
-      ->envname("ISOMESH_MAX_DISK")
-      ->transform(CLI::AsSizeValue(false))
-      ->capture_default_str();
-  cli.add_option("--lease-seconds", options.lease_seconds,
-                 "How long a job stays with a worker that shows no sign of life")
-      ->envname("ISOMESH_LEASE_SECONDS")
-      ->check(CLI::Range(1, 3600))
-      ->capture_default_str();
-  cli.add_option("--max-job-minutes", options.longest_job_minutes,
-                 "How long a job may run; one that takes longer fails")
-      ->envname("ISOMESH_MAX_JOB_MINUTES")
-      ->check(CLI::Range(1, 10000))
-      ->capture_default_str();
-  cli.add_option("--max-upload", options.http.upload.max_bytes, "Bytes of one upload")
-      ->envname("ISOMESH_MAX_UPLOAD")
-      ->transform(CLI::AsSizeValue(false))
-      ->capture_default_str();
-  cli.add_option("--upload-places", options.http.upload_places,
-                 "Uploads at the same time; more get 503")
-      ->envname("ISOMESH_UPLOAD_PLACES")
-      ->check(CLI::Range(1, 24))
-      ->capture_default_str();
-  cli.add_option(
-         "--cors-origin", options.http.cors_origins,
-         "Origins whose pages may use the service, such as https://viewer.example; * for all")
-      ->envname("ISOMESH_CORS_ORIGIN")
-      ->delimiter(',');
-  cli.add_option("--allow-host", options.http.hosts,
-                 "Names of this service beside those of loopback, for requests without tokens")
-      ->envname("ISOMESH_ALLOW_HOST")
-      ->delimiter(',');
-  cli.add_option("--max-volume", options.import.max_sample_bytes,
-                 "Bytes of one volume's samples, unpacked")
-      ->envname("ISOMESH_MAX_VOLUME")
-      ->transform(CLI::AsSizeValue(false))
-      ->capture_default_str();
-  cli.add_option("--imports", options.runner.at_once,
-                 "Uploads that are read at the same time; others wait")
-      ->envname("ISOMESH_IMPORTS")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
-  cli.add_option("--import-memory", options.runner.bounds.memory_bytes,
-                 "Bytes of memory that reading one upload may take, beside the volume itself")
-      ->envname("ISOMESH_IMPORT_MEMORY")
-      ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::Range(std::uint64_t{64} << 20, std::uint64_t{1} << 50))
-      ->capture_default_str();
-  cli.add_option("--import-seconds", options.import_seconds, "How long reading one upload may take")
-      ->envname("ISOMESH_IMPORT_SECONDS")
-      ->check(CLI::Range(1, 86400))
-      ->capture_default_str();
-  cli.add_option("--job-memory", options.job_memory,
-                 "Bytes of memory one job may take; 0: its share of three quarters of the machine")
-      ->envname("ISOMESH_JOB_MEMORY")
-      ->transform(CLI::AsSizeValue(false));
-  cli.add_option("--drain-seconds", options.drain_seconds,
-                 "How long running jobs may finish after SIGTERM")
-      ->envname("ISOMESH_DRAIN_SECONDS")
-      ->capture_default_str();
-  cli.add_flag("--open-network", options.open_network,
-               "Listen beyond loopback although requests are not authenticated")
-      ->envname("ISOMESH_OPEN_NETWORK");
-  add_log_options(cli, options);
-  add_security_options(cli, options);
-  add_callback_options(cli, options);
 }
 
 CLI::App& add_token_command(CLI::App& cli, TokenRequest& request) {
@@ -363,12 +178,6 @@ int run(const Options& options, const sigset_t& signals) {
                             http::callback_recorder(metrics));
   const jobs::PipelineLimits limits = {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
-  const jobs::WorkerOptions worker_options = {
-      .threads = options.workers,
-      .limits = limits,
-      .lease = std::chrono::seconds(options.lease_seconds),
-      .longest_job = std::chrono::minutes(options.longest_job_minutes)};
-  jobs::Workers workers(worker_options, jobs, volumes, blobs);
   const jobs::Housekeeper housekeeper(retention, housekeeping_interval(keep));
   jobs::Histograms histograms(blobs);
   jobs::Estimator estimator(volumes, blobs, jobs, limits);
@@ -378,6 +187,13 @@ int run(const Options& options, const sigset_t& signals) {
                                    histograms, estimator, retention,         metrics, outbox,
                                    callbacks,  targets,   files.tokens.get()};
   http::Server server(services, server_options);
+  // After the server, which tells and counts how jobs end.
+  const jobs::WorkerOptions worker_options = {
+      .threads = options.workers,
+      .limits = limits,
+      .lease = std::chrono::seconds(options.lease_seconds),
+      .longest_job = std::chrono::minutes(options.longest_job_minutes)};
+  jobs::Workers workers(worker_options, jobs, volumes, blobs);
 
   const std::string url = server.bind(address);
   std::cout << "listening on " << url << std::endl;

@@ -1,8 +1,5 @@
 #include "tests/bench/experiments.h"
 
-#include <cmath>
-#include <numbers>
-
 #include "tests/bench/peers.h"
 #include "tests/bench/timing.h"
 
@@ -13,37 +10,7 @@ constexpr int kPasses = 5;
 constexpr int kRuns = 5;
 constexpr int kFewestSincPasses = 5;  // with fewer the filter finds no coefficients
 
-double quality_of_one(const mesh::Vec3& a, const mesh::Vec3& b, const mesh::Vec3& c) {
-  std::array<double, 3> u;
-  std::array<double, 3> v;
-  double squares = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    u[axis] = double{b[axis]} - a[axis];
-    v[axis] = double{c[axis]} - a[axis];
-    const double w = v[axis] - u[axis];
-    squares += u[axis] * u[axis] + v[axis] * v[axis] + w * w;
-  }
-  const double area =
-      std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) /
-      2;
-  return squares > 0 ? 4 * std::numbers::sqrt3 * area / squares : 0;
-}
-
 }  // namespace
-
-Quality quality_of(std::span<const mesh::Vec3> positions,
-                   std::span<const mesh::Triangle> triangles) {
-  Quality quality;
-  if (triangles.empty()) return quality;
-  for (const auto& [a, b, c] : triangles) {
-    const double one = quality_of_one(positions[a], positions[b], positions[c]);
-    quality.mean += one;
-    if (one < kPoorQuality) ++quality.poor;
-  }
-  quality.mean /= static_cast<double>(triangles.size());
-  quality.poor /= static_cast<double>(triangles.size());
-  return quality;
-}
 
 SurfaceFigures measure_surface(const Samples& samples, const Surface& surface) {
   Stages stages(samples, surface);
@@ -51,14 +18,27 @@ SurfaceFigures measure_surface(const Samples& samples, const Surface& surface) {
   SurfaceFigures figures;
   figures.extract_ms = median_ms({[&] { stages.extract(); }}, kRuns);
   figures.size = stages.size();
-  figures.extracted = quality_of(stages.positions(), stages.triangles());
+  figures.extracted = stages.shapes().aspect_ratio;
   figures.extracted_mm3 = stages.volume_mm3();
   figures.smooth_ms =
       median_ms({[&] { stages.smooth(kPasses); }, [&] { stages.extract(); }}, kRuns);
-  figures.smoothed = quality_of(stages.positions(), stages.triangles());
+  figures.smoothed = stages.shapes().aspect_ratio;
   figures.smoothed_mm3 = stages.volume_mm3();
   figures.drc_bytes = stages.encode(Encoding::kEdgebreakerWhole);
   return figures;
+}
+
+std::vector<SmoothedFigures> measure_smoothed(const Samples& samples, const Surface& surface,
+                                              Smoothing smoothing, std::span<const int> passes) {
+  std::vector<SmoothedFigures> result;
+  Stages stages(samples, surface);
+  for (const int count : passes) {
+    stages.extract();
+    const double extracted_mm3 = stages.volume_mm3();
+    stages.smooth(count, smoothing);
+    result.push_back({count, stages.shapes(), stages.volume_mm3() / extracted_mm3});
+  }
+  return result;
 }
 
 std::optional<PaperFigures> measure_paper_smoothing(const Soup& soup, std::size_t sub_tables,

@@ -13,28 +13,27 @@
 
 namespace isomesh::bench {
 
-// How close triangles are to equilateral: 4 * sqrt(3) * area / (sum of squared sides), from 0 for
-// one without area to 1.
-struct Quality {
-  double mean = 0;
-  double poor = 0;  // the share of triangles below kPoorQuality
-};
-inline constexpr double kPoorQuality = 0.3;
-Quality quality_of(std::span<const mesh::Vec3> positions,
-                   std::span<const mesh::Triangle> triangles);
-
 // One surface through the stages.
 struct SurfaceFigures {
   MeshSize size;
   double extract_ms = 0;
   double smooth_ms = 0;  // 5 passes, connectivity included
   std::uint64_t drc_bytes = 0;
-  Quality extracted;
-  Quality smoothed;
+  Distribution extracted;  // aspect ratios
+  Distribution smoothed;
   double extracted_mm3 = 0;
   double smoothed_mm3 = 0;
 };
 SurfaceFigures measure_surface(const Samples& samples, const Surface& surface);
+
+// What a number of passes makes of a surface.
+struct SmoothedFigures {
+  int passes = 0;
+  mesh::Shapes shapes;
+  double volume_kept = 1;  // the enclosed volume as a share of that before smoothing
+};
+std::vector<SmoothedFigures> measure_smoothed(const Samples& samples, const Surface& surface,
+                                              Smoothing smoothing, std::span<const int> passes);
 
 // The paper's own way on this machine, one run.
 struct PaperFigures {

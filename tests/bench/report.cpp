@@ -94,7 +94,10 @@ int write_report(const std::filesystem::path& folder) {
   }
   for (const Subject& subject : subjects) write_passes(subject, report);
   write_growth(kSizes, report);
-  if (!subjects.empty()) write_choices(subjects, report);
+  if (!subjects.empty()) {
+    write_choices(subjects, report);
+    write_quality(subjects, report);
+  }
   document.heading("Where measurement and paper differ");
   document.bullets(report.remarks);
   document.write();

@@ -41,6 +41,8 @@ void write_passes(const Subject& subject, Report& report);
 void write_growth(std::span<const std::uint32_t> sizes, Report& report);
 // What scheme, interpolation and smoothing do to the mesh.
 void write_choices(const std::vector<Subject>& subjects, Report& report);
+// Aspect ratios, angles and enclosed volume against passes, Laplacian beside Taubin.
+void write_quality(const std::vector<Subject>& subjects, Report& report);
 void write_goals(const Plan& plan, Report& report);
 
 }  // namespace isomesh::bench

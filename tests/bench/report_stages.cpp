@@ -160,59 +160,6 @@ void write_growth(std::span<const std::uint32_t> sizes, Report& report) {
   write_growth_of_memory(all, report.document);
 }
 
-void write_choices(const std::vector<Subject>& subjects, Report& report) {
-  report.document.heading("Five against six, linear against midpoint: what they do to the mesh");
-  report.document.paragraph(
-      "*Quality* is 1 for an equilateral triangle and 0 for one without area (4 sqrt(3) area / sum "
-      "of squared sides); *poor* is the share of triangles below " +
-      fixed(kPoorQuality, 1) +
-      ". Smoothing is five passes, lambda 1. *Volume* is the enclosed volume after smoothing as a "
-      "share of that before; an open surface is closed by a cone. Draco is the `drc` file.");
-  Factors poor_before;
-  Factors poor_after;
-  Factors volume;
-  for (const Subject& subject : subjects) {
-    const Subject::Level& level = subject.levels.front();
-    say("choices, " + title_of(subject.samples, level));
-    Rows rows;
-    for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
-      for (const Interpolation way : {Interpolation::kLinear, Interpolation::kMidpoint}) {
-        const SurfaceFigures figures = measure_surface(subject.samples, {level.iso, scheme, way});
-        const double bits = 8 * static_cast<double>(figures.drc_bytes) /
-                            static_cast<double>(figures.size.triangles);
-        const double kept = figures.smoothed_mm3 / figures.extracted_mm3;
-        if (way == Interpolation::kLinear) {
-          poor_before.include(100 * figures.extracted.poor);
-          poor_after.include(100 * figures.smoothed.poor);
-        }
-        volume.include(100 * kept);
-        rows.push_back({scheme_name(scheme) + ", " + std::string(to_string(way)),
-                        grouped(figures.size.triangles), milliseconds(figures.extract_ms),
-                        milliseconds(figures.smooth_ms), mebibytes(figures.drc_bytes),
-                        fixed(bits, 1),
-                        fixed(figures.extracted.mean, 2) + " / " + fixed(figures.smoothed.mean, 2),
-                        percent(figures.extracted.poor) + " / " + percent(figures.smoothed.poor),
-                        percent(kept)});
-      }
-    }
-    if (peers_available()) {
-      const PeerFigures peer = measure_flying_edges(subject.samples, level.iso);
-      rows.push_back({"Flying Edges", grouped(peer.size.triangles), milliseconds(peer.extract_ms),
-                      "", "", "", "", "", ""});
-    }
-    report.document.paragraph("**" + title_of(subject.samples, level) + "**");
-    report.document.table({"", "triangles", "extraction", "smoothing", "Draco", "bits per triangle",
-                           "quality before / after", "poor before / after", "volume"},
-                          rows);
-  }
-  report.remarks.push_back(
-      "That smoothing repairs bad triangles holds: with linear interpolation " +
-      poor_before.text(1) + " % are poor before and " + poor_after.text(1) +
-      " % after five passes. Midpoint vertices leave hardly any to repair. What happens to the "
-      "enclosed volume the paper does not ask: " +
-      volume.text(1) + " % of it is there after smoothing.");
-}
-
 void write_goals(const Plan& plan, Report& report) {
   say("goals");
   report.document.heading("Against the peers and the goals");

@@ -7,6 +7,7 @@
 #include "server/codec/encode.h"
 #include "server/jobs/make_mesh.h"
 #include "server/mesh/extract.h"
+#include "server/mesh/measure.h"
 #include "server/mesh/smooth.h"
 #include "server/mesh/topology.h"
 
@@ -23,7 +24,10 @@ struct CountingSink {
 };
 
 mesh::ExtractOptions options_of(const Surface& surface) {
-  return {.iso = surface.iso, .scheme = surface.scheme, .interpolation = surface.interpolation};
+  return {.iso = surface.iso,
+          .scheme = surface.scheme,
+          .interpolation = surface.interpolation,
+          .close = surface.close};
 }
 
 template <class T>
@@ -73,7 +77,13 @@ void Stages::extract() {
   });
 }
 
-void Stages::smooth(int passes) { mesh::smooth({.passes = passes}, {}, mesh_); }
+void Stages::smooth(int passes, Smoothing smoothing) {
+  mesh::SmoothOptions options = {.passes = passes, .lambda = default_lambda(smoothing)};
+  if (smoothing == Smoothing::kTaubin) {
+    options.mu = mesh::taubin_mu(options.lambda, JobParameters{}.pass_band);
+  }
+  mesh::smooth(options, {}, mesh_);
+}
 
 std::uint64_t Stages::smoothing_memory(int passes) const {
   return visit_samples(samples_, [&](const auto* data) {
@@ -115,6 +125,7 @@ std::uint64_t Stages::run_job(int passes, MeshFormat format) {
   JobParameters parameters;
   parameters.scheme = surface_.scheme;
   parameters.interpolation = surface_.interpolation;
+  parameters.close = surface_.close;
   parameters.passes = passes;
   parameters.formats = {format};
   CountingSink counting;
@@ -136,6 +147,8 @@ void Stages::release_memory() {
 MeshSize Stages::size() const { return {mesh_.positions.size(), mesh_.triangles.size()}; }
 
 double Stages::volume_mm3() const { return mesh::measure_extent(mesh_, {}).volume_mm3; }
+
+mesh::Shapes Stages::shapes() const { return mesh::measure_shapes(mesh_, {}); }
 
 std::uint64_t Stages::mesh_bytes() const {
   return positions().size_bytes() + triangles().size_bytes();

@@ -9,6 +9,7 @@
 
 #include "proto/types.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/quality.h"
 #include "tests/bench/samples.h"
 
 namespace isomesh::bench {
@@ -18,6 +19,7 @@ struct Surface {
   double iso = 0;
   Scheme scheme = Scheme::kSix;
   Interpolation interpolation = Interpolation::kLinear;
+  bool close = false;
 };
 
 struct MeshSize {
@@ -54,8 +56,9 @@ class Stages {
 
   MeshSize count() const;
   void extract();  // counts first
-  // With area, volume and bounds before and after, as a job has it.
-  void smooth(int passes);
+  // With area, volume and bounds before and after, as a job has it; the other parameters are those
+  // of a job that gives none.
+  void smooth(int passes, Smoothing smoothing = Smoothing::kLaplacian);
 
   // What smoothing says that it takes beside the mesh, in bytes.
   std::uint64_t smoothing_memory(int passes) const;
@@ -72,6 +75,7 @@ class Stages {
 
   MeshSize size() const;
   double volume_mm3() const;
+  mesh::Shapes shapes() const;
   std::span<const mesh::Vec3> positions() const { return mesh_.positions.span(); }
   std::span<const mesh::Triangle> triangles() const { return mesh_.triangles.span(); }
   // What the mesh alone takes.

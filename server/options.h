@@ -1,0 +1,54 @@
+// What a person can set of the daemon.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "server/http/log.h"
+#include "server/http/server.h"
+#include "server/store/sqlite_job_store.h"
+#include "server/volume/import.h"
+#include "server/volume/import_runner.h"
+
+namespace CLI {
+class App;
+}
+
+namespace isomesh {
+
+struct Options {
+  std::string listen = "127.0.0.1:8080";
+  std::filesystem::path data = "isomesh-data";
+  std::size_t workers = 2;
+  int threads = 0;  // of the kernels; 0: one a processor
+  bool open_network = false;
+  unsigned drain_seconds = 30;
+  http::LogLevel log_level = http::LogLevel::kInfo;
+  http::LogFormat log_format = http::LogFormat::kText;
+  std::filesystem::path tokens;  // empty: requests are not authenticated
+  std::filesystem::path tls_certificate;
+  std::filesystem::path tls_key;
+  std::vector<std::string> callback_targets;
+  std::filesystem::path callback_secrets;
+  std::filesystem::path callback_authorities;
+  double callback_retry_seconds = 5;
+  store::JobStoreOptions jobs;
+  double keep_days = 30;
+  std::uint64_t max_disk = 0;
+  unsigned lease_seconds = 30;
+  unsigned longest_job_minutes = 60;
+  http::ServerOptions http;
+  volume::ImportLimits import;
+  volume::RunnerOptions runner;
+  std::int64_t import_seconds = runner.bounds.time.count();
+  std::uint64_t job_memory = 0;  // 0: see default_job_memory
+};
+
+// Every option also as ISOMESH_... in the environment and by its name in the file of --config.
+// `options` is filled in when `cli` parses.
+void add_options(CLI::App& cli, Options& options);
+
+}  // namespace isomesh
