@@ -57,8 +57,8 @@ constexpr std::array kQuantities = {
              [](const SmoothedFigures& one) { return one.shapes.smallest_angle_deg.mean; }, 1},
     Quantity{"least-angle", "smallest angle of all, degrees",
              [](const SmoothedFigures& one) { return one.shapes.smallest_angle_deg.min; }, 3},
-    Quantity{"volume", "enclosed volume, % of that before",
-             [](const SmoothedFigures& one) { return 100 * one.volume_kept; }, 3},
+    Quantity{"volume", "change of the enclosed volume, %",
+             [](const SmoothedFigures& one) { return 100 * (one.volume_kept - 1); }, 3},
 };
 
 struct Smoothed {
