@@ -235,7 +235,9 @@ std::vector<std::pair<std::string, std::string>> query_of(const JobParameters& p
   const std::function<void(const std::string&, const nlohmann::json&)> add =
       [&](const std::string& name, const nlohmann::json& value) {
         if (value.is_object()) {
-          for (const auto& [member, inner] : value.items()) add(name + '.' + member, inner);
+          for (const auto& [member, inner] : value.items()) {
+            add(std::string(name).append(".").append(member), inner);
+          }
         } else if (value.is_array()) {
           std::string list;
           for (const auto& item : value) {

@@ -160,7 +160,7 @@ std::string idempotency_key_of(const httplib::Request& request) {
   constexpr const char* kHeader = "Idempotency-Key";
   constexpr std::size_t kLongest = 255;
   if (!request.has_header(kHeader)) return {};
-  const std::string key = request.get_header_value(kHeader);
+  std::string key = request.get_header_value(kHeader);
   const bool is_printable = std::ranges::all_of(key, [](char c) { return c > 0x20 && c < 0x7F; });
   if (request.get_header_value_count(kHeader) > 1 || key.empty() || key.size() > kLongest ||
       !is_printable) {

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "client/isomesh/sha256.h"
+#include "proto/json.h"
 
 namespace isomesh::test {
 namespace {
@@ -116,6 +117,26 @@ void send_text(int socket, const std::string& text) {
     if (count <= 0) return;
     sent += static_cast<std::size_t>(count);
   }
+}
+
+std::string pattern(std::size_t size) {
+  std::string bytes(size, '\0');
+  for (std::size_t n = 0; n < size; ++n) bytes[n] = static_cast<char>(n * 131 + n / 251);
+  return bytes;
+}
+
+Volume some_volume() {
+  Volume volume;
+  volume.id = "abc";
+  volume.format = "nifti";
+  volume.dims = {2, 3, 4};
+  return volume;
+}
+
+void answer_with(httplib::Response& response, const Error& error) {
+  const Problem problem = to_problem(error, "/v1/here");
+  response.status = problem.status;
+  response.set_content(to_json(problem), "application/problem+json");
 }
 
 Job finished_job(const std::string& id, const std::string& mesh_bytes) {

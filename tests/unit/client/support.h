@@ -76,6 +76,15 @@ std::string read_head(int socket);
 // Sends all of it; a client that went away is no error.
 void send_text(int socket, const std::string& text);
 
+// Bytes that are not the same anywhere near.
+std::string pattern(std::size_t size);
+
+// A volume as an upload is answered with.
+Volume some_volume();
+
+// Answers with the problem that the error is.
+void answer_with(httplib::Response& response, const Error& error);
+
 // A job that has succeeded with one Draco file of these bytes.
 Job finished_job(const std::string& id, const std::string& mesh_bytes);
 

@@ -6,6 +6,7 @@
 
 #include "server/codec/encode.h"
 #include "server/mesh/mesh.h"
+#include "tests/support/kernels.h"
 
 namespace isomesh::test {
 

@@ -2,19 +2,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <sstream>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "server/mesh/extract.h"
 #include "server/mesh/smooth.h"
-#include "tests/support/kernels.h"
-#include "tests/support/mesh_checks.h"
 #include "tests/support/points.h"
-#include "tests/support/reference.h"
 #include "tests/support/shapes.h"
+#include "tests/unit/mesh/reference_surface.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -24,24 +20,6 @@ using test::dot;
 using test::minus;
 using test::SampleVolume;
 using test::Surface;
-
-// The four ways to extract a closed surface.
-std::vector<ExtractOptions> all_closed(double iso) {
-  std::vector<ExtractOptions> all;
-  for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
-    for (const auto interpolation : {Interpolation::kLinear, Interpolation::kMidpoint}) {
-      all.push_back({iso, scheme, interpolation, true});
-    }
-  }
-  return all;
-}
-
-std::string describe(const Dims& dims, const ExtractOptions& options) {
-  std::ostringstream text;
-  text << dims.x << "x" << dims.y << "x" << dims.z << ", iso " << options.iso << ", scheme "
-       << static_cast<int>(options.scheme) << ", " << to_string(options.interpolation);
-  return text.str();
-}
 
 // What every closed mesh is, besides the reference's: sound, without a boundary, and within the
 // volume's box, whose faces its caps lie in and face out of.
@@ -88,20 +66,15 @@ void expect_closed(const Mesh& mesh, const Dims& dims, const LatticeToSpace& map
 template <class T>
 void expect_closed_reference_surface(const SampleVolume<T>& volume, const ExtractOptions& options) {
   SCOPED_TRACE(describe(volume.dims, options));
-  const Lattice<T> lattice = volume.lattice();
-  const test::ReferenceMesh reference = test::reference_surface(lattice, options);
-  const SurfaceCount count = count_surface(lattice, options, {});
-  EXPECT_EQ(count.vertices(), reference.vertices.size());
-  EXPECT_EQ(count.triangles(), reference.triangles());
+  test::ReferenceMesh reference;
   Mesh mesh;
-  extract_surface(lattice, options, count, {}, mesh);
-  ASSERT_TRUE(test::matches(mesh, reference));
-  expect_closed(mesh, volume.dims, lattice.to_space);
+  ASSERT_NO_FATAL_FAILURE(extract_as_reference(volume, options, reference, mesh));
+  expect_closed(mesh, volume.dims, volume.lattice().to_space);
 }
 
 template <class T>
 void expect_closed_reference_surfaces(const SampleVolume<T>& volume, double iso) {
-  for (const ExtractOptions& options : all_closed(iso)) {
+  for (const ExtractOptions& options : all_options(iso, true)) {
     expect_closed_reference_surface(volume, options);
     if (testing::Test::HasFailure()) return;
   }
@@ -134,7 +107,7 @@ TEST_P(CloseBox, IsTheBoxOfTheOuterSamples) {
     const LatticeToSpace map = test::space_of(geometry);
     const double cells = (dims.x - 1.0) * (dims.y - 1.0) * (dims.z - 1.0);
     const double box = cells * std::abs(map.determinant());
-    for (const ExtractOptions& options : all_closed(100)) {
+    for (const ExtractOptions& options : all_options(100, true)) {
       expect_closed_reference_surface(volume, options);
       SCOPED_TRACE(describe(dims, options));
       const Surface surface = test::surface_of(test::extracted(volume, options));
@@ -152,7 +125,7 @@ INSTANTIATE_TEST_SUITE_P(Geometries, CloseBox, testing::ValuesIn(test::all_geome
 TEST(CloseBoxShape, HasNoSlivers) {
   for (const Dims dims : {Dims{2, 2, 2}, Dims{3, 3, 3}, Dims{4, 3, 2}, Dims{7, 6, 5}}) {
     const auto volume = test::constant<std::int16_t>(5, dims);
-    for (const ExtractOptions& options : all_closed(5)) {
+    for (const ExtractOptions& options : all_options(5, true)) {
       SCOPED_TRACE(describe(dims, options));
       const Surface surface = test::surface_of(test::extracted(volume, options));
       EXPECT_GT(smallest_angle_in_degrees(surface), 7);
@@ -226,7 +199,7 @@ TEST_P(CloseInGeometry, NoiseIsClosed) {
   const std::vector<std::int16_t> values = {-700, -20, -3, 0, 1, 40, 900};
   const auto volume = test::noise(values, {11, 9, 10}, 17, GetParam().geometry);
   for (const double iso : {0.5, 1.0}) {
-    for (const ExtractOptions& options : all_closed(iso)) {
+    for (const ExtractOptions& options : all_options(iso, true)) {
       SCOPED_TRACE(describe(volume.dims, options));
       expect_closed(test::extracted(volume, options), volume.dims, volume.lattice().to_space);
       if (HasFailure()) return;
@@ -240,7 +213,7 @@ INSTANTIATE_TEST_SUITE_P(Geometries, CloseInGeometry, testing::ValuesIn(test::al
 TEST(Close, VolumesWithoutCellsHaveNoSurface) {
   for (const Dims dims :
        {Dims{1, 9, 8}, Dims{9, 1, 8}, Dims{9, 8, 1}, Dims{1, 1, 1}, Dims{0, 0, 0}}) {
-    for (const ExtractOptions& options : all_closed(1)) {
+    for (const ExtractOptions& options : all_options(1, true)) {
       EXPECT_EQ(test::extracted(test::constant<std::uint8_t>(9, dims), options).positions.size(),
                 0U);
     }
@@ -260,7 +233,7 @@ std::vector<Vec3> places_on_border(const Mesh& mesh) {
 // The vertices that are not on the border are those of the open surface, also after smoothing.
 TEST(Close, DoesNotChangeWhatIsNotOnTheBorder) {
   const auto volume = test::noise_between<float>(-4, 5, {14, 12, 13}, 31);
-  for (ExtractOptions options : all_closed(0)) {
+  for (ExtractOptions options : all_options(0, true)) {
     SCOPED_TRACE(describe(volume.dims, options));
     Mesh closed = test::extracted(volume, options);
     options.close = false;
@@ -293,7 +266,7 @@ TEST(Close, DoesNotChangeWhatIsNotOnTheBorder) {
 
 TEST(Close, IsTheSameToTheByteOnAnyNumberOfThreads) {
   const auto volume = test::noise<std::uint8_t>({0, 3, 4, 5}, {66, 9, 60}, 32);
-  for (const ExtractOptions& options : all_closed(2)) {
+  for (const ExtractOptions& options : all_options(2, true)) {
     Mesh single;
     {
       const test::ThreadCount one(1);

@@ -1,0 +1,257 @@
+// Files on their way to the server, and meshes on theirs back.
+#include <atomic>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/isomesh/client.h"
+#include "client/isomesh/sha256.h"
+#include "proto/json.h"
+#include "tests/unit/client/support.h"
+
+namespace isomesh {
+namespace {
+
+using test::answer_with;
+using test::error_of;
+using test::FakeServer;
+using test::finished_job;
+using test::pattern;
+using test::some_volume;
+using test::TemporaryFolder;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr const char* kJson = "application/json";
+
+TEST(Upload, SendsTheFileInPiecesWithItsLengthAndReportsEachOfThem) {
+  const std::string content = pattern(3'000'001);
+  FakeServer server;
+  std::string received;
+  httplib::Headers headers;
+  std::size_t largest = 0;
+  server.http.Post("/v1/volumes", [&](const httplib::Request& request, httplib::Response& response,
+                                      const httplib::ContentReader& read) {
+    headers = request.headers;
+    read([&](const char* data, std::size_t size) {
+      received.append(data, size);
+      return true;
+    });
+    response.set_content(to_json(some_volume()), kJson);
+    response.status = 201;
+  });
+  TemporaryFolder folder;
+  test::write_file(folder / "head.nii.gz", content);
+
+  std::uint64_t last = 0;
+  UploadOptions options{.digest = true};
+  options.progress = [&](std::uint64_t done, std::uint64_t total) {
+    EXPECT_EQ(total, content.size());
+    EXPECT_GE(done, last);
+    largest = std::max<std::size_t>(largest, done - last);
+    last = done;
+  };
+  Client client({.server = server.start(), .token = "secret"});
+  EXPECT_EQ(client.upload(folder / "head.nii.gz", options), some_volume());
+
+  EXPECT_TRUE(received == content);
+  EXPECT_EQ(last, content.size());
+  EXPECT_LT(largest, std::size_t{1'000'000});
+  EXPECT_EQ(headers.find("Content-Length")->second, std::to_string(content.size()));
+  EXPECT_EQ(headers.find("Authorization")->second, "Bearer secret");
+  EXPECT_THAT(headers.find("User-Agent")->second, testing::StartsWith("isomesh/"));
+  Sha256 sha256;
+  sha256.update(content);
+  EXPECT_EQ(headers.find("Content-Digest")->second, "sha-256=:" + to_base64(sha256.finish()) + ":");
+}
+
+TEST(Upload, OfAnEmptyFileReachesTheServer) {
+  FakeServer server;
+  server.http.Post("/v1/volumes", [](const httplib::Request&, httplib::Response& response) {
+    answer_with(response, Error(ErrorCode::kUnsupportedMedia, "the body is empty"));
+  });
+  TemporaryFolder folder;
+  test::write_file(folder / "empty", "");
+  Client client({.server = server.start()});
+  EXPECT_EQ(error_of([&] { client.upload(folder / "empty"); }).code(),
+            ErrorCode::kUnsupportedMedia);
+}
+
+TEST(Upload, DescribesRawSamplesInTheQuery) {
+  FakeServer server;
+  httplib::Params seen;
+  std::string target;
+  server.http.Post("/v1/volumes", [&](const httplib::Request& request, httplib::Response& response,
+                                      const httplib::ContentReader& read) {
+    seen = request.params;
+    target = request.target;
+    read([](const char*, std::size_t) { return true; });
+    response.set_content(to_json(some_volume()), kJson);
+  });
+  TemporaryFolder folder;
+  test::write_file(folder / "ct.raw", pattern(48));
+
+  UploadOptions options;
+  options.raw = RawDescription{.dims = {2, 3, 4},
+                               .type = SampleType::kInt16,
+                               .spacing = {{0.7, 0.1, 1e-7}},
+                               .origin = {{-90, 0, 1.5}},
+                               .direction = {{0, 1, 0, 1, 0, 0, 0, 0, -1}},
+                               .big_endian = true};
+  Client client({.server = server.start()});
+  client.upload(folder / "ct.raw", options);
+
+  EXPECT_EQ(seen.find("dims")->second, "2,3,4");
+  EXPECT_EQ(seen.find("type")->second, "int16");
+  EXPECT_EQ(seen.find("spacing")->second, "0.7,0.1,1e-07");
+  EXPECT_EQ(seen.find("origin")->second, "-90,0,1.5");
+  EXPECT_EQ(seen.find("direction")->second, "0,1,0,1,0,0,0,0,-1");
+  EXPECT_EQ(seen.find("byte_order")->second, "big");
+  EXPECT_THAT(target, HasSubstr("dims=2%2C3%2C4"));
+}
+
+// What a person sees who sends half a gigabyte without a token: the reason, not a broken pipe.
+TEST(Upload, HearsARefusalThatComesBeforeTheBodyWasTaken) {
+  const std::string body = to_json(to_problem(Error(ErrorCode::kUnauthorized, "no token"), ""));
+  test::SocketServer server([&](int socket) {
+    test::read_head(socket);
+    test::send_text(socket,
+                    "HTTP/1.1 401 Unauthorized\r\nContent-Type: application/problem+json\r\n"
+                    "Connection: close\r\nContent-Length: " +
+                        std::to_string(body.size()) + "\r\n\r\n" + body);
+  });
+  TemporaryFolder folder;
+  test::write_file(folder / "large", pattern(20'000'000));
+  Client client({.server = server.url()});
+  const Error error = error_of([&] { client.upload(folder / "large"); });
+  EXPECT_EQ(error.code(), ErrorCode::kUnauthorized);
+  EXPECT_STREQ(error.what(), "no token");
+  EXPECT_EQ(server.connections(), 1);
+}
+
+TEST(Upload, IsNotRepeatedWhenTheConnectionBreaks) {
+  test::SocketServer server([](int socket) { test::read_head(socket); });
+  TemporaryFolder folder;
+  test::write_file(folder / "file", pattern(1000));
+  Client client({.server = server.url()});
+  EXPECT_EQ(error_of([&] { client.upload(folder / "file"); }).code(), ErrorCode::kUnreachable);
+  EXPECT_EQ(server.connections(), 1);
+}
+
+TEST(Upload, GivesBackWhatACallbackThrows) {
+  FakeServer server;
+  server.http.Post("/v1/volumes", [](const httplib::Request&, httplib::Response&) {});
+  TemporaryFolder folder;
+  test::write_file(folder / "file", pattern(1000));
+  UploadOptions options;
+  options.progress = [](std::uint64_t, std::uint64_t) { throw std::out_of_range("enough"); };
+  Client client({.server = server.start()});
+  EXPECT_THROW(client.upload(folder / "file", options), std::out_of_range);
+}
+
+TEST(Upload, NamesAFileThatIsNotThere) {
+  Client client({.server = test::unused_url()});
+  const Error error = error_of([&] { client.upload("/nowhere/head.nii"); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
+  EXPECT_THAT(error.what(), HasSubstr("/nowhere/head.nii"));
+}
+
+class Fetch : public testing::Test {
+ protected:
+  // A server whose job 7 announces `announced` and whose mesh is `sent`.
+  Client client_for(const std::string& announced, const std::string& sent) {
+    server_.http.Get("/v1/jobs/7",
+                     [announced](const httplib::Request&, httplib::Response& response) {
+                       response.set_content(to_json(finished_job("7", announced)), kJson);
+                     });
+    server_.http.Get("/v1/jobs/7/mesh.drc",
+                     [sent](const httplib::Request&, httplib::Response& response) {
+                       response.set_content(sent, "application/octet-stream");
+                     });
+    return Client({.server = server_.start()});
+  }
+
+  FakeServer server_;
+  TemporaryFolder folder_;
+};
+
+TEST_F(Fetch, WritesTheMeshAndNothingElse) {
+  const std::string mesh = pattern(1'234'567);
+  Client client = client_for(mesh, mesh);
+  std::uint64_t last = 0;
+  client.fetch("7", MeshFormat::kDrc, folder_ / "brain.drc",
+               [&](std::uint64_t done, std::uint64_t total) {
+                 EXPECT_EQ(total, mesh.size());
+                 last = done;
+               });
+  EXPECT_EQ(last, mesh.size());
+  EXPECT_TRUE(test::read_file(folder_ / "brain.drc") == mesh);
+  EXPECT_THAT(folder_.names(), ElementsAre("brain.drc"));
+}
+
+TEST_F(Fetch, LeavesNoFileWhenOtherBytesCome) {
+  std::string changed = pattern(1000);
+  changed[500] ^= 1;
+  Client client = client_for(pattern(1000), changed);
+  const Error error = error_of([&] { client.fetch("7", MeshFormat::kDrc, folder_ / "brain.drc"); });
+  EXPECT_EQ(error.code(), ErrorCode::kDigestMismatch);
+  EXPECT_THAT(folder_.names(), IsEmpty());
+}
+
+TEST_F(Fetch, LeavesTheOldFileWhenTooManyBytesCome) {
+  test::write_file(folder_ / "brain.drc", "old");
+  Client client = client_for(pattern(1000), pattern(1'000'000));
+  EXPECT_EQ(error_of([&] { client.fetch("7", MeshFormat::kDrc, folder_ / "brain.drc"); }).code(),
+            ErrorCode::kDigestMismatch);
+  EXPECT_EQ(test::read_file(folder_ / "brain.drc"), "old");
+  EXPECT_THAT(folder_.names(), ElementsAre("brain.drc"));
+}
+
+TEST_F(Fetch, RefusesFormatsThatTheJobWasNotAskedFor) {
+  Client client = client_for("mesh", "mesh");
+  EXPECT_EQ(error_of([&] { client.fetch("7", MeshFormat::kStl, folder_ / "brain.stl"); }).code(),
+            ErrorCode::kNotFound);
+  EXPECT_THAT(folder_.names(), IsEmpty());
+}
+
+TEST_F(Fetch, GivesTheReasonOfAJobThatFailed) {
+  Job job = finished_job("7", "mesh");
+  job.state = JobState::kFailed;
+  job.mesh.reset();
+  job.error = to_problem(Error(ErrorCode::kTooLarge, "the mesh has too many triangles"), "");
+  server_.http.Get("/v1/jobs/7", [&](const httplib::Request&, httplib::Response& response) {
+    response.set_content(to_json(job), kJson);
+  });
+  Client client({.server = server_.start()});
+  const Error error = error_of([&] { client.fetch("7", MeshFormat::kDrc, folder_ / "a.drc"); });
+  EXPECT_EQ(error.code(), ErrorCode::kTooLarge);
+  EXPECT_STREQ(error.what(), "the mesh has too many triangles");
+}
+
+TEST_F(Fetch, StartsOverWhenTheConnectionBreaksInTheMiddle) {
+  const std::string mesh = pattern(100'000);
+  std::atomic<int> downloads = 0;
+  test::SocketServer server([&](int socket) {
+    const bool download = test::read_head(socket).find("/mesh.drc") != std::string::npos;
+    const std::string body = download ? mesh : to_json(finished_job("7", mesh));
+    const bool cut = download && ++downloads == 1;
+    test::send_text(socket, "HTTP/1.1 200 OK\r\nContent-Length: " + std::to_string(body.size()) +
+                                "\r\n\r\n" + body.substr(0, cut ? 70'000 : body.size()));
+  });
+  Client client({.server = server.url()});
+  client.fetch("7", MeshFormat::kDrc, folder_ / "brain.drc");
+  EXPECT_EQ(downloads, 2);
+  EXPECT_TRUE(test::read_file(folder_ / "brain.drc") == mesh);
+}
+
+TEST_F(Fetch, NamesATargetThatCannotBeWritten) {
+  Client client = client_for("mesh", "mesh");
+  const auto target = folder_ / "missing" / "brain.drc";
+  const Error error = error_of([&] { client.fetch("7", MeshFormat::kDrc, target); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
+  EXPECT_THAT(error.what(), HasSubstr("brain.drc"));
+}
+
+}  // namespace
+}  // namespace isomesh

@@ -1,0 +1,79 @@
+// That what the kernels extract is the surface of the brute-force reference.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/mesh/extract.h"
+#include "tests/support/kernels.h"
+#include "tests/support/mesh_checks.h"
+#include "tests/support/reference.h"
+#include "tests/support/shapes.h"
+
+namespace isomesh::mesh {
+
+// The four ways to extract at one iso-value.
+std::vector<ExtractOptions> all_options(double iso, bool close = false);
+
+std::string describe(const Dims& dims, const ExtractOptions& options);
+
+// Area and volume as the reference has them, but for the small way that vertices may be moved.
+void expect_extent(const test::Surface& surface, const test::ReferenceMesh& reference,
+                   const ExtractOptions& options);
+
+// Extracts, and expects the reference's vertices and triangles in the layers that were counted.
+template <class T>
+void extract_as_reference(const test::SampleVolume<T>& volume, const ExtractOptions& options,
+                          test::ReferenceMesh& reference, Mesh& mesh) {
+  const Lattice<T> lattice = volume.lattice();
+  reference = test::reference_surface(lattice, options);
+  const SurfaceCount count = count_surface(lattice, options, {});
+  EXPECT_EQ(count.vertices(), reference.vertices.size());
+  EXPECT_EQ(count.triangles(), reference.triangles());
+  extract_surface(lattice, options, count, {}, mesh);
+  EXPECT_EQ(mesh.origin, lattice.to_space.origin);
+  EXPECT_EQ(mesh.layer_vertices, count.layer_vertices);
+  EXPECT_EQ(mesh.layer_triangles, count.layer_triangles);
+  ASSERT_TRUE(test::matches(mesh, reference));
+}
+
+template <class T>
+void expect_reference_surface(const test::SampleVolume<T>& volume, const ExtractOptions& options) {
+  SCOPED_TRACE(describe(volume.dims, options));
+  test::ReferenceMesh reference;
+  Mesh mesh;
+  ASSERT_NO_FATAL_FAILURE(extract_as_reference(volume, options, reference, mesh));
+  const test::Surface surface = test::surface_of(mesh);
+  EXPECT_TRUE(test::is_sound(surface));
+  EXPECT_TRUE(test::boundary_is_on_border(surface, volume.dims, volume.lattice().to_space));
+  expect_extent(surface, reference, options);
+}
+
+// All four ways. Stops at the first that fails: one is enough to read.
+template <class T>
+void expect_reference_surfaces(const test::SampleVolume<T>& volume, double iso) {
+  for (const ExtractOptions& options : all_options(iso)) {
+    expect_reference_surface(volume, options);
+    if (testing::Test::HasFailure()) return;
+  }
+}
+
+template <class T>
+void expect_empty(const test::SampleVolume<T>& volume, double iso) {
+  for (const ExtractOptions& options : all_options(iso)) {
+    SCOPED_TRACE(describe(volume.dims, options));
+    const SurfaceCount count = count_surface(volume.lattice(), options, {});
+    EXPECT_EQ(count.vertices(), 0U);
+    EXPECT_EQ(count.triangles(), 0U);
+    const Mesh mesh = test::extracted(volume, options);
+    EXPECT_EQ(mesh.positions.size(), 0U);
+    EXPECT_EQ(mesh.triangles.size(), 0U);
+  }
+}
+
+}  // namespace isomesh::mesh
