@@ -9,7 +9,7 @@
 
 #include "proto/error.h"
 #include "server/volume/archive.h"
-#include "server/volume/dicom.h"
+#include "server/volume/dicom/import.h"
 #include "server/volume/files.h"
 #include "server/volume/geometry.h"
 #include "server/volume/gzip.h"

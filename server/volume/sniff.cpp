@@ -5,7 +5,7 @@
 #include <string>
 
 #include "server/volume/archive.h"
-#include "server/volume/dicom.h"
+#include "server/volume/dicom/import.h"
 #include "server/volume/gzip.h"
 #include "server/volume/metaimage.h"
 #include "server/volume/nifti.h"

@@ -1,11 +1,11 @@
-#include "server/volume/dicom_dataset.h"
+#include "server/volume/dicom/dataset.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "server/volume/dicom_parser.h"
-#include "server/volume/dicom_tags.h"
+#include "server/volume/dicom/parser.h"
+#include "server/volume/dicom/tags.h"
 #include "server/volume/gzip.h"
 #include "server/volume/source.h"
 #include "server/volume/text.h"

@@ -1,10 +1,10 @@
-#include "server/volume/dicom_pixels.h"
+#include "server/volume/dicom/pixels.h"
 
 #include <algorithm>
 #include <string>
 
-#include "server/volume/dicom_decode.h"
-#include "server/volume/dicom_tags.h"
+#include "server/volume/dicom/decode.h"
+#include "server/volume/dicom/tags.h"
 #include "server/volume/source.h"
 
 namespace isomesh::volume::dicom {

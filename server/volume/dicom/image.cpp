@@ -1,11 +1,11 @@
-#include "server/volume/dicom_image.h"
+#include "server/volume/dicom/image.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "server/volume/dicom_decode.h"
-#include "server/volume/dicom_tags.h"
-#include "server/volume/dicom_text.h"
+#include "server/volume/dicom/decode.h"
+#include "server/volume/dicom/tags.h"
+#include "server/volume/dicom/text.h"
 #include "server/volume/source.h"
 #include "server/volume/text.h"
 

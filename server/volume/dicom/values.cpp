@@ -1,4 +1,4 @@
-#include "server/volume/dicom_values.h"
+#include "server/volume/dicom/values.h"
 
 #include <algorithm>
 #include <cmath>

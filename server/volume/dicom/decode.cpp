@@ -1,4 +1,4 @@
-#include "server/volume/dicom_decode.h"
+#include "server/volume/dicom/decode.h"
 
 #include <algorithm>
 #include <array>
@@ -15,7 +15,7 @@
 #include <gdcmSequenceOfFragments.h>
 #include <gdcmTrace.h>
 
-#include "server/volume/dicom_tags.h"
+#include "server/volume/dicom/tags.h"
 #include "server/volume/source.h"
 #include "server/volume/text.h"
 

@@ -1,10 +1,10 @@
-#include "server/volume/dicom_parser.h"
+#include "server/volume/dicom/parser.h"
 
 #include <algorithm>
 #include <array>
 
-#include "server/volume/dicom_tags.h"
-#include "server/volume/dicom_text.h"
+#include "server/volume/dicom/tags.h"
+#include "server/volume/dicom/text.h"
 #include "server/volume/source.h"
 
 namespace isomesh::volume::dicom {

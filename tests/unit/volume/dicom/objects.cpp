@@ -1,4 +1,4 @@
-#include "tests/unit/volume/dicom_objects.h"
+#include "tests/unit/volume/dicom/objects.h"
 
 #include <algorithm>
 #include <stdexcept>
@@ -8,8 +8,8 @@
 #include <gdcmSequenceOfFragments.h>
 #include <zlib.h>
 
-#include "server/volume/dicom.h"
-#include "server/volume/dicom_tags.h"
+#include "server/volume/dicom/import.h"
+#include "server/volume/dicom/tags.h"
 #include "server/volume/text.h"
 
 namespace isomesh::volume::test {

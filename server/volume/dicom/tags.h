@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-#include "server/volume/dicom_dataset.h"
+#include "server/volume/dicom/dataset.h"
 
 namespace isomesh::volume::dicom {
 

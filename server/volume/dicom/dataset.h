@@ -1,7 +1,7 @@
 // The structure of a DICOM file: its elements, checked against the bytes that are there.
 //
 // GDCM's reader allocates whatever a length says and follows sequences as deep as they go, so this
-// is read by ourselves, and GDCM sees only pixel data that has been checked (dicom_decode.h).
+// is read by ourselves, and GDCM sees only pixel data that has been checked (decode.h).
 #pragma once
 
 #include <cstdint>

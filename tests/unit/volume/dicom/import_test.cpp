@@ -1,5 +1,5 @@
 // Series of slices that make a volume: order, geometry and values.
-#include "server/volume/dicom.h"
+#include "server/volume/dicom/import.h"
 
 #include <array>
 #include <cmath>
@@ -10,8 +10,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/volume/dicom_tags.h"
-#include "tests/unit/volume/dicom_objects.h"
+#include "server/volume/dicom/tags.h"
+#include "tests/unit/volume/dicom/objects.h"
 
 namespace isomesh::volume::test {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "proto/error.h"
 #include "proto/types.h"
-#include "server/volume/dicom_image.h"
+#include "server/volume/dicom/image.h"
 
 namespace isomesh::volume::dicom {
 

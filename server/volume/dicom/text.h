@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "server/volume/dicom_dataset.h"
+#include "server/volume/dicom/dataset.h"
 
 namespace isomesh::volume::dicom {
 

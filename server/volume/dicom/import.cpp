@@ -1,4 +1,4 @@
-#include "server/volume/dicom.h"
+#include "server/volume/dicom/import.h"
 
 #include <algorithm>
 #include <cstring>
@@ -7,12 +7,12 @@
 
 #include "proto/error.h"
 #include "server/volume/canonical.h"
-#include "server/volume/dicom_decode.h"
-#include "server/volume/dicom_pixels.h"
-#include "server/volume/dicom_series.h"
-#include "server/volume/dicom_stack.h"
-#include "server/volume/dicom_tags.h"
-#include "server/volume/dicom_values.h"
+#include "server/volume/dicom/decode.h"
+#include "server/volume/dicom/pixels.h"
+#include "server/volume/dicom/series.h"
+#include "server/volume/dicom/stack.h"
+#include "server/volume/dicom/tags.h"
+#include "server/volume/dicom/values.h"
 #include "server/volume/geometry.h"
 #include "server/volume/presets.h"
 #include "server/volume/source.h"

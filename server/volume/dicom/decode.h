@@ -5,7 +5,7 @@
 #include <span>
 #include <string_view>
 
-#include "server/volume/dicom_image.h"
+#include "server/volume/dicom/image.h"
 
 namespace isomesh::volume::dicom {
 

@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/volume/dicom_tags.h"
-#include "tests/unit/volume/dicom_objects.h"
+#include "server/volume/dicom/tags.h"
+#include "tests/unit/volume/dicom/objects.h"
 
 namespace isomesh::volume::test {
 namespace {

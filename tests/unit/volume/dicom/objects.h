@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/volume/dicom_image.h"
+#include "server/volume/dicom/image.h"
 #include "tests/unit/volume/files.h"
 
 namespace isomesh::volume::test {

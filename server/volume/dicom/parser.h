@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "server/volume/dicom_dataset.h"
+#include "server/volume/dicom/dataset.h"
 
 namespace isomesh::volume::dicom {
 

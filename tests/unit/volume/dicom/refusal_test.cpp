@@ -4,9 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/volume/dicom.h"
-#include "server/volume/dicom_tags.h"
-#include "tests/unit/volume/dicom_objects.h"
+#include "server/volume/dicom/import.h"
+#include "server/volume/dicom/tags.h"
+#include "tests/unit/volume/dicom/objects.h"
 
 namespace isomesh::volume::test {
 namespace {

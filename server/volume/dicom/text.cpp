@@ -1,4 +1,4 @@
-#include "server/volume/dicom_text.h"
+#include "server/volume/dicom/text.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 
 #include <iconv.h>
 
-#include "server/volume/dicom_tags.h"
+#include "server/volume/dicom/tags.h"
 
 namespace isomesh::volume::dicom {
 namespace {

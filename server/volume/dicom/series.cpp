@@ -1,11 +1,11 @@
-#include "server/volume/dicom_series.h"
+#include "server/volume/dicom/series.h"
 
 #include <algorithm>
 #include <map>
 
-#include "server/volume/dicom.h"
-#include "server/volume/dicom_tags.h"
-#include "server/volume/dicom_text.h"
+#include "server/volume/dicom/import.h"
+#include "server/volume/dicom/tags.h"
+#include "server/volume/dicom/text.h"
 #include "server/volume/source.h"
 #include "server/volume/text.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/volume/dicom_dataset.h"
+#include "server/volume/dicom/dataset.h"
 #include "server/volume/geometry.h"
 #include "server/volume/samples.h"
 

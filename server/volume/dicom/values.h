@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "proto/types.h"
-#include "server/volume/dicom_stack.h"
+#include "server/volume/dicom/stack.h"
 
 namespace isomesh::volume::dicom {
 

@@ -1,4 +1,4 @@
-#include "server/volume/dicom_stack.h"
+#include "server/volume/dicom/stack.h"
 
 #include <algorithm>
 #include <cmath>
