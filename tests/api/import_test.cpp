@@ -4,10 +4,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include "proto/json.h"
 #include "tests/api/daemon.h"
+#include "tests/support/deflate.h"
 
 namespace isomesh::test {
 namespace {
@@ -81,20 +81,6 @@ std::size_t resident_bytes(pid_t pid) {
   throw std::runtime_error("the daemon's memory is not told");
 }
 
-std::string gzipped(const std::string& bytes) {
-  z_stream stream = {};
-  deflateInit2(&stream, 1, Z_DEFLATED, MAX_WBITS + 16, 8, Z_DEFAULT_STRATEGY);
-  std::string result(deflateBound(&stream, bytes.size()) + 64, '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-  stream.avail_in = static_cast<uInt>(bytes.size());
-  stream.next_out = reinterpret_cast<Bytef*>(result.data());
-  stream.avail_out = static_cast<uInt>(result.size());
-  deflate(&stream, Z_FINISH);
-  result.resize(stream.total_out);
-  deflateEnd(&stream);
-  return result;
-}
-
 TEST(Import, AGreatUploadLeavesLittleInTheDaemon) {
   constexpr std::size_t kMost = std::size_t{24} << 20;
   const std::string samples(std::size_t{96} << 20, '\x07');
@@ -107,7 +93,7 @@ TEST(Import, AGreatUploadLeavesLittleInTheDaemon) {
   const Answer raw = daemon.send("POST", "/v1/volumes?dims=512,512,384&type=uint8", samples);
   EXPECT_EQ(raw.status, 201) << raw.body;
   EXPECT_LT(resident_bytes(daemon.pid()), before + kMost);
-  const Answer packed = daemon.send("POST", "/v1/volumes", gzipped(header + samples));
+  const Answer packed = daemon.send("POST", "/v1/volumes", gzip(header + samples));
   EXPECT_EQ(packed.status, 200) << packed.body;
   EXPECT_LT(resident_bytes(daemon.pid()), before + kMost);
 }

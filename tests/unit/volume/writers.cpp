@@ -1,27 +1,7 @@
 #include "tests/unit/volume/writers.h"
 
-#include <stdexcept>
-
-#include <zlib.h>
-
 namespace isomesh::volume::test {
 namespace {
-
-std::string deflated(std::string_view bytes, int window_bits) {
-  z_stream stream = {};
-  if (deflateInit2(&stream, 6, Z_DEFLATED, window_bits, 8, Z_DEFAULT_STRATEGY) != Z_OK) {
-    throw std::runtime_error("deflateInit2 failed");
-  }
-  std::string result(deflateBound(&stream, bytes.size()) + 32, '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-  stream.avail_in = static_cast<uInt>(bytes.size());
-  stream.next_out = reinterpret_cast<Bytef*>(result.data());
-  stream.avail_out = static_cast<uInt>(result.size());
-  deflate(&stream, Z_FINISH);
-  result.resize(stream.total_out);
-  deflateEnd(&stream);
-  return result;
-}
 
 // Puts numbers into a header at the places that the standard names.
 class Header {
@@ -96,9 +76,6 @@ std::string joined(const Lines& lines, std::string_view separator) {
 }
 
 }  // namespace
-
-std::string gzip(std::string_view bytes) { return deflated(bytes, MAX_WBITS + 16); }
-std::string zlib(std::string_view bytes) { return deflated(bytes, MAX_WBITS); }
 
 std::string nifti(const NiftiFields& fields, std::string_view samples) {
   return (fields.version == 1 ? nifti1_header(fields) : nifti2_header(fields)) +

@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/deflate.h"
+
 namespace isomesh::volume::test {
 
 // The bytes of numbers in either byte order.
@@ -45,8 +47,8 @@ std::vector<Number> some_samples(std::size_t count) {
   return result;
 }
 
-std::string gzip(std::string_view bytes);
-std::string zlib(std::string_view bytes);
+using isomesh::test::gzip;
+using isomesh::test::zlib;
 
 struct NiftiFields {
   int version = 1;

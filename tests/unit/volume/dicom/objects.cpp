@@ -6,11 +6,11 @@
 #include <gdcmImage.h>
 #include <gdcmImageChangeTransferSyntax.h>
 #include <gdcmSequenceOfFragments.h>
-#include <zlib.h>
 
 #include "server/volume/dicom/import.h"
 #include "server/volume/dicom/tags.h"
 #include "server/volume/text.h"
+#include "tests/support/deflate.h"
 
 namespace isomesh::volume::test {
 namespace {
@@ -49,20 +49,6 @@ std::string swapped(std::string bytes, unsigned word) {
                  bytes.begin() + static_cast<std::ptrdiff_t>(at + word));
   }
   return bytes;
-}
-
-std::string raw_deflated(const std::string& bytes) {
-  z_stream stream = {};
-  deflateInit2(&stream, Z_BEST_SPEED, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
-  std::string result(deflateBound(&stream, bytes.size()) + 16, '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-  stream.avail_in = static_cast<uInt>(bytes.size());
-  stream.next_out = reinterpret_cast<Bytef*>(result.data());
-  stream.avail_out = static_cast<uInt>(result.size());
-  deflate(&stream, Z_FINISH);
-  result.resize(stream.total_out);
-  deflateEnd(&stream);
-  return result;
 }
 
 std::string joined(std::initializer_list<double> numbers) {
@@ -165,7 +151,7 @@ std::string DicomObject::file(std::string_view transfer_syntax) const {
   DicomObject meta;
   meta.text(dicom::kTransferSyntaxUid, "UI", transfer_syntax);
   std::string data = data_set(transfer_syntax != kImplicit, transfer_syntax == kBigEndian);
-  if (transfer_syntax == kDeflate) data = raw_deflated(data);
+  if (transfer_syntax == kDeflate) data = isomesh::test::raw_deflate(data);
   return std::string(128, '\0') + "DICM" + meta.data_set(true, false) + data;
 }
 

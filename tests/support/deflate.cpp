@@ -1,0 +1,34 @@
+#include "tests/support/deflate.h"
+
+#include <stdexcept>
+
+#include <zlib.h>
+
+namespace isomesh::test {
+namespace {
+
+// `window_bits` tell zlib what is put around the stream.
+std::string deflated(std::string_view bytes, int window_bits) {
+  z_stream stream = {};
+  if (deflateInit2(&stream, 6, Z_DEFLATED, window_bits, 8, Z_DEFAULT_STRATEGY) != Z_OK) {
+    throw std::runtime_error("deflateInit2 failed");
+  }
+  std::string result(deflateBound(&stream, bytes.size()) + 32, '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = reinterpret_cast<Bytef*>(result.data());
+  stream.avail_out = static_cast<uInt>(result.size());
+  const int end = deflate(&stream, Z_FINISH);
+  result.resize(stream.total_out);
+  deflateEnd(&stream);
+  if (end != Z_STREAM_END) throw std::runtime_error("deflate failed");
+  return result;
+}
+
+}  // namespace
+
+std::string gzip(std::string_view bytes) { return deflated(bytes, MAX_WBITS + 16); }
+std::string zlib(std::string_view bytes) { return deflated(bytes, MAX_WBITS); }
+std::string raw_deflate(std::string_view bytes) { return deflated(bytes, -MAX_WBITS); }
+
+}  // namespace isomesh::test
