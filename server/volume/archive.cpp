@@ -162,6 +162,10 @@ class Unpacker {
 
  private:
   void unpack_one(archive_entry* entry, const std::string& name) {
+    if (base_of(name).empty()) {
+      throw_unusable("The archive is damaged: its member " + std::to_string(entries_) +
+                     " is a file without a name.");
+    }
     if (!names_.insert(name).second) {
       throw_unusable("The archive has the member " + in_quotes(name) + " twice.");
     }

@@ -56,6 +56,7 @@ std::vector<std::string> archive_files() {
   const std::string nhdr = nrrd(with(small_nrrd(), "data file", "a.raw"), "");
   return {zip({{"a.mhd", mhd}, {"a.raw", kSamples}}), tar({{"a.nhdr", nhdr}, {"a.raw", kSamples}}),
           gzip(tar({{"a.nii", nifti({}, kSamples)}})),
+          without_name(tar({{"a.nii", nifti({}, kSamples)}, {"b", "text"}}), "b"),
           zip({{"a.nii.gz", gzip(nifti({}, kSamples))}, {"README", "text"}})};
 }
 

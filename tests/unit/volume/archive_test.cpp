@@ -120,6 +120,14 @@ TEST(Archive, NamesOfMembersAreNoPlaces) {
   }
 }
 
+TEST(Archive, AFileWithoutANameIsRefused) {
+  const std::string file = tar({{"head.nii", nifti({}, kSamples)}, {"notes", "text"}});
+  EXPECT_TRUE(import_bytes(file).imported());
+  const Outcome outcome = import_bytes(without_name(file, "notes"));
+  EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
+  EXPECT_THAT(outcome.error, HasSubstr("member 2 is a file without a name"));
+}
+
 TEST(Archive, LinksDevicesAndHiddenFilesArePassedOver) {
   const Member volume{"head.nii", nifti({}, kSamples)};
   expect_read({volume, {"__MACOSX/head.nii", "junk"}, {".DS_Store", "junk"}}, "nifti");

@@ -1,5 +1,6 @@
 #include "tests/unit/volume/archives.h"
 
+#include <algorithm>
 #include <memory>
 #include <stdexcept>
 
@@ -85,6 +86,20 @@ std::string tar(const std::vector<Member>& members) {
   writer.check(::archive_write_set_format_pax_restricted(writer.handle()));
   ::archive_write_set_bytes_in_last_block(writer.handle(), 1);
   return written(writer, members);
+}
+
+std::string without_name(std::string tar, std::string_view name) {
+  constexpr std::size_t kBlock = 512;
+  for (std::size_t at = 0; at + kBlock <= tar.size(); at += kBlock) {
+    const std::string_view field = std::string_view(tar).substr(at, name.size() + 1);
+    if (field != std::string(name) + '\0') continue;
+    // The field ends before it begins; the sum of its bytes is what it was.
+    const auto first = tar.begin() + static_cast<std::ptrdiff_t>(at);
+    const auto end = first + static_cast<std::ptrdiff_t>(name.size());
+    std::rotate(first, end, end + 1);
+    return tar;
+  }
+  throw std::logic_error("no member has that name");
 }
 
 }  // namespace isomesh::volume::test

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace isomesh::volume::test {
@@ -18,5 +19,8 @@ enum class Locked { kNo, kYes };
 
 std::string zip(const std::vector<Member>& members, Locked locked = Locked::kNo);
 std::string tar(const std::vector<Member>& members);
+
+// A TAR whose member `name` is a file with an empty name, under a checksum that is right.
+std::string without_name(std::string tar, std::string_view name);
 
 }  // namespace isomesh::volume::test
