@@ -84,11 +84,34 @@ std::optional<std::string> field(const std::string& line, char sign, std::string
   return trimmed(line.substr(at + 1));
 }
 
+// The files of a folder that a pattern such as "slice%03d.raw 1 93 1" may mean. Which of them it
+// does the server finds out.
+std::vector<std::string> names_like(const fs::path& folder, std::string_view said) {
+  const std::string_view pattern = said.substr(0, said.find_first_of(" \t"));
+  const std::size_t percent = pattern.find('%');
+  const std::size_t letter = pattern.find_first_not_of("0123456789", percent + 1);
+  if (percent == std::string_view::npos || letter == std::string_view::npos) return {};
+  const std::string_view before = pattern.substr(0, percent);
+  const std::string_view after = pattern.substr(letter + 1);
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::directory_iterator at(folder.empty() ? "." : folder, error);
+       !error && at != fs::directory_iterator(); at.increment(error)) {
+    const std::string name = at->path().filename().string();
+    if (!name.starts_with(before) || !name.ends_with(after)) continue;
+    if (name.size() <= before.size() + after.size()) continue;
+    const auto number = name.substr(before.size(), name.size() - before.size() - after.size());
+    if (number.find_first_not_of(" 0123456789") == std::string::npos) names.push_back(name);
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
 std::vector<PackedFile> header_and_data(const fs::path& path, char sign, std::string_view name) {
   std::vector<PackedFile> files = {{path.filename().string(), path}};
   const auto add = [&](const std::string& data) {
-    // The server follows names, and says so where a header has a path or a pattern.
-    const bool plain = !data.empty() && data.find_first_of("/\\%") == std::string::npos;
+    // The server follows names, and says so where a header has a path.
+    const bool plain = !data.empty() && data.find_first_of("/\\") == std::string::npos;
     if (plain && data != files.front().name) files.push_back({data, path.parent_path() / data});
   };
   const std::vector<std::string> lines = lines_of(path);
@@ -97,6 +120,8 @@ std::vector<PackedFile> header_and_data(const fs::path& path, char sign, std::st
     if (!data || lower(*data) == "local") continue;
     if (data->starts_with("LIST")) {
       for (const auto& line : std::span(lines).subspan(at + 1)) add(line);
+    } else if (data->find('%') != std::string::npos) {
+      for (const auto& like : names_like(path.parent_path(), *data)) add(like);
     } else {
       add(*data);
     }

@@ -20,7 +20,7 @@ struct PackedFile {
 
 // The files that belong to an upload of `path`: of a folder all regular ones below it, sorted by
 // name, without hidden ones and links; of a MetaImage or NRRD header (.mhd, .nhdr) it and the files
-// beside it that it names; of any other file itself.
+// beside it that it names, or that a pattern in it may name; of any other file itself.
 // Throws Error kInvalidParameter for a folder that holds none, or one of more than 20000.
 std::vector<PackedFile> files_of_upload(const std::filesystem::path& path);
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "server/volume/file_pattern.h"
 #include "server/volume/itk_reader.h"
 #include "server/volume/text.h"
 #include "server/volume/units.h"
@@ -91,9 +92,7 @@ bool is_detached(const Fields& fields) { return lower(optional(fields, kLastKey)
 // The files that hold the samples: one, or those in the lines behind the header.
 std::vector<std::string> data_names(const InputFile& file, const Header& header) {
   const std::string_view said = optional(header.fields, kLastKey);
-  if (said.find('%') != std::string_view::npos) {
-    throw_unusable("Its samples are in another file or several, named by a pattern; LIST them.");
-  }
+  if (is_file_pattern(said)) return expand_file_pattern(said);
   if (!said.starts_with("LIST")) return {std::string(said)};
   const std::string text = file.text(header.bytes, kMostHeaderBytes);
   const auto names = lines(text);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/volume/file_pattern.h"
 #include "server/volume/itk_reader.h"
 #include "server/volume/text.h"
 #include "server/volume/units.h"
@@ -276,9 +277,7 @@ std::uint64_t payload_offset(const InputFile& file, const Header& header,
 std::vector<std::string> data_names(const InputFile& file, const Header& header) {
   const std::string_view said = optional(header.fields, kDataFile);
   if (!names_list(header.fields)) {
-    if (said.find('%') != std::string_view::npos) {
-      throw_unusable("Its samples are in another file or several, named by a pattern; LIST them.");
-    }
+    if (is_file_pattern(said)) return expand_file_pattern(said);
     return {std::string(said)};
   }
   const std::string text = file.text(header.bytes, kMostHeaderBytes);

@@ -54,9 +54,13 @@ std::vector<std::string> vti_files() {
 std::vector<std::string> archive_files() {
   const std::string mhd = metaimage(with(small_metaimage(), "ElementDataFile", "a.raw"), "");
   const std::string nhdr = nrrd(with(small_nrrd(), "data file", "a.raw"), "");
-  return {zip({{"a.mhd", mhd}, {"a.raw", kSamples}}), tar({{"a.nhdr", nhdr}, {"a.raw", kSamples}}),
+  return {zip({{"a.mhd", mhd}, {"a.raw", kSamples}}),
+          tar({{"a.nhdr", nhdr}, {"a.raw", kSamples}}),
           gzip(tar({{"a.nii", nifti({}, kSamples)}})),
           without_name(tar({{"a.nii", nifti({}, kSamples)}, {"b", "text"}}), "b"),
+          tar({{"1", kSamples.substr(0, 12)},
+               {"2", kSamples.substr(12)},
+               {"a.mhd", metaimage(with(small_metaimage(), "ElementDataFile", "%01d 1 2 1"), "")}}),
           zip({{"a.nii.gz", gzip(nifti({}, kSamples))}, {"README", "text"}})};
 }
 

@@ -113,9 +113,13 @@ TEST(UploadBody, OfAHeaderTakesItsDataAlong) {
               ElementsAre("h.nhdr", "head.raw"));
   EXPECT_THAT(names("h.nhdr", "NRRD0004\ndatafile: LIST\n1.raw\n2.raw"),
               ElementsAre("h.nhdr", "1.raw", "2.raw"));
+  EXPECT_THAT(names("h.mhd", "ElementDataFile = %d.raw 1 2 1\n"),
+              ElementsAre("h.mhd", "1.raw", "2.raw"));
+  EXPECT_THAT(names("h.nhdr", "NRRD0004\ndata file: 1%02d.raw 1 2 1\n"), ElementsAre("h.nhdr"));
   // The server tells what is wrong with these.
   EXPECT_THAT(names("h.mhd", "ElementDataFile = ../head.raw\n"), ElementsAre("h.mhd"));
   EXPECT_THAT(names("h.mhd", "ElementDataFile = s%d.raw 1 2 1\n"), ElementsAre("h.mhd"));
+  EXPECT_THAT(names("h.mhd", "ElementDataFile = 1% 1 2 1\n"), ElementsAre("h.mhd"));
 }
 
 TEST(UploadBody, DataThatIsNotThereIsNamed) {

@@ -93,6 +93,54 @@ TEST(Archive, DataMayBeEncodedSkippedAndShared) {
   expect_read({halves[0], halves[1], {"h.nhdr", list}}, "nrrd");
 }
 
+// Each slice in a file of its own, as MetaIO and NRRD name them.
+TEST(Archive, DataMayBeNamedByAPattern) {
+  const Member lower{"head-08.raw", kSamples.substr(0, 12)};
+  const Member upper{"head-10.raw", kSamples.substr(12)};
+  const Member between{"head-09.raw", "another"};
+  for (const std::string said : {"head-%02d.raw 8 10 2", "head-%02i.raw 8 11 2"}) {
+    expect_read({upper, between, {"h.mhd", mhd(said)}, lower}, "metaimage");
+    expect_read({upper, between, {"h.nhdr", nhdr(said)}, lower}, "nrrd");
+  }
+  expect_read({upper, lower, {"h.nhdr", nhdr("head-%02u.raw 8 10 2 2")}}, "nrrd");
+  expect_read({{"1", lower.bytes}, {"2", upper.bytes}, {"h.mhd", mhd("%d 1 2")}}, "metaimage");
+  // The other way round.
+  expect_read({{"9.raw", upper.bytes}, {"10.raw", lower.bytes}, {"h.nhdr", nhdr("%d.raw 10 9 -1")}},
+              "nrrd");
+  expect_refused({lower, {"h.mhd", mhd("head-%02d.raw 8 10 2")}},
+                 HasSubstr("\"head-10.raw\", which did not come with it"));
+  expect_refused({lower, upper, between, {"h.mhd", mhd("head-%02d.raw 8 10 1")}},
+                 HasSubstr("has 12 bytes, where the header tells 8"));
+}
+
+TEST(Archive, PatternsOfOtherThingsAreRefused) {
+  for (const std::string said : {"a%02d.raw",
+                                 "a%02d.raw 1",
+                                 "a%02d.raw 1 2 0",
+                                 "a%02d.raw 2 1",
+                                 "a%02d.raw 2 1 5",
+                                 "a%d 1 -9223372036854775808",
+                                 "a%02d.raw 1 2 -1",
+                                 "a%02d.raw 1 x",
+                                 "a%02d.raw -1 1",
+                                 "a%s.raw 1 2",
+                                 "a%n 1 2",
+                                 "a%*d 1 2",
+                                 "a%d%d 1 2",
+                                 "a%d%% 1 2",
+                                 "a% 1 2",
+                                 "a%9 1 2",
+                                 "a%999999999999999999999d 1 2",
+                                 "a%10d 1 2",
+                                 "a%d 1 99999999999",
+                                 "a%d 1 2 3 4 5",
+                                 "b 1%d 2"}) {
+    expect_refused({{"h.mhd", mhd(said)}, {"a01.raw", kSamples}}, HasSubstr("no pattern"));
+  }
+  expect_refused({{"h.mhd", mhd("a%d 0 65536")}}, HasSubstr("names 65537 data files"));
+  expect_refused({{"h.mhd", mhd("../a%d.raw 1 2")}}, HasSubstr("in another file"));
+}
+
 TEST(Archive, DataThatIsNotWhatTheHeaderTellsIsRefused) {
   expect_refused({{"head.mhd", mhd()}, {"head.raw", kSamples + "x"}}, HasSubstr("25 bytes"));
   expect_refused({{"head.nhdr", nhdr()}, {"head.raw", kSamples.substr(1)}}, HasSubstr("23 bytes"));
