@@ -84,28 +84,37 @@ std::string element(unsigned group, unsigned number, const std::string& vr, std:
   return little(group) + little(number) + vr + length + value;
 }
 
-std::string dicom_file(const std::string& syntax) {
-  const auto number = [](std::uint16_t n) { return bytes_of(std::vector{n}); };
+std::string dicom_meta(const std::string& syntax) {
   const std::string meta = element(2, 2, "UI", "1.2.840.10008.5.1.4.1.1.2") +
                            element(2, 3, "UI", "1.2.3.4") + element(2, 0x10, "UI", syntax);
-  return std::string(128, '\0') + "DICM" +
-         element(2, 0, "UL", bytes_of(std::vector{static_cast<std::uint32_t>(meta.size())})) +
-         meta + element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") +
-         element(8, 0x18, "UI", "1.2.3.4") + element(8, 0x60, "CS", "CT") +
-         element(0x10, 0x10, "PN", "A^B") + element(0x20, 0xd, "UI", "1.2") +
-         element(0x20, 0xe, "UI", "1.3") + element(0x20, 0x32, "DS", "0\\0\\0") +
-         element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + element(0x28, 2, "US", number(1)) +
-         element(0x28, 4, "CS", "MONOCHROME2") + element(0x28, 0x10, "US", number(3)) +
-         element(0x28, 0x11, "US", number(4)) + element(0x28, 0x30, "DS", "1\\1") +
-         element(0x28, 0x100, "US", number(16)) + element(0x28, 0x101, "US", number(16)) +
-         element(0x28, 0x102, "US", number(15)) + element(0x28, 0x103, "US", number(1)) +
-         element(0x28, 0x1052, "DS", "-1024") + element(0x28, 0x1053, "DS", "1") +
-         element(0x7fe0, 0x10, "OW", kSamples);
+  return element(2, 0, "UL", bytes_of(std::vector{static_cast<std::uint32_t>(meta.size())})) + meta;
+}
+
+std::string dicom_data() {
+  const auto number = [](std::uint16_t n) { return bytes_of(std::vector{n}); };
+  return element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") + element(8, 0x18, "UI", "1.2.3.4") +
+         element(8, 0x60, "CS", "CT") + element(0x10, 0x10, "PN", "A^B") +
+         element(0x20, 0xd, "UI", "1.2") + element(0x20, 0xe, "UI", "1.3") +
+         element(0x20, 0x32, "DS", "0\\0\\0") + element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") +
+         element(0x28, 2, "US", number(1)) + element(0x28, 4, "CS", "MONOCHROME2") +
+         element(0x28, 0x10, "US", number(3)) + element(0x28, 0x11, "US", number(4)) +
+         element(0x28, 0x30, "DS", "1\\1") + element(0x28, 0x100, "US", number(16)) +
+         element(0x28, 0x101, "US", number(16)) + element(0x28, 0x102, "US", number(15)) +
+         element(0x28, 0x103, "US", number(1)) + element(0x28, 0x1052, "DS", "-1024") +
+         element(0x28, 0x1053, "DS", "1") + element(0x7fe0, 0x10, "OW", kSamples);
+}
+
+std::string dicom_file(const std::string& syntax) {
+  return std::string(128, '\0') + "DICM" + dicom_meta(syntax) + dicom_data();
 }
 
 std::vector<std::string> dicom_files() {
-  return {dicom_file("1.2.840.10008.1.2.1"), dicom_file("1.2.840.10008.1.2.5"),
-          dicom_file("1.2.840.10008.1.2.4.70"), dicom_file("1.2.840.10008.1.2.4.80"),
+  return {dicom_file("1.2.840.10008.1.2.1"),
+          dicom_meta("1.2.840.10008.1.2.1") + dicom_data(),
+          dicom_data(),
+          dicom_file("1.2.840.10008.1.2.5"),
+          dicom_file("1.2.840.10008.1.2.4.70"),
+          dicom_file("1.2.840.10008.1.2.4.80"),
           dicom_file("1.2.840.10008.1.2.4.90")};
 }
 

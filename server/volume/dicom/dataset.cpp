@@ -4,16 +4,23 @@
 #include <array>
 #include <cmath>
 
+#include "server/volume/dicom/beginning.h"
 #include "server/volume/dicom/parser.h"
 #include "server/volume/dicom/tags.h"
 #include "server/volume/gzip.h"
+#include "server/volume/sniff.h"
 #include "server/volume/source.h"
 #include "server/volume/text.h"
 
 namespace isomesh::volume::dicom {
 namespace {
 
-constexpr std::uint64_t kPreambleBytes = 132;
+std::size_t beginning_of(const InputFile& file) {
+  const std::string head = file.text(0, kSniffBytes);
+  const auto beginning = find_beginning(std::as_bytes(std::span(head)));
+  if (!beginning) throw_unusable("The file is no DICOM file.");
+  return *beginning;
+}
 
 void inflate(const InputFile& file, std::uint64_t offset, std::uint64_t limit,
              ScratchFile& scratch) {
@@ -105,7 +112,7 @@ std::optional<std::uint32_t> DataSet::unsigned_number(Tag tag) const {
 
 DicomFile::DicomFile(const std::filesystem::path& path, const std::filesystem::path& scratch,
                      std::uint64_t most_bytes)
-    : file_(path), meta_(parse_meta_information(file_, kPreambleBytes)) {
+    : file_(path), meta_(parse_meta_information(file_, beginning_of(file_))) {
   std::uint64_t begin = meta_.end;
   if (transfer_syntax() == kDeflated) {
     scratch_.emplace(scratch, ".inflated");

@@ -1,12 +1,12 @@
 #include "server/volume/dicom/import.h"
 
 #include <algorithm>
-#include <cstring>
 #include <optional>
 #include <vector>
 
 #include "proto/error.h"
 #include "server/volume/canonical.h"
+#include "server/volume/dicom/beginning.h"
 #include "server/volume/dicom/decode.h"
 #include "server/volume/dicom/pixels.h"
 #include "server/volume/dicom/series.h"
@@ -122,10 +122,7 @@ std::vector<DicomInstance> instances_of(const Stack& stack, std::span<const Sour
 }  // namespace
 }  // namespace dicom
 
-bool is_dicom(std::span<const std::byte> head) {
-  constexpr std::size_t kPreambleBytes = 128;
-  return head.size() >= kPreambleBytes + 4 && std::memcmp(&head[kPreambleBytes], "DICM", 4) == 0;
-}
+bool is_dicom(std::span<const std::byte> head) { return dicom::find_beginning(head).has_value(); }
 
 Volume import_dicom(std::span<const std::filesystem::path> files, const std::string& series,
                     const ImportLimits& limits, const std::filesystem::path& target) {

@@ -11,7 +11,7 @@
 
 namespace isomesh::volume {
 
-// True for bytes that begin a DICOM file (PS3.10): "DICM" behind a preamble of 128 bytes.
+// True for bytes that begin a DICOM file, with a preamble (PS3.10) or without.
 bool is_dicom(std::span<const std::byte> head);
 
 // The one volume that the images among `files` make: of slices in a file each, or of several frames

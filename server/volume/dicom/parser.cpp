@@ -32,16 +32,6 @@ struct Head {
   bool has_undefined_length() const { return length == kUndefinedLength; }
 };
 
-bool is_letter(char letter) { return letter >= 'A' && letter <= 'Z'; }
-
-// Those whose length has 16 bits; all others, and all to come, have 32 after two reserved bytes.
-bool has_short_length(std::string_view vr) {
-  static constexpr std::array<std::string_view, 21> kShort = {
-      "AE", "AS", "AT", "CS", "DA", "DS", "DT", "FD", "FL", "IS", "LO",
-      "LT", "PN", "SH", "SL", "SS", "ST", "TM", "UI", "UL", "US"};
-  return std::find(kShort.begin(), kShort.end(), vr) != kShort.end();
-}
-
 // The sequences that a volume needs; implicit ones do not say that they are sequences.
 bool is_needed_sequence(Tag tag) {
   switch (tag) {
@@ -90,8 +80,7 @@ class Parser {
   // True when the element at the position names its value representation.
   bool looks_explicit() {
     if (end() - at_ < 8) return true;
-    const std::string_view head = window(at_, 8);
-    return is_letter(head[4]) && is_letter(head[5]);
+    return is_representation(window(at_ + 4, 2));
   }
 
   ParsedFile file(const Encoding& encoding) {
@@ -156,7 +145,7 @@ class Parser {
       return head;
     }
     head.vr = window(at_, 2);
-    if (!is_letter(head.vr[0]) || !is_letter(head.vr[1])) {
+    if (!is_representation(head.vr)) {
       throw_unusable("The DICOM file is corrupt: its element " + tag_name(head.tag) +
                      " has no value representation.");
     }
@@ -299,8 +288,19 @@ class Parser {
 
 }  // namespace
 
+bool is_representation(std::string_view text) {
+  const auto is_letter = [](char each) { return each >= 'A' && each <= 'Z'; };
+  return text.size() == 2 && is_letter(text[0]) && is_letter(text[1]);
+}
+
+bool has_short_length(std::string_view vr) {
+  static constexpr std::array<std::string_view, 21> kShort = {
+      "AE", "AS", "AT", "CS", "DA", "DS", "DT", "FD", "FL", "IS", "LO",
+      "LT", "PN", "SH", "SL", "SS", "ST", "TM", "UI", "UL", "US"};
+  return std::find(kShort.begin(), kShort.end(), vr) != kShort.end();
+}
+
 MetaInformation parse_meta_information(const InputFile& file, std::uint64_t offset) {
-  if (file.size() < offset) throw_unusable("The DICOM file is truncated: it ends in its preamble.");
   return Parser(file, offset).meta_information();
 }
 

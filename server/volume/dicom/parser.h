@@ -3,12 +3,20 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "server/volume/dicom/dataset.h"
 
 namespace isomesh::volume::dicom {
 
-// The group 0002, which begins at `offset`. Throws Error kUnusableVolume.
+// True for two capital letters, which is what a value representation (PS3.5, 6.2) is.
+bool is_representation(std::string_view text);
+
+// True for those whose length has 16 bits; all others, and all to come, have 32 after two reserved
+// bytes.
+bool has_short_length(std::string_view vr);
+
+// The group 0002, if it stands at `offset`. Throws Error kUnusableVolume.
 MetaInformation parse_meta_information(const InputFile& file, std::uint64_t offset);
 
 struct ParsedFile {

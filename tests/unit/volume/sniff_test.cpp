@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "server/volume/dicom/tags.h"
+#include "tests/unit/volume/dicom/objects.h"
 #include "tests/unit/volume/writers.h"
 
 namespace isomesh::volume::test {
@@ -30,6 +32,26 @@ TEST(Sniff, KnowsNrrdAndMetaImage) {
 }
 
 TEST(Sniff, KnowsDicom) { EXPECT_EQ(sniffed(std::string(128, '\0') + "DICM"), FileFormat::kDicom); }
+
+TEST(Sniff, KnowsDicomWithoutPreambleByItsFirstElements) {
+  const DicomObject slice = DicomSeries{}.slice(0);
+  for (const std::string_view syntax : {kExplicit, kImplicit}) {
+    EXPECT_EQ(sniffed(slice.bare(syntax)), FileFormat::kDicom) << syntax;
+    EXPECT_EQ(sniffed(slice.file(syntax).substr(132)), FileFormat::kDicom) << syntax;
+    const std::string bare = slice.bare(syntax);
+    for (std::size_t bytes = 0; bytes < 20; ++bytes) {
+      EXPECT_EQ(sniffed(bare.substr(0, bytes)), std::nullopt) << syntax << ' ' << bytes;
+    }
+    DicomObject other = slice;
+    other.text(dicom::kSopClassUid, "UI", "1.2.3");
+    EXPECT_EQ(sniffed(other.bare(syntax)), std::nullopt) << syntax;
+    other.erase(dicom::kSopClassUid);
+    EXPECT_EQ(sniffed(other.bare(syntax)), std::nullopt) << syntax;
+    other = slice;
+    other.text(0x00070010, "LO", "in front");
+    EXPECT_EQ(sniffed(other.bare(syntax)), std::nullopt) << syntax;
+  }
+}
 
 TEST(Sniff, KnowsNothingElse) {
   EXPECT_EQ(sniffed(""), std::nullopt);

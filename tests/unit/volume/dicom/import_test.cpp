@@ -64,6 +64,40 @@ TEST(DicomSeriesImport, SortsByPositionAndKeepsGeometry) {
   EXPECT_TRUE(volume.ignored.empty());
 }
 
+// The series' slices, each as `bytes_of_slice` writes it.
+Outcome import_slices(const DicomSeries& series,
+                      const std::function<std::string(const DicomObject&)>& bytes_of_slice) {
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    files.emplace_back(std::to_string(k), bytes_of_slice(series.slice(k)));
+  }
+  return import_objects(files);
+}
+
+TEST(DicomSeriesImport, ReadsDataSetsAlone) {
+  const DicomSeries series;
+  const std::string expected = import_objects(series.files()).canonical;
+  for (const std::string_view syntax : {kExplicit, kImplicit}) {
+    const Outcome outcome =
+        import_slices(series, [&](const DicomObject& slice) { return slice.bare(syntax); });
+    EXPECT_EQ(outcome.error, "") << syntax;
+    EXPECT_EQ(outcome.canonical, expected) << syntax;
+  }
+}
+
+TEST(DicomSeriesImport, ReadsMetaInformationWithoutPreamble) {
+  constexpr std::size_t kPreambleBytes = 132;
+  const DicomSeries series;
+  const std::string expected = import_objects(series.files()).canonical;
+  for (const std::string_view syntax : {kExplicit, kImplicit, kBigEndian, kDeflate}) {
+    const Outcome outcome = import_slices(series, [&](const DicomObject& slice) {
+      return slice.file(syntax).substr(kPreambleBytes);
+    });
+    EXPECT_EQ(outcome.error, "") << syntax;
+    EXPECT_EQ(outcome.canonical, expected) << syntax;
+  }
+}
+
 TEST(DicomSeriesImport, RunsAlongTheNormalWhateverTheScannersOrder) {
   DicomSeries series;
   series.step = {0, 0, -2.5};

@@ -150,9 +150,12 @@ std::string DicomObject::data_set(bool is_explicit, bool big_endian) const {
 std::string DicomObject::file(std::string_view transfer_syntax) const {
   DicomObject meta;
   meta.text(dicom::kTransferSyntaxUid, "UI", transfer_syntax);
-  std::string data = data_set(transfer_syntax != kImplicit, transfer_syntax == kBigEndian);
-  if (transfer_syntax == kDeflate) data = isomesh::test::raw_deflate(data);
-  return std::string(128, '\0') + "DICM" + meta.data_set(true, false) + data;
+  return std::string(128, '\0') + "DICM" + meta.data_set(true, false) + bare(transfer_syntax);
+}
+
+std::string DicomObject::bare(std::string_view transfer_syntax) const {
+  const std::string data = data_set(transfer_syntax != kImplicit, transfer_syntax == kBigEndian);
+  return transfer_syntax == kDeflate ? isomesh::test::raw_deflate(data) : data;
 }
 
 std::int64_t DicomSeries::stored(std::uint32_t i, std::uint32_t j, std::uint32_t k) const {

@@ -32,6 +32,8 @@ class DicomObject {
 
   // The whole file. Sequences are of undefined length in explicit syntaxes, of defined in others.
   std::string file(std::string_view transfer_syntax = kExplicit) const;
+  // The same without preamble and meta information.
+  std::string bare(std::string_view transfer_syntax = kExplicit) const;
 
  private:
   struct Value {
