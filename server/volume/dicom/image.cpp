@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/volume/dicom/decode.h"
+#include "server/volume/dicom/dose.h"
 #include "server/volume/dicom/tags.h"
 #include "server/volume/dicom/text.h"
 #include "server/volume/source.h"
@@ -258,7 +259,7 @@ Image describe_image(const DicomFile& file) {
   if (data.item(kModalityLutSequence) != nullptr) {
     throw_unusable("The DICOM image gives its samples their values by a table, which is not read.");
   }
-  refuse_unplaced_frames(data, frames);
+  if (!is_dose(data)) refuse_unplaced_frames(data, frames);
   for (std::uint32_t number = 0; number < frames; ++number) {
     const Attributes attributes(data, number);
     const DataSet& values = attributes.place(kPixelValueTransformationSequence);
@@ -266,6 +267,7 @@ Image describe_image(const DicomFile& file) {
     image.frames.push_back(
         {number, plane_of(attributes), rescale_of(values), phases_of(data, attributes)});
   }
+  if (is_dose(data)) place_dose(data, image.frames);
   return image;
 }
 
