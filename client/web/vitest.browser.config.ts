@@ -11,8 +11,8 @@ export default defineConfig({
     include: ['**/browser/**/*.test.ts'],
     fileParallelism: false,
     // Software draws, on machines that have other things to do.
-    expect: { poll: { timeout: 20_000, interval: 100 } },
-    testTimeout: 240_000,
+    expect: { poll: { timeout: 60_000, interval: 100 } },
+    testTimeout: 300_000,
     hookTimeout: 120_000,
   },
 });

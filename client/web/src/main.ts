@@ -106,7 +106,10 @@ async function show(): Promise<void> {
     const view = await place.show(mine, route);
     if (mine.isOver) return;
     main.replaceChildren(view);
-    if (isMove) main.focus({ preventScroll: true });
+    if (isMove) {
+      main.scrollTop = 0;
+      main.focus({ preventScroll: true });
+    }
   } catch (error) {
     if (mine.isOver) return;
     const failure = asApiError(error);

@@ -1,58 +1,38 @@
 // The page as a person uses it: a real volume comes in, its surface goes out.
 import { createHash } from 'node:crypto';
 import { readFileSync } from 'node:fs';
-import type { Browser, Page } from 'playwright-core';
-import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from 'vitest';
+import { beforeAll, describe, expect, it } from 'vitest';
 import {
   ballNrrd,
   brain,
   brainHull,
   contourPixels,
   Daemon,
+  desk,
   drop,
   noiseNrrd,
   openPage,
+  settled,
   silhouette,
-  startBrowser,
+  still,
   surfaceLoaded,
   type JobAnswer,
 } from './support';
 
-let browser: Browser;
-let daemon: Daemon;
-let page: Page;
-let faults: string[];
-
-beforeAll(async () => {
-  browser = await startBrowser();
-  daemon = await Daemon.start();
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await daemon?.remove();
-});
-
-beforeEach(async () => {
-  ({ page, faults } = await openPage(browser, daemon.url));
-});
-
-afterEach(async () => {
-  await page.close();
-  expect(faults).toEqual([]);
-});
+const at = desk();
 
 function query(): URLSearchParams {
-  return new URLSearchParams(new URL(page.url()).hash.split('?')[1] ?? '');
+  return new URLSearchParams(new URL(at.page.url()).hash.split('?')[1] ?? '');
 }
 
 async function job(): Promise<JobAnswer> {
-  const id = /#\/jobs\/([^?]+)/.exec(page.url())?.[1] ?? '';
-  return daemon.json(`/v1/jobs/${id}`);
+  const id = /#\/jobs\/([^?]+)/.exec(at.page.url())?.[1] ?? '';
+  return at.daemon.json(`/v1/jobs/${id}`);
 }
 
 describe('a real volume', () => {
   it('is dropped, looked at, meshed, turned, downloaded, and still there after a reload', async () => {
+    const { daemon, page } = at;
     await page.goto(daemon.url);
     await drop(page, [{ name: 'ch2bet.nii.gz', bytes: readFileSync(brain) }]);
     await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
@@ -65,15 +45,14 @@ describe('a real volume', () => {
     await page.keyboard.press('Shift+ArrowRight');
     await page.keyboard.press('Shift+ArrowRight');
     await expect.poll(() => contourPixels(page, 'axial')).not.toBe(before);
-    const byKeys = Number(query().get('iso'));
+    const byKeys = Number(await settled(() => query().get('iso')));
     const box = await line.boundingBox();
     if (!box) throw new Error('the histogram is not shown');
     await page.mouse.move(box.x + box.width * 0.5, box.y + 30);
     await page.mouse.down();
     await page.mouse.move(box.x + box.width * 0.25, box.y + 30, { steps: 4 });
     await page.mouse.up();
-    const byPointer = Number(query().get('iso'));
-    expect(byPointer).toBeLessThan(byKeys);
+    await expect.poll(() => Number(query().get('iso'))).toBeLessThan(byKeys);
     await page.getByLabel('Iso-value', { exact: true }).nth(0).fill(String(brainHull));
     await expect.poll(() => query().get('iso')).toBe(String(brainHull));
     await expect.poll(() => page.locator('.estimate:not(.stale)').count()).toBe(1);
@@ -88,7 +67,7 @@ describe('a real volume', () => {
 
     // From the front: as wide and high as its bounds say.
     await page.getByRole('button', { name: /^Anterior/ }).click();
-    await page.waitForTimeout(600);
+    await still(page);
     const front = await silhouette(page, page.locator('.viewport'));
     expect(front.part).toBeGreaterThan(0.1);
     expect(front.colours).toBeGreaterThan(50);
@@ -106,10 +85,8 @@ describe('a real volume', () => {
     const fromFront = query().get('cam');
     await page.locator('.viewport canvas').focus();
     for (let i = 0; i < 6; i += 1) await page.keyboard.press('ArrowRight');
-    // It is noted once the camera rests.
-    await page.waitForTimeout(2000);
-    const camera = query().get('cam');
-    expect(camera).not.toBe(fromFront);
+    await expect.poll(() => query().get('cam')).not.toBe(fromFront);
+    const camera = await settled(() => query().get('cam'));
 
     const download = page.waitForEvent('download');
     await page.locator('[data-format=glb]').click();
@@ -132,16 +109,17 @@ describe('a surface', () => {
   let made: JobAnswer;
 
   beforeAll(async () => {
-    ball = await daemon.upload(ballNrrd(48, 18));
-    made = await daemon.submit({ volume: ball, iso: 100, passes: 2, formats: ['glb', 'drc', 'stl'] }, 30);
+    ball = await at.daemon.upload(ballNrrd(48, 18));
+    made = await at.daemon.submit({ volume: ball, iso: 100, passes: 2, formats: ['glb', 'drc', 'stl'] }, 30);
   });
 
   it('of a ball is a disc from every side', async () => {
+    const { daemon, page } = at;
     await page.goto(`${daemon.url}/#/jobs/${made.id}`);
     await surfaceLoaded(page);
     for (const key of ['a', 'l', 's']) {
       await page.keyboard.press(key);
-      await page.waitForTimeout(400);
+      await still(page);
       const disc = await silhouette(page, page.locator('.viewport'));
       expect(disc.filling, key).toBeGreaterThan(Math.PI / 4 - 0.02);
       expect(disc.filling, key).toBeLessThan(Math.PI / 4 + 0.02);
@@ -149,36 +127,53 @@ describe('a surface', () => {
   });
 
   it('is cut in half by the plane, which shows the slice', async () => {
+    const { daemon, page } = at;
     await page.goto(`${daemon.url}/#/jobs/${made.id}`);
     await surfaceLoaded(page);
     await page.keyboard.press('a');
-    await page.waitForTimeout(300);
+    await still(page);
     const whole = await silhouette(page, page.locator('.viewport'));
     const slice = page.waitForResponse(/slice\.png/);
     await page.keyboard.press('c');
     await slice;
-    await page.waitForTimeout(500);
     await page.keyboard.press('s');
-    await page.waitForTimeout(500);
     // From above the slice covers all of the volume, also where the ball is not; some of its greys are
     // those of the background.
-    const above = await silhouette(page, page.locator('.viewport'));
-    expect(above.filling).toBeGreaterThan(0.9);
-    expect(above.part).toBeGreaterThan(whole.part);
+    await expect.poll(async () => (await silhouette(page, page.locator('.viewport'))).filling).toBeGreaterThan(0.9);
+    expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(whole.part);
+    expect(await page.locator('.cut-place').innerText()).toBe('25 / 48');
+
+    // The slice can be measured as well: across the volume, of which the ball is only a part.
+    await page.keyboard.press('m');
+    const view = await page.locator('.viewport').boundingBox();
+    if (!view) throw new Error('there is no viewport');
+    const seen = await silhouette(page, page.locator('.viewport'));
+    const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };
+    const half = (seen.width * view.width) / 2;
+    await page.mouse.click(middle.x - 0.9 * half, middle.y);
+    await page.mouse.click(middle.x + 0.9 * half, middle.y);
+    const label = page.locator('.ruler-labels span');
+    await expect.poll(() => label.count()).toBe(1);
+    const millimetres = Number.parseFloat(await label.innerText());
+    expect(millimetres).toBeGreaterThan(0.9 * 48 * 0.97);
+    expect(millimetres).toBeLessThan(0.9 * 48 * 1.03);
   });
 
   it('is measured in millimetres', async () => {
+    const { daemon, page } = at;
     await page.goto(`${daemon.url}/#/jobs/${made.id}`);
     await surfaceLoaded(page);
     await page.keyboard.press('a');
     await page.keyboard.press('m');
-    await page.waitForTimeout(400);
+    await still(page);
     const view = await page.locator('.viewport').boundingBox();
     if (!view) throw new Error('there is no viewport');
     const disc = await silhouette(page, page.locator('.viewport'));
     // Two points at 0.8 of the radius, left and right of the middle: 1.6 radii apart.
     const radius = (disc.height * view.height) / 2;
     const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };
+    await page.mouse.click(middle.x, view.y + 3);
+    await expect.poll(() => page.locator('.toasts').innerText()).toMatch(/no surface/);
     await page.mouse.click(middle.x - 0.8 * radius, middle.y);
     await page.mouse.click(middle.x + 0.8 * radius, middle.y);
     const label = page.locator('.ruler-labels span');
@@ -189,6 +184,7 @@ describe('a surface', () => {
   });
 
   it('made as Draco alone is shown as well', async () => {
+    const { daemon, page } = at;
     const draco = await daemon.submit({ volume: ball, iso: 100, formats: ['drc'] }, 30);
     await page.goto(`${daemon.url}/#/jobs/${draco.id}`);
     await surfaceLoaded(page);
@@ -196,6 +192,7 @@ describe('a surface', () => {
   });
 
   it('is compared with others by linked cameras', async () => {
+    const { daemon, page } = at;
     await page.goto(`${daemon.url}/#/jobs/${made.id}`);
     await page.getByRole('button', { name: '0, 5 and 10 passes' }).click();
     await page.waitForURL(/#\/compare/);
@@ -210,7 +207,7 @@ describe('a surface', () => {
     await page.mouse.down();
     await page.mouse.move(first.x + 230, first.y + 220, { steps: 4 });
     await page.mouse.up();
-    await page.waitForTimeout(600);
+    await still(page);
     expect(before.equals(await third.screenshot())).toBe(false);
     for (const cell of await page.locator('.cell .viewport').all()) {
       expect((await silhouette(page, cell)).part).toBeGreaterThan(0.05);
@@ -220,6 +217,7 @@ describe('a surface', () => {
 
 describe('a job', () => {
   it('is cancelled while it runs', async () => {
+    const { daemon, page } = at;
     const volume = await daemon.upload(noiseNrrd(96));
     const { id } = await daemon.submit({ volume, iso: 128, passes: 1000, formats: ['glb'] });
     await page.goto(`${daemon.url}/#/jobs/${id}`);
@@ -231,6 +229,7 @@ describe('a job', () => {
   });
 
   it('is shown as lost when nobody answers, and goes on when somebody does', async () => {
+    const { browser, faults } = at;
     const other = await Daemon.start();
     try {
       const volume = await other.upload(ballNrrd(24, 8));
@@ -240,10 +239,10 @@ describe('a job', () => {
       await expect.poll(() => mine.getByRole('heading', { name: 'Jobs' }).count()).toBe(1);
       const { host } = new URL(other.url);
       await other.kill();
-      await expect.poll(() => mine.locator('.banner').isVisible(), { timeout: 15_000 }).toBe(true);
+      await expect.poll(() => mine.locator('.banner').isVisible()).toBe(true);
       const again = await Daemon.start(other.data, host);
       try {
-        await expect.poll(() => mine.locator('.banner').isVisible(), { timeout: 15_000 }).toBe(false);
+        await expect.poll(() => mine.locator('.banner').isVisible()).toBe(false);
         await mine.goto(`${other.url}/#/volumes/${volume}`);
         await expect.poll(() => mine.locator('.slice').count()).toBe(3);
       } finally {
@@ -259,6 +258,7 @@ describe('a job', () => {
 
 describe('the page', () => {
   it('is small, compressed and nobody else can serve or frame it', async () => {
+    const { daemon, page } = at;
     const answer = await fetch(daemon.url);
     const policy = answer.headers.get('content-security-policy') ?? '';
     expect(policy).toContain("default-src 'none'");
@@ -285,6 +285,7 @@ describe('the page', () => {
   });
 
   it('can be used by keyboard, and every control has a name', async () => {
+    const { daemon, page } = at;
     await page.goto(daemon.url);
     await expect.poll(() => page.locator('.drop').count()).toBe(1);
     for (const place of ['', '#/jobs', `#/volumes/${await daemon.upload(ballNrrd(16, 5))}`]) {

@@ -7,7 +7,7 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { encodePng } from './png';
-import { brain, brainHull, Daemon, openPage, silhouette, startBrowser, surfaceLoaded } from './support';
+import { brain, brainHull, contourPixels, Daemon, openPage, silhouette, startBrowser, still, surfaceLoaded } from './support';
 
 const skullProject = '/usr/share/doc/invesalius-examples/examples/Cranium.inv3';
 const mostBytes = 150_000;
@@ -91,8 +91,10 @@ describe('pictures', () => {
     const { page, faults } = await openPage(browser, daemon.url, { viewport: { width: 1120, height: 680 } });
 
     await page.goto(`${daemon.url}/#/volumes/${skull}?iso=250`);
-    await expect.poll(() => page.locator('.estimate dd').count()).toBeGreaterThan(2);
-    await page.waitForTimeout(1500);
+    await expect.poll(() => page.locator('.estimate:not(.stale) dd').count()).toBeGreaterThan(2);
+    for (const plane of ['axial', 'coronal', 'sagittal']) {
+      await expect.poll(() => contourPixels(page, plane)).toBeGreaterThan(100);
+    }
     await take(page, 'iso-value');
 
     // A fresh page each, so that no surface of the last one is taken for the next.
@@ -100,7 +102,6 @@ describe('pictures', () => {
       await page.goto('about:blank');
       await page.goto(`${daemon.url}/#/${place}`);
       await surfaceLoaded(page, surfaces);
-      await page.waitForTimeout(1000);
     };
     const bone = await daemon.submit({ volume: skull, iso: 250, formats: ['glb'] }, 30);
     await show(`jobs/${bone.id}`, 1);
@@ -113,7 +114,8 @@ describe('pictures', () => {
     const slice = page.waitForResponse(/slice\.png/);
     await page.keyboard.press('c');
     await slice;
-    await page.waitForTimeout(1500);
+    await expect.poll(() => page.locator('.viewport[data-slice]').count()).toBe(1);
+    await still(page);
     await take(page, 'cut');
     await page.emulateMedia({ colorScheme: 'light' });
 
@@ -129,7 +131,7 @@ describe('pictures', () => {
 
     await page.goto(daemon.url);
     await expect.poll(() => page.locator('.card').count()).toBe(2);
-    await page.waitForTimeout(1500);
+    await expect.poll(() => page.locator('.thumbnail[data-painted]').count()).toBe(2);
     await take(page, 'volumes');
     expect(faults).toEqual([]);
   }, 400_000);

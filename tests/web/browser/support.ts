@@ -5,7 +5,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { createInterface } from 'node:readline';
 import { chromium, type Browser, type Locator, type Page } from 'playwright-core';
-import { expect } from 'vitest';
+import { afterAll, afterEach, beforeAll, beforeEach, expect } from 'vitest';
 
 // A head in magnetic resonance and its brain alone, of Debian's mricron-data. The brain's hull has a
 // million triangles, which software draws in bearable time.
@@ -104,6 +104,8 @@ export function startBrowser(): Promise<Browser> {
   });
 }
 
+const slowest = 90_000;
+
 export interface OpenPage {
   page: Page;
   // Faults that no test provokes: exceptions, what the content policy blocked, foreign hosts.
@@ -116,6 +118,9 @@ export async function openPage(
   options: Parameters<Browser['newPage']>[0] = {},
 ): Promise<OpenPage> {
   const page = await browser.newPage({ viewport: { width: 1180, height: 760 }, ...options });
+  // A machine with other things to do may take long; what never comes still fails.
+  page.setDefaultTimeout(slowest);
+  page.setDefaultNavigationTimeout(slowest);
   const faults: string[] = [];
   page.on('pageerror', (error) => faults.push(String(error)));
   page.on('console', (message) => {
@@ -126,6 +131,33 @@ export async function openPage(
     if (![origin, 'blob:', 'about:'].some((start) => url.startsWith(start))) faults.push(`asked for ${url}`);
   });
   return { page, faults };
+}
+
+export interface Desk extends OpenPage {
+  browser: Browser;
+  daemon: Daemon;
+}
+
+// A browser and a daemon for the tests of a file, with a fresh page for each of them, that may have no
+// faults. To be taken apart inside of a test.
+export function desk(options: Parameters<Browser['newPage']>[0] = {}): Desk {
+  const made = {} as Desk;
+  beforeAll(async () => {
+    made.browser = await startBrowser();
+    made.daemon = await Daemon.start();
+  });
+  afterAll(async () => {
+    await made.browser?.close();
+    await made.daemon?.remove();
+  });
+  beforeEach(async () => {
+    Object.assign(made, await openPage(made.browser, made.daemon.url, options));
+  });
+  afterEach(async () => {
+    await made.page.close();
+    expect(made.faults).toEqual([]);
+  });
+  return made;
 }
 
 // A ball of that radius in a cube of samples, as NRRD: 100 on its surface, more inside.
@@ -272,7 +304,22 @@ export async function silhouette(page: Page, element: Locator, tolerance = 24): 
 
 // Waits until all parts of the surfaces are there and drawn.
 export async function surfaceLoaded(page: Page, count = 1): Promise<void> {
-  await expect.poll(() => page.locator('.pane[data-loaded]').count(), { timeout: 60_000 }).toBe(count);
+  await expect.poll(() => page.locator('.pane[data-loaded]').count(), { timeout: slowest }).toBe(count);
+  await still(page);
+}
+
+// Waits until the surfaces are drawn as they are to be seen.
+export async function still(page: Page): Promise<void> {
+  await expect.poll(() => page.locator('.viewport:not([data-still])').count(), { timeout: slowest }).toBe(0);
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
-  await page.waitForTimeout(300);
+}
+
+// The value that no longer changes.
+export async function settled<T>(read: () => T | Promise<T>): Promise<T> {
+  const seen: T[] = [];
+  // The interval is longer than the page waits before it notes its place.
+  await expect
+    .poll(async () => seen.push(await read()) > 1 && seen.at(-1) === seen.at(-2), { interval: 1000 })
+    .toBe(true);
+  return seen.at(-1) as T;
 }

@@ -2,46 +2,24 @@
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import type { Browser, Page } from 'playwright-core';
-import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from 'vitest';
+import { describe, expect, it } from 'vitest';
 import {
   ballNrrd,
   brain,
   contourPixels,
   Daemon,
+  desk,
   drop,
   makeToken,
   openPage,
-  startBrowser,
   surfaceLoaded,
 } from './support';
 
-let browser: Browser;
-let daemon: Daemon;
-let page: Page;
-let faults: string[];
-
-beforeAll(async () => {
-  browser = await startBrowser();
-  daemon = await Daemon.start();
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await daemon?.remove();
-});
-
-beforeEach(async () => {
-  ({ page, faults } = await openPage(browser, daemon.url));
-});
-
-afterEach(async () => {
-  await page.close();
-  expect(faults).toEqual([]);
-});
+const at = desk();
 
 describe('several files', () => {
   it('are packed in the browser and come as one volume', async () => {
+    const { daemon, page } = at;
     await page.goto(daemon.url);
     const header = [
       'ObjectType = Image',
@@ -61,6 +39,7 @@ describe('several files', () => {
   });
 
   it('of more than one series let a person choose', async () => {
+    const { daemon, page } = at;
     // The daemon's own tests hold real series; here it matters what the page does with the refusal.
     const asked: string[] = [];
     await page.route('**/v1/volumes*', async (route) => {
@@ -95,6 +74,7 @@ describe('several files', () => {
 
 describe('a server with tokens', () => {
   it('is entered with one, and with none but one', async () => {
+    const { browser } = at;
     const folder = mkdtempSync(join(tmpdir(), 'isomesh-tokens-'));
     const file = join(folder, 'tokens');
     const token = makeToken(file);
@@ -134,6 +114,7 @@ describe('a server with tokens', () => {
 
 describe('a refused file', () => {
   it('says why, and what to do next', async () => {
+    const { daemon, page } = at;
     await page.goto(daemon.url);
     const whole = readFileSync(brain);
     await drop(page, [{ name: 'half.nii.gz', bytes: whole.subarray(0, whole.length / 2) }]);
@@ -144,6 +125,7 @@ describe('a refused file', () => {
   });
 
   it('that holds raw samples is taken with a description', async () => {
+    const { daemon, page } = at;
     await page.goto(daemon.url);
     await drop(page, [{ name: 'samples.raw', bytes: ballNrrd(20, 7).subarray(-8000) }]);
     const submit = page.getByRole('button', { name: 'Upload as raw samples' });

@@ -71,9 +71,9 @@ export function adviceFor(error: ApiError): string {
     case 413:
       return 'Crop or resample it, or ask the administrator to raise the limit.';
     case 415:
-      return 'NIfTI, NRRD, MetaImage and DICOM are read; raw samples need a description.';
+      return 'NIfTI, NRRD, MetaImage, VTK images and DICOM are read; raw samples need a description.';
     case 422:
-      return 'Export it again from its source, or choose another series.';
+      return 'Export it again from its source, or choose another one.';
     case 429:
     case 503:
       return 'The server is busy; try again in a moment.';
@@ -82,6 +82,11 @@ export function adviceFor(error: ApiError): string {
     default:
       return '';
   }
+}
+
+// Whether the same request may be taken another time.
+export function mayPass({ status }: ApiError): boolean {
+  return ![400, 413, 415, 422].includes(status);
 }
 
 // The series that a refusal offers to choose from.

@@ -10,7 +10,9 @@ import {
   SRGBColorSpace,
   Texture,
   Vector3,
+  type Intersection,
   type Object3D,
+  type Raycaster,
 } from 'three';
 import type { Axis } from '../api/client';
 import type { Volume } from '../api/types';
@@ -67,6 +69,7 @@ export class Cut {
       positions.setXYZ(corner, ...toPatient(volume, at));
     });
     positions.needsUpdate = true;
+    this.geometry.computeBoundingSphere();
     // Across the slice, which in a tilted volume is not where its third axis points.
     const along = new Vector3(...axisDirection(volume, across));
     const normal = new Vector3(...axisDirection(volume, first))
@@ -88,6 +91,11 @@ export class Cut {
     this.material.map = picture ? this.texture : null;
     this.material.needsUpdate = true;
     this.quad.visible = picture !== null;
+  }
+
+  // Where the ray meets the slice that is shown.
+  hit(ray: Raycaster): Intersection | null {
+    return this.quad.visible ? (ray.intersectObject(this.quad)[0] ?? null) : null;
   }
 
   dispose(): void {

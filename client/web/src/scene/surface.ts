@@ -22,7 +22,9 @@ import { Seams } from '../mesh/seams';
 import { OrientationCube } from './cube';
 import { Cut } from './cut';
 import { FrameBudget } from './budget';
+import { firstHit, keptBy, wholeRay } from './pick';
 import { Rulers } from './rulers';
+import { onTap } from './tap';
 import { firstOffset, fitDistance, turned, viewOffsets, type CameraPlace, type ViewName } from './views';
 
 export interface SurfaceStyle {
@@ -50,7 +52,8 @@ export class Surface {
   readonly cut: Cut;
   readonly budget = new FrameBudget();
   onCamera: (() => void) | null = null;
-  onPick: ((point: Vec3) => void) | null = null;
+  // A click or tap; null where nothing is.
+  onPick: ((point: Vec3 | null) => void) | null = null;
 
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
@@ -77,7 +80,6 @@ export class Surface {
   private isMoving = false;
   private isCoarse = false;
   private isDisposed = false;
-  private press: { x: number; y: number } | null = null;
 
   constructor(private readonly host: HTMLElement) {
     this.renderer = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' });
@@ -103,8 +105,7 @@ export class Surface {
     this.controls.addEventListener('start', () => this.beginMove());
     this.controls.addEventListener('end', () => this.endMove());
     this.controls.addEventListener('change', () => this.cameraChanged());
-    this.canvas.addEventListener('pointerdown', (event) => this.pressed(event));
-    this.canvas.addEventListener('pointerup', (event) => this.released(event));
+    onTap(this.canvas, (event) => this.tapped(event));
     this.canvas.addEventListener('webglcontextrestored', () => this.draw());
 
     this.resizing = new ResizeObserver(() => this.resize());
@@ -132,6 +133,7 @@ export class Surface {
       };
       const fine = geometry(block.index);
       const coarse = geometry(block.coarse);
+      fine.computeBoundingBox();
       fine.computeBoundingSphere();
       coarse.boundingSphere = fine.boundingSphere;
       const mesh = new Mesh(this.isCoarse ? coarse : fine, this.material);
@@ -226,6 +228,7 @@ export class Surface {
   // Asks for a frame.
   draw(): void {
     if (this.scheduled !== 0 || this.isDisposed) return;
+    delete this.host.dataset.still;
     this.scheduled = requestAnimationFrame(() => {
       this.scheduled = 0;
       this.render();
@@ -288,6 +291,8 @@ export class Surface {
     this.rulers.placeLabels(this.camera, width, height);
     this.budget.drawn(began, this.isMoving);
     if (this.isMoving && this.budget.isSlow) this.setCoarse(true);
+    // What is seen is all of it, and nothing is to be drawn any more.
+    if (!this.isMoving && !this.isCoarse && this.scheduled === 0) this.host.dataset.still = '';
   }
 
   private resize(): void {
@@ -369,15 +374,7 @@ export class Surface {
     requestAnimationFrame(() => this.joinSeams(next));
   }
 
-  private pressed(event: PointerEvent): void {
-    this.press = { x: event.clientX, y: event.clientY };
-  }
-
-  // A click is a press that was let go where it began.
-  private released(event: PointerEvent): void {
-    const press = this.press;
-    this.press = null;
-    if (!press || Math.hypot(event.clientX - press.x, event.clientY - press.y) > 4) return;
+  private tapped(event: PointerEvent): void {
     const box = this.canvas.getBoundingClientRect();
     const x = event.clientX - box.left;
     const y = event.clientY - box.top;
@@ -386,18 +383,26 @@ export class Surface {
       this.look(face);
       return;
     }
-    if (!this.onPick) return;
-    const point = this.pointAt((2 * x) / box.width - 1, 1 - (2 * y) / box.height);
-    if (point) this.onPick(point);
+    if (this.onPick) this.onPick(this.pointAt((2 * x) / box.width - 1, 1 - (2 * y) / box.height));
   }
 
-  // The nearest point of the surface that is seen there.
+  // The nearest point of the surface, or of the slice on its cut, that is seen there.
   private pointAt(x: number, y: number): Vec3 | null {
     this.setCoarse(false);
     this.ray.setFromCamera(new Vector2(x, y), this.camera);
-    const planes = this.material.clippingPlanes ?? [];
-    const hits = this.ray.intersectObjects(this.blocks.map(({ mesh }) => mesh));
-    const hit = hits.find(({ point }) => planes.every((plane) => plane.distanceToPoint(point) >= 0));
-    return hit ? [hit.point.x, hit.point.y, hit.point.z] : null;
+    const { ray } = this.ray;
+    const [plane] = this.material.clippingPlanes ?? [];
+    const { from, to } = plane ? keptBy(plane, ray) : wholeRay;
+    const slice = this.cut.hit(this.ray)?.distance ?? Infinity;
+    const end = Math.min(to, slice);
+    let nearest = end;
+    for (const { fine } of this.blocks) {
+      if (!fine.index || !fine.boundingBox || !ray.intersectsBox(fine.boundingBox)) continue;
+      nearest = firstHit(fine.getAttribute('position').array, fine.index.array, ray, { from, to: nearest });
+    }
+    const found = nearest < end ? nearest : slice;
+    if (found === Infinity) return null;
+    const point = ray.at(found, new Vector3());
+    return [point.x, point.y, point.z];
   }
 }

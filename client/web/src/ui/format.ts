@@ -75,5 +75,6 @@ export const formatNames: Record<string, string> = {
   nrrd: 'NRRD',
   metaimage: 'MetaImage',
   raw: 'Raw samples',
+  vti: 'VTK',
   dicom: 'DICOM',
 };

@@ -35,13 +35,39 @@ export function currentRoute(): Route {
 }
 
 export function go(path: readonly string[], query?: URLSearchParams): void {
+  writePending();
   window.location.hash = hashOf(path, query);
 }
 
-// Notes values in the address without leaving the view; empty values are taken out.
+// Browsers let a page change its address only so often (Safari a hundred times in half a minute).
+const noteEvery = 400;
+let pending: { path: string; values: Record<string, string> } | null = null;
+let noteTimer = 0;
+
+// Notes values in the address without leaving the view; empty values are taken out. The first of
+// several is there at once, the last soon.
 export function noteInAddress(values: Record<string, string>): void {
+  const path = currentRoute().path.join('/');
+  pending = { path, values: { ...(pending?.path === path ? pending.values : {}), ...values } };
+  if (noteTimer === 0) writeAgain();
+}
+
+function writeAgain(): void {
+  if (pending) {
+    writePending();
+    noteTimer = window.setTimeout(writeAgain, noteEvery);
+  } else {
+    noteTimer = 0;
+  }
+}
+
+function writePending(): void {
+  const noted = pending;
+  pending = null;
   const { path, query } = currentRoute();
-  for (const [name, value] of Object.entries(values)) {
+  // The person went somewhere else meanwhile.
+  if (noted?.path !== path.join('/')) return;
+  for (const [name, value] of Object.entries(noted.values)) {
     if (value === '') query.delete(name);
     else query.set(name, value);
   }

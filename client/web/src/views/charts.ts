@@ -74,7 +74,11 @@ export function distributionChart(
     });
     return `M0 ${height}${points.join('')}L${width} ${height}Z`;
   };
-  const mean = (value: Distribution): string => `${formatNumber(value.mean, most > 1 ? 1 : 3)}${unit}`;
+  const digits = most > 1 ? 1 : 3;
+  const said = (value: number): string => {
+    const isTiny = value > 0 && value < 10 ** -digits;
+    return `${isTiny ? `< ${10 ** -digits}` : formatNumber(value, digits)}${unit}`;
+  };
   return h(
     'figure',
     { class: 'distribution' },
@@ -83,7 +87,7 @@ export function distributionChart(
       {
         viewBox: `0 0 ${width} ${height}`,
         role: 'img',
-        'aria-label': `${title}: mean ${mean(extracted)} before and ${mean(smoothed)} after smoothing`,
+        'aria-label': `${title}: mean ${said(extracted.mean)} before and ${said(smoothed.mean)} after smoothing`,
       },
       svg('path', { class: 'after', d: outline(smoothed) }),
       svg('path', { class: 'before', d: outline(extracted) }),
@@ -93,7 +97,7 @@ export function distributionChart(
       'figcaption',
       {},
       h('b', {}, title),
-      ` mean ${mean(extracted)} \u2192 ${mean(smoothed)}, least ${formatNumber(smoothed.min, most > 1 ? 1 : 3)}${unit}`,
+      ` mean ${said(extracted.mean)} \u2192 ${said(smoothed.mean)}, least ${said(smoothed.min)}`,
     ),
   );
 }

@@ -9,6 +9,7 @@ import { formatCount, formatMilliseconds, formatNumber, formatValue } from '../u
 import { refusal } from '../ui/notices';
 import { hashOf, noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
+import { volumeName } from '../volume/names';
 import { SurfacePane } from './surface_pane';
 
 const most = 4;
@@ -46,7 +47,7 @@ function numbersOf(job: Job): HTMLElement {
     ['Time', formatMilliseconds((job.timing.total ?? 0) - (job.timing.queue ?? 0))],
   ];
   const angle = mesh.quality?.smallest_angle_deg?.smoothed;
-  if (angle) rows.push(['Smallest angle', `${formatNumber(angle.mean, 1)}\u00b0 in the mean`]);
+  if (angle) rows.push(['Mean smallest angle', `${formatNumber(angle.mean, 1)}\u00b0`]);
   return h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
 }
 
@@ -64,6 +65,7 @@ export async function compareView(scope: Scope, route: Route): Promise<HTMLEleme
   const titles = differences(jobs);
   const [first] = jobs;
   const volume = first ? await getVolume(first.volume).catch(() => null) : null;
+  const isOneVolume = jobs.every((job) => job.volume === volume?.id);
   const camera = placeOfText(route.query.get('cam') ?? '');
   const panes: SurfacePane[] = [];
   let noting = 0;
@@ -146,7 +148,7 @@ export async function compareView(scope: Scope, route: Route): Promise<HTMLEleme
     h(
       'div',
       { class: 'section-head' },
-      h('h1', {}, 'Compare'),
+      h('h1', { title: volume ? volumeName(volume) : '' }, volume && isOneVolume ? `Compare, ${volumeName(volume)}` : 'Compare'),
       h(
         'div',
         { class: 'tool-group', role: 'toolbar', 'aria-label': 'View of all' },

@@ -121,7 +121,7 @@ export class HistogramView {
       this.onIso(this.rounded(this.low + part * (this.high - this.low)));
     };
     scope.listen(thumb, 'pointerdown', (event: PointerEvent) => {
-      if (event.button !== 0) return;
+      if (event.button !== 0 || !event.isPrimary) return;
       thumb.setPointerCapture(event.pointerId);
       thumb.focus();
       take(event);

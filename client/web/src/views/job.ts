@@ -9,6 +9,7 @@ import { formatValue, shortId } from '../ui/format';
 import { refusal, tellError } from '../ui/notices';
 import { noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
+import { volumeName } from '../volume/names';
 import { inWords } from '../volume/parameters';
 import { againSection, changeLink, compareSection, downloads, numbers, quality, section, timings } from './job_panel';
 import { SurfacePane } from './surface_pane';
@@ -30,16 +31,17 @@ function isoText(job: Job): string {
   return job.parameters.iso === 'otsu' ? 'Otsu' : formatValue(job.parameters.iso);
 }
 
-function head(job: Job): HTMLElement {
+function head(job: Job, volume: Volume | null): HTMLElement {
   return h(
     'header',
     { class: 'panel-head' },
     h('h1', {}, `Surface at ${isoText(job)}`),
+    h('p', { class: 'of-volume' }, volume ? volumeName(volume) : 'Its volume was erased'),
     h('p', {}, inWords(job.parameters)),
     h(
       'p',
       { class: 'links' },
-      h('a', { href: changeLink(job) }, 'Change parameters'),
+      volume && h('a', { href: changeLink(job) }, 'Change parameters'),
       h('span', { class: 'faint' }, `job ${shortId(job.id)}`),
     ),
   );
@@ -98,7 +100,7 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
   const showEnd = (job: Job): void => {
     element.dataset.state = job.state;
     if (job.state === 'succeeded' && job.mesh) showSurface(scope, route, job, volume, stageArea, panel);
-    else showFailure(job, stageArea, panel);
+    else showFailure(job, volume, stageArea, panel);
   };
   if (isFinal(first.state)) {
     showEnd(first);
@@ -108,7 +110,7 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
   const progress = new ProgressPanel(first.id);
   progress.show(first);
   stageArea.append(h('div', { class: 'waiting' }, h('p', {}, 'The surface appears here when it is made.')));
-  panel.append(head(first), progress.element);
+  panel.append(head(first, volume), progress.element);
   follow(first.id, scope.signal, (job) => {
     element.dataset.state = job.state;
     progress.show(job);
@@ -117,19 +119,19 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
       if (!scope.isOver) showEnd(job);
     },
     (error: unknown) => {
-      if (!scope.isOver) panel.replaceChildren(head(first), refusal(asApiError(error)));
+      if (!scope.isOver) panel.replaceChildren(head(first, volume), refusal(asApiError(error)));
     },
   );
   return element;
 }
 
-function showFailure(job: Job, stageArea: HTMLElement, panel: HTMLElement): void {
+function showFailure(job: Job, volume: Volume | null, stageArea: HTMLElement, panel: HTMLElement): void {
   const change = h('a', { href: changeLink(job), class: 'button primary' }, 'Change parameters');
   const body = job.error
     ? refusal(errorOfProblem(job.error), change)
     : h('div', { class: 'refusal' }, h('h3', {}, 'Cancelled'), h('p', {}, 'The job was cancelled and made no surface.'), h('div', { class: 'actions' }, change));
   stageArea.replaceChildren(h('div', { class: 'waiting' }, body));
-  panel.replaceChildren(head(job), timings(job));
+  panel.replaceChildren(head(job, volume), timings(job));
 }
 
 function showSurface(
@@ -154,7 +156,7 @@ function showSurface(
   const times = timings(job);
   panel.replaceChildren(
     ...[
-      head(job),
+      head(job, volume),
       section('Numbers', numbers(mesh)),
       times,
       downloads(job),

@@ -1,5 +1,5 @@
 // The parameters of a job beside its iso-value.
-import { meshFormats, type JobParameters, type MeshFormat, type Priority } from '../api/types';
+import { meshFormats, type JobParameters, type MeshFormat } from '../api/types';
 import { checkbox, field, h, segmented } from '../ui/dom';
 import { formatNames } from '../ui/format';
 import { withGlb } from '../volume/parameters';
@@ -66,6 +66,18 @@ export function parameterForm(parameters: JobParameters, onChange: (change: Chan
     components = { ...components, ...change };
     onChange({ components });
   };
+  // The labels and titles of what the job's member of that name may be.
+  const choice = <Member extends 'interpolation' | 'smoothing' | 'priority'>(
+    member: Member,
+    label: string,
+    texts: Record<JobParameters[Member], [label: string, title: string]>,
+  ): HTMLElement =>
+    segmented(
+      label,
+      Object.entries<[string, string]>(texts).map(([value, [text, title]]) => ({ value, label: text, title })),
+      parameters[member],
+      (value) => onChange({ [member]: value }),
+    );
   return h(
     'div',
     { class: 'parameters' },
@@ -81,43 +93,28 @@ export function parameterForm(parameters: JobParameters, onChange: (change: Chan
         String(parameters.scheme) as '5' | '6',
         (value) => onChange({ scheme: value === '5' ? 5 : 6 }),
       ),
-      segmented(
-        'Vertices on edges',
-        [
-          { value: 'linear', label: 'Linear', title: 'Where the iso-value lies between two samples' },
-          { value: 'midpoint', label: 'Midpoint', title: 'Half-way between two samples' },
-        ],
-        parameters.interpolation,
-        (interpolation) => onChange({ interpolation }),
-      ),
+      choice('interpolation', 'Vertices on edges', {
+        linear: ['Linear', 'Where the iso-value lies between two samples'],
+        midpoint: ['Midpoint', 'Half-way between two samples'],
+      }),
     ),
     h(
       'div',
       { class: 'pair uneven' },
-      segmented(
-        'Smoothing',
-        [
-          { value: 'laplacian', label: 'Laplacian', title: 'Shrinks a little with every pass' },
-          { value: 'taubin', label: 'Taubin', title: 'Keeps the enclosed volume' },
-        ],
-        parameters.smoothing,
-        (smoothing) => onChange({ smoothing }),
-      ),
+      choice('smoothing', 'Smoothing', {
+        laplacian: ['Laplacian', 'Shrinks a little with every pass'],
+        taubin: ['Taubin', 'Keeps the enclosed volume'],
+      }),
       field(
         'Passes',
         numberInput(parameters.passes, { min: 0, max: 1000, step: 1 }, (passes) => onChange({ passes })),
       ),
     ),
-    segmented(
-      'Priority',
-      [
-        { value: 'stat', label: 'Stat', title: 'Before all others' },
-        { value: 'routine', label: 'Routine' },
-        { value: 'bulk', label: 'Bulk', title: 'When nothing else waits' },
-      ],
-      parameters.priority,
-      (priority: Priority) => onChange({ priority }),
-    ),
+    choice('priority', 'Priority', {
+      stat: ['Stat', 'Before all others'],
+      routine: ['Routine', 'After all that are stat'],
+      bulk: ['Bulk', 'When nothing else waits'],
+    }),
     h(
       'details',
       { class: 'more' },

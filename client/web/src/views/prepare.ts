@@ -168,9 +168,11 @@ class Prepare {
             'ul',
             {},
             h('li', {}, h('b', {}, 'Drag'), ' in a slice: window and level'),
-            h('li', {}, h('b', {}, 'Wheel'), ' or arrow keys: next slice'),
-            h('li', {}, h('b', {}, 'Click'), ': the other slices go there'),
-            h('li', {}, h('b', {}, 'Line in the histogram'), ': the iso-value; arrow keys move it too'),
+            h('li', { class: 'by-mouse' }, h('b', {}, 'Wheel'), ' or arrow keys: next slice'),
+            h('li', { class: 'by-mouse' }, h('b', {}, 'Click'), ': the other slices go there'),
+            h('li', { class: 'by-touch' }, h('b', {}, 'Slider'), ' below it: next slice'),
+            h('li', { class: 'by-touch' }, h('b', {}, 'Tap'), ': the other slices go there'),
+            h('li', {}, h('b', {}, 'Line in the histogram'), ': the iso-value', h('span', { class: 'by-mouse' }, '; arrow keys move it too')),
           ),
           h(
             'div',
@@ -206,7 +208,7 @@ class Prepare {
         }),
         this.estimate,
         this.problem,
-        h('div', { class: 'run' }, this.run, h('span', { class: 'hint' }, 'Ctrl + Enter')),
+        h('div', { class: 'run' }, this.run, h('span', { class: 'hint by-mouse' }, 'Ctrl + Enter')),
       ),
     );
   }

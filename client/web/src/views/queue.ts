@@ -1,11 +1,12 @@
 // All jobs: what waits in which order, what runs, what is done. #/jobs
-import { cancelJob, listJobs } from '../api/client';
-import { isFinal, priorities, type Job } from '../api/types';
+import { cancelJob, listJobs, listVolumes } from '../api/client';
+import { isFinal, priorities, type Job, type Volume } from '../api/types';
 import { button, h } from '../ui/dom';
 import { formatCount, formatMilliseconds, formatTime, formatValue, shortId } from '../ui/format';
 import { tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
+import { nameIn } from '../volume/names';
 import { inWords } from '../volume/parameters';
 
 const refreshEvery = 1500;
@@ -46,6 +47,9 @@ export async function queueView(scope: Scope): Promise<HTMLElement> {
   const more = button('Older jobs', () => void showMore().catch(tellError), { hidden: true });
   let jobs: Job[] = [];
   let next: string | null = null;
+  let volumes = new Map<string, Volume>();
+  // Those that were asked for already: what is gone is not asked for again.
+  const asked = new Set<string>();
 
   const choose = (id: string, isOn: boolean): void => {
     if (isOn) chosen.add(id);
@@ -85,6 +89,7 @@ export async function queueView(scope: Scope): Promise<HTMLElement> {
           `iso ${job.parameters.iso === 'otsu' ? 'Otsu' : formatValue(job.parameters.iso)}`,
         ),
         h('span', { class: 'faint' }, ` ${inWords(job.parameters)}`),
+        h('span', { class: 'of-volume' }, nameIn(volumes, job.volume)),
       ),
       cell(progressOf(job)),
       cell(isFinal(job.state) && job.timing.total ? formatMilliseconds(job.timing.total) : ''),
@@ -129,12 +134,20 @@ export async function queueView(scope: Scope): Promise<HTMLElement> {
     }
   };
 
+  const findVolumes = async (): Promise<void> => {
+    const unknown = jobs.filter((job) => !volumes.has(job.volume) && !asked.has(job.volume));
+    if (unknown.length === 0) return;
+    volumes = new Map((await listVolumes()).map((volume) => [volume.id, volume]));
+    for (const job of unknown) asked.add(job.volume);
+  };
+
   const refresh = async (): Promise<void> => {
     const page = await listJobs();
     const newest = new Set(page.jobs.map((job) => job.id));
     const older = jobs.filter((job) => !newest.has(job.id) && job.id < (page.jobs.at(-1)?.id ?? ''));
     if (older.length === 0) next = page.next;
     jobs = [...page.jobs, ...older];
+    await findVolumes();
     show();
   };
   const showMore = async (): Promise<void> => {
@@ -142,6 +155,7 @@ export async function queueView(scope: Scope): Promise<HTMLElement> {
     const page = await listJobs(next);
     jobs = [...jobs, ...page.jobs];
     next = page.next;
+    await findVolumes();
     show();
   };
 

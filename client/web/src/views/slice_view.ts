@@ -243,22 +243,34 @@ export class SliceView {
   }
 
   private listen(): void {
-    let press: { x: number; y: number; window: Window; moved: boolean } | null = null;
+    let press: { pointer: number; x: number; y: number; window: Window; moved: boolean } | null = null;
     const { canvas, scope } = this;
     scope.listen(canvas, 'pointerdown', (event: PointerEvent) => {
       if (event.button !== 0 && event.button !== 2) return;
+      if (!event.isPrimary) {
+        // A second finger: a pinch, or the palm.
+        press = null;
+        return;
+      }
       canvas.setPointerCapture(event.pointerId);
-      press = { x: event.clientX, y: event.clientY, window: this.host.state().window, moved: false };
+      press = {
+        pointer: event.pointerId,
+        x: event.clientX,
+        y: event.clientY,
+        window: this.host.state().window,
+        moved: false,
+      };
     });
     scope.listen(canvas, 'pointermove', (event: PointerEvent) => {
-      if (!press) return;
+      if (press?.pointer !== event.pointerId) return;
       const dx = event.clientX - press.x;
       const dy = event.clientY - press.y;
-      press.moved ||= Math.hypot(dx, dy) > 3;
+      press.moved ||= Math.hypot(dx, dy) > (event.pointerType === 'mouse' ? 3 : 10);
       if (press.moved) this.host.setWindow(draggedWindow(press.window, dx, dy));
     });
     scope.listen(canvas, 'pointerup', (event: PointerEvent) => {
-      const cursor = press && !press.moved ? this.sampleAt(event) : null;
+      if (press?.pointer !== event.pointerId) return;
+      const cursor = press.moved ? null : this.sampleAt(event);
       press = null;
       if (cursor) this.host.setCursor(cursor);
     });

@@ -168,11 +168,15 @@ export class SurfacePane {
   private prepareSurface(surface: Surface): void {
     surface.canvas.setAttribute(
       'aria-label',
-      'The surface. Drag or use the arrow keys to turn it, shift and arrow keys to move it, plus and minus to zoom.',
+      'The surface. Drag or use the arrow keys to turn it, shift and arrow keys to move it, plus and minus to zoom. Two fingers move and zoom it.',
     );
     surface.onCamera = () => this.onCamera?.(surface.place);
     surface.onPick = (point) => {
       if (!this.isMeasuring) return;
+      if (!point) {
+        tell('There is no surface at that place.');
+        return;
+      }
       const ruler = surface.rulers.add(point);
       surface.draw();
       this.announcement.textContent = ruler
@@ -250,7 +254,7 @@ export class SurfacePane {
     this.isMeasuring = !this.isMeasuring;
     this.press('measure', this.isMeasuring);
     this.view.classList.toggle('measuring', this.isMeasuring);
-    if (this.isMeasuring) tell('Click two points of the surface. Esc takes the last one back.');
+    if (this.isMeasuring) tell('Click or tap two points, of the surface or of the slice on its cut. Esc takes the last one back.');
   }
 
   private toggleCut(): void {
@@ -263,6 +267,7 @@ export class SurfacePane {
     if (!this.cut.isOn) {
       this.pictureWanted = '';
       this.surface.cut.show(null);
+      delete this.view.dataset.slice;
       return;
     }
     this.showCutControls(volume);
@@ -278,8 +283,11 @@ export class SurfacePane {
       'aria-label': 'Slice of the cut',
     });
     slider.value = String(this.cut.index);
+    const count = volume.dims[axisIndex(this.cut.axis)];
+    const place = h('span', { class: 'cut-place' }, `${this.cut.index + 1} / ${count}`);
     slider.addEventListener('input', () => {
       this.cut.index = slider.valueAsNumber;
+      place.textContent = `${this.cut.index + 1} / ${count}`;
       this.placeCut();
     });
     const choice = h(
@@ -299,7 +307,7 @@ export class SurfacePane {
       this.cut.flipped = flipped;
       this.placeCut();
     });
-    this.cutControls.replaceChildren(choice, slider, other);
+    this.cutControls.replaceChildren(choice, slider, place, other);
   }
 
   private placeCut(): void {
@@ -329,6 +337,7 @@ export class SurfacePane {
         if (this.scope.isOver || !this.cut.isOn) picture.close();
         else {
           this.surface?.cut.show(picture);
+          this.view.dataset.slice = shown;
           this.surface?.draw();
         }
       }

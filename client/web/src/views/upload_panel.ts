@@ -1,6 +1,6 @@
 // Where volumes are dropped: one file, a folder of slices, or several files.
 import { upload, type RawDescription } from '../api/upload';
-import { ApiError, asApiError, seriesOf } from '../api/problem';
+import { ApiError, asApiError, mayPass, seriesOf } from '../api/problem';
 import type { Volume } from '../api/types';
 import { button, field, h, icon } from '../ui/dom';
 import { formatBytes } from '../ui/format';
@@ -36,7 +36,7 @@ export function uploadPanel(scope: Scope, onVolume: (volume: Volume, isNew: bool
     body.replaceChildren(
       icon(arrow),
       h('h2', {}, 'Drop a volume here'),
-      h('p', {}, 'NIfTI, NRRD, MetaImage, a DICOM file or folder, a ZIP or TAR of them, raw samples'),
+      h('p', {}, 'NIfTI, NRRD, MetaImage, VTK (.vti), a DICOM file or folder, a ZIP or TAR of them, raw samples'),
       h(
         'div',
         { class: 'actions' },
@@ -48,7 +48,8 @@ export function uploadPanel(scope: Scope, onVolume: (volume: Volume, isNew: bool
 
   const showProblem = (error: ApiError, gathered: Gathered): void => {
     zone.classList.remove('busy');
-    const again = button('Try again', () => void send(gathered));
+    // What the server understood and refused, it would refuse again.
+    const again = mayPass(error) && button('Try again', () => void send(gathered));
     const other = button('Choose another', showIdle);
     const series = seriesOf(error);
     const parts: Node[] = [refusal(series.length > 0 ? withoutSeries(error) : error, again, other)];

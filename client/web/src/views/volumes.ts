@@ -7,7 +7,7 @@ import { ask, tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { axisIndex, slicePlane } from '../volume/geometry';
-import { rememberName, volumeKind, volumeName } from '../volume/names';
+import { nameIn, rememberName, volumeKind, volumeName } from '../volume/names';
 import { inWords } from '../volume/parameters';
 import { uploadPanel } from './upload_panel';
 
@@ -38,6 +38,7 @@ async function paintThumbnail(canvas: HTMLCanvasElement, volume: Volume, signal:
     context.drawImage(bitmap, 0, 0, width, height);
   }
   bitmap.close();
+  canvas.dataset.painted = '';
 }
 
 function thumbnail(volume: Volume, scope: Scope): HTMLElement {
@@ -101,7 +102,7 @@ export function jobLine(job: Job): string {
   return `iso ${job.parameters.iso === 'otsu' ? 'Otsu' : formatValue(job.parameters.iso)}, ${inWords(job.parameters)}`;
 }
 
-function surfaceRow(job: Job): HTMLElement {
+function surfaceRow(job: Job, volume: string): HTMLElement {
   const result = job.mesh
     ? `${formatCount(job.mesh.triangles)} triangles`
     : job.state === 'running'
@@ -114,7 +115,7 @@ function surfaceRow(job: Job): HTMLElement {
       'a',
       { href: hashOf(['jobs', job.id]) },
       h('span', { class: `state ${job.state}`, title: job.state }),
-      h('span', { class: 'grow' }, jobLine(job)),
+      h('span', { class: 'grow' }, h('b', {}, volume), ` ${jobLine(job)}`),
       h('span', { class: 'number' }, result),
       h('span', { class: 'faint' }, formatTime(job.created)),
     ),
@@ -137,7 +138,8 @@ export async function volumesView(scope: Scope): Promise<HTMLElement> {
       list.append(h('li', { class: 'empty' }, 'No volumes yet. Drop one above to begin.'));
     }
     const jobs = page.jobs.slice(0, shownJobs);
-    surfaces.replaceChildren(...jobs.map(surfaceRow));
+    const byId = new Map(volumes.map((volume) => [volume.id, volume]));
+    surfaces.replaceChildren(...jobs.map((job) => surfaceRow(job, nameIn(byId, job.volume))));
     if (jobs.length === 0) surfaces.append(h('li', { class: 'empty' }, 'No surfaces yet.'));
   };
   const panel = uploadPanel(scope, (volume, isNew, name) => {

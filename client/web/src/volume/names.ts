@@ -23,6 +23,12 @@ export function volumeName(volume: Volume): string {
   return sessionStorage.getItem(key(volume.id)) ?? volumeKind(volume);
 }
 
+// Of a job's volume, which may be gone.
+export function nameIn(volumes: ReadonlyMap<string, Volume>, id: string): string {
+  const volume = volumes.get(id);
+  return volume ? volumeName(volume) : 'a volume that was erased';
+}
+
 export function volumeKind(volume: Volume): string {
   const kind = volume.modality ?? formatNames[volume.format] ?? volume.format;
   return `${kind}, ${formatDims(volume.dims)}`;
