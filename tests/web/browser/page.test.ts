@@ -6,6 +6,7 @@ import {
   ballNrrd,
   brain,
   brainHull,
+  chordOfBall,
   contourPixels,
   Daemon,
   desk,
@@ -144,10 +145,10 @@ describe('a surface', () => {
     expect(await page.locator('.cut-place').innerText()).toBe('25 / 48');
 
     // The slice can be measured as well: across the volume, of which the ball is only a part.
+    const seen = await silhouette(page, page.locator('.viewport'));
     await page.keyboard.press('m');
     const view = await page.locator('.viewport').boundingBox();
     if (!view) throw new Error('there is no viewport');
-    const seen = await silhouette(page, page.locator('.viewport'));
     const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };
     const half = (seen.width * view.width) / 2;
     await page.mouse.click(middle.x - 0.9 * half, middle.y);
@@ -164,23 +165,24 @@ describe('a surface', () => {
     await page.goto(`${daemon.url}/#/jobs/${made.id}`);
     await surfaceLoaded(page);
     await page.keyboard.press('a');
-    await page.keyboard.press('m');
     await still(page);
     const view = await page.locator('.viewport').boundingBox();
     if (!view) throw new Error('there is no viewport');
     const disc = await silhouette(page, page.locator('.viewport'));
-    // Two points at 0.8 of the radius, left and right of the middle: 1.6 radii apart.
+    const [x = 0, y = 0, z = 0] = (await settled(() => query().get('cam') ?? '')).split(',').map(Number);
+    await page.keyboard.press('m');
     const radius = (disc.height * view.height) / 2;
     const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };
     await page.mouse.click(middle.x, view.y + 3);
     await expect.poll(() => page.locator('.toasts').innerText()).toMatch(/no surface/);
+    const expected = chordOfBall(18, Math.hypot(x, y, z), 0.8);
     await page.mouse.click(middle.x - 0.8 * radius, middle.y);
     await page.mouse.click(middle.x + 0.8 * radius, middle.y);
     const label = page.locator('.ruler-labels span');
     await expect.poll(() => label.count()).toBe(1);
     const millimetres = Number.parseFloat(await label.innerText());
-    expect(millimetres).toBeGreaterThan(1.6 * 18 * 0.97);
-    expect(millimetres).toBeLessThan(1.6 * 18 * 1.03);
+    expect(millimetres).toBeGreaterThan(expected * 0.97);
+    expect(millimetres).toBeLessThan(expected * 1.03);
   });
 
   it('made as Draco alone is shown as well', async () => {

@@ -160,6 +160,15 @@ export function desk(options: Parameters<Browser['newPage']>[0] = {}): Desk {
   return made;
 }
 
+// How far apart two points of a ball are that are seen left and right of its middle, each at that part of
+// the radius of its disc, by a camera at that distance.
+export function chordOfBall(radius: number, distance: number, part: number): number {
+  const slope = (part * radius) / Math.sqrt(distance ** 2 - radius ** 2);
+  const lengthening = 1 + slope ** 2;
+  const depth = (distance - Math.sqrt(radius ** 2 * lengthening - (slope * distance) ** 2)) / lengthening;
+  return 2 * slope * depth;
+}
+
 // A ball of that radius in a cube of samples, as NRRD: 100 on its surface, more inside.
 export function ballNrrd(size: number, radius: number, seed = 0): Buffer {
   const middle = (size - 1) / 2;

@@ -1,7 +1,7 @@
 // The page under fingers, as on a tablet.
 import type { CDPSession, Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, contourPixels, desk, settled, silhouette, still, surfaceLoaded } from './support';
+import { ballNrrd, chordOfBall, contourPixels, desk, settled, silhouette, still, surfaceLoaded } from './support';
 
 const at = desk({ viewport: { width: 820, height: 1180 }, hasTouch: true, isMobile: true });
 
@@ -87,22 +87,24 @@ describe('fingers', () => {
 
     // Taps set points; two fingers at once set none.
     await page.getByRole('button', { name: 'Fit' }).tap();
-    await page.getByRole('button', { name: 'Measure' }).tap();
     await still(page);
+    const { distance } = await camera(page);
+    const disc = await silhouette(page, page.locator('.viewport'));
+    await page.getByRole('button', { name: 'Measure' }).tap();
     await fingers(page, [
       { from: { x: x - 40, y }, to: { x: x - 40, y } },
       { from: { x: x + 40, y }, to: { x: x + 40, y } },
     ]);
-    const disc = await silhouette(page, page.locator('.viewport'));
     const { height } = await middleOf(page, '.viewport');
     const radius = (disc.height * height) / 2;
     await page.touchscreen.tap(x - 0.8 * radius, y);
     await page.touchscreen.tap(x + 0.8 * radius, y);
+    const expected = chordOfBall(18, distance, 0.8);
     const label = page.locator('.ruler-labels span');
     await expect.poll(() => label.count()).toBe(1);
     const millimetres = Number.parseFloat(await label.innerText());
-    expect(millimetres).toBeGreaterThan(1.6 * 18 * 0.95);
-    expect(millimetres).toBeLessThan(1.6 * 18 * 1.05);
+    expect(millimetres).toBeGreaterThan(expected * 0.97);
+    expect(millimetres).toBeLessThan(expected * 1.03);
   });
 
   it('drag the line in the histogram, the window of a slice, and its place', async () => {
