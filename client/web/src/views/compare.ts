@@ -40,11 +40,13 @@ function numbersOf(job: Job): HTMLElement {
   if (!mesh) return h('p', {}, job.state);
   const { extracted, smoothed } = mesh.volume_mm3;
   const percent = extracted === 0 ? 0 : (100 * (smoothed - extracted)) / Math.abs(extracted);
+  const work = (job.timing.total ?? 0) - (job.timing.queue ?? 0);
   const rows: [string, string][] = [
     ['Triangles', formatCount(mesh.triangles)],
     ['Volume', `${formatValue(smoothed)} mm\u00b3`],
     ['by smoothing', `${percent > 0 ? '+' : ''}${formatNumber(percent, 2)} %`],
-    ['Time', formatMilliseconds((job.timing.total ?? 0) - (job.timing.queue ?? 0))],
+    // An equal job's files were there already.
+    ['Time', work < 1 ? 'was made before' : formatMilliseconds(work)],
   ];
   const angle = mesh.quality?.smallest_angle_deg?.smoothed;
   if (angle) rows.push(['Mean smallest angle', `${formatNumber(angle.mean, 1)}\u00b0`]);
