@@ -100,12 +100,17 @@ std::shared_ptr<Broadcaster::Mailbox> Broadcaster::listen_to(const std::string& 
   return mailbox;
 }
 
-void Broadcaster::publish(const store::Event& event) {
+bool Broadcaster::publish(const store::Event& event) {
   const std::lock_guard lock(mutex_);
+  bool is_heard = false;
   const auto [begin, end] = listeners_.equal_range(event.job);
   for (auto listener = begin; listener != end; ++listener) {
-    if (const auto mailbox = listener->second.lock()) mailbox->put(event);
+    const auto mailbox = listener->second.lock();
+    if (!mailbox) continue;
+    mailbox->put(event);
+    is_heard = true;
   }
+  return is_heard;
 }
 
 std::unique_ptr<Source> event_source(EventStream stream) {

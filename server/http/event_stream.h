@@ -36,7 +36,8 @@ class Broadcaster {
   // Gets the job's events from now on, for as long as it is kept.
   std::shared_ptr<Mailbox> listen_to(const std::string& job);
 
-  void publish(const store::Event& event);
+  // True when somebody listens to it.
+  bool publish(const store::Event& event);
 
  private:
   std::mutex mutex_;  // guards what follows

@@ -6,11 +6,13 @@
 namespace isomesh::http {
 namespace {
 
-void log_ended(const Job& job) {
+void log_ended(const store::JobAccount& account) {
+  const Job& job = account.job;
   LogLine line("job");
   line.add("id", job.id)
       .add("state", to_string(job.state))
       .add("priority", to_string(job.parameters.priority))
+      .add("attempts", account.attempts)
       .add("queue_ms", job.timing.queue)
       .add("load_ms", job.timing.load)
       .add("extract_ms", job.timing.extract)
@@ -25,15 +27,16 @@ void log_ended(const Job& job) {
 }  // namespace
 
 void record_ended(App& app, const std::string& id) {
-  Job job;
+  store::JobAccount account;
   try {
-    job = app.services.jobs.get(std::nullopt, id);
+    account = app.services.jobs.account(id);
   } catch (const Error& error) {
-    if (error.code() == ErrorCode::kGone || error.code() == ErrorCode::kNotFound) return;
-    throw;
+    if (error.code() != ErrorCode::kGone && error.code() != ErrorCode::kNotFound) throw;
+    return app.services.callbacks.wake();  // it may have had one
   }
-  app.metrics.count_ended(job);
-  log_ended(job);
+  if (account.job.parameters.callback) app.services.callbacks.wake();
+  app.metrics.count_ended(account.job);
+  log_ended(account);
 }
 
 jobs::CallbackObserver callback_recorder(Metrics& metrics) {

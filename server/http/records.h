@@ -14,7 +14,8 @@ namespace isomesh::http {
 
 struct App;
 
-// Logs and counts a job that has just ended. One that has expired already is passed over.
+// Logs and counts a job that has just ended, and has its callback sent. One that has expired
+// already is neither logged nor counted.
 void record_ended(App& app, const std::string& job);
 
 // Calls `add`, which makes a volume of an upload, and counts what it refuses.

@@ -137,15 +137,15 @@ void watch_jobs(App& app) {
   while (!app.stopping) {
     try {
       const auto events = app.services.jobs.events(std::nullopt, "", last, kLongestWatch);
+      bool is_heard = false;
       for (const store::Event& event : events) {
         last = event.id;
-        app.events.publish(event);
+        is_heard |= app.events.publish(event);
         if (event.kind != store::EventKind::kDone) continue;
         app.http.job_ended(event.job);
-        app.services.callbacks.wake();
         record_ended(app, event.job);
       }
-      if (!events.empty()) app.http.something_happened();
+      if (is_heard) app.http.something_happened();
     } catch (const Error& error) {
       spdlog::error("events of jobs cannot be read: {}", error.what());
       std::this_thread::sleep_for(kLongestWatch);

@@ -1,6 +1,7 @@
 #include "server/jobs/workers.h"
 
 #include <array>
+#include <condition_variable>
 #include <exception>
 #include <new>
 #include <optional>
@@ -36,10 +37,9 @@ std::string worker_name(std::size_t thread) {
 }
 
 void pause(const std::stop_token& stop, milliseconds time) {
-  constexpr milliseconds kStep{20};
-  for (const auto end = Clock::now() + time; Clock::now() < end && !stop.stop_requested();) {
-    std::this_thread::sleep_for(kStep);
-  }
+  std::mutex mutex;
+  std::unique_lock lock(mutex);
+  std::condition_variable_any().wait_for(lock, stop, time, [] { return false; });
 }
 
 }  // namespace
@@ -194,6 +194,8 @@ void Workers::conclude(const Run& run, store::Outcome outcome) {
         "/v1/jobs/" + lease.id);
   }
   const auto tell = [&] {
+    // Without an outcome it would end cancelled, should the lease hold after all.
+    if (was_stopped && run.reason() == Reason::kLost) return false;
     if (was_stopped && run.reason() == Reason::kEnding) {
       return jobs_.put_back(lease, milliseconds(0));
     }

@@ -30,6 +30,7 @@ DataFolder::DataFolder(const std::filesystem::path& root) : root_(root) {
   for (const auto& folder : {blobs(), scratch()}) {
     std::filesystem::create_directories(folder);
   }
+  sync_folder(root_);
 }
 
 DataFolder::~DataFolder() { ::close(lock_); }

@@ -7,20 +7,23 @@
 namespace isomesh::store {
 namespace {
 
-constexpr std::size_t kMostTold = 2000;
+constexpr std::size_t kMostRecent = 4000;
 
 }  // namespace
 
-std::uint64_t EventLog::reserve() {
+std::uint64_t EventLog::reserve(Event event) {
   const std::lock_guard lock(mutex_);
-  const std::uint64_t number = next_number();
-  if (reserved_ == 0) reserved_ = number;
-  return number;
+  event.id = next_number();
+  reserved_.push_back(std::move(event));
+  return reserved_.back().id;
 }
 
-void EventLog::settle() {
+void EventLog::settle(bool is_committed) {
   const std::lock_guard lock(mutex_);
-  reserved_ = 0;
+  if (is_committed) {
+    for (Event& event : reserved_) remember({std::move(event), true});
+  }
+  reserved_.clear();
   ++generation_;
   changed_.notify_all();
 }
@@ -28,24 +31,25 @@ void EventLog::settle() {
 void EventLog::tell(Event event) {
   const std::lock_guard lock(mutex_);
   event.id = next_number();
-  told_.push_back(std::move(event));
-  if (told_.size() > kMostTold) told_.pop_front();
+  remember({std::move(event), false});
   ++generation_;
   changed_.notify_all();
 }
 
 std::uint64_t EventLog::end() const {
   const std::lock_guard lock(mutex_);
-  return reserved_ == 0 ? last_ + 1 : reserved_;
+  return reserved_.empty() ? last_ + 1 : reserved_.front().id;
 }
 
-std::vector<Event> EventLog::told(const Viewer& viewer, const std::string& job, std::uint64_t since,
+EventLog::Recent EventLog::recent(const Viewer& viewer, const std::string& job, std::uint64_t since,
                                   std::uint64_t end) const {
   const std::lock_guard lock(mutex_);
-  std::vector<Event> result;
-  const auto begin = std::ranges::upper_bound(told_, since, {}, &Event::id);
-  for (auto event = begin; event != told_.end() && event->id < end; ++event) {
-    if (concerns(*event, viewer, job)) result.push_back(*event);
+  Recent result;
+  result.is_complete = job.empty() && since >= complete_after_;
+  const auto begin = std::ranges::upper_bound(recent_, since, {}, &Entry::id);
+  for (auto entry = begin; entry != recent_.end() && entry->id() < end; ++entry) {
+    const bool is_wanted = result.is_complete || !entry->is_kept;
+    if (is_wanted && concerns(entry->event, viewer, job)) result.events.push_back(entry->event);
   }
   return result;
 }
@@ -74,6 +78,15 @@ bool EventLog::is_closed() const {
 std::uint64_t EventLog::next_number() {
   last_ = std::max(last_ + 1, static_cast<std::uint64_t>(now_us()));
   return last_;
+}
+
+// What was told while a transaction was open has greater numbers than the events of that.
+void EventLog::remember(Entry entry) {
+  const auto place = std::ranges::upper_bound(recent_, entry.id(), {}, &Entry::id);
+  recent_.insert(place, std::move(entry));
+  if (recent_.size() <= kMostRecent) return;
+  complete_after_ = std::max(complete_after_, recent_.front().id());
+  recent_.pop_front();
 }
 
 bool concerns(const Event& event, const Viewer& viewer, const std::string& job) {

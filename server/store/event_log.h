@@ -1,5 +1,5 @@
-// Events of this process: their numbers, those that are not kept, and who waits for them. Private
-// to this folder.
+// Events of this process: their numbers, the latest of them, and who waits for them. Private to
+// this folder.
 #pragma once
 
 #include <chrono>
@@ -19,14 +19,15 @@ class EventLog {
   using Clock = std::chrono::steady_clock;
 
   // `last` is the greatest number that was given ever.
-  explicit EventLog(std::uint64_t last) : last_(last) {}
+  explicit EventLog(std::uint64_t last) : last_(last), complete_after_(last) {}
 
-  // A number for an event of the open transaction. Until settle(), nobody sees it or a later one:
-  // a reader that continues after the later one would miss it. One transaction at a time.
-  std::uint64_t reserve();
+  // Numbers an event of the open transaction, which keeps it. Until settle(), nobody sees it or a
+  // later one: a reader that continues after the later one would miss it. One transaction at a
+  // time.
+  std::uint64_t reserve(Event event);
 
-  // The transaction has ended, committed or not; wakes everybody.
-  void settle();
+  // The transaction has ended; wakes everybody. Events of one that was not committed never were.
+  void settle(bool is_committed);
 
   // An event that is not kept.
   void tell(Event event);
@@ -34,9 +35,16 @@ class EventLog {
   // Events that may be seen now have smaller numbers.
   std::uint64_t end() const;
 
-  // Those that are not kept, after `since` and before `end`.
-  std::vector<Event> told(const Viewer& viewer, const std::string& job, std::uint64_t since,
-                          std::uint64_t end) const;
+  struct Recent {
+    std::vector<Event> events;  // oldest first
+    // Nothing is missing. Otherwise there are only those that are not kept anywhere else; so it is
+    // for a single job, because its events go with it when it expires.
+    bool is_complete = false;
+  };
+
+  // Those after `since` and before `end` that this process remembers.
+  Recent recent(const Viewer& viewer, const std::string& job, std::uint64_t since,
+                std::uint64_t end) const;
 
   // Grows whenever anything is settled or told.
   std::uint64_t generation() const;
@@ -48,14 +56,23 @@ class EventLog {
   bool is_closed() const;
 
  private:
+  struct Entry {
+    Event event;
+    bool is_kept = false;
+
+    std::uint64_t id() const { return event.id; }
+  };
+
   std::uint64_t next_number();
+  void remember(Entry entry);
 
   mutable std::mutex mutex_;  // guards everything below
   mutable std::condition_variable changed_;
   std::uint64_t last_;
-  std::uint64_t reserved_ = 0;  // the first of the open transaction; 0: none
+  std::vector<Event> reserved_;  // of the open transaction
   std::uint64_t generation_ = 0;
-  std::deque<Event> told_;
+  std::deque<Entry> recent_;      // by number
+  std::uint64_t complete_after_;  // what is in recent_ are all events with greater numbers
   bool closed_ = false;
 };
 

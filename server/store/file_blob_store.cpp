@@ -179,18 +179,28 @@ void FileBlobStore::publish_as(const std::filesystem::path& file, const std::str
   // A file of long ago that is named now must look as young as its naming is.
   ::utimensat(AT_FDCWD, file.c_str(), nullptr, 0);
   const std::filesystem::path place = path_of(key);
-  std::error_code error;
-  if (std::filesystem::create_directory(place.parent_path(), error)) {
-    sync_folder(folder_.blobs());
-  }
-  if (error == std::errc::no_space_on_device) {
-    throw Error(ErrorCode::kOutOfSpace, "the data folder has no space left");
-  }
+  make_folder_for(place);
   {
     const std::lock_guard lock(places_);
     move_to(file, place);
   }
   sync_folder(place.parent_path());
+}
+
+// A folder that is there may be younger than the last sync, made by another thread or by a process
+// that was killed then; nobody relies on it before that.
+void FileBlobStore::make_folder_for(const std::filesystem::path& place) const {
+  const std::filesystem::path folder = place.parent_path();
+  std::error_code error;
+  const std::lock_guard lock(synced_mutex_);
+  const bool is_new = std::filesystem::create_directory(folder, error);
+  if (error == std::errc::no_space_on_device) {
+    throw Error(ErrorCode::kOutOfSpace, "the data folder has no space left");
+  }
+  const std::string name = folder.filename();
+  if (!is_new && synced_.contains(name)) return;
+  sync_folder(folder_.blobs());
+  synced_.insert(name);
 }
 
 }  // namespace isomesh::store

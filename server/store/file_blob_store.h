@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <set>
 #include <string>
 
 #include "server/store/blob_store.h"
@@ -44,11 +45,14 @@ class FileBlobStore : public BlobStore {
   };
 
   void publish_as(const std::filesystem::path& file, const std::string& key) const;
+  void make_folder_for(const std::filesystem::path& place) const;
 
   const DataFolder& folder_;
   // Held while a file takes its place or is swept, so that the sweeper never erases a file that has
   // just been put there anew.
   mutable std::mutex places_;
+  mutable std::mutex synced_mutex_;
+  mutable std::set<std::string> synced_;  // folders that are on the disk; guarded by synced_mutex_
   mutable std::mutex intact_mutex_;
   mutable std::map<std::string, Sighting> intact_;  // guarded by intact_mutex_
 };

@@ -76,6 +76,12 @@ struct Outcome {
   Timing timing;
 };
 
+// What the service itself wants to know about a job.
+struct JobAccount {
+  Job job;
+  int attempts = 0;  // that count; none for a job that took the mesh of another
+};
+
 enum class EventKind {
   kStage,     // queued, or at a stage of its run
   kProgress,  // further in the same stage
@@ -145,6 +151,9 @@ class JobStore {
 
   // Throws Error kNotFound or kGone.
   virtual Job get(const Viewer& viewer, const std::string& id) const = 0;
+
+  // Whoever owns it. Throws Error kNotFound or kGone.
+  virtual JobAccount account(const std::string& id) const = 0;
 
   // The job when it is final, `wait` is over or close() was called. Throws Error kNotFound or
   // kGone.

@@ -8,6 +8,9 @@ namespace isomesh::store {
 namespace {
 
 constexpr int kBusyTimeoutMs = 10'000;
+// How long the log of changes grows before they are brought into the file itself: 16 MiB, so that a
+// commit seldom has to do that, and pages that changed often are written once.
+constexpr const char* kLogPages = "PRAGMA wal_autocheckpoint=4000";
 
 [[noreturn]] void fail(sqlite3* handle, int code) {
   const int primary = code & 0xFF;
@@ -71,6 +74,7 @@ Connection::Connection(const std::filesystem::path& path, Mode mode) {
     sqlite3_busy_timeout(handle_, kBusyTimeoutMs);
     if (mode == Mode::kRead) return;
     script("PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON;");
+    script(kLogPages);
   } catch (...) {
     sqlite3_close(handle_);
     throw;
@@ -85,6 +89,12 @@ Connection::~Connection() {
 void Connection::script(const char* sql) {
   const int code = sqlite3_exec(handle_, sql, nullptr, nullptr, nullptr);
   if (code != SQLITE_OK) fail(handle_, sqlite3_extended_errcode(handle_));
+}
+
+void Connection::set_durability(Durability durability) {
+  if (durability == durability_) return;
+  script(durability == Durability::kFull ? "PRAGMA synchronous=FULL" : "PRAGMA synchronous=NORMAL");
+  durability_ = durability;
 }
 
 void Connection::roll_back() noexcept {
@@ -107,8 +117,7 @@ int Connection::changes() const { return sqlite3_changes(handle_); }
 
 Transaction::Transaction(Connection& connection, Durability durability)
     : lock_(connection.mutex()), connection_(connection) {
-  connection_.script(durability == Durability::kFull ? "PRAGMA synchronous=FULL"
-                                                     : "PRAGMA synchronous=NORMAL");
+  connection_.set_durability(durability);
   connection_.run("BEGIN IMMEDIATE");
 }
 

@@ -52,6 +52,12 @@ class Query {
   sqlite3_stmt* statement_;
 };
 
+// What a commit outlives. All of them outlive the process, however it ends.
+enum class Durability {
+  kFull,     // also a machine that loses its power
+  kProcess,  // what a power cut may take back, for changes that are made again without harm
+};
+
 // One connection. What it does is done under the lock of a Transaction or a Reading.
 class Connection {
  public:
@@ -81,6 +87,9 @@ class Connection {
   // Several statements without parameters.
   void script(const char* sql);
 
+  // What the next transaction's commit outlives.
+  void set_durability(Durability durability);
+
   // Rolls back what is open.
   void roll_back() noexcept;
 
@@ -92,13 +101,8 @@ class Connection {
 
   sqlite3* handle_ = nullptr;
   std::mutex mutex_;
+  Durability durability_ = Durability::kFull;
   std::unordered_map<std::string, sqlite3_stmt*> statements_;
-};
-
-// What a commit outlives. All of them outlive the process, however it ends.
-enum class Durability {
-  kFull,     // also a machine that loses its power
-  kProcess,  // what a power cut may take back, for changes that are made again without harm
 };
 
 // All or nothing: what was not committed is rolled back when it goes.

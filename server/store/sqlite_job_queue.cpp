@@ -90,7 +90,7 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
     }
     change.commit();
   }
-  wake_workers();
+  if (!is_final(row.job.state)) wake_a_worker();
   return {Submission::Kind::kNew, row.job, {}};
 }
 
@@ -117,41 +117,52 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   row.job.stage = Stage::kLoad;
   row.job.started = timestamp();
   row.job.timing.queue = milliseconds_since(row.accepted);
+  const std::int64_t until = now + microseconds(lease);
   change->run(
       "UPDATE jobs SET state = 1, attempts = ?, fence = ?, claimed = ?, is_long = 0, lease_until = "
-      "?, "
-      "worker = ?, record = ? WHERE id = ?",
-      row.attempts, row.fence, now, now + microseconds(lease), worker, to_json(row.job),
-      row.job.id);
+      "?, worker = ?, record = ? WHERE id = ?",
+      row.attempts, row.fence, now, until, worker, to_json(row.job), row.job.id);
   change.announce(row, EventKind::kStage);
   change.commit();
+  {
+    // Before anybody else's transaction, which may ask the run to stop or end its lease.
+    const std::lock_guard lock(live_mutex_);
+    live_[row.job.id] = {.fence = row.fence, .claimed = now, .lease_until = until};
+  }
   return Lease{row.job.id, row.fence, row.attempts, row.owner, row.job.parameters};
 }
 
 Standing SqliteJobStore::renew(const Lease& lease, const Progress& progress,
                                std::chrono::milliseconds length) {
-  std::optional<Row> row;
+  std::optional<Live> run;
   {
-    const Reading reading(database_.reader());
-    row = leased(reading.connection(), lease);
+    const std::lock_guard lock(live_mutex_);
+    if (const Live* const known = live(lease)) run = *known;
   }
-  if (!row) return Standing::kLost;
-  tell(lease, progress);
   const std::int64_t now = now_us();
-  const bool is_long = now - row->claimed >= microseconds(options_.short_run);
-  if (row->lease_until - now < microseconds(length) * 2 / 3 || is_long != row->is_long) {
-    Change change(*this, Durability::kProcess);
+  if (!run || run->lease_until < now) return Standing::kLost;
+  tell(lease, progress);
+  const bool is_long = now - run->claimed >= microseconds(options_.short_run);
+  if (run->lease_until - now < microseconds(length) * 2 / 3 || is_long != run->is_long) {
+    // That the run is long is what it is charged for when it takes the machine down with it.
+    Change change(*this, is_long == run->is_long ? Durability::kProcess : Durability::kFull);
     const int held = change->run(
         "UPDATE jobs SET lease_until = ?, is_long = ? WHERE id = ? AND fence = ? AND state = 1 AND "
         "lease_until >= ?",
         now + microseconds(length), is_long ? 1 : 0, lease.id, lease.fence, now);
     if (held == 0) return Standing::kLost;
     change.commit();
+    const std::lock_guard lock(live_mutex_);
+    if (Live* const renewed = live(lease)) {
+      renewed->lease_until = now + microseconds(length);
+      renewed->is_long = is_long;
+    }
   }
-  return row->cancelling ? Standing::kCancel : Standing::kOk;
+  return run->cancelling ? Standing::kCancel : Standing::kOk;
 }
 
 bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
+  bool has_mesh = false;
   {
     Change change(*this);
     auto held = leased(change.connection(), lease);
@@ -165,6 +176,7 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
     } else if (outcome.mesh) {
       succeed(change, row, *outcome.mesh);
       succeed_alike(change, row, *outcome.mesh);
+      has_mesh = true;
     } else if (outcome.may_retry && row.attempts < options_.attempts) {
       queue_again(change, row, delay_after(row.attempts));
     } else {
@@ -173,8 +185,9 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
     }
     change.commit();
   }
-  forget_progress(lease.id);
-  wake_workers();
+  forget_run(lease.id, lease.fence);
+  // Without a mesh it may be due again, or one like it now. With one, nothing has become ready.
+  if (!has_mesh) wake_workers();
   return true;
 }
 
@@ -191,7 +204,7 @@ bool SqliteJobStore::put_back(const Lease& lease, std::chrono::milliseconds dela
     }
     change.commit();
   }
-  forget_progress(lease.id);
+  forget_run(lease.id, lease.fence);
   wake_workers();
   return true;
 }
@@ -216,7 +229,7 @@ std::size_t SqliteJobStore::reap() {
       } else {
         queue_again(change, row, std::chrono::milliseconds(0));
       }
-      forget_progress(row.job.id);
+      forget_run(row.job.id, row.fence);
     }
     reaped = rows.size();
     change.commit();
@@ -250,9 +263,13 @@ Job SqliteJobStore::cancel(const Viewer& viewer, const std::string& id) {
       change->run("UPDATE jobs SET cancelling = 1 WHERE id = ?", id);
     }
     change.commit();
+    if (row.job.state == JobState::kRunning) {
+      const std::lock_guard lock(live_mutex_);
+      const auto run = live_.find(id);
+      if (run != live_.end() && run->second.fence == row.fence) run->second.cancelling = true;
+    }
     job = with_progress(row);
   }
-  wake_workers();
   return job;
 }
 
@@ -339,18 +356,25 @@ std::chrono::milliseconds SqliteJobStore::delay_after(int attempts) const {
   return delay;
 }
 
+// Guarded by live_mutex_, which the caller holds.
+SqliteJobStore::Live* SqliteJobStore::live(const Lease& lease) {
+  const auto run = live_.find(lease.id);
+  return run != live_.end() && run->second.fence == lease.fence ? &run->second : nullptr;
+}
+
 void SqliteJobStore::tell(const Lease& lease, const Progress& progress) {
   const auto now = EventLog::Clock::now();
   bool is_other_stage = false;
   {
     const std::lock_guard lock(live_mutex_);
-    Live& live = live_[lease.id];
-    if (live.fence != lease.fence) live = {lease.fence, {}, {}};
-    is_other_stage = live.progress.stage != progress.stage;
-    const bool is_further = live.progress.share != progress.share;
-    live.progress = progress;
-    if (!is_other_stage && (!is_further || now < live.told + kBetweenProgressEvents)) return;
-    live.told = now;
+    Live* const run = live(lease);
+    if (run == nullptr) return;
+    const Progress before = run->progress.value_or(Progress{});
+    is_other_stage = before.stage != progress.stage;
+    const bool is_further = before.share != progress.share;
+    run->progress = progress;
+    if (!is_other_stage && (!is_further || now < run->told + kBetweenProgressEvents)) return;
+    run->told = now;
   }
   log_.tell({.id = 0,
              .owner = lease.owner,
@@ -361,9 +385,11 @@ void SqliteJobStore::tell(const Lease& lease, const Progress& progress) {
              .progress = progress.share});
 }
 
-void SqliteJobStore::forget_progress(const std::string& id) {
+// A later run of the job stays known.
+void SqliteJobStore::forget_run(const std::string& id, std::uint64_t fence) {
   const std::lock_guard lock(live_mutex_);
-  live_.erase(id);
+  const auto run = live_.find(id);
+  if (run != live_.end() && run->second.fence == fence) live_.erase(run);
 }
 
 }  // namespace isomesh::store

@@ -28,7 +28,7 @@ class SqliteJobStore::Change {
   Change(const SqliteJobStore& store, Durability durability = Durability::kFull)
       : log_(store.log_), transaction_(store.database_.writer(), durability) {}
   ~Change() {
-    if (announced_) log_.settle();
+    if (announced_) log_.settle(committed_);
   }
   Change(const Change&) = delete;
   Change& operator=(const Change&) = delete;
@@ -39,11 +39,15 @@ class SqliteJobStore::Change {
   // Keeps the event of the row's present state.
   void announce(const Row& row, EventKind kind);
 
-  void commit() { transaction_.commit(); }
+  void commit() {
+    transaction_.commit();
+    committed_ = true;
+  }
 
  private:
   EventLog& log_;
   bool announced_ = false;
+  bool committed_ = false;
   Transaction transaction_;  // last: its lock is held until the events are settled
 };
 

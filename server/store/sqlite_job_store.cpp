@@ -41,6 +41,12 @@ Job SqliteJobStore::get(const Viewer& viewer, const std::string& id) const {
   return with_progress(found(reading.connection(), viewer, id));
 }
 
+JobAccount SqliteJobStore::account(const std::string& id) const {
+  const Reading reading(database_.reader());
+  const Row row = found(reading.connection(), std::nullopt, id);
+  return {with_progress(row), row.attempts};
+}
+
 Job SqliteJobStore::wait(const Viewer& viewer, const std::string& id,
                          std::chrono::milliseconds wait) const {
   const auto deadline = EventLog::Clock::now() + wait;
@@ -80,21 +86,29 @@ std::vector<Event> SqliteJobStore::events(const Viewer& viewer, const std::strin
   while (true) {
     const std::uint64_t generation = log_.generation();
     const std::uint64_t end = log_.end();
-    std::vector<Event> events = log_.told(viewer, job, since, end);
-    {
-      const Reading reading(database_.reader());
-      const std::string sql =
-          std::string("SELECT id, owner, job, kind, state, stage, progress FROM events WHERE ") +
-          (job.empty() ? "?1 = ''" : "job = ?1") + " AND id > ?2 AND id < ?3" +
-          (viewer ? " AND owner = ?4" : " AND ?4 IS NULL") + " ORDER BY id LIMIT ?5";
-      Query query = reading->query(sql, job, since, end, viewer, kMostEvents);
-      while (query.next()) events.push_back(event_of(query));
+    auto [events, is_complete] = log_.recent(viewer, job, since, end);
+    if (!is_complete) {
+      const std::vector<Event> kept = kept_events(viewer, job, since, end);
+      events.insert(events.end(), kept.begin(), kept.end());
+      std::ranges::sort(events, {}, &Event::id);
     }
-    std::ranges::sort(events, {}, &Event::id);
     if (events.size() > kMostEvents) events.resize(kMostEvents);
     if (!events.empty() || log_.is_closed() || EventLog::Clock::now() >= deadline) return events;
     log_.wait_beyond(generation, deadline);
   }
+}
+
+std::vector<Event> SqliteJobStore::kept_events(const Viewer& viewer, const std::string& job,
+                                               std::uint64_t since, std::uint64_t end) const {
+  const Reading reading(database_.reader());
+  const std::string sql =
+      std::string("SELECT id, owner, job, kind, state, stage, progress FROM events WHERE ") +
+      (job.empty() ? "?1 = ''" : "job = ?1") + " AND id > ?2 AND id < ?3" +
+      (viewer ? " AND owner = ?4" : " AND ?4 IS NULL") + " ORDER BY id LIMIT ?5";
+  Query query = reading->query(sql, job, since, end, viewer, kMostEvents);
+  std::vector<Event> events;
+  while (query.next()) events.push_back(event_of(query));
+  return events;
 }
 
 QueueDepth SqliteJobStore::depth() const {
@@ -147,9 +161,18 @@ bool SqliteJobStore::wait_for_work(const std::stop_token& stop, std::chrono::mil
     }
     if (std::chrono::steady_clock::now() >= deadline) return false;
     lock.lock();
-    work_.wait_until(lock, stop, until, [&] { return work_generation_ != generation; });
+    if (work_.wait_until(lock, stop, until, [&] { return work_generation_ != generation; })) {
+      return true;
+    }
   }
   return false;
+}
+
+// For one job that has become ready: others would find nothing.
+void SqliteJobStore::wake_a_worker() {
+  const std::lock_guard lock(work_mutex_);
+  ++work_generation_;
+  work_.notify_one();
 }
 
 void SqliteJobStore::wake_workers() {
@@ -197,10 +220,10 @@ Job SqliteJobStore::with_progress(const Row& row) const {
   Job job = row.job;
   const std::lock_guard lock(live_mutex_);
   const auto live = live_.find(job.id);
-  if (job.state != JobState::kRunning || live == live_.end() || live->second.fence != row.fence) {
-    return job;
-  }
-  const Progress& progress = live->second.progress;
+  const bool is_told = job.state == JobState::kRunning && live != live_.end() &&
+                       live->second.fence == row.fence && live->second.progress;
+  if (!is_told) return job;
+  const Progress& progress = *live->second.progress;
   const double queue = job.timing.queue;
   job.stage = progress.stage;
   job.progress = progress.share;
@@ -211,8 +234,15 @@ Job SqliteJobStore::with_progress(const Row& row) const {
 
 void SqliteJobStore::Change::announce(const Row& row, EventKind kind) {
   announced_ = true;
-  transaction_->run("INSERT INTO events VALUES(?, ?, ?, ?, ?, ?, ?)", log_.reserve(), row.owner,
-                    row.job.id, kind, row.job.state, row.job.stage, row.job.progress);
+  const std::uint64_t id = log_.reserve({.id = 0,
+                                         .owner = row.owner,
+                                         .job = row.job.id,
+                                         .kind = kind,
+                                         .state = row.job.state,
+                                         .stage = row.job.stage,
+                                         .progress = row.job.progress});
+  transaction_->run("INSERT INTO events VALUES(?, ?, ?, ?, ?, ?, ?)", id, row.owner, row.job.id,
+                    kind, row.job.state, row.job.stage, row.job.progress);
 }
 
 std::size_t count_queued(Connection& connection) {

@@ -46,6 +46,7 @@ class SqliteJobStore : public JobStore {
   std::size_t reap() override;
   Job cancel(const Viewer& viewer, const std::string& id) override;
   Job get(const Viewer& viewer, const std::string& id) const override;
+  JobAccount account(const std::string& id) const override;
   Job wait(const Viewer& viewer, const std::string& id,
            std::chrono::milliseconds wait) const override;
   std::vector<Job> list(const Viewer& viewer, std::optional<JobState> state,
@@ -60,10 +61,16 @@ class SqliteJobStore : public JobStore {
  private:
   struct Row;
   class Change;
+  // A run that this process has claimed. What the row says counts; this spares renewals a look at
+  // it.
   struct Live {
     std::uint64_t fence = 0;
-    Progress progress;
-    EventLog::Clock::time_point told;
+    std::int64_t claimed = 0;
+    std::int64_t lease_until = 0;
+    bool is_long = false;
+    bool cancelling = false;
+    std::optional<Progress> progress = {};  // none before the first renewal
+    EventLog::Clock::time_point told = {};
   };
 
   static Row row_of(const Query& query);
@@ -78,9 +85,13 @@ class SqliteJobStore : public JobStore {
   void succeed_alike(Change& change, const Row& row, const MeshSummary& mesh) const;
   void queue_again(Change& change, Row& row, std::chrono::milliseconds delay) const;
   std::chrono::milliseconds delay_after(int attempts) const;
+  std::vector<Event> kept_events(const Viewer& viewer, const std::string& job, std::uint64_t since,
+                                 std::uint64_t end) const;
+  Live* live(const Lease& lease);
   void tell(const Lease& lease, const Progress& progress);
-  void forget_progress(const std::string& id);
+  void forget_run(const std::string& id, std::uint64_t fence);
   Job with_progress(const Row& row) const;
+  void wake_a_worker();
   void wake_workers();
 
   Database& database_;

@@ -63,6 +63,7 @@ TEST_F(LogTest, SoIsEveryJobThatEndsAndEveryVolumeThatIsRefused) {
   ASSERT_EQ(jobs.size(), 1U);
   EXPECT_EQ(jobs[0]["id"], job.id);
   EXPECT_EQ(jobs[0]["state"], "succeeded");
+  EXPECT_EQ(jobs[0]["attempts"], 1);
   EXPECT_EQ(jobs[0]["triangles"], job.mesh->triangles);
   EXPECT_GT(jobs[0]["total_ms"], 0);
   const auto refused = lines_of("import_refused");

@@ -48,9 +48,9 @@ TEST_F(EventStreamTest, TellsThePastAndThenWhatHappens) {
             "data: {\"state\":\"running\",\"stage\":\"smooth\",\"progress\":0.5}\n\n");
   std::string nothing;
   EXPECT_EQ(stream->next(nothing), Source::More::kLater);
-  broadcaster_.publish(event(2, EventKind::kProgress, "another job"));
+  EXPECT_FALSE(broadcaster_.publish(event(2, EventKind::kProgress, "another job")));
   EXPECT_EQ(stream->next(nothing), Source::More::kLater);
-  broadcaster_.publish(event(3, EventKind::kProgress));
+  EXPECT_TRUE(broadcaster_.publish(event(3, EventKind::kProgress)));
   broadcaster_.publish(event(4, EventKind::kDone));
   const std::string rest = told_by(*stream);
   EXPECT_THAT(rest, testing::StartsWith("id: 3\nevent: progress\n"));

@@ -124,11 +124,15 @@ TEST_P(FaultConformance, AFailureThatMayPassIsTriedThreeTimes) {
     ASSERT_TRUE(jobs().wait_for_work({}, kLong));
     const Lease lease = claimed();
     EXPECT_EQ(lease.attempt, attempt);
+    EXPECT_EQ(jobs().account(id).attempts, attempt);
     EXPECT_TRUE(jobs().finish(lease, failure(true)));
     EXPECT_FALSE(jobs().claim("worker", kLongLease)) << "there is no delay";
   }
   EXPECT_EQ(jobs().get("", id).state, JobState::kFailed);
   EXPECT_EQ(jobs().get("", id).error, failure().error);
+  EXPECT_EQ(jobs().account(id).attempts, 3);
+  EXPECT_EQ(jobs().account(id).job, jobs().get("", id));
+  EXPECT_EQ(code_thrown_by([&] { jobs().account("x"); }), ErrorCode::kNotFound);
 }
 
 // --- Idempotency

@@ -82,6 +82,22 @@ TEST_P(RaceConformance, CancelAgainstFinishGivesOneEnd) {
   }
 }
 
+// The end of one run is no news of the next one.
+TEST_P(RaceConformance, ARunThatEndsDoesNotTouchTheNextOne) {
+  for (int round = 0; round < 50; ++round) {
+    const std::string id = submit().id;
+    const Lease first = claimed();
+    std::jthread worker([&] { jobs().put_back(first, std::chrono::milliseconds(0)); });
+    std::optional<Lease> second;
+    while (!second) second = jobs().claim("worker", kLongLease);
+    EXPECT_EQ(second->id, id);
+    worker.join();
+    ASSERT_EQ(jobs().renew(*second, {Stage::kEncode, 0.9, {}}, kLongLease), Standing::kOk) << round;
+    EXPECT_EQ(jobs().get("", id).stage, Stage::kEncode);
+    EXPECT_TRUE(jobs().finish(*second, some_mesh()));
+  }
+}
+
 TEST_P(RaceConformance, CancelAgainstClaimNeverLosesTheRequest) {
   for (int round = 0; round < 100; ++round) {
     const std::string id = submit().id;

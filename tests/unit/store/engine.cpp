@@ -4,34 +4,68 @@
 
 #include "server/store/database.h"
 #include "server/store/file_blob_store.h"
+#include "server/store/files.h"
 #include "server/store/sqlite_job_store.h"
 #include "server/store/sqlite_volume_store.h"
 #include "tests/support/files.h"
+#include "tests/unit/store/power_cut.h"
 
 namespace isomesh::test {
 namespace {
 
 class SqliteEngine : public Engine {
  public:
-  explicit SqliteEngine(const EngineOptions& options) : options_(options) { open(); }
+  explicit SqliteEngine(const EngineOptions& options) : options_(options) { begin_life(); }
 
   store::JobStore& jobs() override { return *jobs_; }
   store::VolumeStore& volumes() override { return *volumes_; }
-  store::BlobStore& blobs() override { return blobs_; }
+  store::BlobStore& blobs() override { return *blobs_; }
 
   void restart() override {
-    jobs_.reset();
-    volumes_.reset();
-    database_.reset();
+    close();
     open();
     jobs_->reap_all();
   }
 
+  void lose_power() override {
+    power_.value().leave(place_of(lives_ + 1));
+    close();
+    power_.reset();
+    begin_life();
+    jobs_->reap_all();
+  }
+
  private:
+  std::filesystem::path place_of(int life) const { return folder_ / std::to_string(life); }
+
+  void begin_life() {
+    ++lives_;
+    const std::filesystem::path place = place_of(lives_);
+    std::filesystem::create_directories(place);
+    if (options_.may_lose_power) {
+      power_.emplace(place);
+      // What the last life left is on the disk.
+      for (const auto& entry : std::filesystem::recursive_directory_iterator(place)) {
+        if (entry.is_regular_file()) store::digest_of(entry.path());
+        if (entry.is_directory()) store::sync_folder(entry.path());
+      }
+      store::sync_folder(place);
+    }
+    data_.emplace(place);
+    blobs_.emplace(*data_);
+    open();
+  }
+
+  void close() {
+    jobs_.reset();
+    volumes_.reset();
+    database_.reset();
+  }
+
   void open() {
-    database_.emplace(data_);
+    database_.emplace(*data_);
     volumes_.emplace(*database_);
-    jobs_.emplace(*database_, blobs_,
+    jobs_.emplace(*database_, *blobs_,
                   store::JobStoreOptions{.max_queued = options_.max_queued,
                                          .retry_delay = options_.retry_delay,
                                          .short_run = std::chrono::milliseconds(0),
@@ -40,8 +74,10 @@ class SqliteEngine : public Engine {
 
   const EngineOptions options_;
   TemporaryFolder folder_;
-  store::DataFolder data_{folder_ / "data"};
-  store::FileBlobStore blobs_{data_};
+  int lives_ = 0;
+  std::optional<PowerCut> power_;
+  std::optional<store::DataFolder> data_;
+  std::optional<store::FileBlobStore> blobs_;
   std::optional<store::Database> database_;
   std::optional<store::SqliteVolumeStore> volumes_;
   std::optional<store::SqliteJobStore> jobs_;

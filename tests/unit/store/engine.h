@@ -18,6 +18,7 @@ namespace isomesh::test {
 struct EngineOptions {
   std::size_t max_queued = 100'000;
   std::chrono::milliseconds retry_delay{0};
+  bool may_lose_power = false;
 };
 
 // Empty stores that belong together, gone with all they hold when it goes.
@@ -32,6 +33,10 @@ class Engine {
   // As after a crash: the stores are opened anew on what is on disk, and nobody holds a lease. What
   // was returned before is not valid any more.
   virtual void restart() = 0;
+
+  // As restart, on what a power cut leaves: only what was brought to the disk. For engines that may
+  // lose power.
+  virtual void lose_power() = 0;
 };
 
 using MakeEngine = std::unique_ptr<Engine> (*)(const EngineOptions& options);
@@ -82,6 +87,7 @@ class EngineTest : public testing::TestWithParam<NamedEngine> {
   store::VolumeStore& volumes() { return engine_->volumes(); }
   store::BlobStore& blobs() { return engine_->blobs(); }
   void restart() { engine_->restart(); }
+  void lose_power() { engine_->lose_power(); }
 
   static constexpr std::chrono::milliseconds kLongLease{600'000};
   static constexpr std::chrono::milliseconds kLong{60'000};

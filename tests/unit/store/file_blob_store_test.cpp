@@ -10,6 +10,7 @@
 
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
+#include "tests/unit/store/power_cut.h"
 
 namespace isomesh::store {
 namespace {
@@ -49,6 +50,21 @@ TEST_F(FileBlobStoreTest, ABlobIsNamedByItsBytes) {
   EXPECT_EQ(blob.bytes, 5U);
   EXPECT_EQ(get(kHello), "hello");
   EXPECT_EQ(test::read_file(blobs_.path_of(kHello)), "hello");
+}
+
+// Whoever made its folder had not come to sync it.
+TEST_F(FileBlobStoreTest, ABlobOutlivesAPowerCutInAFolderThatWasThere) {
+  const test::TemporaryFolder outer;
+  const test::PowerCut power(outer.path());
+  const DataFolder data(outer / "data");
+  sync_folder(outer.path());
+  const FileBlobStore blobs(data);
+  std::filesystem::create_directory(blobs.path_of(kHello).parent_path());
+  const auto writer = blobs.begin();
+  writer->write(as_span("hello"));
+  writer->commit();
+  power.leave(folder_ / "left");
+  EXPECT_EQ(test::read_file(folder_ / "left/data/blobs/2c" / kHello), "hello");
 }
 
 TEST_F(FileBlobStoreTest, IsThereOnlyAfterItsCommit) {
