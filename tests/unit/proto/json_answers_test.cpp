@@ -224,7 +224,8 @@ TEST(AnswerJson, BytesThatAreNotUtf8AreReplaced) {
   EXPECT_EQ(read.detail.find('\xff'), std::string::npos);
 }
 
-// --- From other versions, and from nobody ---------------------------------------------------------
+// --- From other versions, and from nobody
+// ---------------------------------------------------------
 
 TEST(AnswerJson, VolumesOfTheFirstVersionAreRead) {
   json volume = json::parse(to_json(dicom_volume()));
