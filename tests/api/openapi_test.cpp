@@ -15,6 +15,7 @@
 
 #include "proto/json.h"
 #include "tests/api/problems.h"
+#include "tests/support/enumerators.h"
 #include "tests/support/nifti.h"
 
 namespace isomesh {
@@ -23,16 +24,6 @@ namespace {
 using namespace test;
 using nlohmann::json;
 using testing::IsEmpty;
-
-// All names of an enumeration whose values are numbered without gaps.
-template <class Enum>
-std::vector<std::string> names() {
-  std::vector<std::string> all;
-  for (int number = 0; !to_string(Enum{number}).empty(); ++number) {
-    all.emplace_back(to_string(Enum{number}));
-  }
-  return all;
-}
 
 TEST_F(OpenApiTest, IsServedAsItWasWritten) {
   const Answer answer = daemon_.get("/openapi.yaml");

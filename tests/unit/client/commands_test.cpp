@@ -97,7 +97,7 @@ TEST_F(Commands, AJobThatFailedGivesTheServersReason) {
   const Outcome outcome = outcome_of(options_);
   EXPECT_EQ(outcome.status, kRefused);
   EXPECT_EQ(outcome.err, "isomesh: the mesh has too many triangles\n");
-  EXPECT_THAT(folder_.names(), ElementsAre("head.nii"));
+  EXPECT_THAT(test::files_below(folder_.path()), ElementsAre("head.nii"));
 }
 
 TEST_F(Commands, AnInterruptCancelsTheJobThatMeshWaitsFor) {

@@ -22,13 +22,13 @@ TEST(PartFile, IsSeenOnlyWhenItIsPublished) {
   file.write("whole");
   file.publish();
   EXPECT_EQ(test::read_file(folder / "mesh.drc"), "whole");
-  EXPECT_THAT(folder.names(), ElementsAre("mesh.drc"));
+  EXPECT_THAT(test::files_below(folder.path()), ElementsAre("mesh.drc"));
 }
 
 TEST(PartFile, LeavesNothingWithoutPublishing) {
   TemporaryFolder folder;
   { PartFile(folder / "mesh.drc").write("half"); }
-  EXPECT_THAT(folder.names(), IsEmpty());
+  EXPECT_THAT(test::files_below(folder.path()), IsEmpty());
 }
 
 TEST(PartFile, FollowsALink) {

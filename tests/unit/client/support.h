@@ -1,8 +1,7 @@
-// Servers of this process for the client to talk to, and a folder that goes with the test.
+// Servers of this process for the client to talk to.
 #pragma once
 
 #include <atomic>
-#include <filesystem>
 #include <functional>
 #include <string>
 #include <thread>
@@ -12,25 +11,9 @@
 
 #include "client/isomesh/client.h"
 #include "proto/types.h"
+#include "tests/support/files.h"
 
 namespace isomesh::test {
-
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-  std::vector<std::string> names() const;  // what lies in it, sorted
-
- private:
-  std::filesystem::path path_;
-};
-
-void write_file(const std::filesystem::path& path, const std::string& content);
-std::string read_file(const std::filesystem::path& path);
 
 // An HTTP server on a free port of loopback. Routes are added through `http` before `start`.
 class FakeServer {

@@ -187,7 +187,7 @@ TEST_F(Fetch, WritesTheMeshAndNothingElse) {
                });
   EXPECT_EQ(last, mesh.size());
   EXPECT_TRUE(test::read_file(folder_ / "brain.drc") == mesh);
-  EXPECT_THAT(folder_.names(), ElementsAre("brain.drc"));
+  EXPECT_THAT(test::files_below(folder_.path()), ElementsAre("brain.drc"));
 }
 
 TEST_F(Fetch, LeavesNoFileWhenOtherBytesCome) {
@@ -196,7 +196,7 @@ TEST_F(Fetch, LeavesNoFileWhenOtherBytesCome) {
   Client client = client_for(pattern(1000), changed);
   const Error error = error_of([&] { client.fetch("7", MeshFormat::kDrc, folder_ / "brain.drc"); });
   EXPECT_EQ(error.code(), ErrorCode::kDigestMismatch);
-  EXPECT_THAT(folder_.names(), IsEmpty());
+  EXPECT_THAT(test::files_below(folder_.path()), IsEmpty());
 }
 
 TEST_F(Fetch, LeavesTheOldFileWhenTooManyBytesCome) {
@@ -205,14 +205,14 @@ TEST_F(Fetch, LeavesTheOldFileWhenTooManyBytesCome) {
   EXPECT_EQ(error_of([&] { client.fetch("7", MeshFormat::kDrc, folder_ / "brain.drc"); }).code(),
             ErrorCode::kDigestMismatch);
   EXPECT_EQ(test::read_file(folder_ / "brain.drc"), "old");
-  EXPECT_THAT(folder_.names(), ElementsAre("brain.drc"));
+  EXPECT_THAT(test::files_below(folder_.path()), ElementsAre("brain.drc"));
 }
 
 TEST_F(Fetch, RefusesFormatsThatTheJobWasNotAskedFor) {
   Client client = client_for("mesh", "mesh");
   EXPECT_EQ(error_of([&] { client.fetch("7", MeshFormat::kStl, folder_ / "brain.stl"); }).code(),
             ErrorCode::kNotFound);
-  EXPECT_THAT(folder_.names(), IsEmpty());
+  EXPECT_THAT(test::files_below(folder_.path()), IsEmpty());
 }
 
 TEST_F(Fetch, GivesTheReasonOfAJobThatFailed) {

@@ -244,11 +244,10 @@ TEST(Close, DoesNotChangeWhatIsNotOnTheBorder) {
       on_boundary[b] = true;
     }
     const std::vector<Vec3> caps = places_on_border(closed);
-    for (const int passes : {0, 3}) {
-      SCOPED_TRACE(passes);
-      for (Mesh* const mesh : {&open, &closed}) {
-        smooth({.passes = passes}, {}, *mesh);
-      }
+    const SmoothOptions taubin = {.passes = 2, .lambda = 0.33, .mu = taubin_mu(0.33, 0.1)};
+    for (const SmoothOptions& smoothing : {SmoothOptions{.passes = 0}, {.passes = 3}, taubin}) {
+      SCOPED_TRACE(testing::Message() << smoothing.passes << " passes, mu " << smoothing.mu);
+      for (Mesh* const mesh : {&open, &closed}) smooth(smoothing, {}, *mesh);
       std::vector<Vec3> inner_of_open;
       for (std::size_t v = 0; v < open.positions.size(); ++v) {
         if (!on_boundary[v]) inner_of_open.push_back(open.positions[v]);

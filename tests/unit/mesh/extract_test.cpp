@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/errors.h"
 #include "tests/unit/mesh/reference_surface.h"
 
 namespace isomesh::mesh {
@@ -113,17 +114,6 @@ TEST(ExtractMemory, IsNotTakenForMoreVerticesThanIndicesCanName) {
   EXPECT_EQ(mesh.triangles.capacity_bytes(), 0U);
 }
 
-// Runs `work` and tells whether it ended with Error kCancelled.
-template <class Work>
-bool is_cancelled(const Work& work) {
-  try {
-    work();
-    return false;
-  } catch (const Error& error) {
-    return error.code() == ErrorCode::kCancelled;
-  }
-}
-
 TEST(ExtractCancellation, BeforeTheStartEndsBothPasses) {
   const auto volume = many_layers();
   std::stop_source source;
@@ -131,10 +121,12 @@ TEST(ExtractCancellation, BeforeTheStartEndsBothPasses) {
   const Context stopped{source.get_token(), {}};
   for (const ExtractOptions& options : all_options(80)) {
     const SurfaceCount count = count_surface(volume.lattice(), options, {});
-    EXPECT_TRUE(is_cancelled([&] { count_surface(volume.lattice(), options, stopped); }));
+    EXPECT_EQ(test::code_thrown_by([&] { count_surface(volume.lattice(), options, stopped); }),
+              ErrorCode::kCancelled);
     Mesh mesh;
-    EXPECT_TRUE(
-        is_cancelled([&] { extract_surface(volume.lattice(), options, count, stopped, mesh); }));
+    EXPECT_EQ(test::code_thrown_by(
+                  [&] { extract_surface(volume.lattice(), options, count, stopped, mesh); }),
+              ErrorCode::kCancelled);
   }
 }
 
@@ -146,13 +138,16 @@ TEST(ExtractCancellation, OnTheWayEndsBothPasses) {
     const test::ThreadCount limit(threads);
     std::stop_source counting;
     const Context stops_counting{counting.get_token(), [&](double) { counting.request_stop(); }};
-    EXPECT_TRUE(is_cancelled([&] { count_surface(volume.lattice(), options, stops_counting); }));
+    EXPECT_EQ(
+        test::code_thrown_by([&] { count_surface(volume.lattice(), options, stops_counting); }),
+        ErrorCode::kCancelled);
 
     std::stop_source writing;
     const Context stops_writing{writing.get_token(), [&](double) { writing.request_stop(); }};
     Mesh mesh;
-    EXPECT_TRUE(is_cancelled(
-        [&] { extract_surface(volume.lattice(), options, count, stops_writing, mesh); }));
+    EXPECT_EQ(test::code_thrown_by(
+                  [&] { extract_surface(volume.lattice(), options, count, stops_writing, mesh); }),
+              ErrorCode::kCancelled);
     // What a cancelled job leaves behind does no harm to the next.
     extract_surface(volume.lattice(), options, count, {}, mesh);
     EXPECT_TRUE(test::same_bytes(mesh, test::extracted(volume, options)));

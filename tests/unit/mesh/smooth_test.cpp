@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/nifti.h"
@@ -90,16 +91,6 @@ double largest_distance(const Surface& a, const Surface& b) {
     }
   }
   return largest;
-}
-
-template <class Work>
-bool is_cancelled(const Work& work) {
-  try {
-    work();
-    return false;
-  } catch (const Error& error) {
-    return error.code() == ErrorCode::kCancelled;
-  }
 }
 
 class Smooth : public testing::TestWithParam<SmoothOptions> {};
@@ -382,8 +373,8 @@ TEST(SmoothCancellation, BeforeTheStartEndsIt) {
   std::stop_source source;
   source.request_stop();
   const Context stopped{source.get_token(), {}};
-  EXPECT_TRUE(is_cancelled([&] { smooth({5, 1}, stopped, mesh); }));
-  EXPECT_TRUE(is_cancelled([&] { smooth({0, 1}, stopped, mesh); }));
+  EXPECT_EQ(test::code_thrown_by([&] { smooth({5, 1}, stopped, mesh); }), ErrorCode::kCancelled);
+  EXPECT_EQ(test::code_thrown_by([&] { smooth({0, 1}, stopped, mesh); }), ErrorCode::kCancelled);
 }
 
 TEST(SmoothCancellation, OnTheWayEndsIt) {
@@ -395,7 +386,10 @@ TEST(SmoothCancellation, OnTheWayEndsIt) {
                                ++reports;
                                source.request_stop();
                              }};
-  EXPECT_TRUE(is_cancelled([&] { smooth({1000, 1}, stops_itself, mesh); }));
+  EXPECT_EQ(test::code_thrown_by([&] {
+              smooth({1000, 1}, stops_itself, mesh);
+            }),
+            ErrorCode::kCancelled);
   EXPECT_EQ(reports, 1);
 }
 

@@ -42,6 +42,25 @@ std::vector<std::string> faults_in(const Query& query) {
   return error ? fields_of(*error) : std::vector<std::string>{"nothing was refused"};
 }
 
+// No member as it is by default.
+JobParameters unusual_parameters(const std::string& volume) {
+  return {.volume = volume,
+          .iso = -150,
+          .scheme = Scheme::kFive,
+          .interpolation = Interpolation::kMidpoint,
+          .passes = 17,
+          .smoothing = Smoothing::kTaubin,
+          .lambda = 0.25,
+          .pass_band = 0.05,
+          .max_displacement_mm = 0.5,
+          .close = true,
+          .components = {.keep = 2, .min_triangles = 100},
+          .formats = {MeshFormat::kStl, MeshFormat::kGlb},
+          .draco = {.position_bits = 11, .speed = 3},
+          .normals = true,
+          .priority = Priority::kBulk};
+}
+
 // --- Bodies --------------------------------------------------------------------------------------
 
 TEST(JobBody, NeedsAVolumeAndAnIsoOnly) {
@@ -61,21 +80,7 @@ TEST(JobBody, TakesEveryMember) {
       "pass_band": 0.05, "max_displacement_mm": 0.5,
       "close": true, "components": {"keep": 2, "min_triangles": 100}, "formats": ["stl", "glb"],
       "draco": {"position_bits": 11, "speed": 3}, "normals": true, "priority": "bulk"})"),
-            (JobParameters{.volume = "abc",
-                           .iso = -150,
-                           .scheme = Scheme::kFive,
-                           .interpolation = Interpolation::kMidpoint,
-                           .passes = 17,
-                           .smoothing = Smoothing::kTaubin,
-                           .lambda = 0.25,
-                           .pass_band = 0.05,
-                           .max_displacement_mm = 0.5,
-                           .close = true,
-                           .components = {.keep = 2, .min_triangles = 100},
-                           .formats = {MeshFormat::kStl, MeshFormat::kGlb},
-                           .draco = {.position_bits = 11, .speed = 3},
-                           .normals = true,
-                           .priority = Priority::kBulk}));
+            unusual_parameters("abc"));
 }
 
 TEST(JobBody, IsWhatToJsonWrites) {
@@ -304,8 +309,7 @@ TEST(JobBody, MembersOfNonUtf8NamesAreRefusedWithoutThem) {
   EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
 }
 
-// --- Queries
-// ---------------------------------------------------------------------------------------
+// --- Queries -------------------------------------------------------------------------------------
 
 TEST(JobQuery, NeedsAnIsoOnly) {
   JobParameters expected;
@@ -332,21 +336,7 @@ TEST(JobQuery, TakesEveryParameter) {
                                        {"position_bits", "11"},
                                        {"speed", "3"},
                                        {"priority", "bulk"}}),
-            (JobParameters{.volume = "",
-                           .iso = -150,
-                           .scheme = Scheme::kFive,
-                           .interpolation = Interpolation::kMidpoint,
-                           .passes = 17,
-                           .smoothing = Smoothing::kTaubin,
-                           .lambda = 0.25,
-                           .pass_band = 0.05,
-                           .max_displacement_mm = 0.5,
-                           .close = true,
-                           .components = {.keep = 2, .min_triangles = 100},
-                           .formats = {MeshFormat::kStl, MeshFormat::kGlb},
-                           .draco = {.position_bits = 11, .speed = 3},
-                           .normals = true,
-                           .priority = Priority::kBulk}));
+            unusual_parameters(""));
 }
 
 TEST(JobQuery, OtsuStandsForAnIso) {

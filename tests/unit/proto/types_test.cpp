@@ -6,18 +6,12 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/enumerators.h"
+
 namespace isomesh {
 namespace {
 
-// All names of an enumeration whose values are numbered without gaps, in order.
-template <class Enum>
-std::vector<std::string> names() {
-  std::vector<std::string> all;
-  for (int number = 0; !to_string(Enum{number}).empty(); ++number) {
-    all.emplace_back(to_string(Enum{number}));
-  }
-  return all;
-}
+using test::names;
 
 template <class Enum>
 void expect_names(const std::vector<std::string>& expected) {
