@@ -1,5 +1,6 @@
 #include "tests/unit/store/power_cut.h"
 
+#include <mutex>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -13,12 +14,12 @@
 namespace isomesh::test {
 namespace {
 
+// Guards all recorders, and what they remember.
 std::mutex& recorders_mutex() {
   static std::mutex mutex;
   return mutex;
 }
 
-// Guarded by recorders_mutex().
 std::set<PowerCut*>& recorders() {
   static std::set<PowerCut*> all;
   return all;
@@ -64,7 +65,7 @@ PowerCut::~PowerCut() {
 }
 
 void PowerCut::leave(const std::filesystem::path& target) const {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(recorders_mutex());
   leave(folder_, target);
 }
 
@@ -74,7 +75,6 @@ void PowerCut::remember(int descriptor) {
   if (!path.native().starts_with(folder_.native())) return;
   struct stat status = {};
   ::fstat(descriptor, &status);
-  const std::lock_guard lock(mutex_);
   if (!S_ISDIR(status.st_mode)) {
     files_[status.st_ino] = bytes_behind(descriptor, status.st_size);
     return;

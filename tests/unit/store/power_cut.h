@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <map>
-#include <mutex>
 #include <string>
 
 #include <sys/types.h>
@@ -24,16 +23,15 @@ class PowerCut {
   // Writes what would be there if the power failed now to `target`, an empty folder.
   void leave(const std::filesystem::path& target) const;
 
-  // Called after each sync of a descriptor.
+  // Called after each sync of a descriptor, by one thread at a time.
   void remember(int descriptor);
 
  private:
   void leave(const std::filesystem::path& folder, const std::filesystem::path& target) const;
 
   const std::filesystem::path folder_;
-  mutable std::mutex mutex_;
-  std::map<ino_t, std::string> files_;                                     // guarded by mutex_
-  std::map<std::filesystem::path, std::map<std::string, ino_t>> folders_;  // guarded by mutex_
+  std::map<ino_t, std::string> files_;
+  std::map<std::filesystem::path, std::map<std::string, ino_t>> folders_;
 };
 
 }  // namespace isomesh::test
