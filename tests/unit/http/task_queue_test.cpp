@@ -31,24 +31,6 @@ TEST(BoundedTaskQueue, RunsTasksSideBySide) {
   EXPECT_TRUE(ran);
 }
 
-// Those that are begun at once all wait for the last one.
-TEST(BoundedTaskQueue, NoTaskWaitsForLongBehindOthersThatWait) {
-  constexpr std::size_t kThreads = 6;
-  constexpr std::size_t kPrompt = 2;
-  std::promise<void> last_ran;
-  const std::shared_future<void> over = last_ran.get_future().share();
-  std::atomic<std::size_t> waited = 0;
-  BoundedTaskQueue queue(kThreads, 100, kPrompt);
-  for (std::size_t n = 1; n < kThreads; ++n) {
-    queue.try_enqueue(
-        [&] { waited += over.wait_for(test::kLongest) == std::future_status::ready; });
-  }
-  queue.try_enqueue([&] { last_ran.set_value(); });
-  EXPECT_EQ(over.wait_for(test::kLongest), std::future_status::ready);
-  queue.shutdown();  // which lets everything run
-  EXPECT_EQ(waited, kThreads - 1);
-}
-
 TEST(BoundedTaskQueue, RunsWhatItAcceptedBeforeItEnds) {
   std::atomic<int> runs = 0;
   std::promise<void> go;
