@@ -16,7 +16,7 @@ void enforce(store::Retention& retention) {
       spdlog::info("let go of {} jobs, {} volumes and {} files", jobs, volumes, blobs);
     }
   } catch (const std::exception& error) {
-    spdlog::error("what is too old stays for now: {}", error.what());
+    spdlog::error("what is too old could not be let go of, and is tried again: {}", error.what());
   }
 }
 
