@@ -320,15 +320,8 @@ void check_if_match(const httplib::Request& request, std::string_view etag) {
 }
 
 std::string cursor_after(std::string_view kind, std::string_view id) {
-  std::string text = std::string(kind) + ':' + std::string(id);
-  std::string cursor;
-  for (const char c : text) {
-    constexpr std::string_view kDigits = "0123456789abcdef";
-    const auto byte = static_cast<unsigned char>(c);
-    cursor += kDigits[byte >> 4];
-    cursor += kDigits[byte & 15];
-  }
-  return cursor;
+  const std::string text = std::string(kind) + ':' + std::string(id);
+  return store::to_hex({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
 std::string id_after(const httplib::Request& request, std::string_view kind) {
