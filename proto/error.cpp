@@ -56,19 +56,6 @@ ErrorCode error_code_of(std::string_view name) {
   return found == kDescriptions.end() ? ErrorCode::kInternal : found->code;
 }
 
-Error invalid_parameter(const std::string& field, const std::string& message) {
-  return invalid_parameters({{field, message}});
-}
-
-Error invalid_parameters(std::vector<FieldError> fields) {
-  std::string detail;
-  for (const FieldError& fault : fields) {
-    if (!detail.empty()) detail += "; ";
-    detail.append(fault.field).append(": ").append(fault.message);
-  }
-  return {ErrorCode::kInvalidParameter, detail, std::move(fields)};
-}
-
 Problem to_problem(const Error& error, const std::string& instance) {
   const ErrorDescription& row = describe(error.code());
   const bool ours = error.code() == ErrorCode::kInternal;

@@ -1,24 +1,19 @@
 // The fields of every type that has a JSON form, each name once: `visit(value, field)` calls
-// field(name, member) for each, in the order in which they are written. Private to this folder.
+// field(name, member) for each, in the order in which they are written. Those of a job's parameters
+// are in parameters.h. Private to this folder.
 #pragma once
 
-#include <concepts>
 #include <type_traits>
 
 #include <nlohmann/json.hpp>
 
 #include "proto/error.h"
+#include "proto/parameters.h"
 #include "proto/types.h"
 
 namespace isomesh {
 
 using Json = nlohmann::ordered_json;
-
-template <class T>
-concept Enumeration = std::is_enum_v<T>;
-
-template <class Self, class T>
-concept Is = std::same_as<std::remove_const_t<Self>, T>;
 
 void visit(Is<Preset> auto& self, auto&& field) {
   field("name", self.name);
@@ -74,38 +69,7 @@ void visit(Is<Volume> auto& self, auto&& field) {
   }
 }
 
-void visit(Is<DracoParameters> auto& self, auto&& field) {
-  field("position_bits", self.position_bits);
-  field("speed", self.speed);
-}
-
-void visit(Is<ComponentFilter> auto& self, auto&& field) {
-  field("keep", self.keep);
-  field("min_triangles", self.min_triangles);
-}
-
-void visit(Is<Callback> auto& self, auto&& field) { field("url", self.url); }
-
-void visit(Is<JobParameters> auto& self, auto&& field) {
-  field("volume", self.volume);
-  field("iso", self.iso);
-  field("scheme", self.scheme);
-  field("interpolation", self.interpolation);
-  field("passes", self.passes);
-  field("smoothing", self.smoothing);
-  field("lambda", self.lambda);
-  field("pass_band", self.pass_band);
-  field("max_displacement_mm", self.max_displacement_mm);
-  field("close", self.close);
-  field("components", self.components);
-  field("formats", self.formats);
-  field("draco", self.draco);
-  field("normals", self.normals);
-  field("priority", self.priority);
-  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? self.callback.has_value() : true) {
-    field("callback", self.callback);
-  }
-}
+void visit(Is<Callback> auto& self, auto&& field) { field(Parameter{.name = "url"}, self.url); }
 
 void visit(Is<Timing> auto& self, auto&& field) {
   field("queue", self.queue);

@@ -25,15 +25,19 @@ Json write_optional(const std::optional<T>& value) {
 }
 
 template <class T>
-void write_field(Json& object, const char* name, const std::optional<T>& value) {
-  // An empty iso-value in the parameters means "let Otsu choose".
-  const bool is_otsu = !value && std::string_view(name) == "iso";
-  object[name] = is_otsu ? Json("otsu") : write_optional(value);
+void write_field(Json& object, const char* name, const T& value) {
+  object[name] = write(value);
 }
 
 template <class T>
-void write_field(Json& object, const char* name, const T& value) {
-  object[name] = write(value);
+void write_field(Json& object, const char* name, const std::optional<T>& value) {
+  object[name] = write_optional(value);
+}
+
+template <class T>
+void write_field(Json& object, const Parameter& parameter, const std::optional<T>& value) {
+  const bool has_word = !value && parameter.when_empty != nullptr;
+  object[parameter.name] = has_word ? Json(parameter.when_empty) : write_optional(value);
 }
 
 template <class T>
@@ -54,7 +58,7 @@ Json write(const T& value) {
     return array;
   } else {
     Json object = Json::object();
-    visit(value, [&](const char* name, const auto& member) { write_field(object, name, member); });
+    visit(value, [&](const auto& name, const auto& member) { write_field(object, name, member); });
     return object;
   }
 }
@@ -182,6 +186,7 @@ T from_record(std::string_view text) {
 std::string to_json(const Volume& volume) { return to_text(volume); }
 std::string to_json(const Job& job) { return to_text(job); }
 std::string to_json(const JobParameters& parameters) { return to_text(parameters); }
+std::string to_json(const MeshParameters& parameters) { return to_text(parameters); }
 std::string to_json(const Problem& problem) { return to_text(problem); }
 std::string to_json(const Histogram& histogram) { return to_text(histogram); }
 std::string to_json(const Estimate& estimate) { return to_text(estimate); }

@@ -17,6 +17,7 @@ namespace isomesh {
 std::string to_json(const Volume& volume);
 std::string to_json(const Job& job);
 std::string to_json(const JobParameters& parameters);
+std::string to_json(const MeshParameters& parameters);
 std::string to_json(const Problem& problem);
 std::string to_json(const Histogram& histogram);
 std::string to_json(const Estimate& estimate);
@@ -45,14 +46,18 @@ Job job_from_record(std::string_view text);
 // unknown, missing, of the wrong type or out of range.
 JobParameters parse_job_parameters(std::string_view body);
 
-// The same from a query, where everything is text: `format` (several, separated by commas) stands
-// for `formats`, `position_bits` and `speed` for the members of `draco`. The volume is a parameter
-// of its own, or the request's body and then stays empty here.
+using QueryParameters =
+    std::vector<std::pair<std::string, std::string>>;  // names and values, decoded
+
+// The same from a query, where everything is text and parameters go by query_name_of()
+// (parameters.h): `format` (several, separated by commas) stands for `formats`, `speed` for the
+// member of `draco`. The volume is a parameter of its own, or the request's body and then stays
+// empty here.
 enum class VolumeIn { kQuery, kBody };
-JobParameters parse_job_parameters(const std::vector<std::pair<std::string, std::string>>& query,
+JobParameters parse_job_parameters(const QueryParameters& query,
                                    VolumeIn volume_in = VolumeIn::kBody);
 
-// What a query calls the member of a body: `format` for `formats`, `speed` for `draco.speed`.
-std::string spelled_in_query(const std::string& member);
+// The inverse of VolumeIn::kQuery. What a query cannot say, such as the callback, is left out.
+QueryParameters to_query(const JobParameters& parameters);
 
 }  // namespace isomesh

@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <map>
 #include <set>
 
 #include <nlohmann/json.hpp>
@@ -11,6 +11,44 @@
 namespace isomesh {
 namespace {
 
+// What a query calls a parameter, where it stands in a body and how its text is read.
+struct QueryName {
+  std::string path;
+  bool is_text = false;
+  bool is_list = false;
+};
+
+// The table's parameters by their names in a query.
+const std::map<std::string, QueryName>& query_names() {
+  static const std::map<std::string, QueryName> names = [] {
+    std::map<std::string, QueryName> by_name;
+    const JobParameters parameters;
+    visit_leaves(parameters,
+                 [&](const std::string& path, const Parameter& parameter, const auto& member) {
+                   using Member = std::remove_cvref_t<decltype(member)>;
+                   if (!parameter.in_query) return;
+                   by_name[query_name_of(parameter)] = {
+                       .path = path,
+                       .is_text = std::is_same_v<Member, std::string>,
+                       .is_list = std::is_same_v<Member, std::vector<MeshFormat>>};
+                 });
+    return by_name;
+  }();
+  return names;
+}
+
+std::string spelled_in_query(const std::string& path) {
+  const auto& names = query_names();
+  const auto found =
+      std::ranges::find_if(names, [&](const auto& entry) { return entry.second.path == path; });
+  return found == names.end() ? path : found->first;
+}
+
+Json::json_pointer pointer_to(std::string path) {
+  std::ranges::replace(path, '.', '/');
+  return Json::json_pointer('/' + path);
+}
+
 // Collects what is wrong with every member, so that one answer names all of it.
 class RequestReader {
  public:
@@ -18,14 +56,14 @@ class RequestReader {
   // before their members.
   void name_as_in_query() { as_in_query_ = true; }
 
-  // Reads `json` into `value`, whose fields are those of `visit`, and refuses any other.
+  // Reads `json` into `value`, whose parameters are those of `visit`, and refuses any other member.
   template <class T>
   void read_object(const Json& json, T& value, const std::string& prefix) {
     std::vector<std::string> known;
-    visit(value, [&](const char* name, auto& member) {
-      known.emplace_back(name);
-      if (const auto found = json.find(name); found != json.end()) {
-        read_member(*found, prefix + name, member);
+    visit(value, [&](const Parameter& parameter, auto& member) {
+      known.emplace_back(parameter.name);
+      if (const auto found = json.find(parameter.name); found != json.end()) {
+        read_member(*found, prefix + parameter.name, parameter, member);
       }
     });
     for (const auto& [name, unused] : json.items()) {
@@ -52,110 +90,118 @@ class RequestReader {
   static constexpr std::size_t kMostErrors = 20;
   static constexpr std::size_t kLongestName = 64;
 
-  void read_member(const Json& json, const std::string& name, std::string& value) {
-    if (!json.is_string()) return add(name, "must be a string");
+  static bool fits(const Parameter& parameter, double number) {
+    return std::isfinite(number) && !(parameter.minimum && number < *parameter.minimum) &&
+           !(parameter.above && number <= *parameter.above) &&
+           !(parameter.maximum && number > *parameter.maximum);
+  }
+
+  // `kind` of number, and what the table says that it may be.
+  void refuse(const std::string& path, const std::string& kind, const Parameter& parameter) {
+    const std::string range = range_of(parameter);
+    std::string message = "must be a " + kind + (range.empty() ? "" : ' ' + range);
+    if (parameter.when_empty != nullptr)
+      message += " or \"" + std::string(parameter.when_empty) + '"';
+    add(path, message);
+  }
+
+  template <class Whole>
+  void read_whole(const Json& json, const std::string& path, const Parameter& parameter,
+                  Whole& value) {
+    const double number = json.is_number() ? json.get<double>() : std::nan("");
+    if (std::floor(number) != number || !fits(parameter, number)) {
+      return refuse(path, "whole number", parameter);
+    }
+    value = static_cast<Whole>(number);
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   std::string& value) {
+    if (!json.is_string()) return add(path, "must be a string");
     value = json.get<std::string>();
   }
 
-  void read_member(const Json& json, const std::string& name, std::optional<double>& value) {
-    if (json == (name == "iso" ? Json("otsu") : Json(nullptr))) return value.reset();
-    double number = 0;
-    read_member(json, name, number);
-    value = number;
+  template <class Number>
+  requires std::is_arithmetic_v<Number>
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::optional<Number>& value) {
+    const Json empty = parameter.when_empty == nullptr ? Json(nullptr) : Json(parameter.when_empty);
+    if (json == empty) return value.reset();
+    read_member(json, path, parameter, value.emplace());
   }
 
-  void read_member(const Json& json, const std::string& name, Scheme& value) {
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   Scheme& value) {
     if (json == 5) {
       value = Scheme::kFive;
     } else if (json == 6) {
       value = Scheme::kSix;
     } else {
-      add(name, "must be 5 or 6");
+      add(path, "must be 5 or 6");
     }
   }
 
-  void read_member(const Json& json, const std::string& name, Enumeration auto& value) {
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   Enumeration auto& value) {
     using Enum = std::remove_reference_t<decltype(value)>;
     const auto known = json.is_string() ? from_string<Enum>(json.get<std::string>()) : std::nullopt;
-    if (!known) return add(name, "must be " + names_of<Enum>());
+    if (!known) return add(path, "must be " + names_of<Enum>());
     value = *known;
   }
 
-  void read_member(const Json& json, const std::string& name, int& value) {
-    const auto [low, high] = range_of(name);
-    const bool whole = json.is_number() && std::floor(json.get<double>()) == json.get<double>();
-    if (!whole || json.get<double>() < low || json.get<double>() > high) {
-      return add(name, "must be a whole number from " + std::to_string(low) + " to " +
-                           std::to_string(high));
-    }
-    value = static_cast<int>(json.get<double>());
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   int& value) {
+    read_whole(json, path, parameter, value);
   }
 
-  void read_member(const Json& json, const std::string& name, double& value) {
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::uint32_t& value) {
+    read_whole(json, path, parameter, value);
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   double& value) {
     const double number = json.is_number() ? json.get<double>() : std::nan("");
-    if (name == "lambda" && !(number > 0 && number <= 1)) {
-      add(name, "must be a number above 0 and at most 1");
-    } else if (name == "pass_band" && !(number > 0 && number <= 0.5)) {
-      add(name, "must be a number above 0 and at most 0.5");
-    } else if (name == "max_displacement_mm" && !(std::isfinite(number) && number >= 0)) {
-      add(name, "must be a finite number of at least 0");
-    } else if (!std::isfinite(number)) {
-      add(name, "must be a finite number or \"otsu\"");  // the iso-value
-    } else {
-      value = number;
+    // Without an upper bound "a number" would take in the infinite ones.
+    if (!fits(parameter, number)) {
+      return refuse(path, parameter.maximum ? "number" : "finite number", parameter);
     }
+    value = number;
   }
 
-  void read_member(const Json& json, const std::string& name, bool& value) {
-    if (!json.is_boolean()) return add(name, "must be true or false");
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   bool& value) {
+    if (!json.is_boolean()) return add(path, "must be true or false");
     value = json.get<bool>();
   }
 
-  void read_member(const Json& json, const std::string& name, std::vector<MeshFormat>& formats) {
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::vector<MeshFormat>& formats) {
     if (!json.is_array() || json.empty()) {
-      return add(name, "must be a list of at least one of " + names_of<MeshFormat>());
+      return add(path, "must be a list of at least one of " + names_of<MeshFormat>());
     }
     formats.clear();
     for (const Json& element : json) {
       MeshFormat format{};
       const std::size_t before = errors_.size();
-      read_member(element, name, format);
+      read_member(element, path, parameter, format);
       if (errors_.size() > before) return;
       if (std::ranges::find(formats, format) == formats.end()) formats.push_back(format);
     }
   }
 
-  void read_member(const Json& json, const std::string& name, std::optional<std::uint32_t>& value) {
-    constexpr double kMost = std::numeric_limits<std::uint32_t>::max();
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   ParameterGroup auto& value) {
+    if (!json.is_object()) return add(path, "must be an object");
+    read_object(json, value, path + ".");
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   std::optional<Callback>& value) {
     if (json.is_null()) return value.reset();
-    const double number = json.is_number() ? json.get<double>() : 0;
-    if (std::floor(number) != number || !(number >= 1 && number <= kMost)) {
-      return add(name, "must be a whole number from 1 to 4294967295");
-    }
-    value = static_cast<std::uint32_t>(number);
-  }
-
-  void read_member(const Json& json, const std::string& name, ComponentFilter& value) {
-    if (!json.is_object()) return add(name, "must be an object");
-    read_object(json, value, name + ".");
-  }
-
-  void read_member(const Json& json, const std::string& name, DracoParameters& value) {
-    if (!json.is_object()) return add(name, "must be an object");
-    read_object(json, value, name + ".");
-  }
-
-  void read_member(const Json& json, const std::string& name, std::optional<Callback>& value) {
-    if (json.is_null()) return value.reset();
-    if (!json.is_object()) return add(name, "must be an object");
-    read_object(json, value.emplace(), name + ".");
-    if (!json.contains("url")) add(name + ".url", "is required");
-  }
-
-  static std::pair<int, int> range_of(const std::string& name) {
-    if (name == "passes") return {0, 1000};
-    if (name == "draco.position_bits") return {8, 30};
-    return {0, 10};  // draco.speed
+    if (!json.is_object()) return add(path, "must be an object");
+    read_object(json, value.emplace(), path + ".");
+    if (!json.contains("url")) add(path + ".url", "is required");
   }
 
   bool as_in_query_ = false;
@@ -200,35 +246,59 @@ Json list_of(const std::string& text) {
   return list;
 }
 
-// The object that holds a member which a query names without it; empty for the others.
-std::string owner_of(const std::string& name) {
-  if (name == "position_bits" || name == "speed") return "draco";
-  if (name == "keep" || name == "min_triangles") return "components";
-  return "";
+// What the table says of the chosen kind of smoothing alone.
+void check_case(const std::string& path, const Parameter& parameter, Smoothing smoothing,
+                const std::optional<double>& value, RequestReader& reader) {
+  for (const auto& entry : parameter.cases) {
+    if (!entry || entry->smoothing != smoothing || !entry->maximum) continue;
+    if (!value || *value <= *entry->maximum) continue;
+    reader.add(path, "must be at most " + number_text(*entry->maximum) + " for \"" +
+                         std::string(to_string(smoothing)) + '"');
+  }
 }
 
 JobParameters read_parameters(const Json& json, bool with_volume, RequestReader& reader) {
   JobParameters parameters;
   reader.read_object(json, parameters, "");
-  if (with_volume && !json.contains("volume")) reader.add("volume", "is required");
-  if (!json.contains("iso")) reader.add("iso", "is required");
-  // With more, what varies fastest would grow with every pass, whatever the pass-band.
-  constexpr double kMostOfTaubin = 0.66;
-  if (parameters.smoothing == Smoothing::kTaubin && parameters.lambda > kMostOfTaubin) {
-    reader.add("lambda", "must be at most 0.66 for \"taubin\"");
-  }
+  visit_leaves(
+      parameters, [&](const std::string& path, const Parameter& parameter, const auto& member) {
+        const bool is_expected = parameter.is_required && (with_volume || path != "volume");
+        if (is_expected && !json.contains(pointer_to(path))) reader.add(path, "is required");
+        if constexpr (std::is_same_v<decltype(member), const std::optional<double>&>) {
+          check_case(path, parameter, parameters.smoothing, member, reader);
+        }
+      });
   reader.throw_if_any();
   if (!parameters.lambda) parameters.lambda = default_lambda(parameters.smoothing);
   return parameters;
 }
 
-}  // namespace
-
-std::string spelled_in_query(const std::string& member) {
-  if (member == "formats") return "format";
-  const std::size_t owner = member.find('.');
-  return owner == std::string::npos ? member : member.substr(owner + 1);
+// Members of a body that no query has, or has by another name.
+bool is_for_bodies(const std::string& name) {
+  bool found = false;
+  JobParameters parameters;  // not constant, for those members that an empty one hides
+  visit(parameters, [&](const Parameter& parameter, const auto& /*member*/) {
+    found = found || name == parameter.name;
+  });
+  return found && !query_names().contains(name);
 }
+
+// A query's text as the JSON value of a body.
+Json value_of(const std::string& text, const QueryName& name) {
+  return name.is_text ? Json(text) : name.is_list ? list_of(text) : value_of(text);
+}
+
+std::string text_of(const Json& value) {
+  if (!value.is_array()) return value.is_string() ? value.get<std::string>() : value.dump();
+  std::string list;
+  for (const Json& item : value) {
+    if (!list.empty()) list += ',';
+    list += text_of(item);
+  }
+  return list;
+}
+
+}  // namespace
 
 JobParameters parse_job_parameters(std::string_view body) {
   RequestReader reader;
@@ -247,30 +317,33 @@ JobParameters parse_job_parameters(std::string_view body) {
   return read_parameters(json, true, reader);
 }
 
-JobParameters parse_job_parameters(const std::vector<std::pair<std::string, std::string>>& query,
-                                   VolumeIn volume_in) {
+JobParameters parse_job_parameters(const QueryParameters& query, VolumeIn volume_in) {
   RequestReader reader;
-  std::vector<std::string> misplaced;
   Json json = Json::object();
   for (const auto& [name, text] : query) {
-    const std::string owner_name = owner_of(name);
-    Json& owner = owner_name.empty() ? json : json[owner_name];
-    const std::string member = name == "format" ? "formats" : name;
-    const bool is_text = name == "volume" && volume_in == VolumeIn::kQuery;
-    if ((name == "volume" && !is_text) || name == "draco" || name == "components" ||
-        name == "formats" || name == "callback") {
-      misplaced.push_back(name);
-    } else if (owner.contains(member)) {
+    const auto known = query_names().find(name);
+    if (is_for_bodies(name) || (name == "volume" && volume_in == VolumeIn::kBody)) {
+      reader.add(name, "is not a parameter of this request");
+    } else if (known == query_names().end()) {
+      reader.add(name, "is not a known member");
+    } else if (const auto place = pointer_to(known->second.path); json.contains(place)) {
       reader.add(name, "is given twice");
     } else {
-      owner[member] = is_text ? Json(text) : name == "format" ? list_of(text) : value_of(text);
+      json[place] = value_of(text, known->second);
     }
-  }
-  for (const std::string& name : misplaced) {
-    reader.add(name, "is not a parameter of this request");
   }
   reader.name_as_in_query();
   return read_parameters(json, volume_in == VolumeIn::kQuery, reader);
+}
+
+QueryParameters to_query(const JobParameters& parameters) {
+  const Json json = Json::parse(to_json(parameters));
+  QueryParameters query;
+  for (const auto& [name, place] : query_names()) {
+    const Json& value = json.at(pointer_to(place.path));
+    if (!value.is_null()) query.emplace_back(name, text_of(value));
+  }
+  return query;
 }
 
 }  // namespace isomesh

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "proto/samples.h"
+
 namespace isomesh {
 namespace {
 
@@ -72,21 +74,7 @@ std::string_view name_of(Enum value) {
 }  // namespace
 
 std::size_t bytes_per_sample(SampleType type) {
-  switch (type) {
-    case SampleType::kUint8:
-    case SampleType::kInt8:
-      return 1;
-    case SampleType::kUint16:
-    case SampleType::kInt16:
-      return 2;
-    case SampleType::kUint32:
-    case SampleType::kInt32:
-    case SampleType::kFloat32:
-      return 4;
-    case SampleType::kFloat64:
-      return 8;
-  }
-  return 0;
+  return with_sample(type, [](auto sample) { return sizeof(sample); });
 }
 
 double default_lambda(Smoothing smoothing) {
@@ -128,6 +116,18 @@ template std::optional<MeshFormat> from_string(std::string_view);
 template std::optional<Priority> from_string(std::string_view);
 template std::optional<JobState> from_string(std::string_view);
 template std::optional<Stage> from_string(std::string_view);
+
+template <class Enum>
+std::vector<Enum> values_of() {
+  std::vector<Enum> values;
+  for (const auto& [value, unused] : Names<Enum>::kTable) values.push_back(value);
+  return values;
+}
+
+template std::vector<Interpolation> values_of();
+template std::vector<Smoothing> values_of();
+template std::vector<MeshFormat> values_of();
+template std::vector<Priority> values_of();
 
 template <class Enum>
 std::string names_of() {

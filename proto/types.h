@@ -39,6 +39,16 @@ struct Geometry {
   bool operator==(const Geometry&) const = default;
 };
 
+// What a request says about raw samples, which say nothing about themselves.
+struct RawDescription {
+  std::array<std::uint32_t, 3> dims = {0, 0, 0};
+  SampleType type = SampleType::kUint8;
+  Geometry geometry;
+  bool big_endian = false;
+
+  bool operator==(const RawDescription&) const = default;
+};
+
 // An iso-value that is known to suit volumes of a kind.
 struct Preset {
   std::string name;
@@ -113,7 +123,7 @@ enum class MeshFormat { kDrc, kGlb, kStl, kPly, kObj };
 enum class Priority { kStat, kRoutine, kBulk };  // claimed in this order
 
 struct DracoParameters {
-  int position_bits = 14;  // 8..30 per coordinate
+  int position_bits = 14;  // per coordinate
   int speed = 7;           // 0 smallest .. 10 fastest
 
   bool operator==(const DracoParameters&) const = default;
@@ -136,10 +146,9 @@ struct Callback {
   bool operator==(const Callback&) const = default;
 };
 
-// What a job is asked to do; the members' ranges are the contract's and are checked by
-// parse_job_parameters (json.h).
-struct JobParameters {
-  std::string volume;
+// What determines a mesh's bytes beside its volume, and nothing else: files carry it, and jobs that
+// agree in it share their result. What each member means and may be is in parameters.h.
+struct MeshParameters {
   std::optional<double> iso;  // in the volume's units; empty: Otsu's threshold
   Scheme scheme = Scheme::kSix;
   Interpolation interpolation = Interpolation::kLinear;
@@ -153,6 +162,13 @@ struct JobParameters {
   std::vector<MeshFormat> formats = {MeshFormat::kDrc};
   DracoParameters draco;
   bool normals = false;  // in glb
+
+  bool operator==(const MeshParameters&) const = default;
+};
+
+// What a job is asked to do: a mesh of a volume, when, and whom to tell.
+struct JobParameters : MeshParameters {
+  std::string volume;
   Priority priority = Priority::kRoutine;
   std::optional<Callback> callback = {};
 
@@ -343,6 +359,15 @@ extern template std::optional<MeshFormat> from_string(std::string_view);
 extern template std::optional<Priority> from_string(std::string_view);
 extern template std::optional<JobState> from_string(std::string_view);
 extern template std::optional<Stage> from_string(std::string_view);
+
+// All values that have a name, in the order of the contract.
+template <class Enum>
+std::vector<Enum> values_of();
+
+extern template std::vector<Interpolation> values_of();
+extern template std::vector<Smoothing> values_of();
+extern template std::vector<MeshFormat> values_of();
+extern template std::vector<Priority> values_of();
 
 // All names of an enumeration as a person reads them: `"stat", "routine" or "bulk"`.
 template <class Enum>

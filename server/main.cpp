@@ -16,45 +16,52 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include "server/http/auth.h"
-#include "server/http/log.h"
-#include "server/http/metrics.h"
-#include "server/http/records.h"
+#include "base/log.h"
+#include "server/callbacks/callbacks.h"
+#include "server/callbacks/signature.h"
+#include "server/callbacks/targets.h"
+#include "server/http/guards/auth.h"
+#include "server/http/observe/metrics.h"
+#include "server/http/observe/outcomes.h"
 #include "server/http/server.h"
-#include "server/http/tls.h"
-#include "server/jobs/callback_signature.h"
-#include "server/jobs/callback_targets.h"
-#include "server/jobs/callbacks.h"
 #include "server/jobs/estimate.h"
 #include "server/jobs/histograms.h"
 #include "server/jobs/housekeeper.h"
 #include "server/jobs/memory.h"
 #include "server/jobs/volume_library.h"
 #include "server/jobs/workers.h"
-#include "server/mesh/context.h"
+#include "server/mesh/parallel.h"
+#include "server/net/address.h"
+#include "server/net/tls.h"
 #include "server/options.h"
-#include "server/store/data_folder.h"
-#include "server/store/database.h"
-#include "server/store/file_blob_store.h"
-#include "server/store/outbox.h"
+#include "server/store/files/blob_store.h"
+#include "server/store/files/data_folder.h"
 #include "server/store/retention.h"
-#include "server/store/sqlite_job_store.h"
-#include "server/store/sqlite_volume_store.h"
+#include "server/store/sqlite/database.h"
+#include "server/store/sqlite/job_store.h"
+#include "server/store/sqlite/outbox.h"
+#include "server/store/sqlite/volume_store.h"
 #include "server/token_command.h"
-#include "server/volume/import_worker.h"
 
 namespace {
 
 using namespace isomesh;
 
-// Three quarters of the machine, shared by the jobs that run at the same time.
+// Three quarters of the machine's memory, divided by the number of jobs that run at the same time.
 std::uint64_t default_job_memory(std::size_t workers) {
   const auto pages = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES));
   const auto page_bytes = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
   return pages * page_bytes / 4 * 3 / workers;
 }
 
-// Often enough that what is kept is not kept much longer, and that a disk does not fill in between.
+std::filesystem::path beside_this_program(const std::string& name) {
+  const auto program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
+  if (::access(program.c_str(), X_OK) == 0) return program;
+  throw Error(ErrorCode::kInternal, "the program " + name + " is missing beside isomeshd");
+}
+
+// A quarter of the time that things are kept, within bounds: what expired goes soon, and the disk
+// cannot fill up between two rounds.
 std::chrono::milliseconds housekeeping_interval(std::chrono::milliseconds keep) {
   return std::clamp<std::chrono::milliseconds>(keep / 4, std::chrono::seconds(1),
                                                std::chrono::seconds(30));
@@ -85,22 +92,22 @@ sigset_t block_signals() {
   return signals;
 }
 
-// What SIGHUP reads again; null where there is none.
+// The files that are read again on SIGHUP; null for those that are not configured.
 struct Files {
   std::unique_ptr<http::Tokens> tokens;
-  std::unique_ptr<http::TlsFiles> tls;
+  std::unique_ptr<net::TlsFiles> tls;
 };
 
-Files open_files(const Options& options, const http::Address& address) {
+Files open_files(const Options& options, const net::Address& address) {
   Files files;
   if (!options.tokens.empty()) files.tokens = std::make_unique<http::Tokens>(options.tokens);
   if (!options.tls_certificate.empty() && !address.is_unix()) {
-    files.tls = std::make_unique<http::TlsFiles>(options.tls_certificate, options.tls_key);
+    files.tls = std::make_unique<net::TlsFiles>(options.tls_certificate, options.tls_key);
   }
   return files;
 }
 
-void check_reach(const Options& options, const http::Address& address, const Files& files) {
+void check_reach(const Options& options, const net::Address& address, const Files& files) {
   if (address.is_loopback()) return;
   if (!files.tokens && !options.open_network) {
     throw invalid_parameter("listen",
@@ -114,7 +121,7 @@ void check_reach(const Options& options, const http::Address& address, const Fil
 
 std::vector<std::string> callback_secrets(const Options& options) {
   if (!options.callback_secrets.empty()) {
-    return jobs::read_callback_secrets(options.callback_secrets);
+    return callbacks::read_callback_secrets(options.callback_secrets);
   }
   if (options.callback_targets.empty()) return {};
   throw invalid_parameter("callback-secret-file",
@@ -122,14 +129,14 @@ std::vector<std::string> callback_secrets(const Options& options) {
                           "--callback-allow");
 }
 
-jobs::CallbackOptions callback_options(const Options& options) {
+callbacks::CallbackOptions callback_options(const Options& options) {
   return {.secrets = callback_secrets(options),
           .authorities = options.callback_authorities,
           .first_delay = std::chrono::round<std::chrono::milliseconds>(
               std::chrono::duration<double>(options.callback_retry_seconds))};
 }
 
-// What cannot be read stays as it was.
+// Keeps what was read before when the file cannot be read now.
 void reload_one(const std::function<void()>& read) {
   try {
     read();
@@ -138,7 +145,7 @@ void reload_one(const std::function<void()>& read) {
   }
 }
 
-void reload(const Options& options, const Files& files, jobs::Callbacks& callbacks) {
+void reload(const Options& options, const Files& files, callbacks::Callbacks& callbacks) {
   spdlog::info("signal {}: reading files again", SIGHUP);
   if (files.tokens) reload_one([&] { files.tokens->reload(); });
   if (files.tls) reload_one([&] { files.tls->reload(); });
@@ -146,36 +153,34 @@ void reload(const Options& options, const Files& files, jobs::Callbacks& callbac
 }
 
 int run(const Options& options, const sigset_t& signals) {
-  const http::Address address = http::parse_address(options.listen);
+  const net::Address address = net::parse_address(options.listen);
   const Files files = open_files(options, address);
   check_reach(options, address, files);
-  const jobs::CallbackTargets targets(options.callback_targets);
+  const callbacks::CallbackTargets targets(options.callback_targets);
   if (options.threads > 0) mesh::set_thread_count(options.threads);
 
   const store::DataFolder folder(options.data);
   store::Database database(folder);
-  for (const std::string& id : database.unreadable()) {
-    spdlog::error("the record of volume {} cannot be read; it is left where it is", id);
-  }
   const store::FileBlobStore blobs(folder);
   store::SqliteVolumeStore volumes(database);
   store::JobStoreOptions job_options = options.jobs;
   job_options.mesher_version = jobs::kMesherVersion;
   store::SqliteJobStore jobs(database, blobs, job_options);
-  if (const std::size_t count = jobs.reap_all()) {
+  if (const std::size_t count = jobs.reap_predecessor()) {
     spdlog::warn("{} jobs ran when the last daemon ended", count);
   }
   const auto keep = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::duration<double, std::chrono::days::period>(options.keep_days));
-  store::Retention retention(folder, database, blobs,
+  store::Retention retention(jobs, volumes, blobs, folder.scratch(),
                              {.keep = keep, .max_bytes = options.max_disk});
-  volume::RunnerOptions runner = options.runner;
+  jobs::RunnerOptions runner = options.runner;
   runner.bounds.time = std::chrono::seconds(options.import_seconds);
+  runner.program = beside_this_program("isomesh-import");
   jobs::VolumeLibrary library(folder, blobs, volumes, retention, options.import, runner);
   http::Metrics metrics;
-  store::Outbox outbox(database);
-  jobs::Callbacks callbacks(outbox, targets, callback_options(options),
-                            http::callback_recorder(metrics));
+  store::SqliteOutbox outbox(database);
+  callbacks::Callbacks callbacks(outbox, targets, callback_options(options),
+                                 http::callback_reporter(metrics));
   const jobs::PipelineLimits limits = {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
   const jobs::Housekeeper housekeeper(retention, housekeeping_interval(keep));
@@ -187,7 +192,8 @@ int run(const Options& options, const sigset_t& signals) {
                                    histograms, estimator, retention,         metrics, outbox,
                                    callbacks,  targets,   files.tokens.get()};
   http::Server server(services, server_options);
-  // After the server, which tells and counts how jobs end.
+  // Declared after the server, so that the workers end before it and the end of their last job is
+  // still logged and counted.
   const jobs::WorkerOptions worker_options = {
       .threads = options.workers,
       .limits = limits,
@@ -213,11 +219,10 @@ int run(const Options& options, const sigset_t& signals) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  volume::become_import_worker_if_asked(argc, argv);
   try {
     const sigset_t signals = block_signals();
     jobs::keep_freed_memory();
-    http::start_log(http::LogFormat::kText, http::LogLevel::kInfo);
+    start_log(LogFormat::kText, LogLevel::kInfo);
     Options options;
     TokenRequest token;
     CLI::App cli("isomeshd turns medical volumes into surface meshes over HTTP");
@@ -233,7 +238,7 @@ int main(int argc, char** argv) {
       make_token(token);
       return 0;
     }
-    http::start_log(options.log_format, options.log_level);
+    start_log(options.log_format, options.log_level);
     return run(options, signals);
   } catch (const std::exception& error) {
     spdlog::critical("{}", error.what());

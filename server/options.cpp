@@ -9,8 +9,6 @@ namespace isomesh {
 namespace {
 
 void add_log_options(CLI::App& cli, Options& options) {
-  using http::LogFormat;
-  using http::LogLevel;
   const std::map<std::string, LogLevel> levels = {{"debug", LogLevel::kDebug},
                                                   {"info", LogLevel::kInfo},
                                                   {"warn", LogLevel::kWarn},

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "server/http/log.h"
+#include "base/log.h"
 #include "server/http/server.h"
-#include "server/store/sqlite_job_store.h"
-#include "server/volume/import.h"
-#include "server/volume/import_runner.h"
+#include "server/jobs/import_runner.h"
+#include "server/process/import_message.h"
+#include "server/store/job_store.h"
 
 namespace CLI {
 class App;
@@ -26,8 +26,8 @@ struct Options {
   int threads = 0;  // of the kernels; 0: one a processor
   bool open_network = false;
   unsigned drain_seconds = 30;
-  http::LogLevel log_level = http::LogLevel::kInfo;
-  http::LogFormat log_format = http::LogFormat::kText;
+  LogLevel log_level = LogLevel::kInfo;
+  LogFormat log_format = LogFormat::kText;
   std::filesystem::path tokens;  // empty: requests are not authenticated
   std::filesystem::path tls_certificate;
   std::filesystem::path tls_key;
@@ -41,8 +41,8 @@ struct Options {
   unsigned lease_seconds = 30;
   unsigned longest_job_minutes = 60;
   http::ServerOptions http;
-  volume::ImportLimits import;
-  volume::RunnerOptions runner;
+  volume::SizeLimits import;
+  jobs::RunnerOptions runner;
   std::int64_t import_seconds = runner.bounds.time.count();
   std::uint64_t job_memory = 0;  // 0: see default_job_memory
 };

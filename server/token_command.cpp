@@ -7,7 +7,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include "server/http/auth.h"
+#include "server/http/guards/auth.h"
 
 namespace isomesh {
 namespace {

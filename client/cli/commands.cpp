@@ -39,7 +39,7 @@ Error reason_of(const Job& job) {
   return {ErrorCode::kCancelled, "the job was cancelled"};
 }
 
-// The job's own way to fail, which is no failure of the exchange about it.
+// The exit status for how a job ended. Why it failed goes to standard error.
 int status_of(const Job& job) {
   if (job.state != JobState::kFailed && job.state != JobState::kCancelled) return kDone;
   complain(reason_of(job).what());
@@ -63,7 +63,7 @@ void fetch(Client& client, const std::string& id, const Output& output, Progress
   bar.clear();
 }
 
-// Without a terminal nobody looks: the client then holds the longest polls.
+// Without a terminal there is no progress to show, so the client uses the longest polls.
 Job wait(Client& client, const std::string& id, ProgressBar& bar) {
   const JobProgress draw = [&](const Job& job) { bar.job(job); };
   Job job = client.wait(id, bar.visible() ? draw : JobProgress{});
@@ -71,7 +71,8 @@ Job wait(Client& client, const std::string& id, ProgressBar& bar) {
   return job;
 }
 
-// Whoever asked to stop will not wait for an answer, but the server must learn of it.
+// After an interrupt the job is no longer wanted, which the server must learn. The user does not
+// wait long for that.
 void cancel_after_stop(const Options& options, const std::string& id) {
   Client client({.server = options.server,
                  .token = options.token,
@@ -180,7 +181,7 @@ void show(const Job& job, bool json) {
   std::cout << (json ? to_json(job) + '\n' : job_report(job));
 }
 
-// The question is answered, whatever the job's state.
+// The status is 0 for every state of the job, because the question was answered.
 int status(const Options& options, const std::stop_token& stop) {
   show(client_of(options, stop).job(options.id), options.json);
   return kDone;
@@ -275,8 +276,8 @@ int dispatch(const Options& options, const std::stop_token& stop) {
   return kWrongUsage;
 }
 
-// A server's address or a token that cannot be sent was typed wrong; every other refusal of a
-// parameter is the server's.
+// A malformed server address or token is wrong usage; every other parameter that is refused was
+// refused by the server.
 void check_server(const Options& options) { client_of(options, {}); }
 
 }  // namespace

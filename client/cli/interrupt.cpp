@@ -35,7 +35,7 @@ Interrupt::Interrupt() {
 
 Interrupt::~Interrupt() {
   waiter_.request_stop();
-  // Wakes it; nobody else receives a signal that is sent to one thread.
+  // The signal ends the thread's wait. No other thread receives it.
   ::pthread_kill(waiter_.native_handle(), SIGINT);
 }
 

@@ -10,6 +10,7 @@
 
 int main(int argc, char** argv) {
   using namespace isomesh::cli;
+  // A reader of the output that went away is an error of std::cout, and no sudden end.
   std::signal(SIGPIPE, SIG_IGN);
   const Interrupt interrupt;
   try {

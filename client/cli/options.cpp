@@ -11,6 +11,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "proto/parameters.h"
+
 namespace isomesh::cli {
 namespace {
 
@@ -66,6 +68,13 @@ Enum name_from(const std::string& option, const std::string& text) {
   return *value;
 }
 
+template <class Enum>
+std::vector<std::string> names_from() {
+  std::vector<std::string> names;
+  for (const Enum value : values_of<Enum>()) names.emplace_back(to_string(value));
+  return names;
+}
+
 // `--option VALUE` that calls `take(VALUE)`.
 CLI::Option* add(CLI::App& app, const std::string& name, const std::string& value,
                  const std::string& help, const std::function<void(const std::string&)>& take) {
@@ -115,7 +124,7 @@ void add_raw(CLI::App& app, Options& options) {
   };
   auto* dims = add(app, "--dims", "X,Y,Z", "Samples along x, y and z; x runs fastest",
                    [raw](const std::string& text) {
-                     raw().dims = numbers_from<std::int64_t, 3>("--dims", text);
+                     raw().dims = numbers_from<std::uint32_t, 3>("--dims", text);
                    });
   auto* type = add_name<SampleType>(app, "--type", "Such as uint8, int16, float32",
                                     [raw](SampleType value) { raw().type = value; });
@@ -124,15 +133,15 @@ void add_raw(CLI::App& app, Options& options) {
   std::vector<CLI::Option*> others = {
       add(app, "--spacing", "X,Y,Z", "Millimetres between samples",
           [raw](const std::string& text) {
-            raw().spacing = numbers_from<double, 3>("--spacing", text);
+            raw().geometry.spacing = numbers_from<double, 3>("--spacing", text);
           }),
       add(app, "--origin", "X,Y,Z", "Where the first sample lies, in millimetres (LPS)",
           [raw](const std::string& text) {
-            raw().origin = numbers_from<double, 3>("--origin", text);
+            raw().geometry.origin = numbers_from<double, 3>("--origin", text);
           }),
       add(app, "--direction", "A,..,I", "Nine numbers, row by row; columns are the axes",
           [raw](const std::string& text) {
-            raw().direction = numbers_from<double, 9>("--direction", text);
+            raw().geometry.direction = numbers_from<double, 9>("--direction", text);
           }),
       add(app, "--byte-order", "ORDER", "little (the default) or big",
           [raw](const std::string& text) {
@@ -144,52 +153,147 @@ void add_raw(CLI::App& app, Options& options) {
   type->group("Raw samples");
 }
 
-void add_parameters(CLI::App& app, JobParameters& parameters) {
-  add(app, "--iso", "N|otsu", "The iso-value, in the volume's units, or Otsu's threshold",
-      [&](const std::string& text) {
-        parameters.iso = number_from<double>(text);
-        if (!parameters.iso && text != "otsu") refuse("--iso", "must be a number or otsu");
-      })
-      ->required();
-  // Ranges are the server's to check: it names the limits that it has.
-  const std::vector<CLI::Option*> others = {
-      add_number<int>(app, "--scheme", "Tetrahedra per cell, 5 or 6 (default: 6)",
-                      [&](int value) { parameters.scheme = Scheme{value}; }),
-      add_name<Interpolation>(app, "--interpolation", "linear (the default) or midpoint",
-                              [&](Interpolation value) { parameters.interpolation = value; }),
-      add_number<int>(app, "--passes", "Smoothing passes (default: 5)",
-                      [&](int value) { parameters.passes = value; }),
-      add_name<Smoothing>(app, "--smoothing", "laplacian (the default) or taubin",
-                          [&](Smoothing value) { parameters.smoothing = value; }),
-      add_number<double>(app, "--lambda", "How far a step moves a vertex (default: 1; taubin 0.33)",
-                         [&](double value) { parameters.lambda = value; }),
-      add_number<double>(app, "--pass-band", "Of taubin: what it keeps (default: 0.1)",
-                         [&](double value) { parameters.pass_band = value; }),
-      add_number<double>(app, "--max-displacement",
-                         "Millimetres that no vertex leaves its place by",
-                         [&](double value) { parameters.max_displacement_mm = value; }),
-      app.add_flag("--close", parameters.close, "Cap the surface at the volume's border"),
-      add_number<std::uint32_t>(app, "--keep-components", "Keep only so many of the largest parts",
-                                [&](std::uint32_t value) { parameters.components.keep = value; }),
-      add_number<std::uint32_t>(
-          app, "--min-triangles", "Keep only parts of so many triangles",
-          [&](std::uint32_t value) { parameters.components.min_triangles = value; }),
-      add_number<int>(app, "--position-bits", "Of Draco, per coordinate (default: 14)",
-                      [&](int value) { parameters.draco.position_bits = value; }),
-      add_number<int>(app, "--speed", "Of Draco, 0 smallest to 10 fastest (default: 7)",
-                      [&](int value) { parameters.draco.speed = value; }),
-      app.add_flag("--normals", parameters.normals, "Put normals into a GLB"),
-      add_name<Priority>(app, "--priority", "stat, routine (the default) or bulk",
-                         [&](Priority value) { parameters.priority = value; }),
-      add(app, "--callback", "URL", "Have the server tell this address when the job has ended",
-          [&](const std::string& text) { parameters.callback = Callback{text}; })};
-  for (CLI::Option* option : others) option->group("Job");
+// What a parameter is by default, and what it may be where that are some words. Ranges are the
+// server's to check: it names the limits that it has.
+template <class T>
+std::string values_and_default(const Parameter& parameter, const T& standard) {
+  if constexpr (std::is_same_v<T, Scheme>) {
+    return ": 5 or 6 (default: " + std::to_string(static_cast<int>(standard)) + ")";
+  } else if constexpr (Enumeration<T>) {
+    return ": " + listed(names_from<T>()) + " (default: " + std::string(to_string(standard)) + ")";
+  } else if constexpr (std::is_same_v<T, std::vector<MeshFormat>>) {
+    return ", of " + listed(names_from<MeshFormat>()) +
+           " (default: " + std::string(to_string(standard.front())) + ")";
+  } else if constexpr (std::is_same_v<T, int> || std::is_same_v<T, double>) {
+    return " (default: " + number_text(standard) + ")";
+  } else {
+    std::string defaults;
+    for (const auto& entry : parameter.cases) {
+      if (!entry || !entry->standard) continue;
+      defaults += (defaults.empty() ? " (default: " : ", ") + number_text(*entry->standard) +
+                  " for " + std::string(to_string(entry->smoothing));
+    }
+    return defaults.empty() ? "" : defaults + ")";
+  }
+}
+
+// One line of the table, as it reads on a terminal.
+template <class T>
+std::string help_of(const Parameter& parameter, const T& standard) {
+  std::string help = parameter.help;
+  std::erase(help, '`');
+  if (help.ends_with('.')) help.pop_back();
+  const std::string unit = parameter.unit;
+  return help + (unit.empty() ? "" : ", in " + unit) + values_and_default(parameter, standard);
+}
+
+// An option for each kind of parameter.
+class ParameterOptions {
+ public:
+  explicit ParameterOptions(CLI::App& app) : app_(app) {}
+
+  template <class T>
+  CLI::Option* add(const Parameter& parameter, T& value) {
+    const std::string name = "--" + option_name_of(parameter);
+    return add_kind(name, parameter, help_of(parameter, value), value);
+  }
+
+ private:
+  template <class Number>
+  requires std::is_arithmetic_v<Number> CLI::Option* add_kind(const std::string& name,
+                                                              const Parameter& /*parameter*/,
+                                                              const std::string& help,
+                                                              Number& value) {
+    return add_number<Number>(app_, name, help, [&value](Number given) { value = given; });
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, bool& value) {
+    return app_.add_flag(name, value, help);
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, Scheme& value) {
+    return add_number<int>(app_, name, help, [&value](int given) { value = Scheme{given}; });
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, Enumeration auto& value) {
+    using Enum = std::remove_reference_t<decltype(value)>;
+    return add_name<Enum>(app_, name, help, [&value](Enum given) { value = given; });
+  }
+
+  template <class Number>
+  requires std::is_arithmetic_v<Number> CLI::Option* add_kind(const std::string& name,
+                                                              const Parameter& parameter,
+                                                              const std::string& help,
+                                                              std::optional<Number>& value) {
+    if (parameter.when_empty == nullptr) {
+      return add_number<Number>(app_, name, help, [&value](Number given) { value = given; });
+    }
+    const std::string word = parameter.when_empty;
+    return isomesh::cli::add(app_, name, "N|" + word, help,
+                             [&value, name, word](const std::string& text) {
+                               value = number_from<Number>(text);
+                               if (!value && text != word) {
+                                 refuse(name, "must be a number or " + word);
+                               }
+                             });
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, std::vector<MeshFormat>& value) {
+    return isomesh::cli::add(app_, name, "NAME,..", help, [&value, name](const std::string& text) {
+      value.clear();
+      std::stringstream names(text);
+      for (std::string format; std::getline(names, format, ',');) {
+        value.push_back(name_from<MeshFormat>(name, format));
+      }
+    });
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, std::optional<Callback>& value) {
+    return isomesh::cli::add(app_, name, "URL", help,
+                             [&value](const std::string& text) { value = Callback{text}; });
+  }
+
+  CLI::App& app_;
+};
+
+// The formats are given otherwise where the mesh is written to files.
+enum class Formats { kAsOption, kByFiles };
+
+void add_parameters(CLI::App& app, JobParameters& parameters, Formats formats) {
+  ParameterOptions options(app);
+  visit_leaves(parameters,
+               [&](const std::string& /*path*/, const Parameter& parameter, auto& member) {
+                 using Member = std::remove_reference_t<decltype(member)>;
+                 const bool is_formats = std::is_same_v<Member, std::vector<MeshFormat>>;
+                 if (is_formats && formats == Formats::kByFiles) return;
+                 // The volume is the command's file or its first argument.
+                 if constexpr (!std::is_same_v<Member, std::string>) {
+                   CLI::Option* option = options.add(parameter, member);
+                   if (parameter.is_required) {
+                     option->required();
+                   } else {
+                     option->group("Job");
+                   }
+                 }
+               });
+}
+
+// ".drc, .glb or .stl": what a file's name may end in.
+std::string suffixes() {
+  std::vector<std::string> all;
+  for (const std::string& name : names_from<MeshFormat>()) all.push_back('.' + name);
+  return listed(all);
 }
 
 MeshFormat format_of(const std::filesystem::path& path) {
   const std::string suffix = path.extension().string();
   const auto format = from_string<MeshFormat>(suffix.empty() ? suffix : suffix.substr(1));
-  if (!format) refuse("-o", path.string() + " must end in .drc, .glb, .stl, .ply or .obj");
+  if (!format) refuse("-o", path.string() + " must end in " + suffixes());
   return *format;
 }
 
@@ -206,24 +310,11 @@ void add_outputs(CLI::App& app, Options& options) {
              options.outputs.push_back({path, format_of(path)});
            }
          },
-         "Where the mesh goes; the suffix (.drc .glb .stl .ply .obj) says the format. May be "
-         "repeated")
+         "Where the mesh goes; the suffix (" + suffixes() + ") says the format. May be repeated")
       ->type_name("OUT")
       ->expected(1)
       ->take_all()
       ->required();
-}
-
-void add_formats(CLI::App& app, JobParameters& parameters) {
-  add(app, "--format", "NAME,..", "Of drc, glb, stl, ply and obj (default: drc)",
-      [&](const std::string& text) {
-        parameters.formats.clear();
-        std::stringstream names(text);
-        for (std::string name; std::getline(names, name, ',');) {
-          parameters.formats.push_back(name_from<MeshFormat>("--format", name));
-        }
-      })
-      ->group("Job");
 }
 
 void add_id(CLI::App& app, Options& options, const std::string& name) {
@@ -254,7 +345,7 @@ class Parser {
     CLI::App& mesh = command(Command::kMesh, "mesh", "Upload a volume, mesh it, download the mesh");
     add_file(mesh, options_);
     add_outputs(mesh, options_);
-    add_parameters(mesh, options_.parameters);
+    add_parameters(mesh, options_.parameters, Formats::kByFiles);
     add_raw(mesh, options_);
 
     CLI::App& upload = command(Command::kUpload, "upload", "Upload a volume and print its id");
@@ -263,8 +354,7 @@ class Parser {
 
     CLI::App& submit = command(Command::kSubmit, "submit", "Start a job and print its id");
     add_id(submit, options_, "VOLUME");
-    add_parameters(submit, options_.parameters);
-    add_formats(submit, options_.parameters);
+    add_parameters(submit, options_.parameters, Formats::kAsOption);
     submit
         .add_option("--key", options_.key,
                     "Idempotency key: the same one gives the same job again (default: a new one)")
@@ -273,8 +363,7 @@ class Parser {
     CLI::App& estimate =
         command(Command::kEstimate, "estimate", "Say what a job would make and take");
     add_id(estimate, options_, "VOLUME");
-    add_parameters(estimate, options_.parameters);
-    add_formats(estimate, options_.parameters);
+    add_parameters(estimate, options_.parameters, Formats::kAsOption);
 
     add_id(command(Command::kStatus, "status", "Show a job"), options_, "JOB");
     add_id(command(Command::kWait, "wait", "Wait for a job and show it"), options_, "JOB");

@@ -19,7 +19,7 @@ std::string bar_line(const std::string& label, double share, const std::string& 
 class ProgressBar {
  public:
   ProgressBar();
-  ~ProgressBar();  // takes the line away
+  ~ProgressBar();  // clears the line
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 

@@ -135,7 +135,7 @@ std::string histogram_report(const Histogram& histogram) {
   std::string bars;
   for (const std::uint64_t count : histogram.counts) {
     const double share = most > 0 ? std::log1p(static_cast<double>(count)) / most : 0;
-    // Whatever is there is seen.
+    // A count above zero always has a bar.
     bars += kBars.at(static_cast<std::size_t>(std::ceil(share * (kBars.size() - 1))));
   }
   return "\n  " + bars + "\n  " + human_number(histogram.range[0]) + " to " +

@@ -21,7 +21,7 @@ std::string with_commas(std::string digits) {
   return digits;
 }
 
-// Characters, not bytes: what UTF-8 continues with is not counted.
+// Counts characters instead of bytes, because UTF-8 takes several bytes for one.
 std::size_t width_of(std::string_view text) {
   const auto starts = [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; };
   return static_cast<std::size_t>(std::ranges::count_if(text, starts));

@@ -1,18 +1,21 @@
 #include "client/isomesh/client.h"
 
 #include <algorithm>
-#include <charconv>
+#include <condition_variable>
 #include <iterator>
-#include <random>
-#include <thread>
+#include <mutex>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "base/base64.h"
+#include "base/hex.h"
+#include "base/ids.h"
+#include "base/sha256.h"
+#include "base/text.h"
 #include "client/isomesh/event_reader.h"
 #include "client/isomesh/file.h"
 #include "client/isomesh/package.h"
-#include "client/isomesh/sha256.h"
 #include "client/isomesh/transport.h"
 #include "client/isomesh/url.h"
 #include "proto/json.h"
@@ -26,9 +29,10 @@ using std::chrono::seconds;
 constexpr int kTries = 4;
 constexpr milliseconds kFirstPause{100};
 constexpr seconds kLongestWait{30};
-// Between two looks at a job, for a server that does not hold a long poll.
+// The least time between two looks at a job, for a server that answers a long poll at once.
 constexpr milliseconds kShortestLook{200};
 constexpr std::size_t kDigestBytes = 1024 * 1024;
+constexpr std::size_t kKeyBytes = 16;
 
 TransportOptions transport_options(ClientOptions&& options) {
   const bool sendable =
@@ -90,7 +94,7 @@ ErrorCode code_of_status(int status) {
   }
 }
 
-Error refusal(const Answer& answer) {
+Error refusal(const HttpAnswer& answer) {
   const std::string status = "the server answered with status " + std::to_string(answer.status);
   if (!answer.content_type.starts_with("application/problem+json")) {
     return {code_of_status(answer.status), status};
@@ -110,12 +114,7 @@ Error refusal(const Answer& answer) {
 template <std::size_t N>
 std::string joined(const std::array<double, N>& values) {
   std::string text;
-  for (const double value : values) {
-    std::array<char, 32> digits{};
-    // The shortest digits that read back as the same number, in every locale.
-    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-    text += (text.empty() ? "" : ",") + std::string(digits.data(), end);
-  }
+  for (const double value : values) text += (text.empty() ? "" : ",") + to_text(value);
   return text;
 }
 
@@ -125,9 +124,9 @@ void add_raw(const RawDescription& raw, Query& pairs) {
   const auto& [x, y, z] = raw.dims;
   pairs.emplace_back("dims", std::to_string(x) + "," + std::to_string(y) + "," + std::to_string(z));
   pairs.emplace_back("type", to_string(raw.type));
-  if (raw.spacing) pairs.emplace_back("spacing", joined(*raw.spacing));
-  if (raw.origin) pairs.emplace_back("origin", joined(*raw.origin));
-  if (raw.direction) pairs.emplace_back("direction", joined(*raw.direction));
+  pairs.emplace_back("spacing", joined(raw.geometry.spacing));
+  pairs.emplace_back("origin", joined(raw.geometry.origin));
+  pairs.emplace_back("direction", joined(raw.geometry.direction));
   if (raw.big_endian) pairs.emplace_back("byte_order", "big");
 }
 
@@ -138,6 +137,7 @@ std::string upload_query(const UploadOptions& options) {
   return pairs.empty() ? std::string() : query_string(pairs);
 }
 
+// The SHA-256 of the body, in base64.
 std::string digest_of(const UploadBody& file) {
   Sha256 sha256;
   std::vector<char> piece(kDigestBytes);
@@ -145,9 +145,9 @@ std::string digest_of(const UploadBody& file) {
     piece.resize(
         static_cast<std::size_t>(std::min<std::uint64_t>(kDigestBytes, file.size() - offset)));
     file.read(offset, piece);
-    sha256.update({piece.data(), piece.size()});
+    sha256.update(std::string_view(piece.data(), piece.size()));
   }
-  return sha256.finish();
+  return to_base64(sha256.finish());
 }
 
 std::string volume_path(const std::string& id) { return "/v1/volumes/" + path_segment(id); }
@@ -178,7 +178,7 @@ const MeshFile& file_of(const Job& job, MeshFormat format) {
   return found->second;
 }
 
-// Writes what arrives and holds it against what was announced.
+// Writes a mesh as it arrives and compares it with the size and digest that the job announced.
 class Download {
  public:
   Download(const MeshFile& announced, const std::filesystem::path& target,
@@ -218,43 +218,6 @@ class Download {
   std::uint64_t received_ = 0;
 };
 
-std::string random_key() {
-  std::random_device random;
-  std::string key;
-  for (int n = 0; n < 4; ++n) {
-    std::array<char, 8> digits{};
-    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), random(), 16).ptr;
-    key.append(digits.data(), end).append("-");
-  }
-  return key;
-}
-
-// A job's parameters as a query, by the members that its JSON has.
-std::vector<std::pair<std::string, std::string>> query_of(const JobParameters& parameters) {
-  std::vector<std::pair<std::string, std::string>> query;
-  const std::function<void(const std::string&, const nlohmann::json&)> add =
-      [&](const std::string& name, const nlohmann::json& value) {
-        if (value.is_object()) {
-          for (const auto& [member, inner] : value.items()) {
-            add(std::string(name).append(".").append(member), inner);
-          }
-        } else if (value.is_array()) {
-          std::string list;
-          for (const auto& item : value) {
-            if (!list.empty()) list += ',';
-            list += item.get<std::string>();
-          }
-          query.emplace_back(spelled_in_query(name), list);
-        } else if (!value.is_null()) {
-          query.emplace_back(spelled_in_query(name),
-                             value.is_string() ? value.get<std::string>() : value.dump());
-        }
-      };
-  const auto members = nlohmann::json::parse(to_json(parameters));
-  for (const auto& [name, value] : members.items()) add(name, value);
-  return query;
-}
-
 }  // namespace
 
 class Client::Impl {
@@ -262,19 +225,20 @@ class Client::Impl {
   explicit Impl(ClientOptions&& options)
       : stop_(options.stop), transport_(transport_options(std::move(options))) {}
 
-  // The body of a successful answer; every other answer is thrown.
-  std::string send(const Exchange& exchange) const {
-    Answer answer = transport_.send(exchange);
+  // Returns the body of a successful answer; every other answer is thrown as an Error.
+  std::string send(const HttpRequest& request) const {
+    HttpAnswer answer = transport_.send(request);
     if (answer.status < 200 || answer.status >= 300) throw refusal(answer);
     return std::move(answer.body);
   }
 
-  // The same for a request that may be sent again. `before` runs ahead of every try.
-  std::string repeat(const Exchange& exchange, const std::function<void()>& before = {}) const {
+  // Sends a request that may be repeated when its connection breaks. `before` runs ahead of each
+  // try.
+  std::string repeat(const HttpRequest& request, const std::function<void()>& before = {}) const {
     for (int attempt = 1;; ++attempt) {
       try {
         if (before) before();
-        return send(exchange);
+        return send(request);
       } catch (const NoAnswer& lost) {
         if (!lost.broken() || attempt == kTries) throw;
       }
@@ -282,12 +246,13 @@ class Client::Impl {
     }
   }
 
+  // Ends at once with Error kCancelled when asked to stop.
   void pause(milliseconds duration) const {
-    constexpr milliseconds kStep{50};
-    for (auto left = duration; left.count() > 0; left -= kStep) {
-      if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
-      std::this_thread::sleep_for(std::min(left, kStep));
-    }
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    const auto never = [] { return false; };
+    std::condition_variable_any().wait_for(lock, stop_, duration, never);
+    if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
   }
 
  private:
@@ -302,20 +267,20 @@ Client& Client::operator=(Client&&) noexcept = default;
 
 Volume Client::upload(const std::filesystem::path& path, const UploadOptions& options) {
   const UploadBody file(path);
-  Exchange exchange{.method = "POST", .target = "/v1/volumes" + upload_query(options)};
-  exchange.headers = {{"Content-Type", "application/octet-stream"}};
+  HttpRequest request{.method = "POST", .target = "/v1/volumes" + upload_query(options)};
+  request.headers = {{"Content-Type", "application/octet-stream"}};
   if (options.digest) {
-    exchange.headers.emplace_back("Content-Digest", "sha-256=:" + to_base64(digest_of(file)) + ":");
+    request.headers.emplace_back("Content-Digest", "sha-256=:" + digest_of(file) + ":");
   }
-  exchange.source_bytes = file.size();
-  exchange.source = [&](std::uint64_t offset, std::span<char> piece) {
+  request.source_bytes = file.size();
+  request.source = [&](std::uint64_t offset, std::span<char> piece) {
     if (options.progress) options.progress(offset, file.size());
     file.read(offset, piece);
     if (options.progress && offset + piece.size() == file.size()) {
       options.progress(file.size(), file.size());
     }
   };
-  return volume_from_json(impl_->send(exchange));
+  return volume_from_json(impl_->send(request));
 }
 
 Volume Client::volume(const std::string& id) {
@@ -326,7 +291,7 @@ std::vector<Volume> Client::volumes() {
   std::vector<Volume> all;
   std::string cursor;
   do {
-    std::vector<std::pair<std::string, std::string>> query;
+    Query query;
     if (!cursor.empty()) query.emplace_back("cursor", cursor);
     const std::string body = impl_->repeat({.target = "/v1/volumes" + query_string(query)});
     std::vector<Volume> page = volumes_from_json(body);
@@ -347,23 +312,23 @@ Histogram Client::histogram(const std::string& id, std::uint32_t bins) {
 
 void Client::slice(const std::string& id, const SliceOptions& options,
                    const std::filesystem::path& target) {
-  std::vector<std::pair<std::string, std::string>> query = {{"axis", options.axis}};
+  Query query = {{"axis", options.axis}};
   if (options.index) query.emplace_back("index", std::to_string(*options.index));
   if (options.window) query.emplace_back("window", joined(*options.window));
   PartFile file(target);
-  Exchange exchange{.target = volume_path(id) + "/slice.png" + query_string(query)};
-  exchange.sink = [&](std::string_view piece) { file.write(piece); };
-  impl_->repeat(exchange, [&] { file.restart(); });
+  HttpRequest request{.target = volume_path(id) + "/slice.png" + query_string(query)};
+  request.sink = [&](std::string_view piece) { file.write(piece); };
+  impl_->repeat(request, [&] { file.restart(); });
   file.publish();
 }
 
 Estimate Client::estimate(const JobParameters& parameters) {
-  const std::string query = query_string(query_of(parameters));
+  const std::string query = query_string(to_query(parameters));
   return estimate_from_json(impl_->repeat({.target = "/v1/estimate" + query}));
 }
 
 Job Client::submit(const JobParameters& parameters, const std::string& idempotency_key) {
-  const std::string key = idempotency_key.empty() ? random_key() : idempotency_key;
+  const std::string key = idempotency_key.empty() ? random_hex(kKeyBytes) : idempotency_key;
   return job_from_json(
       impl_->repeat({.method = "POST",
                      .target = "/v1/jobs",
@@ -381,7 +346,7 @@ Job Client::job(const std::string& id, seconds wait) {
 }
 
 JobPage Client::jobs(std::optional<JobState> state, const std::string& cursor) {
-  std::vector<std::pair<std::string, std::string>> query;
+  Query query;
   if (state) query.emplace_back("state", to_string(*state));
   if (!cursor.empty()) query.emplace_back("cursor", cursor);
   const std::string body = impl_->repeat({.target = "/v1/jobs" + query_string(query)});
@@ -407,14 +372,14 @@ Job Client::wait(const std::string& id, const JobProgress& progress) {
 
 Job Client::follow(const std::string& id, const JobListener& listener) {
   EventReader events(listener);
-  Exchange exchange{.target = job_path(id) + "/events"};
-  exchange.sink = [&](std::string_view piece) { events.take(piece); };
-  impl_->repeat(exchange, [&] {
+  HttpRequest request{.target = job_path(id) + "/events"};
+  request.sink = [&](std::string_view piece) { events.take(piece); };
+  impl_->repeat(request, [&] {
     events.restart();
-    exchange.headers.clear();
-    if (!events.last_id().empty()) exchange.headers = {{"Last-Event-ID", events.last_id()}};
+    request.headers.clear();
+    if (!events.last_id().empty()) request.headers = {{"Last-Event-ID", events.last_id()}};
   });
-  // A stream that ended early, or one that a proxy has cut, leaves the question to be asked.
+  // A stream may end before the job does, for instance because a proxy cuts it.
   return events.job() ? *events.job() : wait(id);
 }
 
@@ -422,9 +387,9 @@ void Client::fetch(const std::string& id, MeshFormat format, const std::filesyst
                    const TransferProgress& progress) {
   const Job done = job(id);
   Download download(file_of(done, format), target, progress);
-  Exchange exchange{.target = job_path(id) + "/mesh." + std::string(to_string(format))};
-  exchange.sink = [&](std::string_view piece) { download.take(piece); };
-  impl_->repeat(exchange, [&] { download.restart(); });
+  HttpRequest request{.target = job_path(id) + "/mesh." + std::string(to_string(format))};
+  request.sink = [&](std::string_view piece) { download.take(piece); };
+  impl_->repeat(request, [&] { download.restart(); });
   download.publish();
 }
 

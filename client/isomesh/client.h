@@ -34,12 +34,12 @@ struct ClientOptions {
   std::filesystem::path authorities = {};
 
   std::chrono::milliseconds connect_timeout{10'000};
-  // The longest silence in the middle of an exchange. After the last byte of an upload the server
-  // reads and checks the volume before it answers, so this is minutes rather than seconds.
+  // The longest silence of the server once it is connected to. After the last byte of an upload the
+  // server reads and checks the volume before it answers, so this is minutes rather than seconds.
   std::chrono::milliseconds silence_timeout{300'000};
 
-  // When asked to stop, the exchange under way ends within a tenth of a second with Error
-  // kCancelled. Jobs on the server go on.
+  // When asked to stop, the request under way ends at once with Error kCancelled. Jobs on the
+  // server go on.
   std::stop_token stop = {};
 };
 
@@ -47,16 +47,6 @@ struct ClientOptions {
 using TransferProgress = std::function<void(std::uint64_t done, std::uint64_t total)>;
 // The job as it was last seen.
 using JobProgress = std::function<void(const Job& job)>;
-
-// What samples without a header are; x runs fastest. What is left out is the server's default.
-struct RawDescription {
-  std::array<std::int64_t, 3> dims = {0, 0, 0};
-  SampleType type = SampleType::kUint8;
-  std::optional<std::array<double, 3>> spacing = {};    // mm
-  std::optional<std::array<double, 3>> origin = {};     // mm, LPS
-  std::optional<std::array<double, 9>> direction = {};  // row-major
-  bool big_endian = false;
-};
 
 struct UploadOptions {
   std::optional<RawDescription> raw = {};  // empty: the file says itself what it is
@@ -86,13 +76,12 @@ struct JobPage {
 // Every method throws Error: kUnreachable when no answer of a server came, the server's own code
 // and reason when it refused, kInternal when its answer is not what the API says, kInvalidParameter
 // for an argument that cannot be sent or a local file that cannot be read or written. An exception
-// that a progress callback throws ends the exchange and comes out unchanged.
+// that a callback throws ends the request and comes out unchanged.
 //
-// Every exchange has a connection of its own: a Client may be used from several threads. Callbacks
+// Every request has a connection of its own, so a Client may be used from several threads. It goes
+// straight to the server: the environment's proxies are not used. No signals are raised. Callbacks
 // run on the calling thread. A GET, or the submission of a job, whose connection broke is tried
 // again, three times at most; nothing else is, and neither is a server that cannot be connected to.
-//
-// Writing to an https server that went away raises SIGPIPE: a program that uses one ignores it.
 class Client {
  public:
   // Throws Error kInvalidParameter when the server's address or the token is malformed. Connects to

@@ -1,7 +1,6 @@
 #include "client/isomesh/file.h"
 
 #include <cerrno>
-#include <random>
 #include <string>
 #include <system_error>
 
@@ -9,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/ids.h"
 #include "proto/error.h"
 
 namespace isomesh {
@@ -31,10 +31,7 @@ std::filesystem::path resolve(const std::filesystem::path& target) {
 }
 
 std::filesystem::path part_beside(const std::filesystem::path& target) {
-  std::random_device random;
-  const std::string name =
-      "." + target.filename().string() + "." + std::to_string(random()) + ".part";
-  return target.parent_path() / name;
+  return target.parent_path() / ("." + target.filename().string() + "." + random_hex(8) + ".part");
 }
 
 // 0666 as any program's output: the umask of the process narrows it.
@@ -44,39 +41,9 @@ int create(const std::filesystem::path& path) {
 
 }  // namespace
 
-Descriptor::~Descriptor() {
-  if (value_ >= 0) ::close(value_);
-}
-
-InputFile::InputFile(const std::filesystem::path& path)
-    : path_(path), file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
-  if (file_.value() < 0) fail(path_, errno);
-  struct stat status {};
-  if (::fstat(file_.value(), &status) != 0) fail(path_, errno);
-  if (!S_ISREG(status.st_mode)) {
-    throw Error(ErrorCode::kInvalidParameter, path_.string() + ": is not a regular file");
-  }
-  size_ = static_cast<std::uint64_t>(status.st_size);
-}
-
-void InputFile::read(std::uint64_t offset, std::span<char> target) const {
-  while (!target.empty()) {
-    const ssize_t count =
-        ::pread(file_.value(), target.data(), target.size(), static_cast<off_t>(offset));
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail(path_, errno);
-    if (count == 0) {
-      throw Error(ErrorCode::kInvalidParameter,
-                  path_.string() + ": became shorter while it was read");
-    }
-    target = target.subspan(static_cast<std::size_t>(count));
-    offset += static_cast<std::uint64_t>(count);
-  }
-}
-
 PartFile::PartFile(const std::filesystem::path& target)
     : target_(resolve(target)), part_(part_beside(target_)), file_(create(part_)) {
-  if (file_.value() < 0) fail(target, errno);
+  if (file_.number() < 0) fail(target, errno);
 }
 
 PartFile::~PartFile() {
@@ -85,7 +52,7 @@ PartFile::~PartFile() {
 
 void PartFile::write(std::string_view bytes) {
   while (!bytes.empty()) {
-    const ssize_t count = ::write(file_.value(), bytes.data(), bytes.size());
+    const ssize_t count = ::write(file_.number(), bytes.data(), bytes.size());
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) fail(target_, errno);
     bytes.remove_prefix(static_cast<std::size_t>(count));
@@ -93,13 +60,13 @@ void PartFile::write(std::string_view bytes) {
 }
 
 void PartFile::restart() {
-  if (::ftruncate(file_.value(), 0) != 0 || ::lseek(file_.value(), 0, SEEK_SET) != 0) {
+  if (::ftruncate(file_.number(), 0) != 0 || ::lseek(file_.number(), 0, SEEK_SET) != 0) {
     fail(target_, errno);
   }
 }
 
 void PartFile::publish() {
-  if (::fsync(file_.value()) != 0 || ::rename(part_.c_str(), target_.c_str()) != 0) {
+  if (::fsync(file_.number()) != 0 || ::rename(part_.c_str(), target_.c_str()) != 0) {
     fail(target_, errno);
   }
   published_ = true;

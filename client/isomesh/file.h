@@ -1,6 +1,5 @@
-// Files of this machine as the client needs them: one that is read while it is sent, and one that
-// appears at once, whole, or not at all. Errors are Error kInvalidParameter that name the file (the
-// caller chose it), or kOutOfSpace.
+// A file of this machine that appears at once, whole, or not at all. Errors are Error
+// kInvalidParameter that name the file (the caller chose it), or kOutOfSpace.
 #pragma once
 
 #include <cstddef>
@@ -9,37 +8,9 @@
 #include <span>
 #include <string_view>
 
+#include "base/descriptor.h"
+
 namespace isomesh {
-
-// Owns a file descriptor; -1 owns nothing.
-class Descriptor {
- public:
-  explicit Descriptor(int value = -1) : value_(value) {}
-  ~Descriptor();
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  int value() const { return value_; }
-
- private:
-  int value_;
-};
-
-// A regular file to read from. Its size is taken when it is opened.
-class InputFile {
- public:
-  explicit InputFile(const std::filesystem::path& path);
-
-  std::uint64_t size() const { return size_; }
-
-  // Fills `target` from `offset`; throws when the file ends before, because it was cut meanwhile.
-  void read(std::uint64_t offset, std::span<char> target) const;
-
- private:
-  std::filesystem::path path_;
-  Descriptor file_;
-  std::uint64_t size_ = 0;
-};
 
 // A file under construction beside `target`. What was written appears at `target`, replacing what
 // is there, with `publish`; without it nothing remains. A target that is a link is followed; one
@@ -56,7 +27,7 @@ class PartFile {
   // Forgets what was written.
   void restart();
 
-  // Makes the bytes durable, then visible; to be called once, and nothing after it.
+  // Makes the bytes durable, then visible. Is called once, as the last method.
   void publish();
 
  private:

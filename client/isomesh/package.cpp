@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include "base/files.h"
+#include "base/text.h"
 #include "proto/error.h"
 
 namespace isomesh {
@@ -16,20 +18,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMostFiles = 20000;  // as many as the server unpacks
 constexpr std::size_t kBlock = 512;
-
-std::string lower(std::string text) {
-  std::ranges::transform(text, text.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  return text;
-}
-
-std::string trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r\n";
-  const std::size_t first = text.find_first_not_of(kBlank);
-  if (first == std::string_view::npos) return {};
-  return std::string(text.substr(first, text.find_last_not_of(kBlank) - first + 1));
-}
 
 // --- Which files ---------------------------------------------------------------------------------
 
@@ -59,33 +47,33 @@ std::vector<PackedFile> files_below(const fs::path& folder) {
   return files;
 }
 
-// The beginning of a header, which is text and has what names its data in the first megabyte.
+// The lines of a header's first megabyte, which is text and names the data.
 std::vector<std::string> lines_of(const fs::path& path) {
   constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 20;
-  const InputFile file(path);
+  const InputFile file = InputFile::chosen(path);
   std::string text(static_cast<std::size_t>(std::min(file.size(), kMostBytes)), '\0');
-  file.read(0, text);
+  file.read_exactly(0, std::as_writable_bytes(std::span(text)));
   std::vector<std::string> lines;
   for (std::size_t next = 0; next < text.size();) {
     const std::size_t end = std::min(text.find('\n', next), text.size());
-    lines.push_back(trimmed(std::string_view(text).substr(next, end - next)));
+    lines.emplace_back(trimmed(std::string_view(text).substr(next, end - next)));
     next = end + 1;
   }
   return lines;
 }
 
-// What the field `name` of a line "Name = value" or "name: value" says.
+// The value of the field `name` where the line, "Name = value" or "name: value", is that field.
 std::optional<std::string> field(const std::string& line, char sign, std::string_view name) {
   const std::size_t at = line.find(sign);
   if (at == std::string::npos) return std::nullopt;
-  std::string found = lower(trimmed(line.substr(0, at)));
+  std::string found = lower(trimmed(std::string_view(line).substr(0, at)));
   std::erase(found, ' ');
   if (found != name) return std::nullopt;
-  return trimmed(line.substr(at + 1));
+  return std::string(trimmed(std::string_view(line).substr(at + 1)));
 }
 
-// The files of a folder that a pattern such as "slice%03d.raw 1 93 1" may mean. Which of them it
-// does the server finds out.
+// The files of a folder that a pattern such as "slice%03d.raw 1 93 1" may name. The server, which
+// has the whole pattern, takes those that it does name.
 std::vector<std::string> names_like(const fs::path& folder, std::string_view said) {
   const std::string_view pattern = said.substr(0, said.find_first_of(" \t"));
   const std::size_t percent = pattern.find('%');
@@ -110,7 +98,7 @@ std::vector<std::string> names_like(const fs::path& folder, std::string_view sai
 std::vector<PackedFile> header_and_data(const fs::path& path, char sign, std::string_view name) {
   std::vector<PackedFile> files = {{path.filename().string(), path}};
   const auto add = [&](const std::string& data) {
-    // The server follows names, and says so where a header has a path.
+    // Data in another folder is not sent: the server refuses a header that names a path.
     const bool plain = !data.empty() && data.find_first_of("/\\") == std::string::npos;
     if (plain && data != files.front().name) files.push_back({data, path.parent_path() / data});
   };
@@ -138,7 +126,7 @@ struct Member {
   std::uint64_t bytes = 0;
 };
 
-// The header's block. What its fields cannot hold stands in a pax record ahead of it.
+// A member's header block. Values that its fields cannot hold are in the pax record ahead of it.
 std::string header_of(const Member& member) {
   constexpr std::size_t kLongestName = 100;
   std::string block(kBlock, '\0');
@@ -172,7 +160,7 @@ std::string padded(std::string text) {
   return text;
 }
 
-// "30 path=...\n", where the number counts itself.
+// Such as "30 path=...\n", where the number is the record's length, its own digits included.
 std::string pax_record(const std::string& key, const std::string& value) {
   const std::string rest = " " + key + "=" + value + "\n";
   std::size_t length = rest.size() + 1;
@@ -180,7 +168,7 @@ std::string pax_record(const std::string& key, const std::string& value) {
   return std::to_string(length) + rest;
 }
 
-// All that stands ahead of a member's bytes.
+// Everything ahead of a member's bytes: its pax record and its header.
 std::string lead_of(const Member& member) {
   const std::string records =
       pax_record("path", member.name) + pax_record("size", std::to_string(member.bytes));
@@ -200,7 +188,7 @@ std::vector<PackedFile> files_of_upload(const std::filesystem::path& path) {
 UploadBody::UploadBody(const std::filesystem::path& path) {
   const std::vector<PackedFile> files = files_of_upload(path);
   if (files.size() == 1 && !fs::is_directory(path)) {
-    add_file(files.front().path, InputFile(files.front().path).size());
+    add_file(files.front().path, InputFile::chosen(files.front().path).size());
     return;
   }
   for (const PackedFile& file : files) add_member(file);
@@ -219,7 +207,7 @@ void UploadBody::add_file(const std::filesystem::path& path, std::uint64_t bytes
 }
 
 void UploadBody::add_member(const PackedFile& file) {
-  const std::uint64_t bytes = InputFile(file.path).size();
+  const std::uint64_t bytes = InputFile::chosen(file.path).size();
   add_text(lead_of({.name = file.name, .bytes = bytes}));
   add_file(file.path, bytes);
   add_text(std::string((kBlock - bytes % kBlock) % kBlock, '\0'));
@@ -244,10 +232,10 @@ void UploadBody::read_part(std::size_t index, std::uint64_t offset, std::span<ch
     return;
   }
   if (!open_file_ || open_part_ != index) {
-    open_file_ = std::make_unique<InputFile>(part.path);
+    open_file_ = std::make_unique<InputFile>(InputFile::chosen(part.path));
     open_part_ = index;
   }
-  open_file_->read(offset, target);
+  open_file_->read_exactly(offset, std::as_writable_bytes(target));
 }
 
 }  // namespace isomesh

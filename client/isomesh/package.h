@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/files.h"
 #include "client/isomesh/file.h"
 
 namespace isomesh {

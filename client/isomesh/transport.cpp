@@ -1,306 +1,313 @@
 #include "client/isomesh/transport.h"
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
-#include <cstring>
 #include <exception>
 #include <memory>
+#include <new>
+#include <optional>
+#include <utility>
 
-#include <httplib.h>
-#include <openssl/ssl.h>
+#include <curl/curl.h>
 #include <poll.h>
-#include <sys/socket.h>
+
+#include "base/text.h"
 
 namespace isomesh {
 namespace {
 
 using std::chrono::milliseconds;
 
-// cpp-httplib reads the lines of an answer's head one byte at a time into memory without a bound,
-// and matches the first with a recursive regular expression: an endless line would end the process.
-constexpr std::size_t kLongestLine = 4096;
+// libcurl bounds each line of an answer's head, but not every version bounds the whole head.
 constexpr std::size_t kLongestHead = 64 * 1024;
-// A list of some ten thousand jobs.
+// A list of some ten thousand jobs has this size.
 constexpr std::size_t kLongestBody = 64 * 1024 * 1024;
 
-constexpr std::size_t kPieceBytes = 256 * 1024;
-constexpr milliseconds kStopInterval{50};
+constexpr long kPieceBytes = 256 * 1024;
+constexpr milliseconds kLongestSleep{60'000};
 
-// What happened on the wire of one exchange, beyond what cpp-httplib reports.
-struct Wire {
-  milliseconds silence{0};
-  std::stop_token stop = {};
-  bool answered_early = false;
-  bool broken = false;
-  std::string failure = {};
+struct EasyCleanup {
+  void operator()(CURL* easy) const { curl_easy_cleanup(easy); }
 };
-
-// A connected socket, plain or TLS, with bounds on time and on the length of lines.
-class GuardedStream final : public httplib::Stream {
- public:
-  GuardedStream(int socket, SSL* ssl, Wire& wire) : socket_(socket), ssl_(ssl), wire_(wire) {}
-
-  bool is_readable() const override { return true; }
-  bool is_writable() const override { return true; }
-
-  ssize_t read(char* target, size_t size) override {
-    if (begin_ == end_ && !refill()) return end_of_stream_ ? 0 : -1;
-    const std::size_t count = std::min(size, end_ - begin_);
-    std::memcpy(target, buffer_.data() + begin_, count);
-    begin_ += count;
-    return within_bounds(*target, size) ? static_cast<ssize_t>(count) : -1;
-  }
-
-  ssize_t write(const char* source, size_t size) override {
-    const auto whole = static_cast<ssize_t>(size);
-    if (wire_.answered_early) return whole;
-    const int events = wait_for(POLLOUT | (ssl_ ? 0 : POLLIN));
-    if (events == 0) return -1;
-    // A server that speaks now has heard enough. What is left to send is dropped here, so that
-    // cpp-httplib goes on to read the answer.
-    if (!ssl_ && (events & (POLLIN | POLLERR | POLLHUP)) != 0) {
-      wire_.answered_early = true;
-      return whole;
-    }
-    const ssize_t count = send_some(source, size);
-    if (count > 0) return count;
-    wire_.answered_early = true;
-    return whole;
-  }
-
-  void get_remote_ip_and_port(std::string&, int&) const override {}
-  void get_local_ip_and_port(std::string&, int&) const override {}
-  socket_t socket() const override { return socket_; }
-
- private:
-  ssize_t send_some(const char* source, size_t size) {
-    if (ssl_) return SSL_write(ssl_, source, static_cast<int>(std::min(size, kPieceBytes)));
-    // Never blocks: the socket was found writable, and a full buffer takes a part.
-    ssize_t count = 0;
-    do {
-      count = ::send(socket_, source, size, MSG_NOSIGNAL | MSG_DONTWAIT);
-    } while (count < 0 && errno == EINTR);
-    return count;
-  }
-
-  bool refill() {
-    if (!(ssl_ && SSL_pending(ssl_) > 0) && wait_for(POLLIN) == 0) return false;
-    ssize_t count = 0;
-    do {
-      count = ssl_ ? SSL_read(ssl_, buffer_.data(), static_cast<int>(buffer_.size()))
-                   : ::recv(socket_, buffer_.data(), buffer_.size(), 0);
-    } while (count < 0 && !ssl_ && errno == EINTR);
-    if (ssl_ && count < 0 &&
-        SSL_get_error(ssl_, static_cast<int>(count)) == SSL_ERROR_ZERO_RETURN) {
-      count = 0;
-    }
-    end_of_stream_ = count == 0;
-    if (count <= 0) {
-      wire_.broken = true;
-      wire_.failure = "the connection was closed before the answer was complete";
-      return false;
-    }
-    begin_ = 0;
-    end_ = static_cast<std::size_t>(count);
-    return true;
-  }
-
-  // The events that came, or 0 when the time is over or the caller has asked to stop.
-  int wait_for(int events) {
-    const auto deadline = std::chrono::steady_clock::now() + wire_.silence;
-    while (!wire_.stop.stop_requested()) {
-      pollfd descriptor{.fd = socket_, .events = static_cast<short>(events), .revents = 0};
-      const int ready = ::poll(&descriptor, 1, static_cast<int>(kStopInterval.count()));
-      if (ready > 0) return descriptor.revents;
-      if (ready < 0 && errno != EINTR) break;
-      if (std::chrono::steady_clock::now() > deadline) {
-        wire_.failure = "the server was silent for too long";
-        break;
-      }
-    }
-    return 0;
-  }
-
-  // Only lines are read byte by byte; see kLongestLine.
-  bool within_bounds(char byte, std::size_t asked) {
-    if (asked > 1) {
-      line_ = head_ = 0;
-      return true;
-    }
-    line_ = byte == '\n' ? 0 : line_ + 1;
-    ++head_;
-    if (line_ <= kLongestLine && head_ <= kLongestHead) return true;
-    wire_.failure = "what answers there does not speak this API";
-    return false;
-  }
-
-  int socket_;
-  SSL* ssl_;
-  Wire& wire_;
-  std::array<char, 16 * 1024> buffer_;
-  std::size_t begin_ = 0;
-  std::size_t end_ = 0;
-  bool end_of_stream_ = false;
-  std::size_t line_ = 0;
-  std::size_t head_ = 0;
+struct MultiCleanup {
+  void operator()(CURLM* multi) const { curl_multi_cleanup(multi); }
 };
-
-// cpp-httplib's client over a GuardedStream.
-template <class Base>
-class GuardedClient final : public Base {
- public:
-  GuardedClient(const std::string& host, int port, Wire& wire) : Base(host, port), wire_(wire) {}
-
- private:
-  bool process_socket(const typename Base::Socket& socket,
-                      std::function<bool(httplib::Stream&)> callback) override {
-    GuardedStream stream(socket.sock, socket.ssl, wire_);
-    return callback(stream);
-  }
-
-  Wire& wire_;
+struct ListCleanup {
+  void operator()(curl_slist* list) const { curl_slist_free_all(list); }
 };
+using Easy = std::unique_ptr<CURL, EasyCleanup>;
+using Multi = std::unique_ptr<CURLM, MultiCleanup>;
+using Headers = std::unique_ptr<curl_slist, ListCleanup>;
 
-std::unique_ptr<httplib::ClientImpl> connect_to(const TransportOptions& options, Wire& wire) {
-  using Plain = GuardedClient<httplib::ClientImpl>;
-  using Tls = GuardedClient<httplib::SSLClient>;
-  const ServerAddress& server = options.server;
-  std::unique_ptr<httplib::ClientImpl> client;
-  switch (server.kind) {
-    case ServerAddress::Kind::kHttp:
-      client = std::make_unique<Plain>(server.host, server.port, wire);
-      break;
-    case ServerAddress::Kind::kHttps: {
-      auto tls = std::make_unique<Tls>(server.host, server.port, wire);
-      if (!options.authorities.empty()) tls->set_ca_cert_path(options.authorities);
-      client = std::move(tls);
-      break;
-    }
-    case ServerAddress::Kind::kUnix:
-      client = std::make_unique<Plain>(server.host, server.port, wire);
-      client->set_address_family(AF_UNIX);
-      break;
-  }
-  client->set_connection_timeout(options.connect_timeout);
-  client->set_read_timeout(wire.silence);
-  client->set_write_timeout(wire.silence);
-  client->set_url_encode(false);
-  client->set_decompress(false);
-  client->set_tcp_nodelay(server.kind != ServerAddress::Kind::kUnix);
-  return client;
+void check(bool done) {
+  if (!done) throw Error(ErrorCode::kInternal, "libcurl cannot be used");
 }
 
-std::string reason_of(httplib::Error error, const Wire& wire) {
-  switch (error) {
-    case httplib::Error::Connection:
+Multi make_multi() {
+  // The call need not be thread safe, so it is made once.
+  static const CURLcode ready = curl_global_init(CURL_GLOBAL_DEFAULT);
+  check(ready == CURLE_OK);
+  Multi multi(curl_multi_init());
+  check(multi != nullptr);
+  return multi;
+}
+
+Easy make_easy() {
+  Easy easy(curl_easy_init());
+  check(easy != nullptr);
+  return easy;
+}
+
+void append(Headers& headers, const std::string& name, const std::string& value) {
+  // libcurl sends lines as they are, so a line break would begin another header.
+  if (has_control_characters(value)) {
+    throw invalid_parameter(name, "must not hold control characters");
+  }
+  curl_slist* longer = curl_slist_append(headers.get(), (name + ": " + value).c_str());
+  if (longer == nullptr) throw std::bad_alloc();
+  static_cast<void>(headers.release());
+  headers.reset(longer);
+}
+
+Headers headers_of(const HttpRequest& request, const TransportOptions& options) {
+  Headers headers;
+  for (const auto& [name, value] : request.headers) append(headers, name, value);
+  if (!options.token.empty()) append(headers, "Authorization", "Bearer " + options.token);
+  return headers;
+}
+
+bool is_broken(CURLcode code) {
+  return code == CURLE_GOT_NOTHING || code == CURLE_PARTIAL_FILE || code == CURLE_RECV_ERROR ||
+         code == CURLE_SEND_ERROR;
+}
+
+std::string reason_of(CURLcode code) {
+  switch (code) {
+    case CURLE_COULDNT_RESOLVE_HOST:
+    case CURLE_COULDNT_CONNECT:
       return "it cannot be connected to";
-    case httplib::Error::ConnectionTimeout:
+    case CURLE_OPERATION_TIMEDOUT:
       return "it does not answer to connecting";
-    case httplib::Error::SSLConnection:
+    case CURLE_SSL_CONNECT_ERROR:
       return "it does not speak TLS";
-    case httplib::Error::SSLLoadingCerts:
+    case CURLE_SSL_CACERT_BADFILE:
       return "the certificate authorities to trust cannot be read";
-    case httplib::Error::SSLServerVerification:
+    case CURLE_PEER_FAILED_VERIFICATION:
       return "its certificate is not one that is trusted here";
     default:
-      return wire.failure.empty() ? "what answers there does not speak this API" : wire.failure;
+      return is_broken(code) ? "the connection was closed before the answer was complete"
+                             : "what answers there does not speak this API";
   }
 }
 
-// The callbacks of one exchange. They must not throw through cpp-httplib, which would be left in
-// the middle of its bookkeeping.
-class Callbacks {
+// One request on its way, and the answer as it comes.
+class Transfer {
  public:
-  Callbacks(const Exchange& exchange, const Wire& wire, Answer& answer)
-      : exchange_(exchange), wire_(wire), answer_(answer) {}
-
-  void attach(httplib::Request& request) {
-    request.response_handler = [this](const httplib::Response& response) {
-      successful_ = response.status >= 200 && response.status < 300;
-      return true;
-    };
-    request.content_receiver = [this](const char* data, size_t size, uint64_t, uint64_t) {
-      return guarded([&] { receive({data, size}); });
-    };
-    if (!exchange_.source) return;
-    request.content_length_ = exchange_.source_bytes;
-    request.content_provider_ = [this](size_t offset, size_t length, httplib::DataSink& sink) {
-      return guarded([&] { provide(offset, length, sink); });
-    };
+  Transfer(const TransportOptions& options, const HttpRequest& request)
+      : options_(options), request_(request), headers_(headers_of(request, options)) {
+    set_connection();
+    set_request();
+    set_callbacks();
+    check(curl_multi_add_handle(multi_.get(), easy_.get()) == CURLM_OK);
   }
+  ~Transfer() { curl_multi_remove_handle(multi_.get(), easy_.get()); }
+  Transfer(const Transfer&) = delete;
+  Transfer& operator=(const Transfer&) = delete;
 
-  void rethrow() const {
+  HttpAnswer answer() {
+    const std::optional<CURLcode> end = run();
     if (failure_) std::rethrow_exception(failure_);
+    if (!end) {
+      if (options_.stop.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
+      throw no_answer("the server was silent for too long", false);
+    }
+    if (*end != CURLE_OK) throw no_answer(reason_of(*end), is_broken(*end));
+    // libcurl accepts a head that the end of the connection cuts off.
+    if (!head_is_whole_) throw no_answer(reason_of(CURLE_PARTIAL_FILE), true);
+    answer_.status = static_cast<int>(info<long>(CURLINFO_RESPONSE_CODE));
+    const char* type = info<char*>(CURLINFO_CONTENT_TYPE);
+    if (type != nullptr) answer_.content_type = type;
+    return std::move(answer_);
   }
 
  private:
-  bool guarded(const std::function<void()>& action) {
+  template <class Value>
+  void set(CURLoption option, Value value) {
+    check(curl_easy_setopt(easy_.get(), option, value) == CURLE_OK);
+  }
+
+  template <class Value>
+  Value info(CURLINFO name) const {
+    Value value{};
+    check(curl_easy_getinfo(easy_.get(), name, &value) == CURLE_OK);
+    return value;
+  }
+
+  void set_connection() {
+    set(CURLOPT_URL, (options_.server.origin + request_.target).c_str());
+    set(CURLOPT_PATH_AS_IS, 1L);
+    set(CURLOPT_PROTOCOLS_STR, "http,https");
+    set(CURLOPT_HTTP_VERSION, static_cast<long>(CURL_HTTP_VERSION_1_1));
+    set(CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
+    set(CURLOPT_PROXY, "");
+    set(CURLOPT_NOSIGNAL, 1L);
+    // A transfer that is given up does not wait for the thread that looks up the server's name.
+    set(CURLOPT_QUICK_EXIT, 1L);
+    set(CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(options_.connect_timeout.count()));
+    if (!options_.server.socket.empty()) {
+      set(CURLOPT_UNIX_SOCKET_PATH, options_.server.socket.c_str());
+    }
+    if (options_.authorities.empty()) return;
+    set(CURLOPT_CAINFO, options_.authorities.c_str());
+    // libcurl would trust the system's folder of certificates besides.
+    set(CURLOPT_CAPATH, static_cast<char*>(nullptr));
+  }
+
+  void set_request() {
+    set(CURLOPT_USERAGENT, "isomesh/" ISOMESH_VERSION);
+    set(CURLOPT_HTTPHEADER, headers_.get());
+    if (request_.source) {
+      set(CURLOPT_POST, 1L);
+      set(CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(request_.source_bytes));
+    } else if (request_.method == "POST") {
+      set(CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(request_.body.size()));
+      set(CURLOPT_POSTFIELDS, request_.body.data());
+    }
+    set(CURLOPT_CUSTOMREQUEST, request_.method.c_str());
+    set(CURLOPT_UPLOAD_BUFFERSIZE, kPieceBytes);
+    set(CURLOPT_BUFFERSIZE, kPieceBytes);
+  }
+
+  void set_callbacks() {
+    set(CURLOPT_HEADERDATA, this);
+    set(CURLOPT_HEADERFUNCTION, &Transfer::on_head);
+    set(CURLOPT_WRITEDATA, this);
+    set(CURLOPT_WRITEFUNCTION, &Transfer::on_body);
+    set(CURLOPT_READDATA, this);
+    set(CURLOPT_READFUNCTION, &Transfer::on_source);
+  }
+
+  // Returns how the transfer ended, or nothing when it was given up, because the server is silent
+  // or the caller has asked to stop. A stop request wakes the poll.
+  std::optional<CURLcode> run() {
+    const std::stop_callback wake(options_.stop, [this] { curl_multi_wakeup(multi_.get()); });
+    while (!options_.stop.stop_requested()) {
+      int running = 0;
+      check(curl_multi_perform(multi_.get(), &running) == CURLM_OK);
+      int left = 0;
+      if (running == 0) return curl_multi_info_read(multi_.get(), &left)->data.result;
+      if (std::exchange(is_paused_, false)) {
+        check(curl_easy_pause(easy_.get(), CURLPAUSE_CONT) == CURLE_OK);
+      }
+      const milliseconds patience = patience_left();
+      if (patience.count() <= 0) break;
+      const auto sleep = static_cast<int>(std::min(patience, kLongestSleep).count());
+      check(curl_multi_poll(multi_.get(), nullptr, 0, sleep, nullptr) == CURLM_OK);
+    }
+    return std::nullopt;
+  }
+
+  // How much longer the server may be silent. Connecting has a time limit of its own.
+  milliseconds patience_left() {
+    const auto now = std::chrono::steady_clock::now();
+    const curl_off_t moved = info<curl_off_t>(CURLINFO_SIZE_UPLOAD_T) +
+                             info<curl_off_t>(CURLINFO_SIZE_DOWNLOAD_T) +
+                             static_cast<curl_off_t>(head_bytes_);
+    const bool is_connected = info<curl_off_t>(CURLINFO_PRETRANSFER_TIME_T) > 0;
+    if (!is_connected || moved != moved_) {
+      moved_ = moved;
+      moved_at_ = now;
+    }
+    const milliseconds allowed = options_.silence_timeout + request_.patience;
+    return allowed - std::chrono::duration_cast<milliseconds>(now - moved_at_);
+  }
+
+  NoAnswer no_answer(const std::string& reason, bool broken) const {
+    return {"no answer from " + options_.server_url + ": " + reason, broken};
+  }
+
+  // An exception must not pass through libcurl, which is C. It ends the transfer, and `answer`
+  // throws it again.
+  template <class Action>
+  std::size_t guarded(std::size_t failed, const Action& action) {
     try {
-      action();
-      return true;
+      return action();
     } catch (...) {
       failure_ = std::current_exception();
-      return false;
+      return failed;
     }
   }
 
-  void receive(std::string_view piece) {
-    if (successful_ && exchange_.sink) return exchange_.sink(piece);
+  // Lines of the answer's head, and of interim answers (1xx) ahead of it.
+  static std::size_t on_head(char* line, std::size_t, std::size_t size, void* self) {
+    auto& transfer = *static_cast<Transfer*>(self);
+    const std::string_view text(line, size);
+    transfer.head_bytes_ += size;
+    if (text.starts_with("HTTP/")) transfer.head_is_whole_ = false;
+    if (trimmed(text).empty()) transfer.head_is_whole_ = true;
+    return transfer.head_bytes_ <= kLongestHead ? size : 0;
+  }
+
+  static std::size_t on_body(char* bytes, std::size_t, std::size_t size, void* self) {
+    auto& transfer = *static_cast<Transfer*>(self);
+    return transfer.guarded(0, [&] {
+      transfer.take({bytes, size});
+      return size;
+    });
+  }
+
+  static std::size_t on_source(char* bytes, std::size_t, std::size_t size, void* self) {
+    auto& transfer = *static_cast<Transfer*>(self);
+    return transfer.guarded(CURL_READFUNC_ABORT, [&] { return transfer.provide({bytes, size}); });
+  }
+
+  void take(std::string_view piece) {
+    const long status = info<long>(CURLINFO_RESPONSE_CODE);
+    if (request_.sink && status >= 200 && status < 300) return request_.sink(piece);
     if (answer_.body.size() + piece.size() > kLongestBody) {
       throw Error(ErrorCode::kInternal, "the server's answer is not what the API describes");
     }
     answer_.body += piece;
   }
 
-  void provide(std::uint64_t offset, std::uint64_t length, httplib::DataSink& sink) {
-    piece_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(length, kPieceBytes)));
-    if (!wire_.answered_early) exchange_.source(offset, piece_);
-    sink.write(piece_.data(), piece_.size());
+  // A server that answers in the middle of a body may close the connection at once, and then
+  // sending fails. So what it has said is read before more is sent.
+  std::size_t provide(std::span<char> space) {
+    const std::uint64_t left = request_.source_bytes - provided_;
+    const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(left, space.size()));
+    if (size == 0) return 0;
+    request_.source(provided_, space.first(size));
+    is_paused_ = server_speaks();
+    if (is_paused_) return CURL_READFUNC_PAUSE;
+    provided_ += size;
+    return size;
   }
 
-  const Exchange& exchange_;
-  const Wire& wire_;
-  Answer& answer_;
-  std::vector<char> piece_;
-  bool successful_ = false;
-  std::exception_ptr failure_;
-};
+  bool server_speaks() const {
+    const auto socket = info<curl_socket_t>(CURLINFO_ACTIVESOCKET);
+    pollfd descriptor{.fd = socket, .events = POLLIN, .revents = 0};
+    return socket != CURL_SOCKET_BAD && ::poll(&descriptor, 1, 0) > 0;
+  }
 
-httplib::Request request_of(const Exchange& exchange, const TransportOptions& options) {
-  httplib::Request request;
-  request.method = exchange.method;
-  request.path = exchange.target;
-  request.body = exchange.body;
-  for (const auto& [name, value] : exchange.headers) request.set_header(name, value);
-  request.set_header("User-Agent", "isomesh/" ISOMESH_VERSION);
-  if (!options.token.empty()) request.set_header("Authorization", "Bearer " + options.token);
-  // cpp-httplib would send the socket's path.
-  if (options.server.kind == ServerAddress::Kind::kUnix) request.set_header("Host", "localhost");
-  return request;
-}
+  const TransportOptions& options_;
+  const HttpRequest& request_;
+  Headers headers_;
+  Multi multi_ = make_multi();  // before the easy handle, because it initialises libcurl
+  Easy easy_ = make_easy();
+
+  HttpAnswer answer_;
+  std::exception_ptr failure_;
+  std::uint64_t provided_ = 0;  // of the source
+  bool is_paused_ = false;      // the source waits until what the server says is read
+  std::size_t head_bytes_ = 0;
+  bool head_is_whole_ = false;
+  curl_off_t moved_ = 0;  // bytes, in both directions
+  std::chrono::steady_clock::time_point moved_at_ = std::chrono::steady_clock::now();
+};
 
 }  // namespace
 
-Answer Transport::send(const Exchange& exchange) const {
-  Wire wire{.silence = options_.silence_timeout + exchange.patience, .stop = options_.stop};
-  Answer answer;
-  Callbacks callbacks(exchange, wire, answer);
-  httplib::Request request = request_of(exchange, options_);
-  callbacks.attach(request);
-
-  httplib::Response response;
-  auto error = httplib::Error::Success;
-  const bool answered = connect_to(options_, wire)->send(request, response, error);
-  callbacks.rethrow();
-  if (!answered) {
-    if (options_.stop.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
-    throw NoAnswer("no answer from " + options_.server_url + ": " + reason_of(error, wire),
-                   wire.broken);
-  }
-  answer.status = response.status;
-  answer.content_type = response.get_header_value("Content-Type");
-  return answer;
+HttpAnswer Transport::send(const HttpRequest& request) const {
+  return Transfer(options_, request).answer();
 }
 
 }  // namespace isomesh

@@ -1,22 +1,21 @@
 #include "client/isomesh/url.h"
 
-#include <algorithm>
-#include <charconv>
+#include <memory>
+#include <new>
+
+#include <curl/curl.h>
 
 #include "proto/error.h"
 
 namespace isomesh {
 namespace {
 
-// The longest name that DNS has.
-constexpr std::size_t kLongestHost = 253;
+// The longest name that DNS has, and a port.
+constexpr std::size_t kLongestAuthority = 253 + 6;
+
+constexpr const char* kForms = "must be http://HOST:PORT, https://HOST:PORT or unix:PATH";
 
 [[noreturn]] void refuse(const std::string& message) { throw invalid_parameter("server", message); }
-
-bool is_unreserved(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
-         c == '.' || c == '_' || c == '~';
-}
 
 bool take_prefix(std::string_view& text, std::string_view prefix) {
   if (!text.starts_with(prefix)) return false;
@@ -24,66 +23,43 @@ bool take_prefix(std::string_view& text, std::string_view prefix) {
   return true;
 }
 
-int parse_port(std::string_view text) {
-  int port = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
-  if (error != std::errc{} || end != text.data() + text.size() || port < 1 || port > 65535) {
-    refuse("the port must be a number from 1 to 65535");
-  }
-  return port;
-}
-
-std::string parse_host(std::string_view text, bool bracketed) {
-  const bool clean = std::ranges::all_of(
-      text, [&](char c) { return is_unreserved(c) || (bracketed && c == ':'); });
-  if (text.empty() || text.size() > kLongestHost || !clean) {
-    refuse("must be http://HOST:PORT, https://HOST:PORT or unix:PATH");
-  }
-  return std::string(text);
+// What connects also says what a host and a port are.
+void check_host_and_port(const std::string& origin) {
+  const std::unique_ptr<CURLU, decltype(&curl_url_cleanup)> parts(curl_url(), &curl_url_cleanup);
+  if (!parts) throw std::bad_alloc();
+  const CURLUcode code = curl_url_set(parts.get(), CURLUPART_URL, origin.c_str(), 0);
+  if (code == CURLUE_BAD_PORT_NUMBER) refuse("the port must be a number from 1 to 65535");
+  if (code != CURLUE_OK) refuse(kForms);
 }
 
 }  // namespace
 
 ServerAddress parse_server_address(std::string_view url) {
-  ServerAddress address;
   if (take_prefix(url, "unix:")) {
     if (url.empty()) refuse("the path of the socket is missing");
-    return {.kind = ServerAddress::Kind::kUnix, .host = std::string(url)};
+    return {.origin = "http://localhost", .socket = url};
   }
-  if (take_prefix(url, "https://")) {
-    address.kind = ServerAddress::Kind::kHttps;
-    address.port = 443;
-  } else if (!take_prefix(url, "http://")) {
+  std::string_view authority = url;
+  if (!take_prefix(authority, "https://") && !take_prefix(authority, "http://")) {
     refuse("must begin with http://, https:// or unix:");
   }
-  if (url.ends_with('/')) url.remove_suffix(1);
-
-  const bool bracketed = take_prefix(url, "[");
-  const std::size_t host_end = bracketed ? url.find(']') : std::min(url.find(':'), url.size());
-  if (host_end == std::string_view::npos) refuse("the bracket of the address is not closed");
-  address.host = parse_host(url.substr(0, host_end), bracketed);
-  url.remove_prefix(host_end + (bracketed ? 1 : 0));
-  if (url.empty()) return address;
-  if (!take_prefix(url, ":")) refuse("must be http://HOST:PORT, https://HOST:PORT or unix:PATH");
-  address.port = parse_port(url);
-  return address;
+  if (authority.ends_with('/')) authority.remove_suffix(1);
+  // libcurl takes a path, a query, a user, and a port that is empty or 0, too.
+  if (authority.size() > kLongestAuthority || authority.ends_with(':') ||
+      authority.ends_with(":0") || authority.find_first_of("/\\?#@") != std::string_view::npos) {
+    refuse(kForms);
+  }
+  const std::string origin(url.begin(), authority.end());
+  check_host_and_port(origin);
+  return {.origin = origin};
 }
 
 std::string percent_encode(std::string_view text) {
-  constexpr std::string_view kHex = "0123456789ABCDEF";
-  std::string encoded;
-  encoded.reserve(text.size());
-  for (const char c : text) {
-    if (is_unreserved(c)) {
-      encoded += c;
-    } else {
-      const auto byte = static_cast<unsigned char>(c);
-      encoded += '%';
-      encoded += kHex[byte >> 4];
-      encoded += kHex[byte & 15];
-    }
-  }
-  return encoded;
+  if (text.empty()) return {};  // a length of 0 would mean that it ends with a zero
+  const std::unique_ptr<char, decltype(&curl_free)> encoded(
+      curl_easy_escape(nullptr, text.data(), static_cast<int>(text.size())), &curl_free);
+  if (!encoded) throw std::bad_alloc();
+  return encoded.get();
 }
 
 std::string path_segment(std::string_view text) {

@@ -1,6 +1,7 @@
 // What is put into URLs, and where a server is.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -8,13 +9,10 @@
 
 namespace isomesh {
 
-// Where a server listens: a TCP port, with or without TLS, or a socket of this machine.
+// Where a server listens.
 struct ServerAddress {
-  enum class Kind { kHttp, kHttps, kUnix };
-
-  Kind kind = Kind::kHttp;
-  std::string host;  // a name, an IPv4 or IPv6 address (no brackets), or the socket's path
-  int port = 80;     // meaningless for kUnix
+  std::string origin;                 // scheme, host and perhaps a port: what URLs begin with
+  std::filesystem::path socket = {};  // of this machine; empty: the origin's host and port
 
   bool operator==(const ServerAddress&) const = default;
 };

@@ -4,7 +4,7 @@ import { defineConfig } from 'vitest/config';
 const here = (path: string): string => fileURLToPath(new URL(path, import.meta.url));
 
 export default defineConfig({
-  resolve: { alias: { 'playwright-core': here('node_modules/playwright-core') } },
+  resolve: { alias: { 'playwright-core': here('node_modules/playwright-core'), yaml: here('node_modules/yaml') } },
   server: { fs: { allow: [here('../..')] } },
   test: {
     dir: here('../../tests/web'),

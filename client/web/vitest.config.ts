@@ -9,6 +9,7 @@ export default defineConfig({
     alias: {
       '@': here('src'),
       'playwright-core': here('node_modules/playwright-core'),
+      yaml: here('node_modules/yaml'),
     },
   },
   server: { fs: { allow: [here('../..')] } },

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <span>
 
+#include "server/mesh/parallel.h"
+
 namespace isomesh::codec {
 namespace {
 

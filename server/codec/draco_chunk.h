@@ -1,4 +1,5 @@
-// Blocks of triangles as Draco streams on one shared quantisation grid; private to this folder.
+// Blocks of triangles as Draco streams on one shared quantisation grid, and who encodes them;
+// private to this folder.
 #pragma once
 
 #include <array>
@@ -7,24 +8,11 @@
 #include <span>
 #include <vector>
 
-#include "proto/types.h"
+#include "server/codec/draco/encoder.h"
+#include "server/codec/draco/grid.h"
 #include "server/mesh/mesh.h"
 
 namespace isomesh::codec {
-
-// The cube that all positions are quantised in: the mesh's lowest corner and its longest side. A
-// position on it decodes to the same bits in every stream that uses the grid.
-struct Grid {
-  mesh::Vec3 low = {0, 0, 0};
-  float side = 0;
-  int bits = 14;
-
-  // What a coordinate along an axis becomes by encoding and decoding.
-  float decoded(float coordinate, std::size_t axis) const;
-};
-
-// Covers the mesh, to a millionth of a millimetre; of an empty one, the point 0.
-Grid grid_of(const mesh::Mesh& mesh, int bits);
 
 struct DracoStream {
   std::vector<std::byte> bytes;
@@ -51,14 +39,57 @@ using Block = std::vector<Run>;
 // one block. No empty blocks.
 std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_block);
 
-// The block of all triangles.
-Block whole_block(const mesh::Mesh& mesh);
+struct DracoOptions {
+  Grid grid;
+  int speed = 7;
+};
 
-// Encodes the block's triangles with the vertices they name: by edgebreaker, or for speed 10 (as
-// Draco's own convention has it) and for a mesh without triangles sequentially. `normals` are those
-// of the mesh's vertices, or none; a normal decodes to the same bits in every stream. Takes one
-// thread. Thread safe. Throws Error kInternal when Draco refuses.
-DracoStream encode_draco(const mesh::Mesh& mesh, const Block& block, const Grid& grid, int speed,
-                         std::span<const mesh::Vec3> normals = {});
+// Encodes blocks of a mesh, or all of it, one after the other in memory that it keeps. Our own
+// encoder takes what it covers at the speeds 5 to 9: see draco/encoder.h. libdraco takes the rest:
+// the slower speeds, whose streams are smaller, speed 10, which is sequential, normals, finer
+// grids, and surfaces that are no oriented manifolds. Not thread safe. Throws Error kInternal when
+// libdraco refuses, and kCancelled, which libdraco does not look at.
+class DracoEncoder {
+ public:
+  // The block's triangles with the vertices they name, on one thread. `normals` are those of the
+  // mesh's vertices, or none; a normal decodes to the same bits in every stream.
+  DracoStream encode_block(const mesh::Mesh& mesh, const Block& block, const DracoOptions& options,
+                           std::span<const mesh::Vec3> normals, const mesh::Context& context);
+
+  // All triangles with the vertices they name. The stream's bounds are left out. Our own encoder
+  // takes several threads, and gives the same bytes on any number.
+  DracoStream encode_whole(const mesh::Mesh& mesh, const DracoOptions& options,
+                           const mesh::Context& context);
+
+  // Of those that it has encoded at once: its memory follows from it.
+  std::size_t most_triangles() const { return most_triangles_; }
+
+ private:
+  // What is encoded, as arrays; layers as mesh::Mesh has them.
+  struct Part {
+    std::span<const mesh::Vec3> positions;
+    std::span<const mesh::Vec3> normals;  // as many, or none
+    std::span<const mesh::Triangle> triangles;
+    std::span<const std::uint64_t> layer_vertices;
+    std::span<const std::uint64_t> layer_triangles;
+  };
+  // A block, with vertices of its own.
+  struct PartMemory {
+    std::vector<mesh::Vec3> positions;
+    std::vector<mesh::Vec3> normals;
+    std::vector<mesh::Triangle> triangles;
+    std::vector<std::uint64_t> layer_vertices;
+    std::vector<std::uint64_t> layer_triangles;
+    std::vector<std::uint32_t> number;  // of the mesh's vertices from the block's lowest on
+  };
+
+  void take(const mesh::Mesh& mesh, const Block& block, std::span<const mesh::Vec3> normals);
+  DracoStream encode(const Part& part, const DracoOptions& options, edgebreaker::Threads threads,
+                     const mesh::Context& context);
+
+  PartMemory part_;
+  std::size_t most_triangles_ = 0;
+  edgebreaker::Encoder encoder_;
+};
 
 }  // namespace isomesh::codec

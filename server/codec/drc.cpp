@@ -1,7 +1,9 @@
 #include <limits>
+#include <utility>
 
 #include "server/codec/draco_chunk.h"
 #include "server/codec/encode.h"
+#include "server/codec/encoders.h"
 
 namespace isomesh::codec {
 
@@ -11,8 +13,10 @@ void encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco, const mesh
   if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::kTooLarge, "the surface has more triangles than Draco can encode");
   }
-  const DracoStream stream =
-      encode_draco(mesh, whole_block(mesh), grid_of(mesh, draco.position_bits), draco.speed);
+  const DracoOptions options = {grid_of(mesh, draco.position_bits), draco.speed};
+  auto encoder = Encoders::instance().take(mesh.triangles.size());
+  const DracoStream stream = encoder->encode_whole(mesh, options, {context.stop, nullptr});
+  Encoders::instance().give_back(std::move(encoder));
   context.throw_if_stopped();
   sink(stream.bytes);
   if (context.progress) context.progress(1);

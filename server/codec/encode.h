@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "proto/types.h"
 #include "server/mesh/context.h"
+#include "server/mesh/extract.h"
 #include "server/mesh/mesh.h"
 
 namespace isomesh::codec {
@@ -17,11 +19,16 @@ namespace isomesh::codec {
 // Takes the encoded bytes, in order; may throw, which ends the encoding.
 using Sink = std::function<void(std::span<const std::byte>)>;
 
+// Whether oriented manifolds without normals are encoded by our own Draco encoder with these
+// parameters, and not by libdraco, which takes everything else.
+bool is_own_draco(const DracoParameters& draco);
+
 // One Draco stream of the whole mesh (edgebreaker connectivity; sequential at speed 10),
 // millimetres in LPS. Positions are quantised to draco.position_bits bits on a cubic grid that
 // covers the mesh closely, so that a decoded vertex is within half a grid step of its place along
-// each axis. The stream keeps the number of vertices and triangles. Thread safe. Throws Error
-// kInternal when Draco refuses, and kCancelled, looked at before and after Draco's one call.
+// each axis. The stream keeps the number of vertices and triangles. The bytes do not depend on the
+// number of threads. Thread safe. Throws Error kUnusableVolume where a position is not finite,
+// kInternal when libdraco refuses, and kCancelled, which libdraco's one call does not look at.
 void encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco, const mesh::Context& context,
                 const Sink& sink);
 
@@ -40,15 +47,17 @@ void encode_ply(const mesh::Mesh& mesh, const mesh::Context& context, const Sink
 // kCancelled.
 void encode_obj(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink);
 
-// What a file says about where its mesh comes from.
+// What a file says about where its mesh comes from, and all that its bytes follow from beside the
+// samples: no owner, no host, nothing of the job that asked.
 struct Provenance {
-  JobParameters parameters;
+  std::string volume;  // its id
+  MeshParameters parameters;
   double iso = 0;  // the value that was used, also where parameters say Otsu
   std::array<std::uint32_t, 3> dims = {0, 0, 0};
   Geometry geometry;
 };
 
-// Binary glTF 2.0: the mesh as one primitive for each block of some 60 000 triangles, each a Draco
+// Binary glTF 2.0: the mesh as one primitive for each block of some 100 000 triangles, each a Draco
 // stream of its own (KHR_draco_mesh_compression), encoded side by side. All share one quantisation
 // grid, so vertices on a seam between blocks decode to the same bits, and so do their normals,
 // which are there when the parameters ask for them. Positions are LPS millimetres under a node that
@@ -58,11 +67,25 @@ struct Provenance {
 void encode_glb(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
                 const Sink& sink);
 
-// Dispatches on the format; parameters are those of the provenance.
+// What the server knows of a format. Its name, which is a file's suffix as well, is in proto. Times
+// and sizes are first guesses, from a head of five million triangles on two cores.
+struct Format {
+  MeshFormat format;
+  std::string_view media_type;  // application/octet-stream where none is registered
+  double milliseconds_per_triangle;
+  // Of the file.
+  double (*bytes)(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
+  // What encoding takes at its peak, beside the mesh; an upper estimate.
+  std::uint64_t (*memory_bytes)(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
+  void (*encode)(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
+                 const Sink& sink);
+};
+
+// The format's row in the one table of them; constant time.
+const Format& describe(MeshFormat format);
+
+// As the format's encoder does.
 void encode(const mesh::Mesh& mesh, MeshFormat format, const Provenance& provenance,
             const mesh::Context& context, const Sink& sink);
-
-// The media type of a mesh file; application/octet-stream where none is registered.
-std::string_view media_type(MeshFormat format);
 
 }  // namespace isomesh::codec

@@ -1,100 +1,86 @@
-// What requests say in their headers and queries, parsed and bounded. Free functions, thread safe;
-// what is malformed throws Error kInvalidParameter that names the header or parameter.
+// A request as its handler sees it, whatever HTTP library has read it.
 #pragma once
 
-#include <array>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "proto/json.h"
-#include "proto/types.h"
-#include "server/volume/import.h"
-
-namespace httplib {
-struct Request;
-}
+#include "server/http/guards/auth.h"
+#include "server/http/observe/trace.h"
+#include "server/net/request_head.h"
 
 namespace isomesh::http {
 
-// All parameters of the query, in the library's order.
-std::vector<std::pair<std::string, std::string>> query_of(const httplib::Request& request);
+// The route of a request that none was found for, in logs and metrics.
+inline constexpr std::string_view kNoRoute = "none";
 
-// Refuses parameters that are not among `known`.
-void check_known(const httplib::Request& request, const std::set<std::string>& known);
-
-// How long the answer may wait: `?wait=N` or `Prefer: wait=N` in seconds; more than 30 are 30.
-std::chrono::milliseconds wait_of(const httplib::Request& request);
-
-// The Idempotency-Key header, as it is; empty without one. At most 255 printable characters.
-std::string idempotency_key_of(const httplib::Request& request);
-
-// The SHA-256 that Content-Digest names (RFC 9530), as hex; empty when it names none, but only
-// other algorithms.
-std::optional<std::string> sha256_of_content_digest(const httplib::Request& request);
-
-// The same as the value of a digest header, from hex.
-std::string digest_header(std::string_view sha256);
-
-// Raw samples' description from `dims`, `type` and the rest; empty without `dims`.
-std::optional<volume::RawDescription> raw_description_of(const httplib::Request& request);
-
-// The names of the parameters that raw_description_of reads.
-const std::set<std::string>& raw_description_parameters();
-
-// What the query says about a body that is a volume: raw samples' description, the series to take.
-volume::ImportOptions import_options_of(const httplib::Request& request);
-
-// The names of the parameters that import_options_of reads.
-const std::set<std::string>& import_parameters();
-
-struct WholeNumbers {
-  std::uint64_t low = 0;
-  std::uint64_t high = 0;
+// What the server knows of a request beside what the client has sent.
+struct RequestContext {
+  std::chrono::steady_clock::time_point began =
+      std::chrono::steady_clock::now();  // its head is read
+  Trace trace;
+  Caller caller;
+  std::string_view route = kNoRoute;  // the pattern of its route, which lives as long as the router
 };
 
-// The parameter's value, which must be among those; `otherwise` without the parameter.
-std::uint64_t whole_number_of(const httplib::Request& request, const std::string& name,
-                              const WholeNumbers& among, std::uint64_t otherwise);
+// Reads a body, once, while its handler works. The functions that take the pieces must not throw;
+// one that returns false ends the reading.
+class BodyReader {
+ public:
+  using TakePiece = std::function<bool(std::string_view piece)>;
+  using BeginField = std::function<bool(const std::string& name)>;
 
-// Two finite numbers of which the second is greater; empty without the parameter.
-std::optional<std::array<double, 2>> interval_of(const httplib::Request& request,
-                                                 const std::string& name);
+  virtual ~BodyReader() = default;
 
-struct ByteRange {
-  std::uint64_t first = 0;
-  std::uint64_t length = 0;
+  // Both return false when the body did not come whole or a function has ended the reading. A form
+  // (Request::is_form) has to be read by read_form, which calls `begin` before the pieces of each
+  // field.
+  virtual bool read(const TakePiece& take) = 0;
+  virtual bool read_form(const BeginField& begin, const TakePiece& take) = 0;
+
+  // Whether the whole body is here already, so that reading it does not wait. False for a chunked
+  // one, whose end is not known before.
+  virtual bool is_whole() const = 0;
+  // Whether reading has ended because the body came too slowly.
+  virtual bool was_too_slow() const = 0;
 };
 
-// One range of a file of `size` bytes. Empty when there is no Range header, or one that RFC 9110
-// lets a server ignore: other units, several ranges, bad syntax. Throws Error kRangeNotSatisfiable
-// when the range lies outside of the file.
-std::optional<ByteRange> range_of(const httplib::Request& request, std::uint64_t size);
+using Parameters = std::vector<std::pair<std::string, std::string>>;
 
-// True when the client takes answers compressed with gzip (RFC 9110, 12.5.3).
-bool accepts_gzip(const httplib::Request& request);
+struct Request {
+  std::string method;
+  std::string target;   // path and query as they were sent
+  std::string version;  // HTTP/1.0 or HTTP/1.1
+  std::string path;     // percent signs decoded, as in the next two
+  Parameters path_parameters;
+  Parameters query;
+  net::Headers headers;
+  std::optional<std::uint64_t> content_length;
+  std::string remote_address;  // empty for a Unix socket
+  BodyReader* body = nullptr;  // of a POST only
+  RequestContext context;
 
-// True when If-None-Match names the entity tag (quotes included).
-bool matches_etag(const httplib::Request& request, std::string_view etag);
+  bool has_header(std::string_view name) const;
+  // The value of the first header of that name; empty without one.
+  std::string_view header(std::string_view name) const;
+  std::size_t count_headers(std::string_view name) const;
 
-// Throws Error kPreconditionFailed when there is an If-Match that does not name the entity tag.
-void check_if_match(const httplib::Request& request, std::string_view etag);
+  // The same for the parameters of the query, whose names have their case.
+  bool has_parameter(std::string_view name) const;
+  std::string_view parameter(std::string_view name) const;
+  std::size_t count_parameters(std::string_view name) const;
 
-// What stands for the rest of a list after that id; lists of another kind do not take it.
-std::string cursor_after(std::string_view kind, std::string_view id);
+  // The part of the path that the route's pattern has {name} for.
+  std::string path_parameter(std::string_view name) const;
 
-// The `id` in the parameter `cursor`, printable ASCII; empty without one.
-std::string id_after(const httplib::Request& request, std::string_view kind);
-
-// What a cursor that is none is refused with.
-Error wrong_cursor();
-
-// Of a client that comes back to a stream of events.
-std::optional<std::uint64_t> last_event_id(const httplib::Request& request);
+  // Whether the body is a form with fields (multipart/form-data).
+  bool is_form() const;
+};
 
 }  // namespace isomesh::http

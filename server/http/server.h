@@ -1,20 +1,20 @@
-// The HTTP side of the daemon: routes and their guards.
+// The HTTP side of the daemon.
 #pragma once
 
 #include <chrono>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "server/http/auth.h"
-#include "server/http/metrics.h"
-#include "server/http/tls.h"
+#include "server/callbacks/callbacks.h"
+#include "server/http/guards/auth.h"
+#include "server/http/observe/metrics.h"
 #include "server/http/upload.h"
-#include "server/jobs/callbacks.h"
 #include "server/jobs/estimate.h"
 #include "server/jobs/histograms.h"
 #include "server/jobs/volume_library.h"
+#include "server/net/address.h"
+#include "server/net/tls.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
 #include "server/store/outbox.h"
@@ -22,19 +22,6 @@
 #include "server/store/volume_store.h"
 
 namespace isomesh::http {
-
-// Where to listen: HOST:PORT (port 0: a free one) or unix:PATH.
-struct Address {
-  std::string host;
-  int port = 0;
-  std::filesystem::path unix_path;  // empty for TCP
-
-  bool is_unix() const { return !unix_path.empty(); }
-  bool is_loopback() const;
-};
-
-// Throws Error kInvalidParameter that says what is wrong.
-Address parse_address(const std::string& text);
 
 struct ServerOptions {
   std::size_t threads = 32;       // requests that are worked on at once
@@ -46,7 +33,7 @@ struct ServerOptions {
   UploadLimits upload;
   std::vector<std::string> cors_origins;  // pages of which origins may use the service, `*` for all
   std::vector<std::string> hosts;         // names of this service beside loopback's, without ports
-  const TlsFiles* tls = nullptr;          // null: connections are plain
+  const net::TlsFiles* tls = nullptr;     // null: connections are plain
 };
 
 // What the routes call.
@@ -61,8 +48,8 @@ struct Services {
   store::Retention& retention;
   Metrics& metrics;
   const store::Outbox& outbox;
-  jobs::Callbacks& callbacks;
-  const jobs::CallbackTargets& callback_targets;
+  callbacks::Callbacks& callbacks;
+  const callbacks::CallbackTargets& callback_targets;
   const Tokens* tokens = nullptr;  // null: requests are not authenticated
 };
 
@@ -76,13 +63,13 @@ class Server {
 
   // Binds; returns what clients connect to, such as http://127.0.0.1:8080 or unix:/run/iso.sock.
   // Throws Error kUnavailable when the address cannot be bound.
-  std::string bind(const Address& address);
+  std::string bind(const net::Address& address);
 
   // Serves until stop(); to be called once, after bind.
   void serve();
 
-  // Ready says 503 from now on, so that a balancer looks elsewhere, and no job is accepted. Thread
-  // safe.
+  // /readyz answers 503 from now on, so that a load balancer looks elsewhere, and no job is
+  // accepted. Thread safe.
   void begin_drain();
 
   // Ends serve(): no connection is accepted any more, nobody waits for a job, uploads and imports

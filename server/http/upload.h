@@ -1,3 +1,4 @@
+// Bodies of requests, bounded: in a file or in memory.
 #pragma once
 
 #include <atomic>
@@ -5,9 +6,8 @@
 #include <cstdint>
 #include <filesystem>
 
-#include <httplib.h>
-
-#include "server/store/data_folder.h"
+#include "server/http/request.h"
+#include "server/store/files/data_folder.h"
 
 namespace isomesh::http {
 
@@ -16,16 +16,15 @@ struct UploadLimits {
   std::chrono::seconds max_time = std::chrono::hours(1);  // in all; each read has its own limit
 };
 
-// A request's body on disk: streamed, counted, checked against its Content-Digest. Removed when it
-// goes. Not thread safe.
+// A request's body in a file: written as it comes, counted, checked against its Content-Digest. The
+// destructor removes the file. Not thread safe.
 class Upload {
  public:
   // Receives the body, or the one field `file` of a form. Throws Error kTooLarge, kDigestMismatch,
   // kUnsupportedMedia for an encoded body, kInvalidParameter for a broken or empty one,
   // kRequestTimeout, kOutOfSpace, and kUnavailable once `stopping` is true.
   Upload(const store::DataFolder& folder, const UploadLimits& limits,
-         const std::atomic<bool>& stopping, const httplib::Request& request,
-         const httplib::ContentReader& read_body);
+         const std::atomic<bool>& stopping, const Request& request);
 
   const std::filesystem::path& path() const { return path_; }
 
@@ -36,7 +35,6 @@ class Upload {
 
 // A small body, whole in memory. Throws Error kTooLarge beyond `max_bytes`, kUnsupportedMedia,
 // kInvalidParameter, kRequestTimeout.
-std::string read_text(const httplib::Request& request, const httplib::ContentReader& read_body,
-                      std::size_t max_bytes);
+std::string read_text(const Request& request, std::size_t max_bytes);
 
 }  // namespace isomesh::http

@@ -4,14 +4,15 @@
 #include <cmath>
 #include <map>
 
+#include "proto/samples.h"
+#include "server/codec/encode.h"
 #include "server/mesh/extract.h"
 #include "server/volume/canonical.h"
-#include "server/volume/samples.h"
 
 namespace isomesh::jobs {
 namespace {
 
-// First guesses, from an 7.1 million voxel head of five million triangles on two cores.
+// First guesses, from a 7.1 million voxel head of five million triangles on two cores.
 constexpr double kMillisecondsPerJob = 1;
 constexpr double kLoadPerSample = 1.3e-6;
 constexpr double kExtractPerSample = 1.0e-6;
@@ -19,7 +20,6 @@ constexpr double kExtractPerTriangle = 1.6e-5;
 constexpr double kConnectivityPerTriangle = 1.0e-5;
 constexpr double kSmoothPerTriangleAndPass = 3.0e-6;
 constexpr double kMeasurePerTriangle = 3.0e-5;
-constexpr double kUsualPositionBits = 14;
 
 // Calibrating looks at these many finished jobs, the youngest.
 constexpr std::size_t kJobsLookedAt = 50;
@@ -33,61 +33,22 @@ double extract_ms(const SurfaceSize& surface, std::uint64_t samples) {
          kExtractPerTriangle * as_double(surface.triangles);
 }
 
-double smooth_ms(const SurfaceSize& surface, const JobParameters& parameters) {
+double smooth_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   if (parameters.passes == 0) return 0;
   return as_double(surface.triangles) *
          (kConnectivityPerTriangle + kSmoothPerTriangleAndPass * parameters.passes);
 }
 
-double encode_ms_per_triangle(MeshFormat format) {
-  switch (format) {
-    case MeshFormat::kDrc:
-      return 3.0e-4;
-    case MeshFormat::kGlb:
-      return 1.5e-4;
-    case MeshFormat::kStl:
-      return 3.0e-5;
-    case MeshFormat::kPly:
-      return 3.0e-5;
-    case MeshFormat::kObj:
-      break;
-  }
-  return 2.0e-4;
-}
-
 // Formats are written side by side, so the slowest counts whole and the others by half.
-double encode_ms(const SurfaceSize& surface, const JobParameters& parameters) {
+double encode_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   double slowest = kMeasurePerTriangle;
   double sum = kMeasurePerTriangle;
   for (const MeshFormat format : parameters.formats) {
-    slowest = std::max(slowest, encode_ms_per_triangle(format));
-    sum += encode_ms_per_triangle(format);
+    const double each = codec::describe(format).milliseconds_per_triangle;
+    slowest = std::max(slowest, each);
+    sum += each;
   }
   return as_double(surface.triangles) * (slowest + (sum - slowest) / 2);
-}
-
-double guessed_bytes(MeshFormat format, const SurfaceSize& surface,
-                     const JobParameters& parameters) {
-  const double triangles = as_double(surface.triangles);
-  const double vertices = as_double(surface.vertices);
-  // A bit more for a coordinate is about a bit more for each coordinate of each vertex.
-  const double more_bits = 3 * (parameters.draco.position_bits - kUsualPositionBits) / 8;
-  constexpr double kSmallestPerVertex = 1;
-  constexpr double kNormalPerVertex = 1.5;
-  switch (format) {
-    case MeshFormat::kDrc:
-      return 100 + vertices * std::max(kSmallestPerVertex, 2.6 + more_bits);
-    case MeshFormat::kGlb:
-      return 2000 + vertices * (std::max(kSmallestPerVertex, 2.7 + more_bits) +
-                                (parameters.normals ? kNormalPerVertex : 0));
-    case MeshFormat::kStl:
-      return 84 + 50 * triangles;
-    case MeshFormat::kPly:
-      return 300 + 12 * vertices + 13 * triangles;
-    case MeshFormat::kObj:
-      break;
-  }
-  return 100 + 30 * vertices + 24 * triangles;
 }
 
 template <class T>
@@ -113,23 +74,24 @@ void CostModel::learn(const Job& job, std::uint64_t samples) {
   add(smooth_, job.timing.smooth, smooth_ms(surface, job.parameters));
   add(encode_, job.timing.encode, encode_ms(surface, job.parameters));
   for (const auto& [format, file] : job.mesh->files) {
-    add(files_.at(static_cast<std::size_t>(format)), as_double(file.bytes),
-        guessed_bytes(format, surface, job.parameters));
+    add(files_.try_emplace(format, kFewBytes).first->second, as_double(file.bytes),
+        codec::describe(format).bytes(surface, job.parameters));
   }
 }
 
 double CostModel::milliseconds(const SurfaceSize& surface, std::uint64_t samples,
-                               const JobParameters& parameters) const {
+                               const MeshParameters& parameters) const {
   return kMillisecondsPerJob + load_ms(samples) + extract_.factor() * extract_ms(surface, samples) +
          smooth_.factor() * smooth_ms(surface, parameters) +
          encode_.factor() * encode_ms(surface, parameters);
 }
 
 std::uint64_t CostModel::file_bytes(MeshFormat format, const SurfaceSize& surface,
-                                    const JobParameters& parameters) const {
-  const double factor = files_.at(static_cast<std::size_t>(format)).factor();
+                                    const MeshParameters& parameters) const {
+  const auto found = files_.find(format);
+  const double factor = (found == files_.end() ? kFewBytes : found->second).factor();
   return static_cast<std::uint64_t>(
-      std::llround(factor * guessed_bytes(format, surface, parameters)));
+      std::llround(factor * codec::describe(format).bytes(surface, parameters)));
 }
 
 Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& parameters) {
@@ -158,15 +120,9 @@ SurfaceSize Estimator::count(const Volume& volume, const mesh::ExtractOptions& o
   const auto size = counts_.get({volume.id, options.iso, options.scheme, options.close}, [&] {
     const store::LocalBlob file = blobs_.local(volume.id);
     const volume::CanonicalVolume canonical(file.path);
-    SurfaceSize counted;
-    volume::with_sample(volume::stored_type(volume.type), [&](auto sample) {
-      using Sample = decltype(sample);
-      if constexpr (!std::is_same_v<Sample, std::uint64_t> &&
-                    !std::is_same_v<Sample, std::int64_t>) {
-        counted = count_as<Sample>(canonical, options, stop_.get_token());
-      }
+    return with_sample(volume.type, [&](auto sample) {
+      return count_as<decltype(sample)>(canonical, options, stop_.get_token());
     });
-    return counted;
   });
   return *size;
 }

@@ -1,8 +1,8 @@
 // What a job would take, told before it runs.
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <map>
 #include <stop_token>
 #include <string>
 #include <tuple>
@@ -28,15 +28,16 @@ class CostModel {
 
   // Load to encode, in milliseconds, without the queue.
   double milliseconds(const SurfaceSize& surface, std::uint64_t samples,
-                      const JobParameters& parameters) const;
+                      const MeshParameters& parameters) const;
 
   // Of one file. Exact for STL.
   std::uint64_t file_bytes(MeshFormat format, const SurfaceSize& surface,
-                           const JobParameters& parameters) const;
+                           const MeshParameters& parameters) const;
 
  private:
-  // What was seen and what the first guess had said, of which the quotient corrects the next one.
-  // Both begin with some weight, so that a few small jobs do not turn it over.
+  // Sums over the jobs that have finished: what was seen, and what the first guess for them was.
+  // Their quotient corrects later guesses. Both sums begin above zero, so that one small job alone
+  // changes the quotient little.
   struct Correction {
     double seen;
     double guessed;
@@ -50,8 +51,7 @@ class CostModel {
   Correction extract_ = kFewMilliseconds;
   Correction smooth_ = kFewMilliseconds;
   Correction encode_ = kFewMilliseconds;
-  std::array<Correction, 5> files_ = {kFewBytes, kFewBytes, kFewBytes, kFewBytes,
-                                      kFewBytes};  // by format
+  std::map<MeshFormat, Correction> files_;  // kFewBytes for those that are not here
 };
 
 // Estimates jobs on stored volumes. Counts of the last surfaces are kept. Thread safe; what it is

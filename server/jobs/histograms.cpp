@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "server/mesh/context.h"
+#include "server/mesh/parallel.h"
 #include "server/volume/canonical.h"
 
 namespace isomesh::jobs {

@@ -7,7 +7,8 @@
 
 namespace isomesh::jobs {
 
-// The thread that lets go of what is not to be kept any longer. `retention` must outlive it.
+// The thread that has retention remove what is not to be kept any longer. `retention` must outlive
+// it.
 class Housekeeper {
  public:
   // Looks at once and every `interval` from then on.

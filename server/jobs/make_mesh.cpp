@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "proto/samples.h"
 #include "server/mesh/components.h"
-#include "server/mesh/quality.h"
+#include "server/mesh/parallel.h"
+#include "server/mesh/shapes.h"
 #include "server/mesh/smooth.h"
 #include "server/mesh/topology.h"
 
@@ -20,7 +22,7 @@ constexpr double kExtractShare = 0.05;
 constexpr double kSmoothShare = 0.08;
 constexpr double kEncodeShare = 1 - kLoadShare - kExtractShare - kSmoothShare;
 
-mesh::SmoothOptions smooth_options(const JobParameters& parameters) {
+mesh::SmoothOptions smooth_options(const MeshParameters& parameters) {
   const bool is_taubin = parameters.smoothing == Smoothing::kTaubin;
   const double lambda = parameters.lambda.value_or(default_lambda(parameters.smoothing));
   return {.passes = parameters.passes,
@@ -30,7 +32,7 @@ mesh::SmoothOptions smooth_options(const JobParameters& parameters) {
               parameters.max_displacement_mm.value_or(std::numeric_limits<double>::infinity())};
 }
 
-void check_memory(const mesh::SurfaceCount& count, const JobParameters& parameters,
+void check_memory(const mesh::SurfaceCount& count, const MeshParameters& parameters,
                   std::uint64_t allowed) {
   const std::uint64_t needed = estimate_memory(size_of(count), parameters);
   if (needed <= allowed) return;
@@ -59,24 +61,8 @@ void extract_as(const SampleArray& samples, const MeshRequest& request, const Pr
 
 void extract(const SampleArray& samples, const MeshRequest& request, const Progress& progress,
              mesh::Mesh& mesh) {
-  switch (samples.type) {
-    case SampleType::kUint8:
-      return extract_as<std::uint8_t>(samples, request, progress, mesh);
-    case SampleType::kInt8:
-      return extract_as<std::int8_t>(samples, request, progress, mesh);
-    case SampleType::kUint16:
-      return extract_as<std::uint16_t>(samples, request, progress, mesh);
-    case SampleType::kInt16:
-      return extract_as<std::int16_t>(samples, request, progress, mesh);
-    case SampleType::kUint32:
-      return extract_as<std::uint32_t>(samples, request, progress, mesh);
-    case SampleType::kInt32:
-      return extract_as<std::int32_t>(samples, request, progress, mesh);
-    case SampleType::kFloat32:
-      return extract_as<float>(samples, request, progress, mesh);
-    case SampleType::kFloat64:
-      return extract_as<double>(samples, request, progress, mesh);
-  }
+  with_sample(samples.type,
+              [&](auto sample) { extract_as<decltype(sample)>(samples, request, progress, mesh); });
 }
 
 // Fills in what is not known from before smoothing.
@@ -102,8 +88,8 @@ void measure_quality(const mesh::Mesh& mesh, bool is_smoothed, const mesh::Conte
   quality.smallest_angle_deg.smoothed = shapes.smallest_angle_deg;
 }
 
-// Encodes every format and measures the mesh, all side by side: a single Draco stream takes one
-// thread.
+// Encodes every format and measures the mesh, all side by side: few of them have work for every
+// thread all the time.
 void encode_and_measure(const codec::Provenance& provenance, std::span<const codec::Sink> sinks,
                         const Progress& progress, const mesh::Mesh& mesh, MeshSummary& summary) {
   const std::vector<MeshFormat>& formats = provenance.parameters.formats;
@@ -141,19 +127,10 @@ void Progress::end_stage() {
   timing_.*elapsed_ = std::chrono::duration<double, std::milli>(Clock::now() - began_).count();
 }
 
-std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const JobParameters& parameters) {
-  // Measured: what Draco takes at its slowest speed, and what GLB's chunks and their bytes add.
-  constexpr std::uint64_t kDracoBytesPerTriangle = 100;
-  constexpr std::uint64_t kGlbBytesPerTriangle = 15;
-  constexpr std::uint64_t kGlbNormalBytesPerTriangle = 8;
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters) {
   std::uint64_t encoding = surface.vertices * 2 * sizeof(std::uint32_t);  // measured meanwhile
   for (const MeshFormat format : parameters.formats) {
-    if (format == MeshFormat::kDrc) encoding += surface.triangles * kDracoBytesPerTriangle;
-    if (format == MeshFormat::kGlb) encoding += surface.triangles * kGlbBytesPerTriangle;
-    if (format == MeshFormat::kGlb && parameters.normals) {
-      encoding +=
-          surface.vertices * sizeof(mesh::Vec3) + surface.triangles * kGlbNormalBytesPerTriangle;
-    }
+    encoding += codec::describe(format).memory_bytes(surface, parameters);
   }
   const std::uint64_t smoothing = smoothing_memory(smooth_options(parameters), surface);
   return surface.vertices * sizeof(mesh::Vec3) + surface.triangles * sizeof(mesh::Triangle) +
@@ -162,7 +139,7 @@ std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const JobParamet
 
 MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
                       std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh) {
-  const JobParameters& parameters = request.parameters;
+  const MeshParameters& parameters = request.parameters;
   MeshSummary summary;
   progress.enter(Stage::kExtract, kExtractShare, &Timing::extract);
   extract(samples, request, progress, mesh);
@@ -185,8 +162,9 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   summary.bounds = {effect.after.low, effect.after.high};
 
   progress.enter(Stage::kEncode, kEncodeShare, &Timing::encode);
-  encode_and_measure({parameters, request.iso, samples.dims, samples.geometry}, sinks, progress,
-                     mesh, summary);
+  encode_and_measure(
+      {std::string(request.volume), parameters, request.iso, samples.dims, samples.geometry}, sinks,
+      progress, mesh, summary);
   return summary;
 }
 

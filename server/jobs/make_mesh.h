@@ -8,6 +8,7 @@
 #include <functional>
 #include <span>
 #include <stop_token>
+#include <string_view>
 
 #include "proto/types.h"
 #include "server/codec/encode.h"
@@ -65,14 +66,15 @@ struct SampleArray {
 
 // What a mesh is to be made of and what it may take.
 struct MeshRequest {
-  const JobParameters& parameters;
+  std::string_view volume;  // its id, for the files to name
+  const MeshParameters& parameters;
   double iso;  // whatever the parameters say of it
   std::uint64_t memory_bytes;
 };
 
 // How much memory a job with a surface of that size takes at its peak, beside its mapped volume:
 // mesh, smoothing, encoders. An upper estimate.
-std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const JobParameters& parameters);
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
 
 // Extracts, smooths, measures and encodes; `sinks` has one for each of the parameters' formats, in
 // their order. The files of the summary are empty. `mesh` is worked in, and left as it was encoded.

@@ -6,30 +6,32 @@
 #include <list>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <utility>
 
+#include "base/mutex.h"
 #include "proto/error.h"
 
 namespace isomesh::jobs {
 
-// Answers that are dear to find and never change: the last ones are kept, and one that several ask
-// for at a time is found once. Thread safe.
+// Keeps the last answers to questions that take long to answer and whose answers never change. A
+// question that several callers ask at the same time is answered once, for all of them. Thread
+// safe.
 template <class Key, class Value>
 class Memo {
  public:
-  // Keeps `capacity` answers, and lets at most `most_waiting` callers find or wait for one.
+  // Keeps `capacity` answers, and lets at most `most_waiting` callers at a time find an answer or
+  // wait for another caller to find it.
   Memo(std::size_t capacity, std::size_t most_waiting)
       : capacity_(capacity), most_waiting_(most_waiting) {}
 
-  // The answer to `key`, by `find` when it is not there. Throws Error kUnavailable when too many
-  // callers wait already, and what `find` throws; then nothing is kept.
+  // The answer to `key`, which `find` finds when it is not kept. Throws Error kUnavailable when too
+  // many callers wait already, and what `find` throws; then nothing is kept.
   std::shared_ptr<const Value> get(const Key& key, const std::function<Value()>& find) {
     std::promise<std::shared_ptr<const Value>> promise;
     std::shared_future<std::shared_ptr<const Value>> answer;
     bool is_mine = false;
     {
-      const std::lock_guard lock(mutex_);
+      const Lock lock(mutex_);
       if (const auto known = answers_.find(key); known != answers_.end()) {
         order_.splice(order_.begin(), order_, known->second.place);
         answer = known->second.answer;
@@ -60,12 +62,12 @@ class Memo {
     typename std::list<Key>::iterator place;
   };
 
-  // Gives the caller's place among the waiting ones back.
+  // Gives a caller's place among those that wait back when it goes.
   class Leave {
    public:
     explicit Leave(Memo& memo) : memo_(memo) {}
     ~Leave() {
-      const std::lock_guard lock(memo_.mutex_);
+      const Lock lock(memo_.mutex_);
       --memo_.waiting_;
     }
     Leave(const Leave&) = delete;
@@ -81,7 +83,7 @@ class Memo {
       promise.set_value(std::make_shared<const Value>(find()));
     } catch (...) {
       promise.set_exception(std::current_exception());
-      const std::lock_guard lock(mutex_);
+      const Lock lock(mutex_);
       if (const auto failed = answers_.find(key); failed != answers_.end()) {
         order_.erase(failed->second.place);
         answers_.erase(failed);
@@ -89,8 +91,8 @@ class Memo {
     }
   }
 
-  // Those that still wait for it hold its future themselves.
-  void forget_oldest() {
+  // Callers that still wait for an answer that is forgotten hold its future themselves.
+  void forget_oldest() ISOMESH_REQUIRES(mutex_) {
     while (order_.size() > capacity_) {
       answers_.erase(order_.back());
       order_.pop_back();
@@ -99,10 +101,10 @@ class Memo {
 
   const std::size_t capacity_;
   const std::size_t most_waiting_;
-  std::mutex mutex_;      // guards everything below
-  std::list<Key> order_;  // the last asked for first
-  std::map<Key, Entry> answers_;
-  std::size_t waiting_ = 0;
+  Mutex mutex_;
+  std::list<Key> order_ ISOMESH_GUARDED_BY(mutex_);  // the last asked for first
+  std::map<Key, Entry> answers_ ISOMESH_GUARDED_BY(mutex_);
+  std::size_t waiting_ ISOMESH_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace isomesh::jobs

@@ -29,7 +29,7 @@ void Workspace::trim(std::size_t budget_bytes) {
   if (held > budget_bytes) *this = {};
 }
 
-PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
+PipelineResult run_pipeline(const Volume& volume, const MeshParameters& parameters,
                             const PipelineLimits& limits, const store::BlobStore& blobs,
                             Workspace& workspace, std::stop_token stop, const Report& report) {
   Progress progress(stop, report);
@@ -47,10 +47,10 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
   }
   const volume::CanonicalHeader& header = canonical.header();
   PipelineResult result;
-  result.mesh =
-      make_mesh({header.type, header.dims, header.geometry, canonical.samples().data()},
-                {parameters, parameters.iso.value_or(volume.suggested_iso), limits.memory_bytes},
-                sinks, progress, workspace.mesh);
+  result.mesh = make_mesh(
+      {header.type, header.dims, header.geometry, canonical.samples().data()},
+      {volume.id, parameters, parameters.iso.value_or(volume.suggested_iso), limits.memory_bytes},
+      sinks, progress, workspace.mesh);
   for (std::size_t i = 0; i < writers.size(); ++i) {
     const store::Blob blob = writers[i]->commit();
     result.mesh.files[parameters.formats[i]] = {blob.bytes, blob.key, ""};

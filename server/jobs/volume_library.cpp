@@ -1,12 +1,12 @@
 #include "server/jobs/volume_library.h"
 
-#include "server/store/files.h"
+#include "base/clock.h"
 
 namespace isomesh::jobs {
 
 std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
                                            const std::filesystem::path& upload,
-                                           const volume::ImportOptions& options) {
+                                           const process::ImportOptions& options) {
   const store::ScratchFolder scratch(folder_.scratch());
   const std::filesystem::path canonical = scratch.path() / "canonical";
   Volume volume = runner_.run({.source = upload,
@@ -15,16 +15,16 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
                                .options = options,
                                .limits = limits_});
   const store::Blob blob = store::digest_of(canonical);
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   if (!volumes_.names(blob.key)) retention_.make_room(blob.bytes);
   blobs_.adopt(canonical, blob);
   volume.id = blob.key;
-  volume.created = store::timestamp();
+  volume.created = timestamp();
   return volumes_.add(owner, volume);
 }
 
 void VolumeLibrary::erase(const std::string& owner, const std::string& id) {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   volumes_.erase(owner, id);
   if (!volumes_.names(id)) blobs_.erase(id);
 }

@@ -1,17 +1,17 @@
 #pragma once
 
 #include <filesystem>
-#include <mutex>
 #include <optional>
 #include <utility>
 
+#include "base/mutex.h"
 #include "proto/types.h"
+#include "server/jobs/import_runner.h"
+#include "server/process/import_message.h"
 #include "server/store/blob_store.h"
-#include "server/store/data_folder.h"
+#include "server/store/files/data_folder.h"
 #include "server/store/retention.h"
 #include "server/store/volume_store.h"
-#include "server/volume/import.h"
-#include "server/volume/import_runner.h"
 
 namespace isomesh::jobs {
 
@@ -21,7 +21,7 @@ class VolumeLibrary {
  public:
   VolumeLibrary(const store::DataFolder& folder, const store::BlobStore& blobs,
                 store::VolumeStore& volumes, store::Retention& retention,
-                const volume::ImportLimits& limits, const volume::RunnerOptions& runner = {})
+                const volume::SizeLimits& limits, const RunnerOptions& runner)
       : folder_(folder),
         blobs_(blobs),
         volumes_(volumes),
@@ -32,7 +32,7 @@ class VolumeLibrary {
   // Imports an uploaded file, in a process of its own. Second: false when the owner had the same
   // samples and geometry already. Throws what ImportRunner::run throws, and kOutOfSpace.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
-                              const volume::ImportOptions& options = {});
+                              const process::ImportOptions& options = {});
 
   // Ends the imports that run or wait, and refuses further ones.
   void stop_imports() { runner_.stop(); }
@@ -46,9 +46,9 @@ class VolumeLibrary {
   const store::BlobStore& blobs_;
   store::VolumeStore& volumes_;
   store::Retention& retention_;
-  const volume::ImportLimits limits_;
-  volume::ImportRunner runner_;
-  std::mutex mutex_;  // held while a blob and its record come or go together
+  const volume::SizeLimits limits_;
+  ImportRunner runner_;
+  Mutex mutex_;  // held while a blob and its record come or go together
 };
 
 }  // namespace isomesh::jobs

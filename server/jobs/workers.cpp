@@ -1,7 +1,6 @@
 #include "server/jobs/workers.h"
 
 #include <array>
-#include <condition_variable>
 #include <exception>
 #include <new>
 #include <optional>
@@ -22,9 +21,9 @@ constexpr std::size_t kWorkspaceBudgetBytes = std::size_t{1} << 30;
 constexpr milliseconds kBetweenRenewals{100};
 constexpr milliseconds kBetweenReaps{1000};
 constexpr milliseconds kLongestIdle{1000};
-// How long a job waits that found the disk full; a shorter wait before the same verb is tried
-// again.
+// How long a job that found the disk full waits before it is run again.
 constexpr milliseconds kFullDiskDelay{5000};
+// How long until a job's end that found the disk full is told the queue again.
 constexpr milliseconds kFullDiskRetry{500};
 
 // Why a run was asked to stop.
@@ -37,9 +36,9 @@ std::string worker_name(std::size_t thread) {
 }
 
 void pause(const std::stop_token& stop, milliseconds time) {
-  std::mutex mutex;
-  std::unique_lock lock(mutex);
-  std::condition_variable_any().wait_for(lock, stop, time, [] { return false; });
+  Mutex mutex;
+  Lock lock(mutex);
+  Condition().wait_for(lock, stop, time, [] { return false; });
 }
 
 }  // namespace
@@ -63,7 +62,7 @@ class Workers::Run {
 
   // True when it is in another stage than before.
   bool advance(const store::Progress& progress) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     const bool is_other_stage = progress.stage != progress_.stage;
     progress_ = progress;
     return is_other_stage;
@@ -71,7 +70,7 @@ class Workers::Run {
 
   // Prolongs the lease unless the run is over, and stops the run when it is not to go on.
   void renew(store::JobStore& jobs, milliseconds lease) {
-    const std::lock_guard renewing(renewal_);
+    const Lock renewing(renewal_);
     if (is_over_) return;
     const store::Standing standing = jobs.renew(lease_, progress(), lease);
     if (standing == store::Standing::kCancel) stop(Reason::kCancelled);
@@ -80,13 +79,13 @@ class Workers::Run {
 
   // No renewal is under way any more, and none begins.
   void end() {
-    const std::lock_guard renewing(renewal_);
+    const Lock renewing(renewal_);
     is_over_ = true;
   }
 
  private:
   store::Progress progress() const {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     return progress_;
   }
 
@@ -94,10 +93,10 @@ class Workers::Run {
   const Clock::time_point began_ = Clock::now();
   std::stop_source stop_;
   std::atomic<Reason> reason_ = Reason::kNone;
-  mutable std::mutex mutex_;
-  store::Progress progress_;  // guarded by mutex_
-  std::mutex renewal_;
-  bool is_over_ = false;  // guarded by renewal_
+  mutable Mutex mutex_;
+  store::Progress progress_ ISOMESH_GUARDED_BY(mutex_);
+  Mutex renewal_;
+  bool is_over_ ISOMESH_GUARDED_BY(renewal_) = false;
 };
 
 Workers::Workers(const WorkerOptions& options, store::JobStore& jobs,
@@ -117,10 +116,9 @@ Workers::~Workers() {
 
 bool Workers::drain(milliseconds wait) {
   claims_.request_stop();
-  const auto deadline = Clock::now() + wait;
-  constexpr milliseconds kPoll{10};
-  while (alive_ > 0 && Clock::now() < deadline) std::this_thread::sleep_for(kPoll);
-  return alive_ == 0;
+  Lock lock(alive_mutex_);
+  return ended_.wait_for(lock, wait,
+                         [this]() ISOMESH_REQUIRES(alive_mutex_) { return alive_ == 0; });
 }
 
 void Workers::work(const std::stop_token& stop, const std::string& name) {
@@ -138,13 +136,15 @@ void Workers::work(const std::stop_token& stop, const std::string& name) {
       pause(stop, kLongestIdle);
     }
   }
+  const Lock lock(alive_mutex_);
   --alive_;
+  ended_.notify_all();
 }
 
 void Workers::run(const store::Lease& lease, Workspace& workspace) {
   const auto run = std::make_shared<Run>(lease);
   {
-    const std::lock_guard lock(runs_mutex_);
+    const Lock lock(runs_mutex_);
     runs_.push_back(run);
   }
   const std::stop_callback on_end(running_.get_token(), [&] { run->stop(Reason::kEnding); });
@@ -177,7 +177,7 @@ void Workers::run(const store::Lease& lease, Workspace& workspace) {
   }
   run->end();
   {
-    const std::lock_guard lock(runs_mutex_);
+    const Lock lock(runs_mutex_);
     std::erase(runs_, run);
   }
   conclude(*run, outcome);
@@ -229,7 +229,7 @@ void Workers::look_after_leases(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     std::vector<std::shared_ptr<Run>> runs;
     {
-      const std::lock_guard lock(runs_mutex_);
+      const Lock lock(runs_mutex_);
       runs = runs_;
     }
     for (const auto& run : runs) {

@@ -1,14 +1,13 @@
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "base/mutex.h"
 #include "server/jobs/pipeline.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
@@ -54,11 +53,13 @@ class Workers {
   store::JobStore& jobs_;
   const store::VolumeStore& volumes_;
   const store::BlobStore& blobs_;
-  std::stop_source claims_;         // ends the taking of jobs
-  std::stop_source running_;        // interrupts those that run
-  std::atomic<std::size_t> alive_;  // threads that may still run a job
-  std::mutex runs_mutex_;
-  std::vector<std::shared_ptr<Run>> runs_;  // under way; guarded by runs_mutex_
+  std::stop_source claims_;   // ends the taking of jobs
+  std::stop_source running_;  // interrupts those that run
+  Mutex alive_mutex_;
+  Condition ended_;
+  std::size_t alive_ ISOMESH_GUARDED_BY(alive_mutex_);  // threads that may still run a job
+  Mutex runs_mutex_;
+  std::vector<std::shared_ptr<Run>> runs_ ISOMESH_GUARDED_BY(runs_mutex_);  // under way
   std::vector<std::jthread> threads_;
   std::jthread leases_;  // last: joined first
 };

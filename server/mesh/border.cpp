@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "proto/samples.h"
+
 namespace isomesh::mesh {
 namespace {
 
@@ -131,10 +133,15 @@ bool BorderPlacement<T>::has_edge(const Sample& from, const Offset& offset) cons
   return std::ranges::min(offset) >= 0 || std::ranges::max(offset) <= 0;
 }
 
-// Whether the vertex of the edge from `inside` to a phantom leaves the face across `axis`, in which
-// both ends lie. On an edge of the box the vertex to the phantom beyond both faces stays; where the
-// split has no such edge, the one beyond the first face does. On a corner it is the one beyond all
-// three; else beyond the first face and the second or third; else beyond the first.
+// The edge from `inside` to a phantom lies in the face of the box across `axis`. Its vertex would
+// coincide with those of the other edges from `inside` to phantoms, beyond other faces (border.h).
+// One of them stays on the face, and this says whether this one moves off it. The one that stays is
+//  * on an edge of the box: the vertex to the phantom beyond both faces; where the split has no
+//  such
+//    edge, the one beyond the face of the smaller axis;
+//  * on a corner of the box: the vertex to the phantom beyond all three faces; else the one beyond
+//  x
+//    and one of the others; else the one beyond x.
 template <class T>
 bool BorderPlacement<T>::gives_way(const Sample& inside, const Offset& to_phantom,
                                    std::size_t axis) const {
@@ -179,13 +186,8 @@ typename BorderPlacement<T>::Point BorderPlacement<T>::cap_point(const Sample& i
   return point;
 }
 
-template class BorderPlacement<std::uint8_t>;
-template class BorderPlacement<std::int8_t>;
-template class BorderPlacement<std::uint16_t>;
-template class BorderPlacement<std::int16_t>;
-template class BorderPlacement<std::uint32_t>;
-template class BorderPlacement<std::int32_t>;
-template class BorderPlacement<float>;
-template class BorderPlacement<double>;
+#define ISOMESH_INSTANTIATE(Sample, name, kType) template class BorderPlacement<Sample>;
+ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
+#undef ISOMESH_INSTANTIATE
 
 }  // namespace isomesh::mesh

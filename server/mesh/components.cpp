@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "server/mesh/parallel.h"
+
 namespace isomesh::mesh {
 namespace {
 
@@ -57,7 +59,7 @@ std::uint64_t join_vertices(const Mesh& mesh, const Context& context,
   Forest forest(parents);
   const std::size_t layers = mesh.layers();
   const std::size_t slabs = (layers + kLayersPerSlab - 1) / kLayersPerSlab;
-  // First what names no vertex of the next slab's, slabs side by side; then what does.
+  // First the triangles that name no vertex of the next slab, slabs side by side; then the others.
   std::vector<std::uint64_t> joined(slabs);
   parallel_for(context, slabs, [&](std::size_t slab) {
     const std::size_t begin = slab * kLayersPerSlab;

@@ -9,6 +9,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "proto/samples.h"
+#include "server/mesh/parallel.h"
 #include "server/mesh/slabs.h"
 
 namespace isomesh::mesh {
@@ -61,6 +63,34 @@ std::vector<Slab> cut_slabs(std::uint32_t layers, RunningCost cost) {
   return result;
 }
 
+// Pass 1: how many vertices and triangles each layer has, in the place behind the layer's.
+template <class T>
+void count_pass(const Extraction<T>& extraction, const Context& context, SurfaceCount& count) {
+  const auto slabs = cut_slabs(extraction.dims.z, [](std::uint32_t z) { return z; });
+  parallel_for(context, slabs.size(),
+               [&](std::size_t task) { count_slab(extraction, slabs[task], count); });
+}
+
+// Pass 2: where each layer begins.
+void prefix_pass(SurfaceCount& count) {
+  for (auto* sums : {&count.layer_vertices, &count.layer_triangles}) {
+    std::partial_sum(sums->begin(), sums->end(), sums->begin());
+  }
+}
+
+// Pass 3: every vertex and triangle to its place, which the mesh's layers tell.
+template <class T>
+void write_pass(const Extraction<T>& extraction, const Context& context, Mesh& mesh) {
+  const Dims& dims = extraction.dims;
+  IndexMemory memory(index_memory_size(dims));
+  // A layer costs its triangles, and its samples even when it is empty.
+  const std::uint64_t samples_cost = std::uint64_t{dims.x} * dims.y / 16;
+  const auto slabs = cut_slabs(
+      dims.z, [&](std::uint32_t z) { return mesh.layer_triangles[z] + z * samples_cost; });
+  parallel_for(context, slabs.size(),
+               [&](std::size_t task) { write_slab(extraction, slabs[task], memory, mesh); });
+}
+
 }  // namespace
 
 SurfaceSize size_of(const SurfaceCount& count) {
@@ -101,12 +131,8 @@ SurfaceCount count_surface(const Lattice<T>& lattice, const ExtractOptions& opti
   }
 
   const Extraction<T> extraction(lattice, options, *smallest);
-  const auto slabs = cut_slabs(layers, [](std::uint32_t z) { return z; });
-  parallel_for(context, slabs.size(),
-               [&](std::size_t task) { count_slab(extraction, slabs[task], count); });
-  for (auto* sums : {&count.layer_vertices, &count.layer_triangles}) {
-    std::partial_sum(sums->begin(), sums->end(), sums->begin());
-  }
+  count_pass(extraction, context, count);
+  prefix_pass(count);
   return count;
 }
 
@@ -130,29 +156,14 @@ void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
     return context.throw_if_stopped();
   }
 
-  const Extraction<T> extraction(lattice, options, *smallest);
-  const Dims& dims = extraction.dims;
-  IndexMemory memory(index_memory_size(dims));
-  // A layer costs its triangles, and its samples even when it is empty.
-  const std::uint64_t samples_cost = std::uint64_t{dims.x} * dims.y / 16;
-  const auto slabs = cut_slabs(
-      dims.z, [&](std::uint32_t z) { return count.layer_triangles[z] + z * samples_cost; });
-  parallel_for(context, slabs.size(),
-               [&](std::size_t task) { write_slab(extraction, slabs[task], memory, mesh); });
+  write_pass(Extraction<T>(lattice, options, *smallest), context, mesh);
 }
 
-#define ISOMESH_INSTANTIATE(T)                                                                   \
+#define ISOMESH_INSTANTIATE(T, name, kType)                                                      \
   template SurfaceCount count_surface(const Lattice<T>&, const ExtractOptions&, const Context&); \
   template void extract_surface(const Lattice<T>&, const ExtractOptions&, const SurfaceCount&,   \
                                 const Context&, Mesh&);
-ISOMESH_INSTANTIATE(std::uint8_t)
-ISOMESH_INSTANTIATE(std::int8_t)
-ISOMESH_INSTANTIATE(std::uint16_t)
-ISOMESH_INSTANTIATE(std::int16_t)
-ISOMESH_INSTANTIATE(std::uint32_t)
-ISOMESH_INSTANTIATE(std::int32_t)
-ISOMESH_INSTANTIATE(float)
-ISOMESH_INSTANTIATE(double)
+ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
 #undef ISOMESH_INSTANTIATE
 
 }  // namespace isomesh::mesh

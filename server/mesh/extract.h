@@ -1,15 +1,21 @@
 // Iso-surface extraction by marching tetrahedra.
 //
 // A cell of eight samples is split into five or six tetrahedra; in each the surface is the plane
-// patch that linear interpolation puts there (A. Doi, A. Koide, "An efficient method of
-// triangulating equi-valued surfaces by using tetrahedral cells", IEICE Trans. E74, 1991). The
-// six-way split is Kuhn's, which tiles by translation; of the five-way split every cell with odd
-// i+j+k is mirrored, or the diagonals of shared faces would cross.
+// patch that linear interpolation puts there (B. A. Payne, A. W. Toga, "Surface mapping brain
+// function on 3D models", IEEE Computer Graphics and Applications 10(5), 1990; A. Doi, A. Koide,
+// "An efficient method of triangulating equi-valued surfaces by using tetrahedral cells", IEICE
+// Transactions E74(1), 1991, whose Table 1 has both splits). The six-way split is Kuhn's (H. W.
+// Kuhn, "Some combinatorial lemmas in topology", IBM Journal of Research and Development 4(5),
+// 1960), which tiles by translation; of the five-way split every cell with odd i+j+k is mirrored,
+// or the diagonals of shared faces would cross. Vertices near a sample could be snapped to it, for
+// better triangles (G. M. Treece, R. W. Prager, A. H. Gee, "Regularised marching tetrahedra",
+// Computers & Graphics 23(4), 1999); here they stay where interpolation puts them, and smoothing
+// betters the triangles.
 //
-// The work is done in two passes over the samples. `count_surface` tells how much there will be,
-// `extract_surface` writes every vertex and triangle to its final place. Nothing is searched,
-// hashed or merged: a vertex is named by the sample that owns its edge and the edge's direction,
-// and its index is a running count.
+// Three passes: count_surface (1) counts the vertices and triangles of each layer and (2) sums the
+// counts up, so that every layer knows its place; extract_surface (3) writes every vertex and
+// triangle there. Nothing is searched, hashed or merged: a vertex is named by the sample that owns
+// its edge and the edge's direction, and its index is a running count.
 //
 // A surface that is to be closed is marched on around the volume, as if one more layer of samples
 // beyond each face were outside; those samples are nowhere in memory. Its caps lie on the border of

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "server/mesh/extent-inl.h"
+#include "server/mesh/parallel.h"
 
 namespace isomesh::mesh {
 namespace {

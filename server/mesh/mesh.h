@@ -13,16 +13,17 @@ namespace isomesh::mesh {
 using Vec3 = std::array<float, 3>;              // millimetres, LPS
 using Triangle = std::array<std::uint32_t, 3>;  // vertex indices, counter-clockwise from outside
 
+inline constexpr std::size_t kFlagBits = 64;  // of a word of Mesh::on_border
+
 // Vertices and triangles in the order of the lattice's layers. Layer k holds the vertices on the
 // edges that the samples of plane k own and the triangles of the cells between planes k and k+1; of
-// a surface that is closed, plane 0 is the one before the volume's first.
-// A triangle of layer k therefore names only vertices of layers k and k+1: whoever works on a run
-// of layers knows which others can touch it.
+// a surface that is closed, plane 0 is the one before the volume's first. So a triangle of layer k
+// names only vertices of layers k and k+1, and work on a run of layers touches no others than those
+// next to it.
 //
-// Every vertex lies on one lattice edge; every lattice edge carries at most one vertex. The surface
-// is an oriented manifold whose boundary, if it was not closed, lies on the border of the volume.
-inline constexpr std::size_t kFlagBits = 64;
-
+// As extraction leaves it, every vertex lies on one lattice edge and every lattice edge carries at
+// most one vertex. The surface is an oriented manifold whose boundary, if it was not closed, lies
+// on the border of the volume.
 struct Mesh {
   std::array<double, 3> origin = {0, 0, 0};  // where the sample (0,0,0) lies
   Buffer<Vec3> positions;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/mesh/parallel.h"
+
 namespace isomesh::mesh {
 namespace {
 

@@ -1,12 +1,13 @@
+#include "server/mesh/parallel.h"
+
 #include <algorithm>
 #include <atomic>
 #include <exception>
 #include <memory>
-#include <mutex>
 #include <thread>
 #include <vector>
 
-#include "server/mesh/context.h"
+#include "base/mutex.h"
 
 #ifdef ISOMESH_PARALLEL_TBB
 #include <tbb/global_control.h>
@@ -45,7 +46,7 @@ class Loop {
 
 #ifdef ISOMESH_PARALLEL_TBB
 
-// The arena and the control that lets it have more threads than there are processors.
+// oneTBB's arena, and the control that lets it have more threads than there are processors.
 struct Arena {
   explicit Arena(int threads)
       : control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads)),
@@ -74,25 +75,22 @@ void run_tasks(Loop& loop, std::size_t tasks) {
 #else
 
 std::atomic<int>& threads_setting() {
-#ifdef ISOMESH_PARALLEL_THREADS
   static std::atomic<int> threads = default_thread_count();
-#else
-  static std::atomic<int> threads = 1;
-#endif
   return threads;
 }
 
-// Plain threads that live as long as the loop: what a sanitizer can follow.
+// Plain threads that live as long as the loop, for the thread sanitizer, which cannot follow
+// oneTBB.
 void run_tasks(Loop& loop, std::size_t tasks) {
   std::atomic<std::size_t> next = 0;
-  std::mutex mutex;
+  Mutex mutex;  // guards failure
   std::exception_ptr failure;
   const auto work = [&] {
     try {
       for (std::size_t task = next++; task < tasks; task = next++) loop.run(task);
     } catch (...) {
       next = tasks;
-      const std::lock_guard lock(mutex);
+      const Lock lock(mutex);
       if (!failure) failure = std::current_exception();
     }
   };
@@ -127,11 +125,7 @@ int thread_count() { return arena()->arena.max_concurrency(); }
 
 #else
 
-void set_thread_count([[maybe_unused]] int threads) {
-#ifdef ISOMESH_PARALLEL_THREADS
-  threads_setting() = std::max(1, threads);
-#endif
-}
+void set_thread_count(int threads) { threads_setting() = std::max(1, threads); }
 
 int thread_count() { return threads_setting(); }
 

@@ -2,13 +2,15 @@
 // for each instruction set. Triangles are taken in blocks of separate arrays, over which the
 // compiler makes the loops wide; a block's sums have a fixed order, so the numbers do not depend on
 // how wide.
+#include "server/mesh/shapes.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
 #include <vector>
 
-#include "server/mesh/quality.h"
+#include "server/mesh/parallel.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "server/mesh/shapes.cpp"
@@ -58,7 +60,6 @@ struct Values {
 // Loading a position as four lanes reads four bytes past it: the next one's, or what Buffer keeps
 // behind the last.
 using Float4 = float __attribute__((vector_size(16)));
-using Int4 = std::int32_t __attribute__((vector_size(16)));
 
 HWY_INLINE Float4 load(const Vec3& position) {
   Float4 lanes;
@@ -69,13 +70,13 @@ HWY_INLINE Float4 load(const Vec3& position) {
 // Four vectors to four of each coordinate.
 HWY_INLINE void store_transposed(const std::array<Float4, 4>& rows, std::size_t at,
                                  std::array<Lanes, 3>& out) {
-  const Float4 low01 = __builtin_shuffle(rows[0], rows[1], Int4{0, 4, 1, 5});
-  const Float4 low23 = __builtin_shuffle(rows[2], rows[3], Int4{0, 4, 1, 5});
-  const Float4 high01 = __builtin_shuffle(rows[0], rows[1], Int4{2, 6, 3, 7});
-  const Float4 high23 = __builtin_shuffle(rows[2], rows[3], Int4{2, 6, 3, 7});
-  const std::array columns = {__builtin_shuffle(low01, low23, Int4{0, 1, 4, 5}),
-                              __builtin_shuffle(low01, low23, Int4{2, 3, 6, 7}),
-                              __builtin_shuffle(high01, high23, Int4{0, 1, 4, 5})};
+  const Float4 low01 = __builtin_shufflevector(rows[0], rows[1], 0, 4, 1, 5);
+  const Float4 low23 = __builtin_shufflevector(rows[2], rows[3], 0, 4, 1, 5);
+  const Float4 high01 = __builtin_shufflevector(rows[0], rows[1], 2, 6, 3, 7);
+  const Float4 high23 = __builtin_shufflevector(rows[2], rows[3], 2, 6, 3, 7);
+  const std::array columns = {__builtin_shufflevector(low01, low23, 0, 1, 4, 5),
+                              __builtin_shufflevector(low01, low23, 2, 3, 6, 7),
+                              __builtin_shufflevector(high01, high23, 0, 1, 4, 5)};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::memcpy(&out[axis][at], &columns[axis], sizeof columns[axis]);
   }

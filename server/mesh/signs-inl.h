@@ -80,7 +80,8 @@ void classify(const Lattice<T>& lattice, std::uint32_t z, T smallest, SignPlane&
   }
 }
 
-// The same with a phantom on every side of the plane, which is outside. Rows begin one bit later.
+// The same for the plane that is z when phantoms are numbered too: a phantom, which is outside, is
+// on each of its sides, so that rows begin one bit later.
 template <class T>
 void classify_with_margin(const Lattice<T>& lattice, std::uint32_t z, T smallest,
                           SignPlane& plane) {
@@ -140,7 +141,8 @@ inline unsigned count_in_tetrahedron(const CornerWords& corners,
 }
 
 // One row of cells: the four rows of signs around it, and which of its cells and edges there are.
-// At the lattice's upper borders the rows beyond are missing; their signs are never used.
+// Beyond the lattice's upper borders there are no rows; the last ones stand for them, and what
+// depends on their signs is left out.
 class CellRow {
  public:
   // `even` are the samples of even parity in a word of the row.

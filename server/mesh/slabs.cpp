@@ -16,6 +16,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "proto/samples.h"
 #include "server/mesh/signs-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -43,8 +44,9 @@ struct WordCells {
   std::array<std::uint8_t, kWordBits> cases;
 };
 
-// The rows that are alive. Cells are walked row by row while the row above and behind is numbered,
-// so one plane and two rows are.
+// The numbered rows that cells still need. Cells are walked row by row, and each needs the rows
+// around it: its own, the one behind, and both of the plane above. So one plane and two rows are
+// kept, and each row that is numbered takes the place of the oldest.
 class RowRing {
  public:
   RowRing(const Dims& dims, IndexMemory& memory)
@@ -333,7 +335,7 @@ void write_slab_here(const Extraction<T>& extraction, const Slab& slab, IndexMem
 }  // namespace
 
 // Highway's tables hold functions, not templates.
-#define ISOMESH_FOR_TYPE(T, Name)                                                                  \
+#define ISOMESH_FOR_TYPE(T, Name, kType)                                                           \
   void count_slab_##Name(const Extraction<T>& extraction, const Slab& slab, SurfaceCount& count) { \
     count_slab_here(extraction, slab, count);                                                      \
   }                                                                                                \
@@ -341,14 +343,7 @@ void write_slab_here(const Extraction<T>& extraction, const Slab& slab, IndexMem
                          Mesh& mesh) {                                                             \
     write_slab_here(extraction, slab, memory, mesh);                                               \
   }
-ISOMESH_FOR_TYPE(std::uint8_t, uint8)
-ISOMESH_FOR_TYPE(std::int8_t, int8)
-ISOMESH_FOR_TYPE(std::uint16_t, uint16)
-ISOMESH_FOR_TYPE(std::int16_t, int16)
-ISOMESH_FOR_TYPE(std::uint32_t, uint32)
-ISOMESH_FOR_TYPE(std::int32_t, int32)
-ISOMESH_FOR_TYPE(float, float32)
-ISOMESH_FOR_TYPE(double, float64)
+ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_FOR_TYPE)
 #undef ISOMESH_FOR_TYPE
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE
@@ -357,7 +352,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace isomesh::mesh {
 
-#define ISOMESH_DISPATCH(T, Name)                                                           \
+#define ISOMESH_DISPATCH(T, Name, kType)                                                    \
   HWY_EXPORT(count_slab_##Name);                                                            \
   HWY_EXPORT(write_slab_##Name);                                                            \
   template <>                                                                               \
@@ -369,14 +364,7 @@ namespace isomesh::mesh {
                   Mesh& mesh) {                                                             \
     HWY_DYNAMIC_DISPATCH(write_slab_##Name)(extraction, slab, memory, mesh);                \
   }
-ISOMESH_DISPATCH(std::uint8_t, uint8)
-ISOMESH_DISPATCH(std::int8_t, int8)
-ISOMESH_DISPATCH(std::uint16_t, uint16)
-ISOMESH_DISPATCH(std::int16_t, int16)
-ISOMESH_DISPATCH(std::uint32_t, uint32)
-ISOMESH_DISPATCH(std::int32_t, int32)
-ISOMESH_DISPATCH(float, float32)
-ISOMESH_DISPATCH(double, float64)
+ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_DISPATCH)
 #undef ISOMESH_DISPATCH
 
 }  // namespace isomesh::mesh

@@ -1,14 +1,14 @@
-// Extraction's work on one slab of layers, compiled for several instruction sets of which the best
-// is chosen when the program runs; private to this folder.
+// The first and the third pass of extraction on one slab of layers, compiled for several
+// instruction sets of which the best is chosen when the program runs; private to this folder.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <vector>
 
+#include "base/mutex.h"
 #include "server/mesh/border.h"
 #include "server/mesh/extract.h"
 #include "server/mesh/placement.h"
@@ -37,7 +37,8 @@ template <class T>
 struct Extraction {
   Extraction(const Lattice<T>& the_lattice, const ExtractOptions& options, T the_smallest);
 
-  // Of the cell or sample there; by the lattice's own numbers, phantoms or not.
+  // 0 or 1: whether i+j+k is even or odd, in the lattice's own numbers, of the cell or sample that
+  // is (x, y, z) when phantoms are numbered too.
   unsigned parity(std::size_t x, std::size_t y, std::size_t z) const {
     return (x + y + z + margin) & 1;
   }
@@ -52,8 +53,9 @@ struct Extraction {
   std::array<CellSplit, 2> splits;           // by parity, wound for the lattice
 };
 
-// Memory that slabs work in, lent to one of them at a time: its pages are mapped once a thread, not
-// once a slab. Thread safe.
+// The memory that a slab numbers its vertices in. A slab that has ended gives its block back and
+// the next one takes it, so that pages are mapped once for each thread, not for each slab. Thread
+// safe.
 class IndexMemory {
  public:
   explicit IndexMemory(std::size_t count) : count_(count) {}
@@ -61,7 +63,7 @@ class IndexMemory {
   using Block = std::unique_ptr<std::uint32_t[]>;
 
   Block take() {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     if (free_.empty()) return std::make_unique_for_overwrite<std::uint32_t[]>(count_);
     Block block = std::move(free_.back());
     free_.pop_back();
@@ -69,14 +71,14 @@ class IndexMemory {
   }
 
   void give_back(Block block) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     free_.push_back(std::move(block));
   }
 
  private:
   const std::size_t count_;
-  std::mutex mutex_;
-  std::vector<Block> free_;  // guarded by mutex_
+  Mutex mutex_;
+  std::vector<Block> free_ ISOMESH_GUARDED_BY(mutex_);
 };
 
 // Places a sample, by direction, for the indices of the vertices on the edges that it owns.
@@ -88,13 +90,13 @@ inline std::size_t index_memory_size(const Dims& dims) {
   return (std::size_t{dims.y} + 2) * dims.x * kPlaces;
 }
 
-// Writes the numbers of vertices and triangles of layer k to layer_vertices[k + 1] and
+// Pass 1, count: how many vertices and triangles layer k has goes to layer_vertices[k + 1] and
 // layer_triangles[k + 1].
 template <class T>
 void count_slab(const Extraction<T>& extraction, const Slab& slab, SurfaceCount& count);
 
-// Writes the slab's vertices and triangles to their places, which mesh.layer_vertices and
-// mesh.layer_triangles tell.
+// Pass 3, write: the slab's vertices and triangles go to their places, which mesh.layer_vertices
+// and mesh.layer_triangles tell.
 template <class T>
 void write_slab(const Extraction<T>& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "server/mesh/parallel.h"
 #include "server/mesh/sweep.h"
 
 namespace isomesh::mesh {

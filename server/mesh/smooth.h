@@ -1,4 +1,6 @@
-// Smoothing of a surface mesh: Laplacian and Taubin's.
+// Smoothing of a surface mesh: Laplacian (D. A. Field, "Laplacian smoothing and Delaunay
+// triangulations", Communications in Applied Numerical Methods 4(6), 1988) and Taubin's (G. Taubin,
+// "A signal processing approach to fair surface design", SIGGRAPH 1995).
 //
 // A step moves every free vertex by a share of the way to the mean of its neighbours, all from the
 // positions that the step before left. A triangle of layer k names only vertices of layers k and
@@ -28,8 +30,7 @@ struct SmoothOptions {
 
 // The second step's share for a first step of `lambda` and a pass-band frequency: what varies more
 // slowly along the surface than `pass_band` is kept, what varies faster is smoothed away. 1/lambda
-// + 1/mu = pass_band (G. Taubin, "A signal processing approach to fair surface design", SIGGRAPH
-// 1995). For 0 < pass_band < 1/lambda.
+// + 1/mu = pass_band, as in Taubin's paper. For 0 < pass_band < 1/lambda.
 double taubin_mu(double lambda, double pass_band);
 
 // What smoothing did to a surface.

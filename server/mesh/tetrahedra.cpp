@@ -8,7 +8,7 @@ namespace {
 using Corner = std::uint8_t;
 using Tetrahedron = std::array<Corner, 4>;
 
-// The paper's Table 1 with its corners 0..7 = 000 100 110 010 001 101 111 011.
+// Table 1 of Doi and Koide (see extract.h), whose corners 0..7 are 000 100 110 010 001 101 111 011.
 constexpr std::array<Corner, 8> kPaperCorner = {0, 1, 3, 2, 4, 5, 7, 6};
 constexpr std::array<Tetrahedron, 6> kPaperSix = {
     {{0, 2, 3, 6}, {0, 1, 2, 6}, {0, 1, 5, 6}, {0, 3, 6, 7}, {0, 4, 6, 7}, {0, 4, 5, 6}}};

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/mesh/components.h"
+#include "server/mesh/parallel.h"
 
 namespace isomesh::mesh {
 namespace {

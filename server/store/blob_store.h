@@ -1,9 +1,11 @@
 // Finished files, named by the SHA-256 of their bytes: the interface behind which engines stand.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -44,7 +46,8 @@ class BlobReader {
   virtual std::size_t read_at(std::uint64_t offset, std::span<std::byte> bytes) const = 0;
 };
 
-// A blob as a file of this machine, for those that map it; what else holds it goes with it.
+// A blob as a file of this machine, to be mapped. The file is there for as long as this is: a store
+// that has to fetch its blobs keeps the copy until `held` is released.
 struct LocalBlob {
   std::filesystem::path path;
   std::shared_ptr<const void> held = {};
@@ -57,8 +60,8 @@ class BlobStore {
 
   virtual std::unique_ptr<BlobWriter> begin() const = 0;
 
-  // Makes a finished file of this machine, which digest_of named, a blob and removes it. Throws
-  // Error kOutOfSpace.
+  // Makes a finished file of this machine a blob and removes it. `blob` is what digest_of has just
+  // said of the file, so that is_intact() need not read it again. Throws Error kOutOfSpace.
   virtual void adopt(const std::filesystem::path& file, const Blob& blob) const = 0;
 
   // Throws Error kNotFound.
@@ -67,8 +70,9 @@ class BlobStore {
   // Throws Error kNotFound.
   virtual LocalBlob local(const std::string& key) const = 0;
 
-  // Whether the bytes are those that the key names. What was found intact is believed for a while,
-  // as long as nothing has touched it. Throws Error kNotFound, kCancelled when `stop` is requested.
+  // Whether the bytes are those that the key names. A blob that was read whole and found intact is
+  // not read again for a while, as long as nothing has touched it. Throws Error kNotFound, and
+  // kCancelled when `stop` is requested while it reads.
   virtual bool is_intact(const std::string& key, const std::stop_token& stop) const = 0;
 
   // In bytes; empty when it is not there.
@@ -76,6 +80,11 @@ class BlobStore {
 
   // Nothing happens when it is not there. Those that have it open keep what they have.
   virtual void erase(const std::string& key) const = 0;
+
+  // Erases the blobs that were stored before `cutoff` and that `keep` does not keep; one that was
+  // stored again since counts as young. Returns how many.
+  virtual std::size_t sweep(std::chrono::system_clock::time_point cutoff,
+                            const std::function<bool(const std::string& key)>& keep) const = 0;
 };
 
 }  // namespace isomesh::store

@@ -8,11 +8,13 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "proto/types.h"
+#include "server/store/expiry.h"
 
 namespace isomesh::store {
 
@@ -102,11 +104,26 @@ struct Event {
   bool operator==(const Event&) const = default;
 };
 
+// Which ended jobs are asked for.
+enum class Ended {
+  kAll,
+  kWithMesh,  // those whose end frees room
+};
+
 struct QueueDepth {
   std::array<std::size_t, 3> queued = {};  // by Priority
   std::size_t running = 0;
 
   std::size_t all_queued() const { return queued[0] + queued[1] + queued[2]; }
+};
+
+struct JobStoreOptions {
+  std::size_t max_queued = 1000;  // a longer queue accepts nothing
+  int attempts = 3;               // how often a job is begun that fails or ends its worker
+  std::chrono::milliseconds retry_delay{1000};  // after the first attempt; four times it after each
+  // A run that ends with its process counts as an attempt when it has lasted longer.
+  std::chrono::milliseconds short_run{1000};
+  std::string mesher_version = {};  // results of another one are not reused
 };
 
 // Thread safe. Every verb is one transaction; nothing is held open between them. All may throw
@@ -141,9 +158,16 @@ class JobStore {
   // does not count. One that was asked to cancel ends cancelled. False when the lease is lost.
   virtual bool put_back(const Lease& lease, std::chrono::milliseconds delay) = 0;
 
-  // Ends what expired leases leave: queued again, failed after the last attempt, or cancelled.
-  // Anyone may call. Returns how many there were.
+  // Ends the runs whose leases have run out: their jobs are queued again, have failed after the
+  // last attempt, or are cancelled. Anyone may call. Returns how many there were.
   virtual std::size_t reap() = 0;
+
+  // Ends the runs of the process whose place this one has taken, which is gone, without waiting
+  // for their leases to run out. To be called once, before anything is claimed. Returns how many
+  // there were. It counts as an attempt of a job that was the only one to run and had run for a
+  // while. Otherwise nobody knows which job ended the process, or whether a job did: no attempt is
+  // counted, and only a job to which this happened ten times fails.
+  virtual std::size_t reap_predecessor() = 0;
 
   // A queued job never runs, a running one is asked to stop, a finished one stays as it is. Throws
   // Error kNotFound or kGone.
@@ -154,11 +178,6 @@ class JobStore {
 
   // Whoever owns it. Throws Error kNotFound or kGone.
   virtual JobAccount account(const std::string& id) const = 0;
-
-  // The job when it is final, `wait` is over or close() was called. Throws Error kNotFound or
-  // kGone.
-  virtual Job wait(const Viewer& viewer, const std::string& id,
-                   std::chrono::milliseconds wait) const = 0;
 
   // Newest first; at most `limit` that are older than the job `after` (empty: from the newest).
   virtual std::vector<Job> list(const Viewer& viewer, std::optional<JobState> state,
@@ -180,6 +199,26 @@ class JobStore {
 
   // The same, and everybody who waits gets what there is.
   virtual void close() = 0;
+
+  // Jobs that ended before that time, the oldest first, at most `limit`.
+  virtual std::vector<Expirable> ended(Time before, Ended which, std::size_t limit) const = 0;
+
+  // Removes ended jobs with their events, in their order, until that frees `enough` bytes: until no
+  // record names blobs of so many bytes any more. One that is gone already is passed over. The
+  // blobs themselves stay for BlobStore::sweep.
+  virtual Expired expire(std::span<const Expirable> jobs, std::uint64_t enough) = 0;
+
+  // Of the blobs that meshes name, each counted once.
+  virtual std::uint64_t named_bytes() const = 0;
+
+  // When the run began that lasts longest; empty when nothing runs. Blobs that were stored since
+  // then may be about to be named.
+  virtual std::optional<Time> oldest_run() const = 0;
+
+  // Ids of jobs and volumes that expired before that time are not found from now on.
+  virtual void forget_expired(Time before) = 0;
+
+  virtual void forget_events(Time before) = 0;
 };
 
 }  // namespace isomesh::store

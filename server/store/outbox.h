@@ -1,13 +1,12 @@
+// The callbacks that are not delivered yet: the interface behind which engines stand.
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "proto/types.h"
-#include "server/store/database.h"
+#include "server/store/expiry.h"
 
 namespace isomesh::store {
 
@@ -17,38 +16,30 @@ struct Delivery {
   std::string url;
   std::string body;  // the job's JSON as it ended
   int attempts = 0;  // that failed
-  std::chrono::system_clock::time_point created;
+  Time created;
 };
 
-// The callbacks that are not delivered yet, kept over restarts. Thread safe; `database` must
-// outlive it. All may throw Error kOutOfSpace or kInternal.
+// Kept over restarts. A job store adds the delivery of a job with a callback in the transaction
+// that ends the job, so that neither is there without the other. Thread safe; all may throw Error
+// kOutOfSpace or kInternal.
 class Outbox {
  public:
-  using Time = std::chrono::system_clock::time_point;
-
-  explicit Outbox(Database& database) : database_(database) {}
-
-  // Has the end of a job delivered, if it has a callback. Part of the transaction that ends it, so
-  // that neither is there without the other.
-  static void add(Connection& connection, const Job& job);
+  virtual ~Outbox() = default;
 
   // Those that are due at that time, the oldest first, at most `per_receiver` of each scheme, host
   // and port.
-  std::vector<Delivery> due(Time now, std::size_t per_receiver) const;
+  virtual std::vector<Delivery> due(Time now, std::size_t per_receiver) const = 0;
 
   // When the first of those is due that are not due yet at that time; empty when there is none.
-  std::optional<Time> next_after(Time now) const;
+  virtual std::optional<Time> next_after(Time now) const = 0;
 
   // It was delivered or given up.
-  void remove(const std::string& job);
+  virtual void remove(const std::string& job) = 0;
 
   // It failed once more and is due again at that time.
-  void postpone(const std::string& job, Time next);
+  virtual void postpone(const std::string& job, Time next) = 0;
 
-  std::size_t count() const;
-
- private:
-  Database& database_;
+  virtual std::size_t count() const = 0;
 };
 
 }  // namespace isomesh::store

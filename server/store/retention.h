@@ -1,11 +1,15 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <utility>
 
-#include "server/store/data_folder.h"
-#include "server/store/database.h"
-#include "server/store/file_blob_store.h"
+#include "base/mutex.h"
+#include "server/store/blob_store.h"
+#include "server/store/job_store.h"
+#include "server/store/volume_store.h"
 
 namespace isomesh::store {
 
@@ -16,13 +20,13 @@ struct RetentionOptions {
   std::uint64_t max_bytes = 0;
   // How long an id is known as expired after it is gone.
   std::chrono::milliseconds remember = std::chrono::days(90);
-  // How young a blob that nothing names must be to be left alone: between its last byte and its
-  // naming lies a transaction, and a worker's run besides, which is reckoned with.
+  // A blob is stored first and named by a record later. So one that no record names is swept only
+  // when it was stored this long ago, and this long before the oldest run that is under way began.
   std::chrono::milliseconds grace = std::chrono::minutes(2);
 };
 
-// What keeps a data folder from growing for ever. Never touches what a job that is queued or runs
-// needs. Thread safe; what it is made of must outlive it.
+// Keeps the stores from growing for ever, and a node's folder of unfinished files. Never touches
+// what a job that is queued or runs needs. Thread safe; what it is made of must outlive it.
 class Retention {
  public:
   struct Gone {
@@ -31,32 +35,41 @@ class Retention {
     std::size_t blobs = 0;
   };
 
-  Retention(const DataFolder& folder, Database& database, const FileBlobStore& blobs,
-            const RetentionOptions& options)
-      : folder_(folder), database_(database), blobs_(blobs), options_(options) {}
+  Retention(JobStore& jobs, VolumeStore& volumes, const BlobStore& blobs,
+            std::filesystem::path scratch, const RetentionOptions& options)
+      : jobs_(jobs),
+        volumes_(volumes),
+        blobs_(blobs),
+        scratch_(std::move(scratch)),
+        options_(options) {}
 
-  // Lets go of what is too old or too much, then of the files that nothing names any more. To be
-  // called again and again. Throws Error kOutOfSpace or kInternal.
+  // Lets what is too old or too much expire, then removes the files that nothing names any more. To
+  // be called again and again. Throws Error kOutOfSpace or kInternal.
   Gone enforce();
 
-  // Lets go of the oldest until `bytes` more fit. Throws Error kOutOfSpace when they cannot.
+  // Lets the oldest expire until `bytes` more fit. Throws Error kOutOfSpace when they cannot.
   void make_room(std::uint64_t bytes);
 
-  // What the named blobs take, each counted once.
-  std::uint64_t named_bytes();
+  // What the blobs of all records take, each counted once.
+  std::uint64_t named_bytes() const;
 
  private:
-  Gone expire_old();
-  // False when what live jobs need is more than that.
-  bool expire_beyond(std::uint64_t max_bytes, Gone& gone);
-  std::size_t sweep_blobs();
-  void sweep_scratch();
+  void expire_old(Gone& gone) ISOMESH_REQUIRES(mutex_);
+  // False when what queued and running jobs need is more than that.
+  bool expire_beyond(std::uint64_t max_bytes, Gone& gone) ISOMESH_REQUIRES(mutex_);
+  std::vector<Expirable> oldest(Time before, Ended which) const;
+  void expire(std::span<const Expirable> items, std::uint64_t enough, Gone& gone);
+  std::size_t sweep_blobs() const;
+  void sweep_scratch() const;
   void forget();
 
-  const DataFolder& folder_;
-  Database& database_;
-  const FileBlobStore& blobs_;
+  JobStore& jobs_;
+  VolumeStore& volumes_;
+  const BlobStore& blobs_;
+  const std::filesystem::path scratch_;
   const RetentionOptions options_;
+  // Two threads that make room at the same time would make twice as much.
+  Mutex mutex_;
 };
 
 }  // namespace isomesh::store

@@ -11,8 +11,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/descriptor.h"
+#include "base/error.h"
+#include "base/files.h"
 #include "proto/error.h"
-#include "server/volume/files.h"
 #include "server/volume/geometry.h"
 
 namespace isomesh::volume {
@@ -57,12 +59,13 @@ CanonicalHeader from_text(const std::string& text) {
   } catch (const nlohmann::json::exception&) {
     throw_not_canonical("its header cannot be read");
   }
-  // Refuses other versions, further members, another order, sizes that were cut to 32 bits.
+  // The comparison refuses other versions, further members, another order of members, and sizes
+  // that do not fit into 32 bits.
   if (to_text(header) != text) throw_not_canonical("its header is not in canonical form");
   return header;
 }
 
-// Empty for sizes whose bytes cannot be counted or that are 0.
+// Empty when a size is 0 or the bytes are too many to count.
 std::optional<std::size_t> file_bytes(const CanonicalHeader& header) {
   std::uint64_t bytes = bytes_per_sample(header.type);
   for (const std::uint64_t size : header.dims) {
@@ -79,7 +82,8 @@ CanonicalWriter::CanonicalWriter(const std::filesystem::path& path, const Canoni
   if (!size) throw Error(ErrorCode::kInternal, "A canonical volume of impossible size.");
   Descriptor file(::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
   if (file.number() < 0) throw_system_error("open", errno);
-  // Room is claimed now, because a full disk met through the mapping would be a signal.
+  // All blocks are allocated now: a full disk would otherwise raise a signal when the mapping is
+  // written.
   const int error = ::posix_fallocate(file.number(), 0, static_cast<off_t>(*size));
   if (error != 0) throw_system_error("posix_fallocate", error);
   void* data = ::mmap(nullptr, *size, PROT_READ | PROT_WRITE, MAP_SHARED, file.number(), 0);
@@ -132,7 +136,7 @@ std::span<const std::byte> CanonicalVolume::samples() const {
 }
 
 void CanonicalVolume::preload() const {
-  // Only advice: samples that stay away are read when they are touched.
+  // An error is no matter, because samples that are not read ahead are read when they are needed.
   ::madvise(const_cast<std::byte*>(data_), size_, MADV_WILLNEED);
 }
 

@@ -1,10 +1,10 @@
 // The canonical volume: the one form in which volumes are kept, whatever they came in as.
 //
-// A file of a header of kHeaderBytes bytes (one JSON object, padded with spaces, ending in a
-// newline) and then the samples, little-endian, x fastest. The header holds what identifies the
-// volume and nothing else: version, dims, type, spacing, origin, direction. So the SHA-256 of the
-// file is the volume's id, and the same samples and geometry have the same id whatever file they
-// came in.
+// A canonical file has a header of kHeaderBytes bytes (one JSON object, padded with spaces, ending
+// in a newline), and then the samples, little-endian, x fastest. The header holds only what
+// identifies the volume: version, dims, type, spacing, origin, direction. So the SHA-256 of the
+// file can be the volume's id: the same samples and geometry have the same id in whatever format
+// they came.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ struct CanonicalHeader {
   }
 };
 
-// A canonical file that is being made. Not thread safe.
+// A canonical file that is being written. Not thread safe.
 class CanonicalWriter {
  public:
   // Creates the file at its full size and maps it. Throws Error kOutOfSpace or kInternal.

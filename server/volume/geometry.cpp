@@ -4,19 +4,20 @@
 #include <cmath>
 #include <string>
 
-#include "server/volume/text.h"
+#include "base/text.h"
 
 namespace isomesh::volume {
 namespace {
 
-// Shear this strong is no scanner's; the flattest that a tilted gantry makes is about 0.85.
+// The least determinant of a direction. A tilted gantry makes about 0.85; no scanner shears a
+// lattice to less than this.
 constexpr double kFlattestDeterminant = 0.01;
 constexpr double kUnitTolerance = 1e-3;
-// Of a sample spacing in millimetres: an electron microscope's and a geologist's lie between.
-// Beyond, areas and volumes leave the range of the numbers that they are computed and sent in.
+// Bounds on a spacing in millimetres, between which electron microscopy and geology lie. Beyond
+// them areas and volumes overflow or underflow the numbers that they are computed and sent in.
 constexpr double kFinestSpacing = 1e-6;
 constexpr double kCoarsestSpacing = 1e6;
-// Single precision has 24 bits: this leaves 8 of them between two samples.
+// Of the 24 bits of single precision this leaves 8 for places between two neighbouring samples.
 constexpr double kFinestRelativeSpacing = 0x1p-16;
 
 Vector3 column(const std::array<double, 9>& matrix, int axis) {

@@ -1,4 +1,4 @@
-// Whether samples lie where a surface can be made of them.
+// Arithmetic with geometries, and the check whether one can be used.
 #pragma once
 
 #include <array>
@@ -12,9 +12,9 @@ namespace isomesh::volume {
 
 using Vector3 = std::array<double, 3>;
 
-// A geometry from where the sample (0,0,0) lies and the steps from a sample to the next along
-// i, j and k, all in LPS millimetres. A step of length 0 or not finite gives one that find_fault
-// finds fault with.
+// Makes a geometry of the place of the sample (0,0,0) and the steps between neighbouring samples
+// along i, j and k, all in LPS millimetres. find_fault refuses what a step of length 0 or one that
+// is not finite makes.
 Geometry geometry_of(const Vector3& origin, const std::array<Vector3, 3>& steps);
 
 // The column of `direction` that belongs to an axis, times its spacing.

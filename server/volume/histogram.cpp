@@ -1,7 +1,10 @@
 #include "server/volume/histogram.h"
 
 #include <algorithm>
+#include <functional>
+#include <type_traits>
 
+#include "proto/samples.h"
 #include "server/volume/statistics.h"
 
 namespace isomesh::volume {
@@ -10,7 +13,7 @@ namespace {
 constexpr std::size_t kMostValues = 65536;
 
 bool is_integer(SampleType type) {
-  return type != SampleType::kFloat32 && type != SampleType::kFloat64;
+  return with_sample(type, [](auto sample) { return std::is_integral_v<decltype(sample)>; });
 }
 
 // Halves, because the difference of two doubles may be beyond the largest double.

@@ -7,13 +7,13 @@
 #include <png.h>
 
 #include "proto/error.h"
-#include "server/volume/samples.h"
+#include "proto/samples.h"
 
 namespace isomesh::volume {
 namespace {
 
 constexpr std::size_t kBlockBytes = 64 * 1024;
-constexpr int kCompression = 3;  // slices are looked at once: time matters more than the last tenth
+constexpr int kCompression = 3;  // higher levels take much longer for a tenth fewer bytes
 
 // Which of the volume's axes run along a picture's columns and rows.
 struct Plane {
@@ -59,8 +59,8 @@ void be_silent(png_struct* /*png*/, const char* /*message*/) {}
 
 }  // namespace
 
-// The library's state. It reports errors by jumping, so each of these functions is where it jumps
-// to, and holds nothing that would have to be destroyed on the way.
+// The library's state. libpng reports errors by longjmp, so each function below sets the place to
+// jump to itself, and has no local objects with destructors, which a jump would pass over.
 struct SlicePng::Writer {
   explicit Writer(std::string& bytes) {
     png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, jump, be_silent);
@@ -149,7 +149,7 @@ std::string_view SlicePng::next() {
   return bytes_;
 }
 
-// The row after the last is the file's end.
+// Writes the end of the file after the last row.
 void SlicePng::write_row() {
   if (next_row_ < height_) {
     read_row(next_row_);
@@ -168,7 +168,7 @@ void SlicePng::read_row(std::uint32_t row) {
   const std::uint64_t first =
       choice_.index * stride[plane.fixed] + std::uint64_t{row} * stride[plane.row];
   const std::uint64_t step = stride[plane.column];
-  with_sample(stored_type(header.type), [&](auto sample) {
+  with_sample(header.type, [&](auto sample) {
     using Sample = decltype(sample);
     const auto* at = reinterpret_cast<const Sample*>(volume_->samples().data()) + first;
     for (std::uint32_t column = 0; column < width_; ++column) {

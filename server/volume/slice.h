@@ -26,11 +26,11 @@ struct SliceChoice {
   std::array<double, 2> window = {};  // what becomes black and what becomes white
 };
 
-// A PNG that is written while it is asked for: a few rows of samples are read at a time, and no
-// others. The picture's columns run along x (along y for the axis x), its rows along y (along z for
-// the axes x and y); the first row and column are sample 0, nothing is turned over. Samples at or
-// below window[0] are black, those at or above window[1] white, those between linear; what is no
-// number is black. The picture says its pixels' sizes (pHYs).
+// A PNG that is encoded piece by piece, as it is sent, and reads only the samples of its slice. The
+// picture's columns run along x (along y for the axis x), its rows along y (along z for the axes x
+// and y); the first row and column are sample 0, and nothing is mirrored. Samples at or below
+// window[0] are black, those at or above window[1] white, and those between are grey in proportion;
+// what is no number is black. The picture tells the size of its pixels (pHYs).
 //
 // The bytes depend on the volume and the choice alone. Not thread safe.
 class SlicePng {
@@ -56,7 +56,7 @@ class SlicePng {
   std::uint32_t height_ = 0;
   std::uint32_t next_row_ = 0;
   std::vector<std::uint8_t> row_;
-  std::string bytes_;  // written; the first taken_ of them are with the caller
+  std::string bytes_;  // encoded; next() has returned the first taken_ of them
   std::size_t taken_ = 0;
   std::unique_ptr<Writer> writer_;
 };

@@ -5,7 +5,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "server/volume/samples.h"
+#include "proto/samples.h"
 
 namespace isomesh::volume {
 namespace {
@@ -98,7 +98,7 @@ Statistics measure_wide(std::span<const Sample> samples) {
 template <class Sample>
 Statistics measure_samples(std::span<const Sample> samples) {
   if constexpr (sizeof(Sample) <= 2) {
-    // So few values that counting them all needs no range first: one pass.
+    // A count for each possible value fits into memory, so the range need not be found first.
     constexpr std::size_t kValues = std::size_t{1} << (8 * sizeof(Sample));
     constexpr std::int64_t kLowest = std::is_signed_v<Sample> ? -std::int64_t{kValues / 2} : 0;
     return from_value_counts(count_values(samples, kLowest, kValues), kLowest);
@@ -110,22 +110,14 @@ Statistics measure_samples(std::span<const Sample> samples) {
 }  // namespace
 
 Statistics measure(std::span<const std::byte> samples, SampleType type) {
-  Statistics statistics;
-  with_sample(stored_type(type), [&](auto sample) {
-    using Sample = decltype(sample);
-    if constexpr (sizeof(Sample) < 8 || std::is_floating_point_v<Sample>) {
-      statistics = measure_samples(as<Sample>(samples));
-    }
-  });
-  return statistics;
+  return with_sample(type,
+                     [&](auto sample) { return measure_samples(as<decltype(sample)>(samples)); });
 }
 
 std::vector<std::uint64_t> histogram(std::span<const std::byte> samples, SampleType type,
                                      const Bins& bins) {
-  std::vector<std::uint64_t> counts;
-  with_sample(stored_type(type),
-              [&](auto sample) { counts = count_samples(as<decltype(sample)>(samples), bins); });
-  return counts;
+  return with_sample(
+      type, [&](auto sample) { return count_samples(as<decltype(sample)>(samples), bins); });
 }
 
 double otsu_threshold(std::span<const std::uint64_t> counts, const std::array<double, 2>& range) {
@@ -160,8 +152,8 @@ double otsu_threshold(std::span<const std::uint64_t> counts, const std::array<do
     last = bin;
   }
 
-  // From the upper edge of the one to the lower edge of the other is the same way as from middle to
-  // middle, but for a single bin, whose middle this is.
+  // The threshold lies midway between the middles of the two bins; of a single bin it is the
+  // middle.
   const double at = (static_cast<double>(best_lower + best_upper) + 1) / 2;
   const double half_bin = (range[1] / 2 - range[0] / 2) / static_cast<double>(counts.size());
   return range[0] + half_bin * at + half_bin * at;

@@ -1,4 +1,4 @@
-// What the values of a volume's samples are like.
+// The range, histogram and threshold of a volume's samples.
 #pragma once
 
 #include <array>

@@ -12,6 +12,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "base/text.h"
 #include "tests/support/process.h"
 
 namespace isomesh::test {
@@ -43,12 +44,6 @@ int connected_to(const std::string& url) {
   const auto port = static_cast<std::uint16_t>(std::stoi(url.substr(url.rfind(':') + 1)));
   address.sin_port = htons(port);
   return connected(AF_INET, address);
-}
-
-std::string lower(std::string text) {
-  std::ranges::transform(text, text.begin(),
-                         [](unsigned char letter) { return std::tolower(letter); });
-  return text;
 }
 
 Answer parse(const std::string& text) {

@@ -13,8 +13,8 @@ using nlohmann::json;
 using Faults = std::vector<std::string>;
 
 // What says nothing about the value, and what is looked at beside another keyword.
-const std::set<std::string> silent_keywords = {"description", "example", "examples",
-                                               "default",     "format",  "properties"};
+const std::set<std::string> silent_keywords = {"title",   "description", "example",   "examples",
+                                               "default", "format",      "properties"};
 
 bool has_type(const json& value, const std::string& type) {
   if (type == "object") return value.is_object();
@@ -47,7 +47,7 @@ class Validator {
 
   void check_keyword(const json& value, const YAML::Node& schema, const std::string& keyword,
                      const YAML::Node& says, const std::string& where) {
-    if (silent_keywords.contains(keyword)) {
+    if (silent_keywords.contains(keyword) || keyword.starts_with("x-")) {
       if (keyword == "properties") check_properties(value, says, where);
     } else if (keyword == "type") {
       check_type(value, says, where);

@@ -3,7 +3,10 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
 
+#include "proto/types.h"
 #include "server/mesh/mesh.h"
 
 namespace isomesh::bench {
@@ -13,5 +16,13 @@ namespace isomesh::bench {
 // Draco refuses.
 std::uint64_t encode_in_one_call(std::span<const mesh::Vec3> positions,
                                  std::span<const long long> corners);
+
+// The same with other parameters and triangles of ours. Returns the stream.
+std::string encode_in_one_call(std::span<const mesh::Vec3> positions,
+                               std::span<const mesh::Triangle> triangles,
+                               const DracoParameters& parameters);
+
+// The number of triangles that a stream decodes to. Throws std::runtime_error when Draco refuses.
+std::uint64_t decode_in_one_call(std::string_view drc);
 
 }  // namespace isomesh::bench

@@ -7,6 +7,7 @@
 #include <regex>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -18,6 +19,7 @@
 #include "tests/bench/peers.h"
 #include "tests/bench/ratios.h"
 #include "tests/bench/report.h"
+#include "tests/bench/service.h"
 #include "tests/bench/stages.h"
 
 namespace isomesh::bench {
@@ -83,6 +85,20 @@ int run(const Options& options) {
   return 0;
 }
 
+int run_service(const Options& options, std::filesystem::path daemon) {
+  if (daemon.empty()) {
+    daemon = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "isomeshd";
+  }
+  ServicePlan plan = {.daemon = std::move(daemon),
+                      .volume = options.volume.empty() ? kDefaultVolume : options.volume,
+                      .iso = options.iso.value_or(kDefaultIso),
+                      .threads = options.threads};
+  if (!options.volume.empty() && !options.iso) plan.iso = load_volume(plan.volume).suggested_iso;
+  std::cout << to_table(measure_service(plan));
+  if (!peers_available()) std::cout << '\n' << peers_description() << '\n';
+  return 0;
+}
+
 std::string check_filter(const std::string& text) {
   try {
     const std::regex filter(text);
@@ -113,6 +129,13 @@ int run_program(int argc, char** argv) {
   CLI::App* report = app.add_subcommand("report", "Write the report on the paper");
   report->add_option("DIR", folder, "Where REPORT.md and its plots go")->required();
 
+  std::filesystem::path daemon;
+  CLI::App* service =
+      app.add_subcommand("service", "Start a daemon and measure it over HTTP, beside the peers");
+  service->add_option("--daemon", daemon, "The program; isomeshd beside this one unless given")
+      ->check(CLI::ExistingFile);
+  service->fallthrough();  // --volume, --iso and --threads may stand behind it
+
   std::string stage;
   std::uint32_t size = 0;
   int threads = 1;
@@ -129,6 +152,7 @@ int run_program(int argc, char** argv) {
   }
   if (*memory) return run_memory_command(stage, size, threads);
   warn_when_busy();
+  if (*service) return run_service(options, daemon);
   return *report ? write_report(folder) : run(options);
 }
 

@@ -15,9 +15,11 @@
 #include <vtkSmoothPolyDataFilter.h>
 #include <vtkTypeInt32Array.h>
 #include <vtkTypeInt64Array.h>
+#include <vtkTypeTraits.h>
 #include <vtkVersion.h>
 #include <vtkWindowedSincPolyDataFilter.h>
 
+#include "proto/samples.h"
 #include "tests/bench/draco_call.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/vtk_threads.h"
@@ -26,25 +28,8 @@ namespace isomesh::bench {
 namespace {
 
 int vtk_type(SampleType type) {
-  switch (type) {
-    case SampleType::kUint8:
-      return VTK_UNSIGNED_CHAR;
-    case SampleType::kInt8:
-      return VTK_SIGNED_CHAR;
-    case SampleType::kUint16:
-      return VTK_UNSIGNED_SHORT;
-    case SampleType::kInt16:
-      return VTK_SHORT;
-    case SampleType::kUint32:
-      return VTK_UNSIGNED_INT;
-    case SampleType::kInt32:
-      return VTK_INT;
-    case SampleType::kFloat32:
-      return VTK_FLOAT;
-    case SampleType::kFloat64:
-      break;
-  }
-  return VTK_DOUBLE;
+  return with_sample(type,
+                     [](auto sample) { return vtkTypeTraits<decltype(sample)>::VTKTypeID(); });
 }
 
 // The samples as they are, without a copy.

@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/bench/draco_call.h"
 #include "tests/bench/memory.h"
 #include "tests/bench/numbers.h"
 #include "tests/bench/peers.h"
@@ -23,6 +24,11 @@ constexpr Goal kExtractGoal = {0.6};
 constexpr Goal kSmoothRateGoal = {200, false};   // Mvertex-passes/s
 constexpr Goal kSmoothFactorGoal = {40, false};  // times vtkSmoothPolyDataFilter
 constexpr Goal kJobGoal = {0.6};
+constexpr Goal kStreamGoal = {0.15};
+constexpr Goal kStreamOnOneThreadGoal = {0.25};
+constexpr Goal kBlocksGoal = {0.12};
+constexpr Goal kBytesGoal = {1};
+constexpr Goal kDecodeGoal = {1.05};
 constexpr Goal kGrowthGoal = {1.1};  // linear within the noise
 constexpr std::uint32_t kCompareSize = 256;
 constexpr std::uint32_t kMemorySize = 256;
@@ -36,11 +42,12 @@ std::string rate_text(double rate) { return fixed(rate, 0) + " Mvp/s"; }
 // The findings about one volume.
 class Comparison {
  public:
-  Comparison(const Samples& samples, double iso, const std::function<bool(std::string)>& wanted,
-             std::vector<Finding>& findings)
+  Comparison(const Samples& samples, double iso, int threads,
+             const std::function<bool(std::string)>& wanted, std::vector<Finding>& findings)
       : samples_(samples),
         stages_(samples, {.iso = iso}),
         iso_(iso),
+        threads_(threads),
         wanted_(wanted),
         findings_(findings) {
     stages_.extract();
@@ -48,6 +55,7 @@ class Comparison {
 
   void run() {
     if (wanted("smooth_rate")) compare_smoothing();
+    compare_encoding();
     if (!peers_available()) return;
     if (wanted("extract_reused_memory")) compare_extraction("extract_reused_memory", false);
     if (wanted("extract_fresh_memory")) compare_extraction("extract_fresh_memory", true);
@@ -107,6 +115,52 @@ class Comparison {
                          rate_text(our_rate), "", our_rate, kSmoothRateGoal});
   }
 
+  // Our streams beside those that libdraco makes of the same smoothed mesh with the same
+  // parameters.
+  void compare_encoding() {
+    if (!wanted("draco_stream") && !wanted("draco_stream_one_thread") && !wanted("draco_blocks") &&
+        !wanted("draco_bytes") && !wanted("draco_decode")) {
+      return;
+    }
+    stages_.extract();
+    stages_.smooth(kPasses);
+    const auto peer = [&] {
+      return encode_in_one_call(stages_.positions(), stages_.triangles(), DracoParameters{});
+    };
+    const Timed theirs = {[&] { peer(); }};
+    const Timed stream = {[&] { stages_.encode(Encoding::kEdgebreakerWhole); }};
+    const Timed blocks = {[&] { stages_.encode(Encoding::kEdgebreakerChunks); }};
+    if (wanted("draco_stream")) {
+      add("draco_stream", "drc / libdraco, same parameters", time_in_pairs(stream, theirs),
+          kStreamGoal);
+    }
+    if (wanted("draco_blocks")) {
+      add("draco_blocks", "glb / libdraco's one stream", time_in_pairs(blocks, theirs),
+          kBlocksGoal);
+    }
+    if (wanted("draco_stream_one_thread")) {
+      set_threads(1);
+      add("draco_stream_one_thread", "drc on one thread / libdraco", time_in_pairs(stream, theirs),
+          kStreamOnOneThreadGoal);
+      set_threads(threads_);
+    }
+    const std::string ours_drc = stages_.drc();
+    const std::string peer_drc = peer();
+    if (wanted("draco_bytes")) {
+      findings_.push_back(
+          {full("draco_bytes"), "bytes of drc / libdraco's, " + samples_.name,
+           std::to_string(ours_drc.size()), std::to_string(peer_drc.size()),
+           static_cast<double>(ours_drc.size()) / static_cast<double>(peer_drc.size()),
+           kBytesGoal});
+    }
+    if (wanted("draco_decode")) {
+      add("draco_decode", "libdraco's decoding of drc / of its own stream",
+          time_in_pairs({[&] { decode_in_one_call(ours_drc); }},
+                        {[&] { decode_in_one_call(peer_drc); }}),
+          kDecodeGoal);
+    }
+  }
+
   // What the peers' pipeline does and no more: a job measures quality besides.
   void compare_stages() {
     Peers peers(samples_, iso_);
@@ -133,6 +187,7 @@ class Comparison {
   const Samples& samples_;
   Stages stages_;
   double iso_;
+  int threads_;
   const std::function<bool(std::string)>& wanted_;
   std::vector<Finding>& findings_;
 };
@@ -200,12 +255,12 @@ std::vector<Finding> measure_findings(const Plan& plan) {
   Peers::set_threads(threads);
 
   std::vector<Finding> findings;
-  if (plan.volume) Comparison(*plan.volume, plan.iso, wanted, findings).run();
+  if (plan.volume) Comparison(*plan.volume, plan.iso, threads, wanted, findings).run();
   const auto& sizes = plan.field_sizes;
   if (!sizes.empty()) {
     const bool has_usual = std::ranges::find(sizes, kCompareSize) != sizes.end();
     const Samples field = synthetic_field(has_usual ? kCompareSize : sizes.front());
-    Comparison(field, kFieldIso, wanted, findings).run();
+    Comparison(field, kFieldIso, threads, wanted, findings).run();
   }
   constexpr std::size_t kFewestForGrowth = 3;
   if (sizes.size() >= kFewestForGrowth && wanted("ratio/growth_of_time")) {
@@ -232,7 +287,7 @@ std::string to_table(const std::vector<Finding>& findings) {
   row("", "isomesh", "peer", "value", "goal", "");
   for (const Finding& finding : findings) {
     const std::string goal =
-        finding.goal ? (finding.goal->at_most ? "<= " : ">= ") + fixed(finding.goal->value, 1) : "";
+        finding.goal ? (finding.goal->at_most ? "<= " : ">= ") + fixed(finding.goal->value, 2) : "";
     row(finding.what, finding.ours, finding.peer, fixed(finding.value, finding.value < 10 ? 2 : 0),
         goal,
         !finding.goal       ? ""

@@ -172,7 +172,7 @@ void write_goals(const Plan& plan, Report& report) {
     rows.push_back(
         {finding.what, finding.ours, finding.peer, fixed(finding.value, finding.value < 10 ? 2 : 0),
          finding.goal
-             ? (finding.goal->at_most ? "at most " : "at least ") + fixed(finding.goal->value, 1)
+             ? (finding.goal->at_most ? "at most " : "at least ") + fixed(finding.goal->value, 2)
              : "",
          !finding.goal       ? ""
          : finding.reached() ? "reached"

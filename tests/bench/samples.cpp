@@ -7,9 +7,9 @@
 #include <cstring>
 #include <numbers>
 
-#include "server/mesh/context.h"
+#include "server/import/import.h"
+#include "server/mesh/parallel.h"
 #include "server/volume/canonical.h"
-#include "server/volume/import.h"
 
 namespace isomesh::bench {
 namespace {
@@ -73,7 +73,7 @@ LoadedVolume load_volume(const fs::path& path) {
   const ScratchFolder scratch;
   const fs::path canonical = scratch.path() / "canonical";
   const Volume description =
-      volume::import_volume({.source = path, .scratch = scratch.path(), .target = canonical});
+      import::import_volume({.source = path, .scratch = scratch.path(), .target = canonical});
   const volume::CanonicalVolume file(canonical);
   LoadedVolume loaded;
   loaded.suggested_iso = description.suggested_iso;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/samples.h"
 #include "proto/types.h"
 #include "server/mesh/lattice.h"
 
@@ -30,25 +31,8 @@ struct Samples {
 // Calls visit(const T* samples) with T the type of the samples.
 template <class Visit>
 decltype(auto) visit_samples(const Samples& samples, Visit visit) {
-  switch (samples.type) {
-    case SampleType::kUint8:
-      return visit(samples.as<std::uint8_t>());
-    case SampleType::kInt8:
-      return visit(samples.as<std::int8_t>());
-    case SampleType::kUint16:
-      return visit(samples.as<std::uint16_t>());
-    case SampleType::kInt16:
-      return visit(samples.as<std::int16_t>());
-    case SampleType::kUint32:
-      return visit(samples.as<std::uint32_t>());
-    case SampleType::kInt32:
-      return visit(samples.as<std::int32_t>());
-    case SampleType::kFloat32:
-      return visit(samples.as<float>());
-    case SampleType::kFloat64:
-      break;
-  }
-  return visit(samples.as<double>());
+  return with_sample(samples.type,
+                     [&](auto sample) { return visit(samples.as<decltype(sample)>()); });
 }
 
 struct LoadedVolume {

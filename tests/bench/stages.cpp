@@ -8,6 +8,7 @@
 #include "server/jobs/make_mesh.h"
 #include "server/mesh/extract.h"
 #include "server/mesh/measure.h"
+#include "server/mesh/parallel.h"
 #include "server/mesh/smooth.h"
 #include "server/mesh/topology.h"
 
@@ -56,9 +57,7 @@ const char* name_of(Encoding encoding) {
   return "stl";
 }
 
-bool is_parallel(Encoding encoding) {
-  return encoding == Encoding::kEdgebreakerChunks || encoding == Encoding::kSequentialChunks;
-}
+bool is_parallel(Encoding encoding) { return encoding != Encoding::kSequentialWhole; }
 
 void set_threads(int threads) { mesh::set_thread_count(threads); }
 
@@ -121,8 +120,16 @@ std::uint64_t Stages::encode(Encoding encoding) const {
   return encode_as(MeshFormat::kStl, kDefaultSpeed);
 }
 
+std::string Stages::drc() const {
+  std::string bytes;
+  codec::encode_drc(mesh_, {}, {}, [&](std::span<const std::byte> piece) {
+    bytes.append(reinterpret_cast<const char*>(piece.data()), piece.size());
+  });
+  return bytes;
+}
+
 std::uint64_t Stages::run_job(int passes, MeshFormat format) {
-  JobParameters parameters;
+  MeshParameters parameters;
   parameters.scheme = surface_.scheme;
   parameters.interpolation = surface_.interpolation;
   parameters.close = surface_.close;
@@ -134,7 +141,7 @@ std::uint64_t Stages::run_job(int passes, MeshFormat format) {
   jobs::Progress progress({}, nobody);
   const auto& [x, y, z] = samples_.dims;
   jobs::make_mesh({samples_.type, {x, y, z}, samples_.geometry, samples_.bytes.data()},
-                  {parameters, surface_.iso, std::numeric_limits<std::uint64_t>::max()}, sinks,
+                  {"", parameters, surface_.iso, std::numeric_limits<std::uint64_t>::max()}, sinks,
                   progress, mesh_);
   return counting.bytes;
 }

@@ -5,11 +5,12 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "proto/types.h"
 #include "server/mesh/mesh.h"
-#include "server/mesh/quality.h"
+#include "server/mesh/shapes.h"
 #include "tests/bench/samples.h"
 
 namespace isomesh::bench {
@@ -66,6 +67,8 @@ class Stages {
   void measure() const;
   // The number of bytes.
   std::uint64_t encode(Encoding encoding) const;
+  // A `drc` file with the parameters of a job that gives none.
+  std::string drc() const;
   // What a job does between the samples in memory and the bytes of its one file, disk left out. The
   // number of bytes.
   std::uint64_t run_job(int passes, MeshFormat format);

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <csignal>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include "proto/json.h"
 #include "tests/api/daemon.h"
@@ -33,14 +35,50 @@ class FaultTest : public testing::Test {
 
   Volume small_volume() { return upload(daemon(), sphere_upload()); }
 
-  // A job that takes some seconds, and has begun to smooth.
-  Job running_job(int passes) {
-    const Job begun = submit(daemon(), upload(daemon(), long_upload()), 50,
-                             "\"passes\": " + std::to_string(passes));
-    if (!eventually([&] { return job(begun.id).stage == Stage::kSmooth; })) {
-      throw std::runtime_error(to_json(job(begun.id)));
+  // A job of so many passes as it is when it has begun to smooth, or has ended before that was
+  // seen.
+  Job begun_job(int passes, double iso = 50) {
+    const std::string id = submit(daemon(), upload(daemon(), long_upload()), iso,
+                                  R"("draco": {"speed": 10}, "passes": )" + std::to_string(passes))
+                               .id;
+    Job seen;
+    const bool is_begun = eventually([&] {
+      seen = job(id);
+      return seen.stage == Stage::kSmooth || is_final(seen.state);
+    });
+    if (!is_begun) throw std::runtime_error(to_json(seen));
+    return seen;
+  }
+
+  // One that runs for longer than any test waits for.
+  Job endless_job() {
+    const Job begun = begun_job(1000);
+    if (begun.state != JobState::kRunning) throw std::runtime_error(to_json(begun));
+    return begun;
+  }
+
+  // Calls attempt(passes) with ever longer jobs until it is true. How long a job takes on a busy
+  // machine is not known, and one that ends too soon shows nothing.
+  static bool with_a_job_that_is_long_enough(const std::function<bool(int passes)>& attempt) {
+    for (int passes = 12; passes <= 1000; passes *= 2) {
+      if (attempt(passes)) return true;
     }
-    return job(begun.id);
+    return false;
+  }
+
+  // Runs SQL on the data folder's database; returns the first column of the last row.
+  std::string run_sql(const std::string& sql) {
+    sqlite3* handle = nullptr;
+    std::string answer;
+    const auto take = [](void* text, int, char** columns, char**) {
+      *static_cast<std::string*>(text) = columns[0] == nullptr ? "" : columns[0];
+      return 0;
+    };
+    sqlite3_open((folder_ / "data/isomesh.sqlite").c_str(), &handle);
+    sqlite3_busy_timeout(handle, 10'000);
+    EXPECT_EQ(sqlite3_exec(handle, sql.c_str(), take, &answer, nullptr), SQLITE_OK);
+    sqlite3_close(handle);
+    return answer;
   }
 
   std::string mesh_of(const Job& job) {

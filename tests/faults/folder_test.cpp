@@ -1,7 +1,5 @@
-// Data folders of other versions, and what is let go of.
+// Data folders of other versions, and what expires.
 #include <string>
-
-#include <sqlite3.h>
 
 #include "tests/api/problems.h"
 #include "tests/faults/fixture.h"
@@ -12,22 +10,7 @@ namespace {
 using namespace test;
 using testing::HasSubstr;
 
-class Folder : public FaultTest {
- protected:
-  // Returns the first column of the last row.
-  std::string run_sql(const std::string& sql) {
-    sqlite3* handle = nullptr;
-    std::string answer;
-    const auto take = [](void* text, int, char** columns, char**) {
-      *static_cast<std::string*>(text) = columns[0];
-      return 0;
-    };
-    sqlite3_open((folder_ / "data/isomesh.sqlite").c_str(), &handle);
-    EXPECT_EQ(sqlite3_exec(handle, sql.c_str(), take, &answer, nullptr), SQLITE_OK);
-    sqlite3_close(handle);
-    return answer;
-  }
-};
+class Folder : public FaultTest {};
 
 TEST_F(Folder, OfANewerVersionIsRefusedAndLeftAsItIs) {
   start();
@@ -41,22 +24,6 @@ TEST_F(Folder, OfANewerVersionIsRefusedAndLeftAsItIs) {
   run_sql("PRAGMA user_version=" + version);
   start();
   EXPECT_EQ(daemon().client().volumes().size(), 1U);
-}
-
-// Its volumes had their records in files, and its jobs were not kept.
-TEST_F(Folder, OfTheFirstVersionIsTakenOver) {
-  start();
-  const Volume volume = small_volume();
-  EXPECT_EQ(daemon().stop(), 0);
-  for (const char* file : {"isomesh.sqlite", "isomesh.sqlite-wal", "isomesh.sqlite-shm"}) {
-    std::filesystem::remove(folder_ / "data" / file);
-  }
-  std::filesystem::create_directories(folder_ / "data/volumes");
-  write_file(folder_ / ("data/volumes/" + volume.id + ".json"), to_json(volume));
-  start();
-  EXPECT_EQ(daemon().client().volumes(), std::vector{volume});
-  EXPECT_EQ(ended(submit(daemon(), volume, 100).id).state, JobState::kSucceeded);
-  EXPECT_TRUE(files_below(folder_ / "data/volumes").empty());
 }
 
 TEST_F(Folder, WhatHasExpiredIsGone) {

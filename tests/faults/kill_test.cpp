@@ -13,7 +13,7 @@
 
 #include <sqlite3.h>
 
-#include "server/store/files.h"
+#include "base/sha256.h"
 #include "tests/faults/fixture.h"
 
 namespace isomesh {
@@ -130,7 +130,7 @@ class Kill : public FaultTest {
   void check_blobs() {
     for (const std::string& file : files_below(folder_ / "data/blobs")) {
       const std::string name = std::filesystem::path(file).filename();
-      EXPECT_EQ(store::sha256_of(read_file(folder_ / ("data/blobs/" + file))), name);
+      EXPECT_EQ(sha256_of(read_file(folder_ / ("data/blobs/" + file))), name);
     }
   }
 
@@ -151,7 +151,7 @@ class Kill : public FaultTest {
       ASSERT_EQ(right.state, JobState::kSucceeded);
       const MeshFile& file = job.mesh->files.at(MeshFormat::kDrc);
       EXPECT_EQ(file.sha256, right.mesh->files.at(MeshFormat::kDrc).sha256) << key;
-      EXPECT_EQ(store::sha256_of(mesh_of(job)), file.sha256) << key;
+      EXPECT_EQ(sha256_of(mesh_of(job)), file.sha256) << key;
     }
     std::size_t listed = 0;
     std::string cursor;

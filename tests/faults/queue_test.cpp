@@ -30,7 +30,7 @@ class Queue : public FaultTest {
 
 TEST_F(Queue, StatBehindAThousandRoutineJobsIsClaimedNext) {
   start({"--workers", "1", "--max-queue", "2000"});
-  const Job running = running_job(1000);
+  const Job running = endless_job();
   const Volume volume = small_volume();
   constexpr int kRoutine = 1000;
   std::atomic<int> next = 0;
@@ -76,7 +76,7 @@ TEST_F(Queue, TheSameKeyFromEightClientsIsOneJob) {
 
 TEST_F(Queue, AFullQueueSaysWhenToComeBackAndStoresTheRetryOnce) {
   start({"--workers", "1", "--max-queue", "1"});
-  const Job running = running_job(1000);
+  const Job running = endless_job();
   const Volume volume = small_volume();
   const Job waiting = job_from_json(post(body_of(volume, 50)).body);
   const Answer full = post(body_of(volume, 60), "retried");
@@ -135,7 +135,7 @@ TEST_F(Queue, SpoiltSamplesGiveNoMesh) {
 TEST_F(Queue, AFullDiskIsToldAndAcceptedJobsStay) {
   start({"--workers", "1"});
   const Volume volume = small_volume();
-  const Job running = running_job(1000);
+  const Job running = endless_job();
   const std::string queued = submit(daemon(), volume, 100).id;
   const auto limit = [&](rlim_t bytes) {
     const rlimit value = {bytes, RLIM_INFINITY};

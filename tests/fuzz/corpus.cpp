@@ -1,18 +1,19 @@
 #include <cstring>
 
 #include "proto/json.h"
+#include "server/process/import_message.h"
 #include "server/volume/canonical.h"
-#include "server/volume/import_message.h"
+#include "tests/fuzz/draco_target.h"
 #include "tests/fuzz/targets.h"
-#include "tests/unit/volume/archives.h"
-#include "tests/unit/volume/files.h"
-#include "tests/unit/volume/vti_writer.h"
-#include "tests/unit/volume/writers.h"
+#include "tests/unit/import/archives.h"
+#include "tests/unit/import/files.h"
+#include "tests/unit/import/vti_writer.h"
+#include "tests/unit/import/writers.h"
 
 namespace isomesh::fuzz {
 namespace {
 
-using namespace volume::test;
+using namespace import::test;
 
 const std::string kSamples(kSmallSamples);
 
@@ -121,11 +122,11 @@ std::vector<std::string> dicom_files() {
 std::vector<std::string> canonical_files() { return {import_bytes(nifti({}, kSamples)).canonical}; }
 
 std::vector<std::string> report_texts() {
-  volume::ImportOrder order;
-  order.task.options.raw = volume::RawDescription{};
+  process::ImportOrder order;
+  order.task.options.raw = RawDescription{};
   const Error error(ErrorCode::kUnusableVolume, "why", {{"field", "message"}});
-  return {volume::reading_message("nifti") + volume::volume_message(Volume{}),
-          volume::error_message(error), volume::to_message(order)};
+  return {process::reading_message("nifti") + process::volume_message(Volume{}),
+          process::error_message(error), process::to_message(order)};
 }
 
 std::vector<std::string> json_texts() {
@@ -151,6 +152,7 @@ std::vector<std::string> corpus(std::string_view name) {
   if (name == "canonical") return canonical_files();
   if (name == "report") return report_texts();
   if (name == "json") return json_texts();
+  if (name == "draco") return meshes_to_encode();
   std::vector<std::string> all;
   for (const Target& target : targets()) {
     if (target.name == name) continue;

@@ -12,17 +12,17 @@
 
 #include "proto/error.h"
 #include "proto/json.h"
+#include "server/import/import.h"
+#include "server/import/readers.h"
+#include "server/process/import_message.h"
 #include "server/volume/canonical.h"
-#include "server/volume/import.h"
-#include "server/volume/import_message.h"
-#include "server/volume/sniff.h"
+#include "tests/fuzz/draco_target.h"
 
 namespace isomesh::fuzz {
 namespace {
 
 namespace fs = std::filesystem;
 using Bytes = std::span<const std::byte>;
-using volume::FileFormat;
 
 std::string_view text_of(Bytes bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -66,18 +66,18 @@ void expect_volume(const Volume& found, const fs::path& canonical) {
   }
 }
 
-void import(Bytes bytes, const volume::ImportOptions& options) {
+void import_bytes(Bytes bytes, const process::ImportOptions& options) {
   const fs::path source = folder() / "upload";
   write(source, bytes);
   const fs::path scratch = folder() / "scratch";
   fs::create_directory(scratch);
-  const volume::ImportTask task = {.source = source,
-                                   .scratch = scratch,
-                                   .target = scratch / "canonical",
-                                   .options = options,
-                                   .limits = {.max_sample_bytes = std::uint64_t{1} << 20}};
+  const process::ImportTask task = {.source = source,
+                                    .scratch = scratch,
+                                    .target = scratch / "canonical",
+                                    .options = options,
+                                    .limits = {.max_sample_bytes = std::uint64_t{1} << 20}};
   try {
-    expect_volume(volume::import_volume(task), task.target);
+    expect_volume(import::import_volume(task), task.target);
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kInternal) fail(error.what());
   }
@@ -85,13 +85,13 @@ void import(Bytes bytes, const volume::ImportOptions& options) {
   if (!fs::is_empty(scratch)) fail("an import left files behind");
 }
 
-template <FileFormat kFormat>
-void import_only(Bytes bytes) {
-  if (volume::sniff(bytes.first(std::min(bytes.size(), volume::kSniffBytes))) != kFormat) return;
-  import(bytes, {});
+void import_only(std::string_view format, Bytes bytes) {
+  const auto head = bytes.first(std::min(bytes.size(), import::kSniffBytes));
+  const import::Reader* reader = import::sniff(head);
+  if (reader != nullptr && reader->name == format) import_bytes(bytes, {});
 }
 
-void import_anything(Bytes bytes) { import(bytes, {}); }
+void import_anything(Bytes bytes) { import_bytes(bytes, {}); }
 
 // The description comes first, byte for byte, and then the samples.
 void import_raw(Bytes bytes) {
@@ -104,14 +104,14 @@ void import_raw(Bytes bytes) {
   } head = {};
   if (bytes.size() < sizeof head) return;
   std::memcpy(&head, bytes.data(), sizeof head);
-  volume::RawDescription raw;
+  RawDescription raw;
   std::copy_n(head.dims, 3, raw.dims.begin());
   raw.type = static_cast<SampleType>(head.type % kTypes);
   raw.big_endian = head.big_endian % 2 != 0;
   std::copy_n(head.geometry, 3, raw.geometry.origin.begin());
   std::copy_n(head.geometry + 3, 3, raw.geometry.spacing.begin());
   std::copy_n(head.geometry + 6, 9, raw.geometry.direction.begin());
-  import(bytes.subspan(sizeof head), {.raw = raw, .series = {}});
+  import_bytes(bytes.subspan(sizeof head), {.raw = raw, .series = {}});
 }
 
 void open_canonical(Bytes bytes) {
@@ -135,8 +135,8 @@ void read_text(Bytes bytes, const Read& read) {
 }
 
 void read_report(Bytes bytes) {
-  read_text(bytes, [](std::string_view text) { volume::report_from(text); });
-  read_text(bytes, [](std::string_view text) { volume::order_from(text); });
+  read_text(bytes, [](std::string_view text) { process::report_from(text); });
+  read_text(bytes, [](std::string_view text) { process::order_from(text); });
 }
 
 void read_json(Bytes bytes) {
@@ -150,16 +150,17 @@ void read_json(Bytes bytes) {
 
 constexpr Target kTargets[] = {
     {"upload", import_anything},
-    {"nifti", import_only<FileFormat::kNifti>},
-    {"nrrd", import_only<FileFormat::kNrrd>},
-    {"metaimage", import_only<FileFormat::kMetaImage>},
-    {"vti", import_only<FileFormat::kVti>},
-    {"dicom", import_only<FileFormat::kDicom>},
-    {"archive", import_only<FileFormat::kArchive>},
+    {"nifti", [](Bytes bytes) { import_only("nifti", bytes); }},
+    {"nrrd", [](Bytes bytes) { import_only("nrrd", bytes); }},
+    {"metaimage", [](Bytes bytes) { import_only("metaimage", bytes); }},
+    {"vti", [](Bytes bytes) { import_only("vti", bytes); }},
+    {"dicom", [](Bytes bytes) { import_only("dicom", bytes); }},
+    {"archive", [](Bytes bytes) { import_only("archive", bytes); }},
     {"raw", import_raw},
     {"canonical", open_canonical},
     {"report", read_report},
     {"json", read_json},
+    {"draco", encode_mesh},
 };
 
 }  // namespace

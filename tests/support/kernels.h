@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <vector>
 
-#include "server/mesh/context.h"
 #include "server/mesh/extract.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/parallel.h"
 #include "tests/support/shapes.h"
 
 namespace isomesh::test {

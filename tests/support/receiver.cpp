@@ -8,18 +8,11 @@
 
 #include <httplib.h>
 
+#include "base/text.h"
 #include "tests/support/process.h"
 
 namespace isomesh::test {
-namespace {
-
-std::string lower(std::string text) {
-  std::ranges::transform(text, text.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
-}  // namespace
+namespace {}  // namespace
 
 struct Receiver::State {
   httplib::Server http;

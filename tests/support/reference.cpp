@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "proto/samples.h"
 #include "tests/support/points.h"
 
 namespace isomesh::test {
@@ -196,19 +197,9 @@ ReferenceMesh reference_surface(const mesh::Lattice<T>& lattice,
   return ReferenceBuilder<T>(lattice, options).build();
 }
 
-template ReferenceMesh reference_surface(const mesh::Lattice<std::uint8_t>&,
-                                         const mesh::ExtractOptions&);
-template ReferenceMesh reference_surface(const mesh::Lattice<std::int8_t>&,
-                                         const mesh::ExtractOptions&);
-template ReferenceMesh reference_surface(const mesh::Lattice<std::uint16_t>&,
-                                         const mesh::ExtractOptions&);
-template ReferenceMesh reference_surface(const mesh::Lattice<std::int16_t>&,
-                                         const mesh::ExtractOptions&);
-template ReferenceMesh reference_surface(const mesh::Lattice<std::uint32_t>&,
-                                         const mesh::ExtractOptions&);
-template ReferenceMesh reference_surface(const mesh::Lattice<std::int32_t>&,
-                                         const mesh::ExtractOptions&);
-template ReferenceMesh reference_surface(const mesh::Lattice<float>&, const mesh::ExtractOptions&);
-template ReferenceMesh reference_surface(const mesh::Lattice<double>&, const mesh::ExtractOptions&);
+#define ISOMESH_INSTANTIATE(T, name, kType) \
+  template ReferenceMesh reference_surface(const mesh::Lattice<T>&, const mesh::ExtractOptions&);
+ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
+#undef ISOMESH_INSTANTIATE
 
 }  // namespace isomesh::test

@@ -6,6 +6,8 @@
 #include <random>
 #include <type_traits>
 
+#include "proto/samples.h"
+
 namespace isomesh::test {
 namespace {
 
@@ -243,7 +245,7 @@ std::vector<NamedGeometry> all_geometries() {
           {"oblique_far", oblique_far_geometry()}};
 }
 
-#define ISOMESH_INSTANTIATE(T)                                                              \
+#define ISOMESH_INSTANTIATE(T, name, kType)                                                 \
   template SampleVolume<T> sample(const Field&, const mesh::Dims&, const Geometry&);        \
   template SampleVolume<T> noise(const std::vector<T>&, const mesh::Dims&, std::uint64_t,   \
                                  const Geometry&);                                          \
@@ -251,15 +253,9 @@ std::vector<NamedGeometry> all_geometries() {
   template SampleVolume<T> constant(T, const mesh::Dims&);                                  \
   template SampleVolume<T> checkerboard(T, T, const mesh::Dims&);                           \
   template void set_border(SampleVolume<T>&, T);                                            \
-  template SampleVolume<T> sign_pattern(unsigned, Parity, Surround)
+  template SampleVolume<T> sign_pattern(unsigned, Parity, Surround);
 
-ISOMESH_INSTANTIATE(std::uint8_t);
-ISOMESH_INSTANTIATE(std::int8_t);
-ISOMESH_INSTANTIATE(std::uint16_t);
-ISOMESH_INSTANTIATE(std::int16_t);
-ISOMESH_INSTANTIATE(std::uint32_t);
-ISOMESH_INSTANTIATE(std::int32_t);
-ISOMESH_INSTANTIATE(float);
-ISOMESH_INSTANTIATE(double);
+ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
+#undef ISOMESH_INSTANTIATE
 
 }  // namespace isomesh::test

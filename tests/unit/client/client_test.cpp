@@ -1,6 +1,8 @@
 #include "client/isomesh/client.h"
 
 #include <atomic>
+#include <cstdlib>
+#include <future>
 #include <mutex>
 
 #include <gmock/gmock.h>
@@ -136,10 +138,38 @@ TEST(Reachability, SpeaksOverASocketOfThisMachine) {
   while (!http.is_running()) std::this_thread::yield();
 
   Client client({.server = "unix:" + path});
-  EXPECT_THAT(client.volumes(), ElementsAre(some_volume()));
+  EXPECT_NO_THROW(EXPECT_THAT(client.volumes(), ElementsAre(some_volume())));
   EXPECT_EQ(host, "localhost");
   http.stop();
   thread.join();
+}
+
+// Volumes and the token go to the server that was named, and to nothing else.
+TEST(Reachability, ProxiesOfTheEnvironmentAreNotUsed) {
+  FakeServer server;
+  server.http.Get("/v1/volumes", [](const httplib::Request&, httplib::Response& response) {
+    response.set_content(to_json(std::vector<Volume>{some_volume()}), kJson);
+  });
+  Client client({.server = server.start()});
+  ASSERT_EQ(::setenv("http_proxy", test::unused_url().c_str(), 1), 0);
+  ASSERT_EQ(::setenv("all_proxy", test::unused_url().c_str(), 1), 0);
+  EXPECT_NO_THROW(EXPECT_THAT(client.volumes(), ElementsAre(some_volume())));
+  ::unsetenv("http_proxy");
+  ::unsetenv("all_proxy");
+}
+
+TEST(Reachability, IsAskedFromSeveralThreads) {
+  FakeServer server;
+  server.http.Get("/v1/volumes", [](const httplib::Request&, httplib::Response& response) {
+    response.set_content(to_json(std::vector<Volume>{some_volume()}), kJson);
+  });
+  Client client({.server = server.start()});
+  std::vector<std::jthread> threads;
+  for (int n = 0; n < 8; ++n) {
+    threads.emplace_back([&] {
+      for (int turn = 0; turn < 20; ++turn) EXPECT_EQ(client.volumes().size(), 1U);
+    });
+  }
 }
 
 TEST(Urls, IdentifiersCannotLeaveTheirPlace) {
@@ -162,6 +192,12 @@ TEST(Urls, IdentifiersCannotLeaveTheirPlace) {
 
 TEST(Urls, ATokenCannotAddHeaders) {
   EXPECT_EQ(error_of([] { Client({.token = "a\r\nX: y"}); }).code(), ErrorCode::kInvalidParameter);
+}
+
+TEST(Urls, AKeyCannotAddHeaders) {
+  FakeServer server;
+  Client client({.server = server.start()});
+  EXPECT_EQ(error_of([&] { client.submit({}, "a\r\nX: y"); }).code(), ErrorCode::kInvalidParameter);
 }
 
 TEST(Jobs, AreSubmittedListedAndCancelled) {
@@ -290,6 +326,20 @@ TEST(Follow, TellsEventsAndComesBackWhereItWas) {
   EXPECT_THAT(seen, ElementsAre(JobEvent{JobState::kRunning, Stage::kLoad, 0.5}));
 }
 
+TEST(Volumes, AreErasedByTheirIds) {
+  FakeServer server;
+  std::string erased;
+  server.http.Delete("/v1/volumes/aa",
+                     [&](const httplib::Request& request, httplib::Response& response) {
+                       erased = request.path;
+                       response.status = 204;
+                     });
+  Client client({.server = server.start()});
+  client.erase_volume("aa");
+  EXPECT_EQ(erased, "/v1/volumes/aa");
+  EXPECT_EQ(error_of([&] { client.erase_volume("bb"); }).code(), ErrorCode::kNotFound);
+}
+
 TEST(Wait, LooksUntilTheJobIsDoneAndShowsEveryStep) {
   FakeServer server;
   std::atomic<int> looks = 0;
@@ -309,32 +359,52 @@ TEST(Wait, LooksUntilTheJobIsDoneAndShowsEveryStep) {
   EXPECT_THAT(states, ElementsAre(JobState::kRunning, JobState::kRunning, JobState::kSucceeded));
 }
 
-TEST(Wait, EndsSoonAfterAStopRequest) {
-  FakeServer server;
-  server.http.Get("/v1/jobs/7", [](const httplib::Request&, httplib::Response& response) {
-    std::this_thread::sleep_for(std::chrono::seconds{2});
-    response.set_content(to_json(finished_job("7", "mesh")), kJson);
-  });
+// The server answers only when the client has gone.
+TEST(Wait, EndsAtOnceWhenAskedToStop) {
   std::stop_source stop;
-  Client client({.server = server.start(), .stop = stop.get_token()});
-  std::jthread interrupter([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds{100});
+  test::SocketServer server([&](int socket) {
+    test::read_head(socket);
     stop.request_stop();
+    test::read_to_the_end(socket);
   });
-  const auto start = std::chrono::steady_clock::now();
+  Client client({.server = server.url(), .stop = stop.get_token()});
   EXPECT_EQ(error_of([&] { client.wait("7"); }).code(), ErrorCode::kCancelled);
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds{1});
+  // Nothing is sent after that.
+  EXPECT_EQ(error_of([&] { client.job("7"); }).code(), ErrorCode::kCancelled);
+  EXPECT_EQ(server.connections(), 1);
 }
 
 TEST(Timeouts, ASilentServerIsGivenUp) {
-  test::SocketServer server([](int socket) {
-    test::read_head(socket);
-    std::this_thread::sleep_for(std::chrono::milliseconds{400});
-  });
+  test::SocketServer server([](int socket) { test::read_to_the_end(socket); });
   Client client({.server = server.url(), .silence_timeout = std::chrono::milliseconds{100}});
   const Error error = error_of([&] { client.cancel("7"); });
   EXPECT_EQ(error.code(), ErrorCode::kUnreachable);
   EXPECT_THAT(error.what(), HasSubstr("silent"));
+}
+
+// In the middle of an answer.
+TEST(Timeouts, AServerThatFallsSilentIsGivenUp) {
+  test::SocketServer server([](int socket) {
+    test::read_head(socket);
+    test::send_text(socket, "HTTP/1.1 200 OK\r\nContent-Length: 9\r\n\r\n[");
+    test::read_to_the_end(socket);
+  });
+  Client client({.server = server.url(), .silence_timeout = std::chrono::milliseconds{100}});
+  EXPECT_THAT(error_of([&] { client.volumes(); }).what(), HasSubstr("silent"));
+}
+
+TEST(Timeouts, AServerThatNoLongerReadsIsGivenUp) {
+  std::promise<void> over;
+  test::SocketServer server([&](int socket) {
+    test::read_head(socket);
+    test::send_text(socket, "HTTP/1.1 100 Continue\r\n\r\n");
+    over.get_future().wait();
+  });
+  TemporaryFolder folder;
+  test::write_file(folder / "large", test::pattern(20'000'000));
+  Client client({.server = server.url(), .silence_timeout = std::chrono::milliseconds{100}});
+  EXPECT_THAT(error_of([&] { client.upload(folder / "large"); }).what(), HasSubstr("silent"));
+  over.set_value();
 }
 
 }  // namespace

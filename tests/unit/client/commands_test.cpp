@@ -1,7 +1,7 @@
 #include "client/cli/commands.h"
 
 #include <atomic>
-#include <thread>
+#include <functional>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -46,6 +46,7 @@ class Commands : public testing::Test {
       response.set_content(to_json(job_), "application/json");
     });
     server_.http.Get("/v1/jobs/7", [this](const auto&, auto& response) {
+      if (at_a_look_) at_a_look_();
       response.set_content(to_json(job_), "application/json");
     });
     server_.http.Get("/v1/jobs/7/mesh.drc", [](const auto&, auto& response) {
@@ -65,6 +66,7 @@ class Commands : public testing::Test {
   Job job_ = test::finished_job("7", "mesh");
   JobParameters asked_;
   std::atomic<int> cancelled_ = 0;
+  std::function<void()> at_a_look_;  // runs when the job is asked for
   test::TemporaryFolder folder_;
   test::FakeServer server_;
   Options options_;
@@ -104,10 +106,7 @@ TEST_F(Commands, AnInterruptCancelsTheJobThatMeshWaitsFor) {
   job_.state = JobState::kRunning;
   job_.mesh.reset();
   std::stop_source stop;
-  std::jthread interrupter([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds{300});
-    stop.request_stop();
-  });
+  at_a_look_ = [&] { stop.request_stop(); };
   const Outcome outcome = outcome_of(options_, stop.get_token());
   EXPECT_EQ(outcome.status, kRefused);
   EXPECT_EQ(cancelled_, 1);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/files.h"
 #include "tests/unit/client/support.h"
 
 namespace isomesh {
@@ -52,17 +53,18 @@ TEST(PartFile, RefusesWhatIsNoRegularFile) {
 TEST(InputFile, ReadsAnyPartAndNoticesATruncation) {
   TemporaryFolder folder;
   test::write_file(folder / "file", "0123456789");
-  const InputFile file(folder / "file");
+  const InputFile file = InputFile::chosen(folder / "file");
   EXPECT_EQ(file.size(), 10U);
   std::string part(4, ' ');
-  file.read(3, part);
+  file.read_exactly(3, std::as_writable_bytes(std::span(part)));
   EXPECT_EQ(part, "3456");
   std::filesystem::resize_file(folder / "file", 5);
-  EXPECT_EQ(error_of([&] { file.read(3, part); }).code(), ErrorCode::kInvalidParameter);
+  EXPECT_EQ(error_of([&] { file.read_exactly(3, std::as_writable_bytes(std::span(part))); }).code(),
+            ErrorCode::kInvalidParameter);
 }
 
 TEST(InputFile, RefusesAFolder) {
-  EXPECT_EQ(error_of([] { InputFile("/tmp"); }).code(), ErrorCode::kInvalidParameter);
+  EXPECT_EQ(error_of([] { InputFile::chosen("/tmp"); }).code(), ErrorCode::kInvalidParameter);
 }
 
 }  // namespace

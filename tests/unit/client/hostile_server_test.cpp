@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "client/isomesh/client.h"
+#include "proto/json.h"
 #include "tests/unit/client/support.h"
 
 namespace isomesh {
@@ -44,12 +45,33 @@ INSTANTIATE_TEST_SUITE_P(
                     "HTTP/1.1 100 Continue\r\n\r\nHTTP/1.1 " + std::string(500'000, 'a') + "\r\n",
                     "HTTP/1.1 200 " + std::string(500'000, 'a') + "\r\n\r\n",
                     "HTTP/1.1 200 OK\r\nX: " + std::string(500'000, 'a') + "\r\n\r\n",
-                    std::string(500'000, '\0')));
+                    std::string(500'000, '\0'), "HTTP/1.1 100 Continue\r\n\r\n"));
 
 TEST(HostileServer, SendsHeadersWithoutEnd) {
   std::string head = "HTTP/1.1 200 OK\r\n";
   for (int n = 0; n < 20'000; ++n) head += "X-" + std::to_string(n) + ": y\r\n";
   EXPECT_THAT(codes_for(head), testing::Each(ErrorCode::kUnreachable));
+}
+
+TEST(HostileServer, SendsInterimAnswersWithoutEnd) {
+  std::string sent;
+  for (int n = 0; n < 5'000; ++n) sent += "HTTP/1.1 100 Continue\r\n\r\n";
+  sent += answer_of(to_json(test::finished_job("7", "mesh")));
+  EXPECT_THAT(codes_for(sent), testing::Each(ErrorCode::kUnreachable));
+}
+
+// A line break in an id would add a header to the request that takes the stream up again.
+TEST(HostileServer, SendsAnEventIdWithALineBreak) {
+  test::SocketServer server([](int socket) {
+    test::read_head(socket);
+    test::send_text(socket,
+                    "HTTP/1.1 200 OK\r\nContent-Length: 1000\r\n\r\n"
+                    "id: 1\rX: y\nevent: stage\ndata: " +
+                        to_json(JobEvent{JobState::kRunning, Stage::kLoad, 0.5}) + "\n\n");
+  });
+  Client client({.server = server.url()});
+  EXPECT_EQ(error_of([&] { client.follow("7", {}); }).code(), ErrorCode::kInvalidParameter);
+  EXPECT_EQ(server.connections(), 1);
 }
 
 class WrongJson : public testing::TestWithParam<std::string> {};

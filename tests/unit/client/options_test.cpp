@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/parameters.h"
 #include "tests/unit/client/support.h"
 
 namespace isomesh::cli {
@@ -105,9 +106,9 @@ TEST_F(OptionsTest, ReadsRawSamples) {
   ASSERT_TRUE(options.raw);
   EXPECT_THAT(options.raw->dims, ElementsAre(512, 512, 300));
   EXPECT_EQ(options.raw->type, SampleType::kInt16);
-  EXPECT_THAT(*options.raw->spacing, ElementsAre(0.7, 0.7, 1));
-  EXPECT_THAT(*options.raw->origin, ElementsAre(-90, 0, 1.5));
-  EXPECT_EQ(options.raw->direction->back(), -1);
+  EXPECT_THAT(options.raw->geometry.spacing, ElementsAre(0.7, 0.7, 1));
+  EXPECT_THAT(options.raw->geometry.origin, ElementsAre(-90, 0, 1.5));
+  EXPECT_EQ(options.raw->geometry.direction.back(), -1);
   EXPECT_TRUE(options.raw->big_endian);
 }
 
@@ -182,6 +183,22 @@ TEST_F(OptionsTest, RefusesWrongUsage) {
     EXPECT_EQ(status, kWrongUsage) << (arguments.empty() ? "" : arguments.back());
     EXPECT_FALSE(text.empty());
   }
+}
+
+TEST_F(OptionsTest, EveryParameterHasAnOptionAndItsHelp) {
+  const std::string help = ending_of({"submit", "--help"}).second;
+  JobParameters parameters;
+  visit_leaves(parameters, [&](const std::string& path, const Parameter& parameter, const auto&) {
+    if (path == "volume") return;
+    EXPECT_THAT(help, HasSubstr("--" + option_name_of(parameter) + ' '));
+  });
+  for (const std::string text :
+       {"Tetrahedra per cell: 5 or 6 (default: 6)", "laplacian or taubin (default: laplacian)",
+        "(default: 1 for laplacian, 0.33 for taubin)", "(default: 0.1)", "extracted, in mm",
+        "(default: drc)"}) {
+    EXPECT_THAT(help, HasSubstr(text));
+  }
+  EXPECT_THAT(ending_of({"mesh", "--help"}).second, testing::Not(HasSubstr("--format NAME")));
 }
 
 TEST_F(OptionsTest, HelpsOnRequest) {

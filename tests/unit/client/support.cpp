@@ -8,7 +8,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "client/isomesh/sha256.h"
+#include "base/hex.h"
+#include "base/sha256.h"
 #include "proto/json.h"
 
 namespace isomesh::test {
@@ -77,6 +78,16 @@ std::string read_head(int socket) {
   char byte = 0;
   while (!head.ends_with("\r\n\r\n") && ::recv(socket, &byte, 1, 0) == 1) head += byte;
   return head;
+}
+
+std::size_t read_to_the_end(int socket) {
+  std::string piece(64 * 1024, '\0');
+  std::size_t received = 0;
+  while (true) {
+    const ssize_t count = ::recv(socket, piece.data(), piece.size(), 0);
+    if (count <= 0) return received;
+    received += static_cast<std::size_t>(count);
+  }
 }
 
 void send_text(int socket, const std::string& text) {

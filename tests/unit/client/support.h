@@ -56,6 +56,8 @@ std::string unused_url();
 
 // Reads from the socket until the head of a request has come, and returns it.
 std::string read_head(int socket);
+// Reads until the client closes the connection, and returns how many bytes came.
+std::size_t read_to_the_end(int socket);
 // Sends all of it; a client that went away is no error.
 void send_text(int socket, const std::string& text);
 

@@ -1,11 +1,14 @@
 // Files on their way to the server, and meshes on theirs back.
 #include <atomic>
+#include <future>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 
+#include "base/base64.h"
+#include "base/sha256.h"
 #include "client/isomesh/client.h"
-#include "client/isomesh/sha256.h"
 #include "proto/json.h"
 #include "tests/unit/client/support.h"
 
@@ -95,9 +98,9 @@ TEST(Upload, DescribesRawSamplesInTheQuery) {
   UploadOptions options;
   options.raw = RawDescription{.dims = {2, 3, 4},
                                .type = SampleType::kInt16,
-                               .spacing = {{0.7, 0.1, 1e-7}},
-                               .origin = {{-90, 0, 1.5}},
-                               .direction = {{0, 1, 0, 1, 0, 0, 0, 0, -1}},
+                               .geometry = {.origin = {-90, 0, 1.5},
+                                            .spacing = {0.7, 0.1, 1e-7},
+                                            .direction = {0, 1, 0, 1, 0, 0, 0, 0, -1}},
                                .big_endian = true};
   Client client({.server = server.start()});
   client.upload(folder / "ct.raw", options);
@@ -128,6 +131,38 @@ TEST(Upload, HearsARefusalThatComesBeforeTheBodyWasTaken) {
   EXPECT_EQ(error.code(), ErrorCode::kUnauthorized);
   EXPECT_STREQ(error.what(), "no token");
   EXPECT_EQ(server.connections(), 1);
+}
+
+TEST(Upload, SendsNothingOfALargeBodyThatIsRefusedByItsHead) {
+  std::promise<std::size_t> received;
+  test::SocketServer server([&](int socket) {
+    EXPECT_THAT(test::read_head(socket), HasSubstr("Content-Length: 20000000\r\n"));
+    test::send_text(socket, "HTTP/1.1 401 Unauthorized\r\nContent-Length: 0\r\n\r\n");
+    received.set_value(test::read_to_the_end(socket));
+  });
+  TemporaryFolder folder;
+  test::write_file(folder / "large", pattern(20'000'000));
+  Client client({.server = server.url()});
+  EXPECT_EQ(error_of([&] { client.upload(folder / "large"); }).code(), ErrorCode::kUnauthorized);
+  EXPECT_EQ(received.get_future().get(), 0U);
+}
+
+TEST(Upload, StopsWhereARefusalComesInTheMiddle) {
+  constexpr std::size_t kBytes = 50'000'000;
+  std::promise<std::size_t> received;
+  test::SocketServer server([&](int socket) {
+    test::read_head(socket);
+    test::send_text(socket, "HTTP/1.1 100 Continue\r\n\r\n");
+    std::string begin(1'000'000, ' ');
+    EXPECT_EQ(::recv(socket, begin.data(), begin.size(), MSG_WAITALL), 1'000'000);
+    test::send_text(socket, "HTTP/1.1 507 Full\r\nContent-Length: 0\r\n\r\n");
+    received.set_value(test::read_to_the_end(socket));
+  });
+  TemporaryFolder folder;
+  test::write_file(folder / "large", pattern(kBytes));
+  Client client({.server = server.url()});
+  EXPECT_EQ(error_of([&] { client.upload(folder / "large"); }).code(), ErrorCode::kOutOfSpace);
+  EXPECT_LT(received.get_future().get(), kBytes / 2);
 }
 
 TEST(Upload, IsNotRepeatedWhenTheConnectionBreaks) {

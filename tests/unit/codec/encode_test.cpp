@@ -15,10 +15,6 @@
 namespace isomesh::codec {
 namespace {
 
-// All formats of the contract.
-constexpr std::array kFormats = {MeshFormat::kDrc, MeshFormat::kGlb, MeshFormat::kStl,
-                                 MeshFormat::kPly, MeshFormat::kObj};
-
 TEST(Encode, WritesTheFormatThatIsAsked) {
   const mesh::Mesh mesh = test::mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});
   EXPECT_TRUE(test::encoded(mesh, MeshFormat::kDrc).starts_with("DRACO"));
@@ -26,7 +22,7 @@ TEST(Encode, WritesTheFormatThatIsAsked) {
 }
 
 TEST(Encode, WritesEveryFormatOfEveryMesh) {
-  for (const MeshFormat format : kFormats) {
+  for (const MeshFormat format : values_of<MeshFormat>()) {
     SCOPED_TRACE(to_string(format));
     EXPECT_FALSE(test::encoded(mesh::Mesh{}, format).empty());
   }
@@ -90,7 +86,41 @@ INSTANTIATE_TEST_SUITE_P(Formats, EncodeInBlocks,
                          testing::Values(MeshFormat::kStl, MeshFormat::kPly, MeshFormat::kObj),
                          [](const auto& test) { return std::string(to_string(test.param)); });
 
-TEST(MediaType, IsTheRegisteredOne) {
+TEST(Formats, EveryOneHasItsRow) {
+  const mesh::SurfaceSize surface = {2'000'000, 1'000'000};
+  for (const MeshFormat format : values_of<MeshFormat>()) {
+    const Format& row = describe(format);
+    EXPECT_EQ(row.format, format);
+    EXPECT_NE(row.media_type.find('/'), std::string_view::npos) << to_string(format);
+    EXPECT_GT(row.milliseconds_per_triangle, 0) << to_string(format);
+    EXPECT_GT(row.bytes(surface, {}), 1'000'000) << to_string(format);
+  }
+}
+
+TEST(Formats, TellTheSizeOfWhatTheyEncode) {
+  const mesh::Mesh& mesh = test::large_mesh();
+  const mesh::SurfaceSize surface = {mesh.triangles.size(), mesh.positions.size()};
+  for (const MeshFormat format : values_of<MeshFormat>()) {
+    const auto bytes = static_cast<double>(test::encoded(mesh, format).size());
+    EXPECT_LT(describe(format).bytes(surface, {}), 3 * bytes) << to_string(format);
+    EXPECT_GT(3 * describe(format).bytes(surface, {}), bytes) << to_string(format);
+  }
+}
+
+TEST(Formats, NormalsAndBitsMakeDracoLarger) {
+  const mesh::SurfaceSize surface = {2'000'000, 1'000'000};
+  MeshParameters more;
+  more.normals = true;
+  more.draco.position_bits = 20;
+  for (const MeshFormat format : {MeshFormat::kDrc, MeshFormat::kGlb}) {
+    EXPECT_GT(describe(format).bytes(surface, more), describe(format).bytes(surface, {}));
+  }
+  const Format& glb = describe(MeshFormat::kGlb);
+  EXPECT_GT(glb.memory_bytes(surface, more), glb.memory_bytes(surface, {}));
+}
+
+TEST(Formats, HaveTheMediaTypesThatAreRegistered) {
+  const auto media_type = [](MeshFormat format) { return describe(format).media_type; };
   EXPECT_EQ(media_type(MeshFormat::kGlb), "model/gltf-binary");
   EXPECT_EQ(media_type(MeshFormat::kStl), "model/stl");
   EXPECT_EQ(media_type(MeshFormat::kObj), "model/obj");

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "proto/json.h"
 #include "server/codec/encode.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
@@ -145,7 +146,7 @@ TEST(Glb, ThePatientsHeadIsUpAndMetresAreTheUnit) {
 
 TEST(Glb, SaysWhereItComesFrom) {
   Provenance provenance;
-  provenance.parameters.volume = "abc";
+  provenance.volume = "abc";
   provenance.parameters.passes = 9;
   provenance.iso = 60.5;
   provenance.dims = {4, 5, 6};
@@ -157,6 +158,9 @@ TEST(Glb, SaysWhereItComesFrom) {
   const json extras = open_container(glb).document["asset"]["extras"];
   EXPECT_EQ(extras["parameters"]["passes"], 9);
   EXPECT_EQ(extras["parameters"]["volume"], "abc");
+  json all = json::parse(to_json(provenance.parameters));
+  all["volume"] = "abc";
+  EXPECT_EQ(extras["parameters"], all) << "and nothing else of a job";
   EXPECT_EQ(extras["iso"], 60.5);
   EXPECT_EQ(extras["dims"], json({4, 5, 6}));
   EXPECT_EQ(extras["origin"], json({1.0, 2.0, 3.0}));

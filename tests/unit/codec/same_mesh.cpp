@@ -10,6 +10,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/unit/codec/placed.h"
+
 namespace isomesh::test {
 
 Grid grid_of(const mesh::Mesh& mesh, int position_bits) {
@@ -33,22 +35,6 @@ Grid grid_of(const mesh::Mesh& mesh, int position_bits) {
 }
 
 namespace {
-
-// A triangle by where its corners lie, from the smallest one on in its own sense of rotation.
-using Place = std::array<float, 3>;
-using PlacedTriangle = std::array<Place, 3>;
-
-template <class Points, class Triangles>
-std::vector<PlacedTriangle> placed(const Points& points, const Triangles& triangles) {
-  std::vector<PlacedTriangle> result;
-  for (const auto& [a, b, c] : triangles) {
-    PlacedTriangle corners = {points[a], points[b], points[c]};
-    std::ranges::rotate(corners, std::ranges::min_element(corners));
-    result.push_back(corners);
-  }
-  std::ranges::sort(result);
-  return result;
-}
 
 // Every decoded vertex is near one of the mesh and no two are near the same; its index there. The
 // vertices of the meshes here are farther apart than the coarsest grid moves them.

@@ -5,6 +5,7 @@
 #include "server/jobs/histograms.h"
 #include "server/jobs/workers.h"
 #include "tests/support/errors.h"
+#include "tests/support/jobs.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
@@ -14,8 +15,7 @@ class EstimateTest : public test::JobsFixture {
  protected:
   Job run(const JobParameters& parameters) {
     const Workers workers({.threads = 1}, jobs_, volumes_, blobs_);
-    return jobs_.wait("", job_of(jobs_.submit({"", parameters, "", ""})).id,
-                      std::chrono::seconds(60));
+    return test::end_of(jobs_, "", job_of(jobs_.submit({"", parameters, "", ""})).id);
   }
 
   Estimator estimator_{volumes_, blobs_, jobs_, {.memory_bytes = 4 << 20}};

@@ -7,11 +7,10 @@
 #include <gtest/gtest.h>
 
 #include "server/jobs/volume_library.h"
-#include "server/store/database.h"
-#include "server/store/file_blob_store.h"
-#include "server/store/sqlite_job_store.h"
-#include "server/store/sqlite_volume_store.h"
-#include "server/volume/import.h"
+#include "server/store/files/blob_store.h"
+#include "server/store/sqlite/database.h"
+#include "server/store/sqlite/job_store.h"
+#include "server/store/sqlite/volume_store.h"
 #include "tests/support/files.h"
 #include "tests/support/shapes.h"
 
@@ -28,7 +27,7 @@ class JobsFixture : public testing::Test {
                     .geometry = samples.geometry,
                     .big_endian = false});
   }
-  Volume add_raw(const std::string& bytes, const volume::RawDescription& description);
+  Volume add_raw(const std::string& bytes, const RawDescription& description);
 
   // A closed sphere of some thousand triangles.
   Volume add_sphere();
@@ -54,8 +53,14 @@ class JobsFixture : public testing::Test {
   store::FileBlobStore blobs_{data_};
   store::SqliteVolumeStore volumes_{database_};
   store::SqliteJobStore jobs_{database_, blobs_, options()};
-  store::Retention retention_{data_, database_, blobs_, store::RetentionOptions{}};
-  jobs::VolumeLibrary library_{data_, blobs_, volumes_, retention_, volume::ImportLimits{}};
+  store::Retention retention_{jobs_, volumes_, blobs_, data_.scratch(), store::RetentionOptions{}};
+  jobs::VolumeLibrary library_{
+      data_,
+      blobs_,
+      volumes_,
+      retention_,
+      volume::SizeLimits{},
+      jobs::RunnerOptions{.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT}};
 };
 
 }  // namespace isomesh::test

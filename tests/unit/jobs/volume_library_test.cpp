@@ -21,10 +21,10 @@ class VolumeLibraryTest : public test::JobsFixture {
   std::pair<Volume, bool> add_bytes(const std::string& bytes, const Geometry& geometry = {}) {
     test::write_file(folder_ / "upload", bytes);
     return library_.add("", folder_ / "upload",
-                        {.raw = volume::RawDescription{.dims = kDims,
-                                                       .type = SampleType::kUint8,
-                                                       .geometry = geometry,
-                                                       .big_endian = false},
+                        {.raw = RawDescription{.dims = kDims,
+                                               .type = SampleType::kUint8,
+                                               .geometry = geometry,
+                                               .big_endian = false},
                          .series = {}});
   }
 
@@ -97,9 +97,9 @@ TEST_F(VolumeLibraryTest, KeepsAVolumeThatAJobNeeds) {
 
 TEST_F(VolumeLibraryTest, SamplesStayUntilTheirLastOwnerGoes) {
   test::write_file(folder_ / "upload", bytes_);
-  const volume::RawDescription raw{
+  const RawDescription raw{
       .dims = kDims, .type = SampleType::kUint8, .geometry = {}, .big_endian = false};
-  const volume::ImportOptions options{.raw = raw, .series = {}};
+  const process::ImportOptions options{.raw = raw, .series = {}};
   const std::string id = library_.add("one", folder_ / "upload", options).first.id;
   EXPECT_TRUE(library_.add("other", folder_ / "upload", options).second);
   EXPECT_EQ(blob_count(), 1U);
@@ -120,7 +120,7 @@ TEST_F(VolumeLibraryTest, OfManyEqualUploadsOneIsNew) {
   std::vector<std::jthread> threads;
   for (int thread = 0; thread < 8; ++thread) {
     threads.emplace_back([&] {
-      const volume::RawDescription raw{
+      const RawDescription raw{
           .dims = kDims, .type = SampleType::kUint8, .geometry = {}, .big_endian = false};
       if (library_.add("", folder_ / "upload", {.raw = raw, .series = {}}).second) ++added;
     });

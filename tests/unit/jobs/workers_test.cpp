@@ -8,7 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/context.h"
+#include "server/mesh/parallel.h"
+#include "tests/support/jobs.h"
 #include "tests/support/process.h"
 #include "tests/unit/jobs/fixture.h"
 
@@ -43,7 +44,7 @@ TEST_F(WorkersTest, RunAJobToItsMesh) {
   const Workers workers(threads(1), jobs_, volumes_, blobs_);
   JobParameters parameters = parameters_of(add_sphere(), 0);
   parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl};
-  const Job job = jobs_.wait("", submit(parameters), kLongest);
+  const Job job = test::end_of(jobs_, "", submit(parameters));
   ASSERT_EQ(job.state, JobState::kSucceeded);
   EXPECT_EQ(job.progress, 1);
   EXPECT_EQ(job.mesh->files.at(MeshFormat::kDrc).href, "/v1/jobs/" + job.id + "/mesh.drc");
@@ -70,7 +71,7 @@ TEST_F(WorkersTest, AVolumeThatIsDamagedOnDiskFailsItsJob) {
     damage(bytes);
     test::write_file(blobs_.path_of(volume.id), bytes);
     const Workers workers(threads(1), jobs_, volumes_, blobs_);
-    const Job job = jobs_.wait("", submit(parameters_of(volume, 0)), kLongest);
+    const Job job = test::end_of(jobs_, "", submit(parameters_of(volume, 0)));
     EXPECT_EQ(job.state, JobState::kFailed);
     ASSERT_TRUE(job.error);
     EXPECT_EQ(job.error->type, "urn:isomesh:problem:unusable-volume");
@@ -85,7 +86,7 @@ TEST_F(WorkersTest, AFailureOfOursTellsNothingAndIsTriedThreeTimes) {
   std::filesystem::remove_all(data_.scratch());
   test::write_file(data_.scratch(), "where a folder should be");
   const Workers workers(threads(1), jobs_, volumes_, blobs_);
-  const Job job = jobs_.wait("", submit(parameters_of(volume, 0)), kLongest);
+  const Job job = test::end_of(jobs_, "", submit(parameters_of(volume, 0)));
   EXPECT_EQ(job.state, JobState::kFailed);
   ASSERT_TRUE(job.error);
   EXPECT_EQ(job.error->status, 500);
@@ -99,9 +100,9 @@ TEST_F(WorkersTest, GoOnAfterAFailure) {
   const Volume spoilt = add_sphere();
   const std::string intact = blob(spoilt.id);
   test::write_file(blobs_.path_of(spoilt.id), "spoilt by the disk");
-  EXPECT_EQ(jobs_.wait("", submit(parameters_of(spoilt, 0)), kLongest).state, JobState::kFailed);
+  EXPECT_EQ(test::end_of(jobs_, "", submit(parameters_of(spoilt, 0))).state, JobState::kFailed);
   test::write_file(blobs_.path_of(spoilt.id), intact);
-  EXPECT_EQ(jobs_.wait("", submit(parameters_of(spoilt, 0)), kLongest).state, JobState::kSucceeded);
+  EXPECT_EQ(test::end_of(jobs_, "", submit(parameters_of(spoilt, 0))).state, JobState::kSucceeded);
 }
 
 // Each of another owner, because one owner's jobs alike are computed once.
@@ -115,7 +116,7 @@ TEST_F(WorkersTest, ManyJobsAtATimeGiveEachItsOwnMesh) {
       volumes_.add(owner, volume);
       ids.push_back(job_of(jobs_.submit({owner, parameters_of(volume, n % 3), "", ""})).id);
     }
-    for (const std::string& id : ids) jobs_.wait(std::nullopt, id, kLongest);
+    for (const std::string& id : ids) test::end_of(jobs_, std::nullopt, id);
   }
   std::vector<Job> first;
   for (const std::string& id : ids) {
@@ -134,7 +135,7 @@ TEST_F(WorkersTest, AJobThatTakesTooLongFails) {
   WorkerOptions options = threads(1);
   options.longest_job = std::chrono::minutes(0);
   const Workers workers(options, jobs_, volumes_, blobs_);
-  const Job job = jobs_.wait("", submit_long(), kLongest);
+  const Job job = test::end_of(jobs_, "", submit_long());
   EXPECT_EQ(job.state, JobState::kFailed);
   ASSERT_TRUE(job.error);
   EXPECT_EQ(job.error->status, 413);
@@ -142,12 +143,18 @@ TEST_F(WorkersTest, AJobThatTakesTooLongFails) {
 
 TEST_F(WorkersTest, ALeaseIsProlongedWhileItsJobRuns) {
   WorkerOptions options = threads(1);
-  options.lease = milliseconds(600);
+  options.lease = std::chrono::seconds(5);
   const Workers workers(options, jobs_, volumes_, blobs_);
   const std::string id = submit_long();
   ASSERT_TRUE(comes_to(id, JobState::kRunning));
-  std::this_thread::sleep_for(2 * options.lease);
-  EXPECT_EQ(jobs_.reap(), 0U);
+  const auto lease_until = [&] {
+    const store::Reading reading(database_.reader());
+    store::Query query = reading->query("SELECT lease_until FROM jobs WHERE id = ?", id);
+    return query.next() ? query.integer(0) : 0;
+  };
+  const std::int64_t first = lease_until();
+  EXPECT_TRUE(eventually([&] { return lease_until() > first; }));
+  EXPECT_EQ(jobs_.account(id).attempts, 1);
   EXPECT_EQ(jobs_.get("", id).state, JobState::kRunning);
   jobs_.cancel("", id);
 }
@@ -158,7 +165,7 @@ TEST_F(WorkersTest, ARunningJobStopsWhenItIsCancelled) {
   ASSERT_TRUE(eventually([&] { return jobs_.get("", id).stage == Stage::kSmooth; }));
   const std::size_t before = blob_count();
   jobs_.cancel("", id);
-  const Job job = jobs_.wait("", id, kLongest);
+  const Job job = test::end_of(jobs_, "", id);
   EXPECT_EQ(job.state, JobState::kCancelled);
   EXPECT_FALSE(job.mesh || job.error);
   EXPECT_EQ(blob_count(), before);

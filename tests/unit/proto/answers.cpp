@@ -81,21 +81,21 @@ Volume dicom_volume() {
 }
 
 JobParameters some_parameters() {
-  return {.volume = "0123abcd",
-          .iso = -0.1,
-          .scheme = Scheme::kFive,
-          .interpolation = Interpolation::kMidpoint,
-          .passes = 1000,
-          .smoothing = Smoothing::kTaubin,
-          .lambda = 0.3,
-          .pass_band = 0.2,
-          .max_displacement_mm = 1.5,
-          .close = true,
-          .components = {.keep = 4294967295, .min_triangles = {}},
-          .formats = {MeshFormat::kStl, MeshFormat::kDrc},
-          .draco = {.position_bits = 30, .speed = 0},
-          .normals = true,
-          .priority = Priority::kStat};
+  return {{.iso = -0.1,
+           .scheme = Scheme::kFive,
+           .interpolation = Interpolation::kMidpoint,
+           .passes = 1000,
+           .smoothing = Smoothing::kTaubin,
+           .lambda = 0.3,
+           .pass_band = 0.2,
+           .max_displacement_mm = 1.5,
+           .close = true,
+           .components = {.keep = 4294967295, .min_triangles = {}},
+           .formats = {MeshFormat::kStl, MeshFormat::kDrc},
+           .draco = {.position_bits = 30, .speed = 0},
+           .normals = true},
+          "0123abcd",
+          Priority::kStat};
 }
 
 Problem some_problem() {

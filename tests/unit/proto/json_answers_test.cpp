@@ -61,15 +61,16 @@ TEST(AnswerJson, SpellsWhatDicomTellsOfAVolume) {
 }
 
 TEST(AnswerJson, SpellsParametersAsTheContractDoes) {
-  EXPECT_EQ(json::parse(to_json(some_parameters())),
-            json::parse(R"({"volume": "0123abcd", "iso": -0.1, "scheme": 5,
+  const json written = json::parse(to_json(some_parameters()));
+  const json expected = json::parse(R"({"volume": "0123abcd", "iso": -0.1, "scheme": 5,
                             "interpolation": "midpoint", "passes": 1000, "smoothing": "taubin",
                             "lambda": 0.3, "pass_band": 0.2, "max_displacement_mm": 1.5,
                             "close": true,
                             "components": {"keep": 4294967295, "min_triangles": null},
                             "formats": ["stl", "drc"],
                             "draco": {"position_bits": 30, "speed": 0}, "normals": true,
-                            "priority": "stat"})"));
+                            "priority": "stat"})");
+  for (const auto& [name, value] : expected.items()) EXPECT_EQ(written[name], value) << name;
 }
 
 TEST(AnswerJson, SpellsAnAbsentIsoAsOtsu) {
@@ -361,6 +362,24 @@ TEST(Records, OfAnOlderVersionHaveDefaultsForWhatItDidNotKnow) {
   for (const std::string text : {"", "[]", "{\"id\": 7}"}) {
     EXPECT_EQ(test::code_thrown_by([&] { job_from_record(text); }), ErrorCode::kInternal) << text;
   }
+}
+
+// As versions wrote it that had all parameters in one type.
+TEST(Record, KeepsTheParametersOfEarlierVersions) {
+  const std::string parameters =
+      R"({"volume":"abc","iso":"otsu","scheme":5,"interpolation":"midpoint","passes":9,)"
+      R"("smoothing":"taubin","lambda":0.5,"pass_band":0.05,"max_displacement_mm":null,)"
+      R"("close":true,"components":{"keep":2,"min_triangles":null},"formats":["glb","stl"],)"
+      R"("draco":{"position_bits":11,"speed":3},"normals":true,"priority":"bulk",)"
+      R"("callback":{"url":"https://receiver.example/?key=1"}})";
+  const Job job = job_from_record(R"({"id":"7","parameters":)" + parameters +
+                                  R"(,"volume":"abc","priority":"bulk"})");
+  const json read = json::parse(to_json(job.parameters));
+  const json written = json::parse(parameters);
+  for (const auto& [name, value] : written.items()) EXPECT_EQ(read[name], value) << name;
+  EXPECT_EQ(job.parameters.volume, "abc");
+  EXPECT_EQ(job.parameters.components.keep, 2U);
+  EXPECT_EQ(job.parameters.callback, Callback{"https://receiver.example/?key=1"});
 }
 
 }  // namespace

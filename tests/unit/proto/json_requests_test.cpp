@@ -44,21 +44,21 @@ std::vector<std::string> faults_in(const Query& query) {
 
 // No member as it is by default.
 JobParameters unusual_parameters(const std::string& volume) {
-  return {.volume = volume,
-          .iso = -150,
-          .scheme = Scheme::kFive,
-          .interpolation = Interpolation::kMidpoint,
-          .passes = 17,
-          .smoothing = Smoothing::kTaubin,
-          .lambda = 0.25,
-          .pass_band = 0.05,
-          .max_displacement_mm = 0.5,
-          .close = true,
-          .components = {.keep = 2, .min_triangles = 100},
-          .formats = {MeshFormat::kStl, MeshFormat::kGlb},
-          .draco = {.position_bits = 11, .speed = 3},
-          .normals = true,
-          .priority = Priority::kBulk};
+  return {{.iso = -150,
+           .scheme = Scheme::kFive,
+           .interpolation = Interpolation::kMidpoint,
+           .passes = 17,
+           .smoothing = Smoothing::kTaubin,
+           .lambda = 0.25,
+           .pass_band = 0.05,
+           .max_displacement_mm = 0.5,
+           .close = true,
+           .components = {.keep = 2, .min_triangles = 100},
+           .formats = {MeshFormat::kStl, MeshFormat::kGlb},
+           .draco = {.position_bits = 11, .speed = 3},
+           .normals = true},
+          volume,
+          Priority::kBulk};
 }
 
 // --- Bodies --------------------------------------------------------------------------------------

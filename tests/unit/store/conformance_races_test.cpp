@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/errors.h"
+#include "tests/support/jobs.h"
 #include "tests/unit/store/engine.h"
 
 namespace isomesh::store {
@@ -44,7 +45,7 @@ TEST_P(RaceConformance, EveryJobIsClaimedByOneWorker) {
   std::set<std::string> submitted;
   for (int n = 0; n < kJobs; ++n) submitted.insert(submit().id);
   for (const std::string& id : submitted) {
-    EXPECT_EQ(jobs().wait("", id, kLong).state, JobState::kSucceeded);
+    EXPECT_EQ(test::end_of(jobs(), "", id).state, JobState::kSucceeded);
   }
   stop.request_stop();
   workers.clear();
@@ -109,7 +110,7 @@ TEST_P(RaceConformance, CancelAgainstClaimNeverLosesTheRequest) {
     });
     while (ready < 1) std::this_thread::yield();
     const Job asked = jobs().cancel("", id);
-    const Job ended = jobs().wait("", id, kLong);
+    const Job ended = test::end_of(jobs(), "", id);
     // Whoever was told that it ran has asked it to stop.
     if (asked.state == JobState::kRunning) {
       EXPECT_EQ(ended.state, JobState::kCancelled);
@@ -125,7 +126,7 @@ TEST_P(RaceConformance, AllWaitersWake) {
   std::vector<std::jthread> waiters;
   for (int waiter = 0; waiter < 8; ++waiter) {
     waiters.emplace_back([&] {
-      if (jobs().wait("", id, kLong).state == JobState::kSucceeded) ++woken;
+      if (test::end_of(jobs(), "", id).state == JobState::kSucceeded) ++woken;
     });
   }
   jobs().finish(claimed(), some_mesh());

@@ -1,4 +1,4 @@
-#include "server/store/data_folder.h"
+#include "server/store/files/data_folder.h"
 
 #include <optional>
 #include <string>

@@ -1,14 +1,12 @@
-#include "server/store/database.h"
+#include "server/store/sqlite/database.h"
 
-#include <optional>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "proto/json.h"
-#include "server/store/sqlite_volume_store.h"
+#include "server/store/sqlite/volume_store.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 
@@ -17,19 +15,6 @@ namespace {
 
 class DatabaseTest : public testing::Test {
  protected:
-  void write_record(const std::string& name, const std::string& text) {
-    std::filesystem::create_directories(data_.volumes());
-    test::write_file(data_.volumes() / name, text);
-  }
-
-  static Volume some_volume() {
-    Volume volume;
-    volume.id = "aa";
-    volume.format = "nrrd";
-    volume.created = "2024-01-02T03:04:05.678Z";
-    return volume;
-  }
-
   test::TemporaryFolder folder_;
   DataFolder data_{folder_ / "data"};
 };
@@ -43,32 +28,6 @@ TEST_F(DatabaseTest, IsForItsOwnerOnly) {
   }
 }
 
-TEST_F(DatabaseTest, TakesTheRecordsOfTheVersionBeforeIt) {
-  const Volume volume = some_volume();
-  write_record("aa.json", to_json(volume));
-  write_record("bb.json.0011.part", "{\"id\": \"bb\"");
-  {
-    Database database(data_);
-    EXPECT_EQ(SqliteVolumeStore(database).list("", {}, 10), std::vector{volume});
-    EXPECT_TRUE(database.unreadable().empty());
-  }
-  EXPECT_FALSE(std::filesystem::exists(data_.volumes() / "aa.json"));
-  Database again(data_);
-  EXPECT_EQ(SqliteVolumeStore(again).get("", "aa"), volume);
-}
-
-// One record that the disk has spoilt must not cost the others, nor keep the daemon from starting.
-TEST_F(DatabaseTest, LeavesARecordThatCannotBeRead) {
-  write_record("aa.json", to_json(some_volume()));
-  for (const std::string text : {"", "{", "[]", "{}", "{\"id\": \"other\"}"}) {
-    write_record("bb.json", text);
-    Database database(data_);
-    EXPECT_EQ(database.unreadable(), std::vector<std::string>{"bb"}) << text;
-    EXPECT_EQ(test::read_file(data_.volumes() / "bb.json"), text);
-    EXPECT_EQ(SqliteVolumeStore(database).list("", {}, 10).size(), 1U);
-  }
-}
-
 TEST_F(DatabaseTest, OfANewerVersionIsRefusedAndLeftAsItIs) {
   { const Database database(data_); }
   { Connection(data_.records(), Connection::Mode::kWrite).script("PRAGMA user_version=99"); }
@@ -77,6 +36,29 @@ TEST_F(DatabaseTest, OfANewerVersionIsRefusedAndLeftAsItIs) {
   EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
   EXPECT_THAT(error->what(), testing::HasSubstr("newer"));
   EXPECT_THAT(error->what(), testing::HasSubstr("99"));
+}
+
+// Its tables are not those that this version's statements are for.
+TEST_F(DatabaseTest, OfAVersionThatWasNeverReleasedIsRefused) {
+  { const Database database(data_); }
+  { Connection(data_.records(), Connection::Mode::kWrite).script("PRAGMA user_version=2"); }
+  const auto error = test::thrown_by([&] { Database database(data_); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
+  EXPECT_THAT(error->what(), testing::HasSubstr("before its release"));
+}
+
+TEST_F(DatabaseTest, IsOpenedAgainAsItWas) {
+  Volume volume;
+  volume.id = "aa";
+  volume.format = "nrrd";
+  volume.created = "2024-01-02T03:04:05.678Z";
+  {
+    Database database(data_);
+    SqliteVolumeStore(database).add("", volume);
+  }
+  Database again(data_);
+  EXPECT_EQ(SqliteVolumeStore(again).get("", "aa"), volume);
 }
 
 TEST_F(DatabaseTest, ThatIsNoneIsRefusedWithoutItsPath) {

@@ -2,11 +2,12 @@
 
 #include <optional>
 
-#include "server/store/database.h"
-#include "server/store/file_blob_store.h"
-#include "server/store/files.h"
-#include "server/store/sqlite_job_store.h"
-#include "server/store/sqlite_volume_store.h"
+#include "server/store/files/blob_store.h"
+#include "server/store/files/files.h"
+#include "server/store/sqlite/database.h"
+#include "server/store/sqlite/job_store.h"
+#include "server/store/sqlite/outbox.h"
+#include "server/store/sqlite/volume_store.h"
 #include "tests/support/files.h"
 #include "tests/unit/store/power_cut.h"
 
@@ -20,11 +21,12 @@ class SqliteEngine : public Engine {
   store::JobStore& jobs() override { return *jobs_; }
   store::VolumeStore& volumes() override { return *volumes_; }
   store::BlobStore& blobs() override { return *blobs_; }
+  store::Outbox& outbox() override { return *outbox_; }
 
   void restart() override {
     close();
     open();
-    jobs_->reap_all();
+    jobs_->reap_predecessor();
   }
 
   void lose_power() override {
@@ -32,7 +34,7 @@ class SqliteEngine : public Engine {
     close();
     power_.reset();
     begin_life();
-    jobs_->reap_all();
+    jobs_->reap_predecessor();
   }
 
  private:
@@ -57,6 +59,7 @@ class SqliteEngine : public Engine {
   }
 
   void close() {
+    outbox_.reset();
     jobs_.reset();
     volumes_.reset();
     database_.reset();
@@ -65,6 +68,7 @@ class SqliteEngine : public Engine {
   void open() {
     database_.emplace(*data_);
     volumes_.emplace(*database_);
+    outbox_.emplace(*database_);
     jobs_.emplace(*database_, *blobs_,
                   store::JobStoreOptions{.max_queued = options_.max_queued,
                                          .retry_delay = options_.retry_delay,
@@ -80,6 +84,7 @@ class SqliteEngine : public Engine {
   std::optional<store::FileBlobStore> blobs_;
   std::optional<store::Database> database_;
   std::optional<store::SqliteVolumeStore> volumes_;
+  std::optional<store::SqliteOutbox> outbox_;
   std::optional<store::SqliteJobStore> jobs_;
 };
 

@@ -11,6 +11,7 @@
 
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
+#include "server/store/outbox.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh::test {
@@ -29,6 +30,7 @@ class Engine {
   virtual store::JobStore& jobs() = 0;
   virtual store::VolumeStore& volumes() = 0;
   virtual store::BlobStore& blobs() = 0;
+  virtual store::Outbox& outbox() = 0;
 
   // As after a crash: the stores are opened anew on what is on disk, and nobody holds a lease. What
   // was returned before is not valid any more.
@@ -86,6 +88,7 @@ class EngineTest : public testing::TestWithParam<NamedEngine> {
   store::JobStore& jobs() { return engine_->jobs(); }
   store::VolumeStore& volumes() { return engine_->volumes(); }
   store::BlobStore& blobs() { return engine_->blobs(); }
+  store::Outbox& outbox() { return engine_->outbox(); }
   void restart() { engine_->restart(); }
   void lose_power() { engine_->lose_power(); }
 

@@ -1,5 +1,3 @@
-#include "server/store/file_blob_store.h"
-
 #include <optional>
 #include <set>
 #include <string>
@@ -8,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "server/store/files/blob_store.h"
+#include "server/store/files/files.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 #include "tests/unit/store/power_cut.h"
@@ -191,6 +191,31 @@ TEST_F(FileBlobStoreTest, ACheckEndsWhenItIsStopped) {
   stop.request_stop();
   EXPECT_EQ(code_thrown_by([&] { blobs_.is_intact(kHello, stop.get_token()); }),
             ErrorCode::kCancelled);
+}
+
+// A check that is stopped before it begins succeeds when it has nothing to read.
+TEST_F(FileBlobStoreTest, WhatWasHashedToBeAdoptedIsNotReadAgain) {
+  std::stop_source stopped;
+  stopped.request_stop();
+  test::write_file(data_.scratch() / "made", "hello");
+  blobs_.adopt(data_.scratch() / "made", digest_of(data_.scratch() / "made"));
+  EXPECT_TRUE(blobs_.is_intact(kHello, stopped.get_token()));
+  test::write_file(blobs_.path_of(kHello), "hallo");
+  EXPECT_EQ(code_thrown_by([&] { blobs_.is_intact(kHello, stopped.get_token()); }),
+            ErrorCode::kCancelled);
+  EXPECT_FALSE(blobs_.is_intact(kHello, {}));
+}
+
+// Of one size, and so soon that the system's times of writing may be the same.
+TEST_F(FileBlobStoreTest, WhatIsChangedRightAfterItsAdoptionIsReadAgain) {
+  for (int n = 0; n < 50; ++n) {
+    const std::string text = std::to_string(1000 + n);
+    test::write_file(data_.scratch() / "made", text);
+    const Blob blob = digest_of(data_.scratch() / "made");
+    blobs_.adopt(data_.scratch() / "made", blob);
+    test::write_file(blobs_.path_of(blob.key), "more");
+    EXPECT_FALSE(blobs_.is_intact(blob.key, {}));
+  }
 }
 
 class Sweeping : public FileBlobStoreTest {

@@ -7,10 +7,13 @@
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 
-#include "tests/unit/volume/files.h"
+#include "tests/support/files.h"
 
 namespace isomesh::volume::test {
 namespace {
+
+using isomesh::test::read_file;
+using isomesh::test::TemporaryFolder;
 
 CanonicalHeader small_header() {
   CanonicalHeader header;
@@ -21,19 +24,19 @@ CanonicalHeader small_header() {
   return header;
 }
 
-std::string written(const Folder& folder, const CanonicalHeader& header) {
-  CanonicalWriter writer(folder.path("volume"), header);
+std::string written(const TemporaryFolder& folder, const CanonicalHeader& header) {
+  CanonicalWriter writer(folder / "volume", header);
   for (std::size_t at = 0; at < writer.samples().size(); ++at) {
     writer.samples()[at] = static_cast<std::byte>(at);
   }
   writer.finish();
-  return read_file(folder.path("volume"));
+  return read_file(folder / "volume");
 }
 
 TEST(Canonical, IsReadBackExactly) {
-  const Folder folder;
+  const TemporaryFolder folder;
   written(folder, small_header());
-  const CanonicalVolume volume(folder.path("volume"));
+  const CanonicalVolume volume(folder / "volume");
   EXPECT_EQ(volume.header().dims, small_header().dims);
   EXPECT_EQ(volume.header().type, SampleType::kInt16);
   EXPECT_EQ(volume.header().geometry, small_header().geometry);
@@ -43,7 +46,7 @@ TEST(Canonical, IsReadBackExactly) {
 }
 
 TEST(Canonical, HasOneFormForOneVolume) {
-  const Folder folder;
+  const TemporaryFolder folder;
   CanonicalHeader header = small_header();
   const std::string with_negative_zero = written(folder, header);
   header.geometry.origin[0] = 0.0;
@@ -56,11 +59,11 @@ TEST(Canonical, HasOneFormForOneVolume) {
 }
 
 TEST(Canonical, RefusesEverythingElse) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string good = written(folder, small_header());
   const auto refused = [&](const std::string& bytes) {
-    folder.write("other", bytes);
-    EXPECT_THROW(CanonicalVolume volume(folder.path("other")), Error);
+    isomesh::test::write_file(folder / "other", bytes);
+    EXPECT_THROW(CanonicalVolume volume(folder / "other"), Error);
   };
   const auto replaced = [&](std::string_view from, std::string_view to) {
     std::string bytes = good;
@@ -88,24 +91,24 @@ TEST(Canonical, RefusesEverythingElse) {
   replaced("\"spacing\":[0.1", "\"spacing\":[-0.1");
   replaced("\"spacing\":[0.1", "\"spacing\":[null");
   replaced("12.5", "1e300");
-  EXPECT_THROW(CanonicalVolume volume(folder.path("absent")), Error);
+  EXPECT_THROW(CanonicalVolume volume(folder / "absent"), Error);
 }
 
 TEST(Canonical, MovesWithItsMapping) {
-  const Folder folder;
+  const TemporaryFolder folder;
   written(folder, small_header());
-  CanonicalVolume one(folder.path("volume"));
+  CanonicalVolume one(folder / "volume");
   const CanonicalVolume other(std::move(one));
   EXPECT_EQ(other.samples()[5], std::byte{5});
 }
 
 // More than any file system holds, so that the first thing done is refused by the disk.
 TEST(Canonical, TellsOfAFullDiskBeforeItIsMapped) {
-  const Folder folder;
+  const TemporaryFolder folder;
   CanonicalHeader header = small_header();
   header.dims = {1U << 20, 1U << 20, 1U << 18};
   try {
-    CanonicalWriter writer(folder.path("volume"), header);
+    CanonicalWriter writer(folder / "volume", header);
     FAIL() << "There is room for 2^59 bytes.";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kOutOfSpace) << error.what();

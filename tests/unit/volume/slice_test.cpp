@@ -8,13 +8,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/files.h"
 #include "tests/support/png.h"
-#include "tests/unit/volume/files.h"
 
 namespace isomesh::volume::test {
 namespace {
 
 using isomesh::test::GreyPicture;
+using isomesh::test::TemporaryFolder;
 using testing::ElementsAre;
 
 class SliceTest : public testing::Test {
@@ -22,10 +23,10 @@ class SliceTest : public testing::Test {
   template <class Sample>
   std::shared_ptr<const CanonicalVolume> volume_of(const CanonicalHeader& header,
                                                    const std::vector<Sample>& samples) {
-    CanonicalWriter writer(folder_.path("volume"), header);
+    CanonicalWriter writer(folder_ / "volume", header);
     std::memcpy(writer.samples().data(), samples.data(), writer.samples().size());
     writer.finish();
-    return std::make_shared<const CanonicalVolume>(folder_.path("volume"));
+    return std::make_shared<const CanonicalVolume>(folder_ / "volume");
   }
 
   // The sample (i,j,k) is 100 k + 10 j + i.
@@ -53,7 +54,7 @@ class SliceTest : public testing::Test {
     return isomesh::test::read_png(bytes);
   }
 
-  const Folder folder_;
+  const TemporaryFolder folder_;
 };
 
 TEST_F(SliceTest, HasTheSamplesOfEachAxisInTheirOrder) {

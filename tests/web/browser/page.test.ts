@@ -9,9 +9,10 @@ import {
   chordOfBall,
   contourPixels,
   Daemon,
-  desk,
+  setup,
   drop,
   noiseNrrd,
+  openedJob,
   openPage,
   settled,
   silhouette,
@@ -20,15 +21,10 @@ import {
   type JobAnswer,
 } from './support';
 
-const at = desk();
+const at = setup();
 
 function query(): URLSearchParams {
   return new URLSearchParams(new URL(at.page.url()).hash.split('?')[1] ?? '');
-}
-
-async function job(): Promise<JobAnswer> {
-  const id = /#\/jobs\/([^?]+)/.exec(at.page.url())?.[1] ?? '';
-  return at.daemon.json(`/v1/jobs/${id}`);
 }
 
 describe('a real volume', () => {
@@ -62,7 +58,7 @@ describe('a real volume', () => {
     await page.getByRole('button', { name: 'Make the surface' }).click();
     await page.waitForURL(/#\/jobs\//);
     await surfaceLoaded(page);
-    const { mesh } = await job();
+    const { mesh } = await openedJob(at);
     if (!mesh) throw new Error('the job made no mesh');
     expect(mesh.triangles).toBe(estimated);
 
@@ -193,6 +189,25 @@ describe('a surface', () => {
     expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
   });
 
+  it('comes to rest where frames are too quick for its coarse copy', async () => {
+    const { daemon, page } = at;
+    const before = page.viewportSize() ?? { width: 1280, height: 800 };
+    try {
+      await page.setViewportSize({ width: 360, height: 300 });
+      await page.goto(`${daemon.url}/#/jobs/${made.id}`);
+      await surfaceLoaded(page);
+      const canvas = await page.locator('.viewport canvas').boundingBox();
+      if (!canvas) throw new Error('there is no canvas');
+      await page.mouse.move(canvas.x + canvas.width / 2, canvas.y + canvas.height / 2);
+      await page.mouse.down();
+      await page.mouse.move(canvas.x + canvas.width / 2 + 30, canvas.y + canvas.height / 2, { steps: 2 });
+      await page.mouse.up();
+      await still(page);
+    } finally {
+      await page.setViewportSize(before);
+    }
+  });
+
   it('is compared with others by linked cameras', async () => {
     const { daemon, page } = at;
     await page.goto(`${daemon.url}/#/jobs/${made.id}`);
@@ -227,7 +242,7 @@ describe('a job', () => {
     await page.getByRole('button', { name: 'Cancel' }).click();
     await expect.poll(() => page.locator('.job').getAttribute('data-state')).toBe('cancelled');
     expect(await page.locator('.refusal').innerText()).toMatch(/Cancelled/);
-    expect((await job()).state).toBe('cancelled');
+    expect((await openedJob(at)).state).toBe('cancelled');
   });
 
   it('is shown as lost when nobody answers, and goes on when somebody does', async () => {

@@ -80,6 +80,7 @@ export function makeToken(file: string): string {
 export interface JobAnswer {
   id: string;
   state: string;
+  parameters: Record<string, unknown>;
   mesh: {
     triangles: number;
     bounds: [[number, number, number], [number, number, number]];
@@ -133,15 +134,15 @@ export async function openPage(
   return { page, faults };
 }
 
-export interface Desk extends OpenPage {
+export interface Setup extends OpenPage {
   browser: Browser;
   daemon: Daemon;
 }
 
 // A browser and a daemon for the tests of a file, with a fresh page for each of them, that may have no
 // faults. To be taken apart inside of a test.
-export function desk(options: Parameters<Browser['newPage']>[0] = {}): Desk {
-  const made = {} as Desk;
+export function setup(options: Parameters<Browser['newPage']>[0] = {}): Setup {
+  const made = {} as Setup;
   beforeAll(async () => {
     made.browser = await startBrowser();
     made.daemon = await Daemon.start();
@@ -158,6 +159,12 @@ export function desk(options: Parameters<Browser['newPage']>[0] = {}): Desk {
     expect(made.faults).toEqual([]);
   });
   return made;
+}
+
+// The job whose page is open.
+export function openedJob({ page, daemon }: Setup): Promise<JobAnswer> {
+  const id = /#\/jobs\/([^?]+)/.exec(page.url())?.[1] ?? '';
+  return daemon.json(`/v1/jobs/${id}`);
 }
 
 // How far apart two points of a ball are that are seen left and right of its middle, each at that part of

@@ -1,9 +1,9 @@
 // The page under fingers, as on a tablet.
 import type { CDPSession, Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, chordOfBall, contourPixels, desk, settled, silhouette, still, surfaceLoaded } from './support';
+import { ballNrrd, chordOfBall, contourPixels, setup, settled, silhouette, still, surfaceLoaded } from './support';
 
-const at = desk({ viewport: { width: 820, height: 1180 }, hasTouch: true, isMobile: true });
+const at = setup({ viewport: { width: 820, height: 1180 }, hasTouch: true, isMobile: true });
 
 interface Point {
   x: number;

@@ -8,14 +8,14 @@ import {
   brain,
   contourPixels,
   Daemon,
-  desk,
+  setup,
   drop,
   makeToken,
   openPage,
   surfaceLoaded,
 } from './support';
 
-const at = desk();
+const at = setup();
 
 describe('several files', () => {
   it('are packed in the browser and come as one volume', async () => {

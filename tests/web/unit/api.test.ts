@@ -71,7 +71,7 @@ describe('uploadPath', () => {
   it('describes raw samples and the series', () => {
     expect(uploadPath({})).toBe('/v1/volumes');
     expect(uploadPath({ series: '1.2.3' })).toBe('/v1/volumes?series=1.2.3');
-    const raw = { dims: [2, 3, 4] as [number, number, number], type: 'int16', spacing: [1, 1, 0.5] as [number, number, number], byteOrder: 'big' as const };
+    const raw = { dims: [2, 3, 4] as [number, number, number], type: 'int16' as const, spacing: [1, 1, 0.5] as [number, number, number], byteOrder: 'big' as const };
     expect(decodeURIComponent(uploadPath({ raw }))).toBe('/v1/volumes?dims=2,3,4&type=int16&spacing=1,1,0.5&byte_order=big');
   });
 });

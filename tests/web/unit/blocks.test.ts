@@ -92,7 +92,7 @@ describe('blocks', () => {
 });
 
 describe('Seams', () => {
-  it('makes the light flow over a seam as if there were none', () => {
+  it('gives vertices on a seam the normals that they had without it', () => {
     const left = prepare(sheet(20));
     const right = prepare(sheet(20, 20));
     const seams = new Seams();

@@ -1,9 +1,19 @@
 import { describe, expect, it } from 'vitest';
-import type { JobParameters } from '@/api/types';
+import type { Job, JobParameters } from '@/api/types';
 import { parseRoute, hashOf } from '@/ui/route';
 import { formatBytes, formatCount, formatMilliseconds, formatValue } from '@/ui/format';
-import { defaultParameters, memorable, parametersOfQuery, queryOfParameters } from '@/volume/parameters';
-import { commandSnippet, curlSnippet } from '@/volume/snippets';
+import { differences } from '@/job/differences';
+import {
+  changed,
+  defaultParameters,
+  isSameJob,
+  jobRequest,
+  parametersOfQuery,
+  queryOfParameters,
+  variantOf,
+} from '@/job/parameters';
+import { commandSnippet, curlSnippet, librarySnippet } from '@/job/snippets';
+import { parameterOf } from '@/job/table';
 import { rawFault } from '@/volume/raw';
 import { draggedWindow } from '@/views/slice_view';
 import { inSlice, windowToFetch } from '@/volume/slices';
@@ -18,6 +28,8 @@ const other: JobParameters = {
   passes: 0,
   smoothing: 'taubin',
   lambda: 0.5,
+  pass_band: 0.05,
+  normals: true,
   close: true,
   components: { keep: 2, min_triangles: null },
   max_displacement_mm: 0.25,
@@ -58,7 +70,7 @@ describe('routes', () => {
 
 describe('snippets', () => {
   it('say what is not the default, and nothing else', () => {
-    expect(memorable(defaults)).toEqual({ volume: defaults.volume, iso: 60, formats: ['glb'] });
+    expect(jobRequest(defaults)).toEqual({ volume: defaults.volume, iso: 60, formats: ['glb'] });
     const text = commandSnippet('http://h:1', other, true);
     for (const option of ['--iso -300.5', '--scheme 5', '--passes 0', '--lambda 0.5', '--close', '--keep-components 2', '--format glb,stl', '--token']) {
       expect(text).toContain(option);
@@ -66,18 +78,85 @@ describe('snippets', () => {
     expect(commandSnippet('http://h:1', defaults, false)).not.toContain('--scheme');
   });
 
-  it('leave a step to the method unless it was chosen', () => {
-    expect(memorable({ ...defaults, lambda: 1 }).lambda).toBe(undefined);
-    expect(memorable({ ...defaults, lambda: 0.5 }).lambda).toBe(0.5);
-    expect(memorable({ ...defaults, smoothing: 'taubin' })).toMatchObject({ smoothing: 'taubin' });
-    expect('components' in memorable(defaults)).toBe(false);
+  it('have a value on the command line for each option that takes one', () => {
+    expect(commandSnippet('http://h:1', other, false)).toContain('--pass-band 0.05 --max-displacement 0.25 --close --keep');
   });
 
   it('hold a body that is the job', () => {
     const text = curlSnippet('http://h:1', other, false);
     const body = /-d '(.*)'$/m.exec(text)?.[1] ?? '';
-    expect(JSON.parse(body)).toEqual(memorable(other));
+    expect(JSON.parse(body)).toEqual(jobRequest(other));
     expect(text).not.toContain('Authorization');
+    expect(librarySnippet('http://h:1', other, false)).toContain(body);
+    expect(librarySnippet('http://h:1', other, true)).toContain('getenv("ISOMESH_TOKEN")');
+  });
+
+  it('do not repeat whom to call', () => {
+    const called: JobParameters = { ...other, callback: { url: 'https://h/?secret=1' } };
+    for (const text of [curlSnippet, commandSnippet, librarySnippet].map((snippet) => snippet('http://h:1', called, false))) {
+      expect(text).not.toContain('secret');
+    }
+    expect(JSON.stringify(queryOfParameters(called, defaults))).not.toContain('secret');
+  });
+});
+
+describe('the kind of smoothing', () => {
+  const smoothing = parameterOf('smoothing');
+  // As the daemon answers: with the step that each kind has by itself.
+  const laplacian: JobParameters = { ...defaults, lambda: 1 };
+  const taubin: JobParameters = { ...defaults, smoothing: 'taubin', lambda: 0.33 };
+
+  it('has a step of its own, which is left to the daemon', () => {
+    expect(jobRequest(laplacian)).not.toHaveProperty('lambda');
+    expect(jobRequest(taubin)).not.toHaveProperty('lambda');
+    expect(queryOfParameters(laplacian, defaults).lambda).toBe('');
+    expect(queryOfParameters(taubin, defaults).lambda).toBe('');
+    expect(jobRequest({ ...laplacian, lambda: 0.33 })).toMatchObject({ lambda: 0.33 });
+    expect(jobRequest({ ...taubin, lambda: 0.5 })).toMatchObject({ lambda: 0.5 });
+  });
+
+  it('takes no step along when it is switched', () => {
+    // 1 would be refused, 0.33 would be a third of the smoothing without a word.
+    expect(jobRequest(changed(laplacian, smoothing, 'taubin'))).toEqual({ ...jobRequest(defaults), smoothing: 'taubin' });
+    expect(jobRequest(changed(taubin, smoothing, 'laplacian'))).toEqual(jobRequest(defaults));
+    expect(changed({ ...taubin, lambda: 0.5, pass_band: 0.2 }, smoothing, 'laplacian')).toMatchObject({ lambda: null, pass_band: 0.1 });
+    expect(changed({ ...taubin, lambda: 0.5 }, smoothing, 'taubin').lambda).toBe(0.5);
+    expect(changed({ ...taubin, lambda: 0.5 }, parameterOf('passes'), 9).lambda).toBe(0.5);
+  });
+
+  it('is compared with the other by the steps of each', () => {
+    expect(jobRequest(variantOf(taubin, { smoothing: 'laplacian' }))).toEqual(jobRequest(defaults));
+    expect(isSameJob(laplacian, variantOf(laplacian, { smoothing: 'laplacian' }))).toBe(true);
+    expect(isSameJob(laplacian, variantOf(laplacian, { smoothing: 'taubin' }))).toBe(false);
+    expect(isSameJob(laplacian, variantOf(laplacian, { passes: 0 }))).toBe(false);
+  });
+
+  it('decides which steps an address may hold', () => {
+    const read = (query: string): JobParameters => parametersOfQuery(new URLSearchParams(query), defaults);
+    expect(read('lambda=1&smoothing=taubin').lambda).toBe(null);
+    expect(read('lambda=0.6&smoothing=taubin').lambda).toBe(0.6);
+    expect(read('lambda=1').lambda).toBe(1);
+  });
+
+  it('keeps its pass band to itself', () => {
+    expect(jobRequest({ ...taubin, pass_band: 0.2 })).toMatchObject({ pass_band: 0.2 });
+    expect(jobRequest({ ...laplacian, pass_band: 0.2 })).not.toHaveProperty('pass_band');
+  });
+});
+
+describe('jobs that are compared', () => {
+  const jobs = (...all: Partial<JobParameters>[]): Job[] =>
+    all.map((one) => ({ parameters: { ...defaults, ...one } }) as Job);
+
+  it('are named by what differs, whichever parameter it is', () => {
+    expect(differences(jobs({ passes: 0 }, { passes: 5 }))).toEqual(['0 passes', '5 passes']);
+    expect(differences(jobs({ max_displacement_mm: null }, { max_displacement_mm: 0.5 }))).toEqual([
+      'move at most: no limit',
+      'move at most: 0.5 mm',
+    ]);
+    expect(differences(jobs({ formats: ['glb'] }, { formats: ['glb', 'stl'] }))).toEqual(
+      Array(2).fill('the same parameters'),
+    );
   });
 });
 

@@ -1,7 +1,7 @@
 // The daemon's routes as functions. Failures are thrown as ApiError.
 import { asApiError, errorOf } from './problem';
 import { Signal } from '../ui/signal';
-import type { Estimate, Histogram, Job, JobParameters, Volume } from './types';
+import type { Axis, Estimate, Histogram, Job, JobList, JobRequest, Volume, VolumeList } from './types';
 
 const tokenKey = 'isomesh.token';
 
@@ -44,7 +44,7 @@ async function json<T>(path: string, init?: RequestInit): Promise<T> {
 }
 
 export async function listVolumes(): Promise<Volume[]> {
-  return (await json<{ volumes: Volume[] }>('/v1/volumes')).volumes;
+  return (await json<VolumeList>('/v1/volumes')).volumes;
 }
 
 export function getVolume(id: string): Promise<Volume> {
@@ -60,18 +60,9 @@ export function histogramOf(id: string, bins: number, signal?: AbortSignal): Pro
 }
 
 // What a job with these parameters would make.
-export function estimateOf(
-  { formats = [], draco, components, ...parameters }: Partial<JobParameters>,
-  signal?: AbortSignal,
-): Promise<Estimate> {
-  const query = new URLSearchParams({ format: formats.join(',') });
-  for (const [name, value] of Object.entries({ ...parameters, ...draco, ...components })) {
-    if (value !== null && value !== undefined) query.set(name, String(value));
-  }
+export function estimateOf(query: URLSearchParams, signal?: AbortSignal): Promise<Estimate> {
   return json(`/v1/estimate?${query.toString()}`, { signal });
 }
-
-export type Axis = 'x' | 'y' | 'z';
 
 export async function slicePicture(
   id: string,
@@ -85,12 +76,7 @@ export async function slicePicture(
   return (await send(path, { signal })).blob();
 }
 
-export interface JobPage {
-  jobs: Job[];
-  next: string | null;
-}
-
-export function listJobs(cursor = ''): Promise<JobPage> {
+export function listJobs(cursor = ''): Promise<JobList> {
   return json(`/v1/jobs${cursor === '' ? '' : `?cursor=${encodeURIComponent(cursor)}`}`);
 }
 
@@ -109,14 +95,14 @@ function randomKey(): string {
 const submitRetries = 3;
 
 // The key makes trying again safe: when only the answer was lost, it is the same job.
-export async function submitJob(parameters: Partial<JobParameters>): Promise<Job> {
+export async function submitJob(request: JobRequest): Promise<Job> {
   const key = randomKey();
   for (let attempt = 1; ; attempt += 1) {
     try {
       return await json<Job>('/v1/jobs', {
         method: 'POST',
         headers: { 'Content-Type': 'application/json', 'Idempotency-Key': key },
-        body: JSON.stringify(parameters),
+        body: JSON.stringify(request),
       });
     } catch (error) {
       if (attempt > submitRetries || !asApiError(error).isUnreachable) throw error;

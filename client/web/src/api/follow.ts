@@ -40,7 +40,7 @@ async function followEvents(
     });
   } catch (error) {
     const refusal = asApiError(error);
-    // Full or not there: asking does as well.
+    // The daemon has no stream, or none to spare: asking again and again does as well.
     if ([404, 405, 406, 429, 503].includes(refusal.status)) return false;
     throw error;
   }

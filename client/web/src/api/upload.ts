@@ -1,11 +1,11 @@
 // Uploads with their progress, which fetch cannot tell.
 import { connected, headers, unauthorized } from './client';
 import { ApiError, errorOf, unreachable } from './problem';
-import type { Volume } from './types';
+import type { SampleType, Volume } from './types';
 
 export interface RawDescription {
   dims: [number, number, number];
-  type: string;
+  type: SampleType;
   spacing: [number, number, number];
   byteOrder: 'little' | 'big';
 }

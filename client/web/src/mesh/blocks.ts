@@ -12,7 +12,7 @@ export interface Block {
   index: Uint16Array<ArrayBuffer>;
   // Fewer triangles of the same vertices.
   coarse: Uint16Array<ArrayBuffer>;
-  // Four of 16 bits a vertex, normalised; the fourth fills up.
+  // Four numbers of 16 bits a vertex, normalised; the fourth is there to align the vertices to 4 bytes.
   normals: Int16Array<ArrayBuffer>;
   // Vertices on edges of one triangle, where the neighbouring block goes on, and their normals before
   // normalisation.
@@ -132,6 +132,9 @@ function meanEdge({ positions, index }: Triangles): number {
 // The triangles that are left when the vertices of a cell of that size become one, apart for each
 // octant that their normals point into, so that both sides of a thin wall stay. Vertices on the border
 // stay as well: the neighbouring block goes on there.
+//
+// meshoptimizer's simplifySloppy takes 1.4 to 1.8 times as long for as many triangles (5.1 million made
+// coarse: 272 against 154 ms) and joins vertices of both sides of a thin wall.
 export function clustered(
   { positions, index }: Triangles,
   normals: Float32Array,
@@ -141,7 +144,7 @@ export function clustered(
   if (!(cell > 0)) return Uint16Array.from(index);
   const first = new Map<number, number>();
   const heads = new Uint16Array(positions.length / 3);
-  // 15 bits an axis; cells that wrap around are too far apart to meet in a block.
+  // 15 bits an axis: cells whose numbers are the same by overflow are farther apart than a block is wide.
   const place = (at: number): number => Math.floor((positions[at] as number) / cell) & 0x7fff;
   const side = (at: number): number => ((normals[at] as number) < 0 ? 1 : 0);
   for (let vertex = 0; vertex < heads.length; vertex += 1) {
@@ -168,7 +171,7 @@ export function clustered(
   return kept.slice(0, used);
 }
 
-// Consecutive triangles with the vertices that they name, so many that 16 bits number them.
+// Parts of consecutive triangles, each with the vertices that it names: few enough for 16-bit indices.
 export function split({ positions, index }: Triangles): Triangles[] {
   if (index.length <= 3 * mostTriangles && positions.length <= 3 * mostVertices) {
     return [{ positions, index }];

@@ -99,7 +99,8 @@ export async function loadMesh(
       listener.onBlocks(blocks);
       listener.onProgress({ ...progress });
     });
-    // Looked at once all are under way; until then a failure must not count as unheard.
+    // Awaited with the others once all bytes are here. Without a handler until then, the browser would
+    // report a failure as one that nobody handles.
     done.catch(() => undefined);
     decoding.push(done);
   };

@@ -1,5 +1,6 @@
 // Normals across the seams of blocks. All blocks share one grid, so that a vertex on a seam has the
-// same bits in every block that names it: the sums of its normals add up, and light flows over the seam.
+// same bits in every block that names it: the sums of its normals add up, and the shading goes on across
+// the seam without an edge.
 import { packNormal, type Block } from './blocks';
 
 export class Seams {

@@ -4,7 +4,7 @@ const slowFrame = 45; // milliseconds
 const keptFrames = 120;
 
 export class FrameBudget {
-  // Durations of the last frames while the surface was moving, for tests and for people who wonder.
+  // Durations of the last frames while the surface was moving, for measurements.
   readonly moving: number[] = [];
   private cost = 0;
   private later = 0;

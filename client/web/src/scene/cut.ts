@@ -14,8 +14,7 @@ import {
   type Object3D,
   type Raycaster,
 } from 'three';
-import type { Axis } from '../api/client';
-import type { Volume } from '../api/types';
+import type { Axis, Volume } from '../api/types';
 import { axisDirection, axisIndex, toPatient } from '../volume/geometry';
 
 export interface CutPlace {

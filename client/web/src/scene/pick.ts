@@ -1,4 +1,6 @@
-// Where a ray meets triangles. three's own way makes objects for every one of millions.
+// Where a ray meets triangles. three's own way makes objects for every one of millions. A tree of boxes
+// (three-mesh-bvh) finds the place at once where it is there, but building it takes as long as a hundred
+// searches through all triangles that a ray may meet, and a person measures with a few.
 import type { Plane, Ray } from 'three';
 
 // Parts of a ray, in lengths of its direction.

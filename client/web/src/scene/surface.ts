@@ -145,7 +145,7 @@ export class Surface {
     this.budget.soon(() => this.draw());
   }
 
-  // To be called once the last block has come: light flows over the seams from then on.
+  // To be called once the last block has come: from then on the shading has no edges at the seams.
   finish(): void {
     this.joinSeams(0);
   }
@@ -217,7 +217,7 @@ export class Surface {
     this.nudge({ offset: [offset[0] * factor, offset[1] * factor, offset[2] * factor], target });
   }
 
-  // By parts of the view's height.
+  // Both in parts of the view's height.
   pan(right: number, up: number): void {
     const { offset, target } = this.place;
     const height = 2 * Math.hypot(...offset) * Math.tan((verticalAngle * Math.PI) / 360);
@@ -291,7 +291,11 @@ export class Surface {
     this.rulers.placeLabels(this.camera, width, height);
     this.budget.drawn(began, this.isMoving);
     if (this.isMoving && this.budget.isSlow) this.setCoarse(true);
-    // What is seen is all of it, and nothing is to be drawn any more.
+    this.noteStill();
+  }
+
+  // What is seen is all of it, and nothing is to be drawn any more.
+  private noteStill(): void {
     if (!this.isMoving && !this.isCoarse && this.scheduled === 0) this.host.dataset.still = '';
   }
 
@@ -335,6 +339,8 @@ export class Surface {
     this.settling = window.setTimeout(() => {
       this.isMoving = false;
       this.setCoarse(false);
+      // Where frames are quick nothing was coarse, and the last frame is the final one.
+      this.noteStill();
     }, settleDelay);
   }
 

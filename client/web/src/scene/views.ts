@@ -13,16 +13,16 @@ export const viewTitles: Record<ViewName, string> = {
   I: 'Inferior: from below',
 };
 
-// From the middle to the camera. The views along the head's axis lean by a hair, so that the front is
+// From the middle to the camera. The views along the head's axis are tilted a little, so that the front is
 // up on the screen.
-const lean = 1e-4;
+const tilt = 1e-4;
 export const viewOffsets: Record<ViewName, Vec3> = {
   A: [0, -1, 0],
   P: [0, 1, 0],
   L: [1, 0, 0],
   R: [-1, 0, 0],
-  S: [0, lean, 1],
-  I: [0, -lean, -1],
+  S: [0, tilt, 1],
+  I: [0, -tilt, -1],
 };
 
 export interface CameraPlace {
@@ -37,7 +37,7 @@ export function turned(offset: Vec3, azimuth: number, elevation: number): Vec3 {
   const radius = Math.hypot(...offset);
   if (!(radius > 0)) return offset;
   const around = Math.atan2(offset[1], offset[0]) + azimuth;
-  const limit = Math.PI / 2 - lean;
+  const limit = Math.PI / 2 - tilt;
   const height = Math.asin(Math.max(-1, Math.min(1, offset[2] / radius))) + elevation;
   const up = Math.max(-limit, Math.min(limit, height));
   return [

@@ -80,7 +80,7 @@ export interface Choice<T extends string> {
   title?: string;
 }
 
-// A row of buttons of which one is down.
+// A row of choices, of which exactly one is chosen.
 export function segmented<T extends string>(
   label: string,
   choices: readonly Choice<T>[],
@@ -124,7 +124,7 @@ export function checkbox(
   return h('label', { class: 'check' }, input, h('span', {}, label));
 }
 
-// True while keys belong to a control and not to the page.
+// True while a control takes what is typed, so that the keys are no shortcuts of the page.
 export function isTyping(event: KeyboardEvent): boolean {
   const target = event.target as HTMLElement | null;
   return target?.closest('input:not([type=checkbox]):not([type=radio]), textarea, select, dialog') != null;

@@ -23,6 +23,10 @@ export function formatValue(value: number): string {
   return formatNumber(value, Math.max(0, 3 - Math.floor(Math.log10(size))));
 }
 
+export function formatIso(iso: number | 'otsu'): string {
+  return iso === 'otsu' ? 'Otsu' : formatValue(iso);
+}
+
 const units = ['B', 'KB', 'MB', 'GB', 'TB'];
 
 export function formatBytes(bytes: number): string {

@@ -27,7 +27,7 @@ export class Signal<T> {
   }
 }
 
-// What a view holds and has to give back when it goes.
+// Ends a view's listeners, timers and requests when a person leaves the view.
 export class Scope {
   private readonly ends: (() => void)[] = [];
   private readonly controller = new AbortController();

@@ -1,7 +1,10 @@
 // Small charts of a job's numbers.
-import type { Distribution, Stages, Timing } from '../api/types';
+import type { Distribution, QualityStages } from '../api/types';
 import { h, svg } from '../ui/dom';
 import { formatMilliseconds, formatNumber } from '../ui/format';
+
+// In milliseconds, by stage.
+export type Durations = Readonly<Record<string, number>>;
 
 export interface Step {
   name: string;
@@ -12,7 +15,7 @@ export interface Step {
 const order = ['queue', 'load', 'extract', 'smooth', 'encode'];
 
 // The stages one after the other; members that this page does not know come at the end.
-export function stepsOf(timing: Timing, more: Timing = {}): Step[] {
+export function stepsOf(timing: Durations, more: Durations = {}): Step[] {
   const known = order.filter((name) => name in timing);
   const others = Object.keys(timing).filter((name) => !order.includes(name) && name !== 'total');
   let begin = 0;
@@ -60,7 +63,7 @@ const height = 44;
 // Both distributions in one picture: before smoothing as an outline, after it filled.
 export function distributionChart(
   title: string,
-  stages: Stages<Distribution>,
+  stages: QualityStages,
   most: number,
   unit: string,
 ): HTMLElement {

@@ -2,8 +2,10 @@
 import { getJob, getVolume } from '../api/client';
 import { follow } from '../api/follow';
 import { ApiError, asApiError, errorOfProblem } from '../api/problem';
-import { isFinal, type Job, type JobParameters } from '../api/types';
-import { placeOfText, placeToText, viewNames, viewTitles } from '../scene/views';
+import { isFinal, type Job, type Volume } from '../api/types';
+import { differences } from '../job/differences';
+import type { SurfaceStyle } from '../scene/surface';
+import { placeOfText, placeToText, viewNames, viewTitles, type CameraPlace } from '../scene/views';
 import { button, h } from '../ui/dom';
 import { formatCount, formatMilliseconds, formatNumber, formatValue } from '../ui/format';
 import { refusal } from '../ui/notices';
@@ -15,41 +17,20 @@ import { SurfacePane } from './surface_pane';
 const most = 4;
 const noteDelay = 300;
 
-// The parameters in which the jobs differ, in words for each job.
-export function differences(jobs: readonly Job[]): string[] {
-  const words: [keyof JobParameters, (parameters: JobParameters) => string][] = [
-    ['volume', ({ volume }) => `volume ${volume.slice(0, 8)}`],
-    ['iso', ({ iso }) => `iso ${iso === 'otsu' ? 'Otsu' : formatValue(iso)}`],
-    ['scheme', ({ scheme }) => `${scheme} tetrahedra`],
-    ['interpolation', ({ interpolation }) => interpolation],
-    ['passes', ({ passes }) => `${passes} passes`],
-    ['smoothing', ({ smoothing }) => smoothing],
-    ['lambda', ({ lambda }) => `lambda ${lambda}`],
-    ['close', ({ close }) => (close ? 'closed' : 'open')],
-  ];
-  const varying = words.filter(
-    ([name]) => new Set(jobs.map(({ parameters }) => JSON.stringify(parameters[name]))).size > 1,
-  );
-  return jobs.map(({ parameters }) =>
-    varying.length > 0 ? varying.map(([, say]) => say(parameters)).join(', ') : 'the same parameters',
-  );
-}
-
 function numbersOf(job: Job): HTMLElement {
   const { mesh } = job;
   if (!mesh) return h('p', {}, job.state);
   const { extracted, smoothed } = mesh.volume_mm3;
   const percent = extracted === 0 ? 0 : (100 * (smoothed - extracted)) / Math.abs(extracted);
-  const work = (job.timing.total ?? 0) - (job.timing.queue ?? 0);
+  const work = job.timing.total - job.timing.queue;
   const rows: [string, string][] = [
     ['Triangles', formatCount(mesh.triangles)],
     ['Volume', `${formatValue(smoothed)} mm\u00b3`],
     ['by smoothing', `${percent > 0 ? '+' : ''}${formatNumber(percent, 2)} %`],
     // An equal job's files were there already.
     ['Time', work < 1 ? 'was made before' : formatMilliseconds(work)],
+    ['Mean smallest angle', `${formatNumber(mesh.quality.smallest_angle_deg.smoothed.mean, 1)}\u00b0`],
   ];
-  const angle = mesh.quality?.smallest_angle_deg?.smoothed;
-  if (angle) rows.push(['Mean smallest angle', `${formatNumber(angle.mean, 1)}\u00b0`]);
   return h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
 }
 
@@ -64,105 +45,136 @@ export async function compareView(scope: Scope, route: Route): Promise<HTMLEleme
     throw new ApiError(-1, 'Nothing to compare', 'Choose two to four jobs in the list of jobs.');
   }
   const jobs = await Promise.all(ids.map((id) => getJob(id)));
-  const titles = differences(jobs);
   const [first] = jobs;
   const volume = first ? await getVolume(first.volume).catch(() => null) : null;
-  const isOneVolume = jobs.every((job) => job.volume === volume?.id);
-  const camera = placeOfText(route.query.get('cam') ?? '');
-  const panes: SurfacePane[] = [];
-  let noting = 0;
-  scope.onEnd(() => clearTimeout(noting));
+  return new Comparison(scope, jobs, volume, placeOfText(route.query.get('cam') ?? '')).element;
+}
 
-  const showPane = async (job: Job, cell: HTMLElement): Promise<void> => {
-    const holder = cell.querySelector('.cell-view');
-    const facts = cell.querySelector('.cell-numbers');
-    if (!holder || !facts) return;
-    facts.replaceChildren(numbersOf(job));
-    if (job.state !== 'succeeded') {
-      const text = job.error ? errorOfProblem(job.error) : new ApiError(-1, 'Cancelled', 'The job made no surface.');
-      holder.replaceChildren(refusal(text));
-      return;
-    }
-    const start = panes[0]?.camera ?? camera;
-    const pane = new SurfacePane(scope, job, { hasKeys: false, camera: start, volume });
-    panes.push(pane);
-    pane.onCamera = (place) => {
-      for (const other of panes) if (other !== pane) other.follow(place);
-      clearTimeout(noting);
-      noting = window.setTimeout(() => noteInAddress({ cam: placeToText(place) }), noteDelay);
-    };
-    holder.replaceChildren(pane.element);
-    await pane.load();
-  };
+// One of the surfaces with its title and numbers.
+class Cell {
+  readonly element: HTMLElement;
+  private readonly status: HTMLElement;
+  private readonly view: HTMLElement;
+  private readonly numbers = h('div', { class: 'cell-numbers' });
 
-  const cells = jobs.map((job, place) => {
-    const status = h('p', { class: 'cell-status', role: 'status' }, job.state);
-    const cell = h(
+  constructor(job: Job, title: string) {
+    this.status = h('p', { class: 'cell-status', role: 'status' }, job.state);
+    this.view = h('div', { class: 'cell-view' }, this.status);
+    this.element = h(
       'section',
-      { class: 'cell', 'aria-label': titles[place] },
-      h(
-        'header',
-        {},
-        h('h2', {}, h('a', { href: hashOf(['jobs', job.id]) }, titles[place] ?? '')),
-        h('div', { class: 'cell-numbers' }),
-      ),
-      h('div', { class: 'cell-view' }, status),
+      { class: 'cell', 'aria-label': title },
+      h('header', {}, h('h2', {}, h('a', { href: hashOf(['jobs', job.id]) }, title)), this.numbers),
+      this.view,
     );
-    const onChange = (now: Job): void => {
-      status.textContent = `${now.state === 'queued' ? 'queued' : now.stage}, ${Math.round(100 * now.progress)} %`;
-    };
-    finished(job.id, scope, onChange).then(
-      (done) => {
-        // The cell has its place in the page by now.
-        if (!scope.isOver) void showPane(done, cell);
-      },
-      (error: unknown) => {
-        if (!scope.isOver) cell.querySelector('.cell-view')?.replaceChildren(refusal(asApiError(error)));
-      },
-    );
-    return cell;
-  });
+  }
 
-  const all = (run: (pane: SurfacePane) => void) => (): void => panes.forEach(run);
-  let isFlat = false;
-  let isWired = false;
-  const flat = button(
-    'Flat',
-    () => {
-      isFlat = !isFlat;
-      flat.setAttribute('aria-pressed', String(isFlat));
-      all((pane) => pane.setStyle({ shading: isFlat ? 'flat' : 'smooth' }))();
-    },
-    { 'aria-pressed': 'false' },
-  );
-  const wires = button(
-    'Wires',
-    () => {
-      isWired = !isWired;
-      wires.setAttribute('aria-pressed', String(isWired));
-      all((pane) => pane.setStyle({ wireframe: isWired }))();
-    },
-    { 'aria-pressed': 'false' },
-  );
-  return h(
-    'div',
-    { class: 'compare', 'data-count': cells.length },
-    h(
+  showProgress({ state, stage, progress }: Job): void {
+    this.status.textContent = `${state === 'queued' ? 'queued' : stage}, ${Math.round(100 * progress)} %`;
+  }
+
+  showNumbers(job: Job): void {
+    this.numbers.replaceChildren(numbersOf(job));
+  }
+
+  show(content: HTMLElement): void {
+    this.view.replaceChildren(content);
+  }
+}
+
+class Comparison {
+  readonly element: HTMLElement;
+  private readonly panes: SurfacePane[] = [];
+  private noting = 0;
+
+  constructor(
+    private readonly scope: Scope,
+    jobs: readonly Job[],
+    private readonly volume: Volume | null,
+    private readonly camera: CameraPlace | null,
+  ) {
+    const titles = differences(jobs);
+    const isOneVolume = jobs.every((job) => job.volume === volume?.id);
+    const cells = jobs.map((job, place) => this.cellFor(job, titles[place] ?? ''));
+    this.element = h(
+      'div',
+      { class: 'compare', 'data-count': cells.length },
+      this.head(volume && isOneVolume ? `Compare, ${volumeName(volume)}` : 'Compare'),
+      h('div', { class: 'grid' }, ...cells),
+    );
+    scope.onEnd(() => clearTimeout(this.noting));
+  }
+
+  private head(title: string): HTMLElement {
+    const views = viewNames.map((name) =>
+      button(name, () => this.panes[0]?.look(name), { 'aria-label': viewTitles[name], title: viewTitles[name] }),
+    );
+    return h(
       'div',
       { class: 'section-head' },
-      h('h1', { title: volume ? volumeName(volume) : '' }, volume && isOneVolume ? `Compare, ${volumeName(volume)}` : 'Compare'),
+      h('h1', { title: this.volume ? volumeName(this.volume) : '' }, title),
       h(
         'div',
         { class: 'tool-group', role: 'toolbar', 'aria-label': 'View of all' },
-        ...viewNames.map((name) =>
-          button(name, () => panes[0]?.look(name), { 'aria-label': viewTitles[name], title: viewTitles[name] }),
-        ),
-        button('Fit', () => panes[0]?.fit()),
-        flat,
-        wires,
+        ...views,
+        button('Fit', () => this.panes[0]?.fit()),
+        this.styleButton('Flat', (isOn) => ({ shading: isOn ? 'flat' : 'smooth' })),
+        this.styleButton('Wires', (isOn) => ({ wireframe: isOn })),
       ),
       h('span', { class: 'hint' }, 'The cameras are linked.'),
-    ),
-    h('div', { class: 'grid' }, ...cells),
-  );
+    );
+  }
+
+  // Switches a style of all surfaces.
+  private styleButton(text: string, styleFor: (isOn: boolean) => Partial<SurfaceStyle>): HTMLButtonElement {
+    let isOn = false;
+    const toggle = button(
+      text,
+      () => {
+        isOn = !isOn;
+        toggle.setAttribute('aria-pressed', String(isOn));
+        for (const pane of this.panes) pane.setStyle(styleFor(isOn));
+      },
+      { 'aria-pressed': 'false' },
+    );
+    return toggle;
+  }
+
+  private cellFor(job: Job, title: string): HTMLElement {
+    const cell = new Cell(job, title);
+    finished(job.id, this.scope, (now) => cell.showProgress(now)).then(
+      (done) => {
+        // The cell has its place in the page by now.
+        if (!this.scope.isOver) void this.showResult(done, cell);
+      },
+      (error: unknown) => {
+        if (!this.scope.isOver) cell.show(refusal(asApiError(error)));
+      },
+    );
+    return cell.element;
+  }
+
+  private async showResult(job: Job, cell: Cell): Promise<void> {
+    cell.showNumbers(job);
+    if (job.state !== 'succeeded') {
+      const reason = job.error ? errorOfProblem(job.error) : new ApiError(-1, 'Cancelled', 'The job made no surface.');
+      cell.show(refusal(reason));
+      return;
+    }
+    const pane = this.addPane(job);
+    cell.show(pane.element);
+    await pane.load();
+  }
+
+  // A surface whose camera moves those of the others.
+  private addPane(job: Job): SurfacePane {
+    const camera = this.panes[0]?.camera ?? this.camera;
+    const pane = new SurfacePane(this.scope, job, { hasKeys: false, camera, volume: this.volume });
+    this.panes.push(pane);
+    pane.onCamera = (place) => {
+      for (const other of this.panes) if (other !== pane) other.follow(place);
+      clearTimeout(this.noting);
+      this.noting = window.setTimeout(() => noteInAddress({ cam: placeToText(place) }), noteDelay);
+    };
+    return pane;
+  }
 }

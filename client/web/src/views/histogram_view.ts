@@ -1,9 +1,8 @@
 // The histogram with the iso-value as a line to drag.
-import type { Histogram } from '../api/types';
 import { h, svg } from '../ui/dom';
 import { formatValue } from '../ui/format';
 import type { Scope } from '../ui/signal';
-import { barHeights, binWidth, niceStep, quantile, ticks } from '../volume/histogram';
+import { barHeights, binWidth, niceStep, quantile, ticks, type Histogram } from '../volume/histogram';
 import type { Window } from '../volume/slices';
 
 const width = 320;

@@ -3,14 +3,14 @@ import { cancelJob, getJob, getVolume } from '../api/client';
 import { follow } from '../api/follow';
 import { asApiError, errorOfProblem } from '../api/problem';
 import { isFinal, type Job, type Volume } from '../api/types';
+import { inWords } from '../job/parameters';
 import { placeOfText, placeToText } from '../scene/views';
 import { button, h } from '../ui/dom';
-import { formatValue, shortId } from '../ui/format';
+import { formatIso, shortId } from '../ui/format';
 import { refusal, tellError } from '../ui/notices';
 import { noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { volumeName } from '../volume/names';
-import { inWords } from '../volume/parameters';
 import { againSection, changeLink, compareSection, downloads, numbers, quality, section, timings } from './job_panel';
 import { SurfacePane } from './surface_pane';
 
@@ -27,15 +27,11 @@ async function volumeOf(job: Job): Promise<Volume | null> {
   }
 }
 
-function isoText(job: Job): string {
-  return job.parameters.iso === 'otsu' ? 'Otsu' : formatValue(job.parameters.iso);
-}
-
 function head(job: Job, volume: Volume | null): HTMLElement {
   return h(
     'header',
     { class: 'panel-head' },
-    h('h1', {}, `Surface at ${isoText(job)}`),
+    h('h1', {}, `Surface at ${formatIso(job.parameters.iso)}`),
     h('p', { class: 'of-volume' }, volume ? volumeName(volume) : 'Its volume was erased'),
     h('p', {}, inWords(job.parameters)),
     h(
@@ -155,17 +151,15 @@ function showSurface(
   stageArea.replaceChildren(pane.element);
   const times = timings(job);
   panel.replaceChildren(
-    ...[
-      head(job, volume),
-      section('Numbers', numbers(mesh)),
-      times,
-      downloads(job),
-      quality(mesh),
-      compareSection(job),
-      againSection(job),
-    ].filter((part): part is HTMLElement => part !== null),
+    head(job, volume),
+    section('Numbers', numbers(mesh)),
+    times,
+    downloads(job),
+    quality(mesh),
+    compareSection(job),
+    againSection(job),
   );
-  // The view is in the page before the canvas asks for its size.
+  // The canvas takes its size from the page, so the view has to be in it first.
   requestAnimationFrame(() => {
     if (scope.isOver) return;
     void pane.load().then((timing) => {

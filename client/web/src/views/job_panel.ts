@@ -1,14 +1,15 @@
 // What stands beside a surface: its numbers, timings, files, and how to make others.
 import { submitJob, token } from '../api/client';
-import { meshFormats, type Job, type JobParameters, type MeshFormat, type MeshSummary, type Timing } from '../api/types';
+import type { Job, JobParameters, MeshFormat, MeshSummary } from '../api/types';
+import { defaultParameters, isSameJob, jobRequest, queryOfParameters, variantOf, withGlb } from '../job/parameters';
+import { commandSnippet, curlSnippet, librarySnippet } from '../job/snippets';
+import { meshFormats } from '../job/table';
 import { button, h, type Child } from '../ui/dom';
 import { formatBytes, formatCount, formatNames, formatNumber, formatValue, shortId } from '../ui/format';
 import { tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import { saveFile } from '../ui/save';
-import { defaultParameters, memorable, queryOfParameters, withGlb } from '../volume/parameters';
-import { commandSnippet, curlSnippet } from '../volume/snippets';
-import { distributionChart, stepsOf, waterfall } from './charts';
+import { distributionChart, stepsOf, waterfall, type Durations } from './charts';
 
 export function section(title: string, ...children: Child[]): HTMLElement {
   return h('section', { class: 'panel-section' }, h('h2', {}, title), ...children);
@@ -32,8 +33,8 @@ function sized(value: number, unit: string): string {
 export function numbers(mesh: MeshSummary): HTMLElement {
   const [low, high] = mesh.bounds;
   const extent = low.map((value, axis) => formatNumber((high[axis as 0] ?? 0) - value, 1)).join(' \u00d7 ');
-  const isClosed = mesh.quality?.closed ?? mesh.boundary_edges === 0;
   const { extracted, smoothed } = mesh.volume_mm3;
+  const { mean, max } = mesh.displacement_mm;
   const rows: [string, Child][] = [
     ['Triangles', formatCount(mesh.triangles)],
     ['Vertices', formatCount(mesh.vertices)],
@@ -52,29 +53,25 @@ export function numbers(mesh: MeshSummary): HTMLElement {
         'span',
         {},
         sized(mesh.area_mm2, 'mm\u00b2'),
-        mesh.area_extracted_mm2 !== undefined &&
-          h(
-            'span',
-            { class: 'faint' },
-            `${change(mesh.area_extracted_mm2, mesh.area_mm2)} was ${sized(mesh.area_extracted_mm2, 'mm\u00b2')}`,
-          ),
+        h(
+          'span',
+          { class: 'faint' },
+          `${change(mesh.area_extracted_mm2, mesh.area_mm2)} was ${sized(mesh.area_extracted_mm2, 'mm\u00b2')}`,
+        ),
       ),
     ],
     [
       'Closed',
-      isClosed
+      mesh.quality.closed
         ? 'yes'
         : h('span', { class: 'attention' }, `no, ${formatCount(mesh.boundary_edges)} edges on the border`),
     ],
     ['Parts', formatCount(mesh.components)],
-    ['Genus', mesh.quality?.genus == null ? '' : formatCount(mesh.quality.genus)],
+    ['Genus', mesh.quality.genus === null ? '' : formatCount(mesh.quality.genus)],
     ['Extent', `${extent} mm`],
+    ['Moved by smoothing', `mean ${formatNumber(mean, 3)}, most ${formatNumber(max, 3)} mm`],
   ];
-  if (mesh.displacement_mm) {
-    const { mean, max } = mesh.displacement_mm;
-    rows.push(['Moved by smoothing', `mean ${formatNumber(mean, 3)}, most ${formatNumber(max, 3)} mm`]);
-  }
-  if (mesh.dropped && mesh.dropped.components > 0) {
+  if (mesh.dropped.components > 0) {
     rows.push([
       'Dropped parts',
       `${formatCount(mesh.dropped.components)} of ${formatCount(mesh.dropped.triangles)} triangles`,
@@ -83,28 +80,27 @@ export function numbers(mesh: MeshSummary): HTMLElement {
   return definitions(rows.filter(([, value]) => value !== ''));
 }
 
-export function quality(mesh: MeshSummary): HTMLElement | null {
-  const { aspect_ratio: aspect, smallest_angle_deg: angle } = mesh.quality ?? {};
-  if (!aspect && !angle) return null;
+export function quality(mesh: MeshSummary): HTMLElement {
+  const { aspect_ratio: aspect, smallest_angle_deg: angle } = mesh.quality;
   return section(
     'Triangle quality',
     h(
       'div',
       { class: 'distributions' },
-      aspect && distributionChart('Radius ratio', aspect, 1, ''),
-      angle && distributionChart('Smallest angle', angle, 60, '\u00b0'),
+      distributionChart('Radius ratio', aspect, 1, ''),
+      distributionChart('Smallest angle', angle, 60, '\u00b0'),
     ),
     h('p', { class: 'hint' }, 'Filled: after smoothing. Line: before.'),
   );
 }
 
-export function timings(job: Job, more: Timing = {}): HTMLElement {
+export function timings(job: Job, more: Durations = {}): HTMLElement {
   return section('Time', waterfall(stepsOf(job.timing, more)));
 }
 
 // Makes the same surface with other parameters, or finds it made already.
 export async function submitVariant(job: Job, variant: Partial<JobParameters>): Promise<Job> {
-  return submitJob(memorable({ ...job.parameters, ...variant }));
+  return submitJob(jobRequest(variantOf(job.parameters, variant)));
 }
 
 export function downloads(job: Job): HTMLElement {
@@ -170,8 +166,8 @@ export const comparisons: readonly Comparison[] = [
   {
     title: 'Laplacian and Taubin',
     variants: [
-      { smoothing: 'laplacian', lambda: null },
-      { smoothing: 'taubin', lambda: null },
+      { smoothing: 'laplacian' },
+      { smoothing: 'taubin' },
     ],
   },
 ];
@@ -201,12 +197,7 @@ export function compareSection(job: Job): HTMLElement {
 }
 
 function isSame(job: Job, variant: Partial<JobParameters>): boolean {
-  return (
-    Object.entries(variant).every(
-      ([name, value]) => value === null || job.parameters[name as keyof JobParameters] === value,
-    ) &&
-    job.mesh?.files.glb !== undefined
-  );
+  return job.mesh?.files.glb !== undefined && isSameJob(job.parameters, variantOf(job.parameters, variant));
 }
 
 function copyButton(text: () => string): HTMLButtonElement {
@@ -230,6 +221,7 @@ export function againSection(job: Job): HTMLElement {
   const texts = {
     isomesh: commandSnippet(origin, job.parameters, hasToken),
     curl: curlSnippet(origin, job.parameters, hasToken),
+    library: librarySnippet(origin, job.parameters, hasToken),
   };
   const link = `${origin}/${hashOf(['jobs', job.id])}`;
   const block = (name: string, text: string): HTMLElement =>
@@ -245,6 +237,7 @@ export function againSection(job: Job): HTMLElement {
     h('div', { class: 'link-row' }, h('input', { readonly: true, value: link, 'aria-label': 'Link to this surface' }), copyButton(() => link)),
     block('With the isomesh command', texts.isomesh),
     block('With curl', texts.curl),
+    block('With the C++ library', texts.library),
   );
 }
 

@@ -1,171 +1,173 @@
-// The parameters of a job beside its iso-value.
-import { meshFormats, type JobParameters, type MeshFormat } from '../api/types';
+// The parameters of a job beside its iso-value, one control for each row of their table.
+import type { JobParameters, MeshFormat } from '../api/types';
+import { withGlb } from '../job/parameters';
+import {
+  applies,
+  defaultOf,
+  fits,
+  maximumOf,
+  meshFormats,
+  parameterOf,
+  parameters,
+  valueIn,
+  type Parameter,
+  type Value,
+} from '../job/table';
 import { checkbox, field, h, segmented } from '../ui/dom';
-import { formatNames } from '../ui/format';
-import { withGlb } from '../volume/parameters';
+import { formatNames, formatValue } from '../ui/format';
 
-export type Change = Partial<JobParameters>;
+export interface FormHost {
+  job: () => JobParameters;
+  set: (parameter: Parameter, value: Value) => void;
+}
 
-function numberInput(
-  value: number,
-  limits: { min: number; max: number; step: number },
-  onChange: (value: number) => void,
-): HTMLInputElement {
-  const input = h('input', { type: 'number', inputmode: 'decimal', value, ...limits });
-  input.addEventListener('input', () => {
-    const isGood = input.value !== '' && input.validity.valid;
-    input.toggleAttribute('aria-invalid', !isGood);
-    if (isGood) onChange(input.valueAsNumber);
+interface Control {
+  element: HTMLElement;
+  // Shows the job's present value.
+  update?: () => void;
+}
+
+// These are chosen elsewhere: the volume before, the iso-value in the histogram.
+const elsewhere = ['volume', 'iso'];
+// Those that are seen at once, in rows. All others are under "More".
+const front = [['scheme', 'interpolation'], ['smoothing', 'passes'], ['priority']];
+
+export const shown = parameters.filter(({ name }) => !elsewhere.includes(name));
+
+function isNumber({ kind }: Parameter): boolean {
+  return kind === 'number' || kind === 'integer';
+}
+
+function labelOf({ title, unit }: Parameter): string {
+  return unit === '' ? title : `${title}, in ${unit}`;
+}
+
+function capitalised(text: string): string {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+function choiceControl(parameter: Parameter, host: FormHost): Control {
+  const { values = [], valueHelp } = parameter;
+  const choices = values.map((value) => ({
+    value: String(value),
+    label: capitalised(String(value)),
+    title: valueHelp?.[String(value)],
+  }));
+  const value = String(valueIn(host.job(), parameter));
+  const set = (text: string): void =>
+    host.set(parameter, values.find((known) => String(known) === text) ?? text);
+  return { element: segmented(labelOf(parameter), choices, value, set) };
+}
+
+function switchControl(parameter: Parameter, host: FormHost): Control {
+  const isOn = valueIn(host.job(), parameter) === true;
+  return { element: checkbox(labelOf(parameter), isOn, (value) => host.set(parameter, value)) };
+}
+
+// The step of the arrows beside a number; other values may be typed.
+function stepOf({ kind, maximum }: Parameter): number | 'any' {
+  if (kind === 'integer') return 1;
+  return maximum === undefined ? 'any' : 10 ** Math.floor(Math.log10(maximum)) / 100;
+}
+
+// What stands in an empty field: what the daemon takes then.
+function placeholderOf(parameter: Parameter, job: JobParameters): string {
+  if (!applies(parameter, job)) return `${Object.keys(parameter.by?.cases ?? {}).map(capitalised).join(', ')} only`;
+  const standard = defaultOf(parameter, job) ?? null;
+  return typeof standard === 'number' ? formatValue(standard) : 'no limit';
+}
+
+function numberControl(parameter: Parameter, host: FormHost): Control {
+  const input = h('input', {
+    type: 'number',
+    inputmode: 'decimal',
+    step: stepOf(parameter),
+    min: parameter.minimum ?? parameter.above,
   });
-  return input;
-}
-
-// Empty means null: no limit, or the default.
-function optionalInput(
-  value: number | null | undefined,
-  limits: { min: number; max?: number; step: number | 'any' },
-  onChange: (value: number | null) => void,
-): HTMLInputElement {
-  const input = h('input', { type: 'number', inputmode: 'decimal', value: value ?? '', ...limits });
-  input.addEventListener('input', () => {
-    input.toggleAttribute('aria-invalid', !input.validity.valid);
-    if (input.validity.valid) onChange(input.value === '' ? null : input.valueAsNumber);
-  });
-  return input;
-}
-
-function formatBoxes(formats: readonly MeshFormat[], onChange: (formats: MeshFormat[]) => void): HTMLElement {
-  const chosen = new Set<MeshFormat>(formats);
-  return h(
-    'fieldset',
-    { class: 'boxes' },
-    h('legend', {}, 'Files to make'),
-    ...meshFormats.map((format) =>
-      checkbox(
-        formatNames[format] ?? format,
-        chosen.has(format),
-        (isOn) => {
-          if (isOn) chosen.add(format);
-          else chosen.delete(format);
-          onChange(withGlb([...chosen]));
-        },
-        // The page shows this one.
-        format === 'glb' ? { disabled: true } : {},
-      ),
-    ),
-  );
-}
-
-export function parameterForm(parameters: JobParameters, onChange: (change: Change) => void): HTMLElement {
-  const { draco } = parameters;
-  let bits = draco.position_bits;
-  let speed = draco.speed;
-  const tellDraco = (): void => onChange({ draco: { position_bits: bits, speed } });
-  let components = parameters.components ?? { keep: null, min_triangles: null };
-  const tellComponents = (change: Partial<typeof components>): void => {
-    components = { ...components, ...change };
-    onChange({ components });
+  const mark = (isGood: boolean): void => input.setAttribute('aria-invalid', String(!isGood));
+  const update = (): void => {
+    const job = host.job();
+    const isUsed = applies(parameter, job);
+    input.disabled = !isUsed;
+    input.max = String(maximumOf(parameter, job) ?? '');
+    input.placeholder = placeholderOf(parameter, job);
+    input.value = isUsed ? String(valueIn(job, parameter) ?? '') : '';
+    mark(true);
   };
-  // The labels and titles of what the job's member of that name may be.
-  const choice = <Member extends 'interpolation' | 'smoothing' | 'priority'>(
-    member: Member,
-    label: string,
-    texts: Record<JobParameters[Member], [label: string, title: string]>,
-  ): HTMLElement =>
-    segmented(
-      label,
-      Object.entries<[string, string]>(texts).map(([value, [text, title]]) => ({ value, label: text, title })),
-      parameters[member],
-      (value) => onChange({ [member]: value }),
+  input.addEventListener('input', () => {
+    // The value is also empty when what was typed is no number; then badInput is true.
+    const value = input.value === '' && !input.validity.badInput ? null : input.valueAsNumber;
+    const isGood = fits(parameter, value, host.job());
+    mark(isGood);
+    if (isGood) host.set(parameter, value);
+  });
+  update();
+  return { element: field(labelOf(parameter), input), update };
+}
+
+function formatsControl(parameter: Parameter, host: FormHost): Control {
+  const chosen = new Set<MeshFormat>(host.job().formats);
+  const box = (format: MeshFormat): HTMLElement =>
+    checkbox(
+      formatNames[format] ?? format,
+      chosen.has(format),
+      (isOn) => {
+        if (isOn) chosen.add(format);
+        else chosen.delete(format);
+        host.set(parameter, withGlb([...chosen]));
+      },
+      // The page shows this one.
+      format === 'glb' ? { disabled: true } : {},
     );
+  const element = h('fieldset', { class: 'boxes' }, h('legend', {}, labelOf(parameter)), ...meshFormats.map(box));
+  return { element };
+}
+
+function controlFor(parameter: Parameter, host: FormHost): Control {
+  switch (parameter.kind) {
+    case 'number':
+    case 'integer':
+      return numberControl(parameter, host);
+    case 'switch':
+      return switchControl(parameter, host);
+    case 'choice':
+      return choiceControl(parameter, host);
+    case 'choices':
+      if (parameter.name === 'formats') return formatsControl(parameter, host);
+  }
+  throw new Error(`${parameter.name}: the page has no control for it`);
+}
+
+export function parameterForm(host: FormHost): HTMLElement {
+  const dependents: { on: string; update: () => void }[] = [];
+  const watching: FormHost = {
+    job: host.job,
+    set: (parameter, value) => {
+      host.set(parameter, value);
+      for (const { on, update } of dependents) if (on === parameter.name) update();
+    },
+  };
+  const elementFor = (parameter: Parameter): HTMLElement => {
+    const { element, update } = controlFor(parameter, watching);
+    if (parameter.by && update) dependents.push({ on: parameter.by.parameter, update });
+    element.dataset.parameter = parameter.name;
+    element.title = parameter.help;
+    return element;
+  };
+  const rows = front.map((names) =>
+    h('div', { class: 'row' }, ...names.map((name) => elementFor(parameterOf(name)))),
+  );
+  const others = shown.filter(({ name }) => !front.flat().includes(name));
   return h(
     'div',
     { class: 'parameters' },
-    h(
-      'div',
-      { class: 'pair' },
-      segmented(
-        'Tetrahedra per cell',
-        [
-          { value: '5', label: '5', title: 'Fewer triangles; every second cell is mirrored' },
-          { value: '6', label: '6', title: 'The same split in every cell' },
-        ],
-        String(parameters.scheme) as '5' | '6',
-        (value) => onChange({ scheme: value === '5' ? 5 : 6 }),
-      ),
-      choice('interpolation', 'Vertices on edges', {
-        linear: ['Linear', 'Where the iso-value lies between two samples'],
-        midpoint: ['Midpoint', 'Half-way between two samples'],
-      }),
-    ),
-    h(
-      'div',
-      { class: 'pair uneven' },
-      choice('smoothing', 'Smoothing', {
-        laplacian: ['Laplacian', 'Shrinks a little with every pass'],
-        taubin: ['Taubin', 'Keeps the enclosed volume'],
-      }),
-      field(
-        'Passes',
-        numberInput(parameters.passes, { min: 0, max: 1000, step: 1 }, (passes) => onChange({ passes })),
-      ),
-    ),
-    choice('priority', 'Priority', {
-      stat: ['Stat', 'Before all others'],
-      routine: ['Routine', 'After all that are stat'],
-      bulk: ['Bulk', 'When nothing else waits'],
-    }),
+    ...rows,
     h(
       'details',
       { class: 'more' },
       h('summary', {}, 'More'),
-      h(
-        'div',
-        { class: 'pair' },
-        field(
-          'Step of a pass (0 to 1)',
-          optionalInput(parameters.lambda, { min: 0.01, max: 1, step: 0.01 }, (lambda) => onChange({ lambda })),
-        ),
-        field(
-          'Move at most, in mm',
-          optionalInput(parameters.max_displacement_mm, { min: 0, step: 'any' }, (value) =>
-            onChange({ max_displacement_mm: value }),
-          ),
-        ),
-        field(
-          'Keep the largest parts',
-          optionalInput(components.keep, { min: 1, step: 1 }, (keep) => tellComponents({ keep })),
-        ),
-        field(
-          'Parts of at least, triangles',
-          optionalInput(components.min_triangles, { min: 1, step: 1 }, (value) =>
-            tellComponents({ min_triangles: value }),
-          ),
-        ),
-      ),
-      h('p', { class: 'hint' }, 'Empty: the default step, no limit, all parts.'),
-      checkbox('Close the surface at the border of the volume', parameters.close, (close) =>
-        onChange({ close }),
-      ),
-      formatBoxes(parameters.formats, (formats) => onChange({ formats })),
-      h(
-        'div',
-        { class: 'pair' },
-        field(
-          'Bits per coordinate',
-          numberInput(bits, { min: 8, max: 30, step: 1 }, (value) => {
-            bits = value;
-            tellDraco();
-          }),
-        ),
-        field(
-          'Encoding speed',
-          numberInput(speed, { min: 0, max: 10, step: 1 }, (value) => {
-            speed = value;
-            tellDraco();
-          }),
-        ),
-      ),
+      h('div', { class: 'pair' }, ...others.filter(isNumber).map(elementFor)),
+      ...others.filter((parameter) => !isNumber(parameter)).map(elementFor),
     ),
   );
 }

@@ -2,11 +2,21 @@
 import { estimateOf, getVolume, histogramOf, listJobs, submitJob } from '../api/client';
 import { asApiError, type ApiError } from '../api/problem';
 import type { Estimate, JobParameters, Vec3, Volume } from '../api/types';
+import {
+  changed,
+  defaultParameters,
+  estimateQuery,
+  inWords,
+  jobRequest,
+  parametersOfQuery,
+  queryOfParameters,
+} from '../job/parameters';
 import { button, field, h, isTyping } from '../ui/dom';
 import {
   formatBytes,
   formatCount,
   formatDims,
+  formatIso,
   formatMilliseconds,
   formatNames,
   formatSpacing,
@@ -16,9 +26,8 @@ import { refusal, tellError } from '../ui/notices';
 import { go, hashOf, noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { cssColour, theme } from '../ui/theme';
-import { defaultWindow } from '../volume/histogram';
+import { defaultWindow, type Histogram } from '../volume/histogram';
 import { volumeName } from '../volume/names';
-import { defaultParameters, inWords, memorable, parametersOfQuery, queryOfParameters } from '../volume/parameters';
 import { SliceSource, type Window } from '../volume/slices';
 import { HistogramView } from './histogram_view';
 import { parameterForm } from './parameter_form';
@@ -50,20 +59,45 @@ function cursorOfQuery(query: URLSearchParams, volume: Volume): Vec3 {
 
 export async function prepareView(scope: Scope, route: Route): Promise<HTMLElement> {
   const volume = await getVolume(route.path[1] ?? '');
-  // A bin for each value where there are few: empty ones between would look like a comb.
+  // A bin for each value where there are few: more bins would leave gaps between the values.
   const values = isInteger(volume) ? volume.range[1] - volume.range[0] + 1 : mostBins;
   const histogram = await histogramOf(volume.id, Math.min(mostBins, values), scope.signal);
   return new Prepare(scope, route, volume, histogram).element;
 }
 
 // What of an upload was left out, because a person may miss it.
-function ignoredNote({ ignored = [] }: Volume): HTMLElement | null {
+function ignoredNote({ ignored }: Volume): HTMLElement | null {
   if (ignored.length === 0) return null;
   return h(
     'details',
     { class: 'more' },
     h('summary', {}, ignored.length === 1 ? '1 file was left out' : `${ignored.length} files were left out`),
     h('ul', {}, ...ignored.map(({ name, reason }) => h('li', {}, h('b', {}, name), `: ${reason}`))),
+  );
+}
+
+function factsOf(volume: Volume): string {
+  return [
+    formatNames[volume.format] ?? volume.format,
+    volume.modality,
+    `${formatDims(volume.dims)}, ${volume.type}`,
+    formatSpacing(volume.spacing),
+    `values ${formatValue(volume.range[0])} to ${formatValue(volume.range[1])}`,
+  ]
+    .filter(Boolean)
+    .join(' \u00b7 ');
+}
+
+function sliceHelp(): HTMLElement {
+  return h(
+    'ul',
+    {},
+    h('li', {}, h('b', {}, 'Drag'), ' in a slice: window and level'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Wheel'), ' or arrow keys: next slice'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Click'), ': the other slices go there'),
+    h('li', { class: 'by-touch' }, h('b', {}, 'Slider'), ' below it: next slice'),
+    h('li', { class: 'by-touch' }, h('b', {}, 'Tap'), ': the other slices go there'),
+    h('li', {}, h('b', {}, 'Line in the histogram'), ': the iso-value', h('span', { class: 'by-mouse' }, '; arrow keys move it too')),
   );
 }
 
@@ -88,7 +122,7 @@ class Prepare {
     scope: Scope,
     route: Route,
     private readonly volume: Volume,
-    counts: { range: [number, number]; counts: number[] },
+    counts: Histogram,
   ) {
     this.defaults = defaultParameters(volume.id, volume.suggested_iso);
     this.parameters = parametersOfQuery(route.query, this.defaults);
@@ -142,15 +176,6 @@ class Prepare {
   }
 
   private layout(common: Window): HTMLElement {
-    const { volume } = this;
-    const presets = [{ name: 'Otsu', iso: volume.suggested_iso }, ...(volume.presets ?? [])];
-    const facts = [
-      formatNames[volume.format] ?? volume.format,
-      volume.modality,
-      `${formatDims(volume.dims)}, ${volume.type}`,
-      formatSpacing(volume.spacing),
-      `values ${formatValue(volume.range[0])} to ${formatValue(volume.range[1])}`,
-    ];
     return h(
       'div',
       { class: 'prepare' },
@@ -158,58 +183,56 @@ class Prepare {
         'section',
         { class: 'slices', 'aria-label': 'Slices' },
         ...this.slices.map((view) => view.element),
-        h(
-          'div',
-          { class: 'slice-help' },
-          h('h1', {}, volumeName(volume)),
-          h('p', { class: 'facts' }, facts.filter(Boolean).join(' \u00b7 ')),
-          ignoredNote(volume),
-          h(
-            'ul',
-            {},
-            h('li', {}, h('b', {}, 'Drag'), ' in a slice: window and level'),
-            h('li', { class: 'by-mouse' }, h('b', {}, 'Wheel'), ' or arrow keys: next slice'),
-            h('li', { class: 'by-mouse' }, h('b', {}, 'Click'), ': the other slices go there'),
-            h('li', { class: 'by-touch' }, h('b', {}, 'Slider'), ' below it: next slice'),
-            h('li', { class: 'by-touch' }, h('b', {}, 'Tap'), ': the other slices go there'),
-            h('li', {}, h('b', {}, 'Line in the histogram'), ': the iso-value', h('span', { class: 'by-mouse' }, '; arrow keys move it too')),
-          ),
-          h(
-            'div',
-            { class: 'actions' },
-            button('Reset window', () => {
-              this.window = common;
-              this.update();
-            }),
-            this.windowText,
-          ),
-          this.surfaces,
-        ),
+        this.about(common),
       ),
       h(
         'section',
         { class: 'panel', 'aria-label': 'Parameters' },
-        h(
-          'div',
-          { class: 'iso-row' },
-          field('Iso-value', this.isoInput),
-          h(
-            'div',
-            { class: 'presets', role: 'group', 'aria-label': 'Presets' },
-            ...presets.map(({ name, iso }) =>
-              button(`${name} ${formatValue(iso)}`, () => this.setIso(iso), { class: 'chip' }),
-            ),
-          ),
-        ),
+        this.isoRow(),
         this.histogram.element,
-        parameterForm(this.parameters, (change) => {
-          this.parameters = { ...this.parameters, ...change };
-          this.changed();
+        parameterForm({
+          job: () => this.parameters,
+          set: (parameter, value) => {
+            this.parameters = changed(this.parameters, parameter, value);
+            this.changed();
+          },
         }),
         this.estimate,
         this.problem,
         h('div', { class: 'run' }, this.run, h('span', { class: 'hint by-mouse' }, 'Ctrl + Enter')),
       ),
+    );
+  }
+
+  // What stands beside the slices: the volume, how to move in it, and what was made of it.
+  private about(common: Window): HTMLElement {
+    const { volume } = this;
+    const reset = button('Reset window', () => {
+      this.window = common;
+      this.update();
+    });
+    return h(
+      'div',
+      { class: 'slice-help' },
+      h('h1', {}, volumeName(volume)),
+      h('p', { class: 'facts' }, factsOf(volume)),
+      ignoredNote(volume),
+      sliceHelp(),
+      h('div', { class: 'actions' }, reset, this.windowText),
+      this.surfaces,
+    );
+  }
+
+  private isoRow(): HTMLElement {
+    const { suggested_iso: otsu, presets } = this.volume;
+    const chips = [{ name: 'Otsu', iso: otsu }, ...presets].map(({ name, iso }) =>
+      button(`${name} ${formatValue(iso)}`, () => this.setIso(iso), { class: 'chip' }),
+    );
+    return h(
+      'div',
+      { class: 'iso-row' },
+      field('Iso-value', this.isoInput),
+      h('div', { class: 'presets', role: 'group', 'aria-label': 'Presets' }, ...chips),
     );
   }
 
@@ -228,7 +251,7 @@ class Prepare {
               h(
                 'li',
                 {},
-                h('a', { href: hashOf(['jobs', id]) }, `iso ${parameters.iso === 'otsu' ? 'Otsu' : formatValue(parameters.iso)}`),
+                h('a', { href: hashOf(['jobs', id]) }, `iso ${formatIso(parameters.iso)}`),
                 ` ${inWords(parameters)}`,
               ),
             ),
@@ -274,7 +297,7 @@ class Prepare {
     this.estimateTimer = window.setTimeout(() => {
       const controller = new AbortController();
       this.estimating = controller;
-      estimateOf(memorable(this.parameters), controller.signal).then(
+      estimateOf(estimateQuery(this.parameters), controller.signal).then(
         (estimate) => this.showEstimate(estimate),
         (error: unknown) => {
           if (!controller.signal.aborted) this.showNoEstimate(asApiError(error));
@@ -292,11 +315,9 @@ class Prepare {
       ['Triangles', formatCount(estimate.triangles)],
       ['Vertices', formatCount(estimate.vertices)],
       ['Files', `about ${files.join(', ')}`],
+      ['Time', `about ${formatMilliseconds(estimate.milliseconds)}`],
     ];
-    if (estimate.milliseconds !== undefined) {
-      rows.push(['Time', `about ${formatMilliseconds(estimate.milliseconds)}`]);
-    }
-    const before = (estimate.queue?.queued ?? 0) + (estimate.queue?.running ?? 0);
+    const before = estimate.queue.queued + estimate.queue.running;
     if (before > 0) rows.push(['Before it', before === 1 ? '1 job' : `${before} jobs`]);
     this.estimate.replaceChildren(
       h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)])),
@@ -306,12 +327,12 @@ class Prepare {
         h('p', { class: 'warning' }, 'No sample boundary has this value: the surface would be empty.'),
       );
     }
-    if (estimate.fits === false) {
+    if (!estimate.fits) {
       this.estimate.append(
         h(
           'p',
           { class: 'warning' },
-          `This needs ${formatBytes(estimate.memory_bytes ?? 0)} of memory, more than a job may take. ` +
+          `This needs ${formatBytes(estimate.memory_bytes)} of memory, more than a job may take. ` +
             'Choose an iso-value with fewer triangles.',
         ),
       );
@@ -332,7 +353,7 @@ class Prepare {
     this.run.disabled = true;
     this.problem.replaceChildren();
     try {
-      const job = await submitJob(memorable(this.parameters));
+      const job = await submitJob(jobRequest(this.parameters));
       go(['jobs', job.id]);
     } catch (error) {
       const failure = asApiError(error);

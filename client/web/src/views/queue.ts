@@ -1,16 +1,18 @@
 // All jobs: what waits in which order, what runs, what is done. #/jobs
 import { cancelJob, listJobs, listVolumes } from '../api/client';
-import { isFinal, priorities, type Job, type Volume } from '../api/types';
+import { isFinal, type Job, type Volume } from '../api/types';
+import { inWords } from '../job/parameters';
+import { priorities } from '../job/table';
 import { button, h } from '../ui/dom';
-import { formatCount, formatMilliseconds, formatTime, formatValue, shortId } from '../ui/format';
+import { formatCount, formatIso, formatMilliseconds, formatTime, shortId } from '../ui/format';
 import { tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { nameIn } from '../volume/names';
-import { inWords } from '../volume/parameters';
 
 const refreshEvery = 1500;
 const mostCompared = 4;
+const columns = ['', 'State', 'Priority', 'Surface', 'Result', 'Time', 'Created', ''];
 
 // As the daemon takes them: by priority, then by age.
 export function inOrder(jobs: readonly Job[]): Job[] {
@@ -36,146 +38,158 @@ function progressOf(job: Job): Node | string {
   return '';
 }
 
-export async function queueView(scope: Scope): Promise<HTMLElement> {
-  const chosen = new Set<string>();
-  const body = h('div', { class: 'queue-body' });
-  const compare = button(
-    'Compare',
-    () => go(['compare'], new URLSearchParams({ jobs: [...chosen].join(',') })),
-    { class: 'primary', disabled: true },
+function stateCell(job: Job, place: number): HTMLElement {
+  const text = job.state === 'queued' ? `queued, ${place + 1}.` : job.state;
+  return cell(h('span', { class: `state ${job.state}` }), text);
+}
+
+function surfaceCell(job: Job, volume: string): HTMLElement {
+  return cell(
+    h('a', { href: hashOf(['jobs', job.id]) }, `iso ${formatIso(job.parameters.iso)}`),
+    h('span', { class: 'faint' }, ` ${inWords(job.parameters)}`),
+    h('span', { class: 'of-volume' }, volume),
   );
-  const more = button('Older jobs', () => void showMore().catch(tellError), { hidden: true });
-  let jobs: Job[] = [];
-  let next: string | null = null;
-  let volumes = new Map<string, Volume>();
+}
+
+function tableOf(rows: readonly HTMLElement[]): HTMLElement {
+  const heads = columns.map((name) => h('th', { scope: 'col' }, name));
+  return h('table', { class: 'jobs' }, h('thead', {}, h('tr', {}, ...heads)), h('tbody', {}, ...rows));
+}
+
+export async function queueView(scope: Scope): Promise<HTMLElement> {
+  const queue = new Queue();
+  await queue.refresh();
+  const timer = setInterval(() => {
+    // A lost connection is said at the top of the page.
+    if (!document.hidden) queue.refresh().catch(() => undefined);
+  }, refreshEvery);
+  scope.onEnd(() => clearInterval(timer));
+  return queue.element;
+}
+
+class Queue {
+  readonly element: HTMLElement;
+  private readonly body = h('div', { class: 'queue-body' });
+  private readonly compare: HTMLButtonElement;
+  private readonly more: HTMLButtonElement;
+  private readonly chosen = new Set<string>();
+  private jobs: Job[] = [];
+  private next: string | null = null;
+  private volumes = new Map<string, Volume>();
   // Those that were asked for already: what is gone is not asked for again.
-  const asked = new Set<string>();
+  private readonly asked = new Set<string>();
 
-  const choose = (id: string, isOn: boolean): void => {
-    if (isOn) chosen.add(id);
-    else chosen.delete(id);
-    compare.disabled = chosen.size < 2 || chosen.size > mostCompared;
-    compare.textContent = chosen.size > 0 ? `Compare (${chosen.size})` : 'Compare';
-  };
-
-  const row = (job: Job, place: number): HTMLElement => {
-    const pick = h('input', {
-      type: 'checkbox',
-      checked: chosen.has(job.id),
-      disabled: job.state !== 'succeeded',
-      'aria-label': `Choose ${shortId(job.id)} to compare`,
-    });
-    pick.addEventListener('change', () => choose(job.id, pick.checked));
-    const cancel = button(
-      'Cancel',
-      () => {
-        cancelJob(job.id).then(() => void refresh().catch(tellError), tellError);
-      },
-      { class: 'quiet', 'aria-label': `Cancel ${shortId(job.id)}` },
+  constructor() {
+    this.compare = button('Compare', () => this.goCompare(), { class: 'primary', disabled: true });
+    this.more = button('Older jobs', () => void this.showMore().catch(tellError), { hidden: true });
+    this.element = h(
+      'div',
+      { class: 'queue' },
+      h(
+        'div',
+        { class: 'section-head' },
+        h('h1', {}, 'Jobs'),
+        h('span', { class: 'hint grow' }, 'Stat goes before routine, routine before bulk; then the oldest.'),
+        this.compare,
+      ),
+      this.body,
+      h('div', { class: 'actions' }, this.more),
     );
+  }
+
+  // Takes the newest jobs over; older ones that were asked for stay as they are.
+  async refresh(): Promise<void> {
+    const page = await listJobs();
+    const newest = new Set(page.jobs.map((job) => job.id));
+    const older = this.jobs.filter((job) => !newest.has(job.id) && job.id < (page.jobs.at(-1)?.id ?? ''));
+    if (older.length === 0) this.next = page.next;
+    this.jobs = [...page.jobs, ...older];
+    await this.findVolumes();
+    this.show();
+  }
+
+  private async showMore(): Promise<void> {
+    if (this.next === null) return;
+    const page = await listJobs(this.next);
+    this.jobs = [...this.jobs, ...page.jobs];
+    this.next = page.next;
+    await this.findVolumes();
+    this.show();
+  }
+
+  private async findVolumes(): Promise<void> {
+    const unknown = this.jobs.filter((job) => !this.volumes.has(job.volume) && !this.asked.has(job.volume));
+    if (unknown.length === 0) return;
+    this.volumes = new Map((await listVolumes()).map((volume) => [volume.id, volume]));
+    for (const job of unknown) this.asked.add(job.volume);
+  }
+
+  private show(): void {
+    const waiting = inOrder(this.jobs.filter((job) => job.state === 'queued'));
+    const running = this.jobs.filter((job) => job.state === 'running');
+    const done = this.jobs.filter((job) => isFinal(job.state));
+    const rows = [...running, ...waiting, ...done].map((job) => this.row(job, waiting.indexOf(job)));
+    this.more.hidden = this.next === null;
+    this.keepFocus(() =>
+      this.body.replaceChildren(
+        rows.length === 0 ? h('p', { class: 'empty' }, 'No jobs yet. Choose a volume to begin.') : tableOf(rows),
+      ),
+    );
+  }
+
+  // The rows are made anew; whoever is on one of them with the keyboard stays there.
+  private keepFocus(replace: () => void): void {
+    const { activeElement } = document;
+    const job = activeElement?.closest('tr')?.dataset.job;
+    const label = activeElement?.getAttribute('aria-label');
+    replace();
+    if (job === undefined || !label) return;
+    this.body.querySelector<HTMLElement>(`tr[data-job="${job}"] [aria-label="${label}"]`)?.focus();
+  }
+
+  private row(job: Job, place: number): HTMLElement {
+    const time = isFinal(job.state) && job.timing.total ? formatMilliseconds(job.timing.total) : '';
     return h(
       'tr',
       { 'data-job': job.id },
-      cell(pick),
-      cell(
-        h('span', { class: `state ${job.state}` }),
-        job.state === 'queued' ? `queued, ${place + 1}.` : job.state,
-      ),
+      cell(this.pickBox(job)),
+      stateCell(job, place),
       cell(h('span', { class: `priority ${job.priority}` }, job.priority)),
-      cell(
-        h(
-          'a',
-          { href: hashOf(['jobs', job.id]) },
-          `iso ${job.parameters.iso === 'otsu' ? 'Otsu' : formatValue(job.parameters.iso)}`,
-        ),
-        h('span', { class: 'faint' }, ` ${inWords(job.parameters)}`),
-        h('span', { class: 'of-volume' }, nameIn(volumes, job.volume)),
-      ),
+      surfaceCell(job, nameIn(this.volumes, job.volume)),
       cell(progressOf(job)),
-      cell(isFinal(job.state) && job.timing.total ? formatMilliseconds(job.timing.total) : ''),
+      cell(time),
       cell(h('span', { class: 'faint' }, formatTime(job.created))),
-      cell(isFinal(job.state) ? '' : cancel),
+      cell(isFinal(job.state) ? '' : this.cancelButton(job)),
     );
-  };
+  }
 
-  const show = (): void => {
-    const waiting = inOrder(jobs.filter((job) => job.state === 'queued'));
-    const running = jobs.filter((job) => job.state === 'running');
-    const done = jobs.filter((job) => isFinal(job.state));
-    const rows = [...running, ...waiting, ...done].map((job) => row(job, waiting.indexOf(job)));
-    const focused = document.activeElement?.closest('tr')?.dataset.job;
-    const focusedLabel = document.activeElement?.getAttribute('aria-label');
-    more.hidden = next === null;
-    body.replaceChildren(
-      rows.length === 0
-        ? h('p', { class: 'empty' }, 'No jobs yet. Choose a volume to begin.')
-        : h(
-            'table',
-            { class: 'jobs' },
-            h(
-              'thead',
-              {},
-              h(
-                'tr',
-                {},
-                ...['', 'State', 'Priority', 'Surface', 'Result', 'Time', 'Created', ''].map((name) =>
-                  h('th', { scope: 'col' }, name),
-                ),
-              ),
-            ),
-            h('tbody', {}, ...rows),
-          ),
-    );
-    // The rows are new; who was on one with the keyboard stays there.
-    if (focused !== undefined && focusedLabel) {
-      body
-        .querySelector<HTMLElement>(`tr[data-job="${focused}"] [aria-label="${focusedLabel}"]`)
-        ?.focus();
-    }
-  };
+  private pickBox(job: Job): HTMLElement {
+    const box = h('input', {
+      type: 'checkbox',
+      checked: this.chosen.has(job.id),
+      disabled: job.state !== 'succeeded',
+      'aria-label': `Choose ${shortId(job.id)} to compare`,
+    });
+    box.addEventListener('change', () => this.choose(job.id, box.checked));
+    return box;
+  }
 
-  const findVolumes = async (): Promise<void> => {
-    const unknown = jobs.filter((job) => !volumes.has(job.volume) && !asked.has(job.volume));
-    if (unknown.length === 0) return;
-    volumes = new Map((await listVolumes()).map((volume) => [volume.id, volume]));
-    for (const job of unknown) asked.add(job.volume);
-  };
+  private cancelButton(job: Job): HTMLElement {
+    const cancel = (): void => {
+      cancelJob(job.id).then(() => void this.refresh().catch(tellError), tellError);
+    };
+    return button('Cancel', cancel, { class: 'quiet', 'aria-label': `Cancel ${shortId(job.id)}` });
+  }
 
-  const refresh = async (): Promise<void> => {
-    const page = await listJobs();
-    const newest = new Set(page.jobs.map((job) => job.id));
-    const older = jobs.filter((job) => !newest.has(job.id) && job.id < (page.jobs.at(-1)?.id ?? ''));
-    if (older.length === 0) next = page.next;
-    jobs = [...page.jobs, ...older];
-    await findVolumes();
-    show();
-  };
-  const showMore = async (): Promise<void> => {
-    if (next === null) return;
-    const page = await listJobs(next);
-    jobs = [...jobs, ...page.jobs];
-    next = page.next;
-    await findVolumes();
-    show();
-  };
+  private choose(id: string, isOn: boolean): void {
+    if (isOn) this.chosen.add(id);
+    else this.chosen.delete(id);
+    const { size } = this.chosen;
+    this.compare.disabled = size < 2 || size > mostCompared;
+    this.compare.textContent = size > 0 ? `Compare (${size})` : 'Compare';
+  }
 
-  await refresh();
-  const timer = setInterval(() => {
-    // A lost connection is said at the top of the page.
-    if (!document.hidden) refresh().catch(() => undefined);
-  }, refreshEvery);
-  scope.onEnd(() => clearInterval(timer));
-  return h(
-    'div',
-    { class: 'queue' },
-    h(
-      'div',
-      { class: 'section-head' },
-      h('h1', {}, 'Jobs'),
-      h('span', { class: 'hint grow' }, 'Stat goes before routine, routine before bulk; then the oldest.'),
-      compare,
-    ),
-    body,
-    h('div', { class: 'actions' }, more),
-  );
+  private goCompare(): void {
+    go(['compare'], new URLSearchParams({ jobs: [...this.chosen].join(',') }));
+  }
 }

@@ -1,3 +1,4 @@
+import type { SampleType } from '../api/types';
 import type { RawDescription } from '../api/upload';
 import { button, field, h } from '../ui/dom';
 import { rawFault, sampleBytes } from '../volume/raw';
@@ -34,6 +35,7 @@ export function rawForm(size: number, onDescribed: (raw: RawDescription) => void
     {},
     ...Object.keys(sampleBytes).map((name) => h('option', { value: name, selected: name === 'int16' }, name)),
   );
+  const chosenType = (): SampleType => type.value as SampleType;
   const order = h(
     'select',
     {},
@@ -46,7 +48,7 @@ export function rawForm(size: number, onDescribed: (raw: RawDescription) => void
     () =>
       onDescribed({
         dims: dims.read(),
-        type: type.value,
+        type: chosenType(),
         spacing: spacing.read(),
         byteOrder: order.value === 'big' ? 'big' : 'little',
       }),
@@ -54,7 +56,7 @@ export function rawForm(size: number, onDescribed: (raw: RawDescription) => void
   );
   const check = (): void => {
     const missing =
-      rawFault(size, dims.read(), type.value) ||
+      rawFault(size, dims.read(), chosenType()) ||
       (spacing.read().every((value) => value > 0) ? '' : 'The spacing has to be positive.');
     fault.textContent = missing;
     submit.disabled = missing !== '';

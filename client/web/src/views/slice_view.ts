@@ -1,6 +1,5 @@
 // One orthogonal slice: grey samples, the iso-contour over them, and the place of the other two planes.
-import type { Axis } from '../api/client';
-import type { Vec3, Volume } from '../api/types';
+import type { Axis, Vec3, Volume } from '../api/types';
 import { h, uniqueId } from '../ui/dom';
 import type { Scope } from '../ui/signal';
 import { contour } from '../volume/contour';

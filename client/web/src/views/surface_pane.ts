@@ -1,7 +1,7 @@
 // A surface with its tools: what a job made, loaded part by part.
-import { histogramOf, slicePicture, type Axis } from '../api/client';
+import { histogramOf, slicePicture } from '../api/client';
 import { asApiError } from '../api/problem';
-import type { Job, Volume } from '../api/types';
+import type { Axis, Job, Volume } from '../api/types';
 import { loadMesh, viewableFile, type LoadTiming } from '../mesh/load';
 import { lengthOf } from '../scene/rulers';
 import { defaultStyle, Surface, type SurfaceStyle } from '../scene/surface';

@@ -1,7 +1,7 @@
 // Where volumes are dropped: one file, a folder of slices, or several files.
-import { upload, type RawDescription } from '../api/upload';
 import { ApiError, asApiError, mayPass, seriesOf } from '../api/problem';
 import type { Volume } from '../api/types';
+import { upload, type RawDescription } from '../api/upload';
 import { button, field, h, icon } from '../ui/dom';
 import { formatBytes } from '../ui/format';
 import { refusal } from '../ui/notices';
@@ -12,136 +12,167 @@ import { rawForm } from './raw_form';
 
 const arrow = 'M8 11V2.5M4.5 6 8 2.5 11.5 6M2.5 10.5v3h11v-3';
 
-export interface UploadPanel {
-  element: HTMLElement;
+// What a person added to an upload that was refused.
+interface Addition {
+  raw?: RawDescription;
+  series?: string;
 }
 
-export function uploadPanel(scope: Scope, onVolume: (volume: Volume, isNew: boolean, name: string) => void): UploadPanel {
-  const body = h('div', { class: 'drop-body' });
-  const zone = h('section', { class: 'drop', 'aria-label': 'Upload a volume' }, body);
-  let running: AbortController | null = null;
+type OnVolume = (volume: Volume, isNew: boolean, name: string) => void;
 
-  const fileInput = h('input', { type: 'file', multiple: true, hidden: true, 'data-pick': 'files' });
-  const folderInput = h('input', { type: 'file', webkitdirectory: true, hidden: true, 'data-pick': 'folder' });
-  for (const input of [fileInput, folderInput]) {
-    input.addEventListener('change', () => {
-      if (input.files && input.files.length > 0) take(filesOfList(input.files));
-      input.value = '';
+// How far an upload is.
+class Progress {
+  readonly bar: HTMLProgressElement;
+  readonly text = h('p', { class: 'upload-status', role: 'status' });
+  private readonly began = performance.now();
+
+  constructor(private readonly total: number) {
+    this.bar = h('progress', { max: total, value: 0, 'aria-label': 'Upload' });
+  }
+
+  show(sent: number): void {
+    this.bar.value = sent;
+    if (sent >= this.total) {
+      this.bar.removeAttribute('value');
+      this.text.textContent = `${formatBytes(this.total)} sent; the server reads the volume`;
+      return;
+    }
+    const rate = sent / Math.max(0.001, (performance.now() - this.began) / 1000);
+    this.text.textContent = `${formatBytes(sent)} of ${formatBytes(this.total)}, ${formatBytes(rate)}/s`;
+  }
+}
+
+export class UploadPanel {
+  readonly element: HTMLElement;
+  private readonly body = h('div', { class: 'drop-body' });
+  private readonly fileInput = h('input', { type: 'file', multiple: true, hidden: true, 'data-pick': 'files' });
+  private readonly folderInput = h('input', { type: 'file', webkitdirectory: true, hidden: true, 'data-pick': 'folder' });
+  private running: AbortController | null = null;
+
+  constructor(
+    private readonly scope: Scope,
+    private readonly onVolume: OnVolume,
+  ) {
+    this.element = h(
+      'section',
+      { class: 'drop', 'aria-label': 'Upload a volume' },
+      this.body,
+      this.fileInput,
+      this.folderInput,
+    );
+    this.takeChosenFiles();
+    this.takeDrops();
+    scope.onEnd(() => this.running?.abort());
+    this.showIdle();
+  }
+
+  private takeChosenFiles(): void {
+    for (const input of [this.fileInput, this.folderInput]) {
+      input.addEventListener('change', () => {
+        if (input.files && input.files.length > 0) this.take(filesOfList(input.files));
+        input.value = '';
+      });
+    }
+  }
+
+  // The whole page takes a drop: a file that misses the zone would replace the page.
+  private takeDrops(): void {
+    const { scope, element } = this;
+    scope.listen(window, 'dragover', (event: DragEvent) => {
+      event.preventDefault();
+      element.classList.add('over');
+    });
+    scope.listen(window, 'dragleave', (event: DragEvent) => {
+      if (event.relatedTarget === null) element.classList.remove('over');
+    });
+    scope.listen(window, 'drop', (event: DragEvent) => {
+      event.preventDefault();
+      element.classList.remove('over');
+      if (!event.dataTransfer) return;
+      filesOfDrop(event.dataTransfer).then(
+        (files) => this.take(files),
+        (error: unknown) => this.showUnusable(asApiError(error)),
+      );
     });
   }
-  zone.append(fileInput, folderInput);
 
-  const showIdle = (): void => {
-    zone.classList.remove('busy');
-    body.replaceChildren(
+  private take(files: NamedFile[]): void {
+    if (this.running) return;
+    const gathered = gather(files);
+    if (gathered) void this.send(gathered);
+    else this.showUnusable(new ApiError(-1, 'Nothing to upload', 'There are no files with content in it.'));
+  }
+
+  private async send(gathered: Gathered, addition: Addition = {}): Promise<void> {
+    const controller = new AbortController();
+    this.running = controller;
+    const progress = new Progress(gathered.body.size);
+    this.showRunning(gathered, progress, controller);
+    try {
+      const { volume, isNew } = await upload(gathered.body, {
+        ...addition,
+        signal: controller.signal,
+        onProgress: (sent) => progress.show(sent),
+      });
+      if (this.scope.isOver) return;
+      this.showIdle();
+      this.onVolume(volume, isNew, gathered.name);
+    } catch (error) {
+      if (this.scope.isOver) return;
+      if (error instanceof DOMException && error.name === 'AbortError') this.showIdle();
+      else this.showRefused(asApiError(error), gathered);
+    } finally {
+      this.running = null;
+    }
+  }
+
+  private showIdle(): void {
+    this.element.classList.remove('busy');
+    this.body.replaceChildren(
       icon(arrow),
       h('h2', {}, 'Drop a volume here'),
       h('p', {}, 'NIfTI, NRRD, MetaImage, VTK (.vti), a DICOM file or folder, a ZIP or TAR of them, raw samples'),
       h(
         'div',
         { class: 'actions' },
-        button('Choose files', () => fileInput.click(), { class: 'primary' }),
-        button('Choose a folder', () => folderInput.click()),
+        button('Choose files', () => this.fileInput.click(), { class: 'primary' }),
+        button('Choose a folder', () => this.folderInput.click()),
       ),
     );
-  };
+  }
 
-  const showProblem = (error: ApiError, gathered: Gathered): void => {
-    zone.classList.remove('busy');
-    // What the server understood and refused, it would refuse again.
-    const again = mayPass(error) && button('Try again', () => void send(gathered));
-    const other = button('Choose another', showIdle);
-    const series = seriesOf(error);
-    const parts: Node[] = [refusal(series.length > 0 ? withoutSeries(error) : error, again, other)];
-    if (series.length > 0) parts.push(seriesForm(series, (uid) => void send(gathered, { series: uid })));
-    if (error.status === 415 && gathered.count === 1) {
-      parts.push(rawForm(gathered.body.size, (raw) => void send(gathered, { raw })));
-    }
-    body.replaceChildren(...parts);
-  };
-
-  const send = async (
-    gathered: Gathered,
-    how: { raw?: RawDescription; series?: string } = {},
-  ): Promise<void> => {
-    const controller = new AbortController();
-    running = controller;
-    const total = gathered.body.size;
-    const bar = h('progress', { max: total, value: 0, 'aria-label': 'Upload' });
-    const status = h('p', { class: 'upload-status', role: 'status' });
-    zone.classList.add('busy');
-    const files = gathered.count > 1 ? ` (${gathered.count} files)` : '';
-    body.replaceChildren(
-      h('h2', {}, `${gathered.name}${files}`),
-      bar,
-      status,
+  private showRunning({ name, count }: Gathered, progress: Progress, controller: AbortController): void {
+    this.element.classList.add('busy');
+    this.body.replaceChildren(
+      h('h2', {}, count > 1 ? `${name} (${count} files)` : name),
+      progress.bar,
+      progress.text,
       h('div', { class: 'actions' }, button('Cancel', () => controller.abort())),
     );
-    const began = performance.now();
-    try {
-      const { volume, isNew } = await upload(gathered.body, {
-        ...how,
-        signal: controller.signal,
-        onProgress: (sent) => {
-          bar.value = sent;
-          if (sent >= total) {
-            bar.removeAttribute('value');
-            status.textContent = `${formatBytes(total)} sent; the server reads the volume`;
-            return;
-          }
-          const rate = sent / Math.max(0.001, (performance.now() - began) / 1000);
-          status.textContent = `${formatBytes(sent)} of ${formatBytes(total)}, ${formatBytes(rate)}/s`;
-        },
-      });
-      if (scope.isOver) return;
-      showIdle();
-      onVolume(volume, isNew, gathered.name);
-    } catch (error) {
-      if (scope.isOver) return;
-      if (error instanceof DOMException && error.name === 'AbortError') showIdle();
-      else showProblem(asApiError(error), gathered);
-    } finally {
-      running = null;
+  }
+
+  // What the server refused, with all that may help it: another try, a choice, a description.
+  private showRefused(error: ApiError, gathered: Gathered): void {
+    this.element.classList.remove('busy');
+    const again = mayPass(error) && button('Try again', () => void this.send(gathered));
+    const series = seriesOf(error);
+    const parts: Node[] = [
+      refusal(series.length > 0 ? withoutSeries(error) : error, again, this.otherButton()),
+    ];
+    if (series.length > 0) parts.push(seriesForm(series, (uid) => void this.send(gathered, { series: uid })));
+    if (error.status === 415 && gathered.count === 1) {
+      parts.push(rawForm(gathered.body.size, (raw) => void this.send(gathered, { raw })));
     }
-  };
+    this.body.replaceChildren(...parts);
+  }
 
-  const take = (files: NamedFile[]): void => {
-    if (running) return;
-    const gathered = gather(files);
-    if (gathered) {
-      void send(gathered);
-      return;
-    }
-    body.replaceChildren(
-      refusal(
-        new ApiError(-1, 'Nothing to upload', 'There are no files with content in it.'),
-        button('Choose another', showIdle),
-      ),
-    );
-  };
+  private showUnusable(error: ApiError): void {
+    this.body.replaceChildren(refusal(error, this.otherButton()));
+  }
 
-  // The whole page takes a drop: a file that misses the zone would replace the page.
-  scope.listen(window, 'dragover', (event: DragEvent) => {
-    event.preventDefault();
-    zone.classList.add('over');
-  });
-  scope.listen(window, 'dragleave', (event: DragEvent) => {
-    if (event.relatedTarget === null) zone.classList.remove('over');
-  });
-  scope.listen(window, 'drop', (event: DragEvent) => {
-    event.preventDefault();
-    zone.classList.remove('over');
-    if (!event.dataTransfer) return;
-    filesOfDrop(event.dataTransfer).then(take, (error: unknown) =>
-      body.replaceChildren(
-        refusal(asApiError(error), button('Choose another', showIdle)),
-      ),
-    );
-  });
-  scope.onEnd(() => running?.abort());
-
-  showIdle();
-  return { element: zone };
+  private otherButton(): HTMLButtonElement {
+    return button('Choose another', () => this.showIdle());
+  }
 }
 
 function withoutSeries(error: ApiError): ApiError {

@@ -1,15 +1,15 @@
 // The first view: upload, the volumes that are there, the last surfaces.
 import { eraseVolume, listJobs, listVolumes, slicePicture } from '../api/client';
 import type { Job, Volume } from '../api/types';
+import { inWords } from '../job/parameters';
 import { button, h } from '../ui/dom';
-import { formatBytes, formatCount, formatSpacing, formatTime, formatValue } from '../ui/format';
+import { formatBytes, formatCount, formatIso, formatSpacing, formatTime } from '../ui/format';
 import { ask, tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { axisIndex, slicePlane } from '../volume/geometry';
 import { nameIn, rememberName, volumeKind, volumeName } from '../volume/names';
-import { inWords } from '../volume/parameters';
-import { uploadPanel } from './upload_panel';
+import { UploadPanel } from './upload_panel';
 
 const shownJobs = 8;
 const thumbnailPixels = 112;
@@ -99,7 +99,7 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void): HTMLEle
 }
 
 export function jobLine(job: Job): string {
-  return `iso ${job.parameters.iso === 'otsu' ? 'Otsu' : formatValue(job.parameters.iso)}, ${inWords(job.parameters)}`;
+  return `iso ${formatIso(job.parameters.iso)}, ${inWords(job.parameters)}`;
 }
 
 function surfaceRow(job: Job, volume: string): HTMLElement {
@@ -142,7 +142,7 @@ export async function volumesView(scope: Scope): Promise<HTMLElement> {
     surfaces.replaceChildren(...jobs.map((job) => surfaceRow(job, nameIn(byId, job.volume))));
     if (jobs.length === 0) surfaces.append(h('li', { class: 'empty' }, 'No surfaces yet.'));
   };
-  const panel = uploadPanel(scope, (volume, isNew, name) => {
+  const panel = new UploadPanel(scope, (volume, isNew, name) => {
     rememberName(volume.id, name);
     if (!isNew) tell('This volume was there already.');
     go(['volumes', volume.id]);

@@ -1,8 +1,8 @@
 // What was dropped or chosen, as one body to upload.
 import { packTar, type NamedFile } from './tar';
 
-// What systems leave in folders beside the slices.
-const litter = /(^|\/)(\.DS_Store|Thumbs\.db|desktop\.ini|\._[^/]*|__MACOSX\/.*)$/i;
+// Files that operating systems put into folders by themselves.
+const systemFiles = /(^|\/)(\.DS_Store|Thumbs\.db|desktop\.ini|\._[^/]*|__MACOSX\/.*)$/i;
 
 function readEntries(reader: FileSystemDirectoryReader): Promise<FileSystemEntry[]> {
   return new Promise((resolve, reject) => reader.readEntries(resolve, reject));
@@ -44,7 +44,7 @@ export interface Gathered {
 
 // One file goes as it is, several are packed. Null when there is none.
 export function gather(files: NamedFile[]): Gathered | null {
-  const wanted = files.filter(({ path, file }) => !litter.test(path) && file.size > 0);
+  const wanted = files.filter(({ path, file }) => !systemFiles.test(path) && file.size > 0);
   const [first] = wanted;
   if (first === undefined) return null;
   if (wanted.length === 1) return { name: first.path, count: 1, body: first.file };

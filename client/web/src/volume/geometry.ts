@@ -1,8 +1,10 @@
 // Where samples lie in the patient (LPS millimetres), and how slices are turned for the eye.
-import type { Axis } from '../api/client';
-import type { Vec3, Volume } from '../api/types';
+import type { Axis, Vec3, Volume } from '../api/types';
 
-type Geometry = Pick<Volume, 'dims' | 'spacing' | 'origin' | 'direction'>;
+interface Directed {
+  direction: readonly number[];
+}
+type Geometry = Pick<Volume, 'dims' | 'spacing' | 'origin'> & Directed;
 
 export const axes: readonly Axis[] = ['x', 'y', 'z'];
 
@@ -11,7 +13,7 @@ export function axisIndex(axis: Axis): 0 | 1 | 2 {
 }
 
 // The unit vector of a volume's axis in LPS.
-export function axisDirection(volume: Pick<Volume, 'direction'>, axis: number): Vec3 {
+export function axisDirection(volume: Directed, axis: number): Vec3 {
   const at = (row: number): number => volume.direction[3 * row + axis] ?? (row === axis ? 1 : 0);
   return [at(0), at(1), at(2)];
 }
@@ -78,7 +80,7 @@ function opposite(vector: Vec3): Vec3 {
 
 // Which volume axis runs most along each of the patient's: the best of the six assignments, so that
 // no axis is taken twice however oblique the volume lies.
-export function patientAxes(volume: Pick<Volume, 'direction'>): [Axis, Axis, Axis] {
+export function patientAxes(volume: Directed): [Axis, Axis, Axis] {
   const orders = [
     [0, 1, 2],
     [0, 2, 1],
@@ -93,7 +95,7 @@ export function patientAxes(volume: Pick<Volume, 'direction'>): [Axis, Axis, Axi
   return best.map((axis) => axes[axis]) as [Axis, Axis, Axis];
 }
 
-export function slicePlane(volume: Pick<Volume, 'direction'>, plane: Plane): SlicePlane {
+export function slicePlane(volume: Directed, plane: Plane): SlicePlane {
   const along = patientAxes(volume);
   const { right, down } = screens[plane];
   const rowOf = (vector: Vec3): 0 | 1 | 2 => vector.findIndex((value) => value !== 0) as 0;

@@ -1,5 +1,9 @@
 // How a histogram is shown and read.
-import type { Histogram } from '../api/types';
+// Samples in bins of equal width over a range of values.
+export interface Histogram {
+  range: [number, number];
+  counts: readonly number[];
+}
 
 export function binWidth(histogram: Histogram): number {
   const [low, high] = histogram.range;

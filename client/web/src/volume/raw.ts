@@ -1,5 +1,7 @@
 // Raw samples: what their size says about them.
-export const sampleBytes: Record<string, number> = {
+import type { SampleType } from '../api/types';
+
+export const sampleBytes: Record<SampleType, number> = {
   uint8: 1,
   int8: 1,
   uint16: 2,
@@ -11,11 +13,11 @@ export const sampleBytes: Record<string, number> = {
 };
 
 // What a description misses; empty when it accounts for every byte.
-export function rawFault(size: number, dims: readonly number[], type: string): string {
+export function rawFault(size: number, dims: readonly number[], type: SampleType): string {
   if (dims.length !== 3 || !dims.every((count) => Number.isInteger(count) && count > 0)) {
     return 'Enter three whole numbers of samples.';
   }
-  const described = dims.reduce((a, b) => a * b, sampleBytes[type] ?? 1);
+  const described = dims.reduce((a, b) => a * b, sampleBytes[type]);
   if (described === size) return '';
   return `That describes ${described} bytes, but the file has ${size}.`;
 }

@@ -1,6 +1,6 @@
 // Slices of a volume as samples: fetched as pictures of 8 bits over a window, kept while they are near.
-import { slicePicture, type Axis } from '../api/client';
-import type { Volume } from '../api/types';
+import { slicePicture } from '../api/client';
+import type { Axis, Volume } from '../api/types';
 
 export type Window = [number, number];
 

@@ -1,0 +1,45 @@
+#include "base/base64.h"
+
+#include <openssl/evp.h>
+
+namespace isomesh {
+namespace {
+
+const unsigned char* as_bytes(std::string_view text) {
+  return reinterpret_cast<const unsigned char*>(text.data());
+}
+
+}  // namespace
+
+std::string to_base64(std::string_view bytes) {
+  // OpenSSL ends the text with a zero of its own.
+  std::string text(4 * ((bytes.size() + 2) / 3) + 1, '\0');
+  const int size = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()), as_bytes(bytes),
+                                   static_cast<int>(bytes.size()));
+  text.resize(static_cast<std::size_t>(size));
+  return text;
+}
+
+std::string to_base64(std::span<const std::uint8_t> bytes) {
+  return to_base64(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+}
+
+std::optional<std::string> from_base64(std::string_view text) {
+  constexpr std::string_view kAlphabet =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  constexpr std::size_t kGroup = 4;
+  const std::size_t padding = text.ends_with("==") ? 2 : text.ends_with('=') ? 1 : 0;
+  // OpenSSL passes over white space, and takes padding in the middle.
+  const std::string_view digits = text.substr(0, text.size() - padding);
+  if (text.size() % kGroup != 0 || digits.find_first_not_of(kAlphabet) != std::string_view::npos) {
+    return std::nullopt;
+  }
+  std::string bytes(text.size() / kGroup * 3, '\0');
+  const int length = EVP_DecodeBlock(reinterpret_cast<unsigned char*>(bytes.data()), as_bytes(text),
+                                     static_cast<int>(text.size()));
+  if (length < 0) return std::nullopt;
+  bytes.resize(static_cast<std::size_t>(length) - padding);  // it counts the padding as zeros
+  return bytes;
+}
+
+}  // namespace isomesh

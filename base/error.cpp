@@ -1,0 +1,34 @@
+#include "base/error.h"
+
+#include <cerrno>
+#include <system_error>
+
+namespace isomesh {
+
+Error invalid_parameter(const std::string& field, const std::string& message) {
+  return invalid_parameters({{field, message}});
+}
+
+Error invalid_parameters(std::vector<FieldError> fields) {
+  std::string detail;
+  for (const FieldError& fault : fields) {
+    if (!detail.empty()) detail += "; ";
+    detail.append(fault.field).append(": ").append(fault.message);
+  }
+  return {ErrorCode::kInvalidParameter, detail, std::move(fields)};
+}
+
+void throw_system_error(std::string_view call, int error_number) {
+  if (error_number == ENOSPC || error_number == EDQUOT || error_number == EFBIG) {
+    throw Error(ErrorCode::kOutOfSpace, "there is no space left on the disk");
+  }
+  throw Error(ErrorCode::kInternal,
+              std::string(call) + ": " + std::generic_category().message(error_number));
+}
+
+void throw_file_error(std::string_view call, int error_number) {
+  if (error_number == ENOENT) throw Error(ErrorCode::kNotFound, "the file is not there");
+  throw_system_error(call, error_number);
+}
+
+}  // namespace isomesh

@@ -1,0 +1,83 @@
+#include "base/files.h"
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/error.h"
+
+namespace isomesh {
+
+InputFile::InputFile(const std::filesystem::path& path) : InputFile(path, "") {}
+
+InputFile InputFile::chosen(const std::filesystem::path& path) { return {path, path.string()}; }
+
+// Without waiting for the other end of a pipe, which is then refused as no regular file.
+InputFile::InputFile(const std::filesystem::path& path, std::string shown)
+    : shown_(std::move(shown)), file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
+  if (file_.number() < 0) fail("opening a file", errno);
+  struct stat status = {};
+  if (::fstat(file_.number(), &status) != 0) fail("reading a file's size", errno);
+  if (!S_ISREG(status.st_mode)) {
+    throw shown_.empty() ? Error(ErrorCode::kInternal, "not a regular file")
+                         : Error(ErrorCode::kInvalidParameter, shown_ + ": is not a regular file");
+  }
+  size_ = static_cast<std::uint64_t>(status.st_size);
+}
+
+void InputFile::fail(std::string_view call, int error_number) const {
+  if (shown_.empty()) throw_file_error(call, error_number);
+  throw Error(ErrorCode::kInvalidParameter,
+              shown_ + ": " + std::generic_category().message(error_number));
+}
+
+std::size_t InputFile::read(std::uint64_t offset, std::span<std::byte> target) const {
+  std::size_t done = 0;
+  while (done < target.size() && offset + done < size_) {
+    const ssize_t count = ::pread(file_.number(), target.data() + done, target.size() - done,
+                                  static_cast<off_t>(offset + done));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail("reading a file", errno);
+    if (count == 0) break;
+    done += static_cast<std::size_t>(count);
+  }
+  return done;
+}
+
+void InputFile::read_exactly(std::uint64_t offset, std::span<std::byte> target) const {
+  if (read(offset, target) == target.size()) return;
+  throw shown_.empty()
+      ? Error(ErrorCode::kInternal, "a file became shorter while it was read")
+      : Error(ErrorCode::kInvalidParameter, shown_ + ": became shorter while it was read");
+}
+
+std::string InputFile::text(std::uint64_t offset, std::size_t count) const {
+  std::string result(count, '\0');
+  result.resize(read(offset, std::as_writable_bytes(std::span(result))));
+  return result;
+}
+
+ScratchFile::ScratchFile(const std::filesystem::path& folder, std::string_view suffix) {
+  std::string name = (folder / "scratch-XXXXXX").string() + std::string(suffix);
+  file_ = Descriptor(::mkostemps(name.data(), static_cast<int>(suffix.size()), O_CLOEXEC));
+  if (file_.number() < 0) throw_system_error("making a temporary file", errno);
+  path_ = name;
+}
+
+ScratchFile::~ScratchFile() {
+  std::error_code ignored;
+  std::filesystem::remove(path_, ignored);
+}
+
+void ScratchFile::write(std::span<const std::byte> bytes) { write_all(file_, bytes); }
+
+std::string read_whole(const std::filesystem::path& path) {
+  const InputFile file(path);
+  return file.text(0, file.size());
+}
+
+}  // namespace isomesh

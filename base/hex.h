@@ -1,0 +1,18 @@
+// Bytes as lower-case hexadecimal digits, two a byte. Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace isomesh {
+
+std::string to_hex(std::span<const std::uint8_t> bytes);
+std::string to_hex(std::string_view bytes);
+
+// The bytes; empty for anything but pairs of lower-case digits.
+std::optional<std::string> from_hex(std::string_view digits);
+
+}  // namespace isomesh

@@ -1,0 +1,48 @@
+#include "base/ids.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <mutex>
+
+#include <openssl/rand.h>
+
+#include "base/error.h"
+#include "base/hex.h"
+
+namespace isomesh {
+
+std::string random_hex(std::size_t bytes) {
+  std::string raw(bytes, '\0');
+  auto* data = reinterpret_cast<unsigned char*>(raw.data());
+  if (RAND_bytes(data, static_cast<int>(bytes)) != 1) {
+    throw Error(ErrorCode::kInternal, "the system's random source failed");
+  }
+  return to_hex(raw);
+}
+
+std::string time_ordered_id() {
+  // Ids of the same millisecond are told apart, and put in order, by the twelve bits behind the
+  // time (RFC 9562, section 6.2, method 1).
+  static std::mutex mutex;
+  static std::int64_t last_stamp = 0;
+  constexpr int kCounterBits = 12;
+  const auto now = std::chrono::duration_cast<std::chrono::milliseconds>(
+      std::chrono::system_clock::now().time_since_epoch());
+  std::int64_t stamp = now.count() << kCounterBits;
+  {
+    const std::lock_guard lock(mutex);
+    stamp = std::max(stamp, last_stamp + 1);
+    last_stamp = stamp;
+  }
+  std::array<char, 20> digits = {};
+  std::snprintf(digits.data(), digits.size(), "%015llx", static_cast<unsigned long long>(stamp));
+  const std::string time(digits.data());
+  const std::string random = random_hex(8);
+  return time.substr(0, 8) + '-' + time.substr(8, 4) + "-7" + time.substr(12, 3) + "-a" +
+         random.substr(0, 3) + '-' + random.substr(3, 12);
+}
+
+}  // namespace isomesh

@@ -1,0 +1,54 @@
+// A mutex whose use the compiler checks: clang's thread-safety analysis, which tests/lint runs,
+// finds what is touched without the lock that guards it. Other compilers see a plain mutex.
+//
+//   Mutex mutex_;
+//   int count_ ISOMESH_GUARDED_BY(mutex_) = 0;
+//   void grow() ISOMESH_REQUIRES(mutex_);          // to be called with the lock held
+//
+//   Lock lock(mutex_);
+//   changed_.wait(lock, [this]() ISOMESH_REQUIRES(mutex_) { return count_ > 0; });
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+
+#if defined(__clang__)
+#define ISOMESH_THREAD_ATTRIBUTE(x) __attribute__((x))
+#else
+#define ISOMESH_THREAD_ATTRIBUTE(x)
+#endif
+
+#define ISOMESH_GUARDED_BY(x) ISOMESH_THREAD_ATTRIBUTE(guarded_by(x))
+#define ISOMESH_REQUIRES(...) ISOMESH_THREAD_ATTRIBUTE(requires_capability(__VA_ARGS__))
+#define ISOMESH_EXCLUDES(...) ISOMESH_THREAD_ATTRIBUTE(locks_excluded(__VA_ARGS__))
+
+namespace isomesh {
+
+class ISOMESH_THREAD_ATTRIBUTE(capability("mutex")) Mutex {
+ public:
+  void lock() ISOMESH_THREAD_ATTRIBUTE(acquire_capability()) { mutex_.lock(); }
+  void unlock() ISOMESH_THREAD_ATTRIBUTE(release_capability()) { mutex_.unlock(); }
+
+ private:
+  std::mutex mutex_;
+};
+
+// Holds a mutex for as long as it lives, but for the time between unlock() and lock().
+class ISOMESH_THREAD_ATTRIBUTE(scoped_lockable) Lock {
+ public:
+  explicit Lock(Mutex& mutex) ISOMESH_THREAD_ATTRIBUTE(acquire_capability(mutex)) : lock_(mutex) {}
+  ~Lock() ISOMESH_THREAD_ATTRIBUTE(release_capability()) = default;
+  Lock(const Lock&) = delete;
+  Lock& operator=(const Lock&) = delete;
+
+  void unlock() ISOMESH_THREAD_ATTRIBUTE(release_capability()) { lock_.unlock(); }
+  void lock() ISOMESH_THREAD_ATTRIBUTE(acquire_capability()) { lock_.lock(); }
+
+ private:
+  std::unique_lock<Mutex> lock_;
+};
+
+// Waits take a Lock; see std::condition_variable_any for the rest, waiting with a stop token too.
+using Condition = std::condition_variable_any;
+
+}  // namespace isomesh

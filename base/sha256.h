@@ -1,0 +1,40 @@
+// SHA-256 (FIPS 180-4), by OpenSSL.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace isomesh {
+
+// The digest of bytes that come piece by piece. Not thread safe. Everything throws Error kInternal
+// when OpenSSL refuses.
+class Sha256 {
+ public:
+  static constexpr std::size_t kBytes = 32;
+  using Digest = std::array<std::uint8_t, kBytes>;
+
+  Sha256();
+  ~Sha256();
+  Sha256(Sha256&&) noexcept;
+  Sha256& operator=(Sha256&&) noexcept;
+
+  void update(std::span<const std::byte> bytes);
+  void update(std::string_view bytes) { update(std::as_bytes(std::span(bytes))); }
+
+  // The digest of all bytes so far; to be called once.
+  Digest finish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+// The digest of a text, in hex.
+std::string sha256_of(std::string_view text);
+
+}  // namespace isomesh

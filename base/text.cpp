@@ -1,0 +1,100 @@
+#include "base/text.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+
+namespace isomesh {
+namespace {
+
+constexpr std::string_view kSpace = " \t\r\n\v\f";
+
+template <class Number>
+std::optional<Number> parse(std::string_view text) {
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
+  Number value{};
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  if (text.empty() || error != std::errc{} || stop != end) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(kSpace);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kSpace) - first + 1);
+}
+
+std::string lower(std::string_view text) {
+  std::string result(text);
+  for (char& letter : result) {
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  }
+  return result;
+}
+
+bool has_control_characters(std::string_view text) {
+  return std::any_of(text.begin(), text.end(), [](char letter) {
+    return (static_cast<unsigned char>(letter) < ' ' && letter != '\t') || letter == '\x7f';
+  });
+}
+
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(separator, begin), text.size());
+    parts.push_back(trimmed(text.substr(begin, end - begin)));
+    begin = end + 1;
+  }
+  return parts;
+}
+
+std::vector<std::string_view> words(std::string_view text) {
+  std::vector<std::string_view> result;
+  for (std::size_t next = text.find_first_not_of(kSpace); next != std::string_view::npos;) {
+    const std::size_t end = std::min(text.find_first_of(kSpace, next), text.size());
+    result.push_back(text.substr(next, end - next));
+    next = text.find_first_not_of(kSpace, end);
+  }
+  return result;
+}
+
+std::vector<std::string_view> lines(std::string_view text) {
+  std::vector<std::string_view> result;
+  for (std::size_t next = 0; next < text.size();) {
+    const std::size_t end = std::min(text.find('\n', next), text.size());
+    const std::string_view line = trimmed(text.substr(next, end - next));
+    if (!line.empty()) result.push_back(line);
+    next = end + 1;
+  }
+  return result;
+}
+
+std::optional<double> parse_double(std::string_view text) { return parse<double>(text); }
+std::optional<std::int64_t> parse_int64(std::string_view text) { return parse<std::int64_t>(text); }
+std::optional<std::uint64_t> parse_uint64(std::string_view text) {
+  return parse<std::uint64_t>(text);
+}
+
+std::string to_text(double value) {
+  std::array<char, 32> buffer;
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
+  return {buffer.data(), end};
+}
+
+std::string in_quotes(std::string_view text) {
+  constexpr std::size_t kLongest = 40;
+  std::string result = "\"";
+  for (const char letter : text.substr(0, kLongest)) {
+    result += letter >= ' ' && letter <= '~' && letter != '"' ? letter : '?';
+  }
+  return result + (text.size() > kLongest ? "...\"" : "\"");
+}
+
+std::string axis_name(std::size_t axis) {
+  return axis < 3 ? std::string(1, "ijk"[axis]) : std::to_string(axis + 1);
+}
+
+}  // namespace isomesh

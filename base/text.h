@@ -1,0 +1,44 @@
+// Text of headers and queries: lines, words and numbers, independent of the locale. Pure functions;
+// views that are returned are views of the argument.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace isomesh {
+
+// Without the white space around it.
+std::string_view trimmed(std::string_view text);
+std::string lower(std::string_view text);  // ASCII only
+
+bool has_control_characters(std::string_view text);  // other than tabs
+
+// The parts between separators, each without the white space around it; one more than there are
+// separators.
+std::vector<std::string_view> split(std::string_view text, char separator);
+
+// The words between white space.
+std::vector<std::string_view> words(std::string_view text);
+
+// The lines that hold more than white space, without what surrounds it.
+std::vector<std::string_view> lines(std::string_view text);
+
+// The whole of `text` as a number; empty when it is anything else.
+std::optional<double> parse_double(std::string_view text);
+std::optional<std::int64_t> parse_int64(std::string_view text);
+std::optional<std::uint64_t> parse_uint64(std::string_view text);
+
+// A number as a person reads it: the shortest text that is read back as the same.
+std::string to_text(double value);
+
+// What may be repeated to a client from a header: printable ASCII, at most 40 characters, in
+// quotes.
+std::string in_quotes(std::string_view text);
+
+// "i", "j" or "k", or "4", "5", ... beyond.
+std::string axis_name(std::size_t axis);
+
+}  // namespace isomesh

@@ -1,0 +1,86 @@
+// node generate.mjs: what the page takes over from proto/openapi.yaml, written to generated/ beside this
+// file. api.d.ts holds the types of requests and answers, parameters.ts the table of a job's parameters.
+import { existsSync, mkdirSync, readFileSync, renameSync, writeFileSync } from 'node:fs';
+import openapiTS, { astToString } from 'openapi-typescript';
+import { parse } from 'yaml';
+
+const source = new URL('../../proto/openapi.yaml', import.meta.url);
+const folder = new URL('generated/', import.meta.url);
+const { components } = parse(readFileSync(source, 'utf8'));
+
+// The schema with the keywords of what it refers to; its own keywords go before those.
+function resolved({ $ref, allOf = [], ...own }) {
+  const named = $ref ? [components.schemas[$ref.replace('#/components/schemas/', '')]] : [];
+  return Object.assign({}, ...[...named, ...allOf].map(resolved), own);
+}
+
+function kindOf(name, { type, enum: values, items }) {
+  const types = [type].flat();
+  if (values) return 'choice';
+  if (types.includes('array') && items && resolved(items).enum) return 'choices';
+  for (const [known, kind] of Object.entries({ boolean: 'switch', integer: 'integer', number: 'number', string: 'text' })) {
+    if (types.includes(known)) return kind;
+  }
+  throw new Error(`${name}: the page has no control for a parameter of this kind`);
+}
+
+// What differs with the value of another parameter: x-by-OTHER.
+function differencesOf(schema) {
+  const key = Object.keys(schema).find((name) => name.startsWith('x-by-'));
+  return key && { parameter: key.slice('x-by-'.length), cases: schema[key] };
+}
+
+function optionOf(query, unit) {
+  return query.replace(new RegExp(`_${unit}$`), '').replaceAll('_', '-');
+}
+
+function parameterOf(name, schema) {
+  // The iso-value may be a word as well; the page has numbers only.
+  const { oneOf: [choice] = [], ...rest } = schema;
+  const all = { ...rest, ...choice };
+  const query = all['x-query'] ?? name.split('.').at(-1);
+  return {
+    name,
+    kind: kindOf(name, all),
+    title: all.title ?? name,
+    help: (all.description ?? '').replaceAll('`', '').replace(/\s+/g, ' ').trim(),
+    unit: all['x-unit'] ?? '',
+    query,
+    option: all['x-option'] ?? optionOf(query, all['x-unit']),
+    isNullable: [all.type].flat().includes('null'),
+    default: all.default,
+    values: all.enum ?? (all.items && resolved(all.items).enum),
+    valueHelp: all['x-enumDescriptions'],
+    minimum: all.minimum,
+    above: all.exclusiveMinimum,
+    maximum: all.maximum,
+    by: differencesOf(all),
+  };
+}
+
+function parametersOf(schema, prefix = '') {
+  return Object.entries(schema.properties).flatMap(([member, given]) => {
+    const inner = resolved(given);
+    const name = prefix + member;
+    return inner.type === 'object' ? parametersOf(inner, `${name}.`) : [parameterOf(name, inner)];
+  });
+}
+
+// In one step, because the page's checks and a build of the daemon may run side by side.
+function write(name, text) {
+  const file = new URL(name, folder);
+  if (existsSync(file) && readFileSync(file, 'utf8') === text) return;
+  const unfinished = new URL(`${name}.${process.pid}`, folder);
+  writeFileSync(unfinished, text);
+  renameSync(unfinished, file);
+}
+
+const made = '// Made by generate.mjs of proto/openapi.yaml.\n';
+const types = await openapiTS(source, { arrayLength: true, defaultNonNullable: false });
+const table = JSON.stringify(parametersOf(components.schemas.JobParameters), null, 2);
+mkdirSync(folder, { recursive: true });
+write('api.d.ts', made + astToString(types));
+write(
+  'parameters.ts',
+  `${made}import type { Parameter } from '../src/job/table';\n\nexport const parameters: readonly Parameter[] = ${table};\n`,
+);

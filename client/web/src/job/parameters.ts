@@ -1,0 +1,136 @@
+// A job's parameters as the page keeps them, in the form and in addresses, and as it sends them.
+import type { JobParameters, JobRequest, MeshFormat } from '../api/types';
+import {
+  applies,
+  fits,
+  isDefault,
+  meshFormats,
+  parameterOf,
+  parameters,
+  valueIn,
+  withValue,
+  type Parameter,
+  type Value,
+} from './table';
+
+// The daemon's defaults, but for the format: GLB is what the page shows.
+export function defaultParameters(volume: string, iso: number): JobParameters {
+  const given = { volume, iso, formats: ['glb'] };
+  return parameters.reduce(
+    (job, parameter) => (parameter.name in given ? job : withValue(job, parameter, parameter.default ?? null)),
+    given as Partial<JobParameters>,
+  ) as JobParameters;
+}
+
+// The job with another value of that parameter. What depends on the parameter (the step of a pass, on
+// the kind of smoothing) gets its default again: a value for the one case means something else, or is
+// refused, in the other.
+export function changed(job: JobParameters, parameter: Parameter, value: Value): JobParameters {
+  const next = withValue(job, parameter, value);
+  if (valueIn(job, parameter) === value) return next;
+  return parameters
+    .filter(({ by }) => by?.parameter === parameter.name)
+    .reduce((result, dependent) => withValue(result, dependent, dependent.default ?? null), next);
+}
+
+// The same for several, one after the other.
+export function variantOf(job: JobParameters, changes: Partial<JobParameters>): JobParameters {
+  return Object.entries(changes).reduce(
+    (result, [name, value]) => changed(result, parameterOf(name), value as Value),
+    job,
+  );
+}
+
+export function withGlb(formats: readonly MeshFormat[]): JobParameters['formats'] {
+  return ['glb', ...meshFormats.filter((format) => format !== 'glb' && formats.includes(format))];
+}
+
+// The last part of its name, which no other parameter has.
+function addressName({ name }: Parameter): string {
+  return name.split('.').at(-1) ?? name;
+}
+
+function asText(value: Value | undefined): string {
+  return value === undefined || value === null ? '' : String(value);
+}
+
+function fromText({ kind, values }: Parameter, text: string): Value {
+  switch (kind) {
+    case 'number':
+    case 'integer':
+      return Number(text);
+    case 'switch':
+      return text === 'true';
+    case 'choice':
+      return values?.find((value) => String(value) === text) ?? text;
+    case 'choices':
+      return text.split(',').filter((one) => values?.includes(one));
+    case 'text':
+      return text;
+  }
+}
+
+// Takes over what the query says and is valid; a link that was typed wrongly does no harm.
+export function parametersOfQuery(query: URLSearchParams, defaults: JobParameters): JobParameters {
+  const take = (job: JobParameters, parameter: Parameter): JobParameters => {
+    const text = query.get(addressName(parameter))?.trim() ?? '';
+    const value = fromText(parameter, text);
+    return text !== '' && fits(parameter, value, job) ? withValue(job, parameter, value) : job;
+  };
+  // What depends on another parameter is judged after that.
+  const inAddress = parameters.filter(({ name }) => name !== 'volume');
+  const job = [...inAddress.filter(({ by }) => !by), ...inAddress.filter(({ by }) => by)].reduce(take, defaults);
+  return { ...job, formats: withGlb(job.formats) };
+}
+
+// What differs from the defaults, as texts for a query; '' where it does not.
+export function queryOfParameters(job: JobParameters, defaults: JobParameters): Record<string, string> {
+  const textOf = (parameter: Parameter): string => {
+    const text = asText(valueIn(job, parameter));
+    if (parameter.name === 'iso') return text;
+    if (parameter.name === 'formats') return text === asText(defaults.formats) ? '' : text;
+    return applies(parameter, job) && !isDefault(parameter, job) ? text : '';
+  };
+  return Object.fromEntries(
+    parameters
+      .filter(({ name }) => name !== 'volume')
+      .map((parameter) => [addressName(parameter), textOf(parameter)]),
+  );
+}
+
+const alwaysSaid = ['volume', 'iso', 'formats'];
+
+// The parameters that a request has to name: those that are not the daemon's defaults.
+export function toSay(job: JobParameters): Parameter[] {
+  return parameters.filter(
+    (parameter) =>
+      alwaysSaid.includes(parameter.name) || (applies(parameter, job) && !isDefault(parameter, job)),
+  );
+}
+
+// The body of the request for that job.
+export function jobRequest(job: JobParameters): JobRequest {
+  return toSay(job).reduce(
+    (request, parameter) => withValue(request, parameter, valueIn(job, parameter) ?? null),
+    {} as Partial<JobParameters>,
+  ) as JobRequest;
+}
+
+// The same as the query of an estimate.
+export function estimateQuery(job: JobParameters): URLSearchParams {
+  return new URLSearchParams(
+    toSay(job).map((parameter) => [parameter.query, asText(valueIn(job, parameter))]),
+  );
+}
+
+export function isSameJob(a: JobParameters, b: JobParameters): boolean {
+  return JSON.stringify(jobRequest(a)) === JSON.stringify(jobRequest(b));
+}
+
+// In a few words, for titles: 6 tetrahedra, linear, 5 passes.
+export function inWords(job: JobParameters): string {
+  const passes = job.passes === 1 ? '1 pass' : `${job.passes} passes`;
+  const smoothing = job.smoothing === 'taubin' && job.passes > 0 ? ' (Taubin)' : '';
+  const closed = job.close ? ', closed' : '';
+  return `${job.scheme} tetrahedra, ${job.interpolation}, ${passes}${smoothing}${closed}`;
+}

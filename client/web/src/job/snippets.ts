@@ -1,0 +1,59 @@
+// How to do the same without the page.
+import type { JobParameters } from '../api/types';
+import { jobRequest, toSay } from './parameters';
+import { valueIn, type Parameter } from './table';
+
+function quoted(text: string): string {
+  return /^[A-Za-z0-9_./:=,-]+$/.test(text) ? text : `'${text.replaceAll("'", `'\\''`)}'`;
+}
+
+export function curlSnippet(origin: string, job: JobParameters, hasToken: boolean): string {
+  const lines = [`curl ${quoted(`${origin}/v1/jobs?wait=30`)}`];
+  if (hasToken) lines.push(`-H "Authorization: Bearer $ISOMESH_TOKEN"`);
+  lines.push(`-H 'Content-Type: application/json'`);
+  lines.push(`-d ${quoted(JSON.stringify(jobRequest(job)))}`);
+  const auth = hasToken ? ' -H "Authorization: Bearer $ISOMESH_TOKEN"' : '';
+  const downloads = job.formats.map(
+    (format) => `curl${auth} -o mesh.${format} ${quoted(`${origin}/v1/jobs/`)}JOB/mesh.${format}`,
+  );
+  return [`${lines.join(' \\\n  ')}`, '# JOB is the id in the answer', ...downloads].join('\n');
+}
+
+function optionFor(parameter: Parameter, job: JobParameters): string {
+  const value = valueIn(job, parameter);
+  return value === true ? `--${parameter.option}` : `--${parameter.option} ${quoted(String(value))}`;
+}
+
+export function commandSnippet(origin: string, job: JobParameters, hasToken: boolean): string {
+  const token = hasToken ? ' --token "$ISOMESH_TOKEN"' : '';
+  const isomesh = `isomesh --server ${quoted(origin)}${token}`;
+  const options = toSay(job)
+    .filter(({ name }) => name !== 'volume')
+    .map((parameter) => optionFor(parameter, job));
+  const fetched = job.formats.map((format) => `-o mesh.${format}`).join(' ');
+  return [
+    `job=$(${isomesh} submit ${job.volume} \\`,
+    `  ${options.join(' ')})`,
+    `${isomesh} wait "$job"`,
+    `${isomesh} fetch "$job" ${fetched}`,
+  ].join('\n');
+}
+
+// Of C++: Glb for glb.
+function enumeratorOf(name: string): string {
+  return `k${name.charAt(0).toUpperCase()}${name.slice(1)}`;
+}
+
+export function librarySnippet(origin: string, job: JobParameters, hasToken: boolean): string {
+  const token = hasToken ? ', .token = std::getenv("ISOMESH_TOKEN")' : '';
+  const fetched = job.formats.map(
+    (format) => `client.fetch(job.id, isomesh::MeshFormat::${enumeratorOf(format)}, "mesh.${format}");`,
+  );
+  return [
+    `isomesh::Client client({.server = ${JSON.stringify(origin)}${token}});`,
+    `const auto parameters = isomesh::parse_job_parameters(R"(`,
+    `  ${JSON.stringify(jobRequest(job))})");`,
+    'const isomesh::Job job = client.wait(client.submit(parameters).id);',
+    ...fetched,
+  ].join('\n');
+}

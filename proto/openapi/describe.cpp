@@ -1,0 +1,404 @@
+#include "proto/openapi/describe.h"
+
+#include <cctype>
+#include <functional>
+#include <map>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "proto/parameters.h"
+
+namespace isomesh {
+namespace {
+
+constexpr std::size_t kWidth = 104;
+
+// --- YAML ----------------------------------------------------------------------------------------
+
+// Lines of YAML, each indented as deep as the mapping that it stands in.
+class Yaml {
+ public:
+  explicit Yaml(std::size_t depth) : depth_(depth) {}
+
+  void line(const std::string& text) { text_ += std::string(2 * depth_, ' ') + text + '\n'; }
+
+  // `name:` and what `inner` writes below it.
+  void under(const std::string& name, const std::function<void()>& inner) {
+    line(name + ':');
+    ++depth_;
+    inner();
+    --depth_;
+  }
+
+  // A text of any length, on the name's own line where it is short and nothing in it means
+  // something to YAML.
+  void text(const std::string& name, const std::string& value) {
+    const bool is_plain = std::isalpha(static_cast<unsigned char>(value.front())) != 0 &&
+                          value.find(": ") == std::string::npos &&
+                          value.find(" #") == std::string::npos;
+    if (is_plain && 2 * depth_ + name.size() + 2 + value.size() <= kWidth) {
+      return line(name + ": " + value);
+    }
+    line(name + ": |");
+    ++depth_;
+    wrapped(value);
+    --depth_;
+  }
+
+  const std::string& str() const { return text_; }
+
+ private:
+  void wrapped(const std::string& value) {
+    std::istringstream words(value);
+    std::string row;
+    for (std::string word; words >> word;) {
+      if (!row.empty() && 2 * depth_ + row.size() + 1 + word.size() > kWidth) {
+        line(std::exchange(row, {}));
+      }
+      row += (row.empty() ? "" : " ") + word;
+    }
+    line(row);
+  }
+
+  std::size_t depth_;
+  std::string text_;
+};
+
+std::string with_commas(const std::vector<std::string>& items) {
+  std::string text;
+  for (const std::string& item : items) {
+    if (!text.empty()) text += ", ";
+    text += item;
+  }
+  return text;
+}
+
+std::string in_brackets(const std::vector<std::string>& items) {
+  return '[' + with_commas(items) + ']';
+}
+
+std::string in_braces(const std::vector<std::string>& items) {
+  return items.empty() ? "{}" : "{ " + with_commas(items) + " }";
+}
+
+std::string reference(const std::string& kind, const std::string& name) {
+  return "$ref: '#/components/" + kind + '/' + name + "'";
+}
+
+// --- What a schema says of a member's type -------------------------------------------------------
+
+template <class T>
+constexpr bool kIsOptional = false;
+template <class T>
+constexpr bool kIsOptional<std::optional<T>> = true;
+
+template <class T>
+constexpr bool kIsCallback = std::is_same_v<T, std::optional<Callback>>;
+
+template <class T>
+constexpr bool kIsChoice = Enumeration<T>;
+
+template <class Enum>
+std::vector<std::string> value_names() {
+  std::vector<std::string> names;
+  if constexpr (std::is_same_v<Enum, Scheme>) {
+    for (const Scheme value : {Scheme::kFive, Scheme::kSix}) {
+      names.push_back(std::to_string(static_cast<int>(value)));
+    }
+  } else {
+    for (const Enum value : values_of<Enum>()) names.emplace_back(to_string(value));
+  }
+  return names;
+}
+
+template <class T>
+std::string name_of(const T& value) {
+  if constexpr (std::is_same_v<T, Scheme>) {
+    return std::to_string(static_cast<int>(value));
+  } else {
+    return std::string(to_string(value));
+  }
+}
+
+template <class T>
+std::string type_of() {
+  if constexpr (kIsOptional<T>) {
+    return "[" + type_of<typename T::value_type>() + ", 'null']";
+  } else if constexpr (std::is_same_v<T, bool>) {
+    return "boolean";
+  } else if constexpr (std::is_same_v<T, double>) {
+    return "number";
+  } else if constexpr (std::is_integral_v<T> || std::is_same_v<T, Scheme>) {
+    return "integer";
+  } else {
+    return "string";
+  }
+}
+
+template <class T>
+std::string default_of(const T& value) {
+  if constexpr (kIsOptional<T>) {
+    return "null";
+  } else if constexpr (std::is_same_v<T, bool>) {
+    return value ? "true" : "false";
+  } else if constexpr (std::is_arithmetic_v<T>) {
+    return number_text(value);
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    return value;
+  } else {
+    return name_of(value);
+  }
+}
+
+// --- One parameter -------------------------------------------------------------------------------
+
+// PassBand for pass_band; without a unit at its end.
+std::string schema_name_of(const Parameter& parameter) {
+  std::string name = parameter.name;
+  const std::string unit = std::string("_") + parameter.unit;
+  if (unit.size() > 1 && name.ends_with(unit)) name.resize(name.size() - unit.size());
+  std::string schema;
+  bool is_first = true;
+  for (const char letter : name) {
+    if (letter != '_') {
+      schema +=
+          is_first ? static_cast<char>(std::toupper(static_cast<unsigned char>(letter))) : letter;
+    }
+    is_first = letter == '_';
+  }
+  return schema;
+}
+
+// "Null: 1 for `laplacian`, 0.33 for `taubin`, which takes at most 0.66."
+std::string cases_in_words(const Parameter& parameter) {
+  std::string text;
+  for (const auto& entry : parameter.cases) {
+    if (!entry || !entry->standard) continue;
+    text += (text.empty() ? " Null: " : ", ") + number_text(*entry->standard) + " for `" +
+            std::string(to_string(entry->smoothing)) + '`';
+    if (entry->maximum) text += ", which takes at most " + number_text(*entry->maximum);
+  }
+  return text.empty() ? "" : text + '.';
+}
+
+std::string description_of(const Parameter& parameter) {
+  const std::string more = parameter.more;
+  return parameter.help + (more.empty() ? "" : ' ' + more) + cases_in_words(parameter);
+}
+
+void write_bounds(Yaml& yaml, const Parameter& parameter) {
+  if (parameter.minimum) yaml.line("minimum: " + number_text(*parameter.minimum));
+  if (parameter.above) yaml.line("exclusiveMinimum: " + number_text(*parameter.above));
+  if (parameter.maximum) yaml.line("maximum: " + number_text(*parameter.maximum));
+}
+
+void write_cases(Yaml& yaml, const Parameter& parameter) {
+  if (!parameter.cases.front()) return;
+  yaml.under("x-by-smoothing", [&] {
+    for (const auto& entry : parameter.cases) {
+      if (!entry) continue;
+      std::vector<std::string> says;
+      if (entry->standard) says.push_back("default: " + number_text(*entry->standard));
+      if (entry->maximum) says.push_back("maximum: " + number_text(*entry->maximum));
+      yaml.line(std::string(to_string(entry->smoothing)) + ": " + in_braces(says));
+    }
+  });
+}
+
+template <class Enum>
+void write_choice(Yaml& yaml, const Parameter& parameter) {
+  const std::vector<std::string> names = value_names<Enum>();
+  yaml.line("enum: " + in_brackets(names));
+  if (parameter.values.front() == nullptr) return;
+  yaml.under("x-enumDescriptions", [&] {
+    for (std::size_t n = 0; n < names.size(); ++n) {
+      const std::string key = std::is_same_v<Enum, Scheme> ? '\'' + names[n] + '\'' : names[n];
+      yaml.text(key, parameter.values.at(n));
+    }
+  });
+}
+
+// Its type, and whatever else it may be.
+template <class T>
+void write_type(Yaml& yaml, const Parameter& parameter, const T& standard) {
+  if constexpr (std::is_same_v<T, std::vector<MeshFormat>>) {
+    yaml.line("type: array");
+    yaml.line("items: { " + reference("schemas", "MeshFormat") + " }");
+    yaml.line("minItems: 1");
+    yaml.line("default: " + in_brackets({name_of(standard.front())}));
+    yaml.line("x-query: " + query_name_of(parameter));
+  } else if (parameter.when_empty != nullptr) {
+    yaml.under("oneOf", [&] {
+      yaml.line("- type: number");
+      yaml.line(std::string("- const: ") + parameter.when_empty);
+    });
+  } else {
+    yaml.line("type: " + type_of<T>());
+    if constexpr (kIsChoice<T>) write_choice<T>(yaml, parameter);
+    write_bounds(yaml, parameter);
+    if (!parameter.is_required) yaml.line("default: " + default_of(standard));
+  }
+}
+
+template <class T>
+void write_schema(Yaml& yaml, const Parameter& parameter, const T& standard) {
+  yaml.line(std::string("title: ") + parameter.title);
+  yaml.text("description", description_of(parameter));
+  write_type(yaml, parameter, standard);
+  write_cases(yaml, parameter);
+  if (*parameter.unit != '\0') yaml.line(std::string("x-unit: ") + parameter.unit);
+  if (parameter.option != nullptr) yaml.line(std::string("x-option: ") + parameter.option);
+}
+
+// --- The parts -----------------------------------------------------------------------------------
+
+// Texts and lists are described where they stand; all others have a schema of their own.
+template <class T>
+constexpr bool kStandsAlone =
+    !std::is_same_v<T, std::string> && !std::is_same_v<T, std::vector<MeshFormat>>;
+
+template <class T>
+void write_properties(Yaml& yaml, const T& parameters);
+
+template <class T>
+void write_property(Yaml& yaml, const Parameter& parameter, const T& member) {
+  if constexpr (kIsCallback<T> || (kStandsAlone<T> && !ParameterGroup<T>)) {
+    yaml.line(std::string(parameter.name) + ": { " +
+              reference("schemas", schema_name_of(parameter)) + " }");
+  } else {
+    yaml.under(parameter.name, [&] {
+      if constexpr (ParameterGroup<T>) {
+        yaml.text("description", description_of(parameter));
+        write_properties(yaml, member);
+      } else {
+        write_schema(yaml, parameter, member);
+      }
+    });
+  }
+}
+
+template <class T>
+void write_properties(Yaml& yaml, const T& parameters) {
+  yaml.line("type: object");
+  yaml.line("additionalProperties: false");
+  yaml.under("properties", [&] {
+    visit(parameters, [&](const Parameter& parameter, const auto& member) {
+      write_property(yaml, parameter, member);
+    });
+  });
+}
+
+// With every member that a job may have.
+JobParameters complete_parameters() {
+  JobParameters parameters;
+  parameters.callback.emplace();
+  return parameters;
+}
+
+std::string schemas() {
+  Yaml yaml(2);
+  const JobParameters parameters = complete_parameters();
+  visit_leaves(parameters, [&](const std::string&, const Parameter& parameter, const auto& member) {
+    using Member = std::remove_cvref_t<decltype(member)>;
+    if constexpr (kStandsAlone<Member> && !kIsCallback<Member>) {
+      yaml.under(schema_name_of(parameter), [&] { write_schema(yaml, parameter, member); });
+    }
+  });
+  yaml.under("JobParameters", [&] {
+    yaml.line(
+        "description: What a job is asked to do. The same volume and parameters give the same "
+        "bytes.");
+    write_properties(yaml, parameters);
+  });
+  std::vector<std::string> required;
+  std::vector<std::string> always;
+  visit(parameters, [&](const Parameter& parameter, const auto& member) {
+    if (parameter.is_required) required.emplace_back(parameter.name);
+    if (!kIsCallback<std::remove_cvref_t<decltype(member)>>) always.emplace_back(parameter.name);
+  });
+  const std::string base = "allOf: [{ " + reference("schemas", "JobParameters") + " }]";
+  yaml.under("JobRequest", [&] {
+    yaml.line(base);
+    yaml.line("required: " + in_brackets(required));
+  });
+  yaml.under("CompleteJobParameters", [&] {
+    yaml.line("description: All of them, with the defaults of those that were left out.");
+    yaml.line(base);
+    yaml.under("required", [&] {
+      for (const std::string& name : always) yaml.line("- " + name);
+    });
+  });
+  return yaml.str();
+}
+
+// Calls each(parameter) for those that a query spells as a body does.
+template <class Each>
+void visit_query(const Each& each) {
+  const JobParameters parameters;
+  visit_leaves(parameters, [&](const std::string&, const Parameter& parameter, const auto& member) {
+    if constexpr (kStandsAlone<std::remove_cvref_t<decltype(member)>>) {
+      if (parameter.in_query) each(parameter);
+    }
+  });
+}
+
+std::string query() {
+  Yaml yaml(2);
+  visit_query([&](const Parameter& parameter) {
+    yaml.under(schema_name_of(parameter), [&] {
+      yaml.line("name: " + query_name_of(parameter));
+      yaml.line("in: query");
+      if (parameter.is_required) yaml.line("required: true");
+      yaml.text("description", parameter.help);
+      yaml.line("schema: { " + reference("schemas", schema_name_of(parameter)) + " }");
+    });
+  });
+  return yaml.str();
+}
+
+std::string query_references() {
+  Yaml yaml(4);
+  visit_query([&](const Parameter& parameter) {
+    yaml.line("- " + reference("parameters", schema_name_of(parameter)));
+  });
+  return yaml.str();
+}
+
+std::string formats() {
+  Yaml yaml(2);
+  yaml.under("MeshFormat", [&] {
+    yaml.line("description: A mesh file's format and suffix. STL and PLY are binary.");
+    yaml.line("type: string");
+    yaml.line("enum: " + in_brackets(value_names<MeshFormat>()));
+  });
+  return yaml.str();
+}
+
+// Where the line that holds `text` begins, and where the next one does.
+std::pair<std::size_t, std::size_t> line_with(const std::string& description,
+                                              const std::string& text, std::size_t from) {
+  const std::size_t found = description.find("# " + text + '\n', from);
+  if (found == std::string::npos) throw std::runtime_error("there is no line \"# " + text + '"');
+  return {description.rfind('\n', found) + 1, description.find('\n', found) + 1};
+}
+
+}  // namespace
+
+std::string with_parameters(const std::string& description) {
+  const std::map<std::string, std::string> parts = {{"schemas of parameters", schemas()},
+                                                    {"formats", formats()},
+                                                    {"parameters of a query", query()},
+                                                    {"query of an estimate", query_references()},
+                                                    {"query of a mesh", query_references()}};
+  std::string result = description;
+  for (const auto& [name, text] : parts) {
+    const std::size_t begin = line_with(result, "made of parameters.h: " + name, 0).second;
+    const std::size_t end = line_with(result, "end of " + name, begin).first;
+    result.replace(begin, end - begin, text);
+  }
+  return result;
+}
+
+}  // namespace isomesh

@@ -1,0 +1,252 @@
+// What a parameter of a job is. Each has one row in the functions `visit` below, beside the member
+// that holds it; its type, its default and the names of its values are those of the member.
+// Requests, queries and their refusals (requests.cpp), the command's options and help
+// (client/cli/options.cpp) and openapi.yaml (openapi/describe.cpp), from which the page's form is
+// made, all follow from the rows.
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <limits>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "proto/types.h"
+
+namespace isomesh {
+
+template <class T>
+concept Enumeration = std::is_enum_v<T>;
+
+template <class Self, class T>
+concept Is = std::same_as<std::remove_const_t<Self>, T>;
+
+// What is different for one kind of smoothing.
+struct SmoothingCase {
+  Smoothing smoothing;
+  std::optional<double> standard = {};  // the default there
+  std::optional<double> maximum = {};
+};
+
+struct Parameter {
+  const char* name;        // of the member in JSON
+  const char* title = "";  // a short label
+  const char* help = "";   // what it does, in one line
+  const char* more = "";  // what else a reader of the API should know: sentences that follow `help`
+  const char* unit = "";  // which may end the name: max_displacement_mm
+  // Of a number.
+  std::optional<double> minimum = {};
+  std::optional<double> above = {};
+  std::optional<double> maximum = {};
+  const char* when_empty = nullptr;        // the word for no value, in place of JSON's null
+  std::array<const char*, 4> values = {};  // what the values of an enumeration mean, in their order
+  std::array<std::optional<SmoothingCase>, 2> cases = {};  // none: for every kind of smoothing
+  bool is_required = false;
+  bool in_query = true;
+  const char* query = nullptr;   // what a query calls it, unless `name`
+  const char* option = nullptr;  // what the command calls it, unless as a query, without the unit
+
+  operator const char*() const { return name; }
+};
+
+void visit(Is<ComponentFilter> auto& self, auto&& parameter) {
+  constexpr double kMost = std::numeric_limits<std::uint32_t>::max();
+  parameter(Parameter{.name = "keep",
+                      .title = "Keep the largest parts",
+                      .help = "Of the parts, so many of the largest are kept.",
+                      .minimum = 1,
+                      .maximum = kMost,
+                      .option = "keep-components"},
+            self.keep);
+  parameter(Parameter{.name = "min_triangles",
+                      .title = "Fewest triangles of a part",
+                      .help = "Of the parts, those of so many triangles are kept.",
+                      .minimum = 1,
+                      .maximum = kMost},
+            self.min_triangles);
+}
+
+void visit(Is<DracoParameters> auto& self, auto&& parameter) {
+  parameter(Parameter{.name = "position_bits",
+                      .title = "Bits per coordinate",
+                      .help = "Bits per coordinate on a grid over the mesh's longest extent.",
+                      .minimum = 8,
+                      .maximum = 30},
+            self.position_bits);
+  parameter(
+      Parameter{.name = "speed",
+                .title = "Encoding speed",
+                .help = "Of Draco: 0 to 4 are smallest and slow (valence coding, by libdraco); "
+                        "5 to 9 are all the same (an encoder of isomesh's own, on several "
+                        "threads, in no more bytes than libdraco takes at 5); 10 keeps the "
+                        "order of vertices and triangles at several times the bytes "
+                        "(sequential, by libdraco).",
+                .minimum = 0,
+                .maximum = 10},
+      self.speed);
+}
+
+void visit(Is<MeshParameters> auto& self, auto&& parameter) {
+  parameter(Parameter{.name = "iso",
+                      .title = "Iso-value",
+                      .help = "The iso-value, in the volume's units, or Otsu's threshold.",
+                      .more = "A sample is inside when its value is >= iso.",
+                      .when_empty = "otsu",
+                      .is_required = true},
+            self.iso);
+  parameter(Parameter{.name = "scheme",
+                      .title = "Tetrahedra per cell",
+                      .help = "Tetrahedra per cell.",
+                      .more = "With 5 every second cell is mirrored; the cell (0,0,0) is not.",
+                      .values = {"Fewer triangles; every second cell is mirrored",
+                                 "The same split in every cell"}},
+            self.scheme);
+  parameter(Parameter{.name = "interpolation",
+                      .title = "Vertices on edges",
+                      .help = "Where a vertex lies on its edge.",
+                      .more = "`midpoint` puts all half-way.",
+                      .values = {"Where the iso-value lies between two samples",
+                                 "Half-way between two samples"}},
+            self.interpolation);
+  parameter(Parameter{.name = "passes",
+                      .title = "Passes",
+                      .help = "How often the surface is smoothed.",
+                      .more = "Vertices on its boundary stay.",
+                      .minimum = 0,
+                      .maximum = 1000},
+            self.passes);
+  parameter(
+      Parameter{
+          .name = "smoothing",
+          .title = "Smoothing",
+          .help = "How a pass moves the vertices.",
+          .more = "`laplacian`: every pass moves each vertex by `lambda` of the way to the mean of "
+                  "its neighbours; what the surface encloses shrinks. `taubin`: every pass does so "
+                  "and then moves the vertices back by `mu`, the same for all, with 1/lambda + "
+                  "1/mu = `pass_band`; so a pass is two steps, and noise goes while shape and "
+                  "volume stay.",
+          .values = {"Shrinks a little with every pass", "Keeps the enclosed volume"}},
+      self.smoothing);
+  // With more than 0.66 in Taubin's, what varies fastest would grow with every pass, whatever the
+  // pass-band.
+  parameter(
+      Parameter{
+          .name = "lambda",
+          .title = "Step of a pass",
+          .help = "How far a pass moves a vertex; 1 moves it onto the mean of its neighbours.",
+          .above = 0,
+          .maximum = 1,
+          .cases = {SmoothingCase{Smoothing::kLaplacian, default_lambda(Smoothing::kLaplacian)},
+                    SmoothingCase{Smoothing::kTaubin, default_lambda(Smoothing::kTaubin), 0.66}}},
+      self.lambda);
+  parameter(
+      Parameter{.name = "pass_band",
+                .title = "Pass band",
+                .help = "Of `taubin`: what varies along the surface more slowly than this is "
+                        "kept.",
+                .more = "From 0 for a constant to 2 for what changes sign from each vertex to "
+                        "the next.",
+                .above = 0,
+                .maximum = 0.5,
+                .cases = {SmoothingCase{Smoothing::kTaubin}}},
+      self.pass_band);
+  parameter(Parameter{.name = "max_displacement_mm",
+                      .title = "Move at most",
+                      .help = "Smoothing moves no vertex farther than this from where it was "
+                              "extracted.",
+                      .more = "Millimetres; null: as far as it goes.",
+                      .unit = "mm",
+                      .minimum = 0},
+            self.max_displacement_mm);
+  parameter(
+      Parameter{.name = "close",
+                .title = "Close the surface at the volume's border",
+                .help = "Cap the surface where it meets the volume's border, as if the samples "
+                        "beyond it were outside.",
+                .more = "The result has no boundary. Caps lie in the border, stay flat and "
+                        "are not smoothed; the rest is smoothed as if the surface were open."},
+      self.close);
+  parameter(
+      Parameter{.name = "components",
+                .help = "Which parts of the surface are kept; the others are dropped before "
+                        "smoothing.",
+                .more = "With both members, the largest of those that are large enough. Parts "
+                        "are compared by their triangles, equal ones by their first vertex. "
+                        "Without members all are kept."},
+      self.components);
+  parameter(Parameter{.name = "formats",
+                      .title = "Files to make",
+                      .help = "The files to make, each named once.",
+                      .query = "format"},
+            self.formats);
+  parameter(Parameter{.name = "draco",
+                      .help = "Of the `drc` format, and of the Draco streams inside `glb`."},
+            self.draco);
+  parameter(Parameter{.name = "normals",
+                      .title = "Put the vertices' normals into GLB",
+                      .help = "Put the vertices' normals, weighted by the areas around them, into "
+                              "`glb`."},
+            self.normals);
+}
+
+inline MeshParameters& mesh_parameters(JobParameters& parameters) { return parameters; }
+inline const MeshParameters& mesh_parameters(const JobParameters& parameters) { return parameters; }
+
+void visit(Is<JobParameters> auto& self, auto&& parameter) {
+  parameter(
+      Parameter{
+          .name = "volume", .title = "Volume", .help = "The volume's id.", .is_required = true},
+      self.volume);
+  visit(mesh_parameters(self), parameter);
+  parameter(Parameter{.name = "priority",
+                      .title = "Priority",
+                      .help = "Jobs are begun by priority, then by age.",
+                      .values = {"Before all others", "After all that are stat",
+                                 "When nothing else waits"}},
+            self.priority);
+  // A job that asked for no call does not say so.
+  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? self.callback.has_value() : true) {
+    parameter(Parameter{.name = "callback",
+                        .help = "Have the server tell this address when the job has ended.",
+                        .in_query = false},
+              self.callback);
+  }
+}
+
+// A parameter that holds others: draco, of which draco.speed is one.
+template <class T>
+concept ParameterGroup = Is<T, ComponentFilter> || Is<T, DracoParameters>;
+
+// Calls leaf(path, parameter, member) for all that are no groups, those in groups by their path:
+// "draco.speed".
+template <class Self, class Leaf>
+void visit_leaves(Self& self, const Leaf& leaf, const std::string& prefix = {}) {
+  visit(self, [&](const Parameter& parameter, auto& member) {
+    const std::string path = prefix + parameter.name;
+    if constexpr (ParameterGroup<std::remove_reference_t<decltype(member)>>) {
+      visit_leaves(member, leaf, path + '.');
+    } else {
+      leaf(path, parameter, member);
+    }
+  });
+}
+
+std::string query_name_of(const Parameter& parameter);
+
+// Without the hyphens before it: "max-displacement".
+std::string option_name_of(const Parameter& parameter);
+
+// What a number may be, for people: "from 0 to 1000", "above 0 and at most 1", "of at least 0";
+// empty where every number will do.
+std::string range_of(const Parameter& parameter);
+
+// As short as it reads back: "0.33", "4294967295".
+std::string number_text(double number);
+
+// Names with commas and a last "or" between.
+std::string listed(const std::vector<std::string>& names);
+
+}  // namespace isomesh

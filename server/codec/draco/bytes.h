@@ -1,0 +1,55 @@
+// Writing of a stream's bytes; private to this folder.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace isomesh::codec::edgebreaker {
+
+static_assert(std::endian::native == std::endian::little, "Draco's streams are little-endian");
+
+// Appends to bytes that it owns. Not thread safe.
+class ByteWriter {
+ public:
+  void byte(std::uint32_t value) { bytes_.push_back(static_cast<std::byte>(value)); }
+
+  template <class T>
+  void raw(T value) {
+    append(std::as_bytes(std::span(&value, 1)));
+  }
+
+  // Seven bits a byte, the lowest first; all but the last have the highest bit set.
+  void varint(std::uint64_t value) {
+    for (; value >= 0x80; value >>= 7) byte(static_cast<std::uint32_t>(value & 0x7F) | 0x80U);
+    byte(static_cast<std::uint32_t>(value));
+  }
+
+  void append(std::span<const std::byte> bytes) {
+    if (!bytes.empty()) std::memcpy(extend(bytes.size()), bytes.data(), bytes.size());
+  }
+
+  // Zeros, for the caller to write over before it appends more.
+  std::byte* extend(std::size_t count) {
+    bytes_.resize(bytes_.size() + count);
+    return bytes_.data() + bytes_.size() - count;
+  }
+
+  // With their number before them.
+  void counted(std::span<const std::byte> bytes) {
+    varint(bytes.size());
+    append(bytes);
+  }
+
+  void reserve(std::size_t bytes) { bytes_.reserve(bytes); }
+  std::vector<std::byte> take() { return std::move(bytes_); }
+
+ private:
+  std::vector<std::byte> bytes_;
+};
+
+}  // namespace isomesh::codec::edgebreaker

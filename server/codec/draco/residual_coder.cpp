@@ -1,0 +1,150 @@
+#include "server/codec/draco/residual_coder.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+#include "server/codec/draco/bits.h"
+#include "server/codec/draco/bytes.h"
+#include "server/codec/draco/rans.h"
+
+namespace isomesh::codec::edgebreaker {
+namespace {
+
+constexpr std::uint32_t kTaggedSymbols = 0;
+constexpr std::uint32_t kRawSymbols = 1;
+
+// The precision of the probabilities goes with a number which the stream calls the bits of the
+// number of different values. Any does; the finest that is worth its table is taken.
+constexpr int kMostLengthBits = 18;
+constexpr int kLengthsTried = 3;
+constexpr int kLeastPrecision = 12;
+constexpr int kMostPrecision = 20;
+
+int precision_of(int length_bits) {
+  return std::clamp(3 * length_bits / 2, kLeastPrecision, kMostPrecision);
+}
+
+struct Choice {
+  int length_bits = 0;
+  double data_bits = 0;
+  double table_bits = 0;
+  Probabilities probabilities;
+
+  double all_bits() const { return data_bits + table_bits; }
+};
+
+Choice best_probabilities(std::span<const std::uint64_t> counts) {
+  const auto different = static_cast<std::uint64_t>(
+      std::ranges::count_if(counts, [](std::uint64_t count) { return count != 0; }));
+  const int longest = std::min(kMostLengthBits, static_cast<int>(std::bit_width(different)));
+  Choice best;
+  for (int length = longest; length >= std::max(1, longest - kLengthsTried + 1); --length) {
+    const int precision = precision_of(length);
+    if (std::uint64_t{1} << precision < 2 * different) break;
+    Probabilities probabilities = probabilities_of(counts, precision);
+    Choice choice = {length, probabilities.data_bits(counts), probabilities.table_bits(), {}};
+    if (best.length_bits == 0 || choice.all_bits() < best.all_bits()) {
+      choice.probabilities = std::move(probabilities);
+      best = std::move(choice);
+    }
+    if (precision == kLeastPrecision) break;
+  }
+  return best;
+}
+
+constexpr int kTagPrecision = kLeastPrecision;
+
+// The bits of a vertex's largest residual, one at least.
+std::uint32_t bits_of(const std::uint16_t* symbols) {
+  return static_cast<std::uint32_t>(
+      std::bit_width(static_cast<std::uint32_t>(symbols[0] | symbols[1] | symbols[2] | 1)));
+}
+
+using TagCounts = std::array<std::uint64_t, 18>;
+
+// What tagged values take, in bits, as some of the vertices tell.
+double tagged_bits(const Residuals& residuals, std::uint32_t vertices) {
+  constexpr std::uint32_t kLookedAt = 1 << 16;
+  const std::uint32_t step = std::max(1U, vertices / kLookedAt);
+  TagCounts counts = {};
+  double values = 0;
+  double looked_at = 0;
+  for (std::uint32_t vertex = 0; vertex < vertices; vertex += step) {
+    const std::uint32_t bits = bits_of(residuals.symbols() + 3 * std::size_t{vertex});
+    ++counts[bits];
+    values += 3 * bits;
+    ++looked_at;
+  }
+  const Probabilities probabilities = probabilities_of(counts, kTagPrecision);
+  return (values + probabilities.data_bits(counts)) * vertices / looked_at +
+         probabilities.table_bits();
+}
+
+}  // namespace
+
+CodedResiduals ResidualCoder::code(const Residuals& residuals, const ValueOrder& order,
+                                   std::span<const Histogram> histograms) {
+  std::vector<std::uint64_t> counts(residuals.wrap().symbols());
+  for (std::uint32_t symbol = 0; symbol < counts.size(); ++symbol) {
+    for (const Histogram& histogram : histograms) counts[symbol] += histogram.count(symbol);
+  }
+  const Choice choice = best_probabilities(counts);
+  if (tagged_bits(residuals, order.count()) < choice.all_bits()) {
+    return code_tagged(residuals, order);
+  }
+  coded_.reserve(RansEncoder::most_bytes(choice.data_bits, 3 * std::uint64_t{order.count()}));
+  RansEncoder encoder(choice.probabilities, coded_.data());
+  // The decoder goes through components from the last to the first.
+  for (const ValueRange& component : order.components()) {
+    encoder.put_backwards(residuals.symbols() + 3 * std::size_t{component.begin},
+                          residuals.symbols() + 3 * std::size_t{component.end});
+  }
+  const std::byte* const end = encoder.finish();
+  const auto bytes = static_cast<std::size_t>(end - coded_.data());
+  ByteWriter out;
+  out.byte(kRawSymbols);
+  out.byte(static_cast<std::uint32_t>(choice.length_bits));
+  choice.probabilities.write(out);
+  out.varint(bytes);
+  return {out.take(), {coded_.data(), bytes}};
+}
+
+CodedResiduals ResidualCoder::code_tagged(const Residuals& residuals, const ValueOrder& order) {
+  TagCounts counts = {};
+  bits_.reserve(order.count());
+  for (std::uint32_t vertex = 0; vertex < order.count(); ++vertex) {
+    const std::uint32_t bits = bits_of(residuals.symbols() + 3 * std::size_t{vertex});
+    bits_[vertex] = static_cast<std::uint16_t>(bits);
+    ++counts[bits];
+  }
+  const Probabilities probabilities = probabilities_of(counts, kTagPrecision);
+  std::uint64_t value_bits = 0;
+  for (std::size_t tag = 0; tag < counts.size(); ++tag) value_bits += 3 * tag * counts[tag];
+  std::vector<std::byte> tags(
+      RansEncoder::most_bytes(probabilities.data_bits(counts), order.count()));
+  RansEncoder encoder(probabilities, tags.data());
+  for (const ValueRange& component : order.components()) {
+    encoder.put_backwards(bits_.data() + component.begin, bits_.data() + component.end);
+  }
+  const std::byte* const end = encoder.finish();
+  ByteWriter out;
+  out.byte(kTaggedSymbols);
+  probabilities.write(out);
+  out.counted(std::span(tags).first(static_cast<std::size_t>(end - tags.data())));
+
+  const std::size_t bytes = BitWriter::bytes_of(value_bits);
+  BitWriter values(coded_.reserve(bytes));
+  for (auto component = order.components().rbegin(); component != order.components().rend();
+       ++component) {
+    for (std::uint32_t vertex = component->begin; vertex < component->end; ++vertex) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        values.put(residuals.symbols()[3 * std::size_t{vertex} + axis], bits_[vertex]);
+      }
+    }
+  }
+  values.finish();
+  return {out.take(), {coded_.data(), bytes}};
+}
+
+}  // namespace isomesh::codec::edgebreaker

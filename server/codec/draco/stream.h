@@ -1,0 +1,29 @@
+// The parts of a Draco stream as bytes, and their order; private to this folder.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "server/codec/draco/corners.h"
+#include "server/codec/draco/grid.h"
+#include "server/codec/draco/quantise.h"
+#include "server/codec/draco/residual_coder.h"
+#include "server/codec/draco/traversal.h"
+
+namespace isomesh::codec::edgebreaker {
+
+// What a stream is made of.
+struct StreamParts {
+  const Traversal& traversal;
+  std::uint32_t faces = 0;
+  std::uint32_t vertices = 0;  // that faces name
+  CodedResiduals residuals;
+  Extent extent;
+  const Grid& grid;
+};
+
+// The whole stream: Draco's bitstream 2.2, a triangle mesh by edgebreaker with one attribute, which
+// is the position.
+std::vector<std::byte> assemble(const StreamParts& parts);
+
+}  // namespace isomesh::codec::edgebreaker

@@ -1,0 +1,87 @@
+// Edgebreaker: the surface face by face as symbols; private to this folder.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "server/codec/draco/corners.h"
+#include "server/codec/draco/fans.h"
+#include "server/codec/draco/scratch.h"
+#include "server/codec/draco/starts.h"
+#include "server/mesh/context.h"
+
+namespace isomesh::codec::edgebreaker {
+
+// How a face lies to those before it, by its tip, which is the vertex opposite of the edge through
+// which it was entered: C is a new vertex. Else the faces to the left and right of the tip are gone
+// (their bits are set) or not.
+enum Symbol : std::uint8_t { kC = 0, kS = 1, kL = 3, kR = 5, kE = 7 };
+
+// A face closes against the one to its left (side 0) or right (side 1) which is an S whose left
+// side waited for it. Both by the numbers of their symbols.
+struct SplitEvent {
+  std::uint32_t source = 0;
+  std::uint32_t split = 0;
+  std::uint8_t side = 0;
+};
+
+// Walks depth-first over all faces, as Rossignac's Edgebreaker in the form that Draco's bitstream
+// has. Keeps its memory from surface to surface. Not thread safe.
+class Traversal {
+ public:
+  // While at least this many faces are left, the entrance to a component is chosen so that its end
+  // is known.
+  explicit Traversal(std::size_t least_to_look_ahead) : least_to_look_ahead_(least_to_look_ahead) {}
+
+  void prepare(const Connectivity& surface, const Fans& fans);
+
+  // Once after prepare. Fills what is below, and `starts` on the way, which it leaves open. Returns
+  // false where a vertex has a second closed fan, which Draco has no code for. Throws Error
+  // kCancelled.
+  bool run(const Fans& fans, Starts& starts, const mesh::Context& context);
+
+  std::span<const std::uint8_t> symbols() const { return {symbols_.data(), count_}; }
+  const std::vector<SplitEvent>& events() const { return events_; }
+  std::size_t splits() const { return all_splits_.size(); }
+  // For each component, whether it starts with a face inside: one that has no symbol.
+  const std::vector<bool>& inner_first_faces() const { return inner_first_faces_; }
+
+ private:
+  // Of a face: gone, also an S, also looked at for a start.
+  enum FaceState : std::uint8_t { kLeft = 0, kGone = 1, kSplit = 2, kListed = 4 };
+
+  // A face that is an S, and the number of its symbol.
+  struct Split {
+    Face face = 0;
+    std::uint32_t symbol = 0;
+  };
+  struct Entrance {
+    Corner corner = 0;
+    std::optional<Face> inner;  // the component's first face, if it is inside: it has no symbol
+  };
+
+  std::optional<Entrance> entrance_of(Face face, const Fans& fans) const;
+  std::optional<Corner> choose_entrance(Entrance& entrance, const Fans& fans);
+  bool take_first(Face face);
+  bool walk(Corner corner, const mesh::Context& context);
+  bool is_of_open_fan(Corner corner) const;
+  Corner tip_before(Corner corner, std::uint32_t symbol, std::size_t& end) const;
+  void resolve_events();
+  void put_starts(std::uint32_t first_symbol, Starts& starts);
+  bool hangs_by_its_gate(Corner corner) const;
+
+  const std::size_t least_to_look_ahead_;
+  Connectivity surface_;
+  Scratch<std::uint8_t> face_state_;
+  Scratch<std::uint8_t> known_;  // a byte a vertex: the decoder has it, or it is of the boundary
+  Scratch<std::uint8_t> symbols_;
+  std::vector<Corner> waiting_;  // the left sides of splits
+  std::vector<Split> all_splits_;
+  std::vector<Corner> ends_;  // the tips of those symbols that are an E
+  std::vector<SplitEvent> events_;
+  std::vector<bool> inner_first_faces_;
+  std::uint32_t count_ = 0;
+};
+
+}  // namespace isomesh::codec::edgebreaker

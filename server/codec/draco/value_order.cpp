@@ -1,0 +1,41 @@
+#include "server/codec/draco/value_order.h"
+
+#include <cstring>
+
+namespace isomesh::codec::edgebreaker {
+
+void ValueOrder::prepare(const Connectivity& surface, const Fans& fans) {
+  surface_ = surface;
+  const std::size_t faces = surface.faces;
+  std::memset(face_gone_.reserve(faces + 1), 0, faces);
+  face_gone_[faces] = 1;  // beyond the boundary
+  std::memset(vertex_state_.reserve(surface.vertices), 0, surface.vertices);
+  fans.for_each_on_boundary([&](Vertex vertex) { vertex_state_[vertex] = kBoundary; });
+  order_.reserve(surface.vertices);
+  waiting_.clear();
+  components_.clear();
+  firsts_.clear();
+  count_ = 0;
+}
+
+// Whether the vertices of the face across the corner's edge all have their values.
+bool ValueOrder::is_predicted(Corner corner) const {
+  const Corner across = surface_.opposite(corner);
+  if (across == surface_.none) return false;
+  for (const Corner other : {across, next(across), previous(across)}) {
+    if ((vertex_state_[surface_.vertex(other)] & kPlaced) == 0) return false;
+  }
+  return true;
+}
+
+// Gives the vertex its place, if it has none.
+void ValueOrder::put(Corner corner) {
+  std::uint8_t& state = vertex_state_[surface_.vertex(corner)];
+  if ((state & kPlaced) != 0) return;
+  const bool is_first = !is_predicted(corner);
+  state = static_cast<std::uint8_t>(state | kPlaced);
+  if (is_first) firsts_.push_back(count_);
+  order_[count_++] = corner | (is_first ? kFirstValue : 0);
+}
+
+}  // namespace isomesh::codec::edgebreaker

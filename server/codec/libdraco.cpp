@@ -1,0 +1,143 @@
+#include "server/codec/libdraco.h"
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include <draco/compression/encode.h>
+#include <draco/mesh/mesh.h>
+
+#include "proto/error.h"
+
+namespace isomesh::codec {
+namespace {
+
+constexpr int kSequentialSpeed = 10;
+constexpr int kNormalBits = 10;  // of each octahedral coordinate: a tenth of a degree
+
+// Draco's entropy coder counts values in an array of all that there could be, four bytes each: 4
+// GiB at 30 bits. Finer grids than this are stored without it, in up to four bytes a coordinate.
+constexpr int kMostEntropyCodedBits = 24;
+
+// libdraco's decoder refuses sequential streams in which less than three bytes a triangle follow
+// the numbers at their beginning, which compressed ones may have. Zeros behind their end are
+// ignored.
+constexpr std::size_t kLeastPerTriangle = 3;
+constexpr std::size_t kHeadBytes = 32;
+
+// Adds one vector a point. Returns the attribute's id within the stream.
+std::uint32_t add_attribute(draco::Mesh& mesh, draco::GeometryAttribute::Type type,
+                            std::span<const mesh::Vec3> vectors) {
+  draco::GeometryAttribute description;
+  description.Init(type, nullptr, 3, draco::DT_FLOAT32, false, sizeof(mesh::Vec3), 0);
+  draco::PointAttribute* attribute = mesh.attribute(
+      mesh.AddAttribute(description, true, static_cast<std::uint32_t>(vectors.size())));
+  // One write for all: the attribute's buffer has the layout of our vectors.
+  if (!vectors.empty()) attribute->buffer()->Write(0, vectors.data(), vectors.size_bytes());
+  return attribute->unique_id();
+}
+
+// Built from arrays: Draco's soup builder would look for duplicates again.
+std::unique_ptr<draco::Mesh> to_draco(std::size_t vertices,
+                                      std::span<const mesh::Triangle> triangles) {
+  auto result = std::make_unique<draco::Mesh>();
+  result->set_num_points(static_cast<std::uint32_t>(vertices));
+  result->SetNumFaces(triangles.size());
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    const auto& [a, b, c] = triangles[t];
+    result->SetFace(draco::FaceIndex(t),
+                    {draco::PointIndex(a), draco::PointIndex(b), draco::PointIndex(c)});
+  }
+  return result;
+}
+
+// The same triangles with the vertices that they name. Draco's own decoder refuses sequential
+// streams of more vertices than corners.
+struct Named {
+  explicit Named(const Arrays& arrays) {
+    constexpr std::uint32_t kUnnamed = ~std::uint32_t{0};
+    std::vector<std::uint32_t> number(arrays.positions.size(), kUnnamed);
+    for (const mesh::Triangle& triangle : arrays.triangles) {
+      mesh::Triangle& renumbered = triangles.emplace_back();
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        std::uint32_t& vertex = number[triangle[corner]];
+        if (vertex == kUnnamed) {
+          vertex = static_cast<std::uint32_t>(positions.size());
+          positions.push_back(arrays.positions[triangle[corner]]);
+          if (!arrays.normals.empty()) normals.push_back(arrays.normals[triangle[corner]]);
+        }
+        renumbered[corner] = vertex;
+      }
+    }
+  }
+
+  Arrays arrays() const { return {positions, normals, triangles}; }
+
+  std::vector<mesh::Vec3> positions;
+  std::vector<mesh::Vec3> normals;
+  std::vector<mesh::Triangle> triangles;
+};
+
+// Edgebreaker leaves out triangles that repeat a vertex.
+bool is_sequential(std::span<const mesh::Triangle> triangles, int speed) {
+  return speed == kSequentialSpeed || std::ranges::any_of(triangles, [](const auto& triangle) {
+           const auto& [a, b, c] = triangle;
+           return a == b || b == c || c == a;
+         });
+}
+
+}  // namespace
+
+DracoStream encode_with_libdraco(const Arrays& arrays, const Grid& grid, int speed) {
+  if (arrays.positions.size() > 3 * arrays.triangles.size()) {
+    const Named named(arrays);
+    return encode_with_libdraco(named.arrays(), grid, speed);
+  }
+  DracoStream stream;
+  const std::unique_ptr<draco::Mesh> draco_mesh =
+      to_draco(arrays.positions.size(), arrays.triangles);
+  stream.position_id =
+      add_attribute(*draco_mesh, draco::GeometryAttribute::POSITION, arrays.positions);
+  const bool sequential = is_sequential(arrays.triangles, speed);
+  draco::Encoder encoder;
+  if (!arrays.normals.empty()) {
+    stream.normal_id = add_attribute(*draco_mesh, draco::GeometryAttribute::NORMAL, arrays.normals);
+    encoder.SetAttributeQuantization(draco::GeometryAttribute::NORMAL, kNormalBits);
+  }
+  encoder.SetSpeedOptions(speed, speed);
+  if (grid.bits > kMostEntropyCodedBits) {
+    encoder.options().SetGlobalBool("use_built_in_attribute_compression", false);
+    // The predictions of the slowest speeds count values too.
+    encoder.SetAttributePredictionScheme(draco::GeometryAttribute::POSITION,
+                                         draco::PREDICTION_DIFFERENCE);
+  }
+  // Of the sequential encoding: indices as entropy coded differences, a third of their size.
+  encoder.options().SetGlobalBool("compress_connectivity", true);
+  if (arrays.triangles.empty()) {
+    // Neither edgebreaker nor quantisation has a code for nothing.
+    encoder.SetEncodingMethod(draco::MESH_SEQUENTIAL_ENCODING);
+  } else {
+    encoder.SetEncodingMethod(sequential ? draco::MESH_SEQUENTIAL_ENCODING
+                                         : draco::MESH_EDGEBREAKER_ENCODING);
+    encoder.SetAttributeExplicitQuantization(draco::GeometryAttribute::POSITION, grid.bits, 3,
+                                             grid.low.data(), grid.side);
+  }
+  // Where a block's cut leaves two fans at one vertex, edgebreaker makes two of it.
+  encoder.SetTrackEncodedProperties(true);
+  draco::EncoderBuffer buffer;
+  const draco::Status status = encoder.EncodeMeshToBuffer(*draco_mesh, &buffer);
+  if (!status.ok()) throw Error(ErrorCode::kInternal, "Draco: " + status.error_msg_string());
+  stream.vertices = static_cast<std::uint32_t>(encoder.num_encoded_points());
+  stream.triangles = static_cast<std::uint32_t>(encoder.num_encoded_faces());
+  if (stream.triangles != arrays.triangles.size()) {
+    throw Error(ErrorCode::kInternal, "Draco dropped triangles");
+  }
+  const auto bytes = std::as_bytes(std::span(buffer.data(), buffer.size()));
+  stream.bytes.assign(bytes.begin(), bytes.end());
+  if (sequential) {
+    stream.bytes.resize(std::max(bytes.size(), kHeadBytes + kLeastPerTriangle * stream.triangles));
+  }
+  return stream;
+}
+
+}  // namespace isomesh::codec

@@ -1,0 +1,107 @@
+#include "server/http/connections.h"
+
+#include <utility>
+
+#include "server/http/library.h"
+
+namespace isomesh::http {
+namespace {
+
+Request request_of(net::Connection& connection) {
+  Request request;
+  request.method = std::move(connection.head.method);
+  request.target = std::move(connection.head.target);
+  request.version = std::move(connection.head.version);
+  request.headers = std::move(connection.head.headers);
+  request.content_length = connection.framing.length;
+  request.remote_address = std::move(connection.address);
+  return request;
+}
+
+}  // namespace
+
+// A request, what has been read of it, and its response.
+struct Connections::Exchange {
+  Exchange(net::Connection connection, const net::BodyLimits& limits,
+           const std::atomic<bool>& stopping)
+      : body(connection, limits, stopping), request(request_of(connection)) {}
+
+  net::IncomingBody body;
+  Request request;
+  Response response;
+};
+
+Connections::Connections(ConnectionOptions options, ConnectionHandlers handlers)
+    : options_(std::move(options)), handlers_(std::move(handlers)) {}
+
+Connections::~Connections() { close(std::chrono::milliseconds(0)); }
+
+void Connections::open(int listening) {
+  sender_.emplace(options_.sender);
+  tasks_.emplace(options_.threads, options_.backlog);
+  parked_.emplace(handlers_.has_ended);
+  acceptor_.emplace(
+      listening, options_.acceptor, options_.stream_of,
+      [this](net::Connection connection) {
+        enqueue(std::make_shared<Exchange>(std::move(connection), options_.body, stopping_),
+                [this](Exchange& exchange) {
+                  return handlers_.answer(exchange.request, exchange.response);
+                });
+      },
+      [this](std::unique_ptr<net::ByteStream> stream, const std::string& address,
+             const Error& error) { refuse(std::move(stream), address, error); });
+}
+
+void Connections::job_ended(const std::string& job) { parked_->job_ended(job); }
+
+void Connections::wake_sources() { sender_->wake(); }
+
+void Connections::close(std::chrono::milliseconds patience) {
+  stopping_ = true;
+  if (acceptor_) acceptor_->stop();
+  if (parked_) parked_->close();
+  if (tasks_) tasks_->shutdown();
+  if (sender_) sender_->stop(patience);
+}
+
+void Connections::refuse(std::unique_ptr<net::ByteStream> stream, const std::string& address,
+                         const Error& error) {
+  if (handlers_.on_refused) handlers_.on_refused(address, error);
+  sender_->send({std::move(stream), refusal(error), nullptr}, false);
+}
+
+void Connections::enqueue(const std::shared_ptr<Exchange>& exchange, const Answer& answer) {
+  if (tasks_->try_enqueue([this, exchange, answer] { serve(exchange, answer); })) return;
+  refuse(exchange->body.take_stream(), exchange->request.remote_address,
+         {ErrorCode::kUnavailable, "too many requests are under way"});
+}
+
+void Connections::serve(const std::shared_ptr<Exchange>& exchange, const Answer& answer) {
+  std::optional<Continuation> continuation;
+  WrittenResponse written =
+      pass_through_library(exchange->request, exchange->body, exchange->response,
+                           [&] { continuation = answer(*exchange); });
+  if (continuation) return park(exchange, *continuation);
+  if (handlers_.on_answered) {
+    handlers_.on_answered(exchange->request, exchange->response,
+                          {.received = exchange->body.received(), .sent = written.body_bytes});
+  }
+  auto source = exchange->response.stream ? std::move(exchange->response.stream->source) : nullptr;
+  sender_->send({exchange->body.take_stream(), std::move(written.bytes), std::move(source)},
+                exchange->body.is_whole());
+}
+
+// The library sees the request once more when its handler goes on, to write the response.
+void Connections::park(const std::shared_ptr<Exchange>& exchange,
+                       const Continuation& continuation) {
+  parked_->park({.job = continuation.job,
+                 .until = continuation.until,
+                 .resume = [this, exchange, resume = continuation.resume] {
+                   enqueue(exchange, [resume](Exchange& parked) {
+                     resume(parked.request, parked.response);
+                     return std::optional<Continuation>();
+                   });
+                 }});
+}
+
+}  // namespace isomesh::http

@@ -1,0 +1,85 @@
+#include "server/http/guards/access.h"
+
+#include <chrono>
+#include <optional>
+
+#include "base/log.h"
+#include "proto/error.h"
+
+namespace isomesh::http {
+namespace {
+
+bool is_below(std::string_view path, std::string_view folder) {
+  return path == folder || (path.starts_with(folder) && path[folder.size()] == '/');
+}
+
+// Throws the same for a missing, a malformed and an unknown token, so that the answer does not help
+// with guessing.
+Caller caller_of(const Tokens& tokens, const Request& request) {
+  std::optional<Caller> caller;
+  if (request.count_headers("Authorization") == 1) {
+    const auto token = bearer_of(request.header("Authorization"));
+    if (token) caller = tokens.find(*token);
+  }
+  if (!caller) throw Error(ErrorCode::kUnauthorized, "this needs a token that the server knows");
+  return *caller;
+}
+
+void check_role(Role role, bool is_metrics) {
+  const bool allowed = role == Role::kAdmin || (role == Role::kMonitor) == is_metrics;
+  if (!allowed) {
+    throw Error(ErrorCode::kForbidden,
+                "a token of the role \"" + std::string(to_string(role)) + "\" does not allow this");
+  }
+}
+
+}  // namespace
+
+const std::string& owner_of(const Request& request) { return request.context.caller.name; }
+
+store::Viewer viewer_of(const Request& request) {
+  const Caller& caller = request.context.caller;
+  return caller.role == Role::kAdmin ? store::Viewer() : store::Viewer(caller.name);
+}
+
+void begin_request(const Tokens* tokens, Request& request, Response& response) {
+  RequestContext& context = request.context;
+  context.trace = continue_trace(request.header("traceparent"));
+  response.set_header("X-Request-Id", context.trace.request_id());
+  if (tokens == nullptr) return;
+  context.caller = {"", Role::kUser};
+  const bool is_metrics = request.path == "/metrics";
+  // Browsers ask what they may send (OPTIONS) without the token.
+  if (request.method == "OPTIONS" || (!is_metrics && !is_below(request.path, "/v1"))) return;
+  try {
+    context.caller = caller_of(*tokens, request);
+  } catch (const Error&) {
+    response.set_header("WWW-Authenticate", "Bearer realm=\"isomesh\"");
+    throw;
+  }
+  check_role(context.caller.role, is_metrics);
+}
+
+void end_request(Metrics& metrics, const Request& request, const Response& response,
+                 const BodySizes& sizes) {
+  const RequestContext& context = request.context;
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - context.began;
+  metrics.count({.method = request.method,
+                 .route = context.route,
+                 .status = response.status,
+                 .seconds = elapsed.count(),
+                 .bytes_in = sizes.received,
+                 .bytes_out = sizes.sent});
+  LogLine line("request");
+  line.add("id", context.trace.request_id())
+      .add("method", request.method)
+      .add("route", context.route)
+      .add("status", response.status)
+      .add("in", sizes.received)
+      .add("out", sizes.sent)
+      .add("ms", elapsed.count() * 1000);
+  if (!context.caller.name.empty()) line.add("token", context.caller.name);
+  line.add("remote", request.remote_address.empty() ? "unix" : request.remote_address);
+}
+
+}  // namespace isomesh::http

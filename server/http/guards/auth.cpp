@@ -1,0 +1,167 @@
+#include "server/http/guards/auth.h"
+
+#include <algorithm>
+#include <map>
+#include <sstream>
+
+#include <openssl/crypto.h>
+#include <sys/stat.h>
+
+#include "base/files.h"
+#include "base/hex.h"
+#include "base/ids.h"
+#include "base/sha256.h"
+
+namespace isomesh::http {
+namespace {
+
+using Hash = std::array<std::uint8_t, Sha256::kBytes>;
+
+constexpr std::size_t kTokenBytes = 32;
+constexpr std::size_t kLongestName = 64;
+constexpr std::string_view kTokenPrefix =
+    "isomesh_";  // by which scanners for leaked secrets know it
+
+Hash hash_of(std::string_view token) {
+  Sha256 digest;
+  digest.update(std::as_bytes(std::span(token)));
+  return digest.finish();
+}
+
+bool is_name(std::string_view text) {
+  return !text.empty() && text.size() <= kLongestName &&
+         std::ranges::all_of(text, [](unsigned char c) {
+           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                  c == '.' || c == '_' || c == '-';
+         });
+}
+
+std::optional<Hash> hash_from(std::string_view hex) {
+  Hash hash = {};
+  if (hex.size() != hash.size() * 2) return std::nullopt;
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  for (std::size_t i = 0; i < hex.size(); ++i) {
+    const std::size_t digit = kDigits.find(hex[i]);
+    if (digit == std::string_view::npos) return std::nullopt;
+    hash[i / 2] = static_cast<std::uint8_t>(hash[i / 2] << 4 | digit);
+  }
+  return hash;
+}
+
+Error at_fault(const std::string& what) { return invalid_parameter("tokens", what); }
+
+// Reading the hashes helps nobody; whoever writes to the file becomes an administrator.
+void check_only_owner_writes(const std::filesystem::path& file) {
+  struct stat status = {};
+  if (::stat(file.c_str(), &status) != 0) throw at_fault("the file cannot be read");
+  if ((status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
+    throw at_fault("others may write to the file: chmod go-w it");
+  }
+}
+
+}  // namespace
+
+std::string_view to_string(Role role) {
+  switch (role) {
+    case Role::kUser:
+      return "user";
+    case Role::kAdmin:
+      return "admin";
+    case Role::kMonitor:
+      return "monitor";
+  }
+  return {};
+}
+
+std::optional<Role> role_from(std::string_view name) {
+  for (const Role role : {Role::kUser, Role::kAdmin, Role::kMonitor}) {
+    if (to_string(role) == name) return role;
+  }
+  return std::nullopt;
+}
+
+Tokens::Tokens(const std::filesystem::path& file)
+    : file_(file), entries_(std::make_shared<const Entries>(read(file))) {}
+
+void Tokens::reload() {
+  auto entries = std::make_shared<const Entries>(read(file_));
+  const Lock lock(mutex_);
+  entries_ = std::move(entries);
+}
+
+std::size_t Tokens::count() const {
+  const Lock lock(mutex_);
+  return entries_->size();
+}
+
+std::optional<Caller> Tokens::find(std::string_view token) const {
+  std::shared_ptr<const Entries> entries;
+  {
+    const Lock lock(mutex_);
+    entries = entries_;
+  }
+  const Hash hash = hash_of(token);
+  const Entry* found = nullptr;
+  for (const Entry& entry : *entries) {
+    if (CRYPTO_memcmp(entry.hash.data(), hash.data(), hash.size()) == 0) found = &entry;
+  }
+  return found == nullptr ? std::nullopt : std::optional(found->caller);
+}
+
+Tokens::Entries Tokens::read(const std::filesystem::path& file) {
+  check_only_owner_writes(file);
+  Entries entries;
+  std::map<std::string, Role> roles;
+  std::istringstream lines(read_whole(file));
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    std::istringstream words(line);
+    std::string name;
+    std::string role_name;
+    std::string hex;
+    std::string more;
+    words >> name >> role_name >> hex >> more;
+    if (name.empty() || name.starts_with('#')) continue;
+    const auto role = role_from(role_name);
+    const auto hash = hash_from(hex);
+    if (!is_name(name) || !role || !hash || !more.empty()) {
+      throw at_fault("line " + std::to_string(number) + " is not NAME ROLE HASH");
+    }
+    if (roles.emplace(name, *role).first->second != *role) {
+      throw at_fault("line " + std::to_string(number) + " gives one name a second role");
+    }
+    entries.push_back({{name, *role}, *hash});
+  }
+  // A daemon that was told to ask for tokens and knows none would refuse everybody.
+  if (entries.empty()) throw at_fault("the file holds no token");
+  return entries;
+}
+
+std::optional<std::string> bearer_of(std::string_view authorization) {
+  constexpr std::string_view kScheme = "bearer ";
+  constexpr std::size_t kLongestToken = 512;
+  const bool is_bearer =
+      authorization.size() > kScheme.size() &&
+      std::ranges::equal(authorization.substr(0, kScheme.size()), kScheme,
+                         [](unsigned char c, char lower) {
+                           return (c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c) == lower;
+                         });
+  if (!is_bearer) return std::nullopt;
+  const std::size_t begin = authorization.find_first_not_of(' ', kScheme.size());
+  if (begin == std::string_view::npos) return std::nullopt;
+  const std::string_view token =
+      authorization.substr(begin, authorization.find_last_not_of(' ') + 1 - begin);
+  if (token.size() > kLongestToken) return std::nullopt;
+  return std::string(token);
+}
+
+std::string make_token() { return std::string(kTokenPrefix) + random_hex(kTokenBytes); }
+
+std::string token_line(const std::string& name, Role role, std::string_view token) {
+  if (!is_name(name)) {
+    throw invalid_parameter("name", "must have 1 to 64 of the letters A-Z a-z 0-9 . _ -");
+  }
+  return name + ' ' + std::string(to_string(role)) + ' ' + to_hex(hash_of(token));
+}
+
+}  // namespace isomesh::http

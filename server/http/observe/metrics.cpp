@@ -1,0 +1,222 @@
+#include "server/http/observe/metrics.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <vector>
+
+#include <prometheus/counter.h>
+#include <prometheus/gauge.h>
+#include <prometheus/histogram.h>
+#include <prometheus/registry.h>
+#include <prometheus/text_serializer.h>
+#include <unistd.h>
+
+namespace isomesh::http {
+namespace {
+
+using prometheus::Counter;
+using prometheus::Family;
+using prometheus::Gauge;
+using prometheus::Histogram;
+using prometheus::Labels;
+
+const Histogram::BucketBoundaries kRequestSeconds = {0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1,
+                                                     0.25,  0.5,    1,     2.5,  10,    30,   300};
+const Histogram::BucketBoundaries kStageSeconds = {
+    0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 300, 1800};
+
+constexpr std::array kPriorities = {Priority::kStat, Priority::kRoutine, Priority::kBulk};
+constexpr std::array kEnds = {JobState::kSucceeded, JobState::kFailed, JobState::kCancelled};
+
+struct TimedStage {
+  std::string_view name;
+  double Timing::*milliseconds;
+};
+constexpr std::array kStages = {
+    TimedStage{"queue", &Timing::queue},     TimedStage{"load", &Timing::load},
+    TimedStage{"extract", &Timing::extract}, TimedStage{"smooth", &Timing::smooth},
+    TimedStage{"encode", &Timing::encode},   TimedStage{"total", &Timing::total}};
+
+std::string_view known_method(std::string_view method) {
+  for (const std::string_view known :
+       {"GET", "HEAD", "POST", "DELETE", "OPTIONS", "PUT", "PATCH"}) {
+    if (method == known) return known;
+  }
+  return "other";
+}
+
+std::string status_class(int status) {
+  const int hundreds = status / 100;
+  return hundreds >= 1 && hundreds <= 5 ? std::to_string(hundreds) + "xx" : "other";
+}
+
+Labels label(const std::string& name, std::string_view value) {
+  return {{name, std::string(value)}};
+}
+
+// A line's number, such as the 4711 of "VmRSS: 4711 kB".
+std::uint64_t process_status(std::string_view name) {
+  std::ifstream file("/proc/self/status");
+  for (std::string line; std::getline(file, line);) {
+    if (!line.starts_with(name)) continue;
+    std::istringstream words(line.substr(name.size()));
+    std::uint64_t value = 0;
+    words >> value;
+    return value;
+  }
+  return 0;
+}
+
+std::uint64_t open_files() {
+  std::error_code error;
+  std::filesystem::directory_iterator file("/proc/self/fd", error);
+  std::uint64_t count = 0;
+  for (; !error && file != std::filesystem::directory_iterator(); file.increment(error)) ++count;
+  return count;
+}
+
+// The library writes the older form of the text, where a counter's family is called like its
+// sample. In OpenMetrics the family lacks the suffix, and an end is marked.
+std::string to_openmetrics(const std::string& text) {
+  constexpr std::string_view kTotal = "_total";
+  std::istringstream lines(text);
+  std::string result;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("# ")) {
+      const std::size_t begin = line.find(' ', 2) + 1;
+      const std::size_t end = std::min(line.find(' ', begin), line.size());
+      if (std::string_view(line).substr(begin, end - begin).ends_with(kTotal)) {
+        line.erase(end - kTotal.size(), kTotal.size());
+      }
+    }
+    result += line + '\n';
+  }
+  return result + "# EOF\n";
+}
+
+}  // namespace
+
+std::string_view name_of(callbacks::CallbackOutcome outcome) {
+  switch (outcome) {
+    case callbacks::CallbackOutcome::kDelivered:
+      return "delivered";
+    case callbacks::CallbackOutcome::kRetried:
+      return "retried";
+    case callbacks::CallbackOutcome::kGivenUp:
+      break;
+  }
+  return "given_up";
+}
+
+struct Metrics::State {
+  prometheus::Registry registry;
+
+  Family<Counter>& counter(const char* name, const char* help) {
+    return prometheus::BuildCounter().Name(name).Help(help).Register(registry);
+  }
+  Family<Gauge>& gauge(const char* name, const char* help) {
+    return prometheus::BuildGauge().Name(name).Help(help).Register(registry);
+  }
+  Family<Histogram>& histogram(const char* name, const char* help) {
+    return prometheus::BuildHistogram().Name(name).Help(help).Register(registry);
+  }
+
+  Family<Counter>& requests = counter("isomesh_http_requests_total", "Requests that were answered");
+  Family<Histogram>& request_seconds =
+      histogram("isomesh_http_request_seconds", "From a request's head to the end of its answer");
+  Counter& bytes_in =
+      counter("isomesh_http_received_bytes_total", "Bytes of requests' bodies").Add({});
+  Counter& bytes_out = counter("isomesh_http_sent_bytes_total", "Bytes of answers' bodies").Add({});
+  Family<Counter>& ended = counter("isomesh_jobs_ended_total", "Jobs by the state they ended in");
+  Family<Counter>& failures = counter("isomesh_job_failures_total", "Failed jobs by error code");
+  Family<Histogram>& stages = histogram("isomesh_job_stage_seconds", "Stages of finished jobs");
+  Counter& triangles =
+      counter("isomesh_job_triangles_total", "Triangles of meshes that were made").Add({});
+  Family<Counter>& refused =
+      counter("isomesh_imports_refused_total", "Volumes that were refused, by error code");
+  Family<Counter>& callbacks =
+      counter("isomesh_callback_attempts_total", "Attempts to deliver a callback, by their result");
+
+  Family<Gauge>& queued = gauge("isomesh_queued_jobs", "Jobs that wait, by priority");
+  Gauge& running = gauge("isomesh_running_jobs", "Jobs that run").Add({});
+  Gauge& uploads = gauge("isomesh_uploads_in_progress", "Uploads in progress").Add({});
+  Gauge& waiting_callbacks =
+      gauge("isomesh_waiting_callbacks", "Callbacks that are not delivered yet").Add({});
+  Gauge& disk_used = gauge("isomesh_disk_used_bytes", "Bytes of volumes and meshes").Add({});
+  Gauge& disk_free = gauge("isomesh_disk_free_bytes", "Free bytes beside them").Add({});
+  Gauge& memory = gauge("process_resident_memory_bytes", "Memory that is mapped and there").Add({});
+  Gauge& threads = gauge("process_threads", "Threads of the process").Add({});
+  Gauge& files = gauge("process_open_fds", "Open file descriptors").Add({});
+};
+
+Metrics::Metrics() : state_(std::make_unique<State>()) {
+  // What has not happened yet is 0, not missing: rates need a beginning.
+  for (const JobState state : kEnds) state_->ended.Add(label("state", to_string(state)));
+  for (const TimedStage& stage : kStages) {
+    state_->stages.Add(label("stage", stage.name), kStageSeconds);
+  }
+  for (const auto result :
+       {callbacks::CallbackOutcome::kDelivered, callbacks::CallbackOutcome::kRetried,
+        callbacks::CallbackOutcome::kGivenUp}) {
+    state_->callbacks.Add(label("result", name_of(result)));
+  }
+}
+
+Metrics::~Metrics() = default;
+
+void Metrics::count(const AnsweredRequest& request) {
+  state_->requests
+      .Add({{"method", std::string(known_method(request.method))},
+            {"route", std::string(request.route)},
+            {"status", status_class(request.status)}})
+      .Increment();
+  state_->request_seconds.Add(label("route", request.route), kRequestSeconds)
+      .Observe(request.seconds);
+  state_->bytes_in.Increment(static_cast<double>(request.bytes_in));
+  state_->bytes_out.Increment(static_cast<double>(request.bytes_out));
+}
+
+void Metrics::count_ended(const Job& job) {
+  state_->ended.Add(label("state", to_string(job.state))).Increment();
+  if (job.error) {
+    const ErrorCode code = to_error(*job.error).code();
+    state_->failures.Add(label("reason", describe(code).name)).Increment();
+  }
+  if (!job.mesh) return;
+  state_->triangles.Increment(static_cast<double>(job.mesh->triangles));
+  constexpr double kMillisecondsPerSecond = 1000;
+  for (const TimedStage& stage : kStages) {
+    state_->stages.Add(label("stage", stage.name), kStageSeconds)
+        .Observe(job.timing.*stage.milliseconds / kMillisecondsPerSecond);
+  }
+}
+
+void Metrics::count_refused(ErrorCode reason) {
+  state_->refused.Add(label("reason", describe(reason).name)).Increment();
+}
+
+void Metrics::count(callbacks::CallbackOutcome outcome) {
+  state_->callbacks.Add(label("result", name_of(outcome))).Increment();
+}
+
+std::string Metrics::text(const Levels& levels) const {
+  constexpr double kKibibyte = 1024;
+  State& state = *state_;
+  for (std::size_t i = 0; i < kPriorities.size(); ++i) {
+    state.queued.Add(label("priority", to_string(kPriorities[i])))
+        .Set(static_cast<double>(levels.queued[i]));
+  }
+  state.running.Set(static_cast<double>(levels.running));
+  state.uploads.Set(static_cast<double>(levels.uploads));
+  state.waiting_callbacks.Set(static_cast<double>(levels.callbacks));
+  state.disk_used.Set(static_cast<double>(levels.disk_used_bytes));
+  state.disk_free.Set(static_cast<double>(levels.disk_free_bytes));
+  state.memory.Set(static_cast<double>(process_status("VmRSS:")) * kKibibyte);
+  state.threads.Set(static_cast<double>(process_status("Threads:")));
+  state.files.Set(static_cast<double>(open_files()));
+  return to_openmetrics(prometheus::TextSerializer().Serialize(state.registry.Collect()));
+}
+
+}  // namespace isomesh::http

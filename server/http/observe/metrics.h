@@ -1,0 +1,67 @@
+// What the service counts, in the text form that Prometheus reads (OpenMetrics 1.0).
+//
+// Every label has few values, known beforehand: routes are patterns, refusals are error codes. No
+// label ever holds what a client sent.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "proto/error.h"
+#include "proto/types.h"
+#include "server/callbacks/callbacks.h"
+
+namespace isomesh::http {
+
+// One request that was answered.
+struct AnsweredRequest {
+  std::string_view method;
+  std::string_view route;  // its pattern, or kNoRoute
+  int status = 0;
+  double seconds = 0;
+  std::uint64_t bytes_in = 0;   // of its body
+  std::uint64_t bytes_out = 0;  // of the answer's
+};
+
+std::string_view name_of(callbacks::CallbackOutcome outcome);
+
+// What is measured when somebody asks.
+struct Levels {
+  std::array<std::uint64_t, 3> queued = {};  // by Priority
+  std::uint64_t running = 0;
+  std::uint64_t uploads = 0;    // in progress
+  std::uint64_t callbacks = 0;  // that wait to be delivered
+  std::uint64_t disk_used_bytes = 0;
+  std::uint64_t disk_free_bytes = 0;
+};
+
+// Thread safe.
+class Metrics {
+ public:
+  Metrics();
+  ~Metrics();
+  Metrics(const Metrics&) = delete;
+  Metrics& operator=(const Metrics&) = delete;
+
+  void count(const AnsweredRequest& request);
+  // A job in a final state.
+  void count_ended(const Job& job);
+  // A volume that was refused.
+  void count_refused(ErrorCode reason);
+  void count(callbacks::CallbackOutcome outcome);
+
+  // Everything that was counted, those levels, and the process's own memory, threads and files.
+  std::string text(const Levels& levels) const;
+
+  static constexpr std::string_view kMediaType =
+      "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace isomesh::http

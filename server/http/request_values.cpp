@@ -1,0 +1,327 @@
+#include "server/http/request_values.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <strings.h>
+
+#include "base/base64.h"
+#include "base/hex.h"
+#include "base/sha256.h"
+#include "base/text.h"
+
+namespace isomesh::http {
+namespace {
+
+constexpr int kLongestWaitSeconds = 30;
+
+// Numbers of headers and queries have no sign "+", which base/text lets pass.
+std::optional<double> number_of(std::string_view text) {
+  return text.starts_with('+') ? std::nullopt : parse_double(text);
+}
+
+std::optional<std::uint64_t> whole_number(std::string_view text) {
+  return text.starts_with('+') ? std::nullopt : parse_uint64(text);
+}
+
+Error wrong_numbers(const std::string& name, std::size_t count) {
+  return invalid_parameter(name,
+                           "must be " + std::to_string(count) + " numbers with commas between");
+}
+
+template <std::size_t N>
+std::array<double, N> numbers_of(const std::string& name, std::string_view text) {
+  const std::vector<std::string_view> parts = split(text, ',');
+  std::array<double, N> numbers = {};
+  if (parts.size() != N) throw wrong_numbers(name, N);
+  for (std::size_t i = 0; i < N; ++i) {
+    const auto number = number_of(parts[i]);
+    if (!number) throw wrong_numbers(name, N);
+    numbers[i] = *number;
+  }
+  return numbers;
+}
+
+std::array<std::uint32_t, 3> dims_of(std::string_view text) {
+  const std::vector<std::string_view> parts = split(text, ',');
+  std::array<std::uint32_t, 3> dims = {};
+  if (parts.size() != dims.size()) throw wrong_numbers("dims", dims.size());
+  for (std::size_t i = 0; i < dims.size(); ++i) {
+    const auto number = whole_number(parts[i]);
+    if (!number || *number > std::numeric_limits<std::uint32_t>::max()) {
+      throw wrong_numbers("dims", dims.size());
+    }
+    dims[i] = static_cast<std::uint32_t>(*number);
+  }
+  return dims;
+}
+
+// The seconds of a preference `wait=N` (RFC 7240), among others in the header and before what may
+// describe it.
+std::optional<std::string_view> preferred_wait(std::string_view header) {
+  for (const std::string_view preference : split(header, ',')) {
+    const std::size_t equals = preference.find('=');
+    const std::string_view name = trimmed(preference.substr(0, equals));
+    if (name.size() != 4 || ::strncasecmp(name.data(), "wait", 4) != 0) continue;
+    if (equals == std::string_view::npos) return "";
+    return trimmed(split(preference.substr(equals + 1), ';').front());
+  }
+  return std::nullopt;
+}
+
+std::string hex_of_base64(std::string_view text) {
+  const auto digest = from_base64(text);
+  if (!digest || digest->size() != Sha256::kBytes) {
+    throw invalid_parameter("Content-Digest", "sha-256 must be 32 bytes in base64 between colons");
+  }
+  return to_hex(*digest);
+}
+
+// A member of a digest header: an algorithm's name and bytes in base64 between colons (RFC 9530).
+std::pair<std::string_view, std::string_view> digest_member(std::string_view member) {
+  const std::size_t equals = member.find('=');
+  const std::string_view name = member.substr(0, equals);
+  const std::string_view value = equals == std::string_view::npos ? "" : member.substr(equals + 1);
+  constexpr std::string_view kBase64 =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/=";
+  const bool is_bytes =
+      value.size() >= 2 && value.front() == ':' && value.back() == ':' &&
+      value.substr(1, value.size() - 2).find_first_not_of(kBase64) == std::string_view::npos;
+  if (name.empty() || !is_bytes) {
+    throw invalid_parameter("Content-Digest", "must be NAME=:BASE64:, such as sha-256=:...:");
+  }
+  return {name, value.substr(1, value.size() - 2)};
+}
+
+bool names_etag(std::string_view header, std::string_view etag) {
+  for (std::string_view tag : split(header, ',')) {
+    if (tag.starts_with("W/")) tag.remove_prefix(2);
+    if (tag == "*" || tag == etag) return true;
+  }
+  return false;
+}
+
+bool is_uid(std::string_view text) {
+  constexpr std::size_t kLongestUid = 64;
+  return !text.empty() && text.size() <= kLongestUid &&
+         text.find_first_not_of("0123456789.") == std::string_view::npos;
+}
+
+}  // namespace
+
+void check_known(const Request& request, const std::set<std::string>& known) {
+  std::vector<FieldError> errors;
+  for (const auto& [name, unused] : request.query) {
+    constexpr std::size_t kLongestName = 64;
+    const std::string shown = name.substr(0, kLongestName);
+    if (!errors.empty() && errors.back().field == shown) continue;  // said already
+    if (!known.contains(name)) {
+      errors.push_back({shown, "is not a parameter of this request"});
+    } else if (request.count_parameters(name) > 1) {
+      errors.push_back({shown, "is given more than once"});
+    }
+  }
+  if (!errors.empty()) throw invalid_parameters(std::move(errors));
+}
+
+std::chrono::milliseconds wait_of(const Request& request) {
+  const bool in_query = request.has_parameter("wait");
+  const std::optional<std::string_view> text =
+      in_query ? request.parameter("wait") : preferred_wait(request.header("Prefer"));
+  if (!text) return std::chrono::milliseconds(0);
+  const auto seconds = number_of(*text);
+  if (!seconds || !std::isfinite(*seconds) || *seconds < 0) {
+    throw invalid_parameter(in_query ? "wait" : "Prefer",
+                            in_query ? "must be a number of seconds, at least 0"
+                                     : "wait must be a number of seconds, at least 0");
+  }
+  return std::chrono::milliseconds(
+      static_cast<std::int64_t>(std::min<double>(*seconds, kLongestWaitSeconds) * 1000));
+}
+
+std::string idempotency_key_of(const Request& request) {
+  constexpr const char* kHeader = "Idempotency-Key";
+  constexpr std::size_t kLongest = 255;
+  if (!request.has_header(kHeader)) return {};
+  std::string key(request.header(kHeader));
+  const bool is_printable = std::ranges::all_of(key, [](char c) { return c > 0x20 && c < 0x7F; });
+  if (request.count_headers(kHeader) > 1 || key.empty() || key.size() > kLongest || !is_printable) {
+    throw invalid_parameter(kHeader, "must be one key of 1 to 255 printable characters");
+  }
+  return key;
+}
+
+std::optional<std::string> sha256_of_content_digest(const Request& request) {
+  if (!request.has_header("Content-Digest")) return std::nullopt;
+  const std::string_view header = request.header("Content-Digest");
+  std::optional<std::string> sha256;
+  for (const std::string_view member : split(header, ',')) {
+    const auto [name, value] = digest_member(member);
+    if (name != "sha-256") continue;
+    if (sha256) throw invalid_parameter("Content-Digest", "names sha-256 twice");
+    sha256 = hex_of_base64(value);
+  }
+  return sha256;
+}
+
+std::string digest_header(std::string_view sha256) {
+  return "sha-256=:" + to_base64(from_hex(sha256).value()) + ':';
+}
+
+const std::set<std::string>& raw_description_parameters() {
+  static const std::set<std::string> names = {"dims",   "type",      "spacing",
+                                              "origin", "direction", "byte_order"};
+  return names;
+}
+
+const std::set<std::string>& import_parameters() {
+  static const std::set<std::string> names = [] {
+    std::set<std::string> all = raw_description_parameters();
+    all.insert("series");
+    return all;
+  }();
+  return names;
+}
+
+process::ImportOptions import_options_of(const Request& request) {
+  process::ImportOptions options{.raw = raw_description_of(request), .series = {}};
+  if (!request.has_parameter("series")) return options;
+  options.series = request.parameter("series");
+  if (!is_uid(options.series)) {
+    throw invalid_parameter("series", "must be a DICOM UID: digits and dots, at most 64 of them");
+  }
+  if (options.raw) throw invalid_parameter("series", "raw samples have no series");
+  return options;
+}
+
+std::optional<RawDescription> raw_description_of(const Request& request) {
+  const auto text = [&](const char* name) { return request.parameter(name); };
+  if (!request.has_parameter("dims")) {
+    for (const std::string& name : raw_description_parameters()) {
+      if (request.has_parameter(name)) {
+        throw invalid_parameter("dims", "is required, because " + name + " describes raw samples");
+      }
+    }
+    return std::nullopt;
+  }
+  RawDescription raw;
+  raw.dims = dims_of(text("dims"));
+  const auto type = from_string<SampleType>(text("type"));
+  if (!type) throw invalid_parameter("type", "must be " + names_of<SampleType>());
+  raw.type = *type;
+  if (request.has_parameter("spacing")) {
+    raw.geometry.spacing = numbers_of<3>("spacing", text("spacing"));
+  }
+  if (request.has_parameter("origin")) {
+    raw.geometry.origin = numbers_of<3>("origin", text("origin"));
+  }
+  if (request.has_parameter("direction")) {
+    raw.geometry.direction = numbers_of<9>("direction", text("direction"));
+  }
+  if (request.has_parameter("byte_order")) {
+    const std::string_view order = text("byte_order");
+    if (order != "little" && order != "big") {
+      throw invalid_parameter("byte_order", "must be \"little\" or \"big\"");
+    }
+    raw.big_endian = order == "big";
+  }
+  return raw;
+}
+
+std::uint64_t whole_number_of(const Request& request, const std::string& name,
+                              const WholeNumbers& among, std::uint64_t otherwise) {
+  if (!request.has_parameter(name)) return otherwise;
+  const auto number = whole_number(request.parameter(name));
+  if (!number || *number < among.low || *number > among.high) {
+    throw invalid_parameter(name, "must be a whole number from " + std::to_string(among.low) +
+                                      " to " + std::to_string(among.high));
+  }
+  return *number;
+}
+
+std::optional<std::array<double, 2>> interval_of(const Request& request, const std::string& name) {
+  if (!request.has_parameter(name)) return std::nullopt;
+  const auto interval = numbers_of<2>(name, request.parameter(name));
+  const bool finite = std::isfinite(interval[0]) && std::isfinite(interval[1]);
+  if (!finite || interval[0] >= interval[1]) {
+    throw invalid_parameter(name, "must be two finite numbers, the smaller first");
+  }
+  return interval;
+}
+
+std::optional<ByteRange> range_of(const Request& request, std::uint64_t size) {
+  constexpr std::string_view kUnit = "bytes=";
+  const std::string_view header = request.header("Range");
+  if (!header.starts_with(kUnit)) return std::nullopt;
+  const std::string_view spec = trimmed(header.substr(kUnit.size()));
+  const std::size_t dash = spec.find('-');
+  if (dash == std::string_view::npos) return std::nullopt;
+  const std::string_view before = spec.substr(0, dash);
+  const std::string_view after = spec.substr(dash + 1);
+  const auto first = whole_number(before);
+  const auto last = whole_number(after);
+  if ((!before.empty() && !first) || (!after.empty() && !last) || (!first && !last) ||
+      (first && last && *last < *first)) {
+    return std::nullopt;  // several ranges or bad syntax
+  }
+  const std::uint64_t begin = first ? *first : size - std::min(size, *last);
+  const std::uint64_t end = first && last ? std::min(size - 1, *last) : size - 1;
+  if (size == 0 || begin >= size || (!first && *last == 0)) {
+    throw Error(ErrorCode::kRangeNotSatisfiable, "the file has " + std::to_string(size) + " bytes");
+  }
+  return ByteRange{begin, end - begin + 1};
+}
+
+bool accepts_gzip(const Request& request) {
+  const std::string_view header = request.header("Accept-Encoding");
+  for (const std::string_view coding : split(header, ',')) {
+    const std::vector<std::string_view> parts = split(coding, ';');
+    if (parts[0] != "gzip" && parts[0] != "*") continue;
+    const bool weighed = parts.size() > 1 && parts[1].starts_with("q=");
+    return !weighed || number_of(parts[1].substr(2)).value_or(1) > 0;
+  }
+  return false;
+}
+
+bool matches_etag(const Request& request, std::string_view etag) {
+  return names_etag(request.header("If-None-Match"), etag);
+}
+
+void check_if_match(const Request& request, std::string_view etag) {
+  if (!request.has_header("If-Match")) return;
+  if (names_etag(request.header("If-Match"), etag)) return;
+  throw Error(ErrorCode::kPreconditionFailed, "what If-Match names is not what is there");
+}
+
+std::string cursor_after(std::string_view kind, std::string_view id) {
+  return to_hex(std::string(kind) + ':' + std::string(id));
+}
+
+std::string id_after(const Request& request, std::string_view kind) {
+  if (!request.has_parameter("cursor")) return {};
+  const std::string text = from_hex(request.parameter("cursor")).value_or("");
+  constexpr std::size_t kLongest = 128;
+  const std::string prefix = std::string(kind) + ':';
+  const bool is_ours = text.size() > prefix.size() && text.size() <= kLongest &&
+                       text.starts_with(prefix) &&
+                       std::ranges::all_of(text, [](char c) { return c >= ' ' && c <= '~'; });
+  if (!is_ours) throw wrong_cursor();
+  return text.substr(prefix.size());
+}
+
+Error wrong_cursor() {
+  return invalid_parameter("cursor", "must be the `next` of another page of this list");
+}
+
+std::optional<std::uint64_t> last_event_id(const Request& request) {
+  if (!request.has_header("Last-Event-ID")) return std::nullopt;
+  const auto number = whole_number(request.header("Last-Event-ID"));
+  if (!number)
+    throw invalid_parameter("Last-Event-ID", "must be the id of an event of this stream");
+  constexpr std::uint64_t kLargest = std::numeric_limits<std::int64_t>::max();  // the store's
+  return std::min(*number, kLargest);
+}
+
+}  // namespace isomesh::http

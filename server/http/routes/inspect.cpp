@@ -1,0 +1,91 @@
+// What a person looks at before starting a job: histograms, slices, estimates.
+#include <memory>
+
+#include "base/text.h"
+#include "proto/json.h"
+#include "server/http/answers/sources.h"
+#include "server/http/request_values.h"
+#include "server/http/routes/routes.h"
+#include "server/volume/slice.h"
+
+namespace isomesh::http {
+namespace {
+
+constexpr std::uint64_t kMostBins = 65536;
+constexpr std::uint64_t kUsualBins = 256;
+
+// A volume never changes under its id, so neither does what is made of it.
+constexpr const char* kForever = "private, max-age=31536000, immutable";
+
+// Sets the headers of what never changes. True when the client has it already: then the response is
+// complete.
+bool is_known(const Request& request, Response& response, const std::string& etag) {
+  check_if_match(request, etag);
+  response.set_header("ETag", etag);
+  response.set_header("Cache-Control", kForever);
+  if (!matches_etag(request, etag)) return false;
+  response.status = 304;
+  return true;
+}
+
+void histogram(App& app, const Request& request, Response& response) {
+  check_known(request, {"bins"});
+  const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
+  const std::uint64_t bins = whole_number_of(request, "bins", {1, kMostBins}, kUsualBins);
+  if (is_known(request, response, '"' + volume.id + ".bins" + std::to_string(bins) + '"')) return;
+  response.status = 200;
+  response.set_body(to_json(app.services.histograms.of(volume, bins)), "application/json");
+}
+
+volume::SliceChoice slice_choice(const Request& request, const Volume& volume) {
+  volume::SliceChoice choice;
+  if (request.has_parameter("axis")) {
+    const auto axis = volume::axis_of(request.parameter("axis"));
+    if (!axis) throw invalid_parameter("axis", R"(must be "x", "y" or "z")");
+    choice.axis = *axis;
+  }
+  const std::uint32_t slices = volume.dims.at(static_cast<std::size_t>(choice.axis));
+  choice.index =
+      static_cast<std::uint32_t>(whole_number_of(request, "index", {0, slices - 1}, slices / 2));
+  choice.window = interval_of(request, "window").value_or(volume.range);
+  return choice;
+}
+
+void slice(App& app, const Request& request, Response& response) {
+  check_known(request, {"axis", "index", "window"});
+  const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
+  const volume::SliceChoice choice = slice_choice(request, volume);
+  const std::string etag = '"' + volume.id + '.' + std::string(to_string(choice.axis)) +
+                           std::to_string(choice.index) + '.' + to_text(choice.window[0]) + '.' +
+                           to_text(choice.window[1]) + '"';
+  if (is_known(request, response, etag)) return;
+  const auto canonical =
+      std::make_shared<const volume::CanonicalVolume>(app.services.blobs.local(volume.id).path);
+  auto picture = std::make_unique<volume::SlicePng>(canonical, choice);
+  const bool in_chunks = request.version != "HTTP/1.0";
+  response.status = 200;
+  response.set_header("Accept-Ranges", "none");
+  response.stream = {.source = slice_source(std::move(picture), in_chunks),
+                     .media_type = "image/png",
+                     .framing = in_chunks ? Framing::kChunks : Framing::kUntilConnectionEnds};
+}
+
+void estimate(App& app, const Request& request, Response& response) {
+  const JobParameters parameters = parse_job_parameters(request.query, VolumeIn::kQuery);
+  answer_json(response, 200,
+              to_json(app.services.estimator.estimate(viewer_of(request), parameters)));
+}
+
+}  // namespace
+
+void add_inspect_routes(App& app) {
+  const std::string volume = "/v1/volumes/{id}";
+  add_get(app, volume + "/histogram",
+          [&app](const auto& request, auto& response) { histogram(app, request, response); });
+  add_get(app, volume + "/slice.png",
+          [&app](const auto& request, auto& response) { slice(app, request, response); });
+  add_get(app, "/v1/estimate",
+          [&app](const auto& request, auto& response) { estimate(app, request, response); });
+}
+
+}  // namespace isomesh::http

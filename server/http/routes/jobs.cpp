@@ -1,0 +1,165 @@
+#include <chrono>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/sha256.h"
+#include "base/text.h"
+#include "proto/json.h"
+#include "server/http/answers/sources.h"
+#include "server/http/request_values.h"
+#include "server/http/routes/routes.h"
+#include "server/http/upload.h"
+
+namespace isomesh::http {
+namespace {
+
+const std::string kJobs = "/v1/jobs";
+constexpr std::size_t kMostBodyBytes = 64 * 1024;
+constexpr const char* kJobCursor = "jobs";
+
+void answer_with(Response& response, int status, const Job& job) {
+  response.set_header("Location", kJobs + '/' + job.id);
+  answer_json(response, status, to_json(job));
+}
+
+// Browsers let pages of other origins send plain text without asking the server first, but not what
+// is declared as JSON.
+void check_is_json(const Request& request) {
+  const std::string_view type = split(request.header("Content-Type"), ';').front();
+  if (type.empty() || lower(type) == "application/json") return;
+  throw Error(ErrorCode::kUnsupportedMedia, "the body's Content-Type must be application/json");
+}
+
+// A body that is not here yet may come slowly, so reading it takes one of the places of uploads.
+std::string small_body(App& app, const Request& request) {
+  const bool may_be_slow = !request.body->is_whole();
+  const auto place = may_be_slow ? app.uploads.try_take() : std::nullopt;
+  if (may_be_slow && !place) {
+    throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
+  }
+  return read_text(request, kMostBodyBytes);
+}
+
+std::optional<Continuation> submit(App& app, const Request& request, Response& response) {
+  check_known(request, {"wait"});
+  const auto wait = wait_of(request);
+  check_is_json(request);
+  const std::string body = small_body(app, request);
+  store::JobSpec spec = {owner_of(request), parse_job_parameters(body), idempotency_key_of(request),
+                         ""};
+  const auto& callback = spec.parameters.callback;
+  if (callback) app.services.callback_targets.check(callback->url);
+  if (!spec.idempotency_key.empty()) spec.request_digest = sha256_of(body);
+  const Job job = submitted(app, spec, response);
+  const bool waits = wait.count() > 0;
+  return answer_at_end(app, request, response, job, wait,
+                       [waits](const Request& /*request*/, Response& out, const Job& now) {
+                         answer_with(out, waits && is_final(now.state) ? 200 : 202, now);
+                       });
+}
+
+std::optional<Continuation> get(App& app, const Request& request, Response& response) {
+  check_known(request, {"wait"});
+  const auto wait = wait_of(request);
+  const Job job = app.services.jobs.get(viewer_of(request), request.path_parameter("id"));
+  return answer_at_end(app, request, response, job, wait,
+                       [](const Request& asked, Response& out, const Job& now) {
+                         answer_tagged_json(asked, out, to_json(now));
+                       });
+}
+
+void list(App& app, const Request& request, Response& response) {
+  check_known(request, {"state", "cursor", "limit"});
+  std::optional<JobState> state;
+  if (request.has_parameter("state")) {
+    state = from_string<JobState>(request.parameter("state"));
+    if (!state) throw invalid_parameter("state", "must be " + names_of<JobState>());
+  }
+  const std::string after = id_after(request, kJobCursor);
+  const std::size_t limit = whole_number_of(request, "limit", kListLengths, kUsualListLength);
+  std::vector<Job> jobs = app.services.jobs.list(viewer_of(request), state, after, limit + 1);
+  std::string next;
+  if (jobs.size() > limit) {
+    jobs.pop_back();
+    next = cursor_after(kJobCursor, jobs.back().id);
+  }
+  answer_json(response, 200, to_json(jobs, next));
+}
+
+void cancel(App& app, const Request& request, Response& response) {
+  check_known(request, {});
+  const std::string id = request.path_parameter("id");
+  if (request.has_header("If-Match")) {
+    check_if_match(request, etag_of(to_json(app.services.jobs.get(viewer_of(request), id))));
+  }
+  answer_json(response, 200, to_json(app.services.jobs.cancel(viewer_of(request), id)));
+}
+
+// The events of the job after `last`, without progress that later progress has replaced.
+std::vector<store::Event> past_of(const App& app, const store::Viewer& viewer,
+                                  const std::string& job, std::uint64_t last) {
+  std::vector<store::Event> past;
+  while (true) {
+    const auto more = app.services.jobs.events(viewer, job, last, std::chrono::milliseconds(0));
+    if (more.empty()) return past;
+    for (const store::Event& event : more) {
+      const bool replaces = event.kind == store::EventKind::kProgress && !past.empty() &&
+                            past.back().kind == store::EventKind::kProgress;
+      if (replaces) past.pop_back();
+      past.push_back(event);
+    }
+    last = more.back().id;
+  }
+}
+
+void events(App& app, const Request& request, Response& response) {
+  check_known(request, {});
+  const std::string id = request.path_parameter("id");
+  const std::uint64_t last = last_event_id(request).value_or(0);
+  auto place = app.streams.try_take();
+  if (!place) throw Error(ErrorCode::kUnavailable, "too many streams of events are open");
+  // The mailbox is there before the past is read, so that no event is missed. One that happens in
+  // between is in both, and the source sends it once.
+  auto mailbox = app.events.listen_to(id);
+  const Job job = app.services.jobs.get(viewer_of(request), id);
+  auto past = past_of(app, viewer_of(request), id, last);
+  if (is_final(job.state) && past.empty()) {
+    if (last > 0) {
+      response.status = 204;  // tells a browser not to come back
+      return;
+    }
+    // The job is kept for longer than its events.
+    past.push_back({1, "", id, store::EventKind::kDone, job.state, job.stage, job.progress});
+  }
+  response.status = 200;
+  response.set_header("Cache-Control", "no-store");
+  response.set_header("X-Accel-Buffering", "no");  // nginx would collect them
+  response.stream = {
+      .source = event_source({.mailbox = std::move(mailbox),
+                              .past = std::move(past),
+                              .last = last,
+                              .result = [&jobs = app.services.jobs, who = viewer_of(request),
+                                         id] { return to_json(jobs.get(who, id)); },
+                              .place = std::move(*place)}),
+      .media_type = "text/event-stream",
+      .framing = Framing::kUntilConnectionEnds};
+}
+
+}  // namespace
+
+void add_job_routes(App& app) {
+  add_post(app, kJobs,
+           [&app](const auto& request, auto& response) { return submit(app, request, response); });
+  add_get(app, kJobs,
+          [&app](const auto& request, auto& response) { list(app, request, response); });
+  add_get(app, kJobs + "/{id}",
+          [&app](const auto& request, auto& response) { return get(app, request, response); });
+  add_delete(app, kJobs + "/{id}",
+             [&app](const auto& request, auto& response) { cancel(app, request, response); });
+  add_get(app, kJobs + "/{id}/events",
+          [&app](const auto& request, auto& response) { events(app, request, response); });
+}
+
+}  // namespace isomesh::http

@@ -1,0 +1,151 @@
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "base/sha256.h"
+#include "proto/json.h"
+#include "server/codec/encode.h"
+#include "server/http/answers/sources.h"
+#include "server/http/observe/outcomes.h"
+#include "server/http/request_values.h"
+#include "server/http/routes/routes.h"
+
+namespace isomesh::http {
+namespace {
+
+constexpr std::chrono::hours kLongestJob{24};
+
+std::string server_timing(const Timing& timing) {
+  std::string text;
+  for (const auto& [name, milliseconds] :
+       {std::pair{"queue", timing.queue}, std::pair{"load", timing.load},
+        std::pair{"extract", timing.extract}, std::pair{"smooth", timing.smooth},
+        std::pair{"encode", timing.encode}}) {
+    std::array<char, 64> entry = {};
+    std::snprintf(entry.data(), entry.size(), "%s%s;dur=%.3f", text.empty() ? "" : ", ", name,
+                  milliseconds);
+    text += entry.data();
+  }
+  return text;
+}
+
+// The part that a GET asks for. When it is outside of the file the response says how long that is.
+std::optional<ByteRange> part_of(const Request& request, Response& response,
+                                 const std::string& etag, std::uint64_t size) {
+  if (request.method != "GET") return std::nullopt;
+  if (request.has_header("If-Range") && request.header("If-Range") != etag) {
+    return std::nullopt;
+  }
+  try {
+    return range_of(request, size);
+  } catch (const Error&) {
+    response.set_header("Content-Range", "bytes */" + std::to_string(size));
+    throw;
+  }
+}
+
+// Submits the job of a request whose body is the volume.
+Job submit_with_volume(App& app, const Request& request, Response& response) {
+  std::vector<std::pair<std::string, std::string>> job_query;
+  std::set<std::string> names;  // all, as so far only being given once is checked
+  for (const auto& parameter : request.query) {
+    names.insert(parameter.first);
+    if (!import_parameters().contains(parameter.first)) job_query.push_back(parameter);
+  }
+  check_known(request, names);
+  JobParameters parameters = parse_job_parameters(job_query, VolumeIn::kBody);
+  if (parameters.formats.size() != 1) {
+    throw invalid_parameter("format", "must be one format: the answer is one file");
+  }
+  const process::ImportOptions options = import_options_of(request);
+  const std::string key = idempotency_key_of(request);
+  const Slots::Place place = place_for_upload(app);
+  const Upload file(app.services.folder, app.options.upload, app.stopping, request);
+  const auto add = [&] {
+    return app.services.library.add(owner_of(request), file.path(), options);
+  };
+  parameters.volume = counting_refusals(app, request, add).first.id;
+  // A key belongs to one request: the same volume (by its id), the same parameters and, as "mesh"
+  // says, this route.
+  const std::string digest = key.empty() ? "" : sha256_of("mesh " + to_json(parameters));
+  return submitted(app, {owner_of(request), parameters, key, digest}, response);
+}
+
+// One request whose body is the volume and whose response is the mesh.
+std::optional<Continuation> mesh_in_one(App& app, const Request& request, Response& response) {
+  const auto answer = [&app](const Request& asked, Response& out, const Job& job) {
+    out.set_header("Location", "/v1/jobs/" + job.id);
+    if (!is_final(job.state) && app.stopping) {
+      throw Error(ErrorCode::kUnavailable, "the service is shutting down");
+    }
+    answer_mesh(app, asked, out, job, job.parameters.formats.front());
+  };
+  const Job job = submit_with_volume(app, request, response);
+  return answer_at_end(app, request, response, job, kLongestJob, answer);
+}
+
+}  // namespace
+
+void answer_mesh(const App& app, const Request& request, Response& response, const Job& job,
+                 MeshFormat format) {
+  if (job.error) throw to_error(*job.error);
+  if (job.state == JobState::kCancelled) {
+    throw Error(ErrorCode::kCancelled, "the job was cancelled and has no mesh");
+  }
+  if (!job.mesh) {
+    throw Error(ErrorCode::kNotReady,
+                "the job is " + std::string(to_string(job.state)) + ": its mesh is not ready");
+  }
+  const std::string name(to_string(format));
+  const auto found = job.mesh->files.find(format);
+  if (found == job.mesh->files.end()) {
+    throw Error(ErrorCode::kNotFound, "the job was not asked for the format \"" + name + '"');
+  }
+  const MeshFile& file = found->second;
+  const std::string etag = '"' + file.sha256 + '"';
+  const bool is_read = request.method != "POST";
+  if (is_read) check_if_match(request, etag);
+  const bool unchanged = is_read && matches_etag(request, etag);
+  response.set_header("ETag", etag);
+  response.set_header("Repr-Digest", digest_header(file.sha256));
+  const auto part = unchanged ? std::nullopt : part_of(request, response, etag, file.bytes);
+  response.set_header("Cache-Control", "private, immutable");
+  response.set_header("Server-Timing", server_timing(job.timing));
+  response.set_header("Accept-Ranges", "bytes");
+  if (unchanged) {
+    response.status = 304;
+    return;
+  }
+  const ByteRange range = part.value_or(ByteRange{0, file.bytes});
+  response.status = part ? 206 : 200;
+  if (part) {
+    response.set_header("Content-Range", "bytes " + std::to_string(range.first) + '-' +
+                                             std::to_string(range.first + range.length - 1) + '/' +
+                                             std::to_string(file.bytes));
+  }
+  response.set_header("Content-Disposition", "attachment; filename=\"mesh." + name + '"');
+  response.stream = {.source = blob_source(app.services.blobs.open(file.sha256), range),
+                     .media_type = std::string(codec::describe(format).media_type),
+                     .framing = Framing::kLength,
+                     .length = range.length};
+}
+
+void add_mesh_routes(App& app) {
+  add_get(app, "/v1/jobs/{id}/mesh.{format}", [&app](const auto& request, auto& response) {
+    check_known(request, {});
+    const auto format = from_string<MeshFormat>(request.path_parameter("format"));
+    if (!format) {
+      throw Error(ErrorCode::kNotFound, "a mesh has the suffix " + names_of<MeshFormat>());
+    }
+    answer_mesh(app, request, response,
+                app.services.jobs.get(viewer_of(request), request.path_parameter("id")), *format);
+  });
+  add_post(app, "/v1/mesh", [&app](const auto& request, auto& response) {
+    return mesh_in_one(app, request, response);
+  });
+}
+
+}  // namespace isomesh::http

@@ -1,0 +1,32 @@
+#include <filesystem>
+
+#include "server/http/request_values.h"
+#include "server/http/routes/routes.h"
+
+namespace isomesh::http {
+namespace {
+
+Levels levels_of(const App& app) {
+  const store::QueueDepth depth = app.services.jobs.depth();
+  Levels levels;
+  for (std::size_t i = 0; i < levels.queued.size(); ++i) levels.queued[i] = depth.queued[i];
+  levels.running = depth.running;
+  levels.uploads = app.uploads.taken();
+  levels.callbacks = app.services.outbox.count();
+  levels.disk_used_bytes = app.services.retention.named_bytes();
+  std::error_code unknown;  // then 0 is told
+  const auto space = std::filesystem::space(app.services.folder.blobs(), unknown);
+  if (!unknown) levels.disk_free_bytes = space.available;
+  return levels;
+}
+
+}  // namespace
+
+void add_metrics_route(App& app) {
+  add_get(app, "/metrics", [&app](const auto& request, auto& response) {
+    check_known(request, {});
+    response.set_body(app.metrics.text(levels_of(app)), Metrics::kMediaType);
+  });
+}
+
+}  // namespace isomesh::http

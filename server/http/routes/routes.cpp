@@ -1,0 +1,139 @@
+#include "server/http/routes/routes.h"
+
+#include <exception>
+#include <new>
+
+#include <spdlog/spdlog.h>
+
+#include "base/log.h"
+#include "base/sha256.h"
+#include "proto/json.h"
+
+namespace isomesh::http {
+namespace {
+
+ConnectionOptions connection_options(const ServerOptions& options) {
+  ConnectionOptions connections;
+  connections.threads = options.threads;
+  connections.backlog = options.backlog;
+  connections.acceptor.head_time = options.request_time;
+  if (const net::TlsFiles* tls = options.tls) {
+    connections.stream_of = [tls](int socket) { return tls->accept(socket); };
+  }
+  return connections;
+}
+
+void report_refused(Metrics& metrics, const std::string& address, const Error& error) {
+  const int status = describe(error.code()).status;
+  metrics.count({.method = "", .route = kNoRoute, .status = status});
+  LogLine("request")
+      .add("status", status)
+      .add("reason", error.what())
+      .add("remote", address.empty() ? "unix" : address);
+}
+
+bool has_ended(const store::JobStore& jobs, const std::string& job) {
+  try {
+    return is_final(jobs.get(std::nullopt, job).state);
+  } catch (const Error&) {
+    return true;  // it is not there any more
+  }
+}
+
+}  // namespace
+
+App::App(const Services& the_services, const ServerOptions& the_options)
+    : services(the_services),
+      options(the_options),
+      uploads(the_options.upload_places),
+      streams(the_options.event_streams),
+      rules{.cors_origins = the_options.cors_origins,
+            .check_host = false,
+            .hosts = the_options.hosts},
+      connections(
+          connection_options(the_options),
+          {.answer = [this](Request& request,
+                            Response& response) { return answer(*this, request, response); },
+           .has_ended = [this](const std::string& job) { return has_ended(services.jobs, job); },
+           .on_answered =
+               [this](const Request& request, const Response& response, const BodySizes& sizes) {
+                 end_request(metrics, request, response, sizes);
+               },
+           .on_refused = [this](const std::string& address,
+                                const Error& error) { report_refused(metrics, address, error); }}) {
+}
+
+std::optional<Continuation> guarded(const Request& request, Response& response,
+                                    const std::function<std::optional<Continuation>()>& run) {
+  try {
+    return run();
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kInternal) {
+      spdlog::error("{} {}: {}", request.method, request.path, error.what());
+    }
+    answer_problem(request, response, error);
+  } catch (const std::bad_alloc&) {
+    spdlog::error("{} {}: out of memory", request.method, request.path);
+    answer_problem(request, response,
+                   Error(ErrorCode::kUnavailable, "there is not enough memory at the moment"));
+  } catch (const std::exception& error) {
+    spdlog::error("{} {}: {}", request.method, request.path, error.what());
+    answer_problem(request, response, Error(ErrorCode::kInternal, error.what()));
+  }
+  return std::nullopt;
+}
+
+std::optional<Continuation> answer_at_end(App& app, const Request& request, Response& response,
+                                          const Job& job, std::chrono::milliseconds wait,
+                                          const JobAnswer& answer) {
+  if (is_final(job.state) || wait.count() == 0 || app.stopping) {
+    answer(request, response, job);
+    return std::nullopt;
+  }
+  return Continuation{.job = job.id,
+                      .until = std::chrono::steady_clock::now() + wait,
+                      .resume = [&app, id = job.id, answer](const Request& asked, Response& out) {
+                        answer(asked, out, app.services.jobs.get(viewer_of(asked), id));
+                      }};
+}
+
+void answer_json(Response& response, int status, const std::string& json) {
+  response.status = status;
+  response.set_header("Cache-Control", "no-store");
+  response.set_body(json, "application/json");
+}
+
+std::string etag_of(const std::string& text) {
+  constexpr std::size_t kEnough = 32;  // hex digits, of 64
+  return '"' + sha256_of(text).substr(0, kEnough) + '"';
+}
+
+void answer_tagged_json(const Request& request, Response& response, const std::string& json) {
+  const std::string etag = etag_of(json);
+  check_if_match(request, etag);
+  response.set_header("ETag", etag);
+  response.set_header("Cache-Control", "private, no-cache");  // ask each time
+  if (matches_etag(request, etag)) {
+    response.status = 304;
+    return;
+  }
+  response.status = 200;
+  response.set_body(json, "application/json");
+}
+
+Slots::Place place_for_upload(App& app) {
+  if (app.draining) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
+  auto place = app.uploads.try_take();
+  if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
+  return std::move(*place);
+}
+
+Job submitted(App& app, const store::JobSpec& spec, Response& response) {
+  const store::Submission submission = app.services.jobs.submit(spec);
+  if (submission.kind == store::Submission::Kind::kBusy) {
+    response.set_header("Retry-After", std::to_string(submission.retry_after.count()));
+  }
+  return store::job_of(submission);
+}
+
+}  // namespace isomesh::http

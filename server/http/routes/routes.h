@@ -1,0 +1,103 @@
+// How routes are written and answered; private to server/http.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "proto/error.h"
+#include "proto/types.h"
+#include "server/http/answers/event_stream.h"
+#include "server/http/connections.h"
+#include "server/http/guards/access.h"
+#include "server/http/guards/origin.h"
+#include "server/http/guards/slots.h"
+#include "server/http/request_values.h"
+#include "server/http/response.h"
+#include "server/http/router.h"
+#include "server/http/server.h"
+
+namespace isomesh::http {
+
+// What all routes share. Thread safe once the routes are added.
+struct App {
+  App(const Services& the_services, const ServerOptions& the_options);
+
+  Services services;
+  ServerOptions options;
+  const Tokens* tokens = services.tokens;  // null: everybody may do everything
+  Metrics& metrics = services.metrics;
+  Slots uploads;
+  Slots streams;  // of events
+  Broadcaster events;
+  OriginRules rules;  // constant once the server is bound
+  const std::uint64_t began_us =
+      static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(
+                                     std::chrono::system_clock::now().time_since_epoch())
+                                     .count());
+  std::atomic<bool> draining = false;  // running jobs are finished, others are not accepted
+  std::atomic<bool> stopping = false;  // nobody is waited for any more
+  Router router;
+  Connections connections;
+};
+
+// One request from its guards to its route. Does not throw.
+std::optional<Continuation> answer(App& app, Request& request, Response& response);
+
+// Makes a problem of what `run` throws. Only an Error's own words reach a client.
+std::optional<Continuation> guarded(const Request& request, Response& response,
+                                    const std::function<std::optional<Continuation>()>& run);
+
+// `run` is a Handler, or a function of the same arguments that returns nothing.
+template <class Run>
+void add_get(App& app, const std::string& pattern, const Run& run) {
+  for (const char* method : {"GET", "HEAD"}) app.router.add(method, pattern, handler_of(run));
+}
+template <class Run>
+void add_post(App& app, const std::string& pattern, const Run& run) {
+  app.router.add("POST", pattern, handler_of(run));
+}
+template <class Run>
+void add_delete(App& app, const std::string& pattern, const Run& run) {
+  app.router.add("DELETE", pattern, handler_of(run));
+}
+
+void answer_json(Response& response, int status, const std::string& json);
+
+// The entity tag of what is represented by that text.
+std::string etag_of(const std::string& text);
+// Answers 200, or 304 when the client has the same already. Throws Error kPreconditionFailed.
+void answer_tagged_json(const Request& request, Response& response, const std::string& json);
+// How many entries of a list one response may have.
+inline constexpr WholeNumbers kListLengths = {1, 1000};
+inline constexpr std::uint64_t kUsualListLength = 100;
+
+// Throws Error kUnavailable when all places are taken, or nothing is accepted any more.
+Slots::Place place_for_upload(App& app);
+
+// Submits a job. Throws what store::job_of throws, and then says in `response` when to come again.
+Job submitted(App& app, const store::JobSpec& spec, Response& response);
+
+using JobAnswer = std::function<void(const Request&, Response&, const Job&)>;
+
+// Has `answer` called with the job as it is when it has ended or `wait` is over: now, or by a
+// continuation.
+std::optional<Continuation> answer_at_end(App& app, const Request& request, Response& response,
+                                          const Job& job, std::chrono::milliseconds wait,
+                                          const JobAnswer& answer);
+
+// Answers with a finished job's mesh file: entity tag, one range, timings.
+void answer_mesh(const App& app, const Request& request, Response& response, const Job& job,
+                 MeshFormat format);
+
+void add_volume_routes(App& app);
+void add_job_routes(App& app);
+void add_mesh_routes(App& app);
+void add_inspect_routes(App& app);
+void add_page_routes(App& app);
+void add_service_routes(App& app);
+void add_metrics_route(App& app);
+
+}  // namespace isomesh::http

@@ -1,0 +1,19 @@
+#include "server/http/openapi.h"
+#include "server/http/routes/routes.h"
+
+namespace isomesh::http {
+
+void add_service_routes(App& app) {
+  add_get(app, "/livez",
+          [](const auto& /*request*/, auto& response) { response.set_body("ok\n", "text/plain"); });
+  add_get(app, "/readyz", [&app](const auto& /*request*/, auto& response) {
+    if (app.draining) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
+    if (app.services.jobs.is_full()) throw Error(ErrorCode::kUnavailable, "the queue is full");
+    response.set_body("ok\n", "text/plain");
+  });
+  add_get(app, "/openapi.yaml", [](const auto& /*request*/, auto& response) {
+    response.set_body(kOpenApi, "application/yaml");
+  });
+}
+
+}  // namespace isomesh::http

@@ -1,0 +1,77 @@
+#include "proto/json.h"
+#include "server/http/observe/outcomes.h"
+#include "server/http/request_values.h"
+#include "server/http/routes/routes.h"
+
+namespace isomesh::http {
+namespace {
+
+const std::string kVolumes = "/v1/volumes";
+constexpr const char* kVolumeCursor = "volumes";
+
+void upload(App& app, const Request& request, Response& response) {
+  check_known(request, import_parameters());
+  const process::ImportOptions options = import_options_of(request);
+  const Slots::Place place = place_for_upload(app);
+  const Upload file(app.services.folder, app.options.upload, app.stopping, request);
+  const auto [volume, is_new] = counting_refusals(app, request, [&] {
+    return app.services.library.add(owner_of(request), file.path(), options);
+  });
+  response.set_header("Location", kVolumes + '/' + volume.id);
+  answer_json(response, is_new ? 201 : 200, to_json(volume));
+}
+
+// Whether that has the form of what store::cursor_of makes: a time, a space and an id.
+bool is_place(const std::string& text) {
+  constexpr std::size_t kTime = std::string_view("2026-11-20T07:00:00.000").size();
+  const std::size_t space = text.find(' ');
+  return space != std::string::npos && space > kTime && text[10] == 'T' && text[space - 1] == 'Z' &&
+         text.find_first_not_of("0123456789-T:.Z", 0) == space;
+}
+
+void list(App& app, const Request& request, Response& response) {
+  check_known(request, {"cursor", "limit"});
+  const std::string after = id_after(request, kVolumeCursor);
+  if (!after.empty() && !is_place(after)) throw wrong_cursor();
+  const std::size_t limit = whole_number_of(request, "limit", kListLengths, kUsualListLength);
+  std::vector<Volume> volumes = app.services.volumes.list(viewer_of(request), after, limit + 1);
+  std::string next;
+  if (volumes.size() > limit) {
+    volumes.pop_back();
+    next = cursor_after(kVolumeCursor, store::cursor_of(volumes.back()));
+  }
+  // Lists leave out the identifiers of slices, of which one volume may have thousands.
+  for (Volume& volume : volumes) volume.dicom.reset();
+  answer_json(response, 200, to_json(volumes, next));
+}
+
+void get(App& app, const Request& request, Response& response) {
+  check_known(request, {});
+  const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
+  answer_tagged_json(request, response, to_json(volume));
+}
+
+void erase(App& app, const Request& request, Response& response) {
+  check_known(request, {});
+  const std::string id = request.path_parameter("id");
+  if (request.has_header("If-Match")) {
+    check_if_match(request, etag_of(to_json(app.services.volumes.get(viewer_of(request), id))));
+  }
+  app.services.library.erase(owner_of(request), id);
+  response.status = 204;
+}
+
+}  // namespace
+
+void add_volume_routes(App& app) {
+  add_post(app, kVolumes,
+           [&app](const auto& request, auto& response) { upload(app, request, response); });
+  add_get(app, kVolumes,
+          [&app](const auto& request, auto& response) { list(app, request, response); });
+  add_get(app, kVolumes + "/{id}",
+          [&app](const auto& request, auto& response) { get(app, request, response); });
+  add_delete(app, kVolumes + "/{id}",
+             [&app](const auto& request, auto& response) { erase(app, request, response); });
+}
+
+}  // namespace isomesh::http

@@ -1,0 +1,253 @@
+#include "server/import/archives/archive.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <memory>
+#include <set>
+#include <span>
+
+#include <archive.h>
+#include <archive_entry.h>
+#include <fcntl.h>
+
+#include "base/descriptor.h"
+#include "base/error.h"
+#include "base/files.h"
+#include "base/text.h"
+#include "proto/error.h"
+#include "server/import/source.h"
+
+namespace isomesh::import {
+namespace {
+
+constexpr std::size_t kTarBlock = 512;
+
+// Deflate makes at most a thousand bytes of one. An empty volume compresses nearly as far, so that
+// archives that unpack to less than a gigabyte are never taken for bombs.
+constexpr std::uint64_t kMostUnpackedPerByte = 200;
+constexpr std::uint64_t kNeverABomb = std::uint64_t{1} << 30;
+
+[[noreturn]] void throw_damaged(archive* source) {
+  const char* reason = ::archive_error_string(source);
+  throw_unusable("The archive is damaged or truncated: " +
+                 in_quotes(reason == nullptr ? "no reason known" : reason) + ".");
+}
+
+// Reads the leading octal digits of a field in a TAR's header.
+std::uint64_t octal(std::string_view text) {
+  std::uint64_t value = 0;
+  const std::size_t first = text.find_first_not_of(' ');
+  for (const char digit : text.substr(std::min(first, text.size()))) {
+    if (digit < '0' || digit > '7') break;
+    value = value * 8 + static_cast<std::uint64_t>(digit - '0');
+  }
+  return value;
+}
+
+bool is_hidden(std::string_view name) {
+  return base_of(name).starts_with('.') || name.starts_with("__MACOSX/");
+}
+
+// The part of a member's name that is safe to use in a path of ours.
+std::string plain_name(std::string_view name) {
+  constexpr std::size_t kLongest = 100;
+  std::string plain(base_of(name).substr(0, kLongest));
+  std::ranges::replace_if(
+      plain,
+      [](char c) {
+        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+        return !letter && !(c >= '0' && c <= '9') && c != '.' && c != '-' && c != '_';
+      },
+      '_');
+  return plain;
+}
+
+class Reader {
+ public:
+  explicit Reader(const InputFile& file) : file_(file), archive_(::archive_read_new()) {
+    if (!archive_) throw Error(ErrorCode::kInternal, "archive_read_new failed.");
+    // A ZIP is read by its central directory, because that shows whether members are missing.
+    ::archive_read_support_format_zip_seekable(archive_.get());
+    ::archive_read_support_format_tar(archive_.get());
+    constexpr std::size_t kPieceBytes = std::size_t{1} << 17;
+    if (::archive_read_open_fd(archive_.get(), file.descriptor(), kPieceBytes) != ARCHIVE_OK) {
+      throw_damaged(archive_.get());
+    }
+  }
+
+  // The next member; null after the last.
+  archive_entry* next() {
+    // Where the rest of the last member is missing, the archive was cut.
+    if (in_member_ && ::archive_read_data_skip(archive_.get()) != ARCHIVE_OK) {
+      throw_damaged(archive_.get());
+    }
+    before_next_ = static_cast<std::uint64_t>(::archive_filter_bytes(archive_.get(), 0));
+    archive_entry* entry = nullptr;
+    const int status = ::archive_read_next_header(archive_.get(), &entry);
+    in_member_ = false;
+    if (status == ARCHIVE_EOF) return nullptr;
+    // The library warns of names that the locale cannot represent, which does no harm.
+    if (status != ARCHIVE_OK && status != ARCHIVE_WARN) throw_damaged(archive_.get());
+    in_member_ = true;
+    return entry;
+  }
+
+  std::size_t read(std::span<std::byte> target) {
+    const la_ssize_t count = ::archive_read_data(archive_.get(), target.data(), target.size());
+    // Here a warning is an error: the library warns of wrong checksums.
+    if (count < 0) throw_damaged(archive_.get());
+    return static_cast<std::size_t>(count);
+  }
+
+  // A TAR ends with at least two blocks of zeros and nothing else. The library does not require
+  // them, but an archive that lacks them may have been cut between two members.
+  void require_end() const {
+    const int format = ::archive_format(archive_.get()) & ARCHIVE_FORMAT_BASE_MASK;
+    if (format != ARCHIVE_FORMAT_TAR) return;
+    std::uint64_t at = (before_next_ + kTarBlock - 1) / kTarBlock * kTarBlock;
+    if (file_.size() < at + 2 * kTarBlock) {
+      throw_unusable("The archive is truncated: its end is missing.");
+    }
+    std::vector<std::byte> piece(std::size_t{1} << 17);
+    while (const std::size_t count = file_.read(at, piece)) {
+      const auto rest = std::span(piece).first(count);
+      if (std::ranges::any_of(rest, [](std::byte b) { return b != std::byte{0}; })) {
+        throw_unusable("Something that is no part of the archive follows its end.");
+      }
+      at += count;
+    }
+  }
+
+ private:
+  struct Free {
+    void operator()(archive* object) const { ::archive_read_free(object); }
+  };
+
+  const InputFile& file_;
+  std::unique_ptr<archive, Free> archive_;
+  std::uint64_t before_next_ = 0;
+  bool in_member_ = false;
+};
+
+std::string name_of(archive_entry* entry, std::size_t number) {
+  for (const char* name : {::archive_entry_pathname_utf8(entry), ::archive_entry_pathname(entry)}) {
+    if (name != nullptr) return name;
+  }
+  return "member " + std::to_string(number);
+}
+
+bool is_regular(archive_entry* entry) {
+  return ::archive_entry_filetype(entry) == AE_IFREG && ::archive_entry_hardlink(entry) == nullptr;
+}
+
+class Unpacker {
+ public:
+  Unpacker(const std::filesystem::path& source, const std::filesystem::path& folder,
+           const ArchiveLimits& limits)
+      : file_(source), reader_(file_), folder_(folder), limits_(limits) {}
+
+  std::vector<ArchiveMember> unpack_all() {
+    while (archive_entry* entry = reader_.next()) {
+      if (++entries_ > limits_.max_members) {
+        throw Error(ErrorCode::kTooLarge, "The archive has more than " +
+                                              std::to_string(limits_.max_members) + " members.");
+      }
+      const std::string name = name_of(entry, entries_);
+      if (::archive_entry_is_encrypted(entry) != 0) {
+        throw_unusable("The archive is encrypted; send it without a password.");
+      }
+      if (is_regular(entry) && !is_hidden(name)) unpack_one(entry, name);
+    }
+    reader_.require_end();
+    return std::move(members_);
+  }
+
+ private:
+  void unpack_one(archive_entry* entry, const std::string& name) {
+    if (base_of(name).empty()) {
+      throw_unusable("The archive is damaged: its member " + std::to_string(entries_) +
+                     " is a file without a name.");
+    }
+    if (!names_.insert(name).second) {
+      throw_unusable("The archive has the member " + in_quotes(name) + " twice.");
+    }
+    if (::archive_entry_size_is_set(entry) != 0) {
+      check_total(static_cast<std::uint64_t>(::archive_entry_size(entry)));
+    }
+    const std::filesystem::path place = folder_ / std::to_string(entries_);
+    std::filesystem::create_directory(place);
+    const std::filesystem::path path = place / plain_name(name);
+    const Descriptor target(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
+    if (target.number() < 0) throw_system_error("open", errno);
+    std::uint64_t bytes = 0;
+    while (const std::size_t count = reader_.read(buffer_)) {
+      check_total(count);
+      total_ += count;
+      bytes += count;
+      write_all(target, std::span(buffer_).first(count));
+    }
+    if (bytes > 0) members_.push_back({name, path});
+  }
+
+  void check_total(std::uint64_t further) const {
+    if (further > limits_.max_bytes - std::min(total_, limits_.max_bytes)) {
+      throw Error(ErrorCode::kTooLarge, "The archive's members are more than the " +
+                                            std::to_string(limits_.max_bytes) +
+                                            " bytes that are accepted.");
+    }
+    if (total_ + further > most_unpacked_bytes(file_.size())) {
+      throw_unusable("The archive unpacks to more than " + std::to_string(kMostUnpackedPerByte) +
+                     " times its size, as only bombs do.");
+    }
+  }
+
+  InputFile file_;
+  Reader reader_;
+  std::filesystem::path folder_;
+  ArchiveLimits limits_;
+  std::vector<ArchiveMember> members_;
+  std::set<std::string> names_;
+  std::size_t entries_ = 0;
+  std::uint64_t total_ = 0;
+  std::vector<std::byte> buffer_ = std::vector<std::byte>(std::size_t{1} << 18);
+};
+
+}  // namespace
+
+bool is_zip(std::string_view head) {
+  return head.starts_with("PK\x03\x04") || head.starts_with("PK\x05\x06");
+}
+
+// A TAR is known by the checksum of its first member's header. The sum counts its own digits as
+// spaces.
+bool is_tar(std::string_view head) {
+  constexpr std::size_t kChecksumAt = 148;
+  constexpr std::size_t kChecksumBytes = 8;
+  if (head.size() < kTarBlock || head[0] == '\0') return false;
+  std::uint64_t sum = 0;
+  for (std::size_t at = 0; at < kTarBlock; ++at) {
+    const bool in_checksum = at >= kChecksumAt && at < kChecksumAt + kChecksumBytes;
+    sum += in_checksum ? ' ' : static_cast<unsigned char>(head[at]);
+  }
+  return octal(head.substr(kChecksumAt, kChecksumBytes)) == sum;
+}
+
+std::uint64_t most_unpacked_bytes(std::uint64_t archive_bytes) {
+  return std::max(kNeverABomb, archive_bytes * kMostUnpackedPerByte);
+}
+
+std::string_view folder_of(std::string_view name) {
+  const std::size_t slash = name.rfind('/');
+  return slash == std::string_view::npos ? std::string_view{} : name.substr(0, slash + 1);
+}
+
+std::string_view base_of(std::string_view name) { return name.substr(folder_of(name).size()); }
+
+std::vector<ArchiveMember> unpack(const std::filesystem::path& archive,
+                                  const std::filesystem::path& folder,
+                                  const ArchiveLimits& limits) {
+  return Unpacker(archive, folder, limits).unpack_all();
+}
+
+}  // namespace isomesh::import

@@ -1,0 +1,22 @@
+// The one volume that an archive holds.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "server/import/reader.h"
+
+namespace isomesh::import {
+
+bool is_archive(std::string_view head);
+
+// Unpacks the archive and reads what it holds: one file of a volume, with the files beside it that
+// its header may name, or any number of DICOM files. Throws Error kUnsupportedMedia when it holds
+// no volume, kUnusableVolume when it holds several or another archive, and whatever unpacking and
+// reading throw.
+Volume parse_archive(const Input& input);
+
+// How many bytes a compressed TAR may inflate to.
+std::uint64_t most_archive_bytes(const InputFile& file, const SizeLimits& limits);
+
+}  // namespace isomesh::import

@@ -1,0 +1,148 @@
+#include "server/import/dicom/import.h"
+
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+#include "proto/error.h"
+#include "server/import/dicom/beginning.h"
+#include "server/import/dicom/decode.h"
+#include "server/import/dicom/pixels.h"
+#include "server/import/dicom/series.h"
+#include "server/import/dicom/stack.h"
+#include "server/import/dicom/tags.h"
+#include "server/import/dicom/values.h"
+#include "server/import/source.h"
+#include "server/import/transfer.h"
+#include "server/volume/presets.h"
+
+namespace isomesh::import {
+namespace dicom {
+namespace {
+
+// Added to the bytes of samples to bound what a deflated file may inflate to.
+constexpr std::uint64_t kMostHeaderBytes = std::uint64_t{1} << 26;
+
+// Keeps the file of the last slice open, because the next slice is often in it, too.
+class OpenFile {
+ public:
+  OpenFile(std::span<const Source> sources, std::filesystem::path scratch, std::uint64_t most_bytes)
+      : sources_(sources), scratch_(std::move(scratch)), most_bytes_(most_bytes) {}
+
+  const FrameReader& reader(std::size_t index) {
+    if (!file_ || index_ != index) {
+      reader_.reset();
+      file_.emplace(sources_[index].path, scratch_, most_bytes_);
+      reader_.emplace(*file_, sources_[index].image);
+      index_ = index;
+    }
+    return *reader_;
+  }
+
+  const DataSet& data() const { return file_->data(); }
+
+ private:
+  std::span<const Source> sources_;
+  std::filesystem::path scratch_;
+  std::uint64_t most_bytes_;
+  std::size_t index_ = 0;
+  std::optional<DicomFile> file_;
+  std::optional<FrameReader> reader_;
+};
+
+std::vector<Slice> slices_of(std::span<const Source> sources) {
+  std::vector<Slice> slices;
+  for (std::size_t file = 0; file < sources.size(); ++file) {
+    const Image& image = sources[file].image;
+    for (const Frame& frame : image.frames) slices.push_back({&image, &frame, file});
+  }
+  return slices;
+}
+
+// False when a sample does not fit into the type.
+bool write_samples(const Stack& stack, SampleType type, OpenFile& file,
+                   std::span<std::byte> target) {
+  std::vector<std::byte> stored;
+  for (std::size_t place = 0; place < stack.slices.size(); ++place) {
+    const Slice& slice = stack.slices[place];
+    const PixelLayout& layout = slice.image->layout;
+    stored.resize(layout.frame_bytes());
+    try {
+      file.reader(slice.file).read(slice.frame->number, stored);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kUnusableVolume) throw;
+      throw_unusable("The DICOM image cannot be read: " + stack.name(place) + ": " + error.what() +
+                     '.');
+    }
+    const std::span<std::byte> plane = target.first(layout.samples() * bytes_per_sample(type));
+    if (!convert_frame(stored, layout, slice.frame->rescale, type, plane)) return false;
+    target = target.subspan(plane.size());
+  }
+  return true;
+}
+
+Volume write_volume(const Stack& stack, Volume volume, OpenFile& file, const SizeLimits& limits,
+                    const std::filesystem::path& target) {
+  for (const SampleType type : candidate_types(stack.slices)) {
+    check_limits(volume.sample_count(), type, limits);
+    volume.type = type;
+    CanonicalWriter writer(target, {volume.dims, type, volume.geometry});
+    if (write_samples(stack, type, file, writer.samples())) return finish(writer, volume);
+  }
+  throw Error(ErrorCode::kInternal, "No type holds a DICOM volume's samples.");
+}
+
+Volume describe_volume(const Stack& stack) {
+  const Image& image = *stack.slices.front().image;
+  Volume volume;
+  volume.format = "dicom";
+  volume.dims = {image.layout.columns, image.layout.rows,
+                 static_cast<std::uint32_t>(stack.slices.size())};
+  volume.geometry = normalised(stack.geometry);
+  if (const auto fault = find_fault(volume.dims, volume.geometry)) {
+    throw_unusable("The series' geometry cannot be used: " + fault->message + ".");
+  }
+  if (!image.modality.empty()) volume.modality = image.modality;
+  return volume;
+}
+
+std::vector<DicomInstance> instances_of(const Stack& stack, std::span<const Source> sources) {
+  std::vector<DicomInstance> instances;
+  std::vector<bool> seen(sources.size());
+  for (const Slice& slice : stack.slices) {
+    if (!seen[slice.file]) instances.push_back(sources[slice.file].instance);
+    seen[slice.file] = true;
+  }
+  return instances;
+}
+
+}  // namespace
+}  // namespace dicom
+
+bool is_dicom(std::string_view head) {
+  return dicom::find_beginning(std::as_bytes(std::span(head))).has_value();
+}
+
+Volume import_dicom(std::span<const std::filesystem::path> files, const std::string& series,
+                    const SizeLimits& limits, const std::filesystem::path& target) {
+  const std::filesystem::path scratch = target.parent_path();
+  const std::uint64_t most_bytes = limits.max_sample_bytes + dicom::kMostHeaderBytes;
+  dicom::Upload upload = dicom::read_headers(files, scratch, most_bytes);
+  const std::vector<dicom::Source> sources = choose_series(std::move(upload.sources), series);
+  const dicom::Stack stack = dicom::make_stack(dicom::slices_of(sources));
+  dicom::OpenFile file(sources, scratch, most_bytes);
+  Volume volume = dicom::write_volume(stack, dicom::describe_volume(stack), file, limits, target);
+  const dicom::Image& image = *stack.slices.front().image;
+  volume.presets = volume::presets_for(image.modality, image.rescale_type, volume.range);
+  volume.ignored = std::move(upload.ignored);
+  volume.dicom = dicom::identity_of(file.data());
+  volume.dicom->instances = dicom::instances_of(stack, sources);
+  return volume;
+}
+
+Volume parse_dicom(const Input& input) {
+  const ImportTask& task = input.task;
+  return import_dicom({&input.path, 1}, task.options.series, task.limits, task.target);
+}
+
+}  // namespace isomesh::import

@@ -1,0 +1,34 @@
+// The samples of one frame, as they are stored or compressed.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "server/import/dicom/image.h"
+
+namespace isomesh::import::dicom {
+
+// Reads the frames of one file. The file and its description must outlive the reader. Not thread
+// safe.
+class FrameReader {
+ public:
+  // Throws Error kUnusableVolume when the frames cannot be told apart among compressed fragments.
+  FrameReader(const DicomFile& file, const Image& image);
+
+  // Reads one frame into `target`, which has layout.frame_bytes() bytes: little-endian, bits as
+  // they are stored. Throws Error kUnusableVolume when the frame cannot be decoded or is of another
+  // size than its object tells.
+  void read(std::uint32_t frame, std::span<std::byte> target) const;
+
+ private:
+  void read_native(std::uint32_t frame, std::span<std::byte> target) const;
+  std::vector<std::byte> compressed(std::uint32_t frame) const;
+
+  const DicomFile& file_;
+  const PixelLayout& layout_;
+  // Where each compressed frame begins among the fragments, and one beyond the last.
+  std::vector<std::size_t> first_fragments_;
+};
+
+}  // namespace isomesh::import::dicom

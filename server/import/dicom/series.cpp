@@ -1,0 +1,170 @@
+#include "server/import/dicom/series.h"
+
+#include <algorithm>
+#include <map>
+
+#include "base/files.h"
+#include "base/text.h"
+#include "server/import/dicom/import.h"
+#include "server/import/dicom/tags.h"
+#include "server/import/dicom/text.h"
+#include "server/import/source.h"
+
+namespace isomesh::import::dicom {
+namespace {
+
+constexpr std::size_t kMostNamedObjects = 100;
+
+std::string name_of(const std::filesystem::path& path) {
+  return printable(path.filename().string());
+}
+
+[[noreturn]] void rethrow_for(const std::filesystem::path& path, const Error& error) {
+  throw Error(error.code(), "File " + in_quotes(name_of(path)) + ": " + error.what());
+}
+
+void ignore(Upload& upload, const std::filesystem::path& path, const std::string& reason) {
+  if (upload.ignored.size() < kMostNamedObjects) {
+    upload.ignored.push_back({name_of(path), reason});
+  }
+}
+
+// Some anonymisers keep identifiers only in the meta information, so those are taken where the data
+// set has none.
+DicomInstance instance_of(const DicomFile& file) {
+  DicomInstance instance = {utf8(file.data(), kSopClassUid), utf8(file.data(), kSopInstanceUid)};
+  if (instance.sop_class_uid.empty()) instance.sop_class_uid = file.meta().sop_class_uid;
+  if (instance.sop_instance_uid.empty()) instance.sop_instance_uid = file.meta().sop_instance_uid;
+  return instance;
+}
+
+Source describe_source(const std::filesystem::path& path, const DicomFile& file) {
+  const DataSet& data = file.data();
+  Source source;
+  source.path = path;
+  source.series_uid = utf8(data, kSeriesInstanceUid);
+  source.series_description = utf8(data, kSeriesDescription);
+  source.frame_count = std::max<std::int64_t>(data.integer(kNumberOfFrames).value_or(1), 1);
+  source.instance = instance_of(file);
+  try {
+    source.image = describe_image(file);
+  } catch (const Error& error) {
+    source.fault = error;
+  }
+  return source;
+}
+
+bool begins_as_dicom(const std::filesystem::path& path) {
+  const std::string head = InputFile(path).text(0, kSniffBytes);
+  return is_dicom(head);
+}
+
+void read_header(const std::filesystem::path& path, const std::filesystem::path& scratch,
+                 std::uint64_t most_bytes, Upload& upload) {
+  if (!begins_as_dicom(path)) return ignore(upload, path, "it is no DICOM file");
+  const DicomFile file(path, scratch, most_bytes);
+  if (const auto reason = reason_to_ignore(file)) return ignore(upload, path, *reason);
+  upload.sources.push_back(describe_source(path, file));
+}
+
+std::string count_of(std::int64_t count) {
+  return std::to_string(count) + (count == 1 ? " slice" : " slices");
+}
+
+// One entry for each series: "1.2.3 (head, 93 slices)".
+std::vector<FieldError> list_series(std::span<const Source> sources) {
+  struct Series {
+    std::string description;
+    std::int64_t slices = 0;
+  };
+  std::map<std::string, Series> all;
+  for (const Source& source : sources) {
+    Series& series = all[source.series_uid];
+    series.description = source.series_description;
+    series.slices += source.frame_count;
+  }
+  std::vector<FieldError> fields;
+  for (const auto& [uid, series] : all) {
+    const std::string description = series.description.empty() ? "" : series.description + ", ";
+    fields.push_back({"series", uid + " (" + description + count_of(series.slices) + ')'});
+  }
+  return fields;
+}
+
+std::string joined_messages(const std::vector<FieldError>& fields) {
+  constexpr std::size_t kMostNamed = 5;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(fields.size(), kMostNamed); ++i) {
+    text += (i == 0 ? "" : "; ") + fields[i].message;
+  }
+  return text + (fields.size() > kMostNamed ? "; ..." : "");
+}
+
+}  // namespace
+
+Upload read_headers(std::span<const std::filesystem::path> files,
+                    const std::filesystem::path& scratch, std::uint64_t most_bytes) {
+  Upload upload;
+  for (const std::filesystem::path& path : files) {
+    try {
+      read_header(path, scratch, most_bytes, upload);
+    } catch (const Error& error) {
+      if (files.size() == 1) throw;
+      rethrow_for(path, error);
+    }
+  }
+  if (files.size() > 1) {
+    for (Source& source : upload.sources) source.image.file_name = name_of(source.path);
+  }
+  if (!upload.sources.empty()) return upload;
+  if (upload.ignored.size() == 1) {
+    throw_unusable("The upload holds no DICOM image: " + upload.ignored.front().reason + ".");
+  }
+  throw_unusable("None of the upload's " + std::to_string(files.size()) +
+                 " files is a DICOM image that a volume can be made of.");
+}
+
+std::vector<Source> choose_series(std::vector<Source> sources, const std::string& uid) {
+  const std::vector<FieldError> all = list_series(sources);
+  if (!uid.empty()) {
+    std::erase_if(sources, [&](const Source& source) { return source.series_uid != uid; });
+    if (sources.empty()) {
+      throw Error(
+          ErrorCode::kUnusableVolume,
+          "The upload has no series " + in_quotes(uid) + ", but: " + joined_messages(all) + '.',
+          all);
+    }
+  } else if (all.size() > 1) {
+    throw Error(ErrorCode::kUnusableVolume,
+                "The upload holds " + std::to_string(all.size()) +
+                    " series; choose one with series=UID: " + joined_messages(all) + '.',
+                all);
+  }
+  for (const Source& source : sources) {
+    if (!source.fault) continue;
+    if (sources.size() == 1) throw *source.fault;
+    rethrow_for(source.path, *source.fault);
+  }
+  return sources;
+}
+
+DicomIdentity identity_of(const DataSet& data) {
+  return {.patient_name = utf8(data, kPatientName),
+          .patient_id = utf8(data, kPatientId),
+          .patient_birth_date = utf8(data, kPatientBirthDate),
+          .patient_sex = utf8(data, kPatientSex),
+          .study_uid = utf8(data, kStudyInstanceUid),
+          .study_date = utf8(data, kStudyDate),
+          .study_time = utf8(data, kStudyTime),
+          .study_id = utf8(data, kStudyId),
+          .study_description = utf8(data, kStudyDescription),
+          .accession_number = utf8(data, kAccessionNumber),
+          .referring_physician = utf8(data, kReferringPhysician),
+          .series_uid = utf8(data, kSeriesInstanceUid),
+          .series_description = utf8(data, kSeriesDescription),
+          .modality = utf8(data, kModality),
+          .frame_of_reference_uid = utf8(data, kFrameOfReferenceUid),
+          .instances = {}};
+}
+
+}  // namespace isomesh::import::dicom

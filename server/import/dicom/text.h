@@ -1,0 +1,19 @@
+// Texts of DICOM -> UTF-8.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "server/import/dicom/dataset.h"
+
+namespace isomesh::import::dicom {
+
+// A text by the data set's Specific Character Set (PS3.3, C.12.1.1.2), several parts separated by
+// backslashes as they are stored. What cannot be read, and control characters, are replaced by
+// U+FFFD.
+std::string utf8(const DataSet& data, Tag tag);
+
+// A text that is UTF-8, or should be, without control characters.
+std::string printable(std::string_view text);
+
+}  // namespace isomesh::import::dicom

@@ -1,0 +1,293 @@
+#include "server/import/formats/metaimage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "base/files.h"
+#include "base/text.h"
+#include "server/import/formats/file_pattern.h"
+#include "server/import/units.h"
+
+namespace isomesh::import {
+namespace {
+
+constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 20;
+constexpr std::string_view kLastKey = "ElementDataFile";
+
+using Fields = std::map<std::string, std::string, std::less<>>;
+
+struct Header {
+  Fields fields;
+  std::uint64_t bytes = 0;  // including its last line
+};
+
+// A MetaImage may begin with any of these keys. The "=" tells them from other text.
+bool is_header_line(std::string_view line) {
+  static constexpr std::string_view kKeys[] = {"ObjectType", "ObjectSubType", "Comment",
+                                               "NDims",      "DimSize",       "ElementType"};
+  const std::size_t equals = line.find('=');
+  if (equals == std::string_view::npos) return false;
+  const std::string_view key = trimmed(line.substr(0, equals));
+  return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
+}
+
+void add_field(Fields& fields, std::string_view line) {
+  const std::size_t equals = line.find('=');
+  if (equals == std::string_view::npos) {
+    throw_unusable("The MetaImage header has a line that is no field: " + in_quotes(line) + ".");
+  }
+  const std::string key(trimmed(line.substr(0, equals)));
+  const std::string_view value = trimmed(line.substr(equals + 1));
+  if (has_control_characters(value)) {
+    throw_unusable("The MetaImage header's field " + in_quotes(key) + " holds control characters.");
+  }
+  if (!fields.emplace(key, value).second) {
+    throw_unusable("The MetaImage header has the field " + in_quotes(key) + " twice.");
+  }
+}
+
+Header read_header(const InputFile& file) {
+  const std::string text = file.text(0, kMostHeaderBytes);
+  Header header;
+  std::size_t next = 0;
+  while (next < text.size()) {
+    const std::size_t end = std::min(text.find('\n', next), text.size());
+    const std::string_view line = std::string_view(text).substr(next, end - next);
+    next = std::min(end + 1, text.size());
+    if (trimmed(line).empty()) continue;
+    add_field(header.fields, line);
+    if (header.fields.contains(kLastKey)) {
+      header.bytes = next;
+      return header;
+    }
+  }
+  throw_unusable("The MetaImage header does not end: it has no field \"ElementDataFile\".");
+}
+
+std::string_view optional(const Fields& fields, std::string_view name) {
+  const auto found = fields.find(name);
+  return found == fields.end() ? std::string_view{} : std::string_view(found->second);
+}
+
+std::string_view required(const Fields& fields, std::string_view name) {
+  const std::string_view value = optional(fields, name);
+  if (value.empty())
+    throw_unusable("The MetaImage header lacks the field " + in_quotes(name) + ".");
+  return value;
+}
+
+bool flag(const Fields& fields, std::string_view name, bool otherwise) {
+  const std::string value = lower(optional(fields, name));
+  if (value.empty()) return otherwise;
+  if (value == "true" || value == "1") return true;
+  if (value == "false" || value == "0") return false;
+  throw_unusable("The MetaImage header's " + in_quotes(name) + " is neither True nor False.");
+}
+
+bool is_detached(const Fields& fields) { return lower(optional(fields, kLastKey)) != "local"; }
+
+// The names of the data files. "LIST" means that they follow the header, one on each line.
+std::vector<std::string> data_names(const InputFile& file, const Header& header) {
+  const std::string_view said = optional(header.fields, kLastKey);
+  if (is_file_pattern(said)) return expand_file_pattern(said);
+  if (!said.starts_with("LIST")) return {std::string(said)};
+  const std::string text = file.text(header.bytes, kMostHeaderBytes);
+  const auto names = lines(text);
+  return {names.begin(), names.end()};
+}
+
+Skip data_skip(const Fields& fields) {
+  const std::string_view text = optional(fields, "HeaderSize");
+  if (text.empty()) return 0;
+  const auto bytes = parse_int64(text);
+  if (!bytes || *bytes < -1) {
+    throw_unusable("The MetaImage header's HeaderSize is " + in_quotes(text) + ".");
+  }
+  if (*bytes < 0) return std::nullopt;
+  return static_cast<std::uint64_t>(*bytes);
+}
+
+std::vector<std::uint64_t> sizes_of(const Fields& fields) {
+  constexpr std::uint64_t kMostAxes = 10;
+  const auto count = parse_uint64(required(fields, "NDims"));
+  std::vector<std::uint64_t> sizes;
+  for (const std::string_view word : words(required(fields, "DimSize"))) {
+    const auto size = parse_uint64(word);
+    if (!size) throw_unusable("The MetaImage header's size " + in_quotes(word) + " is no number.");
+    sizes.push_back(*size);
+  }
+  if (!count || *count < 1 || *count > kMostAxes || *count != sizes.size()) {
+    throw_unusable("The MetaImage header's NDims " + in_quotes(required(fields, "NDims")) +
+                   " does not fit its " + std::to_string(sizes.size()) + " sizes.");
+  }
+  return sizes;
+}
+
+StoredType type_of(const Fields& fields) {
+  struct Row {
+    std::string_view name;
+    StoredType type;
+  };
+  // MetaIO's long is 4 bytes on every machine.
+  static constexpr Row kTypes[] = {
+      {"MET_CHAR", StoredType::kInt8},       {"MET_UCHAR", StoredType::kUint8},
+      {"MET_SHORT", StoredType::kInt16},     {"MET_USHORT", StoredType::kUint16},
+      {"MET_INT", StoredType::kInt32},       {"MET_UINT", StoredType::kUint32},
+      {"MET_LONG", StoredType::kInt32},      {"MET_ULONG", StoredType::kUint32},
+      {"MET_LONG_LONG", StoredType::kInt64}, {"MET_ULONG_LONG", StoredType::kUint64},
+      {"MET_FLOAT", StoredType::kFloat32},   {"MET_DOUBLE", StoredType::kFloat64},
+  };
+  const std::string_view name = required(fields, "ElementType");
+  for (const Row& row : kTypes) {
+    if (row.name == name) return row.type;
+  }
+  throw_unusable("The MetaImage header's ElementType " + in_quotes(name) +
+                 " is not one of plain numbers.");
+}
+
+void check_samples_are_plain(const Fields& fields) {
+  const std::string_view channels = optional(fields, "ElementNumberOfChannels");
+  if (!channels.empty() && parse_uint64(channels) != 1) {
+    throw_unusable("Each sample has " + in_quotes(channels) +
+                   " channels, where plain numbers are needed.");
+  }
+  const std::string_view slope = optional(fields, "ElementToIntensityFunctionSlope");
+  const std::string_view offset = optional(fields, "ElementToIntensityFunctionOffset");
+  if ((!slope.empty() && parse_double(slope) != 1) ||
+      (!offset.empty() && parse_double(offset) != 0)) {
+    throw_unusable(
+        "The MetaImage header has a slope or offset for its samples, which programs "
+        "disagree about; store the values themselves.");
+  }
+}
+
+bool is_big_endian(const Fields& fields) {
+  return flag(fields, "ElementByteOrderMSB", flag(fields, "BinaryDataByteOrderMSB", false));
+}
+
+Encoding encoding_of(const Fields& fields) {
+  const bool compressed = flag(fields, "CompressedData", false);
+  if (flag(fields, "BinaryData", true)) return compressed ? Encoding::kDeflate : Encoding::kRaw;
+  if (compressed)
+    throw_unusable("The MetaImage header contradicts itself: text that is compressed.");
+  return Encoding::kText;
+}
+
+CompressedRange payload_of(const InputFile& file, const Header& header,
+                           const SourceVolume& volume) {
+  CompressedRange payload{header.bytes, file.size() - header.bytes};
+  const std::string_view skip = optional(header.fields, "HeaderSize");
+  if (!skip.empty() && parse_int64(skip) != 0) {
+    throw_unusable(
+        "The MetaImage header has a HeaderSize, which only samples in another file can.");
+  }
+  const std::string_view size = optional(header.fields, "CompressedDataSize");
+  if (size.empty() || volume.encoding != Encoding::kDeflate) return payload;
+  const auto bytes = parse_uint64(size);
+  if (!bytes) throw_unusable("The MetaImage header's CompressedDataSize is no number.");
+  if (*bytes > payload.bytes) {
+    throw_unusable("The file is truncated: its header tells " + std::to_string(*bytes) +
+                   " bytes of compressed data, and " + std::to_string(payload.bytes) + " follow.");
+  }
+  payload.bytes = *bytes;
+  return payload;
+}
+
+void check_numbers(const Fields& fields, std::string_view name, std::size_t count) {
+  const std::string_view value = optional(fields, name);
+  if (value.empty()) return;
+  const auto numbers = words(value);
+  const auto is_number = [](std::string_view word) {
+    return std::isfinite(parse_double(word).value_or(HUGE_VAL));
+  };
+  if (numbers.size() == count && std::all_of(numbers.begin(), numbers.end(), is_number)) return;
+  throw_unusable("The MetaImage header's " + in_quotes(name) + " is not " + std::to_string(count) +
+                 " finite numbers.");
+}
+
+// The value of a field that has several names. Throws where they contradict each other.
+std::string_view one_of(const Fields& fields, std::initializer_list<std::string_view> names,
+                        std::size_t count) {
+  std::string_view result;
+  for (const std::string_view name : names) {
+    check_numbers(fields, name, count);
+    const std::string_view value = optional(fields, name);
+    if (value.empty()) continue;
+    if (!result.empty() && words(result) != words(value)) {
+      throw_unusable("The MetaImage header contradicts itself: " + in_quotes(name) +
+                     " is not what another field tells.");
+    }
+    result = value;
+  }
+  return result;
+}
+
+// The numbers of a field that has been checked; none of one that is missing.
+std::vector<double> numbers_of(std::string_view value) {
+  std::vector<double> numbers;
+  for (const std::string_view word : words(value)) {
+    numbers.push_back(parse_double(word).value_or(0));
+  }
+  return numbers;
+}
+
+// MetaImage's space is LPS, as all programs that write it have it. Axes beyond the third are left
+// out.
+Geometry geometry_of(const Fields& fields, std::size_t axes) {
+  const auto matrix =
+      numbers_of(one_of(fields, {"TransformMatrix", "Rotation", "Orientation"}, axes * axes));
+  const auto origin = numbers_of(one_of(fields, {"Offset", "Position", "Origin"}, axes));
+  // ElementSize is the extent of a sample. It is taken for the distance between samples only where
+  // ElementSpacing is missing.
+  check_numbers(fields, "ElementSize", axes);
+  const std::string_view distances = one_of(fields, {"ElementSpacing"}, axes);
+  const auto spacing = numbers_of(distances.empty() ? optional(fields, "ElementSize") : distances);
+  Geometry geometry;
+  const std::size_t used = std::min<std::size_t>(axes, 3);
+  std::copy_n(origin.begin(), std::min(used, origin.size()), geometry.origin.begin());
+  std::copy_n(spacing.begin(), std::min(used, spacing.size()), geometry.spacing.begin());
+  // The matrix has a row for each axis, a geometry a column.
+  for (std::size_t axis = 0; axis < used && !matrix.empty(); ++axis) {
+    for (std::size_t row = 0; row < used; ++row) {
+      geometry.direction[row * 3 + axis] = matrix[axis * axes + row];
+    }
+  }
+  return geometry;
+}
+
+}  // namespace
+
+bool is_metaimage(std::string_view head) {
+  const std::size_t end = head.find('\n');
+  return end != std::string_view::npos && is_header_line(head.substr(0, end));
+}
+
+SourceVolume parse_metaimage(const InputFile& file, const Companions& companions) {
+  const Header header = read_header(file);
+  const Fields& fields = header.fields;
+  const std::string_view object = optional(fields, "ObjectType");
+  if (!object.empty() && object != "Image") {
+    throw_unusable("The file holds a MetaIO " + in_quotes(object) + ", not an image.");
+  }
+  const std::vector<std::uint64_t> sizes = sizes_of(fields);
+  check_samples_are_plain(fields);
+  SourceVolume volume;
+  volume.dims = volume_dims(sizes);
+  volume.encoding = encoding_of(fields);
+  volume.layout.type = type_of(fields);
+  volume.layout.big_endian = is_big_endian(fields);
+  if (is_detached(fields)) {
+    volume.data_files =
+        data_files_of(data_names(file, header), companions, volume, data_skip(fields));
+  } else {
+    volume.payload = payload_of(file, header, volume);
+  }
+  volume.geometry = geometry_of(fields, sizes.size());
+  scale_to_millimetres(volume.geometry, optional(fields, "DistanceUnits"));
+  return volume;
+}
+
+}  // namespace isomesh::import

@@ -1,0 +1,245 @@
+#include "server/import/formats/nrrd.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/files.h"
+#include "base/text.h"
+#include "server/import/formats/file_pattern.h"
+#include "server/import/formats/nrrd_space.h"
+
+namespace isomesh::import {
+namespace {
+
+constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 20;
+constexpr std::string_view kDataFile = "datafile";
+
+using Fields = NrrdFields;
+
+struct Header {
+  Fields fields;
+  std::uint64_t bytes = 0;  // including the empty line that ends it
+};
+
+std::string field_name(std::string_view text) {
+  std::string name = lower(trimmed(text));
+  std::erase(name, ' ');
+  if (name == "centerings") return "centers";
+  return name;
+}
+
+void add_field(Fields& fields, std::string_view line) {
+  const std::size_t colon = line.find(':');
+  if (colon == std::string_view::npos) {
+    throw_unusable("The NRRD header has a line that is no field: " + in_quotes(line) + ".");
+  }
+  // "key:=value" is a program's own and no field of the format.
+  if (line.substr(colon).starts_with(":=")) return;
+  const std::string name = field_name(line.substr(0, colon));
+  const std::string_view value = trimmed(line.substr(colon + 1));
+  if (has_control_characters(value)) {
+    throw_unusable("The NRRD header's field " + in_quotes(name) + " holds control characters.");
+  }
+  if (!fields.emplace(name, value).second) {
+    throw_unusable("The NRRD header has the field " + in_quotes(name) + " twice.");
+  }
+}
+
+// True when the rest of the header is names of data files.
+bool names_list(const Fields& fields) {
+  const auto found = fields.find(kDataFile);
+  return found != fields.end() && found->second.starts_with("LIST");
+}
+
+Header read_header(const InputFile& file) {
+  const std::string text = file.text(0, kMostHeaderBytes);
+  Header header;
+  std::size_t next = 0;
+  for (bool first = true;; first = false) {
+    const std::size_t end = text.find('\n', next);
+    // Only a header without samples may end with its file.
+    if (end == std::string::npos || names_list(header.fields)) {
+      header.bytes = next;
+      if (header.fields.contains(kDataFile)) return header;
+      break;
+    }
+    std::string_view line = std::string_view(text).substr(next, end - next);
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    next = end + 1;
+    if (line.empty()) {
+      header.bytes = next;
+      return header;
+    }
+    if (!first && !line.starts_with('#')) add_field(header.fields, line);
+  }
+  throw_unusable("The NRRD header does not end: no empty line is found after it.");
+}
+
+const std::string& required(const Fields& fields, std::string_view name) {
+  const auto found = fields.find(name);
+  if (found == fields.end()) {
+    throw_unusable("The NRRD header lacks the field " + in_quotes(name) + ".");
+  }
+  return found->second;
+}
+
+StoredType type_of(const Fields& fields) {
+  using Names = std::vector<std::string_view>;
+  static const std::vector<std::pair<StoredType, Names>> types = {
+      {StoredType::kInt8, {"signed char", "int8", "int8_t"}},
+      {StoredType::kUint8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
+      {StoredType::kInt16,
+       {"short", "short int", "signed short", "signed short int", "int16", "int16_t"}},
+      {StoredType::kUint16,
+       {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
+      {StoredType::kInt32, {"int", "signed int", "int32", "int32_t"}},
+      {StoredType::kUint32, {"uint", "unsigned int", "uint32", "uint32_t"}},
+      {StoredType::kInt64,
+       {"longlong", "long long", "long long int", "signed long long", "signed long long int",
+        "int64", "int64_t"}},
+      {StoredType::kUint64,
+       {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
+      {StoredType::kFloat32, {"float"}},
+      {StoredType::kFloat64, {"double"}}};
+  const std::string name = lower(required(fields, "type"));
+  for (const auto& [type, names] : types) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) return type;
+  }
+  throw_unusable("The NRRD header's type " + in_quotes(name) + " is not one of plain numbers.");
+}
+
+std::vector<std::uint64_t> sizes_of(const Fields& fields) {
+  constexpr std::uint64_t kMostAxes = 16;
+  const auto count = parse_uint64(required(fields, "dimension"));
+  std::vector<std::uint64_t> sizes;
+  for (const std::string_view word : words(required(fields, "sizes"))) {
+    const auto size = parse_uint64(word);
+    if (!size) throw_unusable("The NRRD header's size " + in_quotes(word) + " is no number.");
+    sizes.push_back(*size);
+  }
+  if (!count || *count < 1 || *count > kMostAxes || *count != sizes.size()) {
+    throw_unusable("The NRRD header's dimension " + in_quotes(required(fields, "dimension")) +
+                   " does not fit its " + std::to_string(sizes.size()) + " sizes.");
+  }
+  return sizes;
+}
+
+Encoding encoding_of(const Fields& fields) {
+  const std::string name = lower(required(fields, "encoding"));
+  if (name == "raw") return Encoding::kRaw;
+  if (name == "gzip" || name == "gz") return Encoding::kDeflate;
+  if (name == "text" || name == "txt" || name == "ascii") return Encoding::kText;
+  if (name == "hex") return Encoding::kHex;
+  throw_unusable("The NRRD header's encoding " + in_quotes(name) +
+                 " is not read; raw, gzip, ascii and hex are.");
+}
+
+bool is_big_endian(const Fields& fields, StoredType type, Encoding encoding) {
+  const std::string name = lower(value_of(fields, "endian"));
+  if (name == "little") return false;
+  if (name == "big") return true;
+  if (!name.empty()) throw_unusable("The NRRD header's endian " + in_quotes(name) + " is unknown.");
+  if (bytes_per_sample(type) > 1 && encoding != Encoding::kText) {
+    throw_unusable("The NRRD header lacks the field \"endian\".");
+  }
+  return false;
+}
+
+std::uint64_t skip_lines(const InputFile& file, std::uint64_t offset, std::uint64_t lines) {
+  constexpr std::size_t kPieceBytes = std::size_t{1} << 16;
+  while (lines > 0) {
+    const std::string piece = file.text(offset, kPieceBytes);
+    const std::size_t end = piece.find('\n');
+    if (piece.empty()) throw_unusable("The file ends before the lines that are to be skipped do.");
+    offset += end == std::string::npos ? piece.size() : end + 1;
+    if (end != std::string::npos) --lines;
+  }
+  return offset;
+}
+
+std::int64_t skip_field(const Fields& fields, std::string_view name) {
+  const std::string_view text = value_of(fields, name);
+  if (text.empty()) return 0;
+  const auto count = parse_int64(text);
+  if (!count || *count < -1) {
+    throw_unusable("The NRRD header's " + in_quotes(name) + " is " + in_quotes(text) + ".");
+  }
+  return *count;
+}
+
+std::uint64_t payload_offset(const InputFile& file, const Header& header,
+                             const SourceVolume& volume) {
+  const std::int64_t lines = skip_field(header.fields, "lineskip");
+  const std::int64_t bytes = skip_field(header.fields, "byteskip");
+  if (lines < 0) throw_unusable("The NRRD header's \"lineskip\" is negative.");
+  if (bytes != 0 && volume.encoding == Encoding::kDeflate) {
+    throw_unusable("Skipping bytes within gzip data is not supported.");
+  }
+  if (bytes < 0) {
+    if (volume.encoding != Encoding::kRaw || file.size() < header.bytes + volume.stored_bytes()) {
+      throw_unusable("The file is too short for its samples to be at its end.");
+    }
+    return file.size() - volume.stored_bytes();
+  }
+  const std::uint64_t offset = skip_lines(file, header.bytes, static_cast<std::uint64_t>(lines)) +
+                               static_cast<std::uint64_t>(bytes);
+  if (offset > file.size()) throw_unusable("The file ends before its samples begin.");
+  return offset;
+}
+
+// The names of the data files. "LIST" means that they follow the header, one on each line.
+std::vector<std::string> data_names(const InputFile& file, const Header& header) {
+  const std::string_view said = value_of(header.fields, kDataFile);
+  if (!names_list(header.fields)) {
+    if (is_file_pattern(said)) return expand_file_pattern(said);
+    return {std::string(said)};
+  }
+  const std::string text = file.text(header.bytes, kMostHeaderBytes);
+  const auto names = lines(text);
+  return {names.begin(), names.end()};
+}
+
+std::vector<DataFile> data_files(const InputFile& file, const Header& header,
+                                 const Companions& companions, const SourceVolume& volume) {
+  const std::int64_t bytes = skip_field(header.fields, "byteskip");
+  if (skip_field(header.fields, "lineskip") != 0) {
+    throw_unusable("Skipping lines of a data file is not supported.");
+  }
+  if (bytes != 0 && volume.encoding == Encoding::kDeflate) {
+    throw_unusable("Skipping bytes within gzip data is not supported.");
+  }
+  const Skip skip = bytes < 0 ? Skip() : Skip(static_cast<std::uint64_t>(bytes));
+  return data_files_of(data_names(file, header), companions, volume, skip);
+}
+
+}  // namespace
+
+bool is_nrrd(std::string_view head) {
+  return head.size() >= 9 && head.starts_with("NRRD000") && head[7] >= '1' && head[7] <= '5' &&
+         (head[8] == '\n' || head[8] == '\r');
+}
+
+SourceVolume parse_nrrd(const InputFile& file, const Companions& companions) {
+  const Header header = read_header(file);
+  const Fields& fields = header.fields;
+  const std::vector<std::uint64_t> sizes = sizes_of(fields);
+  SourceVolume volume;
+  volume.dims = volume_dims(lattice_sizes(fields, sizes));
+  volume.encoding = encoding_of(fields);
+  volume.layout.type = type_of(fields);
+  volume.layout.big_endian = is_big_endian(fields, volume.layout.type, volume.encoding);
+  if (fields.contains(kDataFile)) {
+    volume.data_files = data_files(file, header, companions, volume);
+  } else {
+    volume.payload.offset = payload_offset(file, header, volume);
+    volume.payload.bytes = file.size() - volume.payload.offset;
+  }
+  volume.geometry = nrrd_geometry(fields, sizes);
+  return volume;
+}
+
+}  // namespace isomesh::import

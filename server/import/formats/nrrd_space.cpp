@@ -1,0 +1,394 @@
+#include "server/import/formats/nrrd_space.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <optional>
+
+#include "base/text.h"
+#include "server/import/names.h"
+#include "server/import/units.h"
+
+namespace isomesh::import {
+namespace {
+
+// What is not told, which the format calls "nan" or "none".
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+constexpr std::string_view kSpaces = " \t";
+
+bool is_known(double number) { return !std::isnan(number); }
+
+[[noreturn]] void throw_not_understood(std::string_view name, std::string_view value) {
+  throw_unusable("The NRRD header's " + in_quotes(name) + " cannot be read: " + in_quotes(value) +
+                 ".");
+}
+
+bool is_lattice_kind(std::string_view kind) {
+  return kind == "domain" || kind == "space" || kind == "time" || kind == "???" || kind == "none";
+}
+
+std::size_t count_of(std::string_view text, std::string_view part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != text.npos; at = text.find(part, at + 1)) ++count;
+  return count;
+}
+
+// The components' axes are the only ones that may lie nowhere in space.
+void check_space_is_told(const NrrdFields& fields, std::size_t component_axes) {
+  const std::string directions = lower(value_of(fields, "spacedirections"));
+  const std::string spacings = lower(value_of(fields, "spacings"));
+  const std::string origin = lower(value_of(fields, "spaceorigin"));
+  if (count_of(directions, "none") > component_axes || count_of(spacings, "nan") > component_axes ||
+      count_of(directions, "nan") > component_axes * 3 || count_of(origin, "nan") > 0) {
+    throw_unusable("The NRRD header leaves open how its samples are spaced (none or nan).");
+  }
+}
+
+// The signs that turn a space into LPS.
+struct Space {
+  std::string_view name;
+  std::array<double, 3> to_lps;
+};
+
+// The space that the header names. Throws for those of which nothing tells how they lie in LPS.
+std::optional<Space> space_of(const NrrdFields& fields) {
+  static constexpr std::array<double, 3> kSame = {1, 1, 1};
+  static constexpr Space kReadable[] = {
+      {"left-posterior-superior", kSame},
+      {"lps", kSame},
+      {"right-anterior-superior", {-1, -1, 1}},
+      {"ras", {-1, -1, 1}},
+      {"left-anterior-superior", {1, -1, 1}},
+      {"las", {1, -1, 1}},
+      {"scanner-xyz", kSame},
+      {"3d-right-handed", kSame},
+  };
+  const std::string name = lower(value_of(fields, "space"));
+  if (name.empty()) return std::nullopt;
+  for (const Space& space : kReadable) {
+    if (space.name == name) return space;
+  }
+  if (name.starts_with("3d-left-handed")) {
+    throw_unusable("The NRRD header's space " + in_quotes(name) +
+                   " is left-handed, and nothing tells how it lies in the patient.");
+  }
+  throw_unusable("The NRRD header's space " + in_quotes(name) +
+                 " is unknown or has more than three dimensions.");
+}
+
+// --- Numbers and vectors -------------------------------------------------------------------------
+
+// A number as the format's own library reads it: whatever holds "nan" is unknown, and what stands
+// behind a number is passed over. Empty when there is none.
+std::optional<double> number_of(std::string_view word) {
+  const std::string text = lower(word);
+  if (text.find("nan") != std::string::npos) return kUnknown;
+  if (text.find("inf") != std::string::npos) return std::numeric_limits<double>::infinity();
+  char* end = nullptr;
+  const double number = std::strtod(text.c_str(), &end);
+  if (end == text.c_str()) return std::nullopt;
+  return number;
+}
+
+// One finite or unknown number for each of `axes` axes; all are unknown without the field.
+std::vector<double> axis_numbers(const NrrdFields& fields, std::string_view name,
+                                 std::size_t axes) {
+  const std::string_view value = value_of(fields, name);
+  if (value.empty()) return std::vector<double>(axes, kUnknown);
+  const auto said = words(value);
+  std::vector<double> numbers;
+  for (std::size_t axis = 0; axis < std::min(axes, said.size()); ++axis) {
+    const auto number = number_of(said[axis]);
+    if (!number || std::isinf(*number)) throw_not_understood(name, value);
+    numbers.push_back(*number);
+  }
+  const bool has_more = said.size() > axes && number_of(said[axes]);
+  if (numbers.size() < axes || has_more) throw_not_understood(name, value);
+  return numbers;
+}
+
+// One word for each axis; none without the field.
+std::vector<std::string_view> axis_words(const NrrdFields& fields, std::string_view name,
+                                         std::size_t axes) {
+  const std::string_view value = value_of(fields, name);
+  const auto said = words(value);
+  if (!said.empty() && said.size() != axes) throw_not_understood(name, value);
+  return said;
+}
+
+void skip_spaces(std::string_view& rest) {
+  rest.remove_prefix(std::min(rest.find_first_not_of(kSpaces), rest.size()));
+}
+
+// The numbers of a vector, all of them known or none.
+std::optional<std::vector<double>> parse_vector(std::string_view inside, std::size_t size) {
+  std::vector<double> numbers;
+  std::size_t known = 0;
+  for (std::size_t next = 0; next <= inside.size();) {
+    const std::size_t end = std::min(inside.find(',', next), inside.size());
+    const std::string_view part = inside.substr(next, end - next);
+    next = end + 1;
+    if (part.empty()) continue;
+    const auto number = number_of(part);
+    if (!number || std::isinf(*number)) return std::nullopt;
+    numbers.push_back(*number);
+    if (is_known(*number)) ++known;
+  }
+  if (numbers.size() != size || (known != 0 && known != size)) return std::nullopt;
+  return numbers;
+}
+
+// Takes "(x,y,z)", or "none", off the front of `rest`. Empty when there is neither.
+std::optional<std::vector<double>> take_vector(std::string_view& rest, std::size_t size) {
+  constexpr std::string_view kNone = "none";
+  skip_spaces(rest);
+  if (rest.starts_with(kNone)) {
+    rest.remove_prefix(kNone.size());
+    if (!rest.empty() && kSpaces.find(rest.front()) == std::string_view::npos) return std::nullopt;
+    return std::vector<double>(size, kUnknown);
+  }
+  const std::size_t end = rest.find(')');
+  if (!rest.starts_with('(') || end == std::string_view::npos) return std::nullopt;
+  const std::string_view inside = rest.substr(1, end - 1);
+  rest.remove_prefix(end + 1);
+  return parse_vector(inside, size);
+}
+
+// --- Axes ----------------------------------------------------------------------------------------
+
+// What the header says of one axis.
+struct Axis {
+  std::uint64_t size = 1;
+  bool is_component = false;
+  bool is_node = false;  // min and max are told of the outer samples, not of their cells' borders
+  double spacing = kUnknown;
+  double min = kUnknown;
+  double max = kUnknown;
+  std::vector<double> direction;  // the step between samples; unknown numbers where it has none
+
+  bool has_direction() const { return !direction.empty() && is_known(direction.front()); }
+};
+
+// Of the kinds that components have, those that a single one may be.
+bool is_kind_of_one(std::string_view kind) {
+  static constexpr std::string_view kKinds[] = {
+      "list",   "point", "vector", "contravariant-vector", "covariant-vector",
+      "normal", "stub",  "scalar"};
+  return std::ranges::find(kKinds, kind) != std::end(kKinds);
+}
+
+// "none" and "???" are told by the format to be written in no other way.
+bool is_unknown_word(std::string_view word) { return word == "none" || word == "???"; }
+
+void set_kind(Axis& axis, std::string_view word) {
+  if (is_unknown_word(word)) {
+    // The format's own library forgets the centering of such an axis.
+    if (word == "none") axis.is_node = false;
+    return;
+  }
+  const std::string kind = lower(word);
+  if (kind == "domain" || kind == "space" || kind == "time") return;
+  if (!is_kind_of_one(kind)) throw_not_understood("kinds", word);
+  axis.is_component = true;
+}
+
+void set_center(Axis& axis, std::string_view word) {
+  const std::string center = lower(word);
+  axis.is_node = center == "node";
+  if (!axis.is_node && center != "cell" && !is_unknown_word(word)) {
+    throw_not_understood("centers", word);
+  }
+}
+
+// How many dimensions the space has in which the axes lie; 0 when there is none.
+std::size_t space_dimension(const NrrdFields& fields) {
+  constexpr std::uint64_t kMost = 8;
+  const std::string_view text = value_of(fields, "spacedimension");
+  const bool is_named = space_of(fields).has_value();
+  if (text.empty()) return is_named ? 3 : 0;
+  const auto dimension = parse_uint64(text);
+  if (is_named || !dimension || *dimension > kMost) throw_not_understood("space dimension", text);
+  return *dimension;
+}
+
+void set_directions(std::vector<Axis>& axes, const NrrdFields& fields, std::size_t dimension) {
+  const std::string_view value = value_of(fields, "spacedirections");
+  if (value.empty()) return;
+  if (dimension == 0) {
+    throw_unusable("The NRRD header has directions, and no space in which they lie.");
+  }
+  std::string_view rest = value;
+  for (Axis& axis : axes) {
+    const auto direction = take_vector(rest, dimension);
+    if (!direction) throw_not_understood("space directions", value);
+    axis.direction = *direction;
+    if (axis.has_direction() &&
+        (is_known(axis.spacing) || is_known(axis.min) || is_known(axis.max))) {
+      throw_unusable("The NRRD header has both a direction and a spacing, min or max of an axis.");
+    }
+  }
+  skip_spaces(rest);
+  if (!rest.empty()) throw_not_understood("space directions", value);
+}
+
+std::vector<Axis> all_axes(const NrrdFields& fields, std::span<const std::uint64_t> sizes) {
+  std::vector<Axis> axes(sizes.size());
+  const auto spacings = axis_numbers(fields, "spacings", axes.size());
+  const auto mins = axis_numbers(fields, "axismins", axes.size());
+  const auto maxs = axis_numbers(fields, "axismaxs", axes.size());
+  const auto centers = axis_words(fields, "centers", axes.size());
+  const auto kinds = axis_words(fields, "kinds", axes.size());
+  for (std::size_t at = 0; at < axes.size(); ++at) {
+    Axis& axis = axes[at];
+    axis.size = sizes[at];
+    axis.spacing = spacings[at];
+    axis.min = mins[at];
+    axis.max = maxs[at];
+    if (!centers.empty()) set_center(axis, centers[at]);
+    if (!kinds.empty()) set_kind(axis, kinds[at]);
+  }
+  return axes;
+}
+
+// The axes on which samples lie.
+std::vector<Axis> lattice_axes(const NrrdFields& fields, std::span<const std::uint64_t> sizes,
+                               std::size_t dimension) {
+  std::vector<Axis> axes = all_axes(fields, sizes);
+  set_directions(axes, fields, dimension);
+  const auto components = std::erase_if(axes, [](const Axis& axis) { return axis.is_component; });
+  if (components > 1) {
+    throw_unusable("The NRRD header has " + std::to_string(components) +
+                   " axes of components, where one at most can be read.");
+  }
+  if (dimension != 0 && dimension != axes.size()) {
+    throw_unusable("The NRRD header's space has " + std::to_string(dimension) +
+                   " dimensions, and its samples lie on " + std::to_string(axes.size()) + " axes.");
+  }
+  return axes;
+}
+
+// --- Geometry ------------------------------------------------------------------------------------
+
+void set_step(Geometry& geometry, std::size_t at, const Axis& axis, bool in_space) {
+  if (is_known(axis.spacing)) {
+    if (in_space) {
+      throw_unusable("The NRRD header has a spacing of an axis, and a space in which it has none.");
+    }
+    if (axis.spacing == 0) throw_not_understood("spacings", "0");
+    geometry.spacing[at] = axis.spacing;
+    return;
+  }
+  if (!axis.has_direction()) return;
+  // As the format's own library computes them: volumes that were read by it before have the same
+  // canonical file, to the last bit.
+  double squares = 0;
+  for (const double part : axis.direction) squares += part * part;
+  const double spacing = std::sqrt(squares);
+  geometry.spacing[at] = spacing;
+  for (std::size_t row = 0; row < 3; ++row) {
+    const double part = row < axis.direction.size() ? axis.direction[row] : 0;
+    geometry.direction[row * 3 + at] = 1 / spacing * part;
+  }
+}
+
+void set_space_origin(Geometry& geometry, const NrrdFields& fields, std::size_t dimension) {
+  const std::string_view value = value_of(fields, "spaceorigin");
+  if (value.empty()) return;
+  if (dimension == 0) {
+    throw_unusable("The NRRD header has an origin, and no space in which it lies.");
+  }
+  std::string_view rest = value;
+  const auto origin = take_vector(rest, dimension);
+  if (!origin) throw_not_understood("space origin", value);
+  if (!is_known(origin->front())) return;
+  std::copy_n(origin->begin(), std::min<std::size_t>(dimension, 3), geometry.origin.begin());
+}
+
+// Without a space the first samples lie half a spacing behind the axes' mins, where those are the
+// borders of cells.
+void set_origin_from_mins(Geometry& geometry, std::span<const Axis> axes) {
+  const auto has_extent = [](const Axis& axis) {
+    return is_known(axis.max) || is_known(axis.spacing);
+  };
+  if (!is_known(axes.front().min) || !std::ranges::all_of(axes, has_extent)) return;
+  for (std::size_t at = 0; at < std::min<std::size_t>(axes.size(), 3); ++at) {
+    const Axis& axis = axes[at];
+    const auto steps = static_cast<double>(axis.is_node ? axis.size - 1 : axis.size);
+    const double spacing = is_known(axis.spacing) ? axis.spacing : (axis.max - axis.min) / steps;
+    geometry.origin[at] = axis.min + (axis.is_node ? 0 : spacing / 2);
+  }
+}
+
+void turn_into_lps(Geometry& geometry, const Space& space) {
+  for (std::size_t row = 0; row < 3; ++row) {
+    geometry.origin[row] *= space.to_lps[row];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      geometry.direction[row * 3 + axis] *= space.to_lps[row];
+    }
+  }
+}
+
+// The unit of every axis, or empty where the header has none.
+std::string unit_of(const NrrdFields& fields) {
+  const bool in_space = fields.contains("spaceunits");
+  const std::string_view text = value_of(fields, in_space ? "spaceunits" : "units");
+  std::string unit;
+  for (std::size_t next = text.find('"'), axis = 0; next != text.npos && axis < 3; ++axis) {
+    const std::size_t end = text.find('"', next + 1);
+    if (end == text.npos) throw_unusable("The NRRD header's units are not in quotes.");
+    const std::string_view axis_unit = text.substr(next + 1, end - next - 1);
+    if (axis > 0 && axis_unit != unit) {
+      throw_unusable("The NRRD header has different units along its axes.");
+    }
+    unit = axis_unit;
+    next = text.find('"', end + 1);
+  }
+  return unit;
+}
+
+}  // namespace
+
+std::string_view value_of(const NrrdFields& fields, std::string_view name) {
+  const auto found = fields.find(name);
+  return found == fields.end() ? std::string_view{} : std::string_view(found->second);
+}
+
+std::vector<std::uint64_t> lattice_sizes(const NrrdFields& fields,
+                                         std::span<const std::uint64_t> sizes) {
+  const auto kinds = words(value_of(fields, "kinds"));
+  std::vector<std::uint64_t> result;
+  for (std::size_t axis = 0; axis < sizes.size(); ++axis) {
+    const std::string kind = axis < kinds.size() ? lower(kinds[axis]) : "none";
+    if (kind == "time" && axis < 3) {
+      throw_unusable("The NRRD header's axis " + axis_name(axis) + " is time.");
+    }
+    if (is_lattice_kind(kind)) {
+      result.push_back(sizes[axis]);
+    } else if (sizes[axis] != 1) {
+      throw_unusable("Each sample has " + std::to_string(sizes[axis]) +
+                     " components (an axis of kind " + in_quotes(kind) +
+                     "), where plain numbers are needed.");
+    }
+  }
+  return result;
+}
+
+Geometry nrrd_geometry(const NrrdFields& fields, std::span<const std::uint64_t> sizes) {
+  check_space_is_told(fields, sizes.size() - lattice_sizes(fields, sizes).size());
+  const std::size_t dimension = space_dimension(fields);
+  const std::vector<Axis> axes = lattice_axes(fields, sizes, dimension);
+  Geometry geometry;
+  for (std::size_t at = 0; at < std::min<std::size_t>(axes.size(), 3); ++at) {
+    set_step(geometry, at, axes[at], dimension != 0);
+  }
+  set_space_origin(geometry, fields, dimension);
+  if (dimension == 0 && !axes.empty()) set_origin_from_mins(geometry, axes);
+  if (const auto space = space_of(fields)) turn_into_lps(geometry, *space);
+  scale_to_millimetres(geometry, unit_of(fields));
+  return geometry;
+}
+
+}  // namespace isomesh::import

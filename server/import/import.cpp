@@ -1,0 +1,32 @@
+#include "server/import/import.h"
+
+#include <string>
+
+#include "proto/error.h"
+#include "server/import/readers.h"
+
+namespace isomesh::import {
+namespace {
+
+[[noreturn]] void throw_unknown_format() {
+  std::string titles;
+  for (const Reader& reader : readers()) {
+    if (reader.sniff == nullptr) continue;
+    if (!titles.empty()) titles += reader.content == Content::kFiles ? ", nor " : ", ";
+    titles += reader.title;
+  }
+  throw Error(ErrorCode::kUnsupportedMedia,
+              "The file is not " + titles + "; raw samples need dims and type.");
+}
+
+}  // namespace
+
+Volume import_volume(const ImportTask& task, const FormatListener& listener) {
+  const Input input = {.path = task.source, .companions = {}, .task = task, .listener = listener};
+  if (task.options.raw) return read_raw_input(input);
+  const Reader* reader = sniff(InputFile(task.source));
+  if (reader == nullptr) throw_unknown_format();
+  return read_input(*reader, input);
+}
+
+}  // namespace isomesh::import

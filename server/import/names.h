@@ -1,0 +1,28 @@
+// What this folder uses of the layers below it, by its own name there.
+#pragma once
+
+#include "server/process/import_message.h"
+#include "server/volume/canonical.h"
+#include "server/volume/geometry.h"
+#include "server/volume/size.h"
+#include "server/volume/unusable.h"
+
+namespace isomesh::import {
+
+using isomesh::bytes_per_sample;
+
+using process::ImportTask;
+
+using volume::CanonicalWriter;
+using volume::check_limits;
+using volume::check_raw;
+using volume::find_fault;
+using volume::geometry_of;
+using volume::normalised;
+using volume::SizeLimits;
+using volume::step_of;
+using volume::throw_unusable;
+using volume::Vector3;
+using volume::volume_dims;
+
+}  // namespace isomesh::import

@@ -1,0 +1,49 @@
+// What an import has to know about a format.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string_view>
+
+#include "base/files.h"
+#include "proto/types.h"
+#include "server/import/import.h"
+#include "server/import/names.h"
+#include "server/import/source.h"
+
+namespace isomesh::import {
+
+// How many leading bytes of a file tell its format.
+inline constexpr std::size_t kSniffBytes = 4096;
+
+// Room for headers, and for what some programs leave behind the samples.
+inline constexpr std::uint64_t kHeadroomBytes = std::uint64_t{1} << 20;
+
+// A file that is to be read, no longer compressed as a whole.
+struct Input {
+  std::filesystem::path path;
+  Companions companions;
+  const ImportTask& task;
+  const FormatListener& listener;
+};
+
+// What one file of a format holds: a volume, slices that make one together with those of other
+// files, or other files.
+enum class Content { kVolume, kSlices, kFiles };
+
+// One row of the table in readers.cpp.
+struct Reader {
+  std::string_view name;   // that of the API; "archive" is none of a volume
+  std::string_view title;  // for a person
+  Content content = Content::kVolume;
+  // Whether a file of the format begins so. Null for raw samples, which look like anything.
+  bool (*sniff)(std::string_view head) = nullptr;
+  // Reads the input and writes the task's target. Throws as import_volume does.
+  Volume (*parse)(const Input& input) = nullptr;
+  // How many bytes the compressed file may inflate to, before it is taken for a bomb. Null: as many
+  // as samples are accepted, and the headroom.
+  std::uint64_t (*most_inflated_bytes)(const InputFile& file, const SizeLimits& limits) = nullptr;
+};
+
+}  // namespace isomesh::import

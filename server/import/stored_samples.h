@@ -1,0 +1,62 @@
+// Samples as files store them -> samples as canonical volumes hold them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "base/files.h"
+#include "proto/samples.h"
+#include "proto/types.h"
+
+namespace isomesh::import {
+
+// The type of one sample in a file: those of canonical volumes, by the same names and numbers, and
+// the two that become another.
+enum class StoredType {
+#define ISOMESH_NAME(Sample, name, kType) kType = static_cast<int>(SampleType::kType),
+  ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_NAME)
+#undef ISOMESH_NAME
+      kUint64,
+  kInt64,
+};
+
+// Calls `use` as with_sample does.
+template <class Use>
+decltype(auto) with_stored_sample(StoredType type, Use&& use) {
+  if (type == StoredType::kUint64) return use(std::uint64_t{});
+  if (type == StoredType::kInt64) return use(std::int64_t{});
+  return with_sample(static_cast<SampleType>(type), use);
+}
+
+std::size_t bytes_per_sample(StoredType type);
+StoredType stored_type(SampleType type);
+
+// What a sample means: stored * slope + intercept.
+struct Rescale {
+  double slope = 1;
+  double intercept = 0;
+};
+
+struct SampleLayout {
+  StoredType type = StoredType::kUint8;
+  bool big_endian = false;
+  std::optional<Rescale> rescale;  // empty: samples mean what is stored
+};
+
+// What the samples become. Rescaled ones become float32 where that holds every stored value
+// (integers of up to 16 bits, float32) and float64 otherwise; 64-bit integers become float64.
+SampleType canonical_type(const SampleLayout& layout);
+
+// Reads as many samples as `target` has room for, from `offset` of the file on, and converts them
+// to their canonical type on the way, with bounded memory.
+// Throws Error kUnusableVolume when the file ends early or a 64-bit integer is not exact in
+// float64.
+void read_samples(const InputFile& file, std::uint64_t offset, const SampleLayout& layout,
+                  std::span<std::byte> target);
+
+// Reverses the bytes of every sample; `bytes` holds whole samples.
+void swap_bytes(std::span<std::byte> bytes, std::size_t bytes_per_sample);
+
+}  // namespace isomesh::import

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string_view>
+
+#include "proto/types.h"
+
+namespace isomesh::import {
+
+// Turns origin and spacing from a header's unit ("mm", "um", "cm", "m", ... or their full names)
+// into millimetres; no unit is millimetres. Throws Error kUnusableVolume for an unknown one.
+void scale_to_millimetres(Geometry& geometry, std::string_view unit);
+
+}  // namespace isomesh::import

@@ -1,0 +1,45 @@
+// Runs each import in a process of its own, which may do little else than read the one file.
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <filesystem>
+#include <mutex>
+#include <stop_token>
+
+#include "server/process/import_message.h"
+
+namespace isomesh::jobs {
+
+struct RunnerOptions {
+  process::ImportBounds bounds;
+  std::size_t at_once = 2;        // further imports wait for their turn
+  std::filesystem::path program;  // isomesh-import
+};
+
+// Thread safe.
+class ImportRunner {
+ public:
+  explicit ImportRunner(const RunnerOptions& options);
+
+  // Imports as import_volume does, in a new process, which has ended when this returns or throws;
+  // only files in the scratch folder may remain of it. Throws what import_volume throws, and Error
+  // kUnusableVolume when the process crashes or exceeds its bounds, kUnavailable once stopped. The
+  // volume has been compared with the canonical file.
+  Volume run(const process::ImportTask& task);
+
+  // Ends the imports that run or wait, and refuses further ones.
+  void stop();
+
+ private:
+  void take_place();
+  void give_place_back();
+
+  const RunnerOptions options_;
+  std::stop_source stop_;
+  std::mutex mutex_;
+  std::condition_variable_any place_free_;
+  std::size_t running_ = 0;
+};
+
+}  // namespace isomesh::jobs

@@ -1,0 +1,233 @@
+#include "server/net/acceptor.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <utility>
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <spdlog/spdlog.h>
+#include <sys/epoll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+namespace isomesh::net {
+namespace {
+
+constexpr int kMostEvents = 128;
+constexpr int kTickMilliseconds = 250;  // how often deadlines are looked at
+constexpr int kMostAcceptedAtOnce = 64;
+constexpr std::size_t kBlock = 16 * 1024;
+
+std::string address_of(const sockaddr_storage& peer) {
+  std::array<char, INET6_ADDRSTRLEN> text = {};
+  const void* address = nullptr;
+  if (peer.ss_family == AF_INET) {
+    address = &reinterpret_cast<const sockaddr_in&>(peer).sin_addr;
+  } else if (peer.ss_family == AF_INET6) {
+    address = &reinterpret_cast<const sockaddr_in6&>(peer).sin6_addr;
+  }
+  if (address == nullptr ||
+      ::inet_ntop(peer.ss_family, address, text.data(), text.size()) == nullptr) {
+    return {};
+  }
+  return text.data();
+}
+
+void add(int epoll, int descriptor, const void* who) {
+  epoll_event event = {};
+  event.events = EPOLLIN;
+  event.data.ptr = const_cast<void*>(who);
+  ::epoll_ctl(epoll, EPOLL_CTL_ADD, descriptor, &event);
+}
+
+}  // namespace
+
+Acceptor::Acceptor(int listening, const AcceptorLimits& limits, StreamOf stream_of,
+                   OnRequest on_request, OnRefused on_refused)
+    : listening_(listening),
+      limits_(limits),
+      stream_of_(std::move(stream_of)),
+      on_request_(std::move(on_request)),
+      on_refused_(std::move(on_refused)),
+      epoll_(new_epoll()) {
+  ::fcntl(listening_, F_SETFL, ::fcntl(listening_, F_GETFL) | O_NONBLOCK);
+  add(epoll_, listening_, this);
+  add(epoll_, wakeup_.descriptor(), &wakeup_);
+  thread_ = std::jthread([this] { work(); });
+}
+
+Acceptor::~Acceptor() {
+  stop();
+  ::close(epoll_);
+}
+
+void Acceptor::stop() {
+  stopping_ = true;
+  wakeup_.ring();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Acceptor::work() {
+  std::array<epoll_event, kMostEvents> events = {};
+  Clock::time_point last_tick = Clock::now();
+  while (!stopping_) {
+    const int count = ::epoll_wait(epoll_, events.data(), kMostEvents, kTickMilliseconds);
+    bool has_new = false;
+    for (int i = 0; i < count; ++i) {
+      const void* who = events.at(static_cast<std::size_t>(i)).data.ptr;
+      has_new = has_new || who == this;
+      // A pending connection is known by its address in memory. New ones are added after this
+      // batch of events, so that none can have the address of one that was closed within it.
+      const auto pending =
+          std::ranges::find_if(pending_, [&](const Pending& each) { return &each == who; });
+      if (pending != pending_.end()) read_some(pending);
+    }
+    if (has_new) accept_some();
+    if (Clock::now() - last_tick >= std::chrono::milliseconds(kTickMilliseconds)) {
+      last_tick = Clock::now();
+      close_overdue();
+    }
+  }
+  pending_.clear();
+  count_ = 0;
+}
+
+void Acceptor::accept_some() {
+  for (int n = 0; n < kMostAcceptedAtOnce && !stopping_; ++n) {
+    sockaddr_storage peer = {};
+    socklen_t size = sizeof peer;
+    const int socket = ::accept4(listening_, reinterpret_cast<sockaddr*>(&peer), &size,
+                                 SOCK_CLOEXEC | SOCK_NONBLOCK);
+    if (socket >= 0) {
+      begin(socket, address_of(peer));
+    } else if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
+      // The oldest pending connection is closed to free its descriptor. Where there is none,
+      // descriptors are held by responses, and some time must go by.
+      if (pending_.empty()) {
+        spdlog::warn("no descriptors are left for connections");
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        return;
+      }
+      close(pending_.begin());
+    } else if (errno != ECONNABORTED && errno != EINTR) {
+      return;
+    }
+  }
+}
+
+void Acceptor::begin(int socket, std::string address) {
+  if (pending_.size() >= limits_.most_pending) close(pending_.begin());
+  Pending& pending = pending_.emplace_back();
+  ++count_;
+  pending.deadline = Clock::now() + limits_.head_time;
+  pending.connection.address = std::move(address);
+  try {
+    pending.connection.stream = stream_of_(socket);
+  } catch (const std::exception& error) {
+    spdlog::warn("a connection could not be begun: {}", error.what());
+    return close(std::prev(pending_.end()));
+  }
+  read_some(std::prev(pending_.end()));
+}
+
+void Acceptor::read_some(PendingList::iterator pending) {
+  try {
+    while (true) {
+      const std::size_t before = pending->received.size();
+      pending->received.resize(before + kBlock);
+      const Transfer transfer =
+          pending->connection.stream->read(std::span(pending->received).subspan(before));
+      pending->received.resize(before + transfer.bytes);
+      bytes_ += transfer.bytes;
+      if (transfer.state == Transfer::State::kClosed) {
+        const bool is_silent = pending->received.empty() && !pending->has_head;
+        return is_silent ? close(pending)
+                         : refuse(pending, {ErrorCode::kInvalidParameter,
+                                            "the request ended before it was complete"});
+      }
+      if (transfer.state != Transfer::State::kDone) return watch(pending, transfer.state);
+      if (is_complete(*pending)) return hand_on(pending);
+      if (bytes_ > limits_.most_bytes) {
+        watch(pending, Transfer::State::kWantsRead);  // what is left to read is read later
+        return close_oldest();
+      }
+    }
+  } catch (const Error& error) {
+    refuse(pending, error);
+  }
+}
+
+// True when the head and the part of the body that is waited for have come. Throws what is wrong
+// with the request.
+bool Acceptor::is_complete(Pending& pending) {
+  if (!pending.has_head) {
+    const auto size = pending.scanner.scan(pending.received);
+    if (!size) return false;
+    Connection& connection = pending.connection;
+    connection.head = parse_head(std::string_view(pending.received).substr(0, *size));
+    connection.framing = framing_of(connection.head);
+    bytes_ -= *size;
+    pending.received.erase(0, *size);
+    pending.has_head = true;
+    // A client that asks whether its body is wanted (Expect) waits for the handler's answer.
+    const std::uint64_t length = connection.framing.length.value_or(0);
+    const bool asks_first = find_header(connection.head.headers, "Expect") != nullptr;
+    pending.wanted = length <= limits_.small_body && !asks_first ? length : 0;
+  }
+  return pending.received.size() >= pending.wanted;
+}
+
+void Acceptor::watch(PendingList::iterator pending, Transfer::State wanted) {
+  epoll_event event = {};
+  event.events = wanted == Transfer::State::kWantsWrite ? EPOLLOUT : EPOLLIN;
+  event.data.ptr = &*pending;
+  const int operation = std::exchange(pending->is_watched, true) ? EPOLL_CTL_MOD : EPOLL_CTL_ADD;
+  const int descriptor = pending->connection.stream->descriptor();
+  if (::epoll_ctl(epoll_, operation, descriptor, &event) != 0) close(pending);
+}
+
+// All have the same time, so the oldest is overdue first.
+void Acceptor::close_overdue() {
+  const auto now = Clock::now();
+  while (!pending_.empty() && now >= pending_.front().deadline) {
+    if (pending_.front().received.empty() && !pending_.front().has_head) {
+      close(pending_.begin());
+    } else {
+      refuse(pending_.begin(), {ErrorCode::kRequestTimeout, "the request did not come in time"});
+    }
+  }
+}
+
+void Acceptor::close_oldest() {
+  while (bytes_ > limits_.most_bytes && !pending_.empty()) close(pending_.begin());
+}
+
+void Acceptor::hand_on(PendingList::iterator pending) {
+  Connection connection = std::move(pending->connection);
+  connection.body = std::move(pending->received);
+  if (pending->is_watched) {
+    ::epoll_ctl(epoll_, EPOLL_CTL_DEL, connection.stream->descriptor(), nullptr);
+  }
+  bytes_ -= connection.body.size();
+  pending_.erase(pending);
+  --count_;
+  on_request_(std::move(connection));
+}
+
+void Acceptor::refuse(PendingList::iterator pending, const Error& error) {
+  const std::unique_ptr<ByteStream>& stream = pending->connection.stream;
+  if (pending->is_watched) ::epoll_ctl(epoll_, EPOLL_CTL_DEL, stream->descriptor(), nullptr);
+  on_refused_(std::move(pending->connection.stream), pending->connection.address, error);
+  close(pending);
+}
+
+// Closing a stream takes it out of epoll.
+void Acceptor::close(PendingList::iterator pending) {
+  bytes_ -= pending->received.size();
+  pending_.erase(pending);
+  --count_;
+}
+
+}  // namespace isomesh::net

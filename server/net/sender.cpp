@@ -1,0 +1,254 @@
+#include "server/net/sender.h"
+
+#include <algorithm>
+#include <array>
+#include <exception>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+#include <sys/epoll.h>
+#include <unistd.h>
+
+namespace isomesh::net {
+namespace {
+
+constexpr int kMostEvents = 128;
+constexpr int kTickMilliseconds = 1000;  // how often sources and deadlines are looked at
+constexpr std::size_t kBytesPerTurn = std::size_t{1} << 20;  // then it is the next one's turn
+constexpr std::size_t kMostIgnored = std::size_t{64} << 20;
+
+// An exception of one source must not end the thread that serves all.
+Source::More next_of(Source& source, std::string& bytes) {
+  try {
+    return source.next(bytes);
+  } catch (const std::exception& error) {
+    spdlog::error("a response was cut off: {}", error.what());
+    return Source::More::kBroken;
+  }
+}
+
+// Writes what the connection takes without waiting, and removes it from the bytes. True when the
+// connection is done with and can be closed.
+bool is_sent(Response& response, bool request_is_whole) {
+  std::string_view left = response.bytes;
+  while (!left.empty()) {
+    const Transfer transfer = response.stream->write(left);
+    if (transfer.state == Transfer::State::kClosed) return true;
+    if (transfer.state != Transfer::State::kDone) break;
+    left.remove_prefix(transfer.bytes);
+  }
+  response.bytes.erase(0, response.bytes.size() - left.size());
+  if (!left.empty() || response.source || !request_is_whole) return false;
+  response.stream->finish_writing();
+  std::array<char, 1> more = {};  // after the request there should be none
+  return response.stream->read(more).state != Transfer::State::kDone;
+}
+
+}  // namespace
+
+Sender::Sender(const SenderLimits& limits) : limits_(limits), epoll_(new_epoll()) {
+  epoll_event event = {};
+  event.events = EPOLLIN;
+  event.data.ptr = nullptr;
+  ::epoll_ctl(epoll_, EPOLL_CTL_ADD, wakeup_.descriptor(), &event);
+  thread_ = std::jthread([this] { work(); });
+}
+
+Sender::~Sender() {
+  stop(std::chrono::milliseconds(0));
+  ::close(epoll_);
+}
+
+void Sender::send(Response response, bool request_is_whole) {
+  if (is_sent(response, request_is_whole)) return;
+  {
+    const Lock lock(mutex_);
+    if (end_ != Clock::time_point::max()) return;  // its stream is closed
+    arrived_.push_back(std::move(response));
+    ++count_;
+  }
+  wakeup_.ring();
+}
+
+void Sender::wake() {
+  {
+    const Lock lock(mutex_);
+    woken_ = true;
+  }
+  wakeup_.ring();
+}
+
+void Sender::stop(std::chrono::milliseconds patience) {
+  {
+    const Lock lock(mutex_);
+    end_ = std::min(end_, Clock::now() + patience);
+  }
+  wakeup_.ring();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Sender::work() {
+  std::array<epoll_event, kMostEvents> events = {};
+  Clock::time_point last_tick = Clock::now();
+  while (true) {
+    const Clock::time_point end = take_arrived();
+    const auto now = Clock::now();
+    if (ending_ || now - last_tick >= std::chrono::milliseconds(kTickMilliseconds)) {
+      last_tick = now;
+      ask_sources();
+      close_overdue();
+    }
+    if (ending_ && (sending_.empty() || now >= end)) break;
+    const int patience = ending_ ? kTickMilliseconds / 20 : kTickMilliseconds;
+    const int count = ::epoll_wait(epoll_, events.data(), kMostEvents, patience);
+    for (int i = 0; i < count; ++i) serve_event(events.at(static_cast<std::size_t>(i)));
+  }
+  sending_.clear();
+  count_ = 0;
+}
+
+// What is sent is known to epoll by its address in memory. New responses are added between two
+// batches of events, so that none can have the address of one that was closed within a batch.
+void Sender::serve_event(const epoll_event& event) {
+  if (event.data.ptr == nullptr) return wakeup_.clear();
+  const auto sending =
+      std::ranges::find_if(sending_, [&](const Sending& each) { return &each == event.data.ptr; });
+  if (sending != sending_.end()) go_on(sending, event.events);
+}
+
+// Returns when to end.
+Sender::Clock::time_point Sender::take_arrived() {
+  std::vector<Response> arrived;
+  bool woken = false;
+  Clock::time_point end;
+  {
+    const Lock lock(mutex_);
+    arrived.swap(arrived_);
+    woken = std::exchange(woken_, false);
+    end = end_;
+  }
+  ending_ = end != Clock::time_point::max();
+  for (Response& response : arrived) {
+    if (sending_.size() >= limits_.most_responses) close(sending_.begin());
+    Sending& sending = sending_.emplace_back();
+    sending.response = std::move(response);
+    sending.deadline = Clock::now() + limits_.patience;
+    go_on(std::prev(sending_.end()), 0);
+  }
+  if (woken) ask_sources();
+  return end;
+}
+
+void Sender::go_on(SendingList::iterator sending, unsigned events) {
+  const bool is_broken = (events & (EPOLLERR | EPOLLHUP)) != 0;
+  const bool reader_is_gone = (events & EPOLLRDHUP) != 0;  // only watched for where it matters
+  if (is_broken || reader_is_gone) return close(sending);
+  const bool goes_on =
+      sending->phase == Phase::kSending ? send_some(*sending) : ignore_input(*sending);
+  if (!goes_on || !watch(*sending)) close(sending);
+}
+
+// Sends until the other side takes no more, there is nothing to send, or it is another's turn.
+// False when the connection is to be closed.
+bool Sender::send_some(Sending& sending) {
+  std::string& bytes = sending.response.bytes;
+  for (std::size_t turn = 0; turn < kBytesPerTurn;) {
+    if (sending.sent == bytes.size()) {
+      if (!refill(sending)) return false;
+      if (sending.phase == Phase::kLingering) return ignore_input(sending);
+      if (sending.waits_for_source) {
+        sending.events = sending.response.source->ends_with_reader() ? EPOLLRDHUP : 0U;
+        return true;
+      }
+    }
+    const Transfer transfer =
+        sending.response.stream->write(std::string_view(bytes).substr(sending.sent));
+    if (transfer.state == Transfer::State::kClosed) return false;
+    if (transfer.state != Transfer::State::kDone) {
+      sending.events = transfer.state == Transfer::State::kWantsRead ? EPOLLIN : EPOLLOUT;
+      return true;
+    }
+    sending.sent += transfer.bytes;
+    turn += transfer.bytes;
+    sending.since_deadline += transfer.bytes;
+    if (sending.since_deadline >= kLeastBytes || sending.sent == bytes.size()) {
+      sending.since_deadline = 0;
+      sending.deadline = Clock::now() + limits_.patience;
+    }
+  }
+  sending.events = EPOLLOUT;  // it can be written at once, after all others
+  return true;
+}
+
+// The next bytes to send, or what follows when there are none. False when the connection is to be
+// closed.
+bool Sender::refill(Sending& sending) {
+  Response& response = sending.response;
+  response.bytes.clear();
+  sending.sent = 0;
+  sending.waits_for_source = false;
+  switch (response.source ? next_of(*response.source, response.bytes) : Source::More::kEnd) {
+    case Source::More::kBytes:
+      return true;
+    case Source::More::kLater:
+      sending.waits_for_source = true;
+      return !ending_;
+    case Source::More::kEnd:
+      response.stream->finish_writing();
+      sending.phase = Phase::kLingering;
+      sending.deadline = Clock::now() + limits_.linger;
+      return true;
+    case Source::More::kBroken:
+      break;
+  }
+  return false;
+}
+
+// Takes and forgets what the other side still sends. False when it has ended, or has sent enough.
+bool Sender::ignore_input(Sending& sending) {
+  std::array<char, 16 * 1024> ignored;
+  for (std::size_t turn = 0; turn < kBytesPerTurn;) {
+    const Transfer transfer = sending.response.stream->read(ignored);
+    if (transfer.state == Transfer::State::kClosed) return false;
+    if (transfer.state != Transfer::State::kDone) break;
+    turn += transfer.bytes;
+    sending.ignored += transfer.bytes;
+    if (sending.ignored > kMostIgnored) return false;
+  }
+  sending.events = EPOLLIN;
+  return true;
+}
+
+void Sender::ask_sources() {
+  for (auto sending = sending_.begin(); sending != sending_.end();) {
+    const auto next = std::next(sending);
+    if (sending->waits_for_source) go_on(sending, 0);
+    sending = next;
+  }
+}
+
+void Sender::close_overdue() {
+  const auto now = Clock::now();
+  for (auto sending = sending_.begin(); sending != sending_.end();) {
+    const auto next = std::next(sending);
+    if (!sending->waits_for_source && now >= sending->deadline) close(sending);
+    sending = next;
+  }
+}
+
+bool Sender::watch(Sending& sending) {
+  epoll_event event = {};
+  event.events = sending.events;
+  event.data.ptr = &sending;
+  const int descriptor = sending.response.stream->descriptor();
+  const int operation = std::exchange(sending.is_watched, true) ? EPOLL_CTL_MOD : EPOLL_CTL_ADD;
+  return ::epoll_ctl(epoll_, operation, descriptor, &event) == 0;
+}
+
+// Closing the descriptor takes it out of epoll.
+void Sender::close(SendingList::iterator sending) {
+  sending_.erase(sending);
+  --count_;
+}
+
+}  // namespace isomesh::net

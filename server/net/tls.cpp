@@ -1,0 +1,132 @@
+#include "server/net/tls.h"
+
+#include <algorithm>
+#include <climits>
+#include <utility>
+
+#include <fcntl.h>
+#include <openssl/err.h>
+#include <openssl/ssl.h>
+#include <spdlog/spdlog.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace isomesh::net {
+namespace {
+
+// Of TLS 1.2, those with forward secrecy and authenticated encryption; 1.3 has no others.
+constexpr const char* kCiphers = "ECDHE+AESGCM:ECDHE+CHACHA20";
+
+class TlsStream : public ByteStream {
+ public:
+  // Owns the socket from the beginning, also when this throws.
+  TlsStream(SSL_CTX* context, int socket) : plain_(socket), ssl_(SSL_new(context), &SSL_free) {
+    if (!ssl_ || SSL_set_fd(ssl_.get(), socket) != 1) {
+      throw Error(ErrorCode::kInternal, "a TLS connection cannot be begun");
+    }
+    SSL_set_accept_state(ssl_.get());
+  }
+
+  int descriptor() const override { return plain_.descriptor(); }
+
+  Transfer read(std::span<char> target) override {
+    ERR_clear_error();
+    return outcome(SSL_read(ssl_.get(), target.data(), length_of(target.size())));
+  }
+
+  Transfer write(std::string_view bytes) override {
+    ERR_clear_error();
+    return outcome(SSL_write(ssl_.get(), bytes.data(), length_of(bytes.size())));
+  }
+
+  // After an error nothing may be sent, and before the handshake is over there is nothing to end.
+  void finish_writing() override {
+    ERR_clear_error();
+    if (!broken_ && SSL_is_init_finished(ssl_.get()) == 1) SSL_shutdown(ssl_.get());
+    plain_.finish_writing();
+  }
+
+ private:
+  static int length_of(std::size_t size) {
+    return static_cast<int>(std::min(size, static_cast<std::size_t>(INT_MAX)));
+  }
+
+  Transfer outcome(int result) {
+    if (result > 0) return {Transfer::State::kDone, static_cast<std::size_t>(result)};
+    switch (SSL_get_error(ssl_.get(), result)) {
+      case SSL_ERROR_WANT_READ:
+        return {Transfer::State::kWantsRead, 0};
+      case SSL_ERROR_WANT_WRITE:
+        return {Transfer::State::kWantsWrite, 0};
+      case SSL_ERROR_ZERO_RETURN:
+        return {Transfer::State::kClosed, 0};
+      default:
+        broken_ = true;
+        return {Transfer::State::kClosed, 0};
+    }
+  }
+
+  PlainStream plain_;
+  std::unique_ptr<SSL, decltype(&SSL_free)> ssl_;
+  bool broken_ = false;
+};
+
+// A key with a passphrase would otherwise be asked for on the terminal, in the middle of a start.
+int no_passphrase(char* /*buffer*/, int /*size*/, int /*writing*/, void* /*nothing*/) { return 0; }
+
+void warn_if_readable(const std::filesystem::path& key) {
+  struct stat status = {};
+  if (::stat(key.c_str(), &status) == 0 && (status.st_mode & S_IROTH) != 0) {
+    spdlog::warn("everybody on this machine can read the key of the TLS certificate");
+  }
+}
+
+}  // namespace
+
+TlsFiles::TlsFiles(std::filesystem::path certificate, std::filesystem::path key)
+    : certificate_(std::move(certificate)), key_(std::move(key)), context_(read()) {
+  warn_if_readable(key_);
+}
+
+void TlsFiles::reload() {
+  Context context = read();
+  const Lock lock(mutex_);
+  context_ = std::move(context);
+}
+
+std::unique_ptr<ByteStream> TlsFiles::accept(int socket) const {
+  Context context;
+  {
+    const Lock lock(mutex_);
+    context = context_;
+  }
+  return std::make_unique<TlsStream>(context.get(), socket);
+}
+
+TlsFiles::Context TlsFiles::read() const {
+  ERR_clear_error();
+  Context context(SSL_CTX_new(TLS_server_method()), &SSL_CTX_free);
+  if (!context) throw Error(ErrorCode::kInternal, "TLS is not available");
+  SSL_CTX* raw = context.get();
+  SSL_CTX_set_min_proto_version(raw, TLS1_2_VERSION);
+  SSL_CTX_set_options(raw, SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION);
+  SSL_CTX_set_mode(raw, SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER |
+                            SSL_MODE_RELEASE_BUFFERS);
+  SSL_CTX_set_default_passwd_cb(raw, no_passphrase);
+  if (SSL_CTX_set_cipher_list(raw, kCiphers) != 1) {
+    throw Error(ErrorCode::kInternal, "TLS has none of the ciphers that are wanted");
+  }
+  if (SSL_CTX_use_certificate_chain_file(raw, certificate_.c_str()) != 1) {
+    throw invalid_parameter("tls-cert", "holds no certificate in PEM form that can be read");
+  }
+  if (SSL_CTX_use_PrivateKey_file(raw, key_.c_str(), SSL_FILETYPE_PEM) != 1 ||
+      SSL_CTX_check_private_key(raw) != 1) {
+    throw invalid_parameter("tls-key",
+                            "holds no key in PEM form, without a passphrase, of the "
+                            "certificate of --tls-cert");
+  }
+  return context;
+}
+
+}  // namespace isomesh::net

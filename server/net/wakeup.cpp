@@ -1,0 +1,38 @@
+#include "server/net/wakeup.h"
+
+#include <cstdint>
+
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include "proto/error.h"
+
+namespace isomesh::net {
+namespace {
+
+int checked(int descriptor) {
+  if (descriptor < 0) throw Error(ErrorCode::kUnavailable, "there are no descriptors left");
+  return descriptor;
+}
+
+}  // namespace
+
+Wakeup::Wakeup() : event_(checked(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK))) {}
+
+Wakeup::~Wakeup() { ::close(event_); }
+
+void Wakeup::ring() const {
+  const std::uint64_t one = 1;
+  // Fails only when it has been rung 2^64 - 2 times already.
+  [[maybe_unused]] const auto written = ::write(event_, &one, sizeof one);
+}
+
+void Wakeup::clear() const {
+  std::uint64_t count = 0;
+  [[maybe_unused]] const auto read = ::read(event_, &count, sizeof count);
+}
+
+int new_epoll() { return checked(::epoll_create1(EPOLL_CLOEXEC)); }
+
+}  // namespace isomesh::net

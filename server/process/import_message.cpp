@@ -1,0 +1,143 @@
+#include "server/process/import_message.h"
+
+#include <algorithm>
+
+#include <nlohmann/json.hpp>
+
+#include "proto/json.h"
+
+namespace isomesh::process {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::string_view kReading = "reading";
+constexpr std::string_view kVolume = "volume";
+constexpr std::string_view kError = "error";
+
+[[noreturn]] void throw_malformed() {
+  throw Error(ErrorCode::kInternal, "A message between the daemon and an import is malformed.");
+}
+
+std::string line_of(std::string_view name, const Json& value) {
+  Json json;
+  json[std::string(name)] = value;
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
+}
+
+Json to_json(const RawDescription& raw) {
+  return {{"dims", raw.dims},
+          {"type", std::string(to_string(raw.type))},
+          {"origin", raw.geometry.origin},
+          {"spacing", raw.geometry.spacing},
+          {"direction", raw.geometry.direction},
+          {"big_endian", raw.big_endian}};
+}
+
+RawDescription raw_from(const Json& json) {
+  RawDescription raw;
+  const auto type = from_string<SampleType>(json.at("type").get<std::string>());
+  if (!type) throw_malformed();
+  raw.type = *type;
+  json.at("dims").get_to(raw.dims);
+  json.at("origin").get_to(raw.geometry.origin);
+  json.at("spacing").get_to(raw.geometry.spacing);
+  json.at("direction").get_to(raw.geometry.direction);
+  json.at("big_endian").get_to(raw.big_endian);
+  return raw;
+}
+
+Json to_json(const Error& error) {
+  Json fields = Json::array();
+  for (const FieldError& field : error.fields()) fields.push_back({field.field, field.message});
+  return {{"code", std::string(describe(error.code()).name)},
+          {"detail", std::string(error.what())},
+          {"fields", fields}};
+}
+
+Error error_from(const Json& json) {
+  std::vector<FieldError> fields;
+  for (const Json& field : json.at("fields")) {
+    fields.push_back({field.at(0).get<std::string>(), field.at(1).get<std::string>()});
+  }
+  return {error_code_of(json.at("code").get<std::string>()), json.at("detail").get<std::string>(),
+          std::move(fields)};
+}
+
+// A format's name is checked before it goes into the log, because the process that sent it reads
+// untrusted files.
+std::string word_of(const std::string& text) {
+  constexpr std::size_t kLongest = 16;
+  const bool plain = text.size() <= kLongest && std::ranges::all_of(text, [](char c) {
+                       return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
+                     });
+  if (!plain) throw_malformed();
+  return text;
+}
+
+void add_line(ImportReport& report, const Json& json) {
+  if (json.contains(kReading)) report.reading = word_of(json.at(kReading).get<std::string>());
+  if (json.contains(kVolume)) report.volume = volume_from_json(json.at(kVolume).dump());
+  if (json.contains(kError)) report.error = error_from(json.at(kError));
+}
+
+}  // namespace
+
+std::string to_message(const ImportOrder& order) {
+  const ImportTask& task = order.task;
+  const Json json = {
+      {"source", task.source.string()},
+      {"scratch", task.scratch.string()},
+      {"target", task.target.string()},
+      {"raw", task.options.raw ? to_json(*task.options.raw) : Json(nullptr)},
+      {"series", task.options.series},
+      {"max_sample_bytes", task.limits.max_sample_bytes},
+      {"memory_bytes", order.bounds.memory_bytes},
+      {"seconds", order.bounds.time.count()},
+  };
+  return json.dump();
+}
+
+ImportOrder order_from(std::string_view message) {
+  try {
+    const Json json = Json::parse(message);
+    ImportOrder order;
+    order.task.source = json.at("source").get<std::string>();
+    order.task.scratch = json.at("scratch").get<std::string>();
+    order.task.target = json.at("target").get<std::string>();
+    if (!json.at("raw").is_null()) order.task.options.raw = raw_from(json.at("raw"));
+    json.at("series").get_to(order.task.options.series);
+    json.at("max_sample_bytes").get_to(order.task.limits.max_sample_bytes);
+    json.at("memory_bytes").get_to(order.bounds.memory_bytes);
+    order.bounds.time = std::chrono::seconds(json.at("seconds").get<std::int64_t>());
+    return order;
+  } catch (const Json::exception&) {
+    throw_malformed();
+  }
+}
+
+std::string reading_message(std::string_view format) {
+  return line_of(kReading, std::string(format));
+}
+
+std::string volume_message(const Volume& volume) {
+  return line_of(kVolume, Json::parse(isomesh::to_json(volume)));
+}
+
+std::string error_message(const Error& error) { return line_of(kError, to_json(error)); }
+
+ImportReport report_from(std::string_view messages) {
+  ImportReport report;
+  try {
+    for (std::size_t next = 0;;) {
+      const std::size_t end = messages.find('\n', next);
+      if (end == std::string_view::npos) return report;
+      add_line(report, Json::parse(messages.substr(next, end - next)));
+      next = end + 1;
+    }
+  } catch (const Json::exception&) {
+    throw_malformed();
+  }
+}
+
+}  // namespace isomesh::process

@@ -1,0 +1,212 @@
+#include "server/process/sandbox.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstddef>
+#include <initializer_list>
+#include <limits>
+
+#include <fcntl.h>
+#include <linux/landlock.h>
+#include <seccomp.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include "base/descriptor.h"
+#include "base/error.h"
+#include "proto/error.h"
+
+namespace isomesh::process {
+namespace {
+
+// Under a sanitizer memory cannot be limited, because it reserves terabytes of addresses.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define ISOMESH_IS_SANITIZED
+constexpr bool kLimitMemory = false;
+#else
+constexpr bool kLimitMemory = true;
+#endif
+
+void require(bool done, std::string_view call) {
+  if (!done) throw_system_error(call, errno);
+}
+
+// --- Limits --------------------------------------------------------------------------------------
+
+void limit(__rlimit_resource resource, std::uint64_t most) {
+  rlimit bounds = {};
+  require(::getrlimit(resource, &bounds) == 0, "getrlimit");
+  bounds.rlim_max = std::min<rlim_t>(bounds.rlim_max, most);
+  bounds.rlim_cur = bounds.rlim_max;
+  require(::setrlimit(resource, &bounds) == 0, "setrlimit");
+}
+
+std::uint64_t sum(std::initializer_list<std::uint64_t> numbers) {
+  std::uint64_t total = 0;
+  for (const std::uint64_t number : numbers) {
+    if (number > std::numeric_limits<std::uint64_t>::max() - total) return RLIM_INFINITY;
+    total += number;
+  }
+  return total;
+}
+
+void limit_resources(const Confinement& confinement) {
+  constexpr std::uint64_t kPrograms = std::uint64_t{512} << 20;  // code, libraries, the stack
+  constexpr std::uint64_t kMostOpenFiles = 64;
+  limit(RLIMIT_CORE, 0);
+  limit(RLIMIT_NOFILE, kMostOpenFiles);
+  limit(RLIMIT_FSIZE, confinement.file_bytes);
+  limit(RLIMIT_CPU, static_cast<std::uint64_t>(confinement.time.count()));
+  // With the signal ignored, a write beyond the limit fails with EFBIG, which can be reported.
+  std::signal(SIGXFSZ, SIG_IGN);
+  if constexpr (kLimitMemory) {
+    limit(RLIMIT_DATA, confinement.memory_bytes);
+    limit(RLIMIT_AS, sum({confinement.memory_bytes, confinement.file_bytes, kPrograms}));
+  }
+}
+
+// --- Files (Landlock) ----------------------------------------------------------------------------
+
+// The right to truncate files, which Debian 12's headers do not know yet.
+constexpr std::uint64_t kTruncate = std::uint64_t{1} << 14;
+
+// The rights that a version of Landlock can restrict.
+std::uint64_t rights_of_version(long version) {
+  std::uint64_t rights = (std::uint64_t{1} << 13) - 1;
+  if (version >= 2) rights |= LANDLOCK_ACCESS_FS_REFER;
+  if (version >= 3) rights |= kTruncate;
+  return rights;
+}
+
+long landlock_version() {
+  return ::syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
+}
+
+void allow(const Descriptor& ruleset, const std::filesystem::path& path, std::uint64_t rights) {
+  const Descriptor place(::open(path.c_str(), O_PATH | O_CLOEXEC));
+  require(place.number() >= 0, "open");
+  landlock_path_beneath_attr rule = {};
+  rule.allowed_access = rights;
+  rule.parent_fd = place.number();
+  require(
+      ::syscall(SYS_landlock_add_rule, ruleset.number(), LANDLOCK_RULE_PATH_BENEATH, &rule, 0) == 0,
+      "landlock_add_rule");
+}
+
+void restrict_files(const Confinement& confinement) {
+  const long version = landlock_version();
+  if (version < 1) return;
+  landlock_ruleset_attr attributes = {};
+  attributes.handled_access_fs = rights_of_version(version);
+  const Descriptor ruleset(
+      static_cast<int>(::syscall(SYS_landlock_create_ruleset, &attributes, sizeof(attributes), 0)));
+  require(ruleset.number() >= 0, "landlock_create_ruleset");
+  constexpr std::uint64_t kRead = LANDLOCK_ACCESS_FS_READ_FILE;
+  constexpr std::uint64_t kWork = kRead | LANDLOCK_ACCESS_FS_READ_DIR |
+                                  LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_MAKE_REG |
+                                  LANDLOCK_ACCESS_FS_MAKE_DIR | LANDLOCK_ACCESS_FS_REMOVE_FILE |
+                                  LANDLOCK_ACCESS_FS_REMOVE_DIR | kTruncate;
+  allow(ruleset, confinement.readable, kRead);
+  allow(ruleset, confinement.writable, kWork & attributes.handled_access_fs);
+  require(::syscall(SYS_landlock_restrict_self, ruleset.number(), 0) == 0,
+          "landlock_restrict_self");
+}
+
+// --- System calls (seccomp) ----------------------------------------------------------------------
+
+// All other calls fail with EPERM, which libraries can handle, rather than end the process.
+constexpr std::array kAllowedCalls = {
+#ifdef ISOMESH_IS_SANITIZED
+    SCMP_SYS(pipe), SCMP_SYS(pipe2),  // sanitizers use them to find out whether memory is readable
+#endif
+    // files
+    SCMP_SYS(read), SCMP_SYS(readv), SCMP_SYS(pread64), SCMP_SYS(write), SCMP_SYS(writev),
+    SCMP_SYS(pwrite64), SCMP_SYS(open), SCMP_SYS(openat), SCMP_SYS(close), SCMP_SYS(lseek),
+    SCMP_SYS(stat), SCMP_SYS(fstat), SCMP_SYS(lstat), SCMP_SYS(newfstatat), SCMP_SYS(statx),
+    SCMP_SYS(fstatfs), SCMP_SYS(access), SCMP_SYS(faccessat), SCMP_SYS(faccessat2),
+    SCMP_SYS(getcwd), SCMP_SYS(readlink), SCMP_SYS(readlinkat), SCMP_SYS(getdents64),
+    SCMP_SYS(fcntl), SCMP_SYS(dup), SCMP_SYS(ftruncate), SCMP_SYS(fallocate), SCMP_SYS(fsync),
+    SCMP_SYS(fdatasync), SCMP_SYS(msync), SCMP_SYS(fadvise64), SCMP_SYS(mkdir), SCMP_SYS(mkdirat),
+    SCMP_SYS(rmdir), SCMP_SYS(unlink), SCMP_SYS(unlinkat), SCMP_SYS(umask),
+    // memory; mmap and mprotect have rules of their own
+    SCMP_SYS(brk), SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(madvise),
+    // the process itself
+    SCMP_SYS(exit), SCMP_SYS(exit_group), SCMP_SYS(getpid), SCMP_SYS(getppid), SCMP_SYS(gettid),
+    SCMP_SYS(getuid), SCMP_SYS(geteuid), SCMP_SYS(getgid), SCMP_SYS(getegid),
+    SCMP_SYS(rt_sigaction), SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
+    SCMP_SYS(futex), SCMP_SYS(set_robust_list), SCMP_SYS(rseq), SCMP_SYS(sched_yield),
+    SCMP_SYS(sched_getaffinity), SCMP_SYS(getrlimit), SCMP_SYS(getrusage), SCMP_SYS(sysinfo),
+    SCMP_SYS(uname), SCMP_SYS(getrandom), SCMP_SYS(clock_gettime), SCMP_SYS(clock_getres),
+    SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep), SCMP_SYS(gettimeofday), SCMP_SYS(time),
+    SCMP_SYS(restart_syscall)};
+
+class Filter {
+ public:
+  Filter() : context_(::seccomp_init(SCMP_ACT_ERRNO(EPERM))) {
+    if (context_ == nullptr) throw Error(ErrorCode::kInternal, "seccomp_init failed.");
+  }
+  ~Filter() { ::seccomp_release(context_); }
+  Filter(const Filter&) = delete;
+  Filter& operator=(const Filter&) = delete;
+
+  void allow(int call) {
+    check(::seccomp_rule_add_array(context_, SCMP_ACT_ALLOW, call, 0, nullptr));
+  }
+  void allow(int call, const scmp_arg_cmp& condition) {
+    check(::seccomp_rule_add_array(context_, SCMP_ACT_ALLOW, call, 1, &condition));
+  }
+  void load() { check(::seccomp_load(context_)); }
+
+ private:
+  static void check(int result) {
+    if (result < 0) throw_system_error("seccomp", -result);
+  }
+
+  scmp_filter_ctx context_;
+};
+
+scmp_arg_cmp argument_is(unsigned index, std::uint64_t value) {
+  return {index, SCMP_CMP_EQ, value, 0};
+}
+
+void filter_calls() {
+  Filter filter;
+  for (const int call : kAllowedCalls) filter.allow(call);
+  // Memory must never be mapped as executable.
+  const scmp_arg_cmp not_executable = {2, SCMP_CMP_MASKED_EQ, PROT_EXEC, 0};
+  filter.allow(SCMP_SYS(mmap), not_executable);
+  filter.allow(SCMP_SYS(mprotect), not_executable);
+  // abort() signals its own thread.
+  filter.allow(SCMP_SYS(tgkill), argument_is(0, static_cast<std::uint64_t>(::getpid())));
+  filter.allow(SCMP_SYS(prctl), argument_is(0, PR_SET_VMA));  // malloc's names for its memory
+  filter.load();
+}
+
+// --- The process itself --------------------------------------------------------------------------
+
+void become_first_victim() {
+  const Descriptor file(::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC));
+  // Where there is no such file, the kernel chooses as usual.
+  if (file.number() >= 0) [[maybe_unused]]
+    const auto count = ::write(file.number(), "1000", 4);
+}
+
+}  // namespace
+
+bool has_landlock() { return landlock_version() >= 1; }
+
+void confine(const Confinement& confinement) {
+  become_first_victim();
+  limit_resources(confinement);
+  require(::prctl(PR_SET_DUMPABLE, 0) == 0, "prctl");
+  require(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0, "prctl");
+  restrict_files(confinement);
+  filter_calls();
+}
+
+}  // namespace isomesh::process

@@ -1,0 +1,34 @@
+// What retention removes from the stores of jobs and of volumes.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+
+namespace isomesh::store {
+
+using Time = std::chrono::system_clock::time_point;
+
+enum class RecordKind { kJob, kVolume };
+
+// A job that has ended, or a volume that no queued or running job needs.
+struct Expirable {
+  RecordKind kind = RecordKind::kJob;
+  std::string owner;
+  std::string id;
+  // When the job ended; when the volume was added or the last job on it ended, whichever is later.
+  Time last_used;
+};
+
+// What a call of expire() removed.
+struct Expired {
+  std::size_t records = 0;
+  std::uint64_t bytes = 0;  // of the blobs that no record names any more
+};
+
+// As the bytes that are enough: all records that are given expire.
+inline constexpr std::uint64_t kAllBytes = std::numeric_limits<std::uint64_t>::max();
+
+}  // namespace isomesh::store

@@ -1,0 +1,226 @@
+#include "server/store/files/blob_store.h"
+
+#include <array>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <time.h>
+
+#include "base/hex.h"
+#include "base/ids.h"
+#include "base/sha256.h"
+#include "proto/error.h"
+#include "server/store/files/files.h"
+
+namespace isomesh::store {
+namespace {
+
+// Folders of many thousand files are slow to list; the first byte of the key splits them.
+constexpr std::size_t kPrefix = 2;
+constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
+constexpr std::chrono::hours kBelieved{1};
+
+// What changes when somebody writes to a file or puts another in its place; empty without a file.
+std::string traits_of(const std::filesystem::path& file) {
+  struct stat status = {};
+  if (::stat(file.c_str(), &status) != 0) return {};
+  std::string text;
+  for (const auto part :
+       {static_cast<std::int64_t>(status.st_dev), static_cast<std::int64_t>(status.st_ino),
+        static_cast<std::int64_t>(status.st_size), static_cast<std::int64_t>(status.st_mtim.tv_sec),
+        static_cast<std::int64_t>(status.st_mtim.tv_nsec),
+        static_cast<std::int64_t>(status.st_ctim.tv_sec),
+        static_cast<std::int64_t>(status.st_ctim.tv_nsec)}) {
+    text += std::to_string(part) + ' ';
+  }
+  return text;
+}
+
+// The digest of all bytes, which passes in blocks.
+Blob digest_of(const File& file, const std::stop_token& stop) {
+  Sha256 digest;
+  std::vector<std::byte> block(kBlockBytes);
+  std::uint64_t offset = 0;
+  while (const std::size_t count = file.read_at(offset, block)) {
+    if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "cancelled");
+    digest.update(std::span(block).first(count));
+    offset += count;
+  }
+  return {to_hex(digest.finish()), offset};
+}
+
+class FileReader : public BlobReader {
+ public:
+  explicit FileReader(File file) : file_(std::move(file)) {}
+
+  std::uint64_t size() const override { return file_.size(); }
+  std::size_t read_at(std::uint64_t offset, std::span<std::byte> bytes) const override {
+    return file_.read_at(offset, bytes);
+  }
+
+ private:
+  File file_;
+};
+
+}  // namespace
+
+class FileBlobStore::Writer : public BlobWriter {
+ public:
+  explicit Writer(const FileBlobStore& store)
+      : store_(store),
+        path_(store.folder_.scratch() / (random_hex(8) + ".blob")),
+        file_(File::create(path_)) {}
+
+  ~Writer() override {
+    std::error_code ignored;  // a blob that was committed is no longer here
+    std::filesystem::remove(path_, ignored);
+  }
+
+  void write(std::span<const std::byte> bytes) override {
+    file_.write(bytes);
+    digest_.update(bytes);
+    bytes_ += bytes.size();
+  }
+
+  Blob commit() override {
+    file_.sync();
+    const std::string key = to_hex(digest_.finish());
+    store_.publish_as(path_, key);
+    return {key, bytes_};
+  }
+
+ private:
+  const FileBlobStore& store_;
+  std::filesystem::path path_;
+  File file_;
+  Sha256 digest_;
+  std::uint64_t bytes_ = 0;
+};
+
+Blob digest_of(const std::filesystem::path& path) {
+  File file = File::open(path);
+  const Blob blob = digest_of(file, {});
+  file.sync();
+  return blob;
+}
+
+std::unique_ptr<BlobWriter> FileBlobStore::begin() const { return std::make_unique<Writer>(*this); }
+
+void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) const {
+  believe(blob.key, publish_as(file, blob.key));
+}
+
+std::unique_ptr<BlobReader> FileBlobStore::open(const std::string& key) const {
+  return std::make_unique<FileReader>(File::open(path_of(key)));
+}
+
+LocalBlob FileBlobStore::local(const std::string& key) const {
+  if (!size(key)) throw Error(ErrorCode::kNotFound, "the file is not there");
+  return {path_of(key)};
+}
+
+bool FileBlobStore::is_intact(const std::string& key, const std::stop_token& stop) const {
+  const std::filesystem::path place = path_of(key);
+  const std::string traits = traits_of(place);
+  const auto now = std::chrono::steady_clock::now();
+  {
+    const Lock lock(intact_mutex_);
+    const auto known = intact_.find(key);
+    if (known != intact_.end() && known->second.traits == traits &&
+        now - known->second.when < kBelieved) {
+      return true;
+    }
+  }
+  const bool is_intact = digest_of(File::open(place), stop).key == key;
+  if (is_intact) believe(key, traits);
+  return is_intact;
+}
+
+void FileBlobStore::believe(const std::string& key, const std::string& traits) const {
+  const auto now = std::chrono::steady_clock::now();
+  const Lock lock(intact_mutex_);
+  std::erase_if(intact_, [&](const auto& entry) { return now - entry.second.when >= kBelieved; });
+  intact_[key] = {traits, now};
+}
+
+std::optional<std::uint64_t> FileBlobStore::size(const std::string& key) const {
+  std::error_code absent;
+  const std::uintmax_t bytes = std::filesystem::file_size(path_of(key), absent);
+  if (absent) return std::nullopt;
+  return bytes;
+}
+
+void FileBlobStore::erase(const std::string& key) const {
+  std::error_code ignored;
+  std::filesystem::remove(path_of(key), ignored);
+}
+
+std::filesystem::path FileBlobStore::path_of(const std::string& key) const {
+  return folder_.blobs() / key.substr(0, kPrefix) / key;
+}
+
+std::size_t FileBlobStore::sweep(std::chrono::system_clock::time_point cutoff,
+                                 const std::function<bool(const std::string& key)>& keep) const {
+  const auto is_old = [&](const std::filesystem::path& file) {
+    struct stat status = {};
+    if (::stat(file.c_str(), &status) != 0) return false;
+    const auto written = std::chrono::seconds(status.st_mtim.tv_sec) +
+                         std::chrono::nanoseconds(status.st_mtim.tv_nsec);
+    return written < cutoff.time_since_epoch();
+  };
+  std::vector<std::string> unnamed;
+  std::error_code gone;  // files come and go while we look
+  std::filesystem::recursive_directory_iterator entry(folder_.blobs(), gone);
+  for (; entry != std::filesystem::recursive_directory_iterator(); entry.increment(gone)) {
+    const std::string key = entry->path().filename();
+    if (entry->is_regular_file(gone) && is_old(entry->path()) && !keep(key)) unnamed.push_back(key);
+  }
+  std::size_t erased = 0;
+  for (const std::string& key : unnamed) {
+    const Lock lock(places_);
+    if (!is_old(path_of(key)) || keep(key)) continue;
+    erase(key);
+    ++erased;
+  }
+  return erased;
+}
+
+std::string FileBlobStore::publish_as(const std::filesystem::path& file,
+                                      const std::string& key) const {
+  // A file of long ago that is named now must look as young as its naming is. The time is a finer
+  // one than the system gives to files that are written, so a write within the same tick changes
+  // it.
+  timespec now = {};
+  ::clock_gettime(CLOCK_REALTIME, &now);
+  const std::array<timespec, 2> times = {now, now};
+  ::utimensat(AT_FDCWD, file.c_str(), times.data(), 0);
+  const std::filesystem::path place = path_of(key);
+  make_folder_for(place);
+  std::string traits;
+  {
+    const Lock lock(places_);
+    move_to(file, place);
+    traits = traits_of(place);
+  }
+  sync_folder(place.parent_path());
+  return traits;
+}
+
+// A folder that is there is not yet on the disk when another thread has just made it, or when the
+// process that made it was killed. So each is synced once by this process, whoever made it.
+void FileBlobStore::make_folder_for(const std::filesystem::path& place) const {
+  const std::filesystem::path folder = place.parent_path();
+  std::error_code error;
+  const Lock lock(synced_mutex_);
+  const bool is_new = std::filesystem::create_directory(folder, error);
+  if (error == std::errc::no_space_on_device) {
+    throw Error(ErrorCode::kOutOfSpace, "the data folder has no space left");
+  }
+  const std::string name = folder.filename();
+  if (!is_new && synced_.contains(name)) return;
+  sync_folder(folder_.blobs());
+  synced_.insert(name);
+}
+
+}  // namespace isomesh::store

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+
+#include "base/mutex.h"
+#include "server/store/blob_store.h"
+#include "server/store/files/data_folder.h"
+
+namespace isomesh::store {
+
+// Blobs as files of the data folder, which must outlive it.
+class FileBlobStore : public BlobStore {
+ public:
+  explicit FileBlobStore(const DataFolder& folder) : folder_(folder) {}
+
+  std::unique_ptr<BlobWriter> begin() const override;
+  void adopt(const std::filesystem::path& file, const Blob& blob) const override;
+  std::unique_ptr<BlobReader> open(const std::string& key) const override;
+  LocalBlob local(const std::string& key) const override;
+  // A file that was read whole, by digest_of before it was adopted or by this, is believed for an
+  // hour, unless its device, inode, size or times change.
+  bool is_intact(const std::string& key, const std::stop_token& stop) const override;
+  std::optional<std::uint64_t> size(const std::string& key) const override;
+  void erase(const std::string& key) const override;
+  std::size_t sweep(std::chrono::system_clock::time_point cutoff,
+                    const std::function<bool(const std::string& key)>& keep) const override;
+
+  // Where a blob lies or would.
+  std::filesystem::path path_of(const std::string& key) const;
+
+ private:
+  class Writer;
+
+  // When a file was found intact, and what it looked like then.
+  struct Check {
+    std::string traits;
+    std::chrono::steady_clock::time_point when;
+  };
+
+  void believe(const std::string& key, const std::string& traits) const;
+  // Returns the traits of the file in its place.
+  std::string publish_as(const std::filesystem::path& file, const std::string& key) const;
+  void make_folder_for(const std::filesystem::path& place) const;
+
+  const DataFolder& folder_;
+  // Held while a file takes its place or is swept, so that the sweeper never erases a file that has
+  // just been put there anew.
+  mutable Mutex places_;
+  mutable Mutex synced_mutex_;
+  mutable std::set<std::string> synced_ ISOMESH_GUARDED_BY(synced_mutex_);  // folders on the disk
+  mutable Mutex intact_mutex_;
+  mutable std::map<std::string, Check> intact_ ISOMESH_GUARDED_BY(intact_mutex_);
+};
+
+}  // namespace isomesh::store

@@ -1,0 +1,53 @@
+#include "server/store/files/data_folder.h"
+
+#include <cerrno>
+#include <cstring>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "base/ids.h"
+#include "proto/error.h"
+#include "server/store/files/files.h"
+
+namespace isomesh::store {
+
+DataFolder::DataFolder(const std::filesystem::path& root) : root_(root) {
+  std::error_code error;
+  std::filesystem::create_directories(root_, error);
+  if (!error) root_ = std::filesystem::canonical(root_, error);
+  if (error) throw Error(ErrorCode::kInternal, "the data folder: " + error.message());
+
+  lock_ = ::open((root_ / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (lock_ < 0) {
+    throw Error(ErrorCode::kInternal, std::string("the data folder: ") + std::strerror(errno));
+  }
+  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+    ::close(lock_);
+    throw Error(ErrorCode::kUnavailable, "another isomeshd is using the data folder");
+  }
+  std::filesystem::remove_all(scratch());
+  for (const auto& folder : {blobs(), scratch()}) {
+    std::filesystem::create_directories(folder);
+  }
+  sync_folder(root_);
+}
+
+DataFolder::~DataFolder() { ::close(lock_); }
+
+ScratchFolder::ScratchFolder(const std::filesystem::path& parent) : path_(parent / random_hex(8)) {
+  std::error_code error;
+  std::filesystem::create_directory(path_, error);
+  if (error == std::errc::no_space_on_device) {
+    throw Error(ErrorCode::kOutOfSpace, "the data folder has no space left");
+  }
+  if (error) throw Error(ErrorCode::kInternal, "a scratch folder: " + error.message());
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code ignored;  // what stays is removed when the daemon starts next
+  std::filesystem::remove_all(path_, ignored);
+}
+
+}  // namespace isomesh::store

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace isomesh::store {
+
+// The one folder that a daemon keeps everything in. Holding it locks it: a second daemon on the
+// same folder is refused. Immutable after construction.
+class DataFolder {
+ public:
+  // Creates what is missing and empties the scratch folder, which holds what a crash cut short.
+  // Throws Error kUnavailable when another process holds the folder, kInternal otherwise.
+  explicit DataFolder(const std::filesystem::path& root);
+  ~DataFolder();
+  DataFolder(const DataFolder&) = delete;
+  DataFolder& operator=(const DataFolder&) = delete;
+
+  std::filesystem::path blobs() const { return root_ / "blobs"; }  // finished files, by digest
+  std::filesystem::path records() const { return root_ / "isomesh.sqlite"; }  // the database
+  std::filesystem::path scratch() const { return root_ / "scratch"; }         // unfinished files
+
+ private:
+  std::filesystem::path root_;
+  int lock_ = -1;
+};
+
+// A folder of its own below `parent`, removed with all it holds when it goes. Not thread safe.
+class ScratchFolder {
+ public:
+  explicit ScratchFolder(const std::filesystem::path& parent);
+  ~ScratchFolder();
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace isomesh::store

@@ -1,0 +1,63 @@
+#include "server/store/files/files.h"
+
+#include <cerrno>
+#include <string>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/descriptor.h"
+#include "base/error.h"
+
+namespace isomesh::store {
+
+File File::create(const std::filesystem::path& path) {
+  Descriptor descriptor(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
+  if (descriptor.number() < 0) throw_file_error("creating a file", errno);
+  return File(std::move(descriptor));
+}
+
+File File::open(const std::filesystem::path& path) {
+  Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (descriptor.number() < 0) throw_file_error("opening a file", errno);
+  return File(std::move(descriptor));
+}
+
+void File::write(std::span<const std::byte> bytes) { write_all(descriptor_, bytes); }
+
+std::size_t File::read_at(std::uint64_t offset, std::span<std::byte> bytes) const {
+  std::size_t total = 0;
+  while (total < bytes.size()) {
+    const ssize_t count = ::pread(descriptor_.number(), bytes.data() + total, bytes.size() - total,
+                                  static_cast<off_t>(offset + total));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) throw_file_error("reading a file", errno);
+    if (count == 0) break;
+    total += static_cast<std::size_t>(count);
+  }
+  return total;
+}
+
+std::uint64_t File::size() const {
+  struct stat status = {};
+  if (::fstat(descriptor_.number(), &status) != 0) throw_file_error("reading a file's size", errno);
+  return static_cast<std::uint64_t>(status.st_size);
+}
+
+void File::sync() {
+  if (::fsync(descriptor_.number()) != 0) throw_file_error("syncing a file", errno);
+}
+
+void move_to(const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (::rename(from.c_str(), to.c_str()) != 0) throw_file_error("renaming a file", errno);
+}
+
+void sync_folder(const std::filesystem::path& folder) {
+  const Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (opened.number() < 0) throw_file_error("opening a folder", errno);
+  if (::fsync(opened.number()) != 0) throw_file_error("syncing a folder", errno);
+}
+
+}  // namespace isomesh::store

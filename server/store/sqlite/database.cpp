@@ -1,0 +1,162 @@
+#include "server/store/sqlite/database.h"
+
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+
+#include "proto/error.h"
+#include "server/store/files/files.h"
+
+namespace isomesh::store {
+namespace {
+
+// The tables of the first version, then what each later one changed. Never to be edited, only to be
+// added to.
+//
+// States are the values of JobState: 0 queued, 1 running, 2 succeeded, 3 failed, 4 cancelled. A
+// record is the JSON of the API; the columns beside it are what is searched for.
+constexpr std::array kSteps = {R"sql(
+CREATE TABLE volumes(
+  owner TEXT NOT NULL,
+  id TEXT NOT NULL,
+  created INTEGER NOT NULL,
+  used INTEGER NOT NULL,      -- when it was created or a job that needed it ended, whichever is last
+  bytes INTEGER NOT NULL,     -- of its blob
+  record TEXT NOT NULL,
+  PRIMARY KEY(owner, id)
+) WITHOUT ROWID;
+CREATE INDEX volumes_by_blob ON volumes(id);
+CREATE INDEX volumes_by_use ON volumes(used);
+
+CREATE TABLE jobs(
+  id TEXT NOT NULL PRIMARY KEY,
+  owner TEXT NOT NULL,
+  state INTEGER NOT NULL,
+  priority INTEGER NOT NULL,
+  volume TEXT NOT NULL,
+  result_key TEXT NOT NULL,   -- the same for jobs that make the same mesh
+  accepted INTEGER NOT NULL,
+  finished INTEGER,
+  not_before INTEGER NOT NULL,
+  attempts INTEGER NOT NULL,
+  fence INTEGER NOT NULL,
+  claimed INTEGER,            -- when its run began, while it runs
+  lease_until INTEGER,
+  worker TEXT,
+  cancelling INTEGER NOT NULL,
+  idempotency_key TEXT,
+  request_digest TEXT,
+  record TEXT NOT NULL,
+  interruptions INTEGER NOT NULL DEFAULT 0,  -- runs that ended with their process, uncharged
+  is_long INTEGER NOT NULL DEFAULT 0         -- its run has lasted a while
+) WITHOUT ROWID;
+CREATE INDEX jobs_queue ON jobs(priority, id) WHERE state = 0;
+CREATE INDEX jobs_running ON jobs(lease_until) WHERE state = 1;
+CREATE INDEX jobs_by_result ON jobs(owner, result_key, state);
+CREATE INDEX jobs_by_volume ON jobs(volume) WHERE state < 2;
+CREATE INDEX jobs_by_end ON jobs(finished) WHERE finished IS NOT NULL;
+CREATE INDEX jobs_by_owner ON jobs(owner, id);
+CREATE UNIQUE INDEX jobs_by_key ON jobs(owner, idempotency_key) WHERE idempotency_key IS NOT NULL;
+
+CREATE TABLE meshes(          -- which blobs the meshes of which jobs are in
+  job TEXT NOT NULL REFERENCES jobs(id) ON DELETE CASCADE,
+  blob TEXT NOT NULL,
+  bytes INTEGER NOT NULL,
+  PRIMARY KEY(job, blob)
+) WITHOUT ROWID;
+CREATE INDEX meshes_by_blob ON meshes(blob);
+
+CREATE TABLE events(
+  id INTEGER PRIMARY KEY,
+  owner TEXT NOT NULL,
+  job TEXT NOT NULL,
+  kind INTEGER NOT NULL,
+  state INTEGER NOT NULL,
+  stage INTEGER NOT NULL,
+  progress REAL NOT NULL
+);
+CREATE INDEX events_by_job ON events(job, id);
+
+CREATE TABLE expired(         -- ids of jobs and volumes that were there
+  id TEXT NOT NULL,
+  owner TEXT NOT NULL,
+  at INTEGER NOT NULL,
+  PRIMARY KEY(id, owner)
+) WITHOUT ROWID;
+CREATE INDEX expired_by_time ON expired(at);
+
+CREATE TABLE callbacks(       -- of jobs that have ended, until they are delivered or given up
+  job TEXT NOT NULL PRIMARY KEY,
+  receiver TEXT NOT NULL,     -- scheme, host and port
+  url TEXT NOT NULL,
+  body TEXT NOT NULL,
+  attempts INTEGER NOT NULL,  -- that failed
+  created INTEGER NOT NULL,
+  next INTEGER NOT NULL       -- when it is due
+) WITHOUT ROWID;
+CREATE INDEX callbacks_by_time ON callbacks(next);
+)sql"};
+
+// Versions 1 and 2 were never released.
+constexpr std::int64_t kFirst = 3;
+constexpr auto kNewest = kFirst + static_cast<std::int64_t>(kSteps.size()) - 1;
+
+std::int64_t version_of(Connection& connection) {
+  Query query = connection.query("PRAGMA user_version");
+  query.next();
+  return query.integer(0);
+}
+
+// Brings the tables up to date before anything else looks at them.
+Connection::Mode migrated(const std::filesystem::path& file) {
+  // Records may tell of patients; SQLite's other files get the rights of this one.
+  if (!std::filesystem::exists(file)) File::create(file);
+  Connection connection(file, Connection::Mode::kWrite);
+  const std::int64_t version = version_of(connection);
+  if (version > kNewest || (version > 0 && version < kFirst)) {
+    throw Error(ErrorCode::kUnavailable,
+                std::string("the data folder was made by ") +
+                    (version > kNewest ? "a newer isomeshd" : "an isomeshd before its release") +
+                    ": its records have version " + std::to_string(version) + ", this one knows " +
+                    std::to_string(kFirst) + " to " + std::to_string(kNewest));
+  }
+  if (version == kNewest) return Connection::Mode::kWrite;
+  Transaction transaction(connection);
+  for (std::int64_t next = version == 0 ? kFirst : version + 1; next <= kNewest; ++next) {
+    connection.script(kSteps[static_cast<std::size_t>(next - kFirst)]);
+  }
+  connection.script(("PRAGMA user_version=" + std::to_string(kNewest)).c_str());
+  transaction.commit();
+  return Connection::Mode::kWrite;
+}
+
+}  // namespace
+
+Database::Database(const DataFolder& folder)
+    : writer_(folder.records(), migrated(folder.records())),
+      reader_(folder.records(), Connection::Mode::kRead) {}
+
+std::int64_t now_us() { return to_us(std::chrono::system_clock::now()); }
+
+std::int64_t to_us(Time time) {
+  return std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count();
+}
+
+Time from_us(std::int64_t us) { return Time(std::chrono::microseconds(us)); }
+
+std::int64_t us_of_timestamp(std::string_view text) {
+  std::tm parts = {};
+  int milliseconds = 0;
+  const std::string copy(text);
+  if (std::sscanf(copy.c_str(), "%d-%d-%dT%d:%d:%d.%dZ", &parts.tm_year, &parts.tm_mon,
+                  &parts.tm_mday, &parts.tm_hour, &parts.tm_min, &parts.tm_sec,
+                  &milliseconds) != 7) {
+    return 0;
+  }
+  parts.tm_year -= 1900;
+  parts.tm_mon -= 1;
+  return (static_cast<std::int64_t>(::timegm(&parts)) * 1000 + milliseconds) * 1000;
+}
+
+}  // namespace isomesh::store

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "server/store/expiry.h"
+#include "server/store/files/data_folder.h"
+#include "server/store/sqlite/sqlite.h"
+
+namespace isomesh::store {
+
+// The records of a data folder: one SQLite file (WAL, synchronous=FULL), with a connection that
+// writes and one that reads, so that readers do not wait for the disk. Thread safe; `folder` must
+// outlive it.
+class Database {
+ public:
+  // Creates what is missing and brings the tables of an older version up to date. Throws Error
+  // kUnavailable when another version made it that this one does not know, kOutOfSpace or
+  // kInternal.
+  explicit Database(const DataFolder& folder);
+
+  Connection& writer() { return writer_; }
+  Connection& reader() { return reader_; }
+
+ private:
+  Connection writer_;
+  Connection reader_;
+};
+
+// Microseconds since 1970: how the tables keep time.
+std::int64_t now_us();
+std::int64_t to_us(Time time);
+Time from_us(std::int64_t us);
+
+// The inverse of timestamp() of files.h; 0 for what is none.
+std::int64_t us_of_timestamp(std::string_view text);
+
+}  // namespace isomesh::store

@@ -1,0 +1,395 @@
+// What changes jobs, one transaction a function; job_store.cpp has what can be asked.
+#include <algorithm>
+
+#include "base/clock.h"
+#include "base/ids.h"
+#include "proto/json.h"
+#include "server/store/sqlite/job_rows.h"
+#include "server/store/sqlite/job_store.h"
+#include "server/store/sqlite/outbox.h"
+
+namespace isomesh::store {
+namespace {
+
+constexpr std::chrono::milliseconds kBetweenProgressEvents{100};
+constexpr std::chrono::seconds kRetryAfter{1};
+// A process that dies under several jobs says little about each of them, and one that is killed
+// from outside says nothing. But a job that is there every time is not run for ever.
+constexpr int kMostInterruptions = 10;
+
+std::int64_t microseconds(std::chrono::milliseconds time) {
+  return std::chrono::microseconds(time).count();
+}
+
+double milliseconds_since(std::int64_t begin_us) {
+  return static_cast<double>(std::max<std::int64_t>(now_us() - begin_us, 1)) / 1000;
+}
+
+void check_volume(Connection& connection, const JobSpec& spec) {
+  const std::string& id = spec.parameters.volume;
+  Query volume =
+      connection.query("SELECT 1 FROM volumes WHERE owner = ? AND id = ?", spec.owner, id);
+  if (volume.next()) return;
+  Query expired =
+      connection.query("SELECT 1 FROM expired WHERE owner = ? AND id = ?", spec.owner, id);
+  const bool is_gone = expired.next();
+  const std::string detail =
+      is_gone ? "the volume has expired: upload it again" : "there is no volume with this id";
+  throw Error(is_gone ? ErrorCode::kGone : ErrorCode::kNotFound, detail, {{"volume", detail}});
+}
+
+// A problem of ours, told with what is known: it would help nobody to hide it.
+Problem lost_worker(const Job& job, int attempts) {
+  Problem problem = to_problem(Error(ErrorCode::kInternal, ""), "/v1/jobs/" + job.id);
+  problem.detail = "The service ended " + std::to_string(attempts) +
+                   " times while it ran this job; the job is not begun again.";
+  return problem;
+}
+
+}  // namespace
+
+Submission SqliteJobStore::submit(const JobSpec& spec) {
+  Row row;
+  {
+    Change change(*this);
+    if (!spec.idempotency_key.empty()) {
+      Query earlier = change->query(std::string("SELECT ") + kRowColumns +
+                                        ", request_digest FROM jobs WHERE owner = ? AND "
+                                        "idempotency_key = ?",
+                                    spec.owner, spec.idempotency_key);
+      if (earlier.next()) {
+        constexpr int kAfterTheRow = 11;
+        if (earlier.text(kAfterTheRow) != spec.request_digest)
+          return {Submission::Kind::kConflict, {}, {}};
+        return {Submission::Kind::kExisting, with_progress(row_of(earlier)), {}};
+      }
+    }
+    check_volume(change.connection(), spec);
+    row.owner = spec.owner;
+    row.result_key = result_key(spec.parameters.volume, spec.parameters, options_.mesher_version);
+    row.accepted = now_us();
+    row.job.id = time_ordered_id();
+    row.job.parameters = spec.parameters;
+    row.job.created = timestamp();
+    const auto mesh = mesh_like(change.connection(), row);
+    if (refusing_ || (!mesh && count_queued(change.connection()) >= options_.max_queued)) {
+      return {Submission::Kind::kBusy, {}, kRetryAfter};
+    }
+    const std::optional<std::string> key =
+        spec.idempotency_key.empty() ? std::nullopt : std::optional(spec.idempotency_key);
+    change->run(
+        "INSERT INTO jobs(id, owner, state, priority, volume, result_key, accepted, not_before, "
+        "attempts, fence, cancelling, idempotency_key, request_digest, record) "
+        "VALUES(?, ?, 0, ?, ?, ?, ?, 0, 0, 0, 0, ?, ?, ?)",
+        row.job.id, row.owner, spec.parameters.priority, spec.parameters.volume, row.result_key,
+        row.accepted, key, spec.request_digest, to_json(row.job));
+    if (mesh) {
+      row.job.reused = true;
+      succeed(change, row, *mesh);
+    } else {
+      change.announce(row, EventKind::kStage);
+    }
+    change.commit();
+  }
+  if (!is_final(row.job.state)) wake_a_worker();
+  return {Submission::Kind::kNew, row.job, {}};
+}
+
+std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
+                                           std::chrono::milliseconds lease) {
+  // A claim that a power cut takes back leaves the job queued, and its worker is gone.
+  Change change(*this, Durability::kProcess);
+  const std::int64_t now = now_us();
+  std::optional<Row> next;
+  {
+    Query query = change->query(
+        std::string("SELECT ") + kRowColumns +
+            " FROM jobs q WHERE state = 0 AND not_before <= ? AND NOT EXISTS (SELECT 1 FROM jobs r "
+            "WHERE r.owner = q.owner AND r.result_key = q.result_key AND r.state = 1) "
+            "ORDER BY priority, id LIMIT 1",
+        now);
+    if (!query.next()) return std::nullopt;
+    next = row_of(query);
+  }
+  Row& row = *next;
+  row.fence += 1;
+  row.attempts += 1;
+  row.job.state = JobState::kRunning;
+  row.job.stage = Stage::kLoad;
+  row.job.started = timestamp();
+  row.job.timing.queue = milliseconds_since(row.accepted);
+  const std::int64_t until = now + microseconds(lease);
+  change->run(
+      "UPDATE jobs SET state = 1, attempts = ?, fence = ?, claimed = ?, is_long = 0, lease_until = "
+      "?, worker = ?, record = ? WHERE id = ?",
+      row.attempts, row.fence, now, until, worker, to_json(row.job), row.job.id);
+  change.announce(row, EventKind::kStage);
+  change.commit();
+  {
+    // Before anybody else's transaction, which may ask the run to stop or end its lease.
+    const Lock lock(live_mutex_);
+    live_[row.job.id] = {.fence = row.fence, .claimed = now, .lease_until = until};
+  }
+  return Lease{row.job.id, row.fence, row.attempts, row.owner, row.job.parameters};
+}
+
+Standing SqliteJobStore::renew(const Lease& lease, const Progress& progress,
+                               std::chrono::milliseconds length) {
+  std::optional<Live> run;
+  {
+    const Lock lock(live_mutex_);
+    if (const Live* const known = live(lease)) run = *known;
+  }
+  const std::int64_t now = now_us();
+  if (!run || run->lease_until < now) return Standing::kLost;
+  tell(lease, progress);
+  const bool is_long = now - run->claimed >= microseconds(options_.short_run);
+  if (run->lease_until - now < microseconds(length) * 2 / 3 || is_long != run->is_long) {
+    // That the run is long is what it is charged for when it takes the machine down with it.
+    Change change(*this, is_long == run->is_long ? Durability::kProcess : Durability::kFull);
+    const int held = change->run(
+        "UPDATE jobs SET lease_until = ?, is_long = ? WHERE id = ? AND fence = ? AND state = 1 AND "
+        "lease_until >= ?",
+        now + microseconds(length), is_long ? 1 : 0, lease.id, lease.fence, now);
+    if (held == 0) return Standing::kLost;
+    change.commit();
+    const Lock lock(live_mutex_);
+    if (Live* const renewed = live(lease)) {
+      renewed->lease_until = now + microseconds(length);
+      renewed->is_long = is_long;
+    }
+  }
+  return run->cancelling ? Standing::kCancel : Standing::kOk;
+}
+
+bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
+  bool has_mesh = false;
+  {
+    Change change(*this);
+    auto held = leased(change.connection(), lease);
+    if (!held) return false;
+    Row& row = *held;
+    const double queue = row.job.timing.queue;
+    row.job.timing = outcome.timing;
+    row.job.timing.queue = queue;
+    if (row.cancelling || (!outcome.mesh && !outcome.error)) {
+      end(change, row, JobState::kCancelled);
+    } else if (outcome.mesh) {
+      succeed(change, row, *outcome.mesh);
+      succeed_alike(change, row, *outcome.mesh);
+      has_mesh = true;
+    } else if (outcome.may_retry && row.attempts < options_.attempts) {
+      queue_again(change, row, delay_after(row.attempts));
+    } else {
+      row.job.error = outcome.error;
+      end(change, row, JobState::kFailed);
+    }
+    change.commit();
+  }
+  forget_run(lease.id, lease.fence);
+  // Without a mesh it may be due again, or one like it now. With one, nothing has become ready.
+  if (!has_mesh) wake_workers();
+  return true;
+}
+
+bool SqliteJobStore::put_back(const Lease& lease, std::chrono::milliseconds delay) {
+  {
+    Change change(*this);
+    auto held = leased(change.connection(), lease);
+    if (!held) return false;
+    if (held->cancelling) {
+      end(change, *held, JobState::kCancelled);
+    } else {
+      held->attempts -= 1;
+      queue_again(change, *held, delay);
+    }
+    change.commit();
+  }
+  forget_run(lease.id, lease.fence);
+  wake_workers();
+  return true;
+}
+
+std::size_t SqliteJobStore::reap() {
+  std::size_t reaped = 0;
+  {
+    Change change(*this);
+    std::vector<Row> rows;
+    {
+      Query query = change->query(
+          std::string("SELECT ") + kRowColumns + " FROM jobs WHERE state = 1 AND lease_until < ?",
+          now_us());
+      while (query.next()) rows.push_back(row_of(query));
+    }
+    for (Row& row : rows) {
+      if (row.cancelling) {
+        end(change, row, JobState::kCancelled);
+      } else if (row.attempts >= options_.attempts || row.interruptions >= kMostInterruptions) {
+        row.job.error = lost_worker(row.job, row.attempts + row.interruptions);
+        end(change, row, JobState::kFailed);
+      } else {
+        queue_again(change, row, std::chrono::milliseconds(0));
+      }
+      forget_run(row.job.id, row.fence);
+    }
+    reaped = rows.size();
+    change.commit();
+  }
+  if (reaped > 0) wake_workers();
+  return reaped;
+}
+
+std::size_t SqliteJobStore::reap_predecessor() {
+  {
+    Transaction transaction(database_.writer());
+    const int running = transaction->run("UPDATE jobs SET lease_until = 0 WHERE state = 1");
+    transaction->run(
+        "UPDATE jobs SET attempts = attempts - 1, interruptions = interruptions + 1 WHERE state = "
+        "1 "
+        "AND (is_long = 0 OR ? > 1)",
+        running);
+    transaction.commit();
+  }
+  return reap();
+}
+
+Job SqliteJobStore::cancel(const Viewer& viewer, const std::string& id) {
+  Job job;
+  {
+    Change change(*this);
+    Row row = found(change.connection(), viewer, id);
+    if (row.job.state == JobState::kQueued) {
+      end(change, row, JobState::kCancelled);
+    } else if (row.job.state == JobState::kRunning) {
+      change->run("UPDATE jobs SET cancelling = 1 WHERE id = ?", id);
+    }
+    change.commit();
+    if (row.job.state == JobState::kRunning) {
+      const Lock lock(live_mutex_);
+      const auto run = live_.find(id);
+      if (run != live_.end() && run->second.fence == row.fence) run->second.cancelling = true;
+    }
+    job = with_progress(row);
+  }
+  return job;
+}
+
+std::optional<SqliteJobStore::Row> SqliteJobStore::leased(Connection& connection,
+                                                          const Lease& lease) const {
+  auto row = find(connection, std::nullopt, lease.id);
+  const bool is_held = row && row->job.state == JobState::kRunning && row->fence == lease.fence &&
+                       row->lease_until >= now_us();
+  return is_held ? std::move(row) : std::nullopt;
+}
+
+std::optional<MeshSummary> SqliteJobStore::mesh_like(Connection& connection, const Row& row) const {
+  Query query = connection.query(
+      "SELECT record FROM jobs WHERE owner = ? AND result_key = ? AND state = 2 ORDER BY id DESC "
+      "LIMIT 1",
+      row.owner, row.result_key);
+  if (!query.next()) return std::nullopt;
+  auto mesh = job_from_record(query.text(0)).mesh;
+  const bool is_there = mesh && std::ranges::all_of(mesh->files, [&](const auto& named) {
+                          return blobs_.size(named.second.sha256) == named.second.bytes;
+                        });
+  return is_there ? std::move(mesh) : std::nullopt;
+}
+
+void SqliteJobStore::end(Change& change, Row& row, JobState state) const {
+  row.job.state = state;
+  row.job.finished = timestamp();
+  row.job.timing.total = milliseconds_since(row.accepted);
+  const std::int64_t now = now_us();
+  change->run(
+      "UPDATE jobs SET state = ?, finished = ?, lease_until = NULL, record = ? WHERE id = ?", state,
+      now, to_json(row.job), row.job.id);
+  change->run("UPDATE volumes SET used = ? WHERE owner = ? AND id = ?", now, row.owner,
+              row.job.parameters.volume);
+  SqliteOutbox::add(change.connection(), row.job);
+  change.announce(row, EventKind::kDone);
+}
+
+void SqliteJobStore::succeed(Change& change, Row& row, const MeshSummary& mesh) const {
+  row.job.mesh = mesh;
+  row.job.stage = Stage::kDone;
+  row.job.progress = 1;
+  for (auto& [format, file] : row.job.mesh->files) {
+    file.href = mesh_path(row.job.id, format);
+    change->run("INSERT OR IGNORE INTO meshes VALUES(?, ?, ?)", row.job.id, file.sha256,
+                file.bytes);
+  }
+  end(change, row, JobState::kSucceeded);
+}
+
+void SqliteJobStore::succeed_alike(Change& change, const Row& row, const MeshSummary& mesh) const {
+  std::vector<Row> alike;
+  {
+    Query query = change->query(std::string("SELECT ") + kRowColumns +
+                                    " FROM jobs WHERE owner = ? AND result_key = ? AND state = 0",
+                                row.owner, row.result_key);
+    while (query.next()) alike.push_back(row_of(query));
+  }
+  for (Row& other : alike) {
+    other.job.reused = true;
+    other.job.timing = {};
+    other.job.timing.queue = milliseconds_since(other.accepted);
+    succeed(change, other, mesh);
+  }
+}
+
+void SqliteJobStore::queue_again(Change& change, Row& row, std::chrono::milliseconds delay) const {
+  row.job.state = JobState::kQueued;
+  row.job.stage = Stage::kQueue;
+  row.job.progress = 0;
+  row.job.started.reset();
+  row.job.timing = {};
+  change->run(
+      "UPDATE jobs SET state = 0, attempts = ?, lease_until = NULL, not_before = ?, record = ? "
+      "WHERE id = ?",
+      row.attempts, now_us() + microseconds(delay), to_json(row.job), row.job.id);
+  change.announce(row, EventKind::kStage);
+}
+
+std::chrono::milliseconds SqliteJobStore::delay_after(int attempts) const {
+  constexpr int kGrowth = 4;
+  std::chrono::milliseconds delay = options_.retry_delay;
+  for (int n = 1; n < attempts; ++n) delay *= kGrowth;
+  return delay;
+}
+
+SqliteJobStore::Live* SqliteJobStore::live(const Lease& lease) {
+  const auto run = live_.find(lease.id);
+  return run != live_.end() && run->second.fence == lease.fence ? &run->second : nullptr;
+}
+
+void SqliteJobStore::tell(const Lease& lease, const Progress& progress) {
+  const auto now = EventLog::Clock::now();
+  bool is_other_stage = false;
+  {
+    const Lock lock(live_mutex_);
+    Live* const run = live(lease);
+    if (run == nullptr) return;
+    const Progress before = run->progress.value_or(Progress{});
+    is_other_stage = before.stage != progress.stage;
+    const bool is_further = before.share != progress.share;
+    run->progress = progress;
+    if (!is_other_stage && (!is_further || now < run->told + kBetweenProgressEvents)) return;
+    run->told = now;
+  }
+  log_.tell({.id = 0,
+             .owner = lease.owner,
+             .job = lease.id,
+             .kind = is_other_stage ? EventKind::kStage : EventKind::kProgress,
+             .state = JobState::kRunning,
+             .stage = progress.stage,
+             .progress = progress.share});
+}
+
+// A later run of the job stays known.
+void SqliteJobStore::forget_run(const std::string& id, std::uint64_t fence) {
+  const Lock lock(live_mutex_);
+  const auto run = live_.find(id);
+  if (run != live_.end() && run->second.fence == fence) live_.erase(run);
+}
+
+}  // namespace isomesh::store

@@ -1,0 +1,67 @@
+// What removes jobs that have ended, and what is known of them.
+#include "server/store/sqlite/expiry.h"
+#include "server/store/sqlite/job_store.h"
+
+namespace isomesh::store {
+
+std::vector<Expirable> SqliteJobStore::ended(Time before, Ended which, std::size_t limit) const {
+  const Reading reading(database_.reader());
+  Query query = reading->query(
+      "SELECT owner, id, finished FROM jobs WHERE finished < ?1 AND (?2 = 0 OR EXISTS (SELECT 1 "
+      "FROM meshes WHERE job = jobs.id)) ORDER BY finished LIMIT ?3",
+      to_us(before), which == Ended::kWithMesh, limit);
+  std::vector<Expirable> jobs;
+  while (query.next()) {
+    jobs.push_back({RecordKind::kJob, query.text(0), query.text(1), from_us(query.integer(2))});
+  }
+  return jobs;
+}
+
+Expired SqliteJobStore::expire(std::span<const Expirable> jobs, std::uint64_t enough) {
+  Transaction transaction(database_.writer());
+  Expired expired;
+  for (const Expirable& job : jobs) {
+    if (expired.bytes >= enough) break;
+    const std::vector<Blob> blobs =
+        read_blobs(transaction->query("SELECT blob, bytes FROM meshes WHERE job = ?", job.id));
+    const int removed =
+        transaction->run("DELETE FROM jobs WHERE id = ? AND finished IS NOT NULL", job.id);
+    if (removed == 0) continue;
+    transaction->run("DELETE FROM events WHERE job = ?", job.id);
+    remember_expired(transaction.connection(), job);
+    ++expired.records;
+    expired.bytes += unnamed_bytes(transaction.connection(), blobs);
+  }
+  transaction.commit();
+  return expired;
+}
+
+std::uint64_t SqliteJobStore::named_bytes() const {
+  const Reading reading(database_.reader());
+  Query query = reading->query(
+      "SELECT coalesce(sum(bytes), 0) FROM (SELECT max(bytes) AS bytes FROM meshes GROUP BY blob)");
+  query.next();
+  return static_cast<std::uint64_t>(query.integer(0));
+}
+
+std::optional<Time> SqliteJobStore::oldest_run() const {
+  const Reading reading(database_.reader());
+  Query query = reading->query("SELECT min(claimed) FROM jobs WHERE state = 1");
+  query.next();
+  if (query.is_null(0)) return std::nullopt;
+  return from_us(query.integer(0));
+}
+
+void SqliteJobStore::forget_expired(Time before) {
+  Transaction transaction(database_.writer(), Durability::kProcess);
+  transaction->run("DELETE FROM expired WHERE at < ?", to_us(before));
+  transaction.commit();
+}
+
+void SqliteJobStore::forget_events(Time before) {
+  Transaction transaction(database_.writer(), Durability::kProcess);
+  transaction->run("DELETE FROM events WHERE id < ?", to_us(before));
+  transaction.commit();
+}
+
+}  // namespace isomesh::store

@@ -1,0 +1,62 @@
+// What the two halves of SqliteJobStore share: a job's row, and a transaction that tells what it
+// changed. Private to this folder.
+#pragma once
+
+#include <string>
+
+#include "server/store/sqlite/job_store.h"
+
+namespace isomesh::store {
+
+struct SqliteJobStore::Row {
+  Job job;
+  std::string owner;
+  std::string result_key;
+  std::int64_t accepted = 0;
+  int attempts = 0;
+  int interruptions = 0;  // runs that ended with their process and that count as no attempt
+  std::int64_t claimed = 0;
+  bool is_long = false;  // its run has lasted the store's short_run
+  std::uint64_t fence = 0;
+  std::int64_t lease_until = 0;
+  bool cancelling = false;
+};
+
+// One transaction of the writer and its events, which are seen when it is over.
+class SqliteJobStore::Change {
+ public:
+  Change(const SqliteJobStore& store, Durability durability = Durability::kFull)
+      : log_(store.log_), transaction_(store.database_.writer(), durability) {}
+  ~Change() {
+    if (announced_) log_.settle(committed_);
+  }
+  Change(const Change&) = delete;
+  Change& operator=(const Change&) = delete;
+
+  Connection* operator->() const { return &transaction_.connection(); }
+  Connection& connection() const { return transaction_.connection(); }
+
+  // Keeps the event of the row's present state.
+  void announce(const Row& row, EventKind kind);
+
+  void commit() {
+    transaction_.commit();
+    committed_ = true;
+  }
+
+ private:
+  EventLog& log_;
+  bool announced_ = false;
+  bool committed_ = false;
+  Transaction transaction_;  // last: its lock is held until the events are settled
+};
+
+// The columns that row_of() reads.
+inline constexpr const char* kRowColumns =
+    "record, owner, result_key, accepted, attempts, fence, lease_until, cancelling, interruptions, "
+    "claimed, is_long";
+
+// How many jobs wait.
+std::size_t count_queued(Connection& connection);
+
+}  // namespace isomesh::store

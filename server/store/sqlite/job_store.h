@@ -1,0 +1,106 @@
+#pragma once
+
+#include <atomic>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "base/mutex.h"
+#include "server/store/blob_store.h"
+#include "server/store/job_store.h"
+#include "server/store/sqlite/database.h"
+#include "server/store/sqlite/event_log.h"
+
+namespace isomesh::store {
+
+// Jobs in the database of a data folder. Leases follow the system's clock. What changes wakes
+// those who wait in this process only; the data folder has one process at a time.
+class SqliteJobStore : public JobStore {
+ public:
+  // Both must outlive it. `blobs` is asked whether a mesh that is to be reused is still there.
+  SqliteJobStore(Database& database, const BlobStore& blobs, JobStoreOptions options);
+
+  Submission submit(const JobSpec& spec) override;
+  std::optional<Lease> claim(const std::string& worker, std::chrono::milliseconds lease) override;
+  bool wait_for_work(const std::stop_token& stop, std::chrono::milliseconds longest) override;
+  Standing renew(const Lease& lease, const Progress& progress,
+                 std::chrono::milliseconds length) override;
+  bool finish(const Lease& lease, const Outcome& outcome) override;
+  bool put_back(const Lease& lease, std::chrono::milliseconds delay) override;
+  std::size_t reap() override;
+  // Whoever has the data folder's lock knows that no other process holds a lease.
+  std::size_t reap_predecessor() override;
+  Job cancel(const Viewer& viewer, const std::string& id) override;
+  Job get(const Viewer& viewer, const std::string& id) const override;
+  JobAccount account(const std::string& id) const override;
+  std::vector<Job> list(const Viewer& viewer, std::optional<JobState> state,
+                        const std::string& after, std::size_t limit) const override;
+  std::vector<Event> events(const Viewer& viewer, const std::string& job, std::uint64_t since,
+                            std::chrono::milliseconds timeout) const override;
+  QueueDepth depth() const override;
+  bool is_full() const override;
+  void refuse_new() override;
+  void close() override;
+  std::vector<Expirable> ended(Time before, Ended which, std::size_t limit) const override;
+  Expired expire(std::span<const Expirable> jobs, std::uint64_t enough) override;
+  std::uint64_t named_bytes() const override;
+  std::optional<Time> oldest_run() const override;
+  void forget_expired(Time before) override;
+  void forget_events(Time before) override;
+
+ private:
+  struct Row;
+  class Change;
+  // A run that this process has claimed: what its row says, so that a renewal seldom has to ask the
+  // database. Where they differ the row is right.
+  struct Live {
+    std::uint64_t fence = 0;
+    std::int64_t claimed = 0;
+    std::int64_t lease_until = 0;
+    bool is_long = false;
+    bool cancelling = false;
+    std::optional<Progress> progress = {};  // none before the first renewal
+    EventLog::Clock::time_point told = {};
+  };
+
+  static Row row_of(const Query& query);
+  static std::optional<Row> find(Connection& connection, const Viewer& viewer,
+                                 const std::string& id);
+  // Throws Error kGone or kNotFound for a row that is not there.
+  static Row found(Connection& connection, const Viewer& viewer, const std::string& id);
+  std::optional<Row> leased(Connection& connection, const Lease& lease) const;
+  std::optional<MeshSummary> mesh_like(Connection& connection, const Row& row) const;
+  void end(Change& change, Row& row, JobState state) const;
+  void succeed(Change& change, Row& row, const MeshSummary& mesh) const;
+  void succeed_alike(Change& change, const Row& row, const MeshSummary& mesh) const;
+  void queue_again(Change& change, Row& row, std::chrono::milliseconds delay) const;
+  std::chrono::milliseconds delay_after(int attempts) const;
+  std::vector<Event> kept_events(const Viewer& viewer, const std::string& job, std::uint64_t since,
+                                 std::uint64_t end) const;
+  Live* live(const Lease& lease) ISOMESH_REQUIRES(live_mutex_);
+  void tell(const Lease& lease, const Progress& progress);
+  void forget_run(const std::string& id, std::uint64_t fence);
+  Job with_progress(const Row& row) const;
+  void wake_a_worker();
+  void wake_workers();
+
+  Database& database_;
+  const BlobStore& blobs_;
+  const JobStoreOptions options_;
+  mutable EventLog log_;
+  std::atomic<bool> refusing_ = false;
+
+  mutable Mutex live_mutex_;
+  std::map<std::string, Live> live_ ISOMESH_GUARDED_BY(live_mutex_);  // of running jobs
+
+  Mutex work_mutex_;
+  Condition work_;
+  // Grows whenever a job may have become ready.
+  std::uint64_t work_generation_ ISOMESH_GUARDED_BY(work_mutex_) = 0;
+};
+
+// The same for all jobs that make the same bytes, whatever else they are.
+std::string result_key(const std::string& volume, const MeshParameters& parameters,
+                       const std::string& mesher_version);
+
+}  // namespace isomesh::store

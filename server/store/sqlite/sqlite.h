@@ -1,0 +1,141 @@
+// SQLite as C++ values: a connection, its statements, transactions. Private to this folder.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <unordered_map>
+
+#include "base/mutex.h"
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace isomesh::store {
+
+// A prepared statement in use; its parameters are cleared when it goes. Not thread safe.
+class Query {
+ public:
+  template <class... Values>
+  explicit Query(sqlite3_stmt* statement, const Values&... values) : statement_(statement) {
+    int parameter = 0;
+    (bind(++parameter, values), ...);
+  }
+  ~Query();
+  Query(const Query&) = delete;
+  Query& operator=(const Query&) = delete;
+
+  // The next row; false after the last. Throws Error kOutOfSpace or kInternal.
+  bool next();
+
+  bool is_null(int column) const;
+  std::int64_t integer(int column) const;
+  double real(int column) const;
+  std::string text(int column) const;
+
+  void bind(int parameter, std::string_view value);
+  void bind(int parameter, double value);
+  void bind(int parameter, std::int64_t value);
+  void bind(int parameter, std::nullptr_t);
+  template <class T>
+  requires std::is_integral_v<T> || std::is_enum_v<T>
+  void bind(int parameter, T value) { bind(parameter, static_cast<std::int64_t>(value)); }
+  template <class T>
+  void bind(int parameter, const std::optional<T>& value) {
+    if (value) return bind(parameter, *value);
+    bind(parameter, nullptr);
+  }
+
+ private:
+  sqlite3_stmt* statement_;
+};
+
+// What a commit outlives. All of them outlive the process, however it ends.
+enum class Durability {
+  kFull,     // also a machine that loses its power
+  kProcess,  // what a power cut may take back, for changes that are made again without harm
+};
+
+// One connection. What it does is done under the lock of a Transaction or a Reading.
+class Connection {
+ public:
+  enum class Mode { kWrite, kRead };
+
+  // Opens the file; creates it for writing. Throws Error kInternal when it is no database.
+  Connection(const std::filesystem::path& path, Mode mode);
+  ~Connection();
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  // Statements are prepared once and kept. At most one use of the same text at a time.
+  template <class... Values>
+  Query query(std::string_view sql, const Values&... values) {
+    return Query(prepared(sql), values...);
+  }
+
+  // Runs a statement to its end; returns how many rows it changed.
+  template <class... Values>
+  int run(std::string_view sql, const Values&... values) {
+    Query statement(prepared(sql), values...);
+    while (statement.next()) {
+    }
+    return changes();
+  }
+
+  // Several statements without parameters.
+  void script(const char* sql);
+
+  // What the next transaction's commit outlives.
+  void set_durability(Durability durability);
+
+  // Rolls back what is open.
+  void roll_back() noexcept;
+
+  Mutex& mutex() { return mutex_; }
+
+ private:
+  sqlite3_stmt* prepared(std::string_view sql);
+  int changes() const;
+
+  sqlite3* handle_ = nullptr;
+  Mutex mutex_;
+  Durability durability_ = Durability::kFull;
+  std::unordered_map<std::string, sqlite3_stmt*> statements_;
+};
+
+// All or nothing: what was not committed is rolled back when it goes.
+class Transaction {
+ public:
+  explicit Transaction(Connection& connection, Durability durability = Durability::kFull);
+  ~Transaction();
+  Transaction(const Transaction&) = delete;
+  Transaction& operator=(const Transaction&) = delete;
+
+  Connection* operator->() const { return &connection_; }
+  Connection& connection() const { return connection_; }
+
+  void commit();
+
+ private:
+  const Lock lock_;
+  Connection& connection_;
+  bool open_ = true;
+};
+
+// Reads what is committed.
+class Reading {
+ public:
+  explicit Reading(Connection& connection) : lock_(connection.mutex()), connection_(connection) {}
+
+  Connection* operator->() const { return &connection_; }
+  Connection& connection() const { return connection_; }
+
+ private:
+  const Lock lock_;
+  Connection& connection_;
+};
+
+}  // namespace isomesh::store

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/store/sqlite/database.h"
+#include "server/store/volume_store.h"
+
+namespace isomesh::store {
+
+// Volumes in the database of a data folder, which must outlive it.
+class SqliteVolumeStore : public VolumeStore {
+ public:
+  explicit SqliteVolumeStore(Database& database) : database_(database) {}
+
+  std::pair<Volume, bool> add(const std::string& owner, const Volume& volume) override;
+  Volume get(const Viewer& viewer, const std::string& id) const override;
+  bool contains(const Viewer& viewer, const std::string& id) const override;
+  std::vector<Volume> list(const Viewer& viewer, const std::string& after,
+                           std::size_t limit) const override;
+  void erase(const std::string& owner, const std::string& id) override;
+  bool names(const std::string& blob) const override;
+  std::vector<Expirable> unused(Time before, std::size_t limit) const override;
+  Expired expire(std::span<const Expirable> volumes, std::uint64_t enough) override;
+  std::uint64_t named_bytes() const override;
+
+ private:
+  Database& database_;
+};
+
+}  // namespace isomesh::store

@@ -1,0 +1,75 @@
+#include "server/volume/size.h"
+
+#include <limits>
+#include <string>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "server/volume/geometry.h"
+#include "server/volume/unusable.h"
+
+namespace isomesh::volume {
+namespace {
+
+void check_beyond(std::span<const std::uint64_t> sizes) {
+  for (std::size_t axis = 3; axis < sizes.size(); ++axis) {
+    if (sizes[axis] == 1) continue;
+    const std::string size = std::to_string(sizes[axis]);
+    throw_unusable(axis == 3 ? "The file holds a time series of " + size +
+                                   " volumes, where one volume is needed."
+                             : "The file has " + size + " values along its axis " +
+                                   axis_name(axis) + ", where one volume is needed.");
+  }
+}
+
+// Throws for the sizes that a request names, as volume_dims does for those in a file.
+void check_dims(const RawDescription& description) {
+  const std::array<std::uint64_t, 3> sizes = {description.dims[0], description.dims[1],
+                                              description.dims[2]};
+  try {
+    volume_dims(sizes);
+  } catch (const Error& error) {
+    throw invalid_parameter("dims", error.what());
+  }
+}
+
+}  // namespace
+
+std::array<std::uint32_t, 3> volume_dims(std::span<const std::uint64_t> sizes) {
+  constexpr std::uint64_t kMostSamples = std::uint64_t{1} << 60;
+  std::array<std::uint32_t, 3> dims = {1, 1, 1};
+  std::uint64_t samples = 1;
+  for (std::size_t axis = 0; axis < sizes.size(); ++axis) {
+    if (sizes[axis] == 0) throw_unusable("The size along " + axis_name(axis) + " is 0.");
+  }
+  check_beyond(sizes);
+  for (std::size_t axis = 0; axis < sizes.size() && axis < dims.size(); ++axis) {
+    if (sizes[axis] > std::numeric_limits<std::uint32_t>::max() ||
+        samples > kMostSamples / sizes[axis]) {
+      throw_unusable("The header's sizes are not believable: " + std::to_string(sizes[axis]) +
+                     " along " + axis_name(axis) + ".");
+    }
+    samples *= sizes[axis];
+    dims[axis] = static_cast<std::uint32_t>(sizes[axis]);
+  }
+  return dims;
+}
+
+void check_limits(std::uint64_t sample_count, SampleType type, const SizeLimits& limits) {
+  if (sample_count <= limits.max_sample_bytes / bytes_per_sample(type)) return;
+  throw Error(ErrorCode::kTooLarge,
+              "Its samples are " + std::to_string(sample_count * bytes_per_sample(type)) +
+                  " bytes, more than the " + std::to_string(limits.max_sample_bytes) +
+                  " that are accepted.");
+}
+
+void check_raw(const RawDescription& description, const SizeLimits& limits) {
+  check_dims(description);
+  if (const auto fault = find_fault(description.dims, description.geometry)) {
+    throw invalid_parameter(fault->field, fault->message);
+  }
+  const auto& dims = description.dims;
+  check_limits(std::uint64_t{dims[0]} * dims[1] * dims[2], description.type, limits);
+}
+
+}  // namespace isomesh::volume

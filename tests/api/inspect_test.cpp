@@ -1,0 +1,152 @@
+// What a person sees of a volume before starting a job.
+#include <numeric>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/json.h"
+#include "tests/api/daemon.h"
+#include "tests/api/problems.h"
+#include "tests/support/png.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+
+class InspectTest : public testing::Test {
+ protected:
+  // As a chunked body's bytes.
+  static std::string joined(const std::string& chunks) {
+    std::string bytes;
+    for (std::size_t at = 0;;) {
+      const std::size_t size = std::stoul(chunks.substr(at), nullptr, 16);
+      if (size == 0) return bytes;
+      at = chunks.find("\r\n", at) + 2;
+      bytes += chunks.substr(at, size);
+      at += size + 2;
+    }
+  }
+
+  Answer slice(const std::string& query = {}) const {
+    return daemon_.get(path_ + "/slice.png" + (query.empty() ? "" : '?' + query));
+  }
+
+  GreyPicture picture(const std::string& query = {}) const {
+    const Answer answer = slice(query);
+    EXPECT_EQ(answer.status, 200) << answer.body;
+    EXPECT_EQ(answer.header("content-type"), "image/png");
+    return read_png(joined(answer.body));
+  }
+
+  Histogram histogram(const std::string& query = {}) const {
+    const Answer answer = daemon_.get(path_ + "/histogram" + query);
+    EXPECT_EQ(answer.status, 200) << answer.body;
+    return histogram_from_json(answer.body);
+  }
+
+  Daemon daemon_;
+  const RawUpload sphere_ = sphere_upload();
+  const Volume volume_ = upload(daemon_, sphere_);
+  const std::string path_ = "/v1/volumes/" + volume_.id;
+};
+
+TEST_F(InspectTest, AHistogramCountsEverySample) {
+  const Histogram usual = histogram();
+  EXPECT_EQ(usual.counts.size(), 256U);
+  EXPECT_EQ(usual.range, volume_.range);
+  for (const std::string bins : {"1", "2", "100", "65536"}) {
+    const Histogram some = histogram("?bins=" + bins);
+    EXPECT_EQ(std::to_string(some.counts.size()), bins);
+    EXPECT_EQ(std::accumulate(some.counts.begin(), some.counts.end(), std::uint64_t{0}),
+              volume_.sample_count());
+  }
+}
+
+TEST_F(InspectTest, AHistogramIsRefusedByName) {
+  for (const std::string bins : {"0", "65537", "-1", "1.5", "ten", "", "99999999999999999999"}) {
+    EXPECT_TRUE(blames(daemon_.get(path_ + "/histogram?bins=" + bins), "bins")) << bins;
+  }
+  EXPECT_TRUE(blames(daemon_.get(path_ + "/histogram?bin=2"), "bin"));
+  EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/0123/histogram"), ErrorCode::kNotFound));
+}
+
+TEST_F(InspectTest, ASliceIsTheSamplesOfTheUpload) {
+  const GreyPicture z = picture("axis=z&index=3&window=0,255");
+  EXPECT_EQ(z.width, 21U);
+  EXPECT_EQ(z.height, 20U);
+  for (std::size_t at = 0; at < z.pixels.size(); ++at) {
+    ASSERT_EQ(z.pixels[at], static_cast<unsigned char>(sphere_.bytes[3 * 21 * 20 + at])) << at;
+  }
+  EXPECT_EQ(picture("axis=x").height, 19U);
+  EXPECT_EQ(picture("axis=y").width, 21U);
+}
+
+TEST_F(InspectTest, TheMiddleInTheVolumesRangeIsTheDefault) {
+  const GreyPicture usual = picture();
+  const std::string range =
+      std::to_string(volume_.range[0]) + ',' + std::to_string(volume_.range[1]);
+  EXPECT_EQ(usual.pixels, picture("axis=z&index=9&window=" + range).pixels);
+  EXPECT_THAT(usual.pixels, testing::Contains(255));
+}
+
+TEST_F(InspectTest, ASliceIsRefusedByName) {
+  for (const std::string axis : {"w", "", "xy", "X"}) {
+    EXPECT_TRUE(blames(slice("axis=" + axis), "axis")) << axis;
+  }
+  for (const std::string index : {"19", "-1", "", "1.5", "99999999999999999999"}) {
+    EXPECT_TRUE(blames(slice("axis=z&index=" + index), "index")) << index;
+  }
+  EXPECT_EQ(slice("axis=x&index=20").status, 200);
+  for (const std::string window : {"1", "1,1", "2,1", "nan,1", "0,inf", "0,1,2", ",", ""}) {
+    EXPECT_TRUE(blames(slice("window=" + window), "window")) << window;
+  }
+  EXPECT_TRUE(blames(slice("zoom=2"), "zoom"));
+  EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/0123/slice.png"), ErrorCode::kNotFound));
+}
+
+TEST_F(InspectTest, WhatNeverChangesIsNotSentTwice) {
+  for (const std::string what : {"/histogram", "/slice.png?index=2"}) {
+    const Answer first = daemon_.get(path_ + what);
+    EXPECT_THAT(first.header("cache-control"), testing::HasSubstr("immutable"));
+    const std::string etag = first.header("etag");
+    ASSERT_FALSE(etag.empty());
+    const Answer again = daemon_.get(path_ + what, {{"If-None-Match", etag}});
+    EXPECT_EQ(again.status, 304);
+    EXPECT_TRUE(again.body.empty());
+    EXPECT_EQ(again.header("etag"), etag);
+  }
+  EXPECT_NE(slice("window=0,10").header("etag"), slice("window=0,11").header("etag"));
+  EXPECT_NE(slice("axis=x&index=1").header("etag"), slice("axis=y&index=1").header("etag"));
+}
+
+TEST_F(InspectTest, AnEstimateCountsWhatTheJobMakes) {
+  const Answer answer =
+      daemon_.get("/v1/estimate?volume=" + volume_.id + "&iso=100&scheme=5&format=drc,stl");
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const Estimate estimate = estimate_from_json(answer.body);
+  const Job job = finished_job(daemon_, R"("scheme": 5, "formats": ["drc", "stl"])");
+  EXPECT_EQ(estimate.triangles, job.mesh->triangles);
+  EXPECT_EQ(estimate.vertices, job.mesh->vertices);
+  EXPECT_EQ(estimate.bytes.at(MeshFormat::kStl), job.mesh->files.at(MeshFormat::kStl).bytes);
+  EXPECT_TRUE(estimate.fits);
+  EXPECT_EQ(estimate.queue, Estimate::Queue{});
+}
+
+TEST_F(InspectTest, AnEstimateIsRefusedByName) {
+  const auto with = [&](const std::string& query) {
+    return daemon_.get("/v1/estimate?volume=" + volume_.id + query);
+  };
+  EXPECT_TRUE(blames(with(""), "iso"));
+  EXPECT_TRUE(blames(with("&iso=x"), "iso"));
+  EXPECT_TRUE(blames(with("&iso=1&scheme=7"), "scheme"));
+  EXPECT_TRUE(blames(with("&iso=1&format=doc"), "format"));
+  EXPECT_TRUE(blames(with("&iso=1&iso=2"), "iso"));
+  EXPECT_TRUE(blames(with("&iso=1&flavour=sweet"), "flavour"));
+  EXPECT_TRUE(blames(daemon_.get("/v1/estimate?iso=1"), "volume"));
+  EXPECT_TRUE(is_problem(daemon_.get("/v1/estimate?iso=1&volume=0123"), ErrorCode::kNotFound));
+}
+
+}  // namespace
+}  // namespace isomesh

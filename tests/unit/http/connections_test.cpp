@@ -1,0 +1,410 @@
+// The connection layer with handlers of the test's own: who is slow, silent or gone costs the
+// others nothing.
+#include "server/http/connections.h"
+
+#include <chrono>
+#include <deque>
+#include <future>
+#include <string>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/http/router.h"
+#include "server/net/listener.h"
+#include "tests/api/http.h"
+#include "tests/support/process.h"
+
+namespace isomesh::http {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+using test::Answer;
+using test::answer_to;
+using test::Connection;
+using test::request;
+
+// What the daemon promises while others are slow. Sanitizers and busy machines get more.
+constexpr auto kPrompt = 50ms;
+constexpr auto kPromptEnough = kPrompt * 20;
+
+// Endless words, at once or when the test says so.
+class Words : public net::Source {
+ public:
+  explicit Words(std::atomic<int>& said) : said_(said) {}
+
+  More next(std::string& bytes) override {
+    if (heard_ >= said_) return More::kLater;
+    ++heard_;
+    bytes += "word\n";
+    return More::kBytes;
+  }
+  bool ends_with_reader() const override { return true; }
+
+ private:
+  std::atomic<int>& said_;
+  int heard_ = 0;
+};
+
+// Many bytes, counted.
+class Flood : public net::Source {
+ public:
+  explicit Flood(std::atomic<std::size_t>& made) : made_(made) {}
+
+  More next(std::string& bytes) override {
+    bytes.assign(64 * 1024, 'x');
+    made_ += bytes.size();
+    return More::kBytes;
+  }
+
+ private:
+  std::atomic<std::size_t>& made_;
+};
+
+class ConnectionsTest : public testing::Test {
+ protected:
+  ~ConnectionsTest() override {
+    if (connections_) connections_->close(1s);
+  }
+
+  // Few threads, so that whoever holds one is noticed.
+  static ConnectionOptions options() {
+    ConnectionOptions options;
+    options.threads = 4;
+    return options;
+  }
+
+  void open(const ConnectionOptions& options) {
+    add_routes();
+    connections_.emplace(
+        options, ConnectionHandlers{
+                     .answer = [this](Request& request,
+                                      Response& response) { return answer(request, response); },
+                     .has_ended = [this](const auto&) { return ended_.load(); },
+                     .on_answered = {},
+                     .on_refused = {}});
+    connections_->open(listener_.descriptor());
+  }
+
+  std::optional<Continuation> answer(const Request& request, Response& response) const {
+    const auto [route, parameters] = router_.find(request.path);
+    if (route != nullptr) {
+      const auto handler = route->handlers().find(request.method);
+      if (handler != route->handlers().end()) return handler->second(request, response);
+    }
+    response.status = 404;
+    return std::nullopt;
+  }
+
+  template <class Run>
+  void add(const std::string& method, const std::string& path, const Run& run) {
+    router_.add(method, path, handler_of(run));
+  }
+
+  void add_routes() {
+    for (const char* method : {"GET", "HEAD"}) {
+      add(method, "/status",
+          [](const Request&, Response& response) { response.set_body("ok", "text/plain"); });
+    }
+    add("GET", "/words", [this](const Request&, Response& response) {
+      response.stream = {std::make_unique<Words>(said_), "text/plain",
+                         Framing::kUntilConnectionEnds, 0};
+    });
+    add("GET", "/flood", [this](const Request&, Response& response) {
+      response.stream = {std::make_unique<Flood>(made_), "text/plain", Framing::kLength,
+                         std::uint64_t{1} << 40};
+    });
+    add("GET", "/wait", [this](const Request&, Response&) -> std::optional<Continuation> {
+      ++runs_;
+      return Continuation{"job", Clock::now() + wait_, [this](const Request&, Response& response) {
+                            ++resumed_;
+                            response.set_body("waited", "text/plain");
+                          }};
+    });
+    add("GET", "/block",
+        [this, gate = go_.get_future().share()](const Request&, Response& response) {
+          busy_ = true;
+          gate.wait();
+          response.set_body("done", "text/plain");
+        });
+    add("GET", "/echo", [](const Request& request, Response& response) {
+      response.set_body(std::string(request.header("X-Echo")), "text/plain");
+    });
+    add("GET", "/query", [](const Request& request, Response& response) {
+      std::string text;
+      for (const auto& [name, value] : request.query) text += '<' + name + '=' + value + '>';
+      response.set_body(text, "text/plain");
+    });
+    add("POST", "/body", [](const Request& request, Response& response) {
+      std::size_t size = 0;
+      const bool whole = request.body->read([&](std::string_view piece) {
+        size += piece.size();
+        return true;
+      });
+      const bool slow = request.body->was_too_slow();
+      response.set_body((whole  ? "whole "
+                         : slow ? "slow "
+                                : "cut ") +
+                            std::to_string(size),
+                        "text/plain");
+    });
+  }
+
+  Answer get(const std::string& path) { return answer_to(url_, request("GET", path)); }
+
+  // Connections that have sent that much and nothing more.
+  void hang_on(int count, const std::string& bytes) {
+    for (int n = 0; n < count; ++n) clients_.emplace_back(url_).send(bytes);
+  }
+
+  // How long a status takes, at best: the machine has other things to do.
+  Clock::duration time_of_status() {
+    Clock::duration best = Clock::duration::max();
+    for (int n = 0; n < 5; ++n) {
+      const auto began = Clock::now();
+      EXPECT_EQ(get("/status").body, "ok");
+      best = std::min(best, Clock::now() - began);
+    }
+    return best;
+  }
+
+  net::Listener listener_{net::parse_address("127.0.0.1:0")};
+  const std::string url_ = "http://" + listener_.authority();
+  Router router_;
+  std::atomic<int> said_ = 0;
+  std::atomic<std::size_t> made_ = 0;
+  std::atomic<int> runs_ = 0;
+  std::atomic<int> resumed_ = 0;
+  std::atomic<bool> ended_ = false;
+  std::atomic<bool> busy_ = false;
+  std::promise<void> go_;
+  std::chrono::milliseconds wait_ = 60s;
+  std::deque<Connection> clients_;
+  std::optional<Connections> connections_;
+};
+
+TEST_F(ConnectionsTest, AnswersARequest) {
+  open(options());
+  const Answer answer = get("/status");
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(answer.body, "ok");
+  EXPECT_EQ(answer.header("connection"), "close");
+}
+
+TEST_F(ConnectionsTest, SilentSlowAndListeningClientsCostTheOthersNothing) {
+  open(options());
+  hang_on(64, "");
+  hang_on(64, "GET /status HTTP/1.1\r\nX-Slow: ");
+  hang_on(64, "POST /body HTTP/1.1\r\nHost: a\r\nContent-Length: 1000\r\n\r\nslow");
+  hang_on(64, request("GET", "/words"));
+  hang_on(64, request("GET", "/wait"));
+  EXPECT_LT(time_of_status(), kPrompt * 2);
+  said_ = 1;
+  connections_->wake_sources();
+  EXPECT_LT(time_of_status(), kPrompt * 2);
+}
+
+// Each takes what its socket holds, and then no more.
+TEST_F(ConnectionsTest, ReadersThatDoNotReadHoldNoThread) {
+  open(options());
+  hang_on(16, request("GET", "/flood"));
+  ASSERT_TRUE(test::eventually([&] { return made_ > 16U * 64 * 1024; }));
+  EXPECT_LT(time_of_status(), kPromptEnough);
+}
+
+TEST_F(ConnectionsTest, WhoeverIsSilentForTooLongIsClosed) {
+  ConnectionOptions quick = options();
+  quick.acceptor.head_time = 100ms;
+  open(quick);
+  const Connection silent(url_);
+  EXPECT_EQ(silent.receive().status, 0);
+  const Connection slow(url_);
+  slow.send("GET /status HTTP/1.1\r\n");
+  EXPECT_EQ(slow.receive().status, 408);
+  const Connection half(url_);
+  half.send("POST /body HTTP/1.1\r\nHost: a\r\nContent-Length: 10\r\n\r\nhalf");
+  EXPECT_EQ(half.receive().status, 408);
+}
+
+TEST_F(ConnectionsTest, TheOldestSilentOneMakesRoom) {
+  ConnectionOptions few = options();
+  few.acceptor.most_pending = 8;
+  open(few);
+  const Connection oldest(url_);
+  hang_on(8, "GET /sta");
+  EXPECT_EQ(oldest.receive().status, 0);
+  EXPECT_EQ(get("/status").status, 200);
+}
+
+TEST_F(ConnectionsTest, ManyHalfBodiesAreBounded) {
+  ConnectionOptions little = options();
+  little.acceptor.most_bytes = 200'000;
+  open(little);
+  hang_on(10, "POST /body HTTP/1.1\r\nHost: a\r\nContent-Length: 60000\r\n\r\n" +
+                  std::string(50'000, 'x'));
+  EXPECT_EQ(clients_.front().receive().status, 0);
+  EXPECT_EQ(get("/status").status, 200);
+}
+
+TEST_F(ConnectionsTest, ABodyThatComesTooSlowlyIsGivenUp) {
+  ConnectionOptions quick = options();
+  quick.body.patience = 100ms;
+  open(quick);
+  const Connection slow(url_);
+  slow.send("POST /body HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\nabc");
+  EXPECT_EQ(slow.receive().body, "slow 3");
+}
+
+TEST_F(ConnectionsTest, ABodyComesInWhateverPieces) {
+  open(options());
+  const std::string whole = request("POST", "/body", std::string(200'000, 'x'));
+  for (const std::size_t piece : {whole.size(), std::size_t{7'000}, std::size_t{70'000}}) {
+    const Connection connection(url_);
+    for (std::size_t at = 0; at < whole.size(); at += piece) {
+      connection.send(std::string_view(whole).substr(at, piece));
+    }
+    EXPECT_EQ(connection.receive().body, "whole 200000");
+  }
+  EXPECT_EQ(answer_to(url_, request("POST", "/body", "small")).body, "whole 5");
+  EXPECT_EQ(answer_to(url_, "POST /body HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n" +
+                                test::chunked(std::string(5000, 'y'), 700))
+                .body,
+            "whole 5000");
+}
+
+TEST_F(ConnectionsTest, ABodyIsInvitedOnceItIsWanted) {
+  open(options());
+  const Connection connection(url_);
+  connection.send(
+      "POST /body HTTP/1.1\r\nHost: a\r\nExpect: 100-continue\r\nContent-Length: 3\r\n\r\n");
+  EXPECT_EQ(connection.receive_some(), "HTTP/1.1 100 Continue\r\n\r\n");
+  connection.send("abc");
+  EXPECT_EQ(connection.receive().body, "whole 3");
+  // Nobody reads this one.
+  EXPECT_EQ(answer_to(url_,
+                      "GET /status HTTP/1.1\r\nHost: a\r\nExpect: 100-continue\r\n"
+                      "Content-Length: 3\r\n\r\n")
+                .body,
+            "ok");
+}
+
+// A large body that nobody reads must not destroy the answer on its way.
+TEST_F(ConnectionsTest, WhoStillSendsGetsTheAnswer) {
+  open(options());
+  const Connection connection(url_);
+  connection.send(request("POST", "/status", std::string(4'000'000, 'x')));
+  EXPECT_EQ(connection.receive().status, 404);
+}
+
+TEST_F(ConnectionsTest, WaitersAreAnsweredByTheEndOfTheirJob) {
+  open(options());
+  hang_on(40, request("GET", "/wait"));
+  ASSERT_TRUE(test::eventually([&] { return runs_ == 40; }));
+  connections_->job_ended("another job");
+  EXPECT_LT(time_of_status(), kPromptEnough);
+  EXPECT_EQ(resumed_, 0);
+  // Some of them may not be parked yet: those find that the job has ended.
+  ended_ = true;
+  connections_->job_ended("job");
+  for (const Connection& connection : clients_) EXPECT_EQ(connection.receive().body, "waited");
+  EXPECT_EQ(resumed_, 40);
+}
+
+TEST_F(ConnectionsTest, WaitersAreAnsweredByTheClock) {
+  wait_ = 50ms;
+  open(options());
+  EXPECT_EQ(get("/wait").body, "waited");
+  EXPECT_EQ(runs_, 1);
+  EXPECT_EQ(resumed_, 1);
+}
+
+TEST_F(ConnectionsTest, AJobThatEndedOnTheWayIsNotWaitedFor) {
+  ended_ = true;
+  open(options());
+  EXPECT_EQ(get("/wait").body, "waited");
+}
+
+TEST_F(ConnectionsTest, AStreamGoesOnWhenSomethingHappens) {
+  open(options());
+  hang_on(2, request("GET", "/words"));
+  said_ = 2;
+  connections_->wake_sources();
+  for (const Connection& connection : clients_) {
+    std::string heard;
+    while (!heard.ends_with("word\nword\n")) heard += connection.receive_some();
+    EXPECT_THAT(heard, testing::HasSubstr("\r\n\r\nword\nword\n"));
+  }
+}
+
+TEST_F(ConnectionsTest, AReaderThatIsGoneIsNoticed) {
+  open(options());
+  hang_on(3, request("GET", "/words"));
+  ASSERT_TRUE(test::eventually([&] { return connections_->sending() == 3; }));
+  clients_.clear();
+  EXPECT_TRUE(test::eventually([&] { return connections_->sending() == 0; }));
+}
+
+TEST_F(ConnectionsTest, AReaderThatTakesNothingIsGivenUp) {
+  ConnectionOptions quick = options();
+  quick.sender.patience = 100ms;
+  open(quick);
+  hang_on(1, request("GET", "/flood"));
+  ASSERT_TRUE(test::eventually([&] { return connections_->sending() == 1; }));
+  EXPECT_TRUE(test::eventually([&] { return connections_->sending() == 0; }));
+}
+
+TEST_F(ConnectionsTest, AFullQueueSaysSo) {
+  ConnectionOptions narrow = options();
+  narrow.threads = 1;
+  narrow.backlog = 1;
+  open(narrow);
+  hang_on(1, request("GET", "/block"));
+  ASSERT_TRUE(test::eventually([&] { return busy_.load(); }));
+  hang_on(1, request("GET", "/status"));  // the one that waits
+  ASSERT_TRUE(test::eventually([&] { return connections_->pending() == 0; }));
+  const Answer refused = get("/status");
+  EXPECT_EQ(refused.status, 503);
+  EXPECT_EQ(refused.header("retry-after"), "1");
+  go_.set_value();
+  EXPECT_EQ(clients_[1].receive().body, "ok");
+}
+
+TEST_F(ConnectionsTest, HeadersComeAsTheyWereSent) {
+  open(options());
+  EXPECT_EQ(answer_to(url_, request("GET", "/echo", "", {{"X-Echo", "a%0d%0aX: b"}})).body,
+            "a%0d%0aX: b");
+}
+
+TEST_F(ConnectionsTest, QueriesAreDecoded) {
+  open(options());
+  EXPECT_EQ(get("/query?b=%41+c&a=?").body, "<a=?><b=A c>");
+}
+
+TEST_F(ConnectionsTest, AHeadRequestGetsTheHeadAlone) {
+  open(options());
+  const Answer answer = answer_to(url_, request("HEAD", "/status"));
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(answer.header("content-length"), "2");
+  EXPECT_TRUE(answer.body.empty());
+}
+
+TEST_F(ConnectionsTest, TheEndCutsBodiesAndAnswersWaiters) {
+  open(options());
+  const Connection waiting(url_);
+  waiting.send(request("GET", "/wait"));
+  ASSERT_TRUE(test::eventually([&] { return runs_ == 1; }));
+  const Connection sending(url_);
+  sending.send("POST /body HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\nabc");
+  hang_on(3, request("GET", "/words"));
+  ASSERT_TRUE(test::eventually([&] { return connections_->sending() == 3; }));
+  const auto began = Clock::now();
+  connections_->close(10s);
+  EXPECT_LT(Clock::now() - began, 5s);
+  EXPECT_EQ(waiting.receive().body, "waited");
+  EXPECT_EQ(sending.receive().body, "cut 3");
+}
+
+}  // namespace
+}  // namespace isomesh::http

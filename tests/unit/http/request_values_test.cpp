@@ -1,0 +1,374 @@
+#include "server/http/request_values.h"
+
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/errors.h"
+
+namespace isomesh::http {
+namespace {
+
+using std::chrono::milliseconds;
+using test::code_thrown_by;
+using test::fields_of;
+using test::thrown_by;
+using testing::ElementsAre;
+using testing::UnorderedElementsAre;
+using Pairs = std::vector<std::pair<std::string, std::string>>;
+
+Request with_header(const std::string& name, const std::string& value) {
+  Request request;
+  request.headers.emplace_back(name, value);
+  return request;
+}
+
+Request with_query(const Pairs& parameters) {
+  Request request;
+  request.query = parameters;
+  return request;
+}
+
+TEST(AcceptsGzip, IsWhatTheHeaderSays) {
+  for (const std::string header : {"gzip", "gzip, deflate, br", "br;q=1.0, gzip;q=0.5", "*"}) {
+    EXPECT_TRUE(accepts_gzip(with_header("Accept-Encoding", header))) << header;
+  }
+  for (const std::string header : {"", "identity", "br", "gzip;q=0", "gzip; q=0.0", "gzipped"}) {
+    EXPECT_FALSE(accepts_gzip(with_header("Accept-Encoding", header))) << header;
+  }
+  EXPECT_FALSE(accepts_gzip(Request()));
+}
+
+// --- Ranges
+
+constexpr std::uint64_t kSize = 1000;
+
+// {first, length}, or empty where the header is ignored.
+std::optional<std::pair<std::uint64_t, std::uint64_t>> range(const std::string& header,
+                                                             std::uint64_t size = kSize) {
+  const auto found = range_of(with_header("Range", header), size);
+  if (!found) return std::nullopt;
+  return std::pair(found->first, found->length);
+}
+
+TEST(Range, NoneIsTheWholeFile) { EXPECT_FALSE(range_of(Request(), kSize)); }
+
+TEST(Range, TakesTheThreeForms) {
+  EXPECT_EQ(range("bytes=0-0"), std::pair(0UL, 1UL));
+  EXPECT_EQ(range("bytes=0-999"), std::pair(0UL, 1000UL));
+  EXPECT_EQ(range("bytes=100-199"), std::pair(100UL, 100UL));
+  EXPECT_EQ(range("bytes=999-"), std::pair(999UL, 1UL));
+  EXPECT_EQ(range("bytes=0-"), std::pair(0UL, 1000UL));
+  EXPECT_EQ(range("bytes=-1"), std::pair(999UL, 1UL));
+  EXPECT_EQ(range("bytes=-1000"), std::pair(0UL, 1000UL));
+  EXPECT_EQ(range("bytes= 5-6 "), std::pair(5UL, 2UL));
+}
+
+TEST(Range, IsCutAtTheEndOfTheFile) {
+  EXPECT_EQ(range("bytes=0-1999"), std::pair(0UL, 1000UL));
+  EXPECT_EQ(range("bytes=990-18446744073709551615"), std::pair(990UL, 10UL));
+  EXPECT_EQ(range("bytes=-5000"), std::pair(0UL, 1000UL));
+  EXPECT_EQ(range("bytes=-18446744073709551615"), std::pair(0UL, 1000UL));
+}
+
+TEST(Range, OutsideOfTheFileIsNotSatisfiable) {
+  for (const std::string header : {"bytes=1000-", "bytes=1000-1000", "bytes=5000-6000", "bytes=-0",
+                                   "bytes=18446744073709551615-"}) {
+    EXPECT_EQ(test::code_thrown_by([&] { range(header); }), ErrorCode::kRangeNotSatisfiable)
+        << header;
+  }
+  for (const std::string header : {"bytes=0-", "bytes=0-0", "bytes=-1"}) {
+    EXPECT_EQ(test::code_thrown_by([&] { range(header, 0); }), ErrorCode::kRangeNotSatisfiable)
+        << header << " of an empty file";
+  }
+}
+
+TEST(Range, IsIgnoredWhereItMayBe) {
+  for (const std::string header :
+       {"", "bytes", "bytes=", "bytes=-", "bytes=a-b", "bytes=5", "bytes=9-5", "bytes=0-1,5-6",
+        "bytes=0-1, 5-", "bytes=--5", "bytes=+1-5", "bytes=0x1-5", "bytes=1.5-9", "bytes=1-9-10",
+        "bytes=0 - 9x", "items=0-5", "Bytes 0-5", "bytes=18446744073709551616-",
+        "bytes=0-18446744073709551616"}) {
+    EXPECT_EQ(range(header), std::nullopt) << header;
+  }
+}
+
+// --- Waiting
+
+TEST(Wait, IsNoneWithoutAWish) { EXPECT_EQ(wait_of(Request()), milliseconds(0)); }
+
+TEST(Wait, TakesTheQuery) {
+  const auto wait = [](const std::string& value) { return wait_of(with_query({{"wait", value}})); };
+  EXPECT_EQ(wait("0"), milliseconds(0));
+  EXPECT_EQ(wait("10"), milliseconds(10'000));
+  EXPECT_EQ(wait("0.25"), milliseconds(250));
+  EXPECT_EQ(wait("30"), milliseconds(30'000));
+  EXPECT_EQ(wait("31"), milliseconds(30'000));
+  EXPECT_EQ(wait("1e300"), milliseconds(30'000));
+}
+
+TEST(Wait, RefusesAQueryThatIsNoNumber) {
+  for (const std::string value :
+       {"", "-1", "abc", "nan", "inf", "-inf", "infinity", "5s", " 5", "1e999"}) {
+    const auto error = thrown_by([&] { wait_of(with_query({{"wait", value}})); });
+    ASSERT_TRUE(error) << value;
+    EXPECT_THAT(fields_of(*error), ElementsAre("wait"));
+  }
+}
+
+TEST(Wait, TakesThePreference) {
+  const auto wait = [](const std::string& value) { return wait_of(with_header("Prefer", value)); };
+  EXPECT_EQ(wait("wait=10"), milliseconds(10'000));
+  EXPECT_EQ(wait("respond-async, wait=10"), milliseconds(10'000));
+  EXPECT_EQ(wait("wait=10, handling=lenient"), milliseconds(10'000));
+  EXPECT_EQ(wait("wait=1000"), milliseconds(30'000));
+  EXPECT_EQ(wait("Wait = 10; x=y"), milliseconds(10'000));
+}
+
+TEST(Wait, RefusesAPreferenceThatIsNoNumber) {
+  for (const std::string value : {"wait", "wait=", "wait=-1", "wait=x", "wait=nan", "wait=inf"}) {
+    const auto error = thrown_by([&] { wait_of(with_header("Prefer", value)); });
+    ASSERT_TRUE(error) << value;
+    EXPECT_THAT(fields_of(*error), ElementsAre("Prefer"));
+  }
+}
+
+TEST(Wait, IgnoresOtherPreferences) {
+  for (const std::string value : {"", "await=5", "respond-async", "handling=strict; wait=5"}) {
+    EXPECT_EQ(wait_of(with_header("Prefer", value)), milliseconds(0)) << value;
+  }
+}
+
+TEST(Wait, TheQueryGoesBeforeThePreference) {
+  Request request = with_header("Prefer", "wait=20");
+  request.query.emplace_back("wait", "1");
+  EXPECT_EQ(wait_of(request), milliseconds(1'000));
+}
+
+// --- Digests
+
+// Of "hello".
+constexpr const char* kHex = "2cf24dba5fb0a30e26e83b2ac5b9e29e1b161e5c1fa7425e73043362938b9824";
+const std::string kBase64 = "LPJNul+wow4m6DsqxbninhsWHlwfp0JecwQzYpOLmCQ=";
+
+std::optional<std::string> digest(const std::string& header) {
+  return sha256_of_content_digest(with_header("Content-Digest", header));
+}
+
+TEST(ContentDigest, GivesTheSha256AsHex) {
+  EXPECT_EQ(digest("sha-256=:" + kBase64 + ":"), kHex);
+  EXPECT_EQ(digest("sha-512=:AAAA:, sha-256=:" + kBase64 + ":"), kHex);
+  EXPECT_EQ(digest("sha-256=:" + kBase64 + ":,sha-512=:AAAA:"), kHex);
+}
+
+TEST(ContentDigest, OtherAlgorithmsAreIgnored) {
+  EXPECT_EQ(sha256_of_content_digest(Request()), std::nullopt);
+  EXPECT_EQ(digest("sha-512=:AAAA:"), std::nullopt);
+}
+
+TEST(ContentDigest, IsWrittenAsItIsRead) {
+  EXPECT_EQ(digest_header(kHex), "sha-256=:" + kBase64 + ":");
+}
+
+TEST(ContentDigest, GarbageIsRefused) {
+  const std::string one = "sha-256=:" + kBase64 + ":";
+  for (const std::string& value :
+       {std::string(), std::string("garbage"), one + ",", one + ", " + one,
+        std::string("sha-512=AAAA"), std::string("sha-512=:A A:")}) {
+    const auto error = thrown_by([&] { digest(value); });
+    ASSERT_TRUE(error) << value;
+    EXPECT_THAT(fields_of(*error), ElementsAre("Content-Digest"));
+  }
+}
+
+TEST(ContentDigest, WhatIsNoDigestIsRefused) {
+  const std::string thirty_three_bytes = kBase64.substr(0, 43) + "A";
+  for (const std::string& value :
+       {std::string(), std::string(":"), std::string("::"), kBase64, ":" + kBase64, kBase64 + ":",
+        ":" + kBase64.substr(4) + ":", ":" + kBase64 + "AAAA:", ":" + thirty_three_bytes + ":",
+        ":" + std::string(44, '!') + ":", ":" + std::string(44, '=') + ":",
+        ":" + kBase64.substr(0, 42) + "==:", ":" + std::string(44, '\xff') + ":"}) {
+    const auto error = thrown_by([&] { digest("sha-256=" + value); });
+    ASSERT_TRUE(error) << value;
+    EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
+    EXPECT_THAT(fields_of(*error), ElementsAre("Content-Digest"));
+  }
+}
+
+// --- Raw samples
+
+TEST(RawDescription, IsNoneWithoutDims) { EXPECT_FALSE(raw_description_of(Request())); }
+
+TEST(RawDescription, NeedsDimsAndTypeOnly) {
+  const auto raw = raw_description_of(with_query({{"dims", "3,4,5"}, {"type", "int16"}}));
+  ASSERT_TRUE(raw);
+  EXPECT_EQ(raw->dims, (std::array<std::uint32_t, 3>{3, 4, 5}));
+  EXPECT_EQ(raw->type, SampleType::kInt16);
+  EXPECT_EQ(raw->geometry, Geometry{});
+  EXPECT_FALSE(raw->big_endian);
+}
+
+TEST(RawDescription, TakesEveryParameter) {
+  const auto raw = raw_description_of(with_query({{"dims", "3, 4,5"},
+                                                  {"type", "float64"},
+                                                  {"spacing", "0.5,1e-1,2"},
+                                                  {"origin", "-1,0,1.5"},
+                                                  {"direction", "0,1,0,1,0,0,0,0,-1"},
+                                                  {"byte_order", "big"}}));
+  ASSERT_TRUE(raw);
+  EXPECT_EQ(raw->type, SampleType::kFloat64);
+  EXPECT_EQ(raw->geometry.spacing, (std::array<double, 3>{0.5, 0.1, 2}));
+  EXPECT_EQ(raw->geometry.origin, (std::array<double, 3>{-1, 0, 1.5}));
+  EXPECT_EQ(raw->geometry.direction, (std::array<double, 9>{0, 1, 0, 1, 0, 0, 0, 0, -1}));
+  EXPECT_TRUE(raw->big_endian);
+}
+
+TEST(RawDescription, WhatIsMalformedIsRefusedByName) {
+  for (const auto& [name, value] : Pairs{{"dims", ""},
+                                         {"dims", "3,4"},
+                                         {"dims", "3,4,5,6"},
+                                         {"dims", "3,4,-5"},
+                                         {"dims", "3,4,5.5"},
+                                         {"dims", "3,4,4294967296"},
+                                         {"dims", "a,b,c"},
+                                         {"dims", "3,,5"},
+                                         {"type", ""},
+                                         {"type", "int64"},
+                                         {"type", "UINT8"},
+                                         {"spacing", "1,1"},
+                                         {"spacing", "1,1,x"},
+                                         {"origin", "0"},
+                                         {"direction", "1,0,0,0,1,0,0,0"},
+                                         {"byte_order", "middle"},
+                                         {"byte_order", ""}}) {
+    Pairs query = {{"dims", "3,4,5"}, {"type", "uint8"}};
+    std::erase_if(query, [&, name = name](const auto& pair) { return pair.first == name; });
+    query.emplace_back(name, value);
+    const auto error = thrown_by([&] { raw_description_of(with_query(query)); });
+    ASSERT_TRUE(error) << name << '=' << value;
+    EXPECT_THAT(fields_of(*error), ElementsAre(name)) << value;
+  }
+}
+
+TEST(RawDescription, PartsOfItWithoutDimsAreRefused) {
+  for (const std::string& name : raw_description_parameters()) {
+    if (name == "dims") continue;
+    const auto error = thrown_by([&] { raw_description_of(with_query({{name, "1"}})); });
+    ASSERT_TRUE(error) << name;
+    EXPECT_THAT(fields_of(*error), ElementsAre("dims"));
+  }
+}
+
+TEST(RawDescription, KnowsItsParameters) {
+  EXPECT_THAT(raw_description_parameters(),
+              UnorderedElementsAre("dims", "type", "spacing", "origin", "direction", "byte_order"));
+}
+
+TEST(ImportOptionsOf, TakesASeries) {
+  const auto options = import_options_of(with_query({{"series", "1.2.840.113619.2.30"}}));
+  EXPECT_EQ(options.series, "1.2.840.113619.2.30");
+  EXPECT_FALSE(options.raw);
+  EXPECT_TRUE(import_options_of(with_query({})).series.empty());
+}
+
+TEST(ImportOptionsOf, RefusesASeriesThatIsNoUid) {
+  for (const std::string& series : {std::string(), std::string("1.2.x"), std::string("../1"),
+                                    std::string("1.2 "), std::string(65, '1')}) {
+    const auto error = thrown_by([&] { import_options_of(with_query({{"series", series}})); });
+    ASSERT_TRUE(error) << series;
+    EXPECT_THAT(fields_of(*error), ElementsAre("series"));
+  }
+}
+
+TEST(ImportOptionsOf, RawSamplesHaveNoSeries) {
+  const auto error = thrown_by([] {
+    import_options_of(with_query({{"dims", "3,4,5"}, {"type", "int16"}, {"series", "1.2"}}));
+  });
+  ASSERT_TRUE(error);
+  EXPECT_THAT(fields_of(*error), ElementsAre("series"));
+}
+
+// --- Queries and entity tags
+
+TEST(CheckKnown, TakesWhatIsKnown) {
+  check_known(with_query({}), {});
+  check_known(with_query({{"a", "1"}}), {"a", "b"});
+}
+
+TEST(CheckKnown, NamesAllThatIsNot) {
+  const auto error = thrown_by([] {
+    check_known(with_query({{"a", "1"}, {"x", "2"}, {"y", "3"}}), {"a"});
+  });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
+  EXPECT_THAT(fields_of(*error), UnorderedElementsAre("x", "y"));
+}
+
+TEST(CheckKnown, RefusesWhatIsGivenTwice) {
+  const auto error = thrown_by([] { check_known(with_query({{"a", "1"}, {"a", "1"}}), {"a"}); });
+  ASSERT_TRUE(error);
+  EXPECT_THAT(fields_of(*error), testing::Each("a"));
+}
+
+TEST(CheckKnown, DoesNotRepeatLongNamesWhole) {
+  const auto error = thrown_by([] { check_known(with_query({{std::string(4000, 'x'), ""}}), {}); });
+  ASSERT_TRUE(error);
+  EXPECT_LT(std::string(error->what()).size(), 200U);
+}
+
+TEST(EntityTag, IsFoundAmongSeveral) {
+  const auto matches = [](const std::string& header) {
+    return matches_etag(with_header("If-None-Match", header), "\"abc\"");
+  };
+  EXPECT_TRUE(matches("\"abc\""));
+  EXPECT_TRUE(matches("W/\"abc\""));
+  EXPECT_TRUE(matches("*"));
+  EXPECT_TRUE(matches("\"x\", \"abc\""));
+  EXPECT_TRUE(matches("\"x\" , W/\"abc\" ,\"y\""));
+  EXPECT_FALSE(matches("abc"));
+  EXPECT_FALSE(matches("\"ABC\""));
+  EXPECT_FALSE(matches("\"abcd\""));
+  EXPECT_FALSE(matches("\"\""));
+  EXPECT_FALSE(matches(""));
+  EXPECT_FALSE(matches_etag(Request(), "\"abc\""));
+}
+
+// --- Preconditions, cursors, streams
+
+TEST(IfMatch, RefusesWhatIsNotThere) {
+  check_if_match(Request(), "\"a\"");
+  check_if_match(with_header("If-Match", "*"), "\"a\"");
+  check_if_match(with_header("If-Match", "\"b\", \"a\""), "\"a\"");
+  EXPECT_EQ(code_thrown_by([] { check_if_match(with_header("If-Match", "\"b\""), "\"a\""); }),
+            ErrorCode::kPreconditionFailed);
+}
+
+TEST(Cursor, StandsForTheRestOfItsList) {
+  const std::string id = "018f3c5e-7a60-7c31-a1f2-0f6c2a9be0d4";
+  const std::string cursor = cursor_after("jobs", id);
+  EXPECT_EQ(id_after(with_query({{"cursor", cursor}}), "jobs"), id);
+  EXPECT_EQ(id_after(Request(), "jobs"), "");
+  for (const std::string& wrong :
+       {std::string(), id, cursor + "0", cursor + "00", cursor.substr(2), std::string("zz"),
+        cursor_after("volumes", id), cursor_after("jobs", ""), cursor_after("jobs", "a\nb"),
+        cursor_after("jobs", std::string(200, 'a'))}) {
+    const auto error = thrown_by([&] { id_after(with_query({{"cursor", wrong}}), "jobs"); });
+    ASSERT_TRUE(error) << wrong;
+    EXPECT_THAT(fields_of(*error), ElementsAre("cursor"));
+  }
+}
+
+TEST(LastEventId, IsANumber) {
+  EXPECT_EQ(last_event_id(Request()), std::nullopt);
+  EXPECT_EQ(last_event_id(with_header("Last-Event-ID", "17")), 17U);
+  for (const std::string wrong : {"", "-1", "x", "1 2", "18446744073709551616"}) {
+    EXPECT_TRUE(thrown_by([&] { last_event_id(with_header("Last-Event-ID", wrong)); })) << wrong;
+  }
+}
+
+}  // namespace
+}  // namespace isomesh::http

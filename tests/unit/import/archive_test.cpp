@@ -1,0 +1,246 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/import/archives.h"
+#include "tests/unit/import/files.h"
+#include "tests/unit/import/writers.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using Kind = Member::Kind;
+using testing::AllOf;
+using testing::HasSubstr;
+
+const std::string kSamples(kSmallSamples);
+
+std::string mhd(const std::string& data = "head.raw") {
+  return metaimage(with(small_metaimage(), "ElementDataFile", data), "");
+}
+
+std::string nhdr(const std::string& data = "head.raw") {
+  return nrrd(with(small_nrrd(), "data file", data), "");
+}
+
+// The archive in each of the three forms.
+std::vector<std::string> forms(const std::vector<Member>& members) {
+  return {zip(members), tar(members), gzip(tar(members))};
+}
+
+void expect_read(const std::vector<Member>& members, const std::string& format) {
+  for (const std::string& file : forms(members)) {
+    const Outcome outcome = import_bytes(file);
+    EXPECT_EQ(outcome.error, "");
+    if (!outcome.imported()) continue;
+    EXPECT_EQ(outcome.sample_bytes(), kSmallSamples);
+    EXPECT_EQ(outcome.volume.format, format);
+  }
+}
+
+template <class Matcher>
+void expect_refused(const std::vector<Member>& members, const Matcher& matcher,
+                    ErrorCode code = ErrorCode::kUnusableVolume) {
+  for (const std::string& file : forms(members)) {
+    const Outcome outcome = import_bytes(file);
+    EXPECT_THAT(outcome.error, matcher);
+    EXPECT_EQ(outcome.code, code);
+  }
+}
+
+TEST(Archive, HoldsOneVolumeOfAnyFormat) {
+  expect_read({{"head.nii", nifti({}, kSamples)}}, "nifti");
+  expect_read({{"folder", "", Kind::kFolder}, {"folder/head.nii.gz", gzip(nifti({}, kSamples))}},
+              "nifti");
+  expect_read({{"a name with spaces \xc3\xbc.nrrd", nrrd(small_nrrd(), kSamples)}}, "nrrd");
+  expect_read({{"README", "what this is"}, {"head.mha", metaimage(small_metaimage(), kSamples)}},
+              "metaimage");
+}
+
+TEST(Archive, HoldsAHeaderAndItsData) {
+  expect_read({{"head.mhd", mhd()}, {"head.raw", kSamples}}, "metaimage");
+  expect_read({{"head.raw", kSamples}, {"head.nhdr", nhdr()}}, "nrrd");
+  // Names belong to the header's folder.
+  expect_read({{"a/head.mhd", mhd()}, {"b/head.raw", "other"}, {"a/head.raw", kSamples}},
+              "metaimage");
+}
+
+TEST(Archive, DataMayBeEncodedSkippedAndShared) {
+  const Lines lines = with(small_metaimage(), "CompressedData", "True");
+  expect_read({{"h.mhd", metaimage(with(lines, "ElementDataFile", "h.zraw"), "")},
+               {"h.zraw", zlib(kSamples)}},
+              "metaimage");
+  expect_read(
+      {{"h.nhdr", nrrd(with(with(small_nrrd(), "encoding", "gzip"), "data file", "h.gz"), "")},
+       {"h.gz", gzip(kSamples)}},
+      "nrrd");
+  expect_read({{"h.mhd", metaimage(with(with(small_metaimage(), "HeaderSize", "3"),
+                                        "ElementDataFile", "h.raw"),
+                                   "")},
+               {"h.raw", "###" + kSamples}},
+              "metaimage");
+  expect_read({{"h.mhd", metaimage(with(with(small_metaimage(), "HeaderSize", "-1"),
+                                        "ElementDataFile", "h.raw"),
+                                   "")},
+               {"h.raw", "####" + kSamples}},
+              "metaimage");
+  const std::vector<Member> halves = {{"1.raw", kSamples.substr(0, 12)},
+                                      {"2.raw", kSamples.substr(12)}};
+  expect_read({halves[1], halves[0], {"h.mhd", mhd("LIST") + "1.raw\n2.raw\n"}}, "metaimage");
+  Lines listed = small_nrrd();
+  listed.emplace_back("data file", "LIST");
+  std::string list = nrrd(listed, "1.raw\n2.raw\n");
+  list.erase(list.find("LIST\n\n") + 5, 1);
+  expect_read({halves[0], halves[1], {"h.nhdr", list}}, "nrrd");
+}
+
+// Each slice in a file of its own, as MetaIO and NRRD name them.
+TEST(Archive, DataMayBeNamedByAPattern) {
+  const Member lower{"head-08.raw", kSamples.substr(0, 12)};
+  const Member upper{"head-10.raw", kSamples.substr(12)};
+  const Member between{"head-09.raw", "another"};
+  for (const std::string said : {"head-%02d.raw 8 10 2", "head-%02i.raw 8 11 2"}) {
+    expect_read({upper, between, {"h.mhd", mhd(said)}, lower}, "metaimage");
+    expect_read({upper, between, {"h.nhdr", nhdr(said)}, lower}, "nrrd");
+  }
+  expect_read({upper, lower, {"h.nhdr", nhdr("head-%02u.raw 8 10 2 2")}}, "nrrd");
+  expect_read({{"1", lower.bytes}, {"2", upper.bytes}, {"h.mhd", mhd("%d 1 2")}}, "metaimage");
+  // The other way round.
+  expect_read({{"9.raw", upper.bytes}, {"10.raw", lower.bytes}, {"h.nhdr", nhdr("%d.raw 10 9 -1")}},
+              "nrrd");
+  expect_refused({lower, {"h.mhd", mhd("head-%02d.raw 8 10 2")}},
+                 HasSubstr("\"head-10.raw\", which did not come with it"));
+  expect_refused({lower, upper, between, {"h.mhd", mhd("head-%02d.raw 8 10 1")}},
+                 HasSubstr("has 12 bytes, where the header tells 8"));
+}
+
+TEST(Archive, PatternsOfOtherThingsAreRefused) {
+  for (const std::string said : {"a%02d.raw",
+                                 "a%02d.raw 1",
+                                 "a%02d.raw 1 2 0",
+                                 "a%02d.raw 2 1",
+                                 "a%02d.raw 2 1 5",
+                                 "a%d 1 -9223372036854775808",
+                                 "a%02d.raw 1 2 -1",
+                                 "a%02d.raw 1 x",
+                                 "a%02d.raw -1 1",
+                                 "a%s.raw 1 2",
+                                 "a%n 1 2",
+                                 "a%*d 1 2",
+                                 "a%d%d 1 2",
+                                 "a%d%% 1 2",
+                                 "a% 1 2",
+                                 "a%9 1 2",
+                                 "a%999999999999999999999d 1 2",
+                                 "a%10d 1 2",
+                                 "a%d 1 99999999999",
+                                 "a%d 1 2 3 4 5",
+                                 "b 1%d 2"}) {
+    expect_refused({{"h.mhd", mhd(said)}, {"a01.raw", kSamples}}, HasSubstr("no pattern"));
+  }
+  expect_refused({{"h.mhd", mhd("a%d 0 65536")}}, HasSubstr("names 65537 data files"));
+  expect_refused({{"h.mhd", mhd("../a%d.raw 1 2")}}, HasSubstr("in another file"));
+}
+
+TEST(Archive, DataThatIsNotWhatTheHeaderTellsIsRefused) {
+  expect_refused({{"head.mhd", mhd()}, {"head.raw", kSamples + "x"}}, HasSubstr("25 bytes"));
+  expect_refused({{"head.nhdr", nhdr()}, {"head.raw", kSamples.substr(1)}}, HasSubstr("23 bytes"));
+  expect_refused({{"head.mhd", mhd()}, {"other.raw", kSamples}}, HasSubstr("did not come with it"));
+  expect_refused({{"head.mhd", mhd("")}, {"head.raw", kSamples}}, HasSubstr(""));
+}
+
+TEST(Archive, HeadersNameOnlyFilesBesideThem) {
+  for (const std::string name : {"../head.raw", "/etc/passwd", "a/head.raw", ".."}) {
+    expect_refused({{"a/head.mhd", mhd(name)}, {"head.raw", kSamples}, {"a/head.raw", kSamples}},
+                   HasSubstr("in another file"));
+    expect_refused({{"a/head.nhdr", nhdr(name)}, {"head.raw", kSamples}},
+                   HasSubstr("in another file"));
+  }
+}
+
+TEST(Archive, NamesOfMembersAreNoPlaces) {
+  const std::string volume = nifti({}, kSamples);
+  for (const std::string name :
+       {"../../../escaped.nii", "/tmp/escaped.nii", "..", "a/../b", "\xff\xfe.nii"}) {
+    for (const std::string& file : forms({{name, volume}})) {
+      const Outcome outcome = import_bytes(file);
+      EXPECT_TRUE(!outcome.imported() || outcome.sample_bytes() == kSmallSamples) << name;
+    }
+  }
+}
+
+TEST(Archive, AFileWithoutANameIsRefused) {
+  const std::string file = tar({{"head.nii", nifti({}, kSamples)}, {"notes", "text"}});
+  EXPECT_TRUE(import_bytes(file).imported());
+  const Outcome outcome = import_bytes(without_name(file, "notes"));
+  EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
+  EXPECT_THAT(outcome.error, HasSubstr("member 2 is a file without a name"));
+}
+
+TEST(Archive, LinksDevicesAndHiddenFilesArePassedOver) {
+  const Member volume{"head.nii", nifti({}, kSamples)};
+  expect_read({volume, {"__MACOSX/head.nii", "junk"}, {".DS_Store", "junk"}}, "nifti");
+  expect_read({{"link.nii", "/etc/passwd", Kind::kLink}, volume}, "nifti");
+  const Outcome tarred = import_bytes(
+      tar({volume, {"again.nii", "head.nii", Kind::kHardLink}, {"null", "", Kind::kDevice}}));
+  EXPECT_EQ(tarred.error, "");
+}
+
+TEST(Archive, SeveralVolumesAreNamed) {
+  const std::string volume = nifti({}, kSamples);
+  expect_refused({{"a.nii", volume}, {"b/c.nii", volume}},
+                 AllOf(HasSubstr("2 volumes"), HasSubstr("\"a.nii\", \"b/c.nii\"")));
+}
+
+TEST(Archive, WithoutAVolumeItIsUnsupported) {
+  expect_refused({{"a.txt", "text"}, {"b.txt", "more"}}, HasSubstr("2 files"),
+                 ErrorCode::kUnsupportedMedia);
+  expect_refused({{"a", "", Kind::kFolder}}, HasSubstr("0 files"), ErrorCode::kUnsupportedMedia);
+}
+
+TEST(Archive, WithinAnArchiveIsRefused) {
+  const Member volume{"head.nii", nifti({}, kSamples)};
+  for (const std::string& inner : forms({volume})) {
+    expect_refused({{"inner", inner}}, HasSubstr("another archive"));
+  }
+}
+
+TEST(Archive, OneNameTwiceIsRefused) {
+  const Member volume{"head.nii", nifti({}, kSamples)};
+  expect_refused({volume, volume}, HasSubstr("twice"));
+}
+
+TEST(Archive, EncryptedIsRefused) {
+  const Outcome outcome = import_bytes(zip({{"head.nii", nifti({}, kSamples)}}, Locked::kYes));
+  EXPECT_THAT(outcome.error, HasSubstr("encrypted"));
+}
+
+TEST(Archive, IsBounded) {
+  const SizeLimits limits = {.max_sample_bytes = 1000};
+  const std::string zeros(std::size_t{3} << 20, '\0');
+  for (const std::string& file : forms({{"zeros", zeros}})) {
+    EXPECT_EQ(import_bytes(file, limits).imported(), false);
+  }
+  EXPECT_EQ(import_bytes(zip({{"zeros", zeros}}), limits).code, ErrorCode::kTooLarge);
+  std::vector<Member> many(20001);
+  for (std::size_t at = 0; at < many.size(); ++at) {
+    many[at] = {std::to_string(at), "", Kind::kFolder};
+  }
+  EXPECT_THAT(import_bytes(tar(many)).error, HasSubstr("more than 20000 members"));
+}
+
+TEST(Archive, SomethingBehindATarIsRefused) {
+  const std::string file = tar({{"head.nii", nifti({}, kSamples)}});
+  EXPECT_TRUE(import_bytes(file + std::string(5120, '\0')).imported());
+  EXPECT_THAT(import_bytes(file + "garbage").error, HasSubstr("follows its end"));
+}
+
+TEST(Archive, ASeriesThatIsNotThereIsNotChosen) {
+  const Folder folder;
+  const auto source = folder.write("upload", zip({{"head.nii", nifti({}, kSamples)}}));
+  ImportTask task = {.source = source, .scratch = folder.path(""), .target = folder.path("target")};
+  task.options.series = "1.2.3";
+  EXPECT_THROW(import_volume(task), Error);
+}
+
+}  // namespace
+}  // namespace isomesh::import::test

@@ -1,0 +1,98 @@
+// Objects of several frames: Enhanced CT and MR, and others.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/import/dicom/import.h"
+#include "server/import/dicom/tags.h"
+#include "tests/unit/import/dicom/objects.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using namespace dicom;
+using testing::HasSubstr;
+
+const std::vector<std::uint32_t> kShuffled = {4, 0, 5, 2, 1, 3};
+
+TEST(DicomFrames, AreSortedLikeSlices) {
+  const DicomSeries series;
+  const Outcome slices = import_objects(series.files());
+  for (const std::string_view syntax : {kImplicit, kExplicit, kDeflate, kBigEndian}) {
+    const Outcome frames = import_objects({{"one", series.enhanced(kShuffled).file(syntax)}});
+    EXPECT_EQ(frames.error, "") << syntax;
+    EXPECT_EQ(frames.canonical, slices.canonical) << syntax;
+    ASSERT_EQ(frames.volume.dicom->instances.size(), 1);
+  }
+}
+
+TEST(DicomFrames, AreReadAsAnUpload) {
+  const DicomSeries series;
+  const Outcome outcome = import_bytes(series.enhanced(kShuffled).file());
+  EXPECT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.canonical, import_objects(series.files()).canonical);
+}
+
+TEST(DicomFrames, OfSeveralFilesMakeOneVolume) {
+  const DicomSeries series;
+  const Outcome outcome = import_objects(
+      {{"b", series.enhanced({5, 1, 3}).file()}, {"a", series.enhanced({0, 4, 2}).file()}});
+  EXPECT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.canonical, import_objects(series.files()).canonical);
+}
+
+TEST(DicomFrames, HaveTheirOwnScales) {
+  const DicomSeries series;
+  std::vector<DicomObject> frames;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    DicomObject position;
+    const Vector3 at = series.position(k);
+    position.text(kImagePosition, "DS", "-10\\20\\" + std::to_string(at[2]));
+    DicomObject scale;
+    scale.text(kRescaleSlope, "DS", std::to_string(k + 1)).text(kRescaleIntercept, "DS", "-7");
+    DicomObject frame;
+    frame.items(kPlanePositionSequence, {position})
+        .items(kPixelValueTransformationSequence, {scale});
+    frames.push_back(frame);
+  }
+  DicomObject object = series.enhanced({0, 1, 2, 3, 4, 5});
+  object.items(kPerFrameFunctionalGroups, frames);
+  const Outcome outcome = import_objects({{"one", object.file()}});
+  ASSERT_EQ(outcome.error, "");
+  ASSERT_EQ(outcome.volume.type, SampleType::kInt16);
+  const auto samples = samples_of<std::int16_t>(outcome);
+  for (std::uint32_t k = 0; k < 6; ++k) {
+    EXPECT_EQ(samples[k * 20 + 7], series.stored(2, 1, k) * (k + 1) - 7) << k;
+  }
+}
+
+TEST(DicomFrames, ThatAreMissingOrDoubledAreNamed) {
+  const DicomSeries series;
+  const auto error_of = [&](const std::vector<std::uint32_t>& order) {
+    return import_objects({{"one", series.enhanced(order).file()}}).error;
+  };
+  EXPECT_THAT(error_of({0, 1, 2, 4, 5}), HasSubstr("slice 4 of 6 is missing"));
+  EXPECT_THAT(error_of({5, 4, 2, 1, 0}), HasSubstr("slice 3 of 6 is missing"));
+  EXPECT_THAT(error_of({0, 1, 2, 3, 3, 4, 5}), HasSubstr("Slice 4 of 6 is there more than once"));
+  EXPECT_THAT(error_of({0, 1, 2, 0, 1, 2}), HasSubstr("2 slices at each of its 3 positions"));
+  EXPECT_THAT(error_of({3}), HasSubstr("single slice"));
+}
+
+TEST(DicomFrames, MustAllBeDescribed) {
+  const DicomSeries series;
+  DicomObject object = series.enhanced({0, 1, 2, 3, 4, 5});
+  object.text(kNumberOfFrames, "IS", "5");
+  EXPECT_THAT(import_objects({{"one", object.file()}}).error,
+              HasSubstr("5 frames and describes 6"));
+}
+
+TEST(DicomSniffing, NeedsItsFourLettersInTheirPlace) {
+  const std::string file = DicomSeries{}.slice(0).file();
+  EXPECT_TRUE(is_dicom(file));
+  EXPECT_TRUE(is_dicom(file.substr(0, 132)));
+  EXPECT_FALSE(is_dicom(file.substr(0, 131)));
+  EXPECT_FALSE(is_dicom(file.substr(1)));
+  EXPECT_FALSE(is_dicom(""));
+}
+
+}  // namespace
+}  // namespace isomesh::import::test

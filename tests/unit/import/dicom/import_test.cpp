@@ -1,0 +1,412 @@
+// Series of slices that make a volume: order, geometry and values.
+#include "server/import/dicom/import.h"
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/import/dicom/tags.h"
+#include "tests/unit/import/dicom/objects.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using namespace dicom;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// What a series' samples must come out as; slices along the normal, as the lattice has them.
+template <class Sample>
+std::vector<Sample> expected_samples(const DicomSeries& series, bool from_last = false) {
+  std::vector<Sample> samples;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    const std::uint32_t slice = from_last ? series.slices - 1 - k : k;
+    for (std::uint32_t j = 0; j < series.rows; ++j) {
+      for (std::uint32_t i = 0; i < series.columns; ++i) {
+        samples.push_back(static_cast<Sample>(series.stored(i, j, slice)));
+      }
+    }
+  }
+  return samples;
+}
+
+// Every slice with the same change.
+NamedFiles changed(const DicomSeries& series, const std::function<void(DicomObject&)>& change) {
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    DicomObject object = series.slice(k);
+    change(object);
+    files.emplace_back(std::to_string(k), object.file(series.syntax));
+  }
+  return files;
+}
+
+TEST(DicomSeriesImport, SortsByPositionAndKeepsGeometry) {
+  const DicomSeries series;
+  const Outcome outcome = import_objects(series.files());
+  ASSERT_EQ(outcome.error, "");
+  const Volume& volume = outcome.volume;
+  EXPECT_EQ(volume.format, "dicom");
+  EXPECT_THAT(volume.dims, ElementsAre(5, 4, 6));
+  EXPECT_EQ(volume.type, SampleType::kUint16);
+  // Pixel spacing is told as the distance between rows first.
+  EXPECT_THAT(volume.geometry.spacing, ElementsAre(0.75, 0.5, 2.5));
+  EXPECT_THAT(volume.geometry.origin, ElementsAre(-10, 20, 30));
+  EXPECT_THAT(volume.geometry.direction, ElementsAre(1, 0, 0, 0, 1, 0, 0, 0, 1));
+  EXPECT_EQ(samples_of<std::uint16_t>(outcome), expected_samples<std::uint16_t>(series));
+  EXPECT_EQ(volume.bytes, 5 * 4 * 6 * 2);
+  EXPECT_EQ(volume.modality, "CT");
+  EXPECT_TRUE(volume.ignored.empty());
+}
+
+// The series' slices, each as `bytes_of_slice` writes it.
+Outcome import_slices(const DicomSeries& series,
+                      const std::function<std::string(const DicomObject&)>& bytes_of_slice) {
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    files.emplace_back(std::to_string(k), bytes_of_slice(series.slice(k)));
+  }
+  return import_objects(files);
+}
+
+TEST(DicomSeriesImport, ReadsDataSetsAlone) {
+  const DicomSeries series;
+  const std::string expected = import_objects(series.files()).canonical;
+  for (const std::string_view syntax : {kExplicit, kImplicit}) {
+    const Outcome outcome =
+        import_slices(series, [&](const DicomObject& slice) { return slice.bare(syntax); });
+    EXPECT_EQ(outcome.error, "") << syntax;
+    EXPECT_EQ(outcome.canonical, expected) << syntax;
+  }
+}
+
+TEST(DicomSeriesImport, ReadsMetaInformationWithoutPreamble) {
+  constexpr std::size_t kPreambleBytes = 132;
+  const DicomSeries series;
+  const std::string expected = import_objects(series.files()).canonical;
+  for (const std::string_view syntax : {kExplicit, kImplicit, kBigEndian, kDeflate}) {
+    const Outcome outcome = import_slices(series, [&](const DicomObject& slice) {
+      return slice.file(syntax).substr(kPreambleBytes);
+    });
+    EXPECT_EQ(outcome.error, "") << syntax;
+    EXPECT_EQ(outcome.canonical, expected) << syntax;
+  }
+}
+
+TEST(DicomSeriesImport, RunsAlongTheNormalWhateverTheScannersOrder) {
+  DicomSeries series;
+  series.step = {0, 0, -2.5};
+  const Outcome outcome = import_objects(series.files());
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_THAT(outcome.volume.geometry.origin, ElementsAre(-10, 20, 17.5));
+  EXPECT_THAT(outcome.volume.geometry.direction, ElementsAre(1, 0, 0, 0, 1, 0, 0, 0, 1));
+  EXPECT_EQ(samples_of<std::uint16_t>(outcome), expected_samples<std::uint16_t>(series, true));
+}
+
+TEST(DicomSeriesImport, KeepsObliqueAxes) {
+  DicomSeries series;
+  series.along_row = {0.6, 0.8, 0};
+  series.along_column = {0, 0, -1};
+  series.step = {-0.8 * 3, 0.6 * 3, 0};  // row x column
+  const Outcome outcome = import_objects(series.files());
+  ASSERT_EQ(outcome.error, "");
+  const auto& direction = outcome.volume.geometry.direction;
+  const std::array<double, 9> expected = {0.6, 0, -0.8, 0.8, 0, 0.6, 0, -1, 0};
+  for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(direction[i], expected[i], 1e-12) << i;
+  EXPECT_NEAR(outcome.volume.geometry.spacing[2], 3, 1e-12);
+}
+
+TEST(DicomSeriesImport, ShearsTheLatticeOfATiltedGantry) {
+  DicomSeries series;
+  const double tilt = 20 * std::numbers::pi / 180;
+  series.along_column = {0, std::cos(tilt), -std::sin(tilt)};
+  series.step = {0, 0, 5};  // the table moves along z, not along the slices' normal
+  const Outcome outcome = import_objects(series.files());
+  ASSERT_EQ(outcome.error, "");
+  const Geometry& geometry = outcome.volume.geometry;
+  EXPECT_NEAR(geometry.spacing[2], 5, 1e-12);
+  EXPECT_NEAR(geometry.direction[2], 0, 1e-12);
+  EXPECT_NEAR(geometry.direction[5], 0, 1e-12);
+  EXPECT_NEAR(geometry.direction[8], 1, 1e-12);
+  EXPECT_NEAR(geometry.direction[4], std::cos(tilt), 1e-12);
+  EXPECT_EQ(samples_of<std::uint16_t>(outcome), expected_samples<std::uint16_t>(series));
+  // Every slice begins where its own header says.
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_NEAR(geometry.origin[axis] + step_of(geometry, 2)[axis] * k, series.position(k)[axis],
+                  1e-9);
+    }
+  }
+}
+
+TEST(DicomSeriesImport, ToleratesRoundedPositions) {
+  DicomSeries series;
+  series.step = {0, 0, 0.625};
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    const double rounded = std::round(series.position(k)[2] * 100) / 100;
+    files.emplace_back(
+        std::to_string(k),
+        series.slice(k).text(kImagePosition, "DS", "-10\\20\\" + std::to_string(rounded)).file());
+  }
+  const Outcome outcome = import_objects(files);
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_NEAR(outcome.volume.geometry.spacing[2], 0.625, 0.01);
+}
+
+// --- Values --------------------------------------------------------------------------------------
+
+struct Scale {
+  std::string slope;
+  std::string intercept;
+  SampleType type;
+};
+
+Outcome import_scaled(const DicomSeries& series, const std::vector<Scale>& scales) {
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    const Scale& scale = scales[k % scales.size()];
+    files.emplace_back(std::to_string(k), series.slice(k)
+                                              .text(kRescaleSlope, "DS", scale.slope)
+                                              .text(kRescaleIntercept, "DS", scale.intercept)
+                                              .file());
+  }
+  return import_objects(files);
+}
+
+TEST(DicomValues, StayIntegersWhereTheyCan) {
+  DicomSeries series;
+  const Outcome outcome = import_scaled(series, {{"1", "-1024", {}}});
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.type, SampleType::kInt16);
+  const auto samples = samples_of<std::int16_t>(outcome);
+  const auto stored = expected_samples<std::int16_t>(series);
+  for (std::size_t i = 0; i < samples.size(); ++i) ASSERT_EQ(samples[i], stored[i] - 1024);
+}
+
+TEST(DicomValues, AreWidenedOnlyWhenTheyMustBe) {
+  DicomSeries series;
+  series.bits_stored = 16;
+  series.high_bit = 15;
+  const Outcome wide = import_scaled(series, {{"1", "-1024", {}}});
+  ASSERT_EQ(wide.error, "");
+  EXPECT_EQ(wide.volume.type, SampleType::kInt32);
+  EXPECT_EQ(samples_of<std::int32_t>(wide)[0], series.stored(0, 0, 0) - 1024);
+
+  // What a CT in 16 bits holds fits, though all that 16 bits can hold would not.
+  NamedFiles files = changed(series, [&](DicomObject& object) {
+    object.text(kRescaleSlope, "DS", "1").text(kRescaleIntercept, "DS", "-1024");
+    std::string pixels;
+    for (int i = 0; i < 20; ++i) pixels += std::string(1, static_cast<char>(i)) + '\x0c';
+    object.pixels(pixels, 2);
+  });
+  const Outcome narrow = import_objects(files);
+  ASSERT_EQ(narrow.error, "");
+  EXPECT_EQ(narrow.volume.type, SampleType::kInt16);
+  EXPECT_EQ(samples_of<std::int16_t>(narrow)[5], 0x0c05 - 1024);
+}
+
+TEST(DicomValues, AreScaledSliceBySlice) {
+  const DicomSeries series;
+  const Outcome outcome = import_scaled(series, {{"0.5", "1.25", {}}, {"2", "-3", {}}});
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.type, SampleType::kFloat32);
+  const auto samples = samples_of<float>(outcome);
+  const auto stored = expected_samples<float>(series);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const bool even = i / 20 % 2 == 0;
+    ASSERT_EQ(samples[i], even ? stored[i] * 0.5F + 1.25F : stored[i] * 2 - 3);
+  }
+}
+
+TEST(DicomValues, WithoutAMeaningAreRefused) {
+  const DicomSeries series;
+  for (const auto& [slope, intercept] :
+       {std::pair{"0", "0"}, std::pair{"nan", "0"}, std::pair{"1", ""}, std::pair{"1e999", "0"}}) {
+    EXPECT_THAT(import_scaled(series, {{slope, intercept, {}}}).error, HasSubstr("rescale slope"))
+        << slope;
+  }
+}
+
+TEST(DicomValues, AreCutOutOfTheirBits) {
+  DicomSeries series;
+  series.bits_stored = 10;
+  series.high_bit = 13;
+  series.is_signed = true;
+  // Bits beside the stored ones are of overlays, and no part of the samples.
+  const Outcome outcome = import_objects(changed(series, [&](DicomObject& object) {
+    std::string pixels = series.native_bytes(2);
+    for (std::size_t i = 0; i < pixels.size(); i += 2) {
+      pixels[i] = static_cast<char>(pixels[i] | 0x0f);
+      pixels[i + 1] = static_cast<char>(pixels[i + 1] | '\xc0');
+    }
+    object.pixels(pixels, 2);
+  }));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.type, SampleType::kInt16);
+  const auto samples = samples_of<std::int16_t>(outcome);
+  for (std::uint32_t i = 0; i < 20; ++i) ASSERT_EQ(samples[i], series.stored(i % 5, i / 5, 2));
+  EXPECT_LT(outcome.volume.range[0], 0);
+}
+
+TEST(DicomValues, OfMonochrome1AreKeptAsTheyAreStored) {
+  const DicomSeries series;
+  const Outcome outcome = import_objects(changed(series, [](DicomObject& object) {
+    object.text(kPhotometricInterpretation, "CS", "MONOCHROME1");
+  }));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(samples_of<std::uint16_t>(outcome), expected_samples<std::uint16_t>(series));
+}
+
+// --- What a person is told -----------------------------------------------------------------------
+
+TEST(DicomPresets, AreThoseOfACtInHounsfieldUnits) {
+  const DicomSeries series;
+  const Outcome outcome = import_scaled(series, {{"1", "-1024", {}}});
+  ASSERT_EQ(outcome.volume.presets.size(), 3);
+  EXPECT_EQ(outcome.volume.presets[0], (Preset{"skin", -300}));
+  EXPECT_EQ(outcome.volume.presets[2], (Preset{"bone", 250}));
+  const auto none = [&](Tag tag, std::string_view value) {
+    return import_objects(
+               changed(
+                   series,
+                   [&](DicomObject& object) {
+                     object.text(kRescaleSlope, "DS", "1").text(kRescaleIntercept, "DS", "-1024");
+                     object.text(tag, "LO", value);
+                   }))
+        .volume.presets.empty();
+  };
+  EXPECT_TRUE(none(kModality, "MR"));
+  EXPECT_TRUE(none(kRescaleType, "US"));
+  EXPECT_FALSE(none(kRescaleType, "HU"));
+}
+
+TEST(DicomPresets, LieWithinTheSamples) {
+  const DicomSeries series;  // 0 to 4095
+  const Outcome outcome = import_objects(series.files());
+  ASSERT_EQ(outcome.volume.presets.size(), 1);
+  EXPECT_EQ(outcome.volume.presets[0].name, "bone");
+}
+
+TEST(DicomIdentityImport, IsKeptInUtf8) {
+  const DicomSeries series;
+  const Outcome outcome = import_objects(changed(series, [](DicomObject& object) {
+    object.text(kSpecificCharacterSet, "CS", "ISO_IR 100")
+        .text(kPatientName, "PN", "M\xfcller^Eva")
+        .text(kPatientId, "LO", "4711")
+        .text(kStudyInstanceUid, "UI", "1.2.3")
+        .text(kSeriesDescription, "LO", "axial \xe0 1 mm");
+  }));
+  ASSERT_EQ(outcome.error, "");
+  ASSERT_TRUE(outcome.volume.dicom);
+  const DicomIdentity& identity = *outcome.volume.dicom;
+  EXPECT_EQ(identity.patient_name, "Müller^Eva");
+  EXPECT_EQ(identity.patient_id, "4711");
+  EXPECT_EQ(identity.study_uid, "1.2.3");
+  EXPECT_EQ(identity.series_uid, "1.2.3.4");
+  EXPECT_EQ(identity.series_description, "axial à 1 mm");
+  ASSERT_EQ(identity.instances.size(), 6);
+  for (std::size_t k = 0; k < 6; ++k) {
+    EXPECT_EQ(identity.instances[k].sop_class_uid, "1.2.840.10008.5.1.4.1.1.2");
+    EXPECT_EQ(identity.instances[k].sop_instance_uid, "1.2.3.4." + std::to_string(k + 1));
+  }
+}
+
+TEST(DicomIdentityImport, IsNoPartOfTheCanonicalFile) {
+  const DicomSeries series;
+  const Outcome known = import_objects(changed(
+      series, [](DicomObject& object) { object.text(kPatientName, "PN", "Somebody^Known"); }));
+  EXPECT_EQ(known.canonical, import_objects(series.files()).canonical);
+  EXPECT_EQ(known.canonical.find("Somebody"), std::string::npos);
+}
+
+struct CharacterSetCase {
+  const char* name;
+  const char* term;
+  std::string stored;
+  const char* utf8;
+};
+
+class DicomCharacterSet : public testing::TestWithParam<CharacterSetCase> {};
+
+TEST_P(DicomCharacterSet, BecomesUtf8) {
+  DicomSeries series;
+  series.slices = 2;
+  const Outcome outcome = import_objects(changed(series, [&](DicomObject& object) {
+    if (*GetParam().term != '\0') object.text(kSpecificCharacterSet, "CS", GetParam().term);
+    object.text(kPatientName, "PN", GetParam().stored);
+  }));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.dicom->patient_name, GetParam().utf8);
+}
+
+// The examples of PS3.5, annexes H to K, where there are.
+INSTANTIATE_TEST_SUITE_P(
+    Sets, DicomCharacterSet,
+    testing::Values(
+        CharacterSetCase{"Default", "", "Adams^John", "Adams^John"},
+        CharacterSetCase{"DefaultWithForeignLetters", "", "B\xe4r", "B\xEF\xBF\xBDr"},
+        CharacterSetCase{"Latin2", "ISO_IR 101",
+                         "W\xb3"
+                         "adys\xb3"
+                         "aw",
+                         "Władysław"},
+        CharacterSetCase{"Cyrillic", "ISO_IR 144", "\xbb\xee\xda\x63\x65\xdc\xd1yp\xd3",
+                         "Люкceмбypг"},
+        CharacterSetCase{"Greek", "ISO_IR 126", "\xc4\xe9\xef\xed\xf5\xf3\xe9\xef\xf2",
+                         "Διονυσιος"},
+        CharacterSetCase{"Utf8", "ISO_IR 192",
+                         "Wang^XiaoDong=\xe7\x8e\x8b^\xe5\xb0\x8f\xe6\x9d\xb1",
+                         "Wang^XiaoDong=王^小東"},
+        CharacterSetCase{"BrokenUtf8", "ISO_IR 192", "a\xe7\x8e", "a\xEF\xBF\xBD\xEF\xBF\xBD"},
+        CharacterSetCase{"Gb18030", "GB18030", "Wang=\xcd\xf5^\xd0\xa1\xb6\xab", "Wang=王^小东"},
+        CharacterSetCase{"Japanese", "\\ISO 2022 IR 87", "Yamada=\x1b$B;3ED\x1b(B^\x1b$BB@O:\x1b(B",
+                         "Yamada=山田^太郎"},
+        CharacterSetCase{"Korean", "\\ISO 2022 IR 149", "Hong=\x1b$)C\xfb\xf3", "Hong=洪"},
+        CharacterSetCase{"Unknown", "ISO_IR 999", "B\xe4r", "B\xEF\xBF\xBDr"},
+        CharacterSetCase{"ControlCharacters", "ISO_IR 100", "a\nb",
+                         "a\xEF\xBF\xBD"
+                         "b"}),
+    [](const auto& each) { return std::string(each.param.name); });
+
+// --- All of it at once ---------------------------------------------------------------------------
+
+TEST(DicomSeriesImport, GivesRandomSeriesBackExactly) {
+  std::mt19937 random(20);
+  const auto pick = [&](int low, int high) {
+    return std::uniform_int_distribution<int>(low, high)(random);
+  };
+  const std::array<std::string_view, 4> syntaxes = {kImplicit, kExplicit, kDeflate, kBigEndian};
+  for (int round = 0; round < 150; ++round) {
+    DicomSeries series;
+    series.columns = static_cast<unsigned>(pick(1, 9));
+    series.rows = static_cast<unsigned>(pick(1, 9));
+    series.slices = static_cast<unsigned>(pick(2, 20));
+    series.bits_allocated = 8U << pick(0, 2);
+    series.bits_stored = static_cast<unsigned>(pick(1, static_cast<int>(series.bits_allocated)));
+    series.high_bit = static_cast<unsigned>(pick(static_cast<int>(series.bits_stored) - 1,
+                                                 static_cast<int>(series.bits_allocated) - 1));
+    series.is_signed = pick(0, 1) == 1;
+    series.syntax = syntaxes[static_cast<std::size_t>(pick(0, 3))];
+    series.step = {0.1 * pick(-9, 9), 0.1 * pick(-9, 9), 0.1 * pick(5, 40)};
+    if (series.bits_allocated == 8 && series.columns * series.rows % 2 != 0) series.columns *= 2;
+    const Outcome outcome = import_objects(series.files());
+    ASSERT_EQ(outcome.error, "") << "round " << round;
+    std::vector<double> samples;
+    with_sample(outcome.volume.type, [&](auto sample) {
+      for (const auto each : samples_of<decltype(sample)>(outcome)) {
+        samples.push_back(static_cast<double>(each));
+      }
+    });
+    ASSERT_EQ(samples, expected_samples<double>(series)) << "round " << round;
+    ASSERT_EQ(bytes_per_sample(outcome.volume.type), series.bits_allocated / 8);
+  }
+}
+
+}  // namespace
+}  // namespace isomesh::import::test

@@ -1,0 +1,211 @@
+// Compressed samples, and what is wrong with them.
+#include <sstream>
+
+#include <gdcmImageReader.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/import/dicom/tags.h"
+#include "tests/unit/import/dicom/objects.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using namespace dicom;
+using testing::AllOf;
+using testing::HasSubstr;
+
+constexpr std::string_view kJpegLossless = "1.2.840.10008.1.2.4.70";
+constexpr std::string_view kJpegLs = "1.2.840.10008.1.2.4.80";
+constexpr std::string_view kJpeg2000 = "1.2.840.10008.1.2.4.90";
+
+struct Depth {
+  unsigned allocated;
+  unsigned stored;
+  bool is_signed;
+};
+
+DicomSeries compressible(const Depth& depth) {
+  DicomSeries series;
+  series.is_smooth = true;
+  series.columns = 32;
+  series.rows = 24;
+  series.slices = 3;
+  series.bits_allocated = depth.allocated;
+  series.bits_stored = depth.stored;
+  series.high_bit = depth.stored - 1;
+  series.is_signed = depth.is_signed;
+  return series;
+}
+
+NamedFiles compressed_files(const DicomSeries& series, std::string_view syntax,
+                            const std::function<void(std::string&)>& damage = {}) {
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    std::string stream = compressed(syntax, series.layout(), series.native_bytes(k));
+    if (damage && k == 1) damage(stream);
+    files.emplace_back("IM" + std::to_string(k + 1),
+                       series.slice(k).fragments({stream}, {}).file(syntax));
+  }
+  return files;
+}
+
+class DicomSyntax : public testing::TestWithParam<std::tuple<std::string_view, Depth>> {};
+
+TEST_P(DicomSyntax, GivesTheSamplesBack) {
+  const auto& [syntax, depth] = GetParam();
+  const DicomSeries series = compressible(depth);
+  const Outcome plain = import_objects(series.files());
+  ASSERT_EQ(plain.error, "");
+  const Outcome outcome = import_objects(compressed_files(series, syntax));
+  EXPECT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.canonical, plain.canonical);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, DicomSyntax,
+                         testing::Combine(testing::Values(kRle, kJpegLossless, kJpegLs, kJpeg2000),
+                                          testing::Values(Depth{8, 8, false}, Depth{16, 12, false},
+                                                          Depth{16, 16, false}, Depth{16, 12, true},
+                                                          Depth{16, 16, true})));
+
+class DamagedStream : public testing::TestWithParam<std::string_view> {};
+
+TEST_P(DamagedStream, IsRefusedWhereverItEnds) {
+  const DicomSeries series = compressible({16, 12, false});
+  const std::string whole = compressed(GetParam(), series.layout(), series.native_bytes(1));
+  ASSERT_EQ(import_objects(compressed_files(series, GetParam())).error, "");
+  // RLE streams of an odd length are padded.
+  for (std::size_t size = 0; size + 2 < whole.size(); size += 1 + whole.size() / 60) {
+    const Outcome outcome = import_objects(
+        compressed_files(series, GetParam(), [&](std::string& stream) { stream.resize(size); }));
+    ASSERT_EQ(outcome.code, ErrorCode::kUnusableVolume) << size;
+    ASSERT_THAT(outcome.error, HasSubstr("slice 2 of 3")) << size;
+  }
+}
+
+TEST_P(DamagedStream, OfAnotherSizeIsRefused) {
+  const DicomSeries series = compressible({16, 12, false});
+  DicomSeries larger = series;
+  larger.rows = 28;
+  larger.columns = 36;
+  const std::string stream = compressed(GetParam(), larger.layout(), larger.native_bytes(1));
+  const Outcome outcome =
+      import_objects(compressed_files(series, GetParam(), [&](std::string& own) { own = stream; }));
+  if (GetParam() == kRle) {
+    // Nothing in an RLE stream tells how large it is.
+    EXPECT_EQ(outcome.error, "");
+  } else {
+    EXPECT_THAT(outcome.error, AllOf(HasSubstr("36 x 28"), HasSubstr("32 x 24")));
+  }
+}
+
+TEST_P(DamagedStream, OfBytesThatAreSomethingElseIsRefused) {
+  const DicomSeries series = compressible({16, 12, false});
+  for (const std::string& other : {std::string(300, '\xff'), std::string(300, '\0'),
+                                   std::string("\xff\xd8\xff\xd9"), std::string()}) {
+    const Outcome outcome = import_objects(
+        compressed_files(series, GetParam(), [&](std::string& stream) { stream = other; }));
+    EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
+    EXPECT_NE(outcome.error, "");
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, DamagedStream,
+                         testing::Values(kRle, kJpegLossless, kJpegLs, kJpeg2000));
+
+TEST(DicomFragments, OfOneFrameAreJoined) {
+  const DicomSeries series = compressible({16, 12, false});
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    const std::string stream = compressed(kJpegLs, series.layout(), series.native_bytes(k));
+    files.emplace_back(
+        std::to_string(k),
+        series.slice(k).fragments({stream.substr(0, 40), stream.substr(40)}, {0}).file(kJpegLs));
+  }
+  EXPECT_EQ(import_objects(files).canonical, import_objects(series.files()).canonical);
+}
+
+// All frames in one file, of which each lies in two fragments.
+std::string in_halves(const DicomSeries& series, bool with_table) {
+  std::vector<std::string> fragments;
+  std::vector<std::uint32_t> offsets;
+  std::uint32_t offset = 0;
+  for (const std::uint32_t k : {0U, 1U, 2U}) {
+    const std::string stream = compressed(kJpeg2000, series.layout(), series.native_bytes(k));
+    offsets.push_back(offset);
+    for (const std::string& half : {stream.substr(0, 60), stream.substr(60)}) {
+      fragments.push_back(half);
+      offset += static_cast<std::uint32_t>(half.size()) + 8;
+    }
+  }
+  if (!with_table) offsets.clear();
+  return series.enhanced({0, 1, 2}).fragments(fragments, offsets).file(kJpeg2000);
+}
+
+TEST(DicomFragments, OfSeveralFramesAreToldApart) {
+  const DicomSeries series = compressible({16, 12, false});
+  const Outcome plain = import_objects(series.files());
+  for (const bool with_table : {true, false}) {
+    const Outcome outcome = import_objects({{"one", in_halves(series, with_table)}});
+    EXPECT_EQ(outcome.error, "");
+    EXPECT_EQ(outcome.canonical, plain.canonical);
+  }
+}
+
+TEST(DicomFragments, ThatAreMissingAreNoticed) {
+  const DicomSeries series = compressible({16, 12, false});
+  const std::string stream = compressed(kJpeg2000, series.layout(), series.native_bytes(0));
+  const auto error_of = [&](std::vector<std::string> fragments) {
+    return import_objects(
+               {{"one",
+                 series.enhanced({0, 1, 2}).fragments(std::move(fragments), {}).file(kJpeg2000)}})
+        .error;
+  };
+  EXPECT_THAT(error_of({stream, stream}),
+              AllOf(HasSubstr("3 frames"), HasSubstr("2 compressed fragments")));
+  EXPECT_THAT(error_of({stream, stream, stream, stream}), HasSubstr("cannot be told apart"));
+}
+
+TEST(DicomFragments, OfAnIconAreNoPixels) {
+  const DicomSeries series = compressible({16, 12, false});
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    DicomObject icon;
+    icon.fragments({std::string("\xff\xd8\xff\xe0 icon", 10)}, {0});
+    files.emplace_back(std::to_string(k), series.slice(k).items(0x00880200, {icon}).file());
+  }
+  const Outcome outcome = import_objects(files);
+  EXPECT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.canonical, import_objects(series.files()).canonical);
+}
+
+TEST(DicomSyntaxes, ThatAreNotReadAreNamed) {
+  const DicomSeries series;
+  EXPECT_THAT(import_objects(
+                  {{"one", series.slice(0).fragments({"xx"}, {}).file("1.2.840.10008.1.2.4.102")}})
+                  .error,
+              HasSubstr("\"1.2.840.10008.1.2.4.102\""));
+  EXPECT_THAT(import_objects({{"one", series.slice(0).file("1.2.840.113619.5.2")}}).error,
+              HasSubstr("\"1.2.840.113619.5.2\""));
+}
+
+// What these tests write is DICOM for others, too.
+TEST(DicomObjects, AreReadByGdcm) {
+  const DicomSeries series;
+  for (const std::string_view syntax : {kImplicit, kExplicit, kBigEndian}) {
+    std::istringstream stream(series.slice(2).file(syntax));
+    gdcm::ImageReader reader;
+    reader.SetStream(stream);
+    ASSERT_TRUE(reader.Read()) << syntax;
+    const gdcm::Image& image = reader.GetImage();
+    std::string bytes(image.GetBufferLength(), '\0');
+    ASSERT_TRUE(image.GetBuffer(bytes.data()));
+    EXPECT_EQ(bytes, series.native_bytes(2)) << syntax;
+    EXPECT_EQ(image.GetSpacing(0), 0.75);
+    EXPECT_EQ(image.GetSpacing(1), 0.5);
+    EXPECT_EQ(image.GetOrigin(2), 35);
+  }
+}
+
+}  // namespace
+}  // namespace isomesh::import::test

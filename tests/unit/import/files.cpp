@@ -1,0 +1,89 @@
+#include "tests/unit/import/files.h"
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include <unistd.h>
+
+namespace isomesh::import::test {
+namespace {
+
+// Runs an import that is given a target; keeps what came of it.
+template <class Import>
+Outcome outcome_of(const Folder& folder, const Import& import) {
+  Outcome outcome;
+  const std::filesystem::path target = folder.path("target");
+  try {
+    outcome.volume = import(target);
+    outcome.canonical = read_file(target);
+  } catch (const Error& error) {
+    outcome.code = error.code();
+    outcome.error = error.what();
+  }
+  return outcome;
+}
+
+}  // namespace
+
+std::string read_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+Folder::Folder() {
+  // Every import waits for the disk; where there is a file system in memory thousands take seconds.
+  const std::filesystem::path memory = "/dev/shm";
+  const auto parent =
+      ::access(memory.c_str(), W_OK) == 0 ? memory : std::filesystem::temp_directory_path();
+  std::string name = (parent / "isomesh-import-XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp failed");
+  path_ = name;
+}
+
+Folder::~Folder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+std::filesystem::path Folder::write(std::string_view name, std::string_view bytes) const {
+  std::ofstream file(path(name), std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  return path(name);
+}
+
+std::size_t Folder::entries() const {
+  const std::filesystem::directory_iterator all(path_);
+  return static_cast<std::size_t>(std::distance(begin(all), end(all)));
+}
+
+Outcome import_bytes(std::string_view bytes, const SizeLimits& limits) {
+  const Folder folder;
+  const Folder scratch;
+  const auto source = folder.write("upload", bytes);
+  Outcome outcome = outcome_of(folder, [&](const std::filesystem::path& target) {
+    return import_volume({.source = source,
+                          .scratch = scratch.path(""),
+                          .target = target,
+                          .options = {},
+                          .limits = limits});
+  });
+  if (scratch.entries() != 0) throw std::logic_error("an import left files behind");
+  return outcome;
+}
+
+Outcome import_raw_bytes(std::string_view bytes, const RawDescription& description,
+                         const SizeLimits& limits) {
+  const Folder folder;
+  const auto source = folder.write("upload", bytes);
+  return outcome_of(folder, [&](const std::filesystem::path& target) {
+    return import_volume({.source = source,
+                          .scratch = folder.path(""),
+                          .target = target,
+                          .options = {.raw = description, .series = {}},
+                          .limits = limits});
+  });
+}
+
+}  // namespace isomesh::import::test

@@ -1,0 +1,64 @@
+// A folder for one test, and the shortest ways to import what is put there.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/error.h"
+#include "server/import/import.h"
+#include "server/volume/canonical.h"
+
+namespace isomesh::import::test {
+
+std::string read_file(const std::filesystem::path& path);
+
+// Made for one test and removed with everything in it.
+class Folder {
+ public:
+  Folder();
+  ~Folder();
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  std::filesystem::path path(std::string_view name) const { return path_ / name; }
+  std::filesystem::path write(std::string_view name, std::string_view bytes) const;
+
+  // How many files and folders are there.
+  std::size_t entries() const;
+
+ private:
+  std::filesystem::path path_;
+};
+
+using volume::kHeaderBytes;
+
+// What came of an import: the volume and its canonical file, or why there is none.
+struct Outcome {
+  Volume volume;
+  std::string canonical;  // bytes of the whole file
+  std::string error;      // empty when it was imported
+  ErrorCode code = ErrorCode::kInternal;
+  std::vector<FieldError> fields;
+
+  bool imported() const { return error.empty(); }
+  std::string_view sample_bytes() const { return std::string_view(canonical).substr(kHeaderBytes); }
+};
+
+Outcome import_bytes(std::string_view bytes, const SizeLimits& limits = {});
+Outcome import_raw_bytes(std::string_view bytes, const RawDescription& description,
+                         const SizeLimits& limits = {});
+
+// The samples of an outcome as their type.
+template <class Sample>
+std::vector<Sample> samples_of(const Outcome& outcome) {
+  const std::string_view bytes = outcome.sample_bytes();
+  std::vector<Sample> samples(bytes.size() / sizeof(Sample));
+  std::copy(bytes.begin(), bytes.end(), reinterpret_cast<char*>(samples.data()));
+  return samples;
+}
+
+}  // namespace isomesh::import::test

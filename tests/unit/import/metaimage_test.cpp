@@ -1,0 +1,149 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/volume/geometry.h"
+#include "tests/unit/import/files.h"
+#include "tests/unit/import/writers.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using testing::HasSubstr;
+
+Outcome import_metaimage(const Lines& lines, std::string_view payload = kSmallSamples) {
+  return import_bytes(metaimage(lines, payload));
+}
+
+Outcome import_with(const std::string& name, const std::string& value) {
+  return import_metaimage(with(small_metaimage(), name, value));
+}
+
+template <class Sample>
+void expect_all_encodings(const std::string& type) {
+  const auto samples = some_samples<Sample>(24);
+  Lines lines = with(small_metaimage(), "ElementType", type);
+  for (const bool big_endian : {false, true}) {
+    lines = with(lines, "BinaryDataByteOrderMSB", big_endian ? "True" : "False");
+    const std::string raw = bytes_of(samples, big_endian);
+    const auto imported = [&](const Lines& header, const std::string& payload) {
+      const Outcome outcome = import_metaimage(header, payload);
+      EXPECT_EQ(outcome.error, "") << type;
+      EXPECT_EQ(samples_of<Sample>(outcome), samples) << type;
+      EXPECT_EQ(outcome.volume.format, "metaimage");
+    };
+    imported(lines, raw);
+    const Lines compressed = with(lines, "CompressedData", "True");
+    imported(compressed, zlib(raw));
+    imported(compressed, gzip(raw));
+    imported(with(compressed, "CompressedDataSize", std::to_string(zlib(raw).size())),
+             zlib(raw) + "behind");
+  }
+}
+
+TEST(MetaImage, IsReadInEveryTypeAndByteOrder) {
+  expect_all_encodings<std::uint8_t>("MET_UCHAR");
+  expect_all_encodings<std::int8_t>("MET_CHAR");
+  expect_all_encodings<std::uint16_t>("MET_USHORT");
+  expect_all_encodings<std::int16_t>("MET_SHORT");
+  expect_all_encodings<std::uint32_t>("MET_UINT");
+  expect_all_encodings<std::int32_t>("MET_INT");
+  expect_all_encodings<std::uint32_t>("MET_ULONG");
+  expect_all_encodings<std::int32_t>("MET_LONG");
+  expect_all_encodings<float>("MET_FLOAT");
+  expect_all_encodings<double>("MET_DOUBLE");
+}
+
+TEST(MetaImage, ReadsText) {
+  Lines lines = with(with(small_metaimage(), "BinaryData", "False"), "DimSize", "2 1 1");
+  lines = with(lines, "ElementType", "MET_SHORT");
+  EXPECT_EQ(samples_of<std::int16_t>(import_metaimage(lines, "-300 7\n")),
+            (std::vector<std::int16_t>{-300, 7}));
+  EXPECT_FALSE(import_metaimage(lines, "-300").imported());
+  EXPECT_FALSE(import_metaimage(lines, "-300 7 8").imported());
+  EXPECT_FALSE(import_metaimage(lines, "-300 70000").imported());
+}
+
+TEST(MetaImage, LiesInLps) {
+  Lines lines = with(small_metaimage(), "TransformMatrix", "0 1 0 0 0 1 1 0 0");
+  lines = with(with(lines, "Offset", "10 20 30"), "ElementSpacing", "2 3 4");
+  const Geometry geometry = import_metaimage(lines).volume.geometry;
+  EXPECT_EQ(geometry.origin, (Vector3{10, 20, 30}));
+  // The file's rows are the directions of the axes, which are columns here.
+  EXPECT_EQ(step_of(geometry, 0), (Vector3{0, 2, 0}));
+  EXPECT_EQ(step_of(geometry, 1), (Vector3{0, 0, 3}));
+  EXPECT_EQ(step_of(geometry, 2), (Vector3{4, 0, 0}));
+}
+
+TEST(MetaImage, KnowsTheOtherNamesOfItsFields) {
+  Lines lines = with(small_metaimage(), "Offset", "");
+  EXPECT_EQ(import_metaimage(with(lines, "Position", "1 2 3")).volume.geometry.origin,
+            (Vector3{1, 2, 3}));
+  EXPECT_EQ(import_metaimage(with(lines, "Origin", "1 2 3")).volume.geometry.origin,
+            (Vector3{1, 2, 3}));
+  EXPECT_THAT(import_with("Position", "1 2 3").error, HasSubstr("contradicts"));
+  EXPECT_TRUE(import_with("Position", "0  0 0").imported());
+  lines = with(with(small_metaimage(), "ElementSpacing", ""), "ElementSize", "2 3 4");
+  EXPECT_EQ(import_metaimage(lines).volume.geometry.spacing, (Vector3{2, 3, 4}));
+  EXPECT_EQ(import_with("ElementSize", "2 3 4").volume.geometry.spacing, (Vector3{1, 1, 1}));
+}
+
+TEST(MetaImage, HonoursItsUnit) {
+  EXPECT_EQ(import_with("DistanceUnits", "um").volume.geometry.spacing,
+            (Vector3{0.001, 0.001, 0.001}));
+  EXPECT_TRUE(import_with("DistanceUnits", "mm").imported());
+  EXPECT_FALSE(import_with("DistanceUnits", "ell").imported());
+}
+
+TEST(MetaImage, GivesLengthsOfDirectionsToTheSpacing) {
+  const Geometry geometry = import_with("TransformMatrix", "2 0 0 0 1 0 0 0 1").volume.geometry;
+  EXPECT_EQ(geometry.spacing, (Vector3{2, 1, 1}));
+}
+
+TEST(MetaImage, NeverReadsAnotherFile) {
+  for (const char* name : {"/etc/passwd", "volume.raw", "LIST", "slice%03d.raw 1 2 1", "Local2"}) {
+    EXPECT_THAT(import_with("ElementDataFile", name).error, HasSubstr("in another file")) << name;
+  }
+  EXPECT_TRUE(import_with("ElementDataFile", "Local").imported());
+}
+
+TEST(MetaImage, RefusesSpacingsThatCannotBe) {
+  for (const char* spacing : {"1 nan 1", "1 0 1", "1 -1 1", "1 inf 1", "1 1", "1 1 x", "1 1 1 1"}) {
+    EXPECT_EQ(import_with("ElementSpacing", spacing).code, ErrorCode::kUnusableVolume) << spacing;
+  }
+  for (const char* matrix :
+       {"1 0 0 0 1 0 0 0 0", "1 0 0 1 0 0 0 0 1", "1 0 0 0 nan 0 0 0 1", "1 0 0 0 1"}) {
+    EXPECT_EQ(import_with("TransformMatrix", matrix).code, ErrorCode::kUnusableVolume) << matrix;
+  }
+  EXPECT_FALSE(import_with("Offset", "0 nan 0").imported());
+}
+
+TEST(MetaImage, RefusesWhatIsNoVolumeOfNumbers) {
+  EXPECT_THAT(import_with("ElementNumberOfChannels", "3").error, HasSubstr("channels"));
+  EXPECT_TRUE(import_with("ElementNumberOfChannels", "1").imported());
+  EXPECT_THAT(import_with("ElementType", "MET_FLOAT_ARRAY").error, HasSubstr("MET_FLOAT_ARRAY"));
+  EXPECT_THAT(import_with("ObjectType", "Tube").error, HasSubstr("Tube"));
+  EXPECT_THAT(import_with("ElementToIntensityFunctionSlope", "2").error, HasSubstr("slope"));
+  Lines lines = with(with(small_metaimage(), "NDims", "4"), "DimSize", "4 3 1 2");
+  lines = with(with(lines, "TransformMatrix", ""), "Offset", "");
+  lines = with(lines, "ElementSpacing", "");
+  EXPECT_THAT(import_metaimage(lines).error, HasSubstr("time series of 2 volumes"));
+  EXPECT_TRUE(import_metaimage(with(lines, "DimSize", "4 3 2 1")).imported());
+}
+
+TEST(MetaImage, RefusesHeadersThatContradictThemselves) {
+  EXPECT_FALSE(import_with("NDims", "2").imported());
+  EXPECT_FALSE(import_with("NDims", "11").imported());
+  EXPECT_FALSE(import_with("DimSize", "4 3 0").imported());
+  EXPECT_FALSE(import_with("DimSize", "4 3 -2").imported());
+  EXPECT_FALSE(import_with("DimSize", "4294967295 4294967295 4294967295").imported());
+  EXPECT_FALSE(import_with("DimSize", "").imported());
+  EXPECT_FALSE(import_with("ElementType", "").imported());
+  EXPECT_FALSE(import_with("BinaryData", "perhaps").imported());
+  EXPECT_FALSE(import_with("HeaderSize", "100").imported());
+  EXPECT_THAT(import_with("CompressedData", "True").error, HasSubstr("corrupt"));
+  EXPECT_THAT(import_bytes("NDims = 3\nNDims = 3\n").error, HasSubstr("twice"));
+  EXPECT_THAT(import_bytes("NDims = 3\nDimSize = 1 1 1\n").error, HasSubstr("does not end"));
+}
+
+}  // namespace
+}  // namespace isomesh::import::test

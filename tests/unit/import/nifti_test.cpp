@@ -1,0 +1,279 @@
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/volume/geometry.h"
+#include "tests/unit/import/files.h"
+#include "tests/unit/import/writers.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using testing::HasSubstr;
+
+Outcome import_nifti(const NiftiFields& fields) {
+  return import_bytes(nifti(fields, kSmallSamples));
+}
+
+Vector3 position(const Geometry& geometry, const Vector3& index) {
+  Vector3 result = geometry.origin;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vector3 step = step_of(geometry, axis);
+    for (std::size_t row = 0; row < 3; ++row) {
+      result[row] += step[row] * index[static_cast<std::size_t>(axis)];
+    }
+  }
+  return result;
+}
+
+void expect_near(const Vector3& one, const Vector3& other, double tolerance) {
+  for (std::size_t row = 0; row < 3; ++row) EXPECT_NEAR(one[row], other[row], tolerance);
+}
+
+template <class Sample>
+class NiftiOfType : public testing::Test {};
+using Samples = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
+                               std::uint32_t, std::int32_t, float, double>;
+TYPED_TEST_SUITE(NiftiOfType, Samples);
+
+TYPED_TEST(NiftiOfType, IsReadInBothByteOrdersAndVersionsPlainAndCompressed) {
+  const auto samples = some_samples<TypeParam>(24);
+  NiftiFields fields;
+  std::tie(fields.datatype, fields.bitpix) = nifti_type<TypeParam>();
+  for (fields.version = 1; fields.version <= 2; ++fields.version) {
+    for (const bool big_endian : {false, true}) {
+      fields.big_endian = big_endian;
+      const std::string file = nifti(fields, bytes_of(samples, big_endian));
+      for (const std::string& bytes : {file, gzip(file)}) {
+        const Outcome outcome = import_bytes(bytes);
+        ASSERT_EQ(outcome.error, "");
+        EXPECT_EQ(outcome.volume.format, "nifti");
+        EXPECT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{4, 3, 2}));
+        EXPECT_EQ(samples_of<TypeParam>(outcome), samples);
+      }
+    }
+  }
+}
+
+TEST(Nifti, Keeps64BitIntegersThatAreExactAndRefusesOthers) {
+  NiftiFields fields{.datatype = 1024, .bitpix = 64};
+  std::vector<std::int64_t> samples(24, -(std::int64_t{1} << 53));
+  samples[1] = std::numeric_limits<std::int64_t>::min();
+  const Outcome outcome = import_bytes(nifti(fields, bytes_of(samples)));
+  EXPECT_EQ(outcome.volume.type, SampleType::kFloat64);
+  EXPECT_EQ(samples_of<double>(outcome)[0], -0x1p53);
+  for (const std::int64_t bad :
+       {(std::int64_t{1} << 53) + 1, std::numeric_limits<std::int64_t>::max()}) {
+    samples[1] = bad;
+    EXPECT_THAT(import_bytes(nifti(fields, bytes_of(samples))).error,
+                HasSubstr(std::to_string(bad)));
+  }
+  fields.datatype = 1280;
+  samples[1] = -1;
+  EXPECT_THAT(import_bytes(nifti(fields, bytes_of(samples))).error,
+              HasSubstr("18446744073709551615"));
+}
+
+TEST(Nifti, TurnsRasIntoLpsBySform) {
+  const Outcome outcome = import_nifti(
+      {.pixdim = {1, 2, 3, 4, 0, 0, 0, 0}, .srow = {2, 0, 0, 10, 0, 3, 0, 20, 0, 0, 4, 30}});
+  EXPECT_EQ(outcome.volume.geometry.origin, (Vector3{-10, -20, 30}));
+  EXPECT_EQ(outcome.volume.geometry.spacing, (Vector3{2, 3, 4}));
+  EXPECT_EQ(outcome.volume.geometry.direction,
+            (std::array<double, 9>{-1, 0, 0, 0, -1, 0, 0, 0, 1}));
+}
+
+// A quarter turn about z, from i to y; with qfac -1 the last axis points down.
+TEST(Nifti, TurnsRasIntoLpsByQform) {
+  const double half = std::sqrt(0.5);
+  NiftiFields fields{.pixdim = {1, 2, 3, 4, 0, 0, 0, 0},
+                     .qform_code = 1,
+                     .sform_code = 0,
+                     .quaternion = {0, 0, half},
+                     .qoffset = {10, 20, 30}};
+  const Geometry right = import_nifti(fields).volume.geometry;
+  expect_near(right.origin, {-10, -20, 30}, 0);
+  expect_near(step_of(right, 0), {0, -2, 0}, 1e-6);
+  expect_near(step_of(right, 1), {3, 0, 0}, 1e-6);
+  expect_near(step_of(right, 2), {0, 0, 4}, 1e-6);
+  fields.pixdim[0] = -1;
+  expect_near(step_of(import_nifti(fields).volume.geometry, 2), {0, 0, -4}, 1e-6);
+  fields.quaternion = {0.8, 0.8, 0.8};
+  EXPECT_THAT(import_nifti(fields).error, HasSubstr("no rotation"));
+}
+
+TEST(Nifti, LiesAlongLpsWithoutForms) {
+  const Geometry geometry =
+      import_nifti({.pixdim = {1, 2, 3, 4, 0, 0, 0, 0}, .sform_code = 0}).volume.geometry;
+  EXPECT_EQ(geometry, (Geometry{.spacing = {2, 3, 4}}));
+}
+
+TEST(Nifti, TakesTheScannersSformBeforeTheQform) {
+  NiftiFields fields{.qform_code = 1, .sform_code = 1, .qoffset = {5, 5, 5}};
+  EXPECT_EQ(import_nifti(fields).volume.geometry.origin, (Vector3{0, 0, 0}));
+  // Any other sform that disagrees is a template's space.
+  fields.sform_code = 4;
+  EXPECT_EQ(import_nifti(fields).volume.geometry.origin, (Vector3{-5, -5, 5}));
+  // Where both agree the sform is more exact.
+  fields.qoffset = {0.001, 0, 0};
+  EXPECT_EQ(import_nifti(fields).volume.geometry.origin, (Vector3{0, 0, 0}));
+}
+
+TEST(Nifti, ReadsAShearedSformAsItIs) {
+  const double step = std::hypot(0.5, 2.0);
+  const Outcome outcome = import_nifti(
+      {.pixdim = {1, 1, 1, step, 0, 0, 0, 0}, .srow = {1, 0, 0, 0, 0, 1, 0.5, 0, 0, 0, 2, 0}});
+  ASSERT_EQ(outcome.error, "");
+  expect_near(position(outcome.volume.geometry, {1, 1, 1}), {-1, -1.5, 2}, 1e-6);
+}
+
+TEST(Nifti, ReadsAnSformFarFromTheOrigin) {
+  const Outcome outcome =
+      import_nifti({.pixdim = {1, 0.865759, 0.865759, 1, 0, 0, 0, 0},
+                    .srow = {0.865759, 0, 0, -221.2, 0, 0.865759, 0, -221.2, 0, 0, 1, -1755.25}});
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.geometry.origin[2], -1755.25);
+}
+
+TEST(Nifti, RefusesAnSformThatContradictsPixdim) {
+  const Outcome outcome = import_nifti({.pixdim = {1, 1, 1, 2, 0, 0, 0, 0}});
+  EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
+  EXPECT_THAT(outcome.error, HasSubstr("along k"));
+}
+
+TEST(Nifti, HonoursItsSpatialUnit) {
+  const std::vector<double> srow = {1, 0, 0, 10, 0, 1, 0, 20, 0, 0, 1, 30};
+  const Geometry metres = import_nifti({.units = 1 + 8, .srow = srow}).volume.geometry;
+  EXPECT_EQ(metres.spacing, (Vector3{1000, 1000, 1000}));
+  EXPECT_EQ(metres.origin, (Vector3{-10000, -20000, 30000}));
+  const Geometry microns =
+      import_nifti({.units = 3, .qform_code = 1, .sform_code = 0, .qoffset = {10, 20, 30}})
+          .volume.geometry;
+  EXPECT_EQ(microns.spacing, (Vector3{0.001, 0.001, 0.001}));
+  expect_near(microns.origin, {-0.01, -0.02, 0.03}, 1e-15);
+  EXPECT_EQ(import_nifti({.units = 0}).volume.geometry.spacing, (Vector3{1, 1, 1}));
+  EXPECT_THAT(import_nifti({.units = 5}).error, HasSubstr("unit 5"));
+}
+
+TEST(Nifti, AppliesSlopeAndIntercept) {
+  const NiftiFields fields{.slope = 0.5, .intercept = -10};
+  const Outcome outcome = import_nifti(fields);
+  EXPECT_EQ(outcome.volume.type, SampleType::kFloat32);
+  EXPECT_EQ(samples_of<float>(outcome)[0], 'a' * 0.5F - 10);
+  EXPECT_EQ(outcome.volume.range[1], 'x' * 0.5 - 10);
+}
+
+TEST(Nifti, KeepsWideIntegersExactUnderASlope) {
+  const std::vector<std::int32_t> samples(24, 2000000001);
+  const Outcome outcome =
+      import_bytes(nifti({.version = 2, .datatype = 8, .bitpix = 32, .slope = 0.5, .intercept = 1},
+                         bytes_of(samples)));
+  EXPECT_EQ(outcome.volume.type, SampleType::kFloat64);
+  EXPECT_EQ(samples_of<double>(outcome)[0], 1000000001.5);
+}
+
+TEST(Nifti, TakesNoSlopeForNone) {
+  const double nan = std::nan("");
+  for (const NiftiFields& fields :
+       {NiftiFields{.slope = 0, .intercept = 5}, NiftiFields{.slope = nan, .intercept = nan},
+        NiftiFields{.slope = 1, .intercept = 0}}) {
+    EXPECT_EQ(import_nifti(fields).volume.type, SampleType::kUint8);
+  }
+  EXPECT_EQ(import_nifti({.slope = 1, .intercept = 5}).volume.type, SampleType::kFloat32);
+  EXPECT_THAT(import_nifti({.slope = 1, .intercept = nan}).error, HasSubstr("intercept nan"));
+}
+
+TEST(Nifti, RefusesMoreThanThreeDimensions) {
+  EXPECT_THAT(import_bytes(nifti({.dim = {4, 4, 3, 1, 2, 1, 1, 1}}, kSmallSamples)).error,
+              HasSubstr("time series of 2 volumes"));
+  EXPECT_THAT(import_bytes(nifti({.dim = {5, 1, 2, 3, 1, 3, 1, 1}}, kSmallSamples)).error,
+              HasSubstr("3 values along its axis 5"));
+  EXPECT_TRUE(import_nifti({.dim = {7, 4, 3, 2, 1, 1, 1, 1}}).imported());
+  // What lies beyond the dimensions that are told says nothing.
+  EXPECT_TRUE(import_nifti({.dim = {3, 4, 3, 2, 0, -5, 9, 0}}).imported());
+}
+
+TEST(Nifti, ReadsFewerThanThreeDimensions) {
+  const Outcome outcome = import_bytes(
+      nifti({.dim = {2, 6, 4, 0, 0, 0, 0, 0}, .pixdim = {1, 1, 1, 0, 0, 0, 0, 0}, .sform_code = 0},
+            kSmallSamples));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{6, 4, 1}));
+}
+
+TEST(Nifti, RefusesSizesThatCannotBe) {
+  for (const std::int64_t bad : {0, -1, -32768}) {
+    EXPECT_EQ(import_nifti({.dim = {3, 4, bad, 2, 1, 1, 1, 1}}).code, ErrorCode::kUnusableVolume);
+  }
+  for (const std::int64_t bad : {-1, 0, 8, 300}) {
+    EXPECT_THAT(import_nifti({.dim = {bad, 4, 3, 2, 1, 1, 1, 1}}).error, HasSubstr("dimensions"));
+  }
+  const std::int64_t huge = std::int64_t{1} << 40;
+  EXPECT_THAT(import_nifti({.version = 2, .dim = {3, huge, huge, huge, 1, 1, 1, 1}}).error,
+              HasSubstr("not believable"));
+  EXPECT_THAT(import_nifti({.dim = {3, 32767, 32767, 32767, 1, 1, 1, 1}}).error,
+              HasSubstr("truncated"));
+}
+
+TEST(Nifti, RefusesSpacingsThatCannotBe) {
+  for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), 0.0, -1.0}) {
+    NiftiFields fields;
+    fields.pixdim[2] = bad;
+    for (fields.sform_code = 0; fields.sform_code <= 1; ++fields.sform_code) {
+      const Outcome outcome = import_nifti(fields);
+      EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
+      EXPECT_THAT(outcome.error, HasSubstr("voxel size along j"));
+    }
+  }
+}
+
+TEST(Nifti, RefusesFormsThatCannotBe) {
+  for (std::size_t at = 0; at < 12; ++at) {
+    NiftiFields fields;
+    fields.srow[at] = std::nan("");
+    EXPECT_EQ(import_nifti(fields).code, ErrorCode::kUnusableVolume);
+  }
+  EXPECT_FALSE(import_nifti({.srow = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}}).imported());
+  EXPECT_FALSE(import_nifti({.srow = {1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0}}).imported());
+  NiftiFields fields{.qform_code = 1, .sform_code = 0};
+  fields.quaternion[1] = std::nan("");
+  EXPECT_FALSE(import_nifti(fields).imported());
+  EXPECT_THAT(import_nifti({.srow = {1, 0, 0, 9e6, 0, 1, 0, 0, 0, 0, 1, 0}}).error,
+              HasSubstr("single precision"));
+}
+
+TEST(Nifti, RefusesTypesThatAreNoNumbersByName) {
+  EXPECT_THAT(import_nifti({.datatype = 32, .bitpix = 64}).error, HasSubstr("complex"));
+  EXPECT_THAT(import_nifti({.datatype = 128, .bitpix = 24}).error, HasSubstr("RGB24"));
+  EXPECT_THAT(import_nifti({.datatype = 1536, .bitpix = 128}).error, HasSubstr("float128"));
+  EXPECT_THAT(import_nifti({.datatype = 77, .bitpix = 8}).error, HasSubstr("77"));
+  EXPECT_THAT(import_nifti({.datatype = 2, .bitpix = 16}).error, HasSubstr("contradicts"));
+}
+
+TEST(Nifti, RefusesSamplesInAnotherFile) {
+  using std::string_literals::operator""s;
+  EXPECT_THAT(import_nifti({.magic = "ni1\0"s}).error, HasSubstr("in another file"));
+  EXPECT_THAT(import_nifti({.version = 2, .magic = "ni2\0\r\n\032\n"s}).error,
+              HasSubstr("in another file"));
+}
+
+TEST(Nifti, FindsItsSamplesBehindExtensions) {
+  const std::string file =
+      nifti({.vox_offset = 400}, std::string(48, 'E') + "abcdefghijklmnopqrstuvwx");
+  EXPECT_EQ(import_bytes(file).sample_bytes(), kSmallSamples);
+  for (const double bad : {0.0, 347.0, 352.5, 1e30, std::nan("")}) {
+    EXPECT_FALSE(import_nifti({.vox_offset = bad}).imported()) << bad;
+  }
+}
+
+TEST(Nifti, RefusesMoreThanTheLimits) {
+  const std::string file = nifti({.slope = 2}, kSmallSamples);
+  EXPECT_EQ(import_bytes(file, {.max_sample_bytes = 95}).code, ErrorCode::kTooLarge);
+  EXPECT_EQ(import_bytes(gzip(file), {.max_sample_bytes = 95}).code, ErrorCode::kTooLarge);
+  EXPECT_TRUE(import_bytes(file, {.max_sample_bytes = 96}).imported());
+}
+
+}  // namespace
+}  // namespace isomesh::import::test

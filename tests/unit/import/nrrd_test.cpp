@@ -1,0 +1,244 @@
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/volume/geometry.h"
+#include "tests/unit/import/files.h"
+#include "tests/unit/import/writers.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using testing::HasSubstr;
+
+Outcome import_nrrd(const Lines& lines, std::string_view payload = kSmallSamples) {
+  return import_bytes(nrrd(lines, payload));
+}
+
+Outcome import_with(const std::string& name, const std::string& value) {
+  return import_nrrd(with(small_nrrd(), name, value));
+}
+
+template <class Sample>
+std::string numbers(const std::vector<Sample>& samples, std::string_view separator) {
+  std::ostringstream text;
+  text.precision(17);
+  for (const Sample sample : samples) text << +sample << separator;
+  return text.str();
+}
+
+std::string hex(std::string_view bytes) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string text;
+  for (const char byte : bytes) {
+    const auto value = static_cast<unsigned char>(byte);
+    text += kDigits[value / 16];
+    text += kDigits[value % 16];
+    if (text.size() % 61 == 0) text += '\n';
+  }
+  return text;
+}
+
+template <class Sample>
+void expect_all_encodings(const std::string& type) {
+  const auto samples = some_samples<Sample>(24);
+  Lines lines = with(small_nrrd(), "type", type);
+  for (const bool big_endian : {false, true}) {
+    lines = with(lines, "endian", big_endian ? "big" : "little");
+    const std::string raw = bytes_of(samples, big_endian);
+    const auto imported = [&](const std::string& encoding, const std::string& payload) {
+      const Outcome outcome = import_nrrd(with(lines, "encoding", encoding), payload);
+      EXPECT_EQ(outcome.error, "") << type << " " << encoding;
+      EXPECT_EQ(samples_of<Sample>(outcome), samples) << type << " " << encoding;
+      EXPECT_EQ(outcome.volume.format, "nrrd");
+    };
+    imported("raw", raw);
+    imported("gzip", gzip(raw));
+    imported("gz", gzip(raw.substr(0, 7)) + gzip(raw.substr(7)));
+    imported("hex", hex(raw));
+    imported("ascii", numbers(samples, " "));
+    imported("text", numbers(samples, "\n"));
+    imported("txt", numbers(samples, ", "));
+  }
+}
+
+TEST(Nrrd, IsReadInEveryTypeEncodingAndByteOrder) {
+  expect_all_encodings<std::uint8_t>("uchar");
+  expect_all_encodings<std::int8_t>("signed char");
+  expect_all_encodings<std::uint16_t>("unsigned short");
+  expect_all_encodings<std::int16_t>("short");
+  expect_all_encodings<std::uint32_t>("uint32_t");
+  expect_all_encodings<std::int32_t>("int");
+  expect_all_encodings<float>("float");
+  expect_all_encodings<double>("double");
+}
+
+TEST(Nrrd, IsReadInsideGzip) {
+  const Outcome outcome = import_bytes(gzip(nrrd(small_nrrd(), kSmallSamples)));
+  EXPECT_EQ(outcome.sample_bytes(), kSmallSamples);
+}
+
+TEST(Nrrd, TurnsItsSpaceIntoLps) {
+  Lines lines = with(small_nrrd(), "space directions", "(0,2,0) (-3,0,0) (0,0,4)");
+  lines = with(lines, "space origin", "(10,20,30)");
+  const auto geometry = [&](const std::string& space) {
+    const Outcome outcome = import_nrrd(with(lines, "space", space));
+    EXPECT_EQ(outcome.error, "") << space;
+    EXPECT_EQ(outcome.volume.geometry.spacing, (Vector3{2, 3, 4})) << space;
+    return outcome.volume.geometry;
+  };
+  for (const char* space : {"left-posterior-superior", "LPS", "scanner-xyz", "3D-right-handed"}) {
+    EXPECT_EQ(geometry(space).origin, (Vector3{10, 20, 30})) << space;
+    EXPECT_EQ(geometry(space).direction, (std::array<double, 9>{0, -1, 0, 1, 0, 0, 0, 0, 1}));
+  }
+  for (const char* space : {"right-anterior-superior", "RAS"}) {
+    EXPECT_EQ(geometry(space).origin, (Vector3{-10, -20, 30})) << space;
+    EXPECT_EQ(geometry(space).direction, (std::array<double, 9>{0, 1, 0, -1, 0, 0, 0, 0, 1}));
+  }
+  for (const char* space : {"left-anterior-superior", "LAS"}) {
+    EXPECT_EQ(geometry(space).origin, (Vector3{10, -20, 30})) << space;
+    EXPECT_EQ(geometry(space).direction, (std::array<double, 9>{0, -1, 0, -1, 0, 0, 0, 0, 1}));
+  }
+}
+
+TEST(Nrrd, RefusesSpacesThatItCannotPlace) {
+  EXPECT_THAT(import_with("space", "3D-left-handed").error, HasSubstr("left-handed"));
+  EXPECT_THAT(import_with("space", "RAST").error, HasSubstr("rast"));
+  EXPECT_THAT(import_with("space", "outer").error, HasSubstr("outer"));
+}
+
+TEST(Nrrd, ReadsPlainSpacingsAndMins) {
+  Lines lines = {{"type", "uint8"},
+                 {"dimension", "3"},
+                 {"sizes", "4 3 2"},
+                 {"spacings", "1 2.5 0.5"},
+                 {"centers", "cell cell cell"},
+                 {"axis mins", "0 0 0"},
+                 {"encoding", "raw"}};
+  const Outcome outcome = import_nrrd(lines);
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.geometry.spacing, (Vector3{1, 2.5, 0.5}));
+}
+
+TEST(Nrrd, HonoursItsUnits) {
+  const Outcome microns = import_with("space units", "\"um\" \"um\" \"um\"");
+  EXPECT_EQ(microns.volume.geometry.spacing, (Vector3{0.001, 0.001, 0.001}));
+  EXPECT_EQ(import_with("space units", "\"mm\" \"mm\" \"mm\"").error, "");
+  EXPECT_THAT(import_with("space units", "\"mm\" \"um\" \"mm\"").error,
+              HasSubstr("different units"));
+  EXPECT_THAT(import_with("space units", "\"ell\" \"ell\" \"ell\"").error, HasSubstr("ell"));
+}
+
+TEST(Nrrd, RefusesSpacingsThatCannotBe) {
+  for (const char* directions :
+       {"(1,0,0) (0,nan,0) (0,0,1)", "(1,0,0) none (0,0,1)", "(1,0,0) (0,0,0) (0,0,1)",
+        "(1,0,0) (1,0,0) (0,0,1)", "(1,0,0) (0,inf,0) (0,0,1)", "(1,0) (0,1) (0,0)",
+        "(1,0,0) (0,1,0)", "nonsense"}) {
+    const Outcome outcome = import_with("space directions", directions);
+    EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume) << directions;
+  }
+  for (const char* spacings : {"1 nan 1", "1 -1 1", "1 0 1", "1 1", "a b c"}) {
+    const Lines lines = {{"type", "uint8"},
+                         {"dimension", "3"},
+                         {"sizes", "4 3 2"},
+                         {"spacings", spacings},
+                         {"encoding", "raw"}};
+    EXPECT_EQ(import_nrrd(lines).code, ErrorCode::kUnusableVolume) << spacings;
+  }
+  EXPECT_FALSE(import_with("space origin", "(nan,0,0)").imported());
+  EXPECT_FALSE(import_with("space origin", "(0,0,nan)").imported());
+}
+
+// ITK takes such steps for 1 mm along an axis of its own choice.
+TEST(Nrrd, RefusesStepsWhoseLengthsCannotBeComputed) {
+  EXPECT_EQ(import_with("space directions", "(1e200,0,0) (0,1,0) (0,0,1)").code,
+            ErrorCode::kUnusableVolume);
+  EXPECT_EQ(import_with("space directions", "(1e-200,0,0) (0,1,0) (0,0,1)").code,
+            ErrorCode::kUnusableVolume);
+}
+
+TEST(Nrrd, RefusesFieldsOfSpaceWithoutOne) {
+  Lines lines = with(small_nrrd(), "space", "");
+  EXPECT_THAT(import_nrrd(lines).error, HasSubstr("no space in which they lie"));
+  lines = with(lines, "space directions", "");
+  EXPECT_THAT(import_nrrd(lines).error, HasSubstr("no space in which it lies"));
+  EXPECT_TRUE(import_nrrd(with(lines, "space origin", "")).imported());
+}
+
+TEST(Nrrd, RefusesComponentsAndSeries) {
+  Lines lines = with(small_nrrd(), "dimension", "4");
+  lines = with(lines, "sizes", "3 2 2 2");
+  lines = with(lines, "space directions", "none (1,0,0) (0,1,0) (0,0,1)");
+  EXPECT_THAT(import_nrrd(with(lines, "kinds", "RGB-color domain domain domain")).error,
+              HasSubstr("3 components"));
+  EXPECT_THAT(import_nrrd(lines).error, HasSubstr("time series of 2 volumes"));
+  EXPECT_THAT(import_with("kinds", "domain domain time").error, HasSubstr("time"));
+  EXPECT_THAT(import_with("type", "block").error, HasSubstr("block"));
+}
+
+TEST(Nrrd, TakesASingleComponentForNone) {
+  Lines lines = with(small_nrrd(), "dimension", "4");
+  lines = with(lines, "sizes", "1 4 3 2");
+  lines = with(lines, "space directions", "none (1,0,0) (0,2,0) (0,0,3)");
+  const Outcome outcome = import_nrrd(with(lines, "kinds", "vector domain domain domain"));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{4, 3, 2}));
+  EXPECT_EQ(outcome.volume.geometry.spacing, (Vector3{1, 2, 3}));
+}
+
+TEST(Nrrd, NeverReadsAnotherFile) {
+  for (const char* name : {"data file", "datafile", "Data File", "DATAFILE", "data  file"}) {
+    EXPECT_THAT(import_with(name, "/etc/passwd").error, HasSubstr("in another file")) << name;
+    // What follows a list are names, also where it looks like fields.
+    EXPECT_EQ(import_with(name, "LIST").code, ErrorCode::kUnusableVolume) << name;
+  }
+}
+
+TEST(Nrrd, SkipsWhatItsHeaderSays) {
+  const std::string payload =
+      "a line\nanother\n" + std::string(5, '#') + std::string(kSmallSamples);
+  const Lines lines = with(with(small_nrrd(), "line skip", "2"), "byte skip", "5");
+  EXPECT_EQ(import_nrrd(lines, payload).sample_bytes(), kSmallSamples);
+  EXPECT_EQ(import_nrrd(with(small_nrrd(), "byte skip", "-1"), payload).sample_bytes(),
+            kSmallSamples);
+  EXPECT_FALSE(import_with("line skip", "1").imported());
+  EXPECT_FALSE(import_with("line skip", "-1").imported());
+  EXPECT_FALSE(import_with("byte skip", "1").imported());
+  EXPECT_FALSE(import_with("byte skip", "-2").imported());
+  EXPECT_FALSE(import_with("byte skip", "9223372036854775807").imported());
+}
+
+TEST(Nrrd, RefusesHeadersThatContradictThemselves) {
+  EXPECT_FALSE(import_with("dimension", "2").imported());
+  EXPECT_FALSE(import_with("dimension", "17").imported());
+  EXPECT_FALSE(import_with("sizes", "4 3 x").imported());
+  EXPECT_FALSE(import_with("sizes", "4 3 0").imported());
+  EXPECT_FALSE(import_with("sizes", "4 3 -2").imported());
+  EXPECT_FALSE(import_with("sizes", "4294967295 4294967295 4294967295").imported());
+  EXPECT_FALSE(import_with("type", "").imported());
+  EXPECT_FALSE(import_with("encoding", "bzip2").imported());
+  EXPECT_FALSE(import_with("type", "short").imported());
+  EXPECT_THAT(import_bytes("NRRD0004\nno field\n\n").error, HasSubstr("no field"));
+  EXPECT_THAT(import_with("content", "a\rb").error, HasSubstr("control characters"));
+  EXPECT_THAT(import_bytes("NRRD0004\ntype: uint8\ntype: uint8\n\n").error, HasSubstr("twice"));
+  EXPECT_THAT(import_bytes("NRRD0004\ntype: uint8\n").error, HasSubstr("does not end"));
+}
+
+TEST(Nrrd, RefusesTextThatIsNotItsSamples) {
+  const Lines lines = with(with(small_nrrd(), "encoding", "ascii"), "sizes", "2 1 1");
+  EXPECT_TRUE(import_nrrd(lines, "1 2").imported());
+  EXPECT_TRUE(import_nrrd(lines, "\n 1,\n 2 \n").imported());
+  for (const char* text : {"", "1", "1 2 3", "1 x", "1 256", "1 -1", "1 2.5", "1 nan", "1,2"}) {
+    EXPECT_EQ(import_nrrd(lines, text).code, ErrorCode::kUnusableVolume) << text;
+  }
+  EXPECT_FALSE(import_nrrd(lines, std::string(1 << 20, '1')).imported());
+  const Lines hex_lines = with(lines, "encoding", "hex");
+  EXPECT_TRUE(import_nrrd(hex_lines, "0 1\nfF").imported());
+  for (const char* text : {"", "00", "00 f", "000000", "00 0g"}) {
+    EXPECT_EQ(import_nrrd(hex_lines, text).code, ErrorCode::kUnusableVolume) << text;
+  }
+}
+
+}  // namespace
+}  // namespace isomesh::import::test

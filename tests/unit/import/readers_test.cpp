@@ -1,0 +1,95 @@
+#include "server/import/readers.h"
+
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/import/dicom/tags.h"
+#include "tests/unit/import/dicom/objects.h"
+#include "tests/unit/import/writers.h"
+
+namespace isomesh::import::test {
+namespace {
+
+// The name of the format that the bytes are told for; empty for none.
+std::string_view sniffed(std::string_view bytes) {
+  const Reader* reader = sniff(std::as_bytes(std::span(bytes.substr(0, kSniffBytes))));
+  return reader == nullptr ? std::string_view{} : reader->name;
+}
+
+TEST(Readers, KnowNiftiInBothVersionsAndByteOrders) {
+  for (const int version : {1, 2}) {
+    for (const bool big_endian : {false, true}) {
+      const std::string file = nifti({.version = version, .big_endian = big_endian}, kSmallSamples);
+      EXPECT_EQ(sniffed(file), "nifti");
+      EXPECT_EQ(sniffed(gzip(file)), "nifti");
+    }
+  }
+}
+
+TEST(Readers, KnowNrrdAndMetaImage) {
+  EXPECT_EQ(sniffed(nrrd(small_nrrd(), kSmallSamples)), "nrrd");
+  EXPECT_EQ(sniffed(gzip(nrrd(small_nrrd(), kSmallSamples))), "nrrd");
+  EXPECT_EQ(sniffed(metaimage(small_metaimage(), kSmallSamples)), "metaimage");
+  EXPECT_EQ(sniffed("NDims = 3\nDimSize = 1 1 1\n"), "metaimage");
+  EXPECT_EQ(sniffed("NDims=3\r\nDimSize = 1 1 1\r\n"), "metaimage");
+}
+
+TEST(Readers, KnowDicom) { EXPECT_EQ(sniffed(std::string(128, '\0') + "DICM"), "dicom"); }
+
+TEST(Readers, KnowDicomWithoutPreambleByItsFirstElements) {
+  const DicomObject slice = DicomSeries{}.slice(0);
+  for (const std::string_view syntax : {kExplicit, kImplicit}) {
+    EXPECT_EQ(sniffed(slice.bare(syntax)), "dicom") << syntax;
+    EXPECT_EQ(sniffed(slice.file(syntax).substr(132)), "dicom") << syntax;
+    const std::string bare = slice.bare(syntax);
+    for (std::size_t bytes = 0; bytes < 20; ++bytes) {
+      EXPECT_EQ(sniffed(bare.substr(0, bytes)), "") << syntax << ' ' << bytes;
+    }
+    DicomObject other = slice;
+    other.text(dicom::kSopClassUid, "UI", "1.2.3");
+    EXPECT_EQ(sniffed(other.bare(syntax)), "") << syntax;
+    other.erase(dicom::kSopClassUid);
+    EXPECT_EQ(sniffed(other.bare(syntax)), "") << syntax;
+    other = slice;
+    other.text(0x00070010, "LO", "in front");
+    EXPECT_EQ(sniffed(other.bare(syntax)), "") << syntax;
+  }
+}
+
+TEST(Readers, KnowNothingElse) {
+  EXPECT_EQ(sniffed(""), "");
+  EXPECT_EQ(sniffed("\x1f\x8b\x08"), "");
+  EXPECT_EQ(sniffed(gzip("plain text")), "");
+  EXPECT_EQ(sniffed("NRRD0009\n"), "");
+  EXPECT_EQ(sniffed("NDims: 3\n"), "");
+  EXPECT_EQ(sniffed("name = value\n"), "");
+  EXPECT_EQ(sniffed(std::string(4096, '\0')), "");
+  EXPECT_EQ(sniffed(nifti({.magic = "none"}, kSmallSamples)), "");
+}
+
+TEST(Readers, EachHasANameOfItsOwnAndReads) {
+  std::set<std::string_view> names;
+  for (const Reader& reader : readers()) {
+    EXPECT_TRUE(names.insert(reader.name).second) << reader.name;
+    EXPECT_FALSE(reader.title.empty()) << reader.name;
+    EXPECT_NE(reader.parse, nullptr) << reader.name;
+    EXPECT_EQ(reader.sniff == nullptr, reader.name == "raw") << reader.name;
+  }
+}
+
+TEST(Readers, AreNamedWhereNoneReadsAFile) {
+  const Outcome outcome = import_bytes("plain text");
+  EXPECT_EQ(outcome.code, ErrorCode::kUnsupportedMedia);
+  EXPECT_THAT(outcome.error, testing::StartsWith("The file is not NIfTI, NRRD, "));
+  EXPECT_THAT(outcome.error, testing::EndsWith(", nor a ZIP or TAR of one; raw samples need dims "
+                                               "and type."));
+  for (const Reader& reader : readers()) {
+    if (reader.sniff == nullptr) continue;
+    EXPECT_THAT(outcome.error, testing::HasSubstr(std::string(reader.title)));
+  }
+}
+
+}  // namespace
+}  // namespace isomesh::import::test

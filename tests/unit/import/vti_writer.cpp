@@ -1,0 +1,98 @@
+#include "tests/unit/import/vti_writer.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "tests/unit/import/writers.h"
+
+namespace isomesh::import::test {
+namespace {
+
+std::string base64(std::string_view bytes) {
+  constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t at = 0; at < bytes.size(); at += 3) {
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - at);
+    unsigned bits = 0;
+    for (std::size_t byte = 0; byte < 3; ++byte) {
+      bits = bits << 8 | (byte < count ? static_cast<unsigned char>(bytes[at + byte]) : 0U);
+    }
+    for (std::size_t digit = 0; digit < 4; ++digit) {
+      text += digit <= count ? kDigits[bits >> (18 - 6 * digit) & 63U] : '=';
+    }
+  }
+  return text;
+}
+
+std::string counts(const VtiFields& f, const std::vector<std::uint64_t>& values) {
+  if (f.wide_header) return bytes_of(values, f.big_endian);
+  return bytes_of(std::vector<std::uint32_t>(values.begin(), values.end()), f.big_endian);
+}
+
+// What stands ahead of an array's bytes, and they.
+struct Encoded {
+  std::string header;
+  std::string bytes;
+};
+
+Encoded encode(const VtiFields& f, std::string_view samples) {
+  if (!f.compressed) return {counts(f, {samples.size()}), std::string(samples)};
+  std::vector<std::uint64_t> sizes;
+  std::string blocks;
+  for (std::size_t at = 0; at < samples.size(); at += f.block_bytes) {
+    const std::string block = zlib(samples.substr(at, f.block_bytes));
+    sizes.push_back(block.size());
+    blocks += block;
+  }
+  sizes.insert(sizes.begin(), {sizes.size(), f.block_bytes, samples.size() % f.block_bytes});
+  return {counts(f, sizes), blocks};
+}
+
+std::string array_bytes(const VtiFields& f, std::string_view samples) {
+  const auto [header, bytes] = encode(f, samples);
+  if (f.form == VtiForm::kAppendedRaw) return header + bytes;
+  return f.compressed ? base64(header) + base64(bytes) : base64(header + bytes);
+}
+
+bool is_appended(const VtiFields& f) {
+  return f.form == VtiForm::kAppendedRaw || f.form == VtiForm::kAppendedBase64;
+}
+
+std::string array(const VtiFields& f, std::string_view samples, const std::string& ahead) {
+  std::string text = "<DataArray Name=\"samples\" type=\"" + f.type + "\" NumberOfComponents=\"" +
+                     f.components + "\" format=\"";
+  if (f.form == VtiForm::kAscii) {
+    return text + "ascii\">\n " + std::string(samples) + "\n</DataArray>";
+  }
+  if (f.form == VtiForm::kBinary) {
+    return text + "binary\">\n   " + array_bytes(f, samples) + "\n  </DataArray>";
+  }
+  return text + "appended\" offset=\"" + std::to_string(ahead.size()) + "\"/>";
+}
+
+}  // namespace
+
+std::string vti(const VtiFields& f, std::string_view samples) {
+  // Something that lies before the samples, as another array would.
+  const std::string ahead = f.form == VtiForm::kAppendedBase64 ? "AAAA" : std::string("\0_<&", 4);
+  const std::string piece = f.piece_extent.empty() ? f.extent : f.piece_extent;
+  const std::string compressor = f.compressor.empty() ? "vtkZLibDataCompressor" : f.compressor;
+  std::string file = "<?xml version=\"1.0\"?>\n<VTKFile type=\"" + f.kind +
+                     "\" version=\"1.0\" byte_order=\"" +
+                     (f.big_endian ? "BigEndian" : "LittleEndian") + "\"";
+  if (f.wide_header) file += " header_type=\"UInt64\"";
+  if (f.compressed) file += " compressor=\"" + compressor + "\"";
+  file += ">\n<" + f.kind + " WholeExtent=\"" + f.extent + "\" Origin=\"" + f.origin +
+          "\" Spacing=\"" + f.spacing + "\" Direction=\"" + f.direction + "\">\n<Piece Extent=\"" +
+          piece + "\">\n<PointData Scalars=\"" + f.scalars + "\">\n" + f.more +
+          array(f, samples, ahead) + "\n</PointData>\n<CellData/>\n</Piece>\n</" + f.kind + ">\n";
+  if (is_appended(f)) {
+    const std::string encoding = f.form == VtiForm::kAppendedRaw ? "raw" : "base64";
+    file += "<AppendedData encoding=\"" + encoding + "\">\n _" + ahead + array_bytes(f, samples) +
+            "\n</AppendedData>\n";
+  }
+  return file + "</VTKFile>";
+}
+
+}  // namespace isomesh::import::test

@@ -1,0 +1,135 @@
+// Stands in for the daemon's own program where an import goes wrong: does what the uploaded file
+// says.
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "server/process/import_message.h"
+#include "server/process/sandbox.h"
+
+namespace {
+
+using namespace isomesh;
+using namespace isomesh::process;
+
+std::string read_order() {
+  std::string text;
+  std::array<char, 4096> piece;
+  for (;;) {
+    const ssize_t count = ::read(kImportDescriptor, piece.data(), piece.size());
+    if (count <= 0) return text;
+    text.append(piece.data(), static_cast<std::size_t>(count));
+  }
+}
+
+void say(std::string_view message) {
+  if (::write(kImportDescriptor, message.data(), message.size()) < 0) std::_Exit(9);
+}
+
+void confine_as(const ImportOrder& order) {
+  confine({.readable = order.task.source,
+           .writable = order.task.scratch,
+           .memory_bytes = order.bounds.memory_bytes,
+           .file_bytes = std::uint64_t{1} << 20,
+           .time = order.bounds.time});
+}
+
+void eat_memory() {
+  std::vector<std::string> eaten;
+  for (;;) eaten.emplace_back(std::size_t{1} << 20, 'x');
+}
+
+// What a confined process can do and should not be able to.
+std::string escapes(const ImportOrder& order) {
+  std::string found;
+  const auto note = [&](bool done, const std::string& what) {
+    if (done) found += what + " ";
+  };
+  const std::string outside = order.task.scratch.parent_path() / "outside";
+  note(::open("/etc/passwd", O_RDONLY) >= 0, "reads-other-file");
+  note(::open(order.task.source.c_str(), O_WRONLY) >= 0, "writes-upload");
+  note(::open(outside.c_str(), O_WRONLY | O_CREAT, 0600) >= 0, "creates-outside");
+  note(::socket(AF_INET, SOCK_STREAM, 0) >= 0, "internet-socket");
+  note(::socket(AF_UNIX, SOCK_STREAM, 0) >= 0, "local-socket");
+  note(::fork() >= 0, "forks");
+  note(::kill(::getppid(), 0) == 0, "signals-the-daemon");
+  const std::array<char*, 1> none = {nullptr};
+  note(::execve("/bin/true", none.data(), none.data()) >= 0, "starts-programs");
+  note(::mmap(nullptr, 4096, PROT_READ | PROT_WRITE | PROT_EXEC, MAP_PRIVATE | MAP_ANONYMOUS, -1,
+              0) != MAP_FAILED,
+       "makes-code");
+  note(::symlink("/etc/passwd", (order.task.scratch / "link").c_str()) == 0, "makes-links");
+  note(::open(order.task.source.c_str(), O_RDONLY) < 0, "cannot-read-upload");
+  note(::open((order.task.scratch / "new").c_str(), O_WRONLY | O_CREAT, 0600) < 0,
+       "cannot-write-scratch");
+  int inherited = 0;
+  for (int descriptor = kImportDescriptor + 1; descriptor < 256; ++descriptor) {
+    // Those that this function has opened itself are the two just above.
+    if (::fcntl(descriptor, F_GETFD) >= 0) ++inherited;
+  }
+  note(inherited > 2, "inherits-descriptors");
+  note(::getenv("PATH") != nullptr || ::getenv("HOME") != nullptr, "inherits-environment");
+  return found;
+}
+
+void write_beyond_limit(const ImportOrder& order) {
+  std::ofstream file(order.task.scratch / "large", std::ios::binary);
+  const std::string piece(std::size_t{1} << 20, 'x');
+  for (int at = 0; at < 3; ++at) file << piece << std::flush;
+  say(error_message({ErrorCode::kOutOfSpace, file ? "it was written" : "it was not written"}));
+}
+
+void lie() {
+  Volume volume;
+  volume.format = "nifti";
+  volume.dims = {2, 2, 2};
+  volume.bytes = 8;
+  say(volume_message(volume));
+}
+
+void misbehave(const std::string& what, const ImportOrder& order) {
+  if (what == "crash") {
+    std::signal(SIGSEGV, SIG_DFL);  // a sanitizer would make a status of it
+    std::raise(SIGSEGV);
+  }
+  if (what == "exit") std::_Exit(7);
+  if (what == "hang") ::pause();
+  if (what == "close and hang") {
+    ::close(kImportDescriptor);
+    ::pause();
+  }
+  if (what == "chatter") {
+    for (;;) say(reading_message("nifti"));
+  }
+  if (what == "babble") say("{\"reading\": 7}\n");
+  if (what == "forge") say("{\"reading\": \"nifti\\u000a[error] forged\"}\n");
+  if (what == "lie") lie();
+  confine_as(order);
+  if (what == "memory") eat_memory();
+  if (what == "file") write_beyond_limit(order);
+  if (what == "escape")
+    say(error_message({ErrorCode::kUnusableVolume, "[" + escapes(order) + "]"}));
+}
+
+}  // namespace
+
+int main() {
+  const ImportOrder order = order_from(read_order());
+  std::ifstream file(order.task.source);
+  const std::string what{std::istreambuf_iterator<char>(file), {}};
+  file.close();
+  say(reading_message("nifti"));
+  misbehave(what, order);
+  std::_Exit(0);
+}

@@ -1,0 +1,137 @@
+#include "server/jobs/import_runner.h"
+
+#include <limits>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/process/import_message.h"
+#include "tests/support/files.h"
+
+namespace isomesh::jobs {
+namespace {
+
+using process::ImportTask;
+using std::chrono::seconds;
+using test::TemporaryFolder;
+using testing::HasSubstr;
+
+// Runs the program that misbehaves as the upload says; what came of it is an error.
+class Faulty {
+ public:
+  explicit Faulty(seconds longest = seconds(60), std::size_t at_once = 2)
+      : runner_({.bounds = {.memory_bytes = std::uint64_t{128} << 20, .time = longest},
+                 .at_once = at_once,
+                 .program = FAULTY_IMPORT}) {}
+
+  Error run(const std::string& what) {
+    const TemporaryFolder folder;
+    const TemporaryFolder scratch;
+    test::write_file(folder / "upload", what);
+    const ImportTask task = {
+        .source = folder / "upload", .scratch = scratch.path(), .target = scratch / "canonical"};
+    try {
+      runner_.run(task);
+    } catch (const Error& error) {
+      return error;
+    }
+    return {ErrorCode::kInternal, "nothing was thrown"};
+  }
+
+  ImportRunner& runner() { return runner_; }
+
+ private:
+  ImportRunner runner_;
+};
+
+void expect_refused(const Error& error, const std::string& reason) {
+  EXPECT_EQ(error.code(), ErrorCode::kUnusableVolume) << error.what();
+  EXPECT_THAT(error.what(), HasSubstr(reason));
+}
+
+TEST(ImportRunner, ACrashIsOneRefusedUpload) {
+  Faulty faulty;
+  expect_refused(faulty.run("crash"), "ended by signal 11 while reading nifti");
+  expect_refused(faulty.run("exit"), "ended with status 7 while reading nifti");
+  expect_refused(faulty.run(""), "ended with status 0 while reading nifti");
+}
+
+TEST(ImportRunner, AHangEndsWithItsTime) {
+  expect_refused(Faulty(seconds(1)).run("hang"), "after 1 seconds while reading nifti");
+  expect_refused(Faulty().run("close and hang"), "ended without an answer while reading nifti");
+}
+
+TEST(ImportRunner, ACrowdOfWordsIsCutOff) { expect_refused(Faulty().run("chatter"), "ended"); }
+
+TEST(ImportRunner, WordsThatAreNoneOfOursAreAnInternalError) {
+  for (const std::string what : {"babble", "forge"}) {
+    const Error error = Faulty().run(what);
+    EXPECT_EQ(error.code(), ErrorCode::kInternal) << what;
+    EXPECT_THAT(error.what(), HasSubstr("malformed")) << what;
+  }
+}
+
+TEST(ImportRunner, AVolumeThatWasNotWrittenIsNotBelieved) {
+  EXPECT_EQ(Faulty().run("lie").code(), ErrorCode::kInternal);
+}
+
+TEST(ImportRunner, AProgramThatIsNotThereIsAnInternalError) {
+  ImportRunner runner({.bounds = {}, .at_once = 1, .program = "/nonexistent"});
+  const TemporaryFolder folder;
+  test::write_file(folder / "upload", "x");
+  const ImportTask task = {
+      .source = folder / "upload", .scratch = folder.path(), .target = folder / "canonical"};
+  EXPECT_THROW(runner.run(task), Error);
+}
+
+TEST(ImportRunner, AConfinedProcessDoesNothingElse) {
+  EXPECT_STREQ(Faulty().run("escape").what(), "[]");
+}
+
+TEST(ImportRunner, FilesHaveALimit) {
+  EXPECT_STREQ(Faulty().run("file").what(), "it was not written");
+}
+
+// Under a sanitizer memory is not limited: see sandbox.cpp.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+TEST(ImportRunner, MemoryHasALimit) {
+  expect_refused(Faulty().run("memory"), "ended by signal 6 while reading nifti");
+}
+#endif
+
+TEST(ImportRunner, StoppingEndsThoseThatRunAndThoseThatWait) {
+  Faulty faulty(seconds(600), 1);
+  std::atomic<int> ended = 0;
+  std::vector<std::jthread> threads;
+  for (int thread = 0; thread < 3; ++thread) {
+    threads.emplace_back([&] {
+      const Error error = faulty.run("hang");
+      EXPECT_EQ(error.code(), ErrorCode::kUnavailable) << error.what();
+      ++ended;
+    });
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_EQ(ended, 0);
+  faulty.runner().stop();
+  threads.clear();
+  EXPECT_EQ(faulty.run("crash").code(), ErrorCode::kUnavailable);
+}
+
+TEST(ImportRunner, RawDescriptionsAreCheckedBeforeAnythingStarts) {
+  ImportRunner runner({.bounds = {}, .at_once = 1, .program = "/nonexistent"});
+  RawDescription raw;
+  raw.dims = {2, 2, 2};
+  raw.geometry.spacing[0] = std::numeric_limits<double>::quiet_NaN();
+  ImportTask task;
+  task.options.raw = raw;
+  try {
+    runner.run(task);
+    FAIL() << "nothing was thrown";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
+  }
+}
+
+}  // namespace
+}  // namespace isomesh::jobs

@@ -1,0 +1,139 @@
+// What confine takes away, seen from processes that are confined and end with the answer. How an
+// import fares in it is tested with the runner that starts imports.
+#include "server/process/sandbox.h"
+
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <ctime>
+#include <functional>
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "tests/support/files.h"
+
+namespace isomesh::process {
+namespace {
+
+using test::TemporaryFolder;
+
+class Sandbox : public testing::Test {
+ protected:
+  Sandbox() { test::write_file(folder_ / "upload", "bytes"); }
+
+  Confinement confinement() const {
+    return {.readable = folder_ / "upload",
+            .writable = scratch_.path(),
+            .memory_bytes = std::uint64_t{256} << 20,
+            .file_bytes = 4096,
+            .time = std::chrono::seconds(60)};
+  }
+
+  // Whether `holds` is true in a process that is confined.
+  bool confined(const std::function<bool()>& holds) const { return confined(confinement(), holds); }
+
+  static bool confined(const Confinement& confinement, const std::function<bool()>& holds) {
+    const int status = status_of([&] {
+      confine(confinement);
+      return holds();
+    });
+    return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+  }
+
+  static int status_of(const std::function<bool()>& holds) {
+    const pid_t child = ::fork();
+    if (child == 0) ::_exit(holds() ? 0 : 1);
+    int status = -1;
+    EXPECT_EQ(::waitpid(child, &status, 0), child);
+    return status;
+  }
+
+  const TemporaryFolder folder_;
+  const TemporaryFolder scratch_;
+};
+
+// True when a call has failed with that error.
+bool fails(long result, int error) { return result < 0 && errno == error; }
+
+TEST_F(Sandbox, LeavesTheUploadAndTheScratchFolder) {
+  EXPECT_TRUE(confined([&] { return ::open((folder_ / "upload").c_str(), O_RDONLY) >= 0; }));
+  EXPECT_TRUE(confined([&] {
+    const auto path = scratch_ / "new";
+    const int file = ::open(path.c_str(), O_WRONLY | O_CREAT, 0600);
+    return file >= 0 && ::write(file, "x", 1) == 1 && ::unlink(path.c_str()) == 0;
+  }));
+}
+
+TEST_F(Sandbox, TakesOtherFilesWhereTheKernelCan) {
+  test::write_file(folder_ / "other", "bytes");
+  const auto reads_other = [&] { return ::open((folder_ / "other").c_str(), O_RDONLY) >= 0; };
+  EXPECT_EQ(confined(reads_other), !has_landlock());
+}
+
+TEST_F(Sandbox, TakesSocketsAndOtherProcesses) {
+  EXPECT_TRUE(confined([] { return fails(::socket(AF_INET, SOCK_STREAM, 0), EPERM); }));
+  EXPECT_TRUE(confined([] { return fails(::socket(AF_UNIX, SOCK_STREAM, 0), EPERM); }));
+  EXPECT_TRUE(confined([] { return fails(::fork(), EPERM); }));
+  EXPECT_TRUE(confined([] { return fails(::kill(::getppid(), 0), EPERM); }));
+}
+
+TEST_F(Sandbox, TakesTheWayBack) {
+  EXPECT_TRUE(confined([] { return fails(::prctl(PR_SET_DUMPABLE, 1), EPERM); }));
+  EXPECT_TRUE(confined([] {
+    const rlimit more = {.rlim_cur = RLIM_INFINITY, .rlim_max = RLIM_INFINITY};
+    return ::setrlimit(RLIMIT_FSIZE, &more) != 0;
+  }));
+}
+
+TEST_F(Sandbox, LimitsAFileAndSaysSoWithoutASignal) {
+  EXPECT_TRUE(confined([&] {
+    const int file = ::open((scratch_ / "large").c_str(), O_WRONLY | O_CREAT, 0600);
+    return ::lseek(file, 4096, SEEK_SET) == 4096 && fails(::write(file, "x", 1), EFBIG);
+  }));
+}
+
+TEST_F(Sandbox, LeavesFewOpenFiles) {
+  EXPECT_TRUE(confined([&] {
+    for (int file = 0; file < 64; ++file) {
+      if (fails(::open((folder_ / "upload").c_str(), O_RDONLY), EMFILE)) return true;
+    }
+    return false;
+  }));
+}
+
+TEST_F(Sandbox, EndsAProcessThatTakesTooMuchOfTheProcessor) {
+  Confinement brief = confinement();
+  brief.time = std::chrono::seconds(1);
+  const int status = status_of([&] {
+    confine(brief);
+    std::atomic<unsigned> turns = 0;
+    while (true) ++turns;
+    return true;
+  });
+  EXPECT_TRUE(WIFSIGNALED(status));
+}
+
+TEST_F(Sandbox, SaysWhenAFolderCannotBeAllowed) {
+  Confinement nowhere = confinement();
+  nowhere.writable = scratch_ / "nowhere";
+  const int status = status_of([&] {
+    try {
+      confine(nowhere);
+    } catch (const std::exception&) {
+      return true;
+    }
+    return false;
+  });
+  // A kernel without Landlock is not asked to allow anything.
+  EXPECT_EQ(WIFEXITED(status) && WEXITSTATUS(status) == 0, has_landlock());
+}
+
+}  // namespace
+}  // namespace isomesh::process

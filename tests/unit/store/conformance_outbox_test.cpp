@@ -1,0 +1,110 @@
+// What every engine's outbox does.
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "proto/json.h"
+#include "server/store/sqlite/job_store.h"
+#include "tests/unit/store/engine.h"
+
+namespace isomesh::store {
+namespace {
+
+using testing::ElementsAre;
+
+class OutboxConformance : public test::EngineTest {
+ protected:
+  // Submits a job that calls that URL back, and ends it.
+  std::string end_with_callback(const std::string& url) {
+    JobParameters calling = unlike();
+    calling.callback = Callback{url};
+    const std::string id = submit(calling).id;
+    jobs().cancel("", id);
+    return id;
+  }
+
+  std::vector<std::string> due(std::size_t per_receiver) {
+    std::vector<std::string> jobs;
+    for (const Delivery& delivery : outbox().due(now(), per_receiver)) jobs.push_back(delivery.job);
+    return jobs;
+  }
+
+  static Time now() { return std::chrono::system_clock::now(); }
+};
+
+INSTANTIATE_TEST_SUITE_P(Engines, OutboxConformance, testing::ValuesIn(test::all_engines()),
+                         test::name_of);
+
+TEST_P(OutboxConformance, HoldsTheEndOfEveryJobThatHasACallback) {
+  const std::string silent = submit().id;
+  JobParameters calling = unlike();
+  calling.callback = Callback{"https://a.example.org/x"};
+  const std::string cancelled = submit(calling).id;
+  EXPECT_EQ(outbox().count(), 0U);
+  jobs().cancel("", cancelled);
+  jobs().cancel("", silent);
+  const auto due = outbox().due(now(), 9);
+  ASSERT_EQ(due.size(), 1U);
+  EXPECT_EQ(due[0].job, cancelled);
+  EXPECT_EQ(due[0].url, "https://a.example.org/x");
+  EXPECT_EQ(job_from_json(due[0].body), jobs().get("", cancelled));
+  EXPECT_EQ(due[0].attempts, 0);
+}
+
+TEST_P(OutboxConformance, OfEachReceiverSomeAreDue) {
+  const std::string first = end_with_callback("https://a.example.org/1");
+  const std::string second = end_with_callback("https://a.example.org/2");
+  const std::string third = end_with_callback("https://a.example.org/3");
+  const std::string port = end_with_callback("https://a.example.org:8443/");
+  const std::string host = end_with_callback("https://b.example.org");
+  EXPECT_THAT(due(2), ElementsAre(first, second, port, host));
+  EXPECT_EQ(outbox().count(), 5U);
+  outbox().remove(first);
+  EXPECT_THAT(due(2), ElementsAre(second, third, port, host));
+}
+
+TEST_P(OutboxConformance, WhatIsPostponedIsDueLater) {
+  const std::string job = end_with_callback("https://a.example.org/");
+  EXPECT_EQ(outbox().next_after(now()), std::nullopt);
+  const auto later = now() + std::chrono::hours(1);
+  outbox().postpone(job, later);
+  EXPECT_TRUE(outbox().due(now(), 9).empty());
+  EXPECT_LT(std::chrono::abs(*outbox().next_after(now()) - later), std::chrono::milliseconds(1));
+  const auto due = outbox().due(later + std::chrono::seconds(1), 9);
+  ASSERT_EQ(due.size(), 1U);
+  EXPECT_EQ(due[0].attempts, 1);
+}
+
+TEST_P(OutboxConformance, OutlivesARestart) {
+  const std::string job = end_with_callback("https://a.example.org/");
+  outbox().postpone(job, now() - std::chrono::seconds(1));
+  restart();
+  const auto due = outbox().due(now(), 9);
+  ASSERT_EQ(due.size(), 1U);
+  EXPECT_EQ(due[0].job, job);
+  EXPECT_EQ(due[0].attempts, 1);
+}
+
+// What a job is besides changes no byte of its mesh: neither when it runs nor whom it tells.
+TEST(ResultKey, KnowsVolumeParametersAndVersionAlone) {
+  JobParameters parameters;
+  parameters.volume = "abc";
+  const auto key = [&](const std::string& version) {
+    return result_key(parameters.volume, parameters, version);
+  };
+  const std::string first = key("1");
+  parameters.priority = Priority::kStat;
+  parameters.callback = Callback{"https://a.example.org/"};
+  EXPECT_EQ(key("1"), first);
+  EXPECT_NE(key("2"), first);
+  parameters.normals = true;
+  EXPECT_NE(key("1"), first);
+  parameters.normals = false;
+  parameters.volume = "abd";
+  EXPECT_NE(key("1"), first);
+}
+
+}  // namespace
+}  // namespace isomesh::store

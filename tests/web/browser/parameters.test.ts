@@ -1,0 +1,126 @@
+// The form of a job's parameters, and what of it reaches the job.
+import { execFileSync } from 'node:child_process';
+import { dirname, join } from 'node:path';
+import type { Locator, Page } from 'playwright-core';
+import { beforeAll, describe, expect, it } from 'vitest';
+import { parameters } from '../../../client/web/src/job/table';
+import { jobParameters, notInTheForm } from '../openapi';
+import { ballNrrd, setup, openedJob } from './support';
+
+const at = setup();
+let ball: string;
+
+beforeAll(async () => {
+  ball = await at.daemon.upload(ballNrrd(24, 8));
+});
+
+async function openForm(page: Page, query = ''): Promise<void> {
+  await page.goto('about:blank');
+  await page.goto(`${at.daemon.url}/#/volumes/${ball}?iso=100${query}`);
+  await page.locator('.parameters summary').click();
+}
+
+function control(page: Page, name: string): Locator {
+  return page.locator(`[data-parameter="${name}"]`);
+}
+
+async function make(page: Page): Promise<Record<string, unknown>> {
+  await page.getByRole('button', { name: 'Make the surface' }).click();
+  await page.waitForURL(/#\/jobs\//);
+  return (await openedJob(at)).parameters;
+}
+
+function valueAt(job: Record<string, unknown>, name: string): unknown {
+  return name.split('.').reduce<unknown>((value, part) => (value as Record<string, unknown>)[part], job);
+}
+
+// Chooses another value than the one that is there.
+async function change(element: Locator): Promise<void> {
+  const number = element.locator('input[type=number]');
+  if ((await number.count()) > 0) {
+    const [low, high] = await Promise.all(['min', 'max'].map(async (bound) => Number(await number.getAttribute(bound))));
+    const isWhole = (await number.getAttribute('step')) === '1';
+    await number.fill(String(isWhole ? (low ?? 0) + 2 : (low ?? 0) + (high || 1) / 4));
+    return;
+  }
+  // A row of choices, or boxes; whichever is not on.
+  const labels = (await element.evaluate((node) => node.matches('label'))) ? element : element.locator('label');
+  for (const label of await labels.all()) {
+    if (await label.locator('input').isChecked()) continue;
+    await label.click();
+    return;
+  }
+  throw new Error('every value is chosen');
+}
+
+describe('the form', () => {
+  it('shows each parameter of the schema, and what is set there reaches the job', async () => {
+    const { page } = at;
+    // With Taubin's smoothing, for which all of them are.
+    await openForm(page, '&smoothing=taubin');
+    const names = [...jobParameters.keys()].filter((name) => !notInTheForm.includes(name));
+    expect(names.length).toBeGreaterThan(13);
+    for (const name of names) {
+      const element = control(page, name);
+      expect(await element.count(), name).toBe(1);
+      expect(await element.isVisible(), name).toBe(true);
+      expect(await element.getAttribute('title'), name).not.toBe('');
+      if (name !== 'smoothing') await change(element);
+    }
+    const job = await make(page);
+    for (const name of names) {
+      expect(valueAt(job, name), name).not.toEqual(jobParameters.get(name)?.default);
+    }
+    // It says how to do the same without the page, with options that the command has.
+    const said = await page.locator('.snippet pre').first().textContent();
+    const isomesh = join(dirname(process.env.ISOMESHD ?? ''), 'isomesh');
+    const help = execFileSync(isomesh, ['submit', '--help']).toString();
+    for (const { name, option } of parameters.filter((parameter) => names.includes(parameter.name))) {
+      expect(said, name).toContain(`--${option}`);
+      expect(help, name).toMatch(new RegExp(`--${option}\\b`));
+    }
+  });
+
+  it('marks what the daemon would refuse, and does not send it', async () => {
+    const { page } = at;
+    await openForm(page);
+    const lambda = control(page, 'lambda').locator('input');
+    for (const [text, isBad] of [['0', true], ['0.123', false], ['1.5', true]] as const) {
+      await lambda.fill(text);
+      expect(await lambda.getAttribute('aria-invalid'), text).toBe(String(isBad));
+    }
+    expect(valueAt(await make(page), 'lambda')).toBe(0.123);
+  });
+});
+
+describe('the kind of smoothing', () => {
+  // Through the link that takes over the parameters of a job, whose answer names its step.
+  const change = async (from: string, to: string): Promise<Record<string, unknown>> => {
+    const { page, daemon } = at;
+    const { id } = await daemon.submit({ volume: ball, iso: 100, smoothing: from, formats: ['glb'] }, 30);
+    await page.goto('about:blank');
+    await page.goto(`${daemon.url}/#/jobs/${id}`);
+    await page.getByRole('link', { name: 'Change parameters' }).click();
+    await control(page, 'smoothing').getByLabel(to).check();
+    return make(page);
+  };
+
+  it('is switched without the step of the other', async () => {
+    expect(await change('laplacian', 'Taubin')).toMatchObject({ smoothing: 'taubin', lambda: 0.33 });
+    expect(await change('taubin', 'Laplacian')).toMatchObject({ smoothing: 'laplacian', lambda: 1 });
+  });
+
+  it('shows which step is taken, and has a pass band only where it is used', async () => {
+    const { page } = at;
+    await openForm(page, '&smoothing=taubin&lambda=0.5&pass_band=0.2');
+    const lambda = control(page, 'lambda').locator('input');
+    const band = control(page, 'pass_band').locator('input');
+    expect([await lambda.inputValue(), await band.inputValue()]).toEqual(['0.5', '0.2']);
+    await control(page, 'smoothing').getByLabel('Laplacian').check();
+    expect([await lambda.inputValue(), await lambda.getAttribute('placeholder')]).toEqual(['', '1']);
+    expect(await band.isDisabled()).toBe(true);
+    await control(page, 'smoothing').getByLabel('Taubin').check();
+    expect([await lambda.inputValue(), await lambda.getAttribute('placeholder')]).toEqual(['', '0.33']);
+    expect([await band.inputValue(), await band.isDisabled()]).toEqual(['0.1', false]);
+  });
+});
