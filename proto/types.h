@@ -213,7 +213,7 @@ struct Distribution {
 
   double mean = 0;
   double min = 0;
-  std::array<std::uint64_t, kBins> histogram = {};  // triangles in equal bins from zero on
+  std::array<std::uint64_t, kBins> histogram = {};  // measured triangles in equal bins from zero on
 
   bool operator==(const Distribution&) const = default;
 };

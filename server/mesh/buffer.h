@@ -1,8 +1,9 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <span>
+
+#include "server/mesh/large_memory.h"
 
 namespace isomesh::mesh {
 
@@ -18,7 +19,7 @@ class Buffer {
     if (count > capacity_) {
       data_.reset();  // give the old block back before asking for the larger one
       capacity_ = 0;
-      data_ = std::make_unique_for_overwrite<T[]>(count + 1);
+      data_ = allocate_for_overwrite<T>(count + 1);
       capacity_ = count;
     }
     size_ = count;
@@ -45,7 +46,7 @@ class Buffer {
   const T* end() const { return data() + size_; }
 
  private:
-  std::unique_ptr<T[]> data_;
+  LargeArray<T> data_;
   std::size_t size_ = 0;
   std::size_t capacity_ = 0;
 };

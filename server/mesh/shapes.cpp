@@ -21,8 +21,19 @@
 #define ISOMESH_SHAPES_ONCE_
 namespace isomesh::mesh {
 
+constexpr std::size_t kBlock = 256;
+
+// Blocks of triangles in the mesh's order, of which every step-th is measured from the first on.
+struct MeasuredBlocks {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  std::size_t step = 1;
+};
+
 // Of a run of triangles.
 struct ShapeSums {
+  std::size_t triangles = 0;
+
   // One quantity's; the sum in parts that are added independently of each other.
   struct Sums {
     static constexpr std::size_t kParts = 8;
@@ -43,7 +54,6 @@ HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 namespace {
 
-constexpr std::size_t kBlock = 256;
 using Lanes = std::array<float, kBlock>;
 
 // Two sides of each triangle, from its first corner.
@@ -175,12 +185,14 @@ void add_values(const Lanes& values, std::size_t count, float per_bin, ShapeSums
   }
 }
 
-void measure_run(const Mesh& mesh, std::size_t begin, std::size_t end, ShapeSums& sums) {
+void measure_run(const Mesh& mesh, const MeasuredBlocks& blocks, ShapeSums& sums) {
   constexpr float kBins = Distribution::kBins;
   Sides sides = {};
   Values values;
-  for (; begin < end; begin += kBlock) {
-    const std::size_t count = std::min(kBlock, end - begin);
+  for (std::size_t block = blocks.begin; block < blocks.end; block += blocks.step) {
+    const std::size_t begin = block * kBlock;
+    const std::size_t count = std::min(kBlock, mesh.triangles.size() - begin);
+    sums.triangles += count;
     load_sides(mesh, begin, count, sides);
     measure_block(sides, values);
     add_values(values.aspect_ratio, count, kBins, sums.aspect_ratio);
@@ -190,8 +202,8 @@ void measure_run(const Mesh& mesh, std::size_t begin, std::size_t end, ShapeSums
 
 }  // namespace
 
-void measure_shapes_of(const Mesh& mesh, std::size_t begin, std::size_t end, ShapeSums& sums) {
-  measure_run(mesh, begin, end, sums);
+void measure_shapes_of(const Mesh& mesh, const MeasuredBlocks& blocks, ShapeSums& sums) {
+  measure_run(mesh, blocks, sums);
 }
 
 }  // namespace isomesh::mesh::HWY_NAMESPACE
@@ -203,15 +215,17 @@ namespace {
 
 HWY_EXPORT(measure_shapes_of);
 
-constexpr std::size_t kTrianglesPerRun = 32768;
+constexpr std::size_t kMeasuredPerRun = 32768;
 
-Distribution summed(const std::vector<ShapeSums>& runs, ShapeSums::Sums ShapeSums::*quantity,
-                    std::size_t triangles) {
+constexpr std::size_t ceil_div(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
+
+Distribution summed(const std::vector<ShapeSums>& runs, ShapeSums::Sums ShapeSums::*quantity) {
   Distribution result;
-  if (triangles == 0) return result;
+  std::size_t triangles = 0;
   double sum = 0;
   float min = INFINITY;
   for (const ShapeSums& run : runs) {
+    triangles += run.triangles;
     const ShapeSums::Sums& sums = run.*quantity;
     for (const double part : sums.sum) sum += part;
     min = std::min(min, sums.min);
@@ -220,6 +234,7 @@ Distribution summed(const std::vector<ShapeSums>& runs, ShapeSums::Sums ShapeSum
         result.histogram[bin] += bins[bin];
     }
   }
+  if (triangles == 0) return result;
   result.mean = sum / static_cast<double>(triangles);
   result.min = min;
   return result;
@@ -229,14 +244,17 @@ Distribution summed(const std::vector<ShapeSums>& runs, ShapeSums::Sums ShapeSum
 
 Shapes measure_shapes(const Mesh& mesh, const Context& context) {
   const std::size_t triangles = mesh.triangles.size();
-  std::vector<ShapeSums> runs((triangles + kTrianglesPerRun - 1) / kTrianglesPerRun);
+  const std::size_t step =
+      triangles <= kMostMeasuredTriangles ? 1 : ceil_div(triangles, kMostMeasuredTriangles / 2);
+  const std::size_t blocks = ceil_div(triangles, kBlock);
+  const std::size_t per_run = kMeasuredPerRun / kBlock * step;
+  std::vector<ShapeSums> runs(ceil_div(blocks, per_run));
   const auto measure = HWY_DYNAMIC_DISPATCH(measure_shapes_of);
   parallel_for(context, runs.size(), [&](std::size_t run) {
-    const std::size_t begin = run * kTrianglesPerRun;
-    measure(mesh, begin, std::min(triangles, begin + kTrianglesPerRun), runs[run]);
+    const std::size_t begin = run * per_run;
+    measure(mesh, {begin, std::min(blocks, begin + per_run), step}, runs[run]);
   });
-  return {summed(runs, &ShapeSums::aspect_ratio, triangles),
-          summed(runs, &ShapeSums::smallest_angle_deg, triangles)};
+  return {summed(runs, &ShapeSums::aspect_ratio), summed(runs, &ShapeSums::smallest_angle_deg)};
 }
 
 }  // namespace isomesh::mesh

@@ -118,6 +118,36 @@ TEST(Shapes, AreThoseOfTheDefinition) {
   expect_shapes(test::extracted(test::noise<std::uint8_t>({0, 1, 2}, {9, 9, 9}, 2), {1}));
 }
 
+// Of what the definition says of all triangles, a sample keeps means and shares.
+TEST(Shapes, OfManyTrianglesAreThoseOfASample) {
+  const Mesh mesh =
+      test::extracted(test::noise<std::int16_t>({-7, -2, 0, 1, 4, 9}, {61, 60, 59}, 4), {0.5});
+  const std::size_t triangles = mesh.triangles.size();
+  ASSERT_GT(triangles, kMostMeasuredTriangles);
+  const test::Surface surface = test::surface_of(mesh);
+  double ratios = 0;
+  double angles = 0;
+  std::array<double, Distribution::kBins> shares = {};
+  for (const Triangle& triangle : mesh.triangles) {
+    const auto [ratio, angle] = shape_of(surface, triangle);
+    ratios += ratio;
+    angles += angle;
+    const auto bin = static_cast<std::size_t>(ratio * Distribution::kBins);
+    shares[std::min(bin, shares.size() - 1)] += 1.0 / static_cast<double>(triangles);
+  }
+  const Shapes shapes = measure_shapes(mesh, {});
+  EXPECT_NEAR(shapes.aspect_ratio.mean, ratios / static_cast<double>(triangles), 1e-3);
+  EXPECT_NEAR(shapes.smallest_angle_deg.mean, angles / static_cast<double>(triangles), 0.05);
+  const auto& histogram = shapes.aspect_ratio.histogram;
+  const auto measured = std::accumulate(histogram.begin(), histogram.end(), std::uint64_t{0});
+  EXPECT_GE(measured, kMostMeasuredTriangles / 3);
+  EXPECT_LE(measured, kMostMeasuredTriangles);
+  for (std::size_t bin = 0; bin < Distribution::kBins; ++bin) {
+    const auto share = static_cast<double>(histogram[bin]) / static_cast<double>(measured);
+    EXPECT_NEAR(share, shares[bin], 2e-3) << bin;
+  }
+}
+
 TEST(Shapes, OfNothingAreZero) {
   const Shapes shapes = measure_shapes(Mesh{}, {});
   EXPECT_EQ(shapes.aspect_ratio, Distribution{});
