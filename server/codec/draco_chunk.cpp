@@ -45,6 +45,16 @@ bool is_own_draco(const DracoParameters& draco) {
          draco.position_bits <= edgebreaker::Encoder::kMostPositionBits;
 }
 
+std::optional<mesh::Topology> topology_of(const mesh::Mesh& mesh, std::span<DracoStream> streams,
+                                          const mesh::Context& context) {
+  std::vector<mesh::PartTopology> parts;
+  for (DracoStream& stream : streams) {
+    if (!stream.topology) return std::nullopt;
+    parts.push_back(*std::move(stream.topology));
+  }
+  return join_topology(mesh, parts, context);
+}
+
 std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_block) {
   const auto triangles = static_cast<double>(mesh.triangles.size());
   const auto layers = static_cast<double>(mesh.layers());
@@ -82,6 +92,7 @@ DracoStream DracoEncoder::encode_block(const mesh::Mesh& mesh, const Block& bloc
                                part_.layer_vertices, part_.layer_triangles},
                               options, edgebreaker::Threads::kOne, context);
   set_bounds(part_.positions, options.grid, stream);
+  if (stream.topology) stream.topology = in_mesh(*std::move(stream.topology));
   return stream;
 }
 
@@ -103,11 +114,32 @@ DracoStream DracoEncoder::encode(const Part& part, const DracoOptions& options,
     if (encoded) {
       return {.bytes = std::move(encoded->bytes),
               .vertices = encoded->vertices,
-              .triangles = static_cast<std::uint32_t>(part.triangles.size())};
+              .triangles = static_cast<std::uint32_t>(part.triangles.size()),
+              .topology = std::move(encoded->topology)};
     }
   }
   return encode_with_libdraco({part.positions, part.normals, part.triangles}, options.grid,
                               options.speed);
+}
+
+// What is known of the block that was taken last, in the mesh's numbers.
+mesh::PartTopology DracoEncoder::in_mesh(mesh::PartTopology part) const {
+  const std::vector<std::uint32_t>& origin = part_.origin;
+  part.first_word = part_.lowest / 64;
+  std::vector<std::uint64_t> inner((part_.lowest + part_.number.size() - 1) / 64 + 1 -
+                                   part.first_word);
+  for (std::size_t v = 0; v < origin.size(); ++v) {
+    const std::uint64_t bit = part.inner[v / 64] >> (v % 64) & 1;
+    inner[origin[v] / 64 - part.first_word] |= bit << (origin[v] % 64);
+  }
+  part.inner = std::move(inner);
+  for (auto& [vertex, next, previous] : part.rim) {
+    vertex = origin[vertex];
+    next = origin[next];
+    previous = origin[previous];
+  }
+  for (auto& [vertex, component] : part.rim_components) vertex = origin[vertex];
+  return part;
 }
 
 // Numbers the block's vertices anew, in the order in which its triangles name them. Those that a
@@ -126,6 +158,8 @@ void DracoEncoder::take(const mesh::Mesh& mesh, const Block& block,
   }
   // Triangles of neighbouring layers name vertices of neighbouring layers, so the range is short.
   part_.number.assign(std::size_t{high} - low + 1, kUnnamed);
+  part_.lowest = low;
+  part_.origin.clear();
   part_.positions.clear();
   part_.normals.clear();
   part_.triangles.clear();
@@ -138,6 +172,7 @@ void DracoEncoder::take(const mesh::Mesh& mesh, const Block& block,
         std::uint32_t& vertex = part_.number[triangle[corner] - low];
         if (vertex == kUnnamed) {
           vertex = static_cast<std::uint32_t>(part_.positions.size());
+          part_.origin.push_back(triangle[corner]);
           part_.positions.push_back(mesh.positions[triangle[corner]]);
           if (!normals.empty()) part_.normals.push_back(normals[triangle[corner]]);
         }

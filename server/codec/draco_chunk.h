@@ -5,12 +5,14 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "server/codec/draco/encoder.h"
 #include "server/codec/draco/grid.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/topology_parts.h"
 
 namespace isomesh::codec {
 
@@ -22,9 +24,17 @@ struct DracoStream {
   std::uint32_t normal_id = 0;
   mesh::Vec3 low = {0, 0, 0};  // bounds of the decoded positions
   mesh::Vec3 high = {0, 0, 0};
+  // What encoding it has shown of the triangles, in the mesh's numbers of vertices; libdraco shows
+  // nothing.
+  std::optional<mesh::PartTopology> topology;
 };
 
 // Consecutive triangles [begin, end).
+// The topology of a mesh whose triangles these streams have between them; none where one of them
+// has shown nothing, or it does not follow.
+std::optional<mesh::Topology> topology_of(const mesh::Mesh& mesh, std::span<DracoStream> streams,
+                                          const mesh::Context& context);
+
 struct Run {
   std::size_t begin = 0;
   std::size_t end = 0;
@@ -80,9 +90,12 @@ class DracoEncoder {
     std::vector<mesh::Triangle> triangles;
     std::vector<std::uint64_t> layer_vertices;
     std::vector<std::uint64_t> layer_triangles;
-    std::vector<std::uint32_t> number;  // of the mesh's vertices from the block's lowest on
+    std::uint32_t lowest = 0;           // of the mesh's vertices
+    std::vector<std::uint32_t> number;  // of the mesh's vertices from the lowest on
+    std::vector<std::uint32_t> origin;  // of the block's vertices, in the mesh
   };
 
+  mesh::PartTopology in_mesh(mesh::PartTopology part) const;
   void take(const mesh::Mesh& mesh, const Block& block, std::span<const mesh::Vec3> normals);
   DracoStream encode(const Part& part, const DracoOptions& options, edgebreaker::Threads threads,
                      const mesh::Context& context);

@@ -7,19 +7,20 @@
 
 namespace isomesh::codec {
 
-void encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco, const mesh::Context& context,
-                const Sink& sink) {
+std::optional<mesh::Topology> encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco,
+                                         const mesh::Context& context, const Sink& sink) {
   context.throw_if_stopped();
   if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::kTooLarge, "the surface has more triangles than Draco can encode");
   }
   const DracoOptions options = {grid_of(mesh, draco.position_bits), draco.speed};
   auto encoder = Encoders::instance().take(mesh.triangles.size());
-  const DracoStream stream = encoder->encode_whole(mesh, options, {context.stop, nullptr});
+  DracoStream stream = encoder->encode_whole(mesh, options, {context.stop, nullptr});
   Encoders::instance().give_back(std::move(encoder));
   context.throw_if_stopped();
   sink(stream.bytes);
   if (context.progress) context.progress(1);
+  return topology_of(mesh, {&stream, 1}, {context.stop, nullptr});
 }
 
 }  // namespace isomesh::codec

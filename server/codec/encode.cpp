@@ -23,27 +23,40 @@ std::uint64_t no_memory(const SurfaceSize& /*surface*/, const MeshParameters& /*
   return 0;
 }
 
+template <auto kEncode>
+std::optional<mesh::Topology> without_topology(const mesh::Mesh& mesh, const Provenance&,
+                                               const mesh::Context& context, const Sink& sink) {
+  kEncode(mesh, context, sink);
+  return std::nullopt;
+}
+
+bool never(const MeshParameters& /*parameters*/) { return false; }
+
+bool if_ours(const MeshParameters& parameters) { return is_own_draco(parameters.draco); }
+
 constexpr std::array kFormats = {
-    Format{
-        .format = MeshFormat::kDrc,
-        .media_type = kUnregistered,
-        .milliseconds_per_triangle = 6.0e-5,
-        .bytes =
-            [](const SurfaceSize& surface, const MeshParameters& parameters) {
-              return 100 + as_double(surface.vertices) * draco_bytes_per_vertex(2.6, parameters);
-            },
-        .memory_bytes =
-            [](const SurfaceSize& surface, const MeshParameters& parameters) {
-              // Measured: libdraco at its slowest speed, and our own encoder, also where all
-              // vertices lie in two layers.
-              constexpr std::uint64_t kLibdracoPerTriangle = 100;
-              constexpr std::uint64_t kOwnPerTriangle = 75;
-              return surface.triangles *
-                     (is_own_draco(parameters.draco) ? kOwnPerTriangle : kLibdracoPerTriangle);
-            },
-        .encode =
-            [](const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
-               const Sink& sink) { encode_drc(mesh, provenance.parameters.draco, context, sink); }},
+    Format{.format = MeshFormat::kDrc,
+           .media_type = kUnregistered,
+           .milliseconds_per_triangle = 6.0e-5,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 return 100 + as_double(surface.vertices) * draco_bytes_per_vertex(2.6, parameters);
+               },
+           .memory_bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 // Measured: libdraco at its slowest speed, and our own encoder, also where all
+                 // vertices lie in two layers.
+                 constexpr std::uint64_t kLibdracoPerTriangle = 100;
+                 constexpr std::uint64_t kOwnPerTriangle = 75;
+                 return surface.triangles *
+                        (is_own_draco(parameters.draco) ? kOwnPerTriangle : kLibdracoPerTriangle);
+               },
+           .shows_topology = if_ours,
+           .encode =
+               [](const mesh::Mesh& mesh, const Provenance& provenance,
+                  const mesh::Context& context, const Sink& sink) {
+                 return encode_drc(mesh, provenance.parameters.draco, context, sink);
+               }},
     Format{.format = MeshFormat::kGlb,
            .media_type = "model/gltf-binary",
            .milliseconds_per_triangle = 4.0e-5,
@@ -62,6 +75,10 @@ constexpr std::array kFormats = {
                  return surface.vertices * sizeof(mesh::Vec3) +
                         surface.triangles * (kPerTriangle + kNormalsPerTriangle);
                },
+           .shows_topology =
+               [](const MeshParameters& parameters) {
+                 return if_ours(parameters) && !parameters.normals;
+               },
            .encode = encode_glb},
     Format{.format = MeshFormat::kStl,
            .media_type = "model/stl",
@@ -69,8 +86,8 @@ constexpr std::array kFormats = {
            .bytes = [](const SurfaceSize& surface,
                        const MeshParameters&) { return 84 + 50 * as_double(surface.triangles); },
            .memory_bytes = no_memory,
-           .encode = [](const mesh::Mesh& mesh, const Provenance&, const mesh::Context& context,
-                        const Sink& sink) { encode_stl(mesh, context, sink); }},
+           .shows_topology = never,
+           .encode = without_topology<encode_stl>},
     Format{.format = MeshFormat::kPly,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -79,8 +96,8 @@ constexpr std::array kFormats = {
                  return 300 + 12 * as_double(surface.vertices) + 13 * as_double(surface.triangles);
                },
            .memory_bytes = no_memory,
-           .encode = [](const mesh::Mesh& mesh, const Provenance&, const mesh::Context& context,
-                        const Sink& sink) { encode_ply(mesh, context, sink); }},
+           .shows_topology = never,
+           .encode = without_topology<encode_ply>},
     Format{.format = MeshFormat::kObj,
            .media_type = "model/obj",
            .milliseconds_per_triangle = 2.0e-4,
@@ -89,8 +106,8 @@ constexpr std::array kFormats = {
                  return 100 + 30 * as_double(surface.vertices) + 24 * as_double(surface.triangles);
                },
            .memory_bytes = no_memory,
-           .encode = [](const mesh::Mesh& mesh, const Provenance&, const mesh::Context& context,
-                        const Sink& sink) { encode_obj(mesh, context, sink); }},
+           .shows_topology = never,
+           .encode = without_topology<encode_obj>},
 };
 
 }  // namespace
@@ -101,9 +118,10 @@ const Format& describe(MeshFormat format) {
   return *found;
 }
 
-void encode(const mesh::Mesh& mesh, MeshFormat format, const Provenance& provenance,
-            const mesh::Context& context, const Sink& sink) {
-  describe(format).encode(mesh, provenance, context, sink);
+std::optional<mesh::Topology> encode(const mesh::Mesh& mesh, MeshFormat format,
+                                     const Provenance& provenance, const mesh::Context& context,
+                                     const Sink& sink) {
+  return describe(format).encode(mesh, provenance, context, sink);
 }
 
 }  // namespace isomesh::codec

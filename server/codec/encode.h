@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,8 +14,12 @@
 #include "server/mesh/context.h"
 #include "server/mesh/extract.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/topology.h"
 
 namespace isomesh::codec {
+
+// Our own Draco encoder walks over all triangles, by which it knows the mesh's topology: same as
+// measure_topology's. Encoders that may use it return it where they have.
 
 // Takes the encoded bytes, in order; may throw, which ends the encoding.
 using Sink = std::function<void(std::span<const std::byte>)>;
@@ -29,8 +34,8 @@ bool is_own_draco(const DracoParameters& draco);
 // each axis. The stream keeps the number of vertices and triangles. The bytes do not depend on the
 // number of threads. Thread safe. Throws Error kUnusableVolume where a position is not finite,
 // kInternal when libdraco refuses, and kCancelled, which libdraco's one call does not look at.
-void encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco, const mesh::Context& context,
-                const Sink& sink);
+std::optional<mesh::Topology> encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco,
+                                         const mesh::Context& context, const Sink& sink);
 
 // STL, PLY and OBJ are written as they go, in some megabytes of memory, formatted side by side. The
 // bytes do not depend on the number of threads.
@@ -64,8 +69,8 @@ struct Provenance {
 // turns them into glTF's metres with Y up. The bytes do not depend on the number of threads. Throws
 // Error kTooLarge beyond the 4 GiB that GLB can hold, kInternal when Draco refuses, and kCancelled,
 // looked at before each block.
-void encode_glb(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
-                const Sink& sink);
+std::optional<mesh::Topology> encode_glb(const mesh::Mesh& mesh, const Provenance& provenance,
+                                         const mesh::Context& context, const Sink& sink);
 
 // What the server knows of a format. Its name, which is a file's suffix as well, is in proto. Times
 // and sizes are first guesses, from a head of five million triangles on two cores.
@@ -77,15 +82,18 @@ struct Format {
   double (*bytes)(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
   // What encoding takes at its peak, beside the mesh; an upper estimate.
   std::uint64_t (*memory_bytes)(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
-  void (*encode)(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
-                 const Sink& sink);
+  // Whether encoding nearly always shows the mesh's topology on its way.
+  bool (*shows_topology)(const MeshParameters& parameters);
+  std::optional<mesh::Topology> (*encode)(const mesh::Mesh& mesh, const Provenance& provenance,
+                                          const mesh::Context& context, const Sink& sink);
 };
 
 // The format's row in the one table of them; constant time.
 const Format& describe(MeshFormat format);
 
-// As the format's encoder does.
-void encode(const mesh::Mesh& mesh, MeshFormat format, const Provenance& provenance,
-            const mesh::Context& context, const Sink& sink);
+// As the format's encoder does. Returns the mesh's topology where encoding it has shown that.
+std::optional<mesh::Topology> encode(const mesh::Mesh& mesh, MeshFormat format,
+                                     const Provenance& provenance, const mesh::Context& context,
+                                     const Sink& sink);
 
 }  // namespace isomesh::codec

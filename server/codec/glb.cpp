@@ -142,9 +142,9 @@ void write_words(const Sink& sink, std::initializer_list<std::uint32_t> words) {
 
 }  // namespace
 
-void encode_glb(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
-                const Sink& sink) {
-  const std::vector<DracoStream> chunks = encode_chunks(mesh, provenance.parameters, context);
+std::optional<mesh::Topology> encode_glb(const mesh::Mesh& mesh, const Provenance& provenance,
+                                         const mesh::Context& context, const Sink& sink) {
+  std::vector<DracoStream> chunks = encode_chunks(mesh, provenance.parameters, context);
   std::size_t binary_bytes = 0;
   for (const DracoStream& chunk : chunks) binary_bytes += padded(chunk.bytes.size());
   std::string json = describe(chunks, binary_bytes, provenance).dump();
@@ -160,13 +160,14 @@ void encode_glb(const mesh::Mesh& mesh, const Provenance& provenance, const mesh
   write_words(sink, {kMagic, kVersion, static_cast<std::uint32_t>(total)});
   write_words(sink, {static_cast<std::uint32_t>(json.size()), kJsonChunk});
   sink(std::as_bytes(std::span(json)));
-  if (chunks.empty()) return;
+  if (chunks.empty()) return std::nullopt;
   write_words(sink, {static_cast<std::uint32_t>(binary_bytes), kBinaryChunk});
   constexpr std::array<std::byte, kAlignment> kZeros = {};
   for (const DracoStream& chunk : chunks) {
     sink(chunk.bytes);
     sink(std::span(kZeros).first(padded(chunk.bytes.size()) - chunk.bytes.size()));
   }
+  return topology_of(mesh, chunks, {context.stop, nullptr});
 }
 
 }  // namespace isomesh::codec

@@ -1,8 +1,10 @@
 #include "server/jobs/make_mesh.h"
 
+#include <algorithm>
 #include <atomic>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -65,10 +67,7 @@ void extract(const SampleArray& samples, const MeshRequest& request, const Progr
               [&](auto sample) { extract_as<decltype(sample)>(samples, request, progress, mesh); });
 }
 
-// Fills in what is not known from before smoothing.
-void measure_quality(const mesh::Mesh& mesh, bool is_smoothed, const mesh::Context& context,
-                     MeshSummary& summary) {
-  const mesh::Topology topology = measure_topology(mesh, context);
+void set_topology(const mesh::Topology& topology, MeshSummary& summary) {
   summary.boundary_edges = topology.boundary_edges;
   summary.components = topology.components;
   summary.euler = topology.euler;
@@ -80,20 +79,27 @@ void measure_quality(const mesh::Mesh& mesh, bool is_smoothed, const mesh::Conte
   if (quality.closed && quality.manifold && quality.oriented) {
     quality.genus = static_cast<std::int64_t>(topology.components) - topology.euler / 2;
   }
-  quality.aspect_ratio.smoothed = quality.aspect_ratio.extracted;
-  quality.smallest_angle_deg.smoothed = quality.smallest_angle_deg.extracted;
-  if (!is_smoothed) return;
-  const mesh::Shapes shapes = measure_shapes(mesh, context);
+}
+
+void set_smoothed_shapes(const mesh::Shapes& shapes, MeshQuality& quality) {
   quality.aspect_ratio.smoothed = shapes.aspect_ratio;
   quality.smallest_angle_deg.smoothed = shapes.smallest_angle_deg;
 }
 
+bool shows_topology(const MeshParameters& parameters) {
+  return std::ranges::any_of(parameters.formats, [&](MeshFormat format) {
+    return codec::describe(format).shows_topology(parameters);
+  });
+}
+
 // Encodes every format and measures the mesh, all side by side: few of them have work for every
-// thread all the time.
+// thread all the time. The topology is measured where no encoder shows it.
 void encode_and_measure(const codec::Provenance& provenance, std::span<const codec::Sink> sinks,
                         const Progress& progress, const mesh::Mesh& mesh, MeshSummary& summary) {
-  const std::vector<MeshFormat>& formats = provenance.parameters.formats;
+  const MeshParameters& parameters = provenance.parameters;
+  const std::vector<MeshFormat>& formats = parameters.formats;
   std::vector<std::atomic<double>> done(formats.size());
+  std::vector<std::optional<mesh::Topology>> shown(formats.size() + 1);
   const mesh::Context stage = progress.context();
   const auto encode = [&](std::size_t i) {
     const mesh::Context context = {stage.stop, [&, i](double share) {
@@ -102,12 +108,20 @@ void encode_and_measure(const codec::Provenance& provenance, std::span<const cod
                                          std::accumulate(done.begin(), done.end(), 0.0);
                                      stage.progress(sum / static_cast<double>(formats.size()));
                                    }};
-    codec::encode(mesh, formats[i], provenance, context, sinks[i]);
+    shown[i] = codec::encode(mesh, formats[i], provenance, context, sinks[i]);
+  };
+  const auto measure = [&] {
+    if (parameters.passes > 0) {
+      set_smoothed_shapes(measure_shapes(mesh, progress.quiet()), summary.quality);
+    }
+    if (!shows_topology(parameters)) shown.back() = measure_topology(mesh, progress.quiet());
   };
   mesh::parallel_for(progress.quiet(), formats.size() + 1, [&](std::size_t task) {
     if (task < formats.size()) return encode(task);
-    measure_quality(mesh, provenance.parameters.passes > 0, progress.quiet(), summary);
+    measure();
   });
+  const auto found = std::ranges::find_if(shown, [](const auto& one) { return one.has_value(); });
+  set_topology(found != shown.end() ? **found : measure_topology(mesh, progress.quiet()), summary);
 }
 
 }  // namespace
@@ -152,6 +166,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   const mesh::Shapes extracted = measure_shapes(mesh, progress.quiet());
   summary.quality.aspect_ratio.extracted = extracted.aspect_ratio;
   summary.quality.smallest_angle_deg.extracted = extracted.smallest_angle_deg;
+  set_smoothed_shapes(extracted, summary.quality);  // also where nothing is smoothed
 
   progress.enter(Stage::kSmooth, kSmoothShare, &Timing::smooth);
   const mesh::SmoothingEffect effect = smooth(smooth_options(parameters), progress.context(), mesh);

@@ -13,11 +13,16 @@ namespace isomesh::mesh {
 struct Topology {
   std::uint64_t boundary_edges = 0;  // of one triangle only
   std::uint64_t components = 0;      // parts that no triangle connects
-  std::int64_t euler =
-      0;                 // vertices - edges + triangles, where no edge has more than two triangles
-  bool manifold = true;  // at most two triangles at an edge, and one fan of them around a vertex
+  std::int64_t euler = 0;            // euler_of it
+  // At most two triangles at an edge, and one fan of them around a vertex.
+  bool manifold = true;
   bool oriented = true;  // no two triangles run through an edge in the same direction
+
+  bool operator==(const Topology&) const = default;
 };
+
+// Vertices - edges + triangles of a mesh without edges of more than two triangles.
+std::int64_t euler_of(const Mesh& mesh, std::uint64_t boundary_edges);
 
 // The same for any number of threads. Throws Error kCancelled.
 Topology measure_topology(const Mesh& mesh, const Context& context);

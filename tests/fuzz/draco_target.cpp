@@ -5,6 +5,7 @@
 #include "proto/error.h"
 #include "server/codec/draco/encoder.h"
 #include "server/codec/encode.h"
+#include "server/mesh/topology_parts.h"
 #include "tests/unit/codec/made_up_meshes.h"
 #include "tests/unit/codec/stream_check.h"
 
@@ -20,6 +21,13 @@ void expect_same(std::string_view drc, const MadeUpMesh& made, MaySplit may_spli
   const std::string difference =
       test::difference(drc, made.mesh, made.draco.position_bits, may_split);
   if (!difference.empty()) throw std::logic_error(difference);
+}
+
+void expect_topology(const mesh::PartTopology& all, const mesh::Mesh& mesh) {
+  const auto shown = mesh::join_topology(mesh, {&all, 1}, {});
+  if (shown != mesh::measure_topology(mesh, {})) {
+    throw std::logic_error("the encoder shows another topology than is measured");
+  }
 }
 
 void encode_as_drc(const MadeUpMesh& made) {
@@ -41,6 +49,7 @@ void encode_by_our_own(const MadeUpMesh& made) {
     if (!encoded) return;
     expect_same({reinterpret_cast<const char*>(encoded->bytes.data()), encoded->bytes.size()}, made,
                 made.is_manifold ? MaySplit::kNo : MaySplit::kYes);
+    if (encoded->topology && !made.has_wrong_layers) expect_topology(*encoded->topology, made.mesh);
   }
 }
 

@@ -9,6 +9,7 @@
 #include "server/codec/draco/corners.h"
 #include "server/codec/draco/fans.h"
 #include "server/codec/draco/opposites.h"
+#include "server/codec/draco/part_topology.h"
 #include "server/codec/draco/quantise.h"
 #include "server/codec/draco/residual_coder.h"
 #include "server/codec/draco/residuals.h"
@@ -101,7 +102,11 @@ std::optional<Encoded> Encoder::Stages::encode(const Surface& surface, const Gri
   if (!connect(layered, threads, context)) return std::nullopt;
   if (!prepare(surface.positions, grid, threads, context)) return std::nullopt;
   if (!walk(threads, context)) return std::nullopt;
-  return Encoded{stream_of(grid), order_.count()};
+  Encoded encoded = {stream_of(grid), order_.count(), std::nullopt};
+  if (order_.count() == surface_.vertices) {
+    encoded.topology = part_topology(surface_, opposites_.boundary(), fans_, traversal_);
+  }
+  return encoded;
 }
 
 bool Encoder::Stages::connect(const Surface& surface, Threads threads,

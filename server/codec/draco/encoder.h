@@ -14,12 +14,15 @@
 #include "server/codec/draco/grid.h"
 #include "server/mesh/context.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/topology_parts.h"
 
 namespace isomesh::codec::edgebreaker {
 
 struct Encoded {
   std::vector<std::byte> bytes;
   std::uint32_t vertices = 0;
+  // In the surface's numbers of vertices; none where there is a vertex that no triangle names.
+  std::optional<mesh::PartTopology> topology;
 };
 
 // The triangles in layers, as mesh::Mesh has them: a triangle of layer k names only vertices of

@@ -17,6 +17,7 @@ bool Traversal::run(const Fans& fans, Starts& starts, const mesh::Context& conte
     const std::optional<Corner> end = choose_entrance(*entrance, fans);
     if (end) starts.put({*end, false});
     inner_first_faces_.push_back(entrance->inner.has_value());
+    if (!entrance->inner) take_gate(entrance->corner);
     if (entrance->inner && !take_first(*entrance->inner)) return false;
     const std::uint32_t first_symbol = count_;
     if (!walk(entrance->corner, context)) return false;
@@ -36,13 +37,14 @@ void Traversal::prepare(const Connectivity& surface, const Fans& fans) {
   std::memset(face_state_.reserve(faces + 1), kLeft, faces);
   face_state_[faces] = kGone;  // beyond the boundary
   std::memset(known_.reserve(surface.vertices), 0, surface.vertices);
-  fans.for_each_on_boundary([&](Vertex vertex) { known_[vertex] = 1; });
+  fans.for_each_on_boundary([&](Vertex vertex) { known_[vertex] = kRim; });
   symbols_.reserve(faces);
   waiting_.clear();
   all_splits_.clear();
   ends_.clear();
   events_.clear();
   inner_first_faces_.clear();
+  rim_.clear();
   count_ = 0;
 }
 
@@ -88,9 +90,21 @@ bool Traversal::take_first(Face face) {
   for (std::uint32_t i = 0; i < 3; ++i) {
     std::uint8_t& known = known_[surface_.vertex(corner_of(face, i))];
     if (known != 0) return false;
-    known = 1;
+    known = kKnown;
   }
   return true;
+}
+
+// A component's first edge, of which neither vertex need ever be a tip.
+void Traversal::take_gate(Corner corner) {
+  for (const Corner end : {next(corner), previous(corner)}) {
+    if (known_[surface_.vertex(end)] == kRim) take_rim(surface_.vertex(end));
+  }
+}
+
+void Traversal::take_rim(Vertex vertex) {
+  known_[vertex] = kKnown;
+  rim_.push_back({vertex, components() - 1});
 }
 
 // From a corner until all that hangs together with it is done.
@@ -111,12 +125,14 @@ bool Traversal::walk(Corner corner, const mesh::Context& context) {
       const Vertex tip = surface.vertex(corner);
       const Corner left = surface.left(corner);
       if (known[tip] == 0) {
-        known[tip] = 1;
+        known[tip] = kKnown;
         symbols[n++] = kC;
         next_round.passed(left);
         corner = right;
         continue;
       }
+      if (known[tip] == kRim) [[unlikely]]
+        take_rim(tip);
       const std::uint8_t right_state = state[face_of(right)];
       const std::uint8_t left_state = state[face_of(left)];
       symbols[n] =

@@ -47,7 +47,19 @@ class Traversal {
   // For each component, whether it starts with a face inside: one that has no symbol.
   const std::vector<bool>& inner_first_faces() const { return inner_first_faces_; }
 
+  std::uint32_t components() const { return static_cast<std::uint32_t>(inner_first_faces_.size()); }
+  // The vertices on the boundary, each with its component.
+  struct RimVertex {
+    Vertex vertex = 0;
+    std::uint32_t component = 0;
+  };
+  const std::vector<RimVertex>& rim() const { return rim_; }
+
  private:
+  // Of a vertex that the decoder has, and of one on the boundary that it is taken to have already.
+  static constexpr std::uint8_t kKnown = 1;
+  static constexpr std::uint8_t kRim = 2;
+
   // Of a face: gone, also an S, also looked at for a start.
   enum FaceState : std::uint8_t { kLeft = 0, kGone = 1, kSplit = 2, kListed = 4 };
 
@@ -64,6 +76,8 @@ class Traversal {
   std::optional<Entrance> entrance_of(Face face, const Fans& fans) const;
   std::optional<Corner> choose_entrance(Entrance& entrance, const Fans& fans);
   bool take_first(Face face);
+  void take_gate(Corner corner);
+  void take_rim(Vertex vertex);
   bool walk(Corner corner, const mesh::Context& context);
   bool is_of_open_fan(Corner corner) const;
   Corner tip_before(Corner corner, std::uint32_t symbol, std::size_t& end) const;
@@ -74,13 +88,14 @@ class Traversal {
   const std::size_t least_to_look_ahead_;
   Connectivity surface_;
   Scratch<std::uint8_t> face_state_;
-  Scratch<std::uint8_t> known_;  // a byte a vertex: the decoder has it, or it is of the boundary
+  Scratch<std::uint8_t> known_;  // a byte a vertex: 0, kKnown, or kRim
   Scratch<std::uint8_t> symbols_;
   std::vector<Corner> waiting_;  // the left sides of splits
   std::vector<Split> all_splits_;
   std::vector<Corner> ends_;  // the tips of those symbols that are an E
   std::vector<SplitEvent> events_;
   std::vector<bool> inner_first_faces_;
+  std::vector<RimVertex> rim_;
   std::uint32_t count_ = 0;
 };
 
