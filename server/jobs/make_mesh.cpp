@@ -163,12 +163,12 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   }
   summary.triangles = mesh.triangles.size();
   summary.vertices = mesh.positions.size();
+
+  progress.enter(Stage::kSmooth, kSmoothShare, &Timing::smooth);
   const mesh::Shapes extracted = measure_shapes(mesh, progress.quiet());
   summary.quality.aspect_ratio.extracted = extracted.aspect_ratio;
   summary.quality.smallest_angle_deg.extracted = extracted.smallest_angle_deg;
   set_smoothed_shapes(extracted, summary.quality);  // also where nothing is smoothed
-
-  progress.enter(Stage::kSmooth, kSmoothShare, &Timing::smooth);
   const mesh::SmoothingEffect effect = smooth(smooth_options(parameters), progress.context(), mesh);
   summary.area_mm2 = effect.after.area_mm2;
   summary.area_extracted_mm2 = effect.before.area_mm2;
