@@ -1,20 +1,19 @@
-// isomesh-import: a program that reads one upload for the daemon. It reads its order from the
-// descriptor kImportDescriptor, confines itself to what the order needs, and writes its answer to
-// the same descriptor.
+// isomesh-import: a program that reads uploads for the daemon, each in a copy of itself that is made
+// ahead. A copy gives up what no import needs, reads its order from kChildDescriptor, gives up what
+// the order does not need, and writes its answer to the same descriptor.
 #include <array>
-#include <csignal>
 #include <cstdlib>
 #include <new>
 #include <string>
 #include <string_view>
 #include <typeinfo>
 
-#include <sys/prctl.h>
 #include <unistd.h>
 
 #include "base/error.h"
 #include "proto/error.h"
 #include "server/import/import.h"
+#include "server/process/fork_server.h"
 #include "server/process/import_message.h"
 #include "server/process/sandbox.h"
 #include "server/volume/canonical.h"
@@ -28,7 +27,7 @@ std::string read_order() {
   std::string text;
   std::array<char, 4096> piece;
   for (;;) {
-    const ssize_t count = ::read(kImportDescriptor, piece.data(), piece.size());
+    const ssize_t count = ::read(kChildDescriptor, piece.data(), piece.size());
     if (count < 0) throw_system_error("read", errno);
     if (count == 0) return text;
     text.append(piece.data(), static_cast<std::size_t>(count));
@@ -37,7 +36,7 @@ std::string read_order() {
 
 void say(std::string_view message) {
   while (!message.empty()) {
-    const ssize_t count = ::write(kImportDescriptor, message.data(), message.size());
+    const ssize_t count = ::write(kChildDescriptor, message.data(), message.size());
     // The daemon has closed its end, because it has given this import up.
     if (count < 0) std::_Exit(EXIT_FAILURE);
     message.remove_prefix(static_cast<std::size_t>(count));
@@ -55,11 +54,12 @@ Confinement confinement_of(const ImportOrder& order) {
 }
 
 // Every exception becomes a message here, because nothing else leaves this process.
-std::string import_as_ordered() {
+std::string import_as_ordered(const std::string& message) {
   ImportOrder order;
   try {
-    order = order_from(read_order());
-    confine(confinement_of(order));
+    order = order_from(message);
+    confine_to(confinement_of(order));
+    say(begun_message());
     return volume_message(import::import_volume(
         order.task, [](std::string_view format) { say(reading_message(format)); }));
   } catch (const Error& error) {
@@ -76,11 +76,14 @@ std::string import_as_ordered() {
   }
 }
 
+void import_one() {
+  confine_ahead();
+  const std::string order = read_order();
+  // The daemon has no use for this process any more.
+  if (order.empty()) return;
+  say(import_as_ordered(order));
+}
+
 }  // namespace
 
-int main() {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  say(import_as_ordered());
-  // The destructors of statics and the leak sanitizer would need calls that are forbidden by now.
-  std::_Exit(EXIT_SUCCESS);
-}
+int main() { serve_copies(import_one); }

@@ -5,15 +5,17 @@
 #include <cstddef>
 #include <filesystem>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 
 #include "server/process/import_message.h"
+#include "server/process/prepared.h"
 
 namespace isomesh::jobs {
 
 struct RunnerOptions {
   process::ImportBounds bounds;
-  std::size_t at_once = 2;        // further imports wait for their turn
+  std::size_t at_once = 2;        // further imports wait; so many processes are kept prepared
   std::filesystem::path program;  // isomesh-import
 };
 
@@ -22,8 +24,8 @@ class ImportRunner {
  public:
   explicit ImportRunner(const RunnerOptions& options);
 
-  // Imports as import_volume does, in a new process, which has ended when this returns or throws;
-  // only files in the scratch folder may remain of it. Throws what import_volume throws, and Error
+  // Imports as import_volume does, in a process that does nothing else, before or after, and has
+  // ended when this returns or throws; only files in the scratch folder may remain of it. Throws what import_volume throws, and Error
   // kUnusableVolume when the process crashes or exceeds its bounds, kUnavailable once stopped. The
   // volume has been compared with the canonical file.
   Volume run(const process::ImportTask& task);
@@ -32,6 +34,8 @@ class ImportRunner {
   void stop();
 
  private:
+  // Empty when the process had ended before it began.
+  std::optional<Volume> run_in(process::Child child, const process::ImportTask& task);
   void take_place();
   void give_place_back();
 
@@ -40,6 +44,7 @@ class ImportRunner {
   std::mutex mutex_;
   std::condition_variable_any place_free_;
   std::size_t running_ = 0;
+  process::PreparedProcesses prepared_;
 };
 
 }  // namespace isomesh::jobs

@@ -11,6 +11,7 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr std::string_view kBegun = "begun";
 constexpr std::string_view kReading = "reading";
 constexpr std::string_view kVolume = "volume";
 constexpr std::string_view kError = "error";
@@ -76,6 +77,7 @@ std::string word_of(const std::string& text) {
 }
 
 void add_line(ImportReport& report, const Json& json) {
+  if (json.contains(kBegun)) report.begun = true;
   if (json.contains(kReading)) report.reading = word_of(json.at(kReading).get<std::string>());
   if (json.contains(kVolume)) report.volume = volume_from_json(json.at(kVolume).dump());
   if (json.contains(kError)) report.error = error_from(json.at(kError));
@@ -115,6 +117,8 @@ ImportOrder order_from(std::string_view message) {
     throw_malformed();
   }
 }
+
+std::string begun_message() { return line_of(kBegun, true); }
 
 std::string reading_message(std::string_view format) {
   return line_of(kReading, std::string(format));

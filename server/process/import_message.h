@@ -16,9 +16,6 @@
 
 namespace isomesh::process {
 
-// The descriptor of the socket in the importing process.
-inline constexpr int kImportDescriptor = 3;
-
 // What a request says about the uploaded file.
 struct ImportOptions {
   std::optional<RawDescription> raw;  // empty: the file is of a format that says what it is
@@ -49,12 +46,14 @@ std::string to_message(const ImportOrder& order);
 ImportOrder order_from(std::string_view message);
 
 // Each makes one line, with its line break.
+std::string begun_message();
 std::string reading_message(std::string_view format);
 std::string volume_message(const Volume& volume);
 std::string error_message(const Error& error);
 
 // What an importing process has said so far.
 struct ImportReport {
+  bool begun = false;   // it has its order and is about to open the file
   std::string reading;  // the last format that it named; printable
   std::optional<Volume> volume;
   std::optional<Error> error;

@@ -57,9 +57,6 @@ std::uint64_t sum(std::initializer_list<std::uint64_t> numbers) {
 
 void limit_resources(const Confinement& confinement) {
   constexpr std::uint64_t kPrograms = std::uint64_t{512} << 20;  // code, libraries, the stack
-  constexpr std::uint64_t kMostOpenFiles = 64;
-  limit(RLIMIT_CORE, 0);
-  limit(RLIMIT_NOFILE, kMostOpenFiles);
   limit(RLIMIT_FSIZE, confinement.file_bytes);
   limit(RLIMIT_CPU, static_cast<std::uint64_t>(confinement.time.count()));
   // With the signal ignored, a write beyond the limit fails with EFBIG, which can be reported.
@@ -145,10 +142,17 @@ constexpr std::array kAllowedCalls = {
     SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep), SCMP_SYS(gettimeofday), SCMP_SYS(time),
     SCMP_SYS(restart_syscall)};
 
+// The calls that only confine_to() makes; prlimit64 beside them.
+constexpr std::array kConfiningCalls = {
+    SCMP_SYS(landlock_create_ruleset), SCMP_SYS(landlock_add_rule),
+    SCMP_SYS(landlock_restrict_self), SCMP_SYS(setrlimit), SCMP_SYS(seccomp)};
+
 class Filter {
  public:
-  Filter() : context_(::seccomp_init(SCMP_ACT_ERRNO(EPERM))) {
+  explicit Filter(std::uint32_t otherwise) : context_(::seccomp_init(otherwise)) {
     if (context_ == nullptr) throw Error(ErrorCode::kInternal, "seccomp_init failed.");
+    // confine_ahead() has done that; loading the second filter would not be allowed to.
+    check(::seccomp_attr_set(context_, SCMP_FLTATR_CTL_NNP, 0));
   }
   ~Filter() { ::seccomp_release(context_); }
   Filter(const Filter&) = delete;
@@ -159,6 +163,9 @@ class Filter {
   }
   void allow(int call, const scmp_arg_cmp& condition) {
     check(::seccomp_rule_add_array(context_, SCMP_ACT_ALLOW, call, 1, &condition));
+  }
+  void forbid(int call) {
+    check(::seccomp_rule_add_array(context_, SCMP_ACT_ERRNO(EPERM), call, 0, nullptr));
   }
   void load() { check(::seccomp_load(context_)); }
 
@@ -175,15 +182,26 @@ scmp_arg_cmp argument_is(unsigned index, std::uint64_t value) {
 }
 
 void filter_calls() {
-  Filter filter;
+  Filter filter(SCMP_ACT_ERRNO(EPERM));
   for (const int call : kAllowedCalls) filter.allow(call);
   // Memory must never be mapped as executable.
   const scmp_arg_cmp not_executable = {2, SCMP_CMP_MASKED_EQ, PROT_EXEC, 0};
   filter.allow(SCMP_SYS(mmap), not_executable);
   filter.allow(SCMP_SYS(mprotect), not_executable);
+  // What confine_to() needs, and then takes away.
+  for (const int call : kConfiningCalls) filter.allow(call);
+  filter.allow(SCMP_SYS(prlimit64), argument_is(0, 0));  // the calling process
   // abort() signals its own thread.
   filter.allow(SCMP_SYS(tgkill), argument_is(0, static_cast<std::uint64_t>(::getpid())));
   filter.allow(SCMP_SYS(prctl), argument_is(0, PR_SET_VMA));  // malloc's names for its memory
+  filter.load();
+}
+
+// A second filter: what either forbids is forbidden.
+void forbid_confining() {
+  Filter filter(SCMP_ACT_ALLOW);
+  for (const int call : kConfiningCalls) filter.forbid(call);
+  filter.forbid(SCMP_SYS(prlimit64));
   filter.load();
 }
 
@@ -200,13 +218,20 @@ void become_first_victim() {
 
 bool has_landlock() { return landlock_version() >= 1; }
 
-void confine(const Confinement& confinement) {
+void confine_ahead() {
+  constexpr std::uint64_t kMostOpenFiles = 64;
   become_first_victim();
-  limit_resources(confinement);
+  limit(RLIMIT_CORE, 0);
+  limit(RLIMIT_NOFILE, kMostOpenFiles);
   require(::prctl(PR_SET_DUMPABLE, 0) == 0, "prctl");
   require(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0, "prctl");
-  restrict_files(confinement);
   filter_calls();
+}
+
+void confine_to(const Confinement& confinement) {
+  limit_resources(confinement);
+  restrict_files(confinement);
+  forbid_confining();
 }
 
 }  // namespace isomesh::process

@@ -16,14 +16,18 @@ struct Confinement {
   std::chrono::seconds time{0};    // of the processor
 };
 
-// Limits the memory, the time, the open files and the size of files, and forbids core dumps. After
-// that, seccomp lets the process open no socket, start no program and signal no other process, and
-// Landlock, where the kernel has it, keeps it from all other files. It cannot gain rights, and the
-// kernel ends it first when memory runs out. Works without privileges and as root.
+// What can be taken from a process before it is known what it is to read. It cannot gain rights,
+// make core dumps, open many files or sockets, start programs or processes or signal others, and
+// the kernel ends it first when memory runs out. Works without privileges and as root.
 //
-// Throws Error kInternal when the kernel refuses any of this; a kernel without Landlock is no
-// error. Must be called before a second thread is started.
-void confine(const Confinement& confinement);
+// Throws Error kInternal when the kernel refuses any of this. Must be called before a second thread
+// is started, once.
+void confine_ahead();
+
+// Takes the rest: limits memory, time and the size of files; Landlock, where the kernel has it,
+// keeps the process from all files but those; nothing of this can be changed any more. Needs
+// confine_ahead(), once. Throws as that does; a kernel without Landlock is no error.
+void confine_to(const Confinement& confinement);
 
 // Whether the kernel can keep a process from other files. Thread safe.
 bool has_landlock();

@@ -1,5 +1,6 @@
 #include "tests/support/process.h"
 
+#include <fstream>
 #include <csignal>
 #include <cstring>
 #include <stdexcept>
@@ -112,6 +113,21 @@ Finished run(const std::vector<std::string>& command, const std::vector<std::str
   Process process(command, environment);
   const int status = process.wait();
   return {status, process.output(), process.errors()};
+}
+
+std::set<pid_t> children_of(pid_t parent) {
+  std::set<pid_t> found;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    const std::string name = entry.path().filename();
+    if (name.find_first_not_of("0123456789") != std::string::npos) continue;
+    std::ifstream file(entry.path() / "stat");
+    std::string line;
+    std::getline(file, line);
+    const std::size_t end = line.rfind(')');
+    if (end == std::string::npos || line[end + 2] == 'Z') continue;
+    if (std::stoi(line.substr(end + 4)) == parent) found.insert(std::stoi(name));
+  }
+  return found;
 }
 
 bool eventually(const std::function<bool()>& condition, std::chrono::seconds longest) {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -63,6 +64,9 @@ struct Finished {
 // Starts the command and waits for its end.
 Finished run(const std::vector<std::string>& command,
              const std::vector<std::string>& environment = {});
+
+// The processes whose parent is `parent` and that have not ended.
+std::set<pid_t> children_of(pid_t parent);
 
 // Calls `condition` until it is true; false when it is not within that time.
 bool eventually(const std::function<bool()>& condition, std::chrono::seconds longest = kLongest);

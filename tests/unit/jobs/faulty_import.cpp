@@ -15,6 +15,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "server/process/fork_server.h"
 #include "server/process/import_message.h"
 #include "server/process/sandbox.h"
 
@@ -27,22 +28,27 @@ std::string read_order() {
   std::string text;
   std::array<char, 4096> piece;
   for (;;) {
-    const ssize_t count = ::read(kImportDescriptor, piece.data(), piece.size());
+    const ssize_t count = ::read(kChildDescriptor, piece.data(), piece.size());
     if (count <= 0) return text;
     text.append(piece.data(), static_cast<std::size_t>(count));
   }
 }
 
 void say(std::string_view message) {
-  if (::write(kImportDescriptor, message.data(), message.size()) < 0) std::_Exit(9);
+  if (::write(kChildDescriptor, message.data(), message.size()) < 0) std::_Exit(9);
 }
 
 void confine_as(const ImportOrder& order) {
-  confine({.readable = order.task.source,
-           .writable = order.task.scratch,
-           .memory_bytes = order.bounds.memory_bytes,
-           .file_bytes = std::uint64_t{1} << 20,
-           .time = order.bounds.time});
+  confine_to({.readable = order.task.source,
+              .writable = order.task.scratch,
+              .memory_bytes = order.bounds.memory_bytes,
+              .file_bytes = std::uint64_t{1} << 20,
+              .time = order.bounds.time});
+}
+
+// pause() is not among the calls that are left.
+void hang() {
+  for (;;) ::sleep(3600);
 }
 
 void eat_memory() {
@@ -74,7 +80,7 @@ std::string escapes(const ImportOrder& order) {
   note(::open((order.task.scratch / "new").c_str(), O_WRONLY | O_CREAT, 0600) < 0,
        "cannot-write-scratch");
   int inherited = 0;
-  for (int descriptor = kImportDescriptor + 1; descriptor < 256; ++descriptor) {
+  for (int descriptor = kChildDescriptor + 1; descriptor < 256; ++descriptor) {
     // Those that this function has opened itself are the two just above.
     if (::fcntl(descriptor, F_GETFD) >= 0) ++inherited;
   }
@@ -104,10 +110,10 @@ void misbehave(const std::string& what, const ImportOrder& order) {
     std::raise(SIGSEGV);
   }
   if (what == "exit") std::_Exit(7);
-  if (what == "hang") ::pause();
+  if (what == "hang") hang();
   if (what == "close and hang") {
-    ::close(kImportDescriptor);
-    ::pause();
+    ::close(kChildDescriptor);
+    hang();
   }
   if (what == "chatter") {
     for (;;) say(reading_message("nifti"));
@@ -118,18 +124,25 @@ void misbehave(const std::string& what, const ImportOrder& order) {
   confine_as(order);
   if (what == "memory") eat_memory();
   if (what == "file") write_beyond_limit(order);
+  if (what == "who")
+    say(error_message({ErrorCode::kUnusableVolume, std::to_string(::getpid())}));
   if (what == "escape")
     say(error_message({ErrorCode::kUnusableVolume, "[" + escapes(order) + "]"}));
 }
 
-}  // namespace
-
-int main() {
-  const ImportOrder order = order_from(read_order());
+void do_one() {
+  confine_ahead();
+  const std::string message = read_order();
+  if (message.empty()) return;
+  const ImportOrder order = order_from(message);
+  say(begun_message());
   std::ifstream file(order.task.source);
   const std::string what{std::istreambuf_iterator<char>(file), {}};
   file.close();
   say(reading_message("nifti"));
   misbehave(what, order);
-  std::_Exit(0);
 }
+
+}  // namespace
+
+int main() { serve_copies(do_one); }

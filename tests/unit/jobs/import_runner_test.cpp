@@ -1,13 +1,17 @@
 #include "server/jobs/import_runner.h"
 
+#include <csignal>
 #include <limits>
+#include <set>
 #include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "server/process/import_message.h"
 #include "tests/support/files.h"
+#include "tests/support/process.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -83,6 +87,34 @@ TEST(ImportRunner, AProgramThatIsNotThereIsAnInternalError) {
   const ImportTask task = {
       .source = folder / "upload", .scratch = folder.path(), .target = folder / "canonical"};
   EXPECT_THROW(runner.run(task), Error);
+}
+
+TEST(ImportRunner, AnImportIsNotLostWithTheProcessThatWaitedForIt) {
+  Faulty faulty;
+  const auto are_prepared = [] { return test::children_of(::getpid()).size() == 3; };
+  ASSERT_TRUE(test::eventually(are_prepared));
+  for (const pid_t child : test::children_of(::getpid())) ::kill(child, SIGKILL);
+  EXPECT_STREQ(faulty.run("escape").what(), "[]");
+}
+
+// Whether its order still reaches it or not: a stopped process takes it and is killed before it has
+// begun.
+TEST(ImportRunner, AnImportIsNotLostWithAProcessThatDiesAsItIsTaken) {
+  Faulty faulty(seconds(60), 1);
+  ASSERT_TRUE(test::eventually([] { return test::children_of(::getpid()).size() == 2; }));
+  const std::set<pid_t> prepared = test::children_of(::getpid());
+  for (const pid_t child : prepared) ::kill(child, SIGSTOP);
+  std::jthread killer([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    for (const pid_t child : prepared) ::kill(child, SIGKILL);
+  });
+  EXPECT_STREQ(faulty.run("escape").what(), "[]");
+}
+
+TEST(ImportRunner, NoProcessReadsTwoFiles) {
+  Faulty faulty(seconds(60), 1);
+  std::set<std::string> seen;
+  for (int run = 0; run < 4; ++run) EXPECT_TRUE(seen.insert(faulty.run("who").what()).second);
 }
 
 TEST(ImportRunner, AConfinedProcessDoesNothingElse) {

@@ -14,6 +14,7 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -41,7 +42,8 @@ class Sandbox : public testing::Test {
 
   static bool confined(const Confinement& confinement, const std::function<bool()>& holds) {
     const int status = status_of([&] {
-      confine(confinement);
+      confine_ahead();
+      confine_to(confinement);
       return holds();
     });
     return WIFEXITED(status) && WEXITSTATUS(status) == 0;
@@ -92,6 +94,33 @@ TEST_F(Sandbox, TakesTheWayBack) {
   }));
 }
 
+TEST_F(Sandbox, TakesSocketsAndProcessesAhead) {
+  const int status = status_of([] {
+    confine_ahead();
+    return fails(::socket(AF_UNIX, SOCK_STREAM, 0), EPERM) && fails(::fork(), EPERM) &&
+           fails(::kill(::getppid(), 0), EPERM) && fails(::prctl(PR_SET_DUMPABLE, 1), EPERM) &&
+           fails(::execl("/bin/true", "true", nullptr), EPERM);
+  });
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+TEST_F(Sandbox, CannotBeConfinedTwice) {
+  EXPECT_TRUE(confined([&] {
+    try {
+      confine_to(confinement());
+    } catch (const std::exception&) {
+      return true;
+    }
+    return false;
+  }));
+  EXPECT_TRUE(confined([] {
+    return fails(::syscall(SYS_landlock_create_ruleset, nullptr, 0, 1), EPERM) &&
+           fails(::syscall(SYS_seccomp, 0, 0, nullptr), EPERM) &&
+           fails(::syscall(SYS_prlimit64, ::getppid(), RLIMIT_CPU, nullptr, nullptr), EPERM);
+  }));
+}
+
 TEST_F(Sandbox, LimitsAFileAndSaysSoWithoutASignal) {
   EXPECT_TRUE(confined([&] {
     const int file = ::open((scratch_ / "large").c_str(), O_WRONLY | O_CREAT, 0600);
@@ -112,7 +141,8 @@ TEST_F(Sandbox, EndsAProcessThatTakesTooMuchOfTheProcessor) {
   Confinement brief = confinement();
   brief.time = std::chrono::seconds(1);
   const int status = status_of([&] {
-    confine(brief);
+    confine_ahead();
+    confine_to(brief);
     std::atomic<unsigned> turns = 0;
     while (true) ++turns;
     return true;
@@ -125,7 +155,8 @@ TEST_F(Sandbox, SaysWhenAFolderCannotBeAllowed) {
   nowhere.writable = scratch_ / "nowhere";
   const int status = status_of([&] {
     try {
-      confine(nowhere);
+      confine_ahead();
+      confine_to(nowhere);
     } catch (const std::exception&) {
       return true;
     }

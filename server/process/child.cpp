@@ -1,0 +1,155 @@
+#include "server/process/child.h"
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <thread>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "base/error.h"
+
+namespace isomesh::process {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr milliseconds kLook{100};  // between two looks at the stop token
+
+void require_spawn(int error, std::string_view call) {
+  if (error != 0) throw_system_error(call, error);
+}
+
+// What a started program is given: one socket, nothing else.
+class Inheritance {
+ public:
+  explicit Inheritance(int socket) {
+    require_spawn(::posix_spawn_file_actions_init(&files_), "posix_spawn_file_actions_init");
+    require_spawn(::posix_spawnattr_init(&attributes_), "posix_spawnattr_init");
+    // The socket is duplicated first, because the next actions may close its old number.
+    add(::posix_spawn_file_actions_adddup2(&files_, socket, kChildDescriptor));
+    for (int standard = 0; standard < kChildDescriptor; ++standard) {
+      add(::posix_spawn_file_actions_addopen(&files_, standard, "/dev/null", O_RDWR, 0));
+    }
+    add(::posix_spawn_file_actions_addclosefrom_np(&files_, kChildDescriptor + 1));
+    sigset_t none;
+    sigset_t all;
+    sigemptyset(&none);
+    sigfillset(&all);
+    ::posix_spawnattr_setsigmask(&attributes_, &none);
+    ::posix_spawnattr_setsigdefault(&attributes_, &all);
+    ::posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+  }
+  ~Inheritance() {
+    ::posix_spawn_file_actions_destroy(&files_);
+    ::posix_spawnattr_destroy(&attributes_);
+  }
+  Inheritance(const Inheritance&) = delete;
+  Inheritance& operator=(const Inheritance&) = delete;
+
+  pid_t start(const std::filesystem::path& program) const {
+    std::string name = program.filename();
+    const std::array<char*, 2> arguments = {name.data(), nullptr};
+    const std::array<char*, 1> environment = {nullptr};
+    pid_t pid = -1;
+    require_spawn(::posix_spawn(&pid, program.c_str(), &files_, &attributes_, arguments.data(),
+                                environment.data()),
+                  "posix_spawn");
+    return pid;
+  }
+
+ private:
+  static void add(int error) { require_spawn(error, "posix_spawn_file_actions_add"); }
+
+  posix_spawn_file_actions_t files_;
+  posix_spawnattr_t attributes_;
+};
+
+}  // namespace
+
+SocketPair make_socket_pair() {
+  std::array<int, 2> ends = {-1, -1};
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) {
+    throw_system_error("socketpair", errno);
+  }
+  return {Descriptor(ends[0]), Descriptor(ends[1])};
+}
+
+Child::Child(Child&& other) noexcept
+    : pid_(other.pid_),
+      socket_(std::move(other.socket_)),
+      status_(other.status_),
+      reaped_(std::exchange(other.reaped_, true)) {}
+
+Child& Child::operator=(Child&& other) noexcept {
+  std::swap(pid_, other.pid_);
+  std::swap(socket_, other.socket_);
+  std::swap(status_, other.status_);
+  std::swap(reaped_, other.reaped_);
+  return *this;
+}
+
+void Child::tell(std::string_view message) const {
+  while (!message.empty()) {
+    const ssize_t count = ::send(socket_.number(), message.data(), message.size(), MSG_NOSIGNAL);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return;
+    message.remove_prefix(static_cast<std::size_t>(count));
+  }
+  ::shutdown(socket_.number(), SHUT_WR);
+}
+
+Heard Child::listen(std::size_t most_bytes, Clock::time_point deadline,
+                    const std::stop_token& stop) const {
+  Heard heard;
+  std::array<char, 4096> piece;
+  for (;;) {
+    if (stop.stop_requested()) return {Heard::Ending::kStopped, {}};
+    if (Clock::now() >= deadline) return {Heard::Ending::kTooLong, std::move(heard.text)};
+    if (heard.text.size() > most_bytes) return {Heard::Ending::kTooMuch, {}};
+    pollfd waiting = {socket_.number(), POLLIN, 0};
+    if (::poll(&waiting, 1, static_cast<int>(kLook.count())) <= 0) continue;
+    const ssize_t count = ::read(socket_.number(), piece.data(), piece.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return heard;
+    heard.text.append(piece.data(), static_cast<std::size_t>(count));
+  }
+}
+
+std::optional<int> Child::ended_within(milliseconds longest) {
+  constexpr milliseconds kStep{2};
+  for (const auto until = Clock::now() + longest;;) {
+    if (reap(false)) return status_;
+    if (Clock::now() >= until) return std::nullopt;
+    std::this_thread::sleep_for(kStep);
+  }
+}
+
+void Child::end() {
+  if (reaped_) return;
+  ::kill(pid_, SIGKILL);
+  reap(true);
+}
+
+bool Child::reap(bool waiting) {
+  if (reaped_) return true;
+  pid_t found = 0;
+  do {
+    found = ::waitpid(pid_, &status_, waiting ? 0 : WNOHANG);
+  } while (found < 0 && errno == EINTR);
+  return reaped_ = found != 0;
+}
+
+Child start_program(const std::filesystem::path& program) {
+  SocketPair sockets = make_socket_pair();
+  const pid_t pid = Inheritance(sockets.theirs.number()).start(program);
+  return {pid, std::move(sockets.ours)};
+}
+
+}  // namespace isomesh::process

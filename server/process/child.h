@@ -1,0 +1,83 @@
+// A process that this one has started and talks to over a socket.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <string_view>
+
+#include <sys/types.h>
+
+#include "base/descriptor.h"
+
+namespace isomesh::process {
+
+// The descriptor of the socket in a child; it has no other but those of standard input and output,
+// which lead nowhere.
+inline constexpr int kChildDescriptor = 3;
+
+// Two ends of a socket, which are closed when a program is started.
+struct SocketPair {
+  Descriptor ours;
+  Descriptor theirs;
+};
+
+// Throws Error kInternal.
+SocketPair make_socket_pair();
+
+// What a child has said until it closed its end, or until no more was wanted of it.
+struct Heard {
+  enum class Ending { kClosed, kTooLong, kTooMuch, kStopped };
+
+  Ending ending = Ending::kClosed;
+  std::string text;
+};
+
+// A child of this process, which is killed and waited for at the end of the object's life. Not
+// thread safe.
+class Child {
+ public:
+  Child(pid_t pid, Descriptor socket) : pid_(pid), socket_(std::move(socket)) {}
+  ~Child() { end(); }
+  Child(Child&& other) noexcept;
+  Child& operator=(Child&& other) noexcept;
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+
+  pid_t pid() const { return pid_; }
+  const Descriptor& socket() const { return socket_; }
+
+  // Sends all of that and closes this direction. A child that has ended is no error here: it is
+  // noticed when it is listened to.
+  void tell(std::string_view message) const;
+
+  // Everything that it says until it closes its end, at most `most_bytes` (about).
+  Heard listen(std::size_t most_bytes, std::chrono::steady_clock::time_point deadline,
+               const std::stop_token& stop) const;
+
+  // Whether it has ended by itself.
+  bool has_ended() { return reap(false); }
+
+  // Its status as waitpid gives it, if it ends by itself within that time.
+  std::optional<int> ended_within(std::chrono::milliseconds longest);
+
+  // Kills it unless it has ended, and returns when it is gone.
+  void end();
+
+ private:
+  bool reap(bool waiting);
+
+  pid_t pid_;
+  Descriptor socket_;
+  int status_ = 0;
+  bool reaped_ = false;
+};
+
+// Starts a program that inherits nothing of this process but one end of a socket: its environment
+// is empty and its signals have their defaults. Safe with threads running. Throws Error kInternal.
+Child start_program(const std::filesystem::path& program);
+
+}  // namespace isomesh::process

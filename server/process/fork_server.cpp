@@ -1,0 +1,126 @@
+#include "server/process/fork_server.h"
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+
+#include <linux/sched.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include "base/error.h"
+#include "proto/error.h"
+
+namespace isomesh::process {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Getting ready takes some hundredths of a second, on a busy machine some tenths.
+constexpr std::chrono::seconds kLongestAnswer{20};
+constexpr std::chrono::milliseconds kLook{100};
+
+// A message of one byte with room for one descriptor.
+struct DescriptorMessage {
+  DescriptorMessage() {
+    header.msg_iov = &content;
+    header.msg_iovlen = 1;
+    header.msg_control = control.data();
+    header.msg_controllen = control.size();
+  }
+  DescriptorMessage(const DescriptorMessage&) = delete;
+  DescriptorMessage& operator=(const DescriptorMessage&) = delete;
+
+  char byte = 0;
+  iovec content = {&byte, 1};
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control = {};
+  msghdr header = {};
+};
+
+void send_descriptor(const Descriptor& socket, const Descriptor& sent) {
+  DescriptorMessage message;
+  cmsghdr* const part = CMSG_FIRSTHDR(&message.header);
+  part->cmsg_level = SOL_SOCKET;
+  part->cmsg_type = SCM_RIGHTS;
+  part->cmsg_len = CMSG_LEN(sizeof(int));
+  const int number = sent.number();
+  std::memcpy(CMSG_DATA(part), &number, sizeof(number));
+  if (::sendmsg(socket.number(), &message.header, MSG_NOSIGNAL) != 1) {
+    throw_system_error("sendmsg", errno);
+  }
+}
+
+// None when the other end is closed.
+Descriptor receive_descriptor() {
+  DescriptorMessage message;
+  ssize_t count = 0;
+  do {
+    count = ::recvmsg(kChildDescriptor, &message.header, MSG_CMSG_CLOEXEC);
+  } while (count < 0 && errno == EINTR);
+  const cmsghdr* const part = count == 1 ? CMSG_FIRSTHDR(&message.header) : nullptr;
+  if (part == nullptr || part->cmsg_type != SCM_RIGHTS) return Descriptor();
+  int number = -1;
+  std::memcpy(&number, CMSG_DATA(part), sizeof(number));
+  return Descriptor(number);
+}
+
+// The C library's fork cannot make a sibling. What its own does besides is about other threads,
+// which there are none of.
+pid_t fork_sibling() {
+  return static_cast<pid_t>(
+      ::syscall(SYS_clone, CLONE_PARENT | SIGCHLD, nullptr, nullptr, nullptr, nullptr));
+}
+
+// The answer is the copy's id, or the negative error number.
+[[nodiscard]] bool answer(std::int32_t number) {
+  return ::send(kChildDescriptor, &number, sizeof(number), MSG_NOSIGNAL) == sizeof(number);
+}
+
+void become_copy(Descriptor socket, const std::function<void()>& work) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::dup2(socket.number(), kChildDescriptor) != kChildDescriptor) std::_Exit(EXIT_FAILURE);
+  if (socket.number() != kChildDescriptor) socket = Descriptor();
+  work();
+  // The destructors of statics and the leak sanitizer would need calls that are forbidden by now.
+  std::_Exit(EXIT_SUCCESS);
+}
+
+}  // namespace
+
+void serve_copies(const std::function<void()>& work) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  for (;;) {
+    Descriptor socket = receive_descriptor();
+    if (socket.number() < 0) std::_Exit(EXIT_SUCCESS);
+    const pid_t pid = fork_sibling();
+    if (pid == 0) become_copy(std::move(socket), work);
+    if (!answer(pid > 0 ? pid : -errno)) std::_Exit(EXIT_FAILURE);
+  }
+}
+
+Child copy_of(const Child& server, const std::stop_token& stop) {
+  SocketPair sockets = make_socket_pair();
+  send_descriptor(server.socket(), sockets.theirs);
+  sockets.theirs = Descriptor();
+  const auto deadline = Clock::now() + kLongestAnswer;
+  while (Clock::now() < deadline) {
+    if (stop.stop_requested()) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
+    pollfd waiting = {server.socket().number(), POLLIN, 0};
+    if (::poll(&waiting, 1, static_cast<int>(kLook.count())) <= 0) continue;
+    std::int32_t number = 0;
+    const ssize_t count = ::recv(server.socket().number(), &number, sizeof(number), MSG_WAITALL);
+    if (count < 0 && errno == EINTR) continue;
+    if (count != sizeof(number)) break;
+    if (number < 0) throw_system_error("fork", -number);
+    return {number, std::move(sockets.ours)};
+  }
+  throw Error(ErrorCode::kInternal, "A program that makes copies of itself does not answer.");
+}
+
+}  // namespace isomesh::process

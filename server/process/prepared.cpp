@@ -1,0 +1,106 @@
+#include "server/process/prepared.h"
+
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "proto/error.h"
+#include "server/process/fork_server.h"
+
+namespace isomesh::process {
+
+PreparedProcesses::PreparedProcesses(const std::filesystem::path& program, std::size_t count)
+    : program_(program), count_(count), keeper_([this](const std::stop_token& end) {
+        keep(stop_.get_token());
+        // Those that were taken would die with this thread.
+        Lock lock(mutex_);
+        changed_.wait(lock, end, [] { return false; });
+      }) {}
+
+PreparedProcesses::~PreparedProcesses() { stop(); }
+
+Child PreparedProcesses::take() {
+  Lock lock(mutex_);
+  ++takers_;
+  const std::uint64_t failures = failures_;
+  is_failing_ = false;
+  for (;;) {
+    changed_.notify_all();
+    changed_.wait(lock, stop_.get_token(), [&]() ISOMESH_REQUIRES(mutex_) {
+      return !ready_.empty() || failures_ != failures;
+    });
+    if (stop_.stop_requested() || ready_.empty()) break;
+    Child child = std::move(ready_.front());
+    ready_.pop_front();
+    if (child.has_ended()) continue;
+    --takers_;
+    changed_.notify_all();
+    return child;
+  }
+  --takers_;
+  if (stop_.stop_requested()) {
+    throw Error(ErrorCode::kUnavailable, "the service is shutting down");
+  }
+  throw Error(ErrorCode::kInternal, "A process could not be started.");
+}
+
+void PreparedProcesses::renew() {
+  const Lock lock(mutex_);
+  ++generation_;
+  ready_.clear();
+  changed_.notify_all();
+}
+
+void PreparedProcesses::stop() { stop_.request_stop(); }
+
+void PreparedProcesses::keep(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    try {
+      prepare_one(stop);
+    } catch (const std::exception& error) {
+      if (stop.stop_requested()) break;
+      spdlog::error("a process was not prepared: {}", error.what());
+      server_.reset();
+      const Lock lock(mutex_);
+      ++failures_;
+      is_failing_ = true;
+      changed_.notify_all();
+    }
+    Lock lock(mutex_);
+    changed_.wait(lock, stop, [this]() ISOMESH_REQUIRES(mutex_) {
+      return !is_failing_ && (ready_.size() < count_ || takers_ > ready_.size());
+    });
+  }
+  server_.reset();
+  const Lock lock(mutex_);
+  ready_.clear();
+}
+
+void PreparedProcesses::prepare_one(const std::stop_token& stop) {
+  std::uint64_t generation = 0;
+  {
+    const Lock lock(mutex_);
+    generation = generation_;
+  }
+  Child child = copy(generation, stop);
+  const Lock lock(mutex_);
+  if (generation != generation_) return;  // the child goes: it is of the program before
+  ready_.push_back(std::move(child));
+  changed_.notify_all();
+}
+
+Child PreparedProcesses::copy(std::uint64_t generation, const std::stop_token& stop) {
+  if (server_ && server_generation_ == generation) {
+    try {
+      return copy_of(*server_, stop);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kInternal) throw;
+      spdlog::warn("{} It is started anew.", error.what());
+    }
+  }
+  server_ = start_program(program_);
+  server_generation_ = generation;
+  return copy_of(*server_, stop);
+}
+
+}  // namespace isomesh::process
