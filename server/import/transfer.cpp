@@ -46,7 +46,6 @@ Volume finish(CanonicalWriter& writer, Volume volume) {
     throw_unusable(std::to_string(statistics.non_finite) + " of its " +
                    std::to_string(volume.sample_count()) + " samples are not finite numbers.");
   }
-  writer.finish();
   volume.range = statistics.range;
   volume.suggested_iso = statistics.otsu;
   volume.bytes = writer.samples().size();

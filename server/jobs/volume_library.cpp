@@ -15,7 +15,7 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
                                .options = options,
                                .limits = limits_});
   const store::Blob blob = store::digest_of(canonical);
-  const Lock lock(mutex_);
+  const std::shared_lock lock(mutex_);
   if (!volumes_.names(blob.key)) retention_.make_room(blob.bytes);
   blobs_.adopt(canonical, blob);
   volume.id = blob.key;
@@ -24,7 +24,7 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
 }
 
 void VolumeLibrary::erase(const std::string& owner, const std::string& id) {
-  const Lock lock(mutex_);
+  const std::scoped_lock lock(mutex_);
   volumes_.erase(owner, id);
   if (!volumes_.names(id)) blobs_.erase(id);
 }

@@ -2,9 +2,9 @@
 
 #include <filesystem>
 #include <optional>
+#include <shared_mutex>
 #include <utility>
 
-#include "base/mutex.h"
 #include "proto/types.h"
 #include "server/jobs/import_runner.h"
 #include "server/process/import_message.h"
@@ -48,7 +48,9 @@ class VolumeLibrary {
   store::Retention& retention_;
   const volume::SizeLimits limits_;
   ImportRunner runner_;
-  Mutex mutex_;  // held while a blob and its record come or go together
+  // Held while a blob and its record come or go together: shared by those that come, which wait for
+  // the disk side by side.
+  std::shared_mutex mutex_;
 };
 
 }  // namespace isomesh::jobs

@@ -20,7 +20,8 @@ struct Blob {
   std::uint64_t bytes = 0;
 };
 
-// Reads a file and brings it to disk. Throws Error kOutOfSpace or kInternal.
+// Reads a file, and lets the disk begin to write it meanwhile. Throws Error kOutOfSpace or
+// kInternal.
 Blob digest_of(const std::filesystem::path& file);
 
 // Takes a blob's bytes in order. Not thread safe. What is not committed is removed.
@@ -60,8 +61,9 @@ class BlobStore {
 
   virtual std::unique_ptr<BlobWriter> begin() const = 0;
 
-  // Makes a finished file of this machine a blob and removes it. `blob` is what digest_of has just
-  // said of the file, so that is_intact() need not read it again. Throws Error kOutOfSpace.
+  // Makes a finished file of this machine a blob on disk and removes it. `blob` is what digest_of
+  // has just said of the file, so that is_intact() need not read it again. Throws Error
+  // kOutOfSpace.
   virtual void adopt(const std::filesystem::path& file, const Blob& blob) const = 0;
 
   // Throws Error kNotFound.

@@ -104,11 +104,6 @@ std::span<std::byte> CanonicalWriter::samples() {
   return {data_ + kHeaderBytes, size_ - kHeaderBytes};
 }
 
-void CanonicalWriter::finish() {
-  if (::msync(data_, size_, MS_SYNC) != 0) throw_system_error("msync", errno);
-  if (::fsync(file_) != 0) throw_system_error("fsync", errno);
-}
-
 CanonicalVolume::CanonicalVolume(const std::filesystem::path& path) {
   const InputFile input(path);
   header_ = from_text(input.text(0, kHeaderBytes));

@@ -39,10 +39,8 @@ class CanonicalWriter {
   CanonicalWriter(const CanonicalWriter&) = delete;
   CanonicalWriter& operator=(const CanonicalWriter&) = delete;
 
+  // Whoever keeps the file brings it to disk.
   std::span<std::byte> samples();
-
-  // Flushes to disk. Throws Error kOutOfSpace.
-  void finish();
 
  private:
   std::byte* data_ = nullptr;

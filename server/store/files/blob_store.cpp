@@ -84,9 +84,8 @@ class FileBlobStore::Writer : public BlobWriter {
   }
 
   Blob commit() override {
-    file_.sync();
     const std::string key = to_hex(digest_.finish());
-    store_.publish_as(path_, key);
+    store_.publish_as(path_, file_, key);
     return {key, bytes_};
   }
 
@@ -99,16 +98,15 @@ class FileBlobStore::Writer : public BlobWriter {
 };
 
 Blob digest_of(const std::filesystem::path& path) {
-  File file = File::open(path);
-  const Blob blob = digest_of(file, {});
-  file.sync();
-  return blob;
+  const File file = File::open(path);
+  file.begin_sync();
+  return digest_of(file, {});
 }
 
 std::unique_ptr<BlobWriter> FileBlobStore::begin() const { return std::make_unique<Writer>(*this); }
 
 void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) const {
-  believe(blob.key, publish_as(file, blob.key));
+  believe(blob.key, publish_as(file, File::open(file), blob.key));
 }
 
 std::unique_ptr<BlobReader> FileBlobStore::open(const std::string& key) const {
@@ -186,7 +184,7 @@ std::size_t FileBlobStore::sweep(std::chrono::system_clock::time_point cutoff,
   return erased;
 }
 
-std::string FileBlobStore::publish_as(const std::filesystem::path& file,
+std::string FileBlobStore::publish_as(const std::filesystem::path& path, const File& file,
                                       const std::string& key) const {
   // A file of long ago that is named now must look as young as its naming is. The time is a finer
   // one than the system gives to files that are written, so a write within the same tick changes
@@ -194,13 +192,23 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& file,
   timespec now = {};
   ::clock_gettime(CLOCK_REALTIME, &now);
   const std::array<timespec, 2> times = {now, now};
-  ::utimensat(AT_FDCWD, file.c_str(), times.data(), 0);
+  ::utimensat(AT_FDCWD, path.c_str(), times.data(), 0);
   const std::filesystem::path place = path_of(key);
   make_folder_for(place);
   std::string traits;
+  // Where nothing is there, no record that survives can name the place before both are synced. The
+  // file's sync then brings its name to disk too on most file systems, and the folder's finds
+  // nothing to do. What is there may be named already and must not be lost in between.
+  bool has_moved = false;
   {
     const Lock lock(places_);
-    move_to(file, place);
+    has_moved = move_to_free_place(path, place);
+    if (has_moved) traits = traits_of(place);
+  }
+  file.sync();
+  if (!has_moved) {
+    const Lock lock(places_);
+    move_to(path, place);
     traits = traits_of(place);
   }
   sync_folder(place.parent_path());
@@ -208,19 +216,24 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& file,
 }
 
 // A folder that is there is not yet on the disk when another thread has just made it, or when the
-// process that made it was killed. So each is synced once by this process, whoever made it.
+// process that made it was killed. So all are synced once by this process, whoever made them.
 void FileBlobStore::make_folder_for(const std::filesystem::path& place) const {
-  const std::filesystem::path folder = place.parent_path();
+  const Lock lock(folders_mutex_);
   std::error_code error;
-  const Lock lock(synced_mutex_);
-  const bool is_new = std::filesystem::create_directory(folder, error);
+  if (!has_folders_) {
+    constexpr int kFolders = 256;
+    for (int first = 0; first < kFolders; ++first) {
+      const auto byte = static_cast<std::uint8_t>(first);
+      std::filesystem::create_directory(folder_.blobs() / to_hex(std::span(&byte, 1)), error);
+    }
+    sync_folder(folder_.blobs());
+    has_folders_ = true;
+  }
+  const bool is_new = std::filesystem::create_directory(place.parent_path(), error);
   if (error == std::errc::no_space_on_device) {
     throw Error(ErrorCode::kOutOfSpace, "the data folder has no space left");
   }
-  const std::string name = folder.filename();
-  if (!is_new && synced_.contains(name)) return;
-  sync_folder(folder_.blobs());
-  synced_.insert(name);
+  if (is_new) sync_folder(folder_.blobs());
 }
 
 }  // namespace isomesh::store

@@ -3,12 +3,12 @@
 #include <chrono>
 #include <functional>
 #include <map>
-#include <set>
 #include <string>
 
 #include "base/mutex.h"
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"
+#include "server/store/files/files.h"
 
 namespace isomesh::store {
 
@@ -42,16 +42,17 @@ class FileBlobStore : public BlobStore {
   };
 
   void believe(const std::string& key, const std::string& traits) const;
-  // Returns the traits of the file in its place.
-  std::string publish_as(const std::filesystem::path& file, const std::string& key) const;
+  // `file` is the open one of that path. Returns its traits in its place.
+  std::string publish_as(const std::filesystem::path& path, const File& file,
+                         const std::string& key) const;
   void make_folder_for(const std::filesystem::path& place) const;
 
   const DataFolder& folder_;
   // Held while a file takes its place or is swept, so that the sweeper never erases a file that has
   // just been put there anew.
   mutable Mutex places_;
-  mutable Mutex synced_mutex_;
-  mutable std::set<std::string> synced_ ISOMESH_GUARDED_BY(synced_mutex_);  // folders on the disk
+  mutable Mutex folders_mutex_;
+  mutable bool has_folders_ ISOMESH_GUARDED_BY(folders_mutex_) = false;  // all, on the disk
   mutable Mutex intact_mutex_;
   mutable std::map<std::string, Check> intact_ ISOMESH_GUARDED_BY(intact_mutex_);
 };

@@ -1,6 +1,7 @@
 #include "server/store/files/files.h"
 
 #include <cerrno>
+#include <cstdio>
 #include <string>
 #include <utility>
 
@@ -46,12 +47,24 @@ std::uint64_t File::size() const {
   return static_cast<std::uint64_t>(status.st_size);
 }
 
-void File::sync() {
+void File::begin_sync() const {
+  // A hint: not every file system knows it.
+  ::sync_file_range(descriptor_.number(), 0, 0, SYNC_FILE_RANGE_WRITE);
+}
+
+void File::sync() const {
   if (::fsync(descriptor_.number()) != 0) throw_file_error("syncing a file", errno);
 }
 
 void move_to(const std::filesystem::path& from, const std::filesystem::path& to) {
   if (::rename(from.c_str(), to.c_str()) != 0) throw_file_error("renaming a file", errno);
+}
+
+bool move_to_free_place(const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return true;
+  // EINVAL: the file system cannot do it, so the place counts as taken.
+  if (errno == EEXIST || errno == EINVAL || errno == ENOSYS) return false;
+  throw_file_error("renaming a file", errno);
 }
 
 void sync_folder(const std::filesystem::path& folder) {

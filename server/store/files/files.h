@@ -27,8 +27,11 @@ class File {
 
   std::uint64_t size() const;
 
+  // The disk begins to write what it has not; only sync() tells when that is done.
+  void begin_sync() const;
+
   // To disk, not only to the system. Throws Error kOutOfSpace or kInternal.
-  void sync();
+  void sync() const;
 
  private:
   explicit File(Descriptor descriptor) : descriptor_(std::move(descriptor)) {}
@@ -39,6 +42,9 @@ class File {
 // Moves a file within its file system, over what is there. A crash leaves either the one or the
 // other there once sync_folder has returned.
 void move_to(const std::filesystem::path& from, const std::filesystem::path& to);
+
+// The same where nothing is there; false, and nothing has changed, where something is.
+bool move_to_free_place(const std::filesystem::path& from, const std::filesystem::path& to);
 
 // Makes renames and new names in a folder survive a crash.
 void sync_folder(const std::filesystem::path& folder);

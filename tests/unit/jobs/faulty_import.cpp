@@ -124,8 +124,7 @@ void misbehave(const std::string& what, const ImportOrder& order) {
   confine_as(order);
   if (what == "memory") eat_memory();
   if (what == "file") write_beyond_limit(order);
-  if (what == "who")
-    say(error_message({ErrorCode::kUnusableVolume, std::to_string(::getpid())}));
+  if (what == "who") say(error_message({ErrorCode::kUnusableVolume, std::to_string(::getpid())}));
   if (what == "escape")
     say(error_message({ErrorCode::kUnusableVolume, "[" + escapes(order) + "]"}));
 }

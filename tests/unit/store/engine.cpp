@@ -48,7 +48,7 @@ class SqliteEngine : public Engine {
       power_.emplace(place);
       // What the last life left is on the disk.
       for (const auto& entry : std::filesystem::recursive_directory_iterator(place)) {
-        if (entry.is_regular_file()) store::digest_of(entry.path());
+        if (entry.is_regular_file()) store::File::open(entry.path()).sync();
         if (entry.is_directory()) store::sync_folder(entry.path());
       }
       store::sync_folder(place);

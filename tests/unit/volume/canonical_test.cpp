@@ -29,7 +29,6 @@ std::string written(const TemporaryFolder& folder, const CanonicalHeader& header
   for (std::size_t at = 0; at < writer.samples().size(); ++at) {
     writer.samples()[at] = static_cast<std::byte>(at);
   }
-  writer.finish();
   return read_file(folder / "volume");
 }
 

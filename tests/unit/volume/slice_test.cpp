@@ -25,7 +25,6 @@ class SliceTest : public testing::Test {
                                                    const std::vector<Sample>& samples) {
     CanonicalWriter writer(folder_ / "volume", header);
     std::memcpy(writer.samples().data(), samples.data(), writer.samples().size());
-    writer.finish();
     return std::make_shared<const CanonicalVolume>(folder_ / "volume");
   }
 
