@@ -38,6 +38,7 @@
 #include "server/store/files/data_folder.h"
 #include "server/store/retention.h"
 #include "server/store/sqlite/database.h"
+#include "server/store/sqlite/identity.h"
 #include "server/store/sqlite/job_store.h"
 #include "server/store/sqlite/outbox.h"
 #include "server/store/sqlite/volume_store.h"
@@ -65,6 +66,13 @@ std::filesystem::path beside_this_program(const std::string& name) {
 std::chrono::milliseconds housekeeping_interval(std::chrono::milliseconds keep) {
   return std::clamp<std::chrono::milliseconds>(keep / 4, std::chrono::seconds(1),
                                                std::chrono::seconds(30));
+}
+
+// How far the clock may be ahead of what was stored last. A clock that is wrong by less makes
+// things expire early by a quarter of their time at most.
+std::chrono::milliseconds clock_tolerance(std::chrono::milliseconds keep) {
+  return std::clamp<std::chrono::milliseconds>(keep / 4, std::chrono::hours(1),
+                                               std::chrono::days(7));
 }
 
 CLI::App& add_token_command(CLI::App& cli, TokenRequest& request) {
@@ -161,6 +169,9 @@ int run(const Options& options, const sigset_t& signals) {
 
   const store::DataFolder folder(options.data);
   store::Database database(folder);
+  const auto keep = std::chrono::duration_cast<std::chrono::milliseconds>(
+      std::chrono::duration<double, std::chrono::days::period>(options.keep_days));
+  store::Identity identity(database, folder, options.word, {.tolerance = clock_tolerance(keep)});
   const store::FileBlobStore blobs(folder);
   store::SqliteVolumeStore volumes(database);
   store::JobStoreOptions job_options = options.jobs;
@@ -169,10 +180,11 @@ int run(const Options& options, const sigset_t& signals) {
   if (const std::size_t count = jobs.reap_predecessor()) {
     spdlog::warn("{} jobs ran when the last daemon ended", count);
   }
-  const auto keep = std::chrono::duration_cast<std::chrono::milliseconds>(
-      std::chrono::duration<double, std::chrono::days::period>(options.keep_days));
-  store::Retention retention(jobs, volumes, blobs, folder.scratch(),
-                             {.keep = keep, .max_bytes = options.max_disk});
+  store::RetentionOptions retention_options;
+  retention_options.keep = keep;
+  retention_options.max_bytes = options.max_disk;
+  retention_options.now = [&identity] { return identity.now(); };
+  store::Retention retention(jobs, volumes, blobs, folder.scratch(), retention_options);
   jobs::RunnerOptions runner = options.runner;
   runner.bounds.time = std::chrono::seconds(options.import_seconds);
   runner.program = beside_this_program("isomesh-import");

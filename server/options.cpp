@@ -63,6 +63,19 @@ void add_callback_options(CLI::App& cli, Options& options) {
       ->capture_default_str();
 }
 
+// Of one start only, so neither in a file nor in the environment.
+void add_operators_word(CLI::App& cli, Options& options) {
+  cli.add_flag("--adopt", options.word.adopt,
+               "Start although the database and the files of volumes and meshes do not belong "
+               "together; for this start only")
+      ->configurable(false);
+  cli.add_flag(
+         "--trust-clock", options.word.trust_clock,
+         "The clock is right although it is far ahead of what was stored last; for this start "
+         "only")
+      ->configurable(false);
+}
+
 }  // namespace
 
 void add_options(CLI::App& cli, Options& options) {
@@ -161,6 +174,7 @@ void add_options(CLI::App& cli, Options& options) {
   add_log_options(cli, options);
   add_security_options(cli, options);
   add_callback_options(cli, options);
+  add_operators_word(cli, options);
 }
 
 }  // namespace isomesh

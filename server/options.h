@@ -12,6 +12,7 @@
 #include "server/jobs/import_runner.h"
 #include "server/process/import_message.h"
 #include "server/store/job_store.h"
+#include "server/store/sqlite/identity.h"
 
 namespace CLI {
 class App;
@@ -38,6 +39,7 @@ struct Options {
   store::JobStoreOptions jobs;
   double keep_days = 30;
   std::uint64_t max_disk = 0;
+  store::OperatorsWord word;
   unsigned lease_seconds = 30;
   unsigned longest_job_minutes = 60;
   http::ServerOptions http;

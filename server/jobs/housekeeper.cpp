@@ -11,9 +11,18 @@ namespace {
 
 void enforce(store::Retention& retention) {
   try {
-    const auto [jobs, volumes, blobs] = retention.enforce();
+    const auto [jobs, volumes, blobs, quarantined, left] = retention.enforce();
     if (jobs + volumes + blobs > 0) {
       spdlog::info("removed {} jobs, {} volumes and {} files", jobs, volumes, blobs);
+    }
+    if (quarantined > 0) {
+      spdlog::warn("{} files that no record names are in quarantine now", quarantined);
+    }
+    if (left > 0) {
+      spdlog::error(
+          "{} more files that no record names stay where they are for now: is this the "
+          "database that belongs to them?",
+          left);
     }
   } catch (const std::exception& error) {
     spdlog::error("what is too old could not be removed, and is tried again: {}", error.what());

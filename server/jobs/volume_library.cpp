@@ -20,7 +20,9 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
   blobs_.adopt(canonical, blob);
   volume.id = blob.key;
   volume.created = timestamp();
-  return volumes_.add(owner, volume);
+  auto added = volumes_.add(owner, volume);
+  blobs_.settle(blob.key);
+  return added;
 }
 
 void VolumeLibrary::erase(const std::string& owner, const std::string& id) {

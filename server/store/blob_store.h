@@ -11,6 +11,9 @@
 #include <span>
 #include <stop_token>
 #include <string>
+#include <vector>
+
+#include "server/store/expiry.h"
 
 namespace isomesh::store {
 
@@ -54,6 +57,16 @@ struct LocalBlob {
   std::shared_ptr<const void> held = {};
 };
 
+// What a sweep has done.
+struct Swept {
+  std::size_t quarantined = 0;
+  std::size_t left = 0;  // blobs that nothing names either, but that would have been too many
+};
+
+// Whether a record names the blob of that key.
+using Names = std::function<bool(const std::string& key)>;
+using Steady = std::chrono::steady_clock::time_point;
+
 // A blob is seen whole or not at all, and never changes. Thread safe.
 class BlobStore {
  public:
@@ -83,10 +96,22 @@ class BlobStore {
   // Nothing happens when it is not there. Those that have it open keep what they have.
   virtual void erase(const std::string& key) const = 0;
 
-  // Erases the blobs that were stored before `cutoff` and that `keep` does not keep; one that was
-  // stored again since counts as young. Returns how many.
-  virtual std::size_t sweep(std::chrono::system_clock::time_point cutoff,
-                            const std::function<bool(const std::string& key)>& keep) const = 0;
+  // A record names the blob from now on. Until then it is safe from erase_unnamed() and sweep() for
+  // as long as they are told. To be called once for each time that it was stored.
+  virtual void settle(const std::string& key) const = 0;
+
+  // Erases those of `keys` that `names` does not name, but for those that this process has stored
+  // since `unsettled` and that are not settled. Returns those that are still there for that reason.
+  virtual std::vector<std::string> erase_unnamed(std::span<const std::string> keys,
+                                                 Steady unsettled, const Names& names) const = 0;
+
+  // Puts what nothing names, by the same rule, into quarantine: a share of all blobs at most, since
+  // what names nearly none of them is more likely wrong than they are. A blob comes back from there
+  // when it is asked for.
+  virtual Swept sweep(Steady unsettled, const Names& names) const = 0;
+
+  // Removes what has been in quarantine since before that time. Returns how many.
+  virtual std::size_t empty_quarantine(Time before) const = 0;
 };
 
 }  // namespace isomesh::store

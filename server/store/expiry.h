@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <vector>
 
 namespace isomesh::store {
 
@@ -25,7 +26,8 @@ struct Expirable {
 // What a call of expire() removed.
 struct Expired {
   std::size_t records = 0;
-  std::uint64_t bytes = 0;  // of the blobs that no record names any more
+  std::uint64_t bytes = 0;              // of the blobs that no record names any more
+  std::vector<std::string> blobs = {};  // those
 };
 
 // As the bytes that are enough: all records that are given expire.

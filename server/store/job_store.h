@@ -213,7 +213,7 @@ class JobStore {
 
   // When the run began that lasts longest; empty when nothing runs. Blobs that were stored since
   // then may be about to be named.
-  virtual std::optional<Time> oldest_run() const = 0;
+  virtual std::optional<std::chrono::steady_clock::time_point> oldest_run() const = 0;
 
   // Ids of jobs and volumes that expired before that time are not found from now on.
   virtual void forget_expired(Time before) = 0;

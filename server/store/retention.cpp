@@ -18,20 +18,21 @@ constexpr std::chrono::hours kLongestScratch{24};
 // More than a client that follows a job could have missed.
 constexpr std::chrono::days kEventsKept{2};
 
-Time before_now(std::chrono::milliseconds time) { return std::chrono::system_clock::now() - time; }
-
 }  // namespace
 
 Retention::Gone Retention::enforce() {
+  const Time now = options_.now();
   Gone gone;
   {
     const Lock lock(mutex_);
-    expire_old(gone);
+    expire_old(now, gone);
     if (options_.max_bytes > 0) expire_beyond(options_.max_bytes, gone);
+    gone.blobs += erase_garbage();
+    sweep_blobs(gone);
   }
-  forget();
-  gone.blobs = sweep_blobs();
-  sweep_scratch();
+  gone.blobs += blobs_.empty_quarantine(now - options_.quarantine);
+  forget(now);
+  sweep_scratch(now);
   return gone;
 }
 
@@ -47,8 +48,8 @@ std::uint64_t Retention::named_bytes() const {
   return jobs_.named_bytes() + volumes_.named_bytes();
 }
 
-void Retention::expire_old(Gone& gone) {
-  const Time cutoff = before_now(options_.keep);
+void Retention::expire_old(Time now, Gone& gone) {
+  const Time cutoff = now - options_.keep;
   while (true) {
     const std::vector<Expirable> items = oldest(cutoff, Ended::kAll);
     expire(items, kAllBytes, gone);
@@ -61,8 +62,7 @@ bool Retention::expire_beyond(std::uint64_t max_bytes, Gone& gone) {
     const std::uint64_t named = named_bytes();
     if (named <= max_bytes) return true;
     // Jobs without a mesh take no room, and go by their age alone.
-    const std::vector<Expirable> items =
-        oldest(before_now(std::chrono::milliseconds(-1)), Ended::kWithMesh);
+    const std::vector<Expirable> items = oldest(Time::max(), Ended::kWithMesh);
     if (items.empty()) return false;
     expire(items, named - max_bytes, gone);
   }
@@ -90,31 +90,46 @@ void Retention::expire(std::span<const Expirable> items, std::uint64_t enough, G
         is_job ? jobs_.expire(alike, enough - freed) : volumes_.expire(alike, enough - freed);
     (is_job ? gone.jobs : gone.volumes) += expired.records;
     freed += expired.bytes;
+    garbage_.insert(garbage_.end(), expired.blobs.begin(), expired.blobs.end());
     items = items.subspan(alike.size());
   }
 }
 
-std::size_t Retention::sweep_blobs() const {
-  // A worker may have stored, at any time since its run began, what it is about to name.
-  Time cutoff = before_now(options_.grace);
-  if (const auto oldest_run = jobs_.oldest_run()) {
-    cutoff = std::min(cutoff, *oldest_run - options_.grace);
-  }
-  return blobs_.sweep(cutoff, [this](const std::string& key) { return volumes_.names(key); });
+// A worker may have stored, at any time since its run began, what it is about to name.
+Steady Retention::unsettled_since() const {
+  const Steady now = Steady::clock::now();
+  return std::min(now, jobs_.oldest_run().value_or(now)) - options_.grace;
 }
 
-void Retention::sweep_scratch() const {
+std::size_t Retention::erase_garbage() {
+  const std::size_t before = garbage_.size();
+  garbage_ = blobs_.erase_unnamed(garbage_, unsettled_since(),
+                                  [this](const std::string& key) { return volumes_.names(key); });
+  return before - garbage_.size();
+}
+
+void Retention::sweep_blobs(Gone& gone) {
+  const Steady now = Steady::clock::now();
+  if (now < next_sweep_) return;
+  const Swept swept = blobs_.sweep(unsettled_since(),
+                                   [this](const std::string& key) { return volumes_.names(key); });
+  gone.quarantined = swept.quarantined;
+  gone.left = swept.left;
+  if (swept.left > 0) next_sweep_ = now + options_.sweep_pause;
+}
+
+void Retention::sweep_scratch(Time now) const {
   std::error_code gone;  // files come and go while we look
-  const auto cutoff = std::filesystem::file_time_type::clock::now() - kLongestScratch;
+  const auto cutoff = std::chrono::file_clock::from_sys(now) - kLongestScratch;
   for (const auto& entry : std::filesystem::directory_iterator(scratch_, gone)) {
     const auto written = entry.last_write_time(gone);
     if (!gone && written < cutoff) std::filesystem::remove_all(entry.path(), gone);
   }
 }
 
-void Retention::forget() {
-  jobs_.forget_expired(before_now(options_.remember));
-  jobs_.forget_events(before_now(kEventsKept));
+void Retention::forget(Time now) {
+  jobs_.forget_expired(now - options_.remember);
+  jobs_.forget_events(now - kEventsKept);
 }
 
 }  // namespace isomesh::store

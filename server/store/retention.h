@@ -4,7 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "base/mutex.h"
 #include "server/store/blob_store.h"
@@ -20,9 +23,15 @@ struct RetentionOptions {
   std::uint64_t max_bytes = 0;
   // How long an id is known as expired after it is gone.
   std::chrono::milliseconds remember = std::chrono::days(90);
-  // A blob is stored first and named by a record later. So one that no record names is swept only
+  // A blob is stored first and named by a record later. So one that no record names is removed only
   // when it was stored this long ago, and this long before the oldest run that is under way began.
   std::chrono::milliseconds grace = std::chrono::minutes(2);
+  // How long blobs that no record names, and of which nobody knows why, lie in quarantine.
+  std::chrono::milliseconds quarantine = std::chrono::days(7);
+  // How long no sweep follows one that found too many of those.
+  std::chrono::milliseconds sweep_pause = std::chrono::hours(1);
+  // The time, as far as it can be believed.
+  std::function<Time()> now = [] { return std::chrono::system_clock::now(); };
 };
 
 // Keeps the stores from growing for ever, and a node's folder of unfinished files. Never touches
@@ -32,7 +41,9 @@ class Retention {
   struct Gone {
     std::size_t jobs = 0;
     std::size_t volumes = 0;
-    std::size_t blobs = 0;
+    std::size_t blobs = 0;        // of what expired, or out of quarantine
+    std::size_t quarantined = 0;  // blobs that no record names although none expired
+    std::size_t left = 0;         // those that were too many to be put into quarantine at once
   };
 
   Retention(JobStore& jobs, VolumeStore& volumes, const BlobStore& blobs,
@@ -54,14 +65,17 @@ class Retention {
   std::uint64_t named_bytes() const;
 
  private:
-  void expire_old(Gone& gone) ISOMESH_REQUIRES(mutex_);
+  void expire_old(Time now, Gone& gone) ISOMESH_REQUIRES(mutex_);
   // False when what queued and running jobs need is more than that.
   bool expire_beyond(std::uint64_t max_bytes, Gone& gone) ISOMESH_REQUIRES(mutex_);
   std::vector<Expirable> oldest(Time before, Ended which) const;
-  void expire(std::span<const Expirable> items, std::uint64_t enough, Gone& gone);
-  std::size_t sweep_blobs() const;
-  void sweep_scratch() const;
-  void forget();
+  void expire(std::span<const Expirable> items, std::uint64_t enough, Gone& gone)
+      ISOMESH_REQUIRES(mutex_);
+  Steady unsettled_since() const;
+  std::size_t erase_garbage() ISOMESH_REQUIRES(mutex_);
+  void sweep_blobs(Gone& gone) ISOMESH_REQUIRES(mutex_);
+  void sweep_scratch(Time now) const;
+  void forget(Time now);
 
   JobStore& jobs_;
   VolumeStore& volumes_;
@@ -70,6 +84,9 @@ class Retention {
   const RetentionOptions options_;
   // Two threads that make room at the same time would make twice as much.
   Mutex mutex_;
+  // Blobs that expired records named, and that are still there.
+  std::vector<std::string> garbage_ ISOMESH_GUARDED_BY(mutex_);
+  Steady next_sweep_ ISOMESH_GUARDED_BY(mutex_);
 };
 
 }  // namespace isomesh::store

@@ -133,7 +133,7 @@ TEST(Restart, KeepsVolumesAndJobsAndSweepsTheRest) {
   write_file(folder / "data/scratch/left-behind", "by a crash");
   const Daemon daemon(folder / "data", "127.0.0.1:0");
   EXPECT_EQ(daemon.client().volumes(), std::vector{volume});
-  EXPECT_EQ(files_below(folder / "data/blobs").size(), 2U);
+  EXPECT_EQ(blobs_below(folder / "data").size(), 2U);
   EXPECT_TRUE(files_below(folder / "data/scratch").empty());
   EXPECT_EQ(daemon.client().job(job.id), job);
   EXPECT_EQ(daemon.get("/v1/jobs/" + job.id + "/mesh.drc").status, 200);

@@ -85,7 +85,7 @@ class FaultTest : public testing::Test {
     return daemon().get(job.mesh->files.at(MeshFormat::kDrc).href).body;
   }
 
-  std::size_t blob_count() { return files_below(folder_ / "data/blobs").size(); }
+  std::size_t blob_count() { return blobs_below(folder_ / "data").size(); }
   std::size_t scratch_count() { return files_below(folder_ / "data/scratch").size(); }
 
   TemporaryFolder folder_;

@@ -1,5 +1,6 @@
 // Data folders of other versions, and what expires.
 #include <string>
+#include <thread>
 
 #include "tests/api/problems.h"
 #include "tests/faults/fixture.h"
@@ -55,6 +56,54 @@ TEST_F(Folder, TheOldestGoesWhenAllIsTooMuch) {
   const Volume second = upload(daemon(), other);
   EXPECT_EQ(daemon().get("/v1/volumes/" + first.id).status, 410);
   EXPECT_EQ(daemon().get("/v1/volumes/" + second.id).status, 200);
+}
+
+// The sweeper would take all files for litter.
+TEST_F(Folder, WithoutItsDatabaseIsRefusedUnlessAdopted) {
+  start();
+  const Job job = finished_job(daemon());
+  EXPECT_EQ(daemon().stop(), 0);
+  const std::size_t blobs = blob_count();
+  std::filesystem::create_directory(folder_ / "away");
+  std::filesystem::rename(folder_ / "data/isomesh.sqlite", folder_ / "away/isomesh.sqlite");
+  std::vector<std::string> command = {ISOMESHD, "--data", folder_ / "data", "--listen",
+                                      "127.0.0.1:0"};
+  const Finished refused = run(command);
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.errors, HasSubstr("--adopt"));
+  EXPECT_EQ(blob_count(), blobs);
+  start({"--adopt"});
+  EXPECT_TRUE(daemon().client().volumes().empty());
+  ASSERT_TRUE(eventually([&] { return blob_count() == 0; }));
+  EXPECT_EQ(files_below(folder_ / "data/quarantine").size(), blobs);
+  EXPECT_EQ(daemon().stop(), 0);
+  // The right one is found after all, and the files with it.
+  std::filesystem::remove(folder_ / "data/isomesh.sqlite");
+  std::filesystem::rename(folder_ / "away/isomesh.sqlite", folder_ / "data/isomesh.sqlite");
+  EXPECT_EQ(run(command).status, 1);
+  start({"--adopt"});
+  EXPECT_EQ(daemon().get(job.mesh->files.at(MeshFormat::kDrc).href).status, 200);
+}
+
+// As a start with a clock that is 40 days ahead would find it.
+TEST_F(Folder, NothingExpiresByAClockThatIsFarAhead) {
+  start();
+  const Job job = finished_job(daemon());
+  EXPECT_EQ(daemon().stop(), 0);
+  const std::string days_ago = " - 40 * 86400000000";
+  run_sql("UPDATE jobs SET finished = finished" + days_ago + ", accepted = accepted" + days_ago);
+  run_sql("UPDATE volumes SET used = used" + days_ago);
+  run_sql("CREATE TABLE IF NOT EXISTS identity(seen INTEGER)");
+  run_sql("UPDATE identity SET seen = seen" + days_ago);
+  start();
+  EXPECT_THAT(daemon().errors(), HasSubstr("the clock is far ahead"));
+  // Housekeeping looks at once, and says in its first round what it has removed.
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  EXPECT_EQ(daemon().get("/v1/jobs/" + job.id).status, 200);
+  EXPECT_EQ(daemon().get("/v1/volumes/" + job.parameters.volume).status, 200);
+  EXPECT_EQ(daemon().stop(), 0);
+  start({"--trust-clock"});
+  EXPECT_TRUE(eventually([&] { return daemon().get("/v1/jobs/" + job.id).status == 410; }));
 }
 
 }  // namespace

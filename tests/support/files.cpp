@@ -40,4 +40,10 @@ std::vector<std::string> files_below(const std::filesystem::path& folder) {
   return names;
 }
 
+std::vector<std::string> blobs_below(const std::filesystem::path& data) {
+  std::vector<std::string> names = files_below(data / "blobs");
+  std::erase(names, "identity");
+  return names;
+}
+
 }  // namespace isomesh::test

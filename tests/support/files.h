@@ -32,6 +32,9 @@ std::string read_file(const std::filesystem::path& path);
 // All regular files below a folder, as sorted paths relative to it.
 std::vector<std::string> files_below(const std::filesystem::path& folder);
 
+// The blobs of a data folder, in the same form.
+std::vector<std::string> blobs_below(const std::filesystem::path& data);
+
 // The bytes that an array occupies, and back to text.
 template <class T>
 std::string bytes_of(const std::vector<T>& values) {

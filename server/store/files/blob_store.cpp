@@ -1,5 +1,6 @@
 #include "server/store/files/blob_store.h"
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -20,6 +21,9 @@ namespace {
 constexpr std::size_t kPrefix = 2;
 constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
 constexpr std::chrono::hours kBelieved{1};
+// Of all blobs, what one sweep may take: a tenth, but a few always.
+constexpr std::size_t kSweptShare = 10;
+constexpr std::size_t kSweptAtLeast = 16;
 
 // What changes when somebody writes to a file or puts another in its place; empty without a file.
 std::string traits_of(const std::filesystem::path& file) {
@@ -48,6 +52,13 @@ Blob digest_of(const File& file, const std::stop_token& stop) {
     offset += count;
   }
   return {to_hex(digest.finish()), offset};
+}
+
+void touch(const std::filesystem::path& file) {
+  timespec now = {};
+  ::clock_gettime(CLOCK_REALTIME, &now);
+  const std::array<timespec, 2> times = {now, now};
+  ::utimensat(AT_FDCWD, file.c_str(), times.data(), 0);
 }
 
 class FileReader : public BlobReader {
@@ -110,16 +121,16 @@ void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) c
 }
 
 std::unique_ptr<BlobReader> FileBlobStore::open(const std::string& key) const {
-  return std::make_unique<FileReader>(File::open(path_of(key)));
+  return std::make_unique<FileReader>(File::open(found(key)));
 }
 
 LocalBlob FileBlobStore::local(const std::string& key) const {
   if (!size(key)) throw Error(ErrorCode::kNotFound, "the file is not there");
-  return {path_of(key)};
+  return {found(key)};
 }
 
 bool FileBlobStore::is_intact(const std::string& key, const std::stop_token& stop) const {
-  const std::filesystem::path place = path_of(key);
+  const std::filesystem::path place = found(key);
   const std::string traits = traits_of(place);
   const auto now = std::chrono::steady_clock::now();
   {
@@ -144,7 +155,7 @@ void FileBlobStore::believe(const std::string& key, const std::string& traits) c
 
 std::optional<std::uint64_t> FileBlobStore::size(const std::string& key) const {
   std::error_code absent;
-  const std::uintmax_t bytes = std::filesystem::file_size(path_of(key), absent);
+  const std::uintmax_t bytes = std::filesystem::file_size(found(key), absent);
   if (absent) return std::nullopt;
   return bytes;
 }
@@ -154,45 +165,95 @@ void FileBlobStore::erase(const std::string& key) const {
   std::filesystem::remove(path_of(key), ignored);
 }
 
+std::filesystem::path FileBlobStore::found(const std::string& key) const {
+  const std::filesystem::path place = path_of(key);
+  if (std::filesystem::exists(place)) return place;
+  std::error_code absent;
+  std::filesystem::rename(folder_.quarantine() / key, place, absent);
+  return place;
+}
+
 std::filesystem::path FileBlobStore::path_of(const std::string& key) const {
   return folder_.blobs() / key.substr(0, kPrefix) / key;
 }
 
-std::size_t FileBlobStore::sweep(std::chrono::system_clock::time_point cutoff,
-                                 const std::function<bool(const std::string& key)>& keep) const {
-  const auto is_old = [&](const std::filesystem::path& file) {
+void FileBlobStore::settle(const std::string& key) const {
+  const Lock lock(places_);
+  const auto stored = unsettled_.find(key);
+  if (stored != unsettled_.end() && --stored->second.times == 0) unsettled_.erase(stored);
+}
+
+bool FileBlobStore::is_unsettled(const std::string& key, Steady since) const {
+  const auto stored = unsettled_.find(key);
+  return stored != unsettled_.end() && stored->second.last >= since;
+}
+
+std::vector<std::string> FileBlobStore::erase_unnamed(std::span<const std::string> keys,
+                                                      Steady unsettled, const Names& names) const {
+  std::vector<std::string> left;
+  for (const std::string& key : keys) {
+    const Lock lock(places_);
+    if (names(key)) continue;
+    if (is_unsettled(key, unsettled)) {
+      left.push_back(key);
+    } else {
+      erase(key);
+    }
+  }
+  return left;
+}
+
+Swept FileBlobStore::sweep(Steady unsettled, const Names& names) const {
+  std::vector<std::string> keys = all_keys();
+  const std::size_t most = std::max(kSweptAtLeast, keys.size() / kSweptShare);
+  std::erase_if(keys, names);
+  Swept swept;
+  for (const std::string& key : keys) {
+    const Lock lock(places_);
+    if (is_unsettled(key, unsettled) || names(key)) continue;
+    if (swept.quarantined == most) {
+      ++swept.left;
+      continue;
+    }
+    touch(path_of(key));  // when it came there
+    move_to(path_of(key), folder_.quarantine() / key);
+    ++swept.quarantined;
+  }
+  const Lock lock(places_);
+  std::erase_if(unsettled_, [&](const auto& stored) { return stored.second.last < unsettled; });
+  return swept;
+}
+
+std::size_t FileBlobStore::empty_quarantine(Time before) const {
+  std::size_t removed = 0;
+  std::error_code gone;  // one that is asked for is put back while we look
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.quarantine(), gone)) {
     struct stat status = {};
-    if (::stat(file.c_str(), &status) != 0) return false;
-    const auto written = std::chrono::seconds(status.st_mtim.tv_sec) +
-                         std::chrono::nanoseconds(status.st_mtim.tv_nsec);
-    return written < cutoff.time_since_epoch();
-  };
-  std::vector<std::string> unnamed;
+    if (::stat(entry.path().c_str(), &status) != 0) continue;
+    const auto since = std::chrono::seconds(status.st_mtim.tv_sec);
+    if (since >= before.time_since_epoch()) continue;
+    removed += std::filesystem::remove(entry.path(), gone) ? 1 : 0;
+  }
+  return removed;
+}
+
+// Only what has a blob's place: the folder has other files too.
+std::vector<std::string> FileBlobStore::all_keys() const {
+  std::vector<std::string> keys;
   std::error_code gone;  // files come and go while we look
   std::filesystem::recursive_directory_iterator entry(folder_.blobs(), gone);
   for (; entry != std::filesystem::recursive_directory_iterator(); entry.increment(gone)) {
     const std::string key = entry->path().filename();
-    if (entry->is_regular_file(gone) && is_old(entry->path()) && !keep(key)) unnamed.push_back(key);
+    if (entry->is_regular_file(gone) && path_of(key) == entry->path()) keys.push_back(key);
   }
-  std::size_t erased = 0;
-  for (const std::string& key : unnamed) {
-    const Lock lock(places_);
-    if (!is_old(path_of(key)) || keep(key)) continue;
-    erase(key);
-    ++erased;
-  }
-  return erased;
+  return keys;
 }
 
 std::string FileBlobStore::publish_as(const std::filesystem::path& path, const File& file,
                                       const std::string& key) const {
-  // A file of long ago that is named now must look as young as its naming is. The time is a finer
-  // one than the system gives to files that are written, so a write within the same tick changes
-  // it.
-  timespec now = {};
-  ::clock_gettime(CLOCK_REALTIME, &now);
-  const std::array<timespec, 2> times = {now, now};
-  ::utimensat(AT_FDCWD, path.c_str(), times.data(), 0);
+  // The time is a finer one than the system gives to files that are written, so a write within the
+  // same tick changes it.
+  touch(path);
   const std::filesystem::path place = path_of(key);
   make_folder_for(place);
   std::string traits;
@@ -203,16 +264,26 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
   {
     const Lock lock(places_);
     has_moved = move_to_free_place(path, place);
-    if (has_moved) traits = traits_of(place);
+    if (has_moved) {
+      note_unsettled(key);
+      traits = traits_of(place);
+    }
   }
   file.sync();
   if (!has_moved) {
     const Lock lock(places_);
     move_to(path, place);
+    note_unsettled(key);
     traits = traits_of(place);
   }
   sync_folder(place.parent_path());
   return traits;
+}
+
+void FileBlobStore::note_unsettled(const std::string& key) const {
+  Unsettled& stored = unsettled_[key];
+  stored.times += 1;
+  stored.last = std::chrono::steady_clock::now();
 }
 
 // A folder that is there is not yet on the disk when another thread has just made it, or when the

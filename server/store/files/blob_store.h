@@ -3,7 +3,9 @@
 #include <chrono>
 #include <functional>
 #include <map>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "base/mutex.h"
 #include "server/store/blob_store.h"
@@ -26,8 +28,11 @@ class FileBlobStore : public BlobStore {
   bool is_intact(const std::string& key, const std::stop_token& stop) const override;
   std::optional<std::uint64_t> size(const std::string& key) const override;
   void erase(const std::string& key) const override;
-  std::size_t sweep(std::chrono::system_clock::time_point cutoff,
-                    const std::function<bool(const std::string& key)>& keep) const override;
+  void settle(const std::string& key) const override;
+  std::vector<std::string> erase_unnamed(std::span<const std::string> keys, Steady unsettled,
+                                         const Names& names) const override;
+  Swept sweep(Steady unsettled, const Names& names) const override;
+  std::size_t empty_quarantine(Time before) const override;
 
   // Where a blob lies or would.
   std::filesystem::path path_of(const std::string& key) const;
@@ -38,7 +43,13 @@ class FileBlobStore : public BlobStore {
   // When a file was found intact, and what it looked like then.
   struct Check {
     std::string traits;
-    std::chrono::steady_clock::time_point when;
+    Steady when;
+  };
+
+  // How often a blob was stored by this process without being settled, and when last.
+  struct Unsettled {
+    std::size_t times = 0;
+    Steady last;
   };
 
   void believe(const std::string& key, const std::string& traits) const;
@@ -46,11 +57,17 @@ class FileBlobStore : public BlobStore {
   std::string publish_as(const std::filesystem::path& path, const File& file,
                          const std::string& key) const;
   void make_folder_for(const std::filesystem::path& place) const;
+  // As path_of, for reading: what is in quarantine is put back.
+  std::filesystem::path found(const std::string& key) const;
+  std::vector<std::string> all_keys() const;
+  void note_unsettled(const std::string& key) const ISOMESH_REQUIRES(places_);
+  bool is_unsettled(const std::string& key, Steady since) const ISOMESH_REQUIRES(places_);
 
   const DataFolder& folder_;
   // Held while a file takes its place or is swept, so that the sweeper never erases a file that has
   // just been put there anew.
   mutable Mutex places_;
+  mutable std::map<std::string, Unsettled> unsettled_ ISOMESH_GUARDED_BY(places_);
   mutable Mutex folders_mutex_;
   mutable bool has_folders_ ISOMESH_GUARDED_BY(folders_mutex_) = false;  // all, on the disk
   mutable Mutex intact_mutex_;

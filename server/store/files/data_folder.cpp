@@ -28,7 +28,7 @@ DataFolder::DataFolder(const std::filesystem::path& root) : root_(root) {
     throw Error(ErrorCode::kUnavailable, "another isomeshd is using the data folder");
   }
   std::filesystem::remove_all(scratch());
-  for (const auto& folder : {blobs(), scratch()}) {
+  for (const auto& folder : {blobs(), quarantine(), scratch()}) {
     std::filesystem::create_directories(folder);
   }
   sync_folder(root_);

@@ -17,6 +17,10 @@ class DataFolder {
   DataFolder& operator=(const DataFolder&) = delete;
 
   std::filesystem::path blobs() const { return root_ / "blobs"; }  // finished files, by digest
+  // What the folder of blobs is called; see Identity.
+  std::filesystem::path blobs_identity() const { return blobs() / "identity"; }
+  // Blobs that nothing names, before they are removed for good.
+  std::filesystem::path quarantine() const { return root_ / "quarantine"; }
   std::filesystem::path records() const { return root_ / "isomesh.sqlite"; }  // the database
   std::filesystem::path scratch() const { return root_ / "scratch"; }         // unfinished files
 

@@ -96,6 +96,13 @@ CREATE TABLE callbacks(       -- of jobs that have ended, until they are deliver
   next INTEGER NOT NULL       -- when it is due
 ) WITHOUT ROWID;
 CREATE INDEX callbacks_by_time ON callbacks(next);
+)sql",
+                               R"sql(
+CREATE TABLE identity(        -- one row: see Identity
+  id TEXT NOT NULL,
+  number INTEGER NOT NULL,
+  seen INTEGER NOT NULL
+);
 )sql"};
 
 // Versions 1 and 2 were never released.
@@ -136,6 +143,11 @@ Connection::Mode migrated(const std::filesystem::path& file) {
 Database::Database(const DataFolder& folder)
     : writer_(folder.records(), migrated(folder.records())),
       reader_(folder.records(), Connection::Mode::kRead) {}
+
+std::int64_t Database::changes() {
+  const Reading reading(writer_);
+  return reading->all_changes();
+}
 
 std::int64_t now_us() { return to_us(std::chrono::system_clock::now()); }
 

@@ -22,6 +22,9 @@ class Database {
   Connection& writer() { return writer_; }
   Connection& reader() { return reader_; }
 
+  // How many rows were changed since it was opened.
+  std::int64_t changes();
+
  private:
   Connection writer_;
   Connection reader_;

@@ -21,10 +21,12 @@ bool is_named(Connection& connection, const std::string& blob) {
   return query.integer(0) != 0;
 }
 
-std::uint64_t unnamed_bytes(Connection& connection, const std::vector<Blob>& blobs) {
-  std::uint64_t bytes = 0;
-  for (const Blob& blob : blobs) bytes += is_named(connection, blob.key) ? 0 : blob.bytes;
-  return bytes;
+void add_unnamed(Connection& connection, const std::vector<Blob>& blobs, Expired& expired) {
+  for (const Blob& blob : blobs) {
+    if (is_named(connection, blob.key)) continue;
+    expired.bytes += blob.bytes;
+    expired.blobs.push_back(blob.key);
+  }
 }
 
 void remember_expired(Connection& connection, const Expirable& item) {

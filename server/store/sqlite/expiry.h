@@ -16,8 +16,8 @@ std::vector<Blob> read_blobs(Query&& query);
 // Whether any record, of a volume or of a mesh, names the blob.
 bool is_named(Connection& connection, const std::string& blob);
 
-// Of those blobs that no record names.
-std::uint64_t unnamed_bytes(Connection& connection, const std::vector<Blob>& blobs);
+// Adds those blobs that no record names.
+void add_unnamed(Connection& connection, const std::vector<Blob>& blobs, Expired& expired);
 
 // From now on the id is known as one that has expired.
 void remember_expired(Connection& connection, const Expirable& item);

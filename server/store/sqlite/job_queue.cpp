@@ -58,7 +58,7 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
                                         "idempotency_key = ?",
                                     spec.owner, spec.idempotency_key);
       if (earlier.next()) {
-        constexpr int kAfterTheRow = 11;
+        constexpr int kAfterTheRow = 10;
         if (earlier.text(kAfterTheRow) != spec.request_digest)
           return {Submission::Kind::kConflict, {}, {}};
         return {Submission::Kind::kExisting, with_progress(row_of(earlier)), {}};
@@ -104,10 +104,11 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   {
     Query query = change->query(
         std::string("SELECT ") + kRowColumns +
-            " FROM jobs q WHERE state = 0 AND not_before <= ? AND NOT EXISTS (SELECT 1 FROM jobs r "
+            " FROM jobs q WHERE state = 0 AND not_before NOT BETWEEN ?1 + 1 AND ?1 + ?2 AND NOT "
+            "EXISTS (SELECT 1 FROM jobs r "
             "WHERE r.owner = q.owner AND r.result_key = q.result_key AND r.state = 1) "
             "ORDER BY priority, id LIMIT 1",
-        now);
+        now, kLongestWaitUs);
     if (!query.next()) return std::nullopt;
     next = row_of(query);
   }
@@ -118,17 +119,17 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   row.job.stage = Stage::kLoad;
   row.job.started = timestamp();
   row.job.timing.queue = milliseconds_since(row.accepted);
-  const std::int64_t until = now + microseconds(lease);
   change->run(
-      "UPDATE jobs SET state = 1, attempts = ?, fence = ?, claimed = ?, is_long = 0, lease_until = "
-      "?, worker = ?, record = ? WHERE id = ?",
-      row.attempts, row.fence, now, until, worker, to_json(row.job), row.job.id);
+      "UPDATE jobs SET state = 1, attempts = ?, fence = ?, claimed = ?, is_long = 0, worker = ?, "
+      "record = ? WHERE id = ?",
+      row.attempts, row.fence, now, worker, to_json(row.job), row.job.id);
   change.announce(row, EventKind::kStage);
   change.commit();
   {
     // Before anybody else's transaction, which may ask the run to stop or end its lease.
     const Lock lock(live_mutex_);
-    live_[row.job.id] = {.fence = row.fence, .claimed = now, .lease_until = until};
+    const Steady began = Steady::clock::now();
+    live_[row.job.id] = {.fence = row.fence, .claimed = began, .lease_until = began + lease};
   }
   return Lease{row.job.id, row.fence, row.attempts, row.owner, row.job.parameters};
 }
@@ -140,26 +141,25 @@ Standing SqliteJobStore::renew(const Lease& lease, const Progress& progress,
     const Lock lock(live_mutex_);
     if (const Live* const known = live(lease)) run = *known;
   }
-  const std::int64_t now = now_us();
+  const Steady now = Steady::clock::now();
   if (!run || run->lease_until < now) return Standing::kLost;
   tell(lease, progress);
-  const bool is_long = now - run->claimed >= microseconds(options_.short_run);
-  if (run->lease_until - now < microseconds(length) * 2 / 3 || is_long != run->is_long) {
-    // That the run is long is what it is charged for when it takes the machine down with it.
-    Change change(*this, is_long == run->is_long ? Durability::kProcess : Durability::kFull);
-    const int held = change->run(
-        "UPDATE jobs SET lease_until = ?, is_long = ? WHERE id = ? AND fence = ? AND state = 1 AND "
-        "lease_until >= ?",
-        now + microseconds(length), is_long ? 1 : 0, lease.id, lease.fence, now);
+  const bool is_long = now - run->claimed >= options_.short_run;
+  if (is_long != run->is_long) {
+    // What it is charged for when it takes the machine down with it.
+    Change change(*this);
+    const int held =
+        change->run("UPDATE jobs SET is_long = ? WHERE id = ? AND fence = ? AND state = 1",
+                    is_long ? 1 : 0, lease.id, lease.fence);
     if (held == 0) return Standing::kLost;
     change.commit();
-    const Lock lock(live_mutex_);
-    if (Live* const renewed = live(lease)) {
-      renewed->lease_until = now + microseconds(length);
-      renewed->is_long = is_long;
-    }
   }
-  return run->cancelling ? Standing::kCancel : Standing::kOk;
+  const Lock lock(live_mutex_);
+  Live* const renewed = live(lease);
+  if (renewed == nullptr) return Standing::kLost;
+  renewed->lease_until = now + length;
+  renewed->is_long = is_long;
+  return renewed->cancelling ? Standing::kCancel : Standing::kOk;
 }
 
 bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
@@ -187,6 +187,9 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
     change.commit();
   }
   forget_run(lease.id, lease.fence);
+  if (has_mesh) {
+    for (const auto& [format, file] : outcome.mesh->files) blobs_.settle(file.sha256);
+  }
   // Without a mesh it may be due again, or one like it now. With one, nothing has become ready.
   if (!has_mesh) wake_workers();
   return true;
@@ -216,11 +219,11 @@ std::size_t SqliteJobStore::reap() {
     Change change(*this);
     std::vector<Row> rows;
     {
-      Query query = change->query(
-          std::string("SELECT ") + kRowColumns + " FROM jobs WHERE state = 1 AND lease_until < ?",
-          now_us());
+      Query query =
+          change->query(std::string("SELECT ") + kRowColumns + " FROM jobs WHERE state = 1");
       while (query.next()) rows.push_back(row_of(query));
     }
+    std::erase_if(rows, [this](const Row& row) { return is_held(row.job.id, row.fence); });
     for (Row& row : rows) {
       if (row.cancelling) {
         end(change, row, JobState::kCancelled);
@@ -242,7 +245,12 @@ std::size_t SqliteJobStore::reap() {
 std::size_t SqliteJobStore::reap_predecessor() {
   {
     Transaction transaction(database_.writer());
-    const int running = transaction->run("UPDATE jobs SET lease_until = 0 WHERE state = 1");
+    std::int64_t running = 0;
+    {
+      Query query = transaction->query("SELECT count(*) FROM jobs WHERE state = 1");
+      query.next();
+      running = query.integer(0);
+    }
     transaction->run(
         "UPDATE jobs SET attempts = attempts - 1, interruptions = interruptions + 1 WHERE state = "
         "1 "
@@ -277,9 +285,15 @@ Job SqliteJobStore::cancel(const Viewer& viewer, const std::string& id) {
 std::optional<SqliteJobStore::Row> SqliteJobStore::leased(Connection& connection,
                                                           const Lease& lease) const {
   auto row = find(connection, std::nullopt, lease.id);
-  const bool is_held = row && row->job.state == JobState::kRunning && row->fence == lease.fence &&
-                       row->lease_until >= now_us();
-  return is_held ? std::move(row) : std::nullopt;
+  const bool is_its = row && row->job.state == JobState::kRunning && row->fence == lease.fence;
+  return is_its && is_held(lease.id, lease.fence) ? std::move(row) : std::nullopt;
+}
+
+bool SqliteJobStore::is_held(const std::string& id, std::uint64_t fence) const {
+  const Lock lock(live_mutex_);
+  const auto run = live_.find(id);
+  return run != live_.end() && run->second.fence == fence &&
+         run->second.lease_until >= Steady::clock::now();
 }
 
 std::optional<MeshSummary> SqliteJobStore::mesh_like(Connection& connection, const Row& row) const {
@@ -300,9 +314,8 @@ void SqliteJobStore::end(Change& change, Row& row, JobState state) const {
   row.job.finished = timestamp();
   row.job.timing.total = milliseconds_since(row.accepted);
   const std::int64_t now = now_us();
-  change->run(
-      "UPDATE jobs SET state = ?, finished = ?, lease_until = NULL, record = ? WHERE id = ?", state,
-      now, to_json(row.job), row.job.id);
+  change->run("UPDATE jobs SET state = ?, finished = ?, record = ? WHERE id = ?", state, now,
+              to_json(row.job), row.job.id);
   change->run("UPDATE volumes SET used = ? WHERE owner = ? AND id = ?", now, row.owner,
               row.job.parameters.volume);
   SqliteOutbox::add(change.connection(), row.job);
@@ -344,7 +357,7 @@ void SqliteJobStore::queue_again(Change& change, Row& row, std::chrono::millisec
   row.job.started.reset();
   row.job.timing = {};
   change->run(
-      "UPDATE jobs SET state = 0, attempts = ?, lease_until = NULL, not_before = ?, record = ? "
+      "UPDATE jobs SET state = 0, attempts = ?, not_before = ?, record = ? "
       "WHERE id = ?",
       row.attempts, now_us() + microseconds(delay), to_json(row.job), row.job.id);
   change.announce(row, EventKind::kStage);

@@ -1,4 +1,6 @@
 // What removes jobs that have ended, and what is known of them.
+#include <algorithm>
+
 #include "server/store/sqlite/expiry.h"
 #include "server/store/sqlite/job_store.h"
 
@@ -30,7 +32,7 @@ Expired SqliteJobStore::expire(std::span<const Expirable> jobs, std::uint64_t en
     transaction->run("DELETE FROM events WHERE job = ?", job.id);
     remember_expired(transaction.connection(), job);
     ++expired.records;
-    expired.bytes += unnamed_bytes(transaction.connection(), blobs);
+    add_unnamed(transaction.connection(), blobs, expired);
   }
   transaction.commit();
   return expired;
@@ -44,12 +46,11 @@ std::uint64_t SqliteJobStore::named_bytes() const {
   return static_cast<std::uint64_t>(query.integer(0));
 }
 
-std::optional<Time> SqliteJobStore::oldest_run() const {
-  const Reading reading(database_.reader());
-  Query query = reading->query("SELECT min(claimed) FROM jobs WHERE state = 1");
-  query.next();
-  if (query.is_null(0)) return std::nullopt;
-  return from_us(query.integer(0));
+std::optional<Steady> SqliteJobStore::oldest_run() const {
+  const Lock lock(live_mutex_);
+  std::optional<Steady> oldest;
+  for (const auto& [id, run] : live_) oldest = std::min(oldest.value_or(run.claimed), run.claimed);
+  return oldest;
 }
 
 void SqliteJobStore::forget_expired(Time before) {

@@ -18,7 +18,6 @@ struct SqliteJobStore::Row {
   std::int64_t claimed = 0;
   bool is_long = false;  // its run has lasted the store's short_run
   std::uint64_t fence = 0;
-  std::int64_t lease_until = 0;
   bool cancelling = false;
 };
 
@@ -53,8 +52,11 @@ class SqliteJobStore::Change {
 
 // The columns that row_of() reads.
 inline constexpr const char* kRowColumns =
-    "record, owner, result_key, accepted, attempts, fence, lease_until, cancelling, interruptions, "
+    "record, owner, result_key, accepted, attempts, fence, cancelling, interruptions, "
     "claimed, is_long";
+
+// A job is not kept waiting for longer: if one seems to be, the clock was set back.
+inline constexpr std::int64_t kLongestWaitUs = std::int64_t{3600} * 1'000'000;
 
 // How many jobs wait.
 std::size_t count_queued(Connection& connection);

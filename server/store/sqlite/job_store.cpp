@@ -138,7 +138,7 @@ bool SqliteJobStore::wait_for_work(const std::stop_token& stop, std::chrono::mil
       query.next();
       if (!query.is_null(0)) {
         const auto wait = std::chrono::microseconds(query.integer(0) - now_us());
-        if (wait.count() <= 0) return true;
+        if (wait.count() <= 0 || wait.count() > kLongestWaitUs) return true;
         until = std::min(until, std::chrono::steady_clock::now() + wait);
       }
     }
@@ -174,11 +174,10 @@ SqliteJobStore::Row SqliteJobStore::row_of(const Query& query) {
   row.accepted = query.integer(3);
   row.attempts = static_cast<int>(query.integer(4));
   row.fence = static_cast<std::uint64_t>(query.integer(5));
-  row.lease_until = query.integer(6);
-  row.cancelling = query.integer(7) != 0;
-  row.interruptions = static_cast<int>(query.integer(8));
-  row.claimed = query.integer(9);
-  row.is_long = query.integer(10) != 0;
+  row.cancelling = query.integer(6) != 0;
+  row.interruptions = static_cast<int>(query.integer(7));
+  row.claimed = query.integer(8);
+  row.is_long = query.integer(9) != 0;
   return row;
 }
 

@@ -13,7 +13,8 @@
 
 namespace isomesh::store {
 
-// Jobs in the database of a data folder. Leases follow the system's clock. What changes wakes
+// Jobs in the database of a data folder. Leases count the time that passes, whatever
+// the system's clock is set to; who holds which is known to this process alone. What changes wakes
 // those who wait in this process only; the data folder has one process at a time.
 class SqliteJobStore : public JobStore {
  public:
@@ -44,19 +45,18 @@ class SqliteJobStore : public JobStore {
   std::vector<Expirable> ended(Time before, Ended which, std::size_t limit) const override;
   Expired expire(std::span<const Expirable> jobs, std::uint64_t enough) override;
   std::uint64_t named_bytes() const override;
-  std::optional<Time> oldest_run() const override;
+  std::optional<Steady> oldest_run() const override;
   void forget_expired(Time before) override;
   void forget_events(Time before) override;
 
  private:
   struct Row;
   class Change;
-  // A run that this process has claimed: what its row says, so that a renewal seldom has to ask the
-  // database. Where they differ the row is right.
+  // A run that this process has claimed.
   struct Live {
     std::uint64_t fence = 0;
-    std::int64_t claimed = 0;
-    std::int64_t lease_until = 0;
+    Steady claimed;
+    Steady lease_until;
     bool is_long = false;
     bool cancelling = false;
     std::optional<Progress> progress = {};  // none before the first renewal
@@ -78,6 +78,7 @@ class SqliteJobStore : public JobStore {
   std::vector<Event> kept_events(const Viewer& viewer, const std::string& job, std::uint64_t since,
                                  std::uint64_t end) const;
   Live* live(const Lease& lease) ISOMESH_REQUIRES(live_mutex_);
+  bool is_held(const std::string& id, std::uint64_t fence) const;
   void tell(const Lease& lease, const Progress& progress);
   void forget_run(const std::string& id, std::uint64_t fence);
   Job with_progress(const Row& row) const;

@@ -115,6 +115,8 @@ sqlite3_stmt* Connection::prepared(std::string_view sql) {
 
 int Connection::changes() const { return sqlite3_changes(handle_); }
 
+std::int64_t Connection::all_changes() const { return sqlite3_total_changes64(handle_); }
+
 Transaction::Transaction(Connection& connection, Durability durability)
     : lock_(connection.mutex()), connection_(connection) {
   connection_.set_durability(durability);

@@ -94,6 +94,9 @@ class Connection {
   // Rolls back what is open.
   void roll_back() noexcept;
 
+  // How many rows were changed since it was opened.
+  std::int64_t all_changes() const;
+
   Mutex& mutex() { return mutex_; }
 
  private:

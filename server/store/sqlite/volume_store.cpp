@@ -118,7 +118,7 @@ Expired SqliteVolumeStore::expire(std::span<const Expirable> volumes, std::uint6
     if (removed == 0) continue;
     remember_expired(transaction.connection(), volume);
     ++expired.records;
-    expired.bytes += unnamed_bytes(transaction.connection(), blobs);
+    add_unnamed(transaction.connection(), blobs, expired);
   }
   transaction.commit();
   return expired;

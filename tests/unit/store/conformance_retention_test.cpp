@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "base/clock.h"
+#include "server/store/believed_clock.h"
 #include "server/store/retention.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
@@ -65,7 +66,16 @@ class RetentionConformance : public test::EngineTest {
     return {jobs(), volumes(), blobs(), scratch_.path(), options};
   }
   Retention retention(std::uint64_t max_bytes, milliseconds keep = std::chrono::hours(1)) {
-    return retention({.keep = keep, .max_bytes = max_bytes, .grace = milliseconds(-2000)});
+    RetentionOptions options = young();
+    options.keep = keep;
+    options.max_bytes = max_bytes;
+    options.grace = milliseconds(-2000);
+    return retention(options);
+  }
+  static RetentionOptions young() {
+    RetentionOptions options;
+    options.grace = milliseconds(100);
+    return options;
   }
 
   bool is_gone(const std::string& id) {
@@ -78,7 +88,8 @@ class RetentionConformance : public test::EngineTest {
   }
   std::size_t blob_count() {
     std::size_t count = 0;
-    blobs().sweep(soon(), [&](const std::string&) { return ++count > 0; });
+    blobs().sweep(Steady::clock::now() + std::chrono::hours(1),
+                  [&](const std::string&) { return ++count > 0; });
     return count;
   }
 
@@ -142,10 +153,10 @@ TEST_P(RetentionConformance, WhatARunningJobHasStoredStays) {
   submit(volume, 1);
   const Lease lease = claimed();
   put("mesh");
-  EXPECT_EQ(retention({.grace = milliseconds(100)}).enforce().blobs, 0U);
+  EXPECT_EQ(retention(young()).enforce().quarantined, 0U);
   EXPECT_EQ(blob_count(), 2U);
   jobs().finish(lease, {});
-  EXPECT_EQ(retention(0).enforce().blobs, 1U);
+  EXPECT_EQ(retention(0).enforce().quarantined, 1U);
 }
 
 TEST_P(RetentionConformance, BeyondItsBytesTheOldestGoesFirst) {
@@ -207,7 +218,10 @@ TEST_P(RetentionConformance, WhatHasExpiredCanComeBack) {
 
 TEST_P(RetentionConformance, ExpiredIdsAreForgottenInTheEnd) {
   const std::string volume = add_volume('v', 100);
-  retention({.keep = milliseconds(-1000), .remember = milliseconds(-1000)}).enforce();
+  RetentionOptions options;
+  options.keep = milliseconds(-1000);
+  options.remember = milliseconds(-1000);
+  retention(options).enforce();
   EXPECT_EQ(code_thrown_by([&] { volumes().get("", volume); }), ErrorCode::kNotFound);
 }
 
@@ -322,11 +336,42 @@ TEST_P(RetentionConformance, OldEventsAreForgotten) {
 TEST_P(RetentionConformance, SweepingAsksWhichOldBlobsToKeep) {
   const Blob kept = put("kept");
   const Blob other = put("other");
+  const auto now = Steady::clock::now();
   const auto nothing = [](const std::string&) { return false; };
-  EXPECT_EQ(blobs().sweep(soon() - std::chrono::hours(1), nothing), 0U);
-  EXPECT_EQ(blobs().sweep(soon(), [&](const std::string& key) { return key == kept.key; }), 1U);
+  const auto only_kept = [&](const std::string& key) { return key == kept.key; };
+  EXPECT_EQ(blobs().sweep(now - std::chrono::hours(1), nothing).quarantined, 0U);
+  EXPECT_EQ(blobs().sweep(now + std::chrono::hours(1), only_kept).quarantined, 1U);
+  EXPECT_EQ(blobs().empty_quarantine(soon() + std::chrono::hours(1)), 1U);
   EXPECT_EQ(blobs().size(kept.key), kept.bytes);
   EXPECT_EQ(blobs().size(other.key), std::nullopt);
+}
+
+// The records know nothing of them: they are more likely wrong than all those files.
+TEST_P(RetentionConformance, FilesThatTheRecordsDoNotKnowStay) {
+  for (int n = 0; n < 100; ++n) put(std::to_string(n));
+  Retention retention = this->retention(0);
+  const auto gone = retention.enforce();
+  EXPECT_EQ(gone.blobs, 0U);
+  EXPECT_GE(gone.left, 80U);
+  const auto again = retention.enforce();
+  EXPECT_EQ(again.quarantined, 0U) << "somebody has time to look";
+  EXPECT_EQ(blob_count() + gone.quarantined, 100U);
+}
+
+// The clock is set 40 days ahead, and back.
+TEST_P(RetentionConformance, NothingExpiresByAClockThatIsNotBelieved) {
+  const std::string volume = add_volume('v', 100);
+  const std::string job = finish(volume, "mesh");
+  auto wall = std::chrono::system_clock::now();
+  BelievedClock clock(wall, {.wall = [&wall] { return wall; }});
+  RetentionOptions options;
+  options.now = [&clock] { return clock.now(); };
+  wall += std::chrono::days(40);
+  EXPECT_EQ(retention(options).enforce().jobs, 0U);
+  EXPECT_TRUE(is_job(job));
+  wall -= std::chrono::days(40);
+  EXPECT_EQ(retention(options).enforce().jobs, 0U);
+  EXPECT_TRUE(volumes().contains("", volume));
 }
 
 }  // namespace

@@ -220,45 +220,89 @@ TEST_F(FileBlobStoreTest, WhatIsChangedRightAfterItsAdoptionIsReadAgain) {
 
 class Sweeping : public FileBlobStoreTest {
  protected:
-  static std::chrono::system_clock::time_point in(std::chrono::hours hours) {
-    return std::chrono::system_clock::now() + hours;
-  }
+  static bool nothing(const std::string& /*key*/) { return false; }
+
+  static Steady in(std::chrono::seconds time) { return Steady::clock::now() + time; }
+  Swept sweep() { return blobs_.sweep(in(std::chrono::seconds(1)), nothing); }
+  std::size_t in_quarantine() { return test::files_below(data_.quarantine()).size(); }
 };
 
-TEST_F(Sweeping, ErasesWhatIsNotKept) {
+TEST_F(Sweeping, PutsWhatIsNotNamedIntoQuarantine) {
   const std::string other = put("other").key;
   put("hello");
   put("more");
   std::set<std::string> asked;
-  const std::size_t erased = blobs_.sweep(in(std::chrono::hours(1)), [&](const std::string& key) {
+  const Swept swept = blobs_.sweep(in(std::chrono::seconds(1)), [&](const std::string& key) {
     asked.insert(key);
     return key == kHello;
   });
-  EXPECT_EQ(erased, 2U);
+  EXPECT_EQ(swept.quarantined, 2U);
+  EXPECT_EQ(swept.left, 0U);
   EXPECT_EQ(asked.size(), 3U);
   EXPECT_EQ(blob_files(), 1U);
+  EXPECT_EQ(in_quarantine(), 2U);
   EXPECT_EQ(get(kHello), "hello");
 }
 
-TEST_F(Sweeping, LeavesWhatIsYoung) {
-  const auto nothing = [](const std::string&) { return false; };
-  put("hello");
-  EXPECT_EQ(blobs_.sweep(in(std::chrono::hours(-1)), nothing), 0U);
-  EXPECT_EQ(blob_files(), 1U);
+TEST_F(Sweeping, TakesAShareOfAllAtMost) {
+  for (int n = 0; n < 400; ++n) put(std::to_string(n));
+  const Swept first = sweep();
+  EXPECT_EQ(first.quarantined, 40U);
+  EXPECT_EQ(first.left, 360U);
+  EXPECT_EQ(blob_files(), 360U);
 }
 
-// The bytes have lain there for long, but somebody has just stored them again to name them.
-TEST_F(Sweeping, AnOldBlobThatIsStoredAgainIsYoung) {
-  const auto nothing = [](const std::string&) { return false; };
+TEST_F(Sweeping, WhatIsAskedForComesBack) {
+  const std::string other = put("other").key;
+  put("hello");
+  sweep();
+  EXPECT_EQ(get(kHello), "hello");
+  EXPECT_EQ(blobs_.size(other), 5U);
+  EXPECT_EQ(in_quarantine(), 0U);
+  EXPECT_EQ(blob_files(), 2U);
+}
+
+TEST_F(Sweeping, TheQuarantineHasAnEnd) {
+  put("hello");
+  sweep();
+  EXPECT_EQ(blobs_.empty_quarantine(std::chrono::system_clock::now() - std::chrono::hours(1)), 0U);
+  EXPECT_EQ(blobs_.empty_quarantine(std::chrono::system_clock::now() + std::chrono::hours(1)), 1U);
+  EXPECT_EQ(code_thrown_by([&] { blobs_.open(kHello); }), ErrorCode::kNotFound);
+}
+
+// What is about to be named, however old its bytes look.
+TEST_F(Sweeping, LeavesWhatWasStoredSince) {
   put("hello");
   const auto long_ago = std::filesystem::file_time_type::clock::now() - std::chrono::hours(48);
   std::filesystem::last_write_time(blobs_.path_of(kHello), long_ago);
-  test::write_file(data_.scratch() / "made", "hello");
-  std::filesystem::last_write_time(data_.scratch() / "made", long_ago);
-  blobs_.adopt(data_.scratch() / "made", {kHello, 5});
-  EXPECT_EQ(blobs_.sweep(in(std::chrono::hours(-1)), nothing), 0U);
-  std::filesystem::last_write_time(blobs_.path_of(kHello), long_ago);
-  EXPECT_EQ(blobs_.sweep(in(std::chrono::hours(-1)), nothing), 1U);
+  const std::vector<std::string> keys = {kHello};
+  EXPECT_EQ(blobs_.sweep(in(std::chrono::hours(-1)), nothing).quarantined, 0U);
+  EXPECT_EQ(blobs_.erase_unnamed(keys, in(std::chrono::hours(-1)), nothing), keys);
+  EXPECT_EQ(get(kHello), "hello");
+}
+
+TEST_F(Sweeping, WhatWasNamedAndIsNotAnyMoreGoesAtOnce) {
+  put("hello");
+  put("hello");  // by another worker, which is about to name it
+  const std::vector<std::string> keys = {kHello};
+  blobs_.settle(kHello);
+  EXPECT_EQ(blobs_.erase_unnamed(keys, in(std::chrono::hours(-1)), nothing), keys);
+  blobs_.settle(kHello);
+  EXPECT_TRUE(blobs_.erase_unnamed(keys, in(std::chrono::hours(-1)), nothing).empty());
+  EXPECT_EQ(blob_files(), 0U);
+}
+
+// Nobody of this process is about to name it.
+TEST_F(Sweeping, WhatAnEarlierProcessLeftIsNotYoung) {
+  put("hello");
+  const FileBlobStore next(data_);
+  EXPECT_EQ(next.sweep(in(std::chrono::hours(-1)), nothing).quarantined, 1U);
+}
+
+TEST_F(Sweeping, LeavesFilesThatAreNoBlobs) {
+  test::write_file(data_.blobs_identity(), "the folder's");
+  sweep();
+  EXPECT_EQ(test::read_file(data_.blobs_identity()), "the folder's");
 }
 
 }  // namespace

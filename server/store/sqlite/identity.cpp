@@ -1,0 +1,178 @@
+#include "server/store/sqlite/identity.h"
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <filesystem>
+#include <string_view>
+
+#include <spdlog/spdlog.h>
+
+#include "base/files.h"
+#include "base/ids.h"
+#include "proto/error.h"
+#include "server/store/files/files.h"
+
+namespace isomesh::store {
+namespace {
+
+// How often the time is marked although nothing was stored.
+constexpr std::chrono::minutes kBetweenIdleMarks{10};
+
+// Whether anything is recorded.
+bool has_records(Connection& connection) {
+  Query query = connection.query(
+      "SELECT EXISTS(SELECT 1 FROM volumes) OR EXISTS(SELECT 1 FROM jobs) OR EXISTS(SELECT 1 FROM "
+      "expired)");
+  query.next();
+  return query.integer(0) != 0;
+}
+
+bool has_blobs(const DataFolder& folder) {
+  std::error_code gone;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.blobs())) {
+    if (entry.is_directory(gone) && !std::filesystem::is_empty(entry.path(), gone)) return true;
+  }
+  return false;
+}
+
+// When the youngest record was made or used; the beginning of time without any.
+std::int64_t newest_record(Connection& connection) {
+  Query query = connection.query(
+      "SELECT max(coalesce((SELECT max(used) FROM volumes), 0), coalesce((SELECT max(finished) "
+      "FROM jobs), 0), coalesce((SELECT max(accepted) FROM jobs), 0))");
+  query.next();
+  return query.integer(0);
+}
+
+[[noreturn]] void refuse(std::string_view what) {
+  throw Error(ErrorCode::kUnavailable,
+              "the data folder: " + std::string(what) +
+                  ". Put back the one that belongs to it; or start once with --adopt to go on with "
+                  "what is there: files that the database does not name are then put into "
+                  "quarantine, and jobs whose files are missing can be submitted again");
+}
+
+}  // namespace
+
+Identity::Identity(Database& database, const DataFolder& folder, const OperatorsWord& word,
+                   const BelievedClock::Options& clock)
+    : database_(database), folder_(folder), clock_(last_seen(database, word), clock) {
+  const Mark records = mark_of_database();
+  const Mark blobs = mark_of_blobs();
+  if (!word.adopt) check(records, blobs);
+  const Lock lock(mutex_);
+  const bool belong_together = !records.id.empty() && records.id == blobs.id;
+  mark_ = belong_together ? records : Mark{random_hex(16), 0, records.seen};
+  mark_.number = std::max(mark_.number, blobs.id == mark_.id ? blobs.number : 0);
+  write_mark(clock_.now());
+  if (clock_.is_doubted()) {
+    spdlog::warn(
+        "the clock is far ahead of what was stored last: until it is right nothing is taken for "
+        "older than this; if the service was away for that long, start once with --trust-clock");
+  }
+}
+
+Time Identity::now() {
+  const bool was_doubted = clock_.is_doubted();
+  const Time time = clock_.now();
+  if (clock_.is_doubted() && !was_doubted) {
+    spdlog::warn("the clock was set far ahead: nothing is taken for older than it was before");
+  }
+  const Lock lock(mutex_);
+  try {
+    if (!is_told_) write_blobs_mark();
+    const bool is_changed = database_.changes() != changes_;
+    if (is_changed || time - from_us(mark_.seen) > kBetweenIdleMarks) write_mark(time);
+  } catch (const Error& error) {
+    spdlog::warn("what is stored cannot be marked now, and is the next time: {}", error.what());
+  }
+  return time;
+}
+
+Time Identity::last_seen(Database& database, const OperatorsWord& word) {
+  const Time wall = std::chrono::system_clock::now();
+  if (word.trust_clock) return wall;
+  const Reading reading(database.reader());
+  Query seen = reading->query("SELECT seen FROM identity");
+  const std::int64_t marked = seen.next() ? seen.integer(0) : 0;
+  const std::int64_t newest = marked > 0 ? marked : newest_record(reading.connection());
+  return newest > 0 ? from_us(newest) : wall;
+}
+
+Identity::Mark Identity::mark_of_database() const {
+  const Reading reading(database_.reader());
+  Query query = reading->query("SELECT id, number, seen FROM identity");
+  if (!query.next()) return {};
+  return {query.text(0), query.integer(1), query.integer(2)};
+}
+
+Identity::Mark Identity::mark_of_blobs() const {
+  if (!std::filesystem::exists(folder_.blobs_identity())) return {};
+  const std::string text = read_whole(folder_.blobs_identity());
+  const std::size_t space = text.find(' ');
+  Mark mark = {text.substr(0, space)};
+  if (space != std::string::npos) {
+    std::from_chars(text.data() + space + 1, text.data() + text.size(), mark.number);
+  }
+  return mark;
+}
+
+void Identity::check(const Mark& records, const Mark& blobs) const {
+  const bool is_recorded = [&] {
+    const Reading reading(database_.reader());
+    return has_records(reading.connection());
+  }();
+  const bool is_stored = has_blobs(folder_);
+  if (!is_recorded && !is_stored) return;  // nothing can be lost
+  // Written by versions that did not mark anything yet.
+  if (records.id.empty() && blobs.id.empty() && is_recorded) return;
+  // The database's mark is made first, so that a crash leaves it ahead by one.
+  if (blobs.id.empty() && records.number == 1) return;
+  if (!is_recorded && records.id != blobs.id) {
+    refuse("there are files of volumes and meshes, but the database that names them is missing");
+  }
+  if (records.id != blobs.id) {
+    refuse("the database and the files of volumes and meshes do not belong together");
+  }
+  if (records.number < blobs.number) {
+    refuse("the database is older than the files of volumes and meshes");
+  }
+  if (records.number > blobs.number + 1) {
+    refuse("the files of volumes and meshes are older than the database");
+  }
+}
+
+// The database's mark is never ahead by more than one.
+void Identity::write_mark(Time time) {
+  Mark next = mark_;
+  next.number += 1;
+  next.seen = to_us(time);
+  {
+    Transaction transaction(database_.writer());
+    transaction->run("DELETE FROM identity");
+    transaction->run("INSERT INTO identity VALUES(?, ?, ?)", next.id, next.number, next.seen);
+    transaction.commit();
+  }
+  mark_ = next;
+  changes_ = database_.changes();
+  is_told_ = false;
+  write_blobs_mark();
+}
+
+void Identity::write_blobs_mark() {
+  const std::filesystem::path place = folder_.blobs_identity();
+  const ScratchFolder scratch(folder_.scratch());
+  const std::filesystem::path draft = scratch.path() / "identity";
+  const std::string text = mark_.id + ' ' + std::to_string(mark_.number) + '\n';
+  {
+    File file = File::create(draft);
+    file.write(std::as_bytes(std::span(text)));
+    file.sync();
+  }
+  move_to(draft, place);
+  sync_folder(place.parent_path());
+  is_told_ = true;
+}
+
+}  // namespace isomesh::store

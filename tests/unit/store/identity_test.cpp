@@ -1,0 +1,165 @@
+#include "server/store/sqlite/identity.h"
+
+#include <optional>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/store/files/blob_store.h"
+#include "server/store/sqlite/volume_store.h"
+#include "tests/support/errors.h"
+#include "tests/support/files.h"
+
+namespace isomesh::store {
+namespace {
+
+using testing::HasSubstr;
+
+class IdentityTest : public testing::Test {
+ protected:
+  // A start of the service, which stores a volume of those bytes, marks it and ends.
+  void live(const std::string& bytes, const OperatorsWord& word = {}) {
+    const DataFolder data(root());
+    Database database(data);
+    Identity identity(database, data, word, {});
+    if (!bytes.empty()) {
+      const auto writer = FileBlobStore(data).begin();
+      writer->write(test::as_span(bytes));
+      Volume volume;
+      volume.id = writer->commit().key;
+      volume.created = "2024-01-02T03:04:05.678Z";
+      SqliteVolumeStore(database).add("", volume);
+    }
+    identity.now();
+  }
+
+  std::string refusal() {
+    const auto error = test::thrown_by([&] { live(""); });
+    if (!error) return "";
+    EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
+    EXPECT_THAT(error->what(), HasSubstr("--adopt"));
+    EXPECT_EQ(std::string(error->what()).find(folder_.path()), std::string::npos);
+    return error->what();
+  }
+
+  std::filesystem::path root() const { return folder_ / "data"; }
+
+  void copy(const std::string& from, const std::string& to) {
+    std::filesystem::remove_all(folder_ / to);
+    std::filesystem::copy(folder_ / from, folder_ / to, std::filesystem::copy_options::recursive);
+  }
+
+  void remove_database() {
+    for (const auto* suffix : {"", "-wal", "-shm"}) {
+      std::filesystem::remove(root() / ("isomesh.sqlite" + std::string(suffix)));
+    }
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(IdentityTest, IsKeptFromStartToStart) {
+  for (int start = 0; start < 4; ++start) live(std::to_string(start));
+  EXPECT_EQ(refusal(), "");
+}
+
+TEST_F(IdentityTest, OfAnEmptyFolderIsMadeAnew) {
+  live("");
+  remove_database();
+  EXPECT_EQ(refusal(), "");
+}
+
+TEST_F(IdentityTest, AMissingDatabaseIsRefused) {
+  live("a volume");
+  remove_database();
+  EXPECT_THAT(refusal(), HasSubstr("missing"));
+  EXPECT_THAT(refusal(), HasSubstr("missing")) << "the refused start has made none of its own";
+}
+
+TEST_F(IdentityTest, AnOlderDatabaseIsRefused) {
+  live("one");
+  copy("data", "copy");
+  live("two");
+  remove_database();
+  copy("copy/isomesh.sqlite", "data/isomesh.sqlite");
+  EXPECT_THAT(refusal(), HasSubstr("older than the files"));
+}
+
+TEST_F(IdentityTest, OlderBlobsAreRefused) {
+  live("one");
+  copy("data/blobs", "copy");
+  live("two");
+  live("three");
+  copy("copy", "data/blobs");
+  EXPECT_THAT(refusal(), HasSubstr("older than the database"));
+}
+
+TEST_F(IdentityTest, AForeignDatabaseIsRefused) {
+  live("one");
+  copy("data", "copy");
+  std::filesystem::remove_all(root());
+  live("two");
+  copy("copy/blobs", "data/blobs");
+  EXPECT_THAT(refusal(), HasSubstr("do not belong together"));
+}
+
+TEST_F(IdentityTest, AnOperatorMayAdoptWhatIsThere) {
+  live("a volume");
+  remove_database();
+  live("", {.adopt = true});
+  EXPECT_EQ(refusal(), "");
+}
+
+// Between the database's mark and the blobs'.
+TEST_F(IdentityTest, AStartThatWasCutShortIsNoMixUp) {
+  live("one");
+  copy("data/blobs", "copy");
+  {
+    const DataFolder data(root());
+    Database database(data);
+    Connection& writer = database.writer();
+    Transaction transaction(writer);
+    transaction->run("UPDATE identity SET number = number + 1");
+    transaction.commit();
+  }
+  EXPECT_EQ(refusal(), "");
+}
+
+// Of the version before there were marks.
+TEST_F(IdentityTest, AnUnmarkedFolderIsMarked) {
+  live("one");
+  std::filesystem::remove(root() / "blobs/identity");
+  {
+    const DataFolder data(root());
+    Connection(data.records(), Connection::Mode::kWrite).script("DELETE FROM identity");
+  }
+  EXPECT_EQ(refusal(), "");
+  EXPECT_TRUE(std::filesystem::exists(root() / "blobs/identity"));
+}
+
+TEST_F(IdentityTest, RemembersTheTimeThatItHasSeen) {
+  live("one");
+  {
+    const DataFolder data(root());
+    Connection(data.records(), Connection::Mode::kWrite)
+        .script("UPDATE identity SET seen = seen - 3456000000000");  // 40 days
+  }
+  const DataFolder data(root());
+  Database database(data);
+  const auto now = std::chrono::system_clock::now();
+  {
+    Identity identity(database, data, {}, {});
+    EXPECT_LT(identity.now(), now - std::chrono::days(39));
+    EXPECT_TRUE(identity.doubts_clock());
+  }
+  {
+    Identity again(database, data, {}, {});
+    EXPECT_LT(again.now(), now - std::chrono::days(39)) << "a doubtful time is never marked";
+  }
+  Identity told(database, data, {.trust_clock = true}, {});
+  EXPECT_GE(told.now(), now);
+}
+
+}  // namespace
+}  // namespace isomesh::store
