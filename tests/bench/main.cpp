@@ -85,11 +85,12 @@ int run(const Options& options) {
   return 0;
 }
 
-int run_service(const Options& options, std::filesystem::path daemon) {
-  if (daemon.empty()) {
-    daemon = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "isomeshd";
-  }
-  ServicePlan plan = {.daemon = std::move(daemon),
+std::filesystem::path daemon_beside_this() {
+  return std::filesystem::read_symlink("/proc/self/exe").parent_path() / "isomeshd";
+}
+
+int run_service(const Options& options, const std::filesystem::path& daemon) {
+  ServicePlan plan = {.daemon = daemon,
                       .volume = options.volume.empty() ? kDefaultVolume : options.volume,
                       .iso = options.iso.value_or(kDefaultIso),
                       .threads = options.threads};
@@ -129,7 +130,7 @@ int run_program(int argc, char** argv) {
   CLI::App* report = app.add_subcommand("report", "Write the report on the paper");
   report->add_option("DIR", folder, "Where REPORT.md and its plots go")->required();
 
-  std::filesystem::path daemon;
+  std::filesystem::path daemon = daemon_beside_this();
   CLI::App* service =
       app.add_subcommand("service", "Start a daemon and measure it over HTTP, beside the peers");
   service->add_option("--daemon", daemon, "The program; isomeshd beside this one unless given")
@@ -153,7 +154,7 @@ int run_program(int argc, char** argv) {
   if (*memory) return run_memory_command(stage, size, threads);
   warn_when_busy();
   if (*service) return run_service(options, daemon);
-  return *report ? write_report(folder) : run(options);
+  return *report ? write_report(folder, daemon) : run(options);
 }
 
 }  // namespace

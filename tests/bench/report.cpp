@@ -61,7 +61,7 @@ void write_opening(const std::optional<Subject>& head, const std::optional<Subje
 
 }  // namespace
 
-int write_report(const std::filesystem::path& folder) {
+int write_report(const std::filesystem::path& folder, const std::filesystem::path& daemon) {
   const int threads = std::min(2, processors());
   set_threads(threads);
   Peers::set_threads(threads);
@@ -78,6 +78,10 @@ int write_report(const std::filesystem::path& folder) {
   if (real) {
     plan.volume = real->samples;
     plan.iso = kBrainIso;
+  }
+  if (real) {
+    write_service({daemon, kBrainFile, kBrainIso, threads}, report);
+    write_draco_share(*real, report);
   }
   write_goals(plan, report);
   std::vector<Subject> subjects;

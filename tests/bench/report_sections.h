@@ -10,6 +10,7 @@
 #include "tests/bench/document.h"
 #include "tests/bench/ratios.h"
 #include "tests/bench/samples.h"
+#include "tests/bench/service.h"
 
 namespace isomesh::bench {
 
@@ -44,5 +45,9 @@ void write_choices(const std::vector<Subject>& subjects, Report& report);
 // Aspect ratios, angles and enclosed volume against passes, Laplacian beside Taubin.
 void write_quality(const std::vector<Subject>& subjects, Report& report);
 void write_goals(const Plan& plan, Report& report);
+// What a daemon reports of its jobs, and how long requests take.
+void write_service(const ServicePlan& plan, Report& report);
+// How much of a job is encoding, by libdraco and by our own encoder.
+void write_draco_share(const Subject& subject, Report& report);
 
 }  // namespace isomesh::bench

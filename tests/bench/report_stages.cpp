@@ -164,21 +164,11 @@ void write_goals(const Plan& plan, Report& report) {
   say("goals");
   report.document.heading("Against the peers and the goals");
   report.document.paragraph(
-      "Ratios are medians over pairs of runs, ours and the peer's in turn, memory as the daemon "
-      "uses it unless said otherwise. The overhead of the service is not measured here: it needs a "
-      "running daemon.");
-  Rows rows;
-  for (const Finding& finding : measure_findings(plan)) {
-    rows.push_back(
-        {finding.what, finding.ours, finding.peer, fixed(finding.value, finding.value < 10 ? 2 : 0),
-         finding.goal
-             ? (finding.goal->at_most ? "at most " : "at least ") + fixed(finding.goal->value, 2)
-             : "",
-         !finding.goal       ? ""
-         : finding.reached() ? "reached"
-                             : "not reached"});
-  }
-  report.document.table({"what", "isomesh", "peer", "value", "goal", ""}, rows);
+      "The kernels and a job's way through them in this process, without the service. Ratios are "
+      "medians "
+      "over pairs of runs, ours and the peer's in turn, memory as the daemon uses it unless said "
+      "otherwise.");
+  write_table(measure_findings(plan), report.document);
   if (!peers_available()) report.document.paragraph(peers_description());
 }
 

@@ -32,6 +32,21 @@ std::string Factors::text(int digits) const {
   return low == high ? low : low + " to " + high;
 }
 
+void write_table(const std::vector<Finding>& findings, Document& document) {
+  std::vector<std::vector<std::string>> rows;
+  for (const Finding& finding : findings) {
+    rows.push_back(
+        {finding.what, finding.ours, finding.peer, fixed(finding.value, finding.value < 10 ? 2 : 0),
+         finding.goal
+             ? (finding.goal->at_most ? "at most " : "at least ") + fixed(finding.goal->value, 2)
+             : "",
+         !finding.goal       ? ""
+         : finding.reached() ? "reached"
+                             : "not reached"});
+  }
+  document.table({"what", "isomesh", "peer", "value", "goal", ""}, rows);
+}
+
 void say(const std::string& what) { std::cerr << "isomesh-bench: " << what << std::endl; }
 
 }  // namespace isomesh::bench

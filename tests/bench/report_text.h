@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "tests/bench/report_sections.h"
 #include "tests/bench/stages.h"
@@ -12,6 +13,8 @@ std::string percent(double share);
 std::string scheme_name(Scheme scheme);
 std::string title_of(const Samples& samples, const Subject::Level& level);
 std::string peer_time(double ms);  // "-" for 0, which is what nobody measured
+
+void write_table(const std::vector<Finding>& findings, Document& document);
 
 // The smallest and the largest of some factors.
 class Factors {
