@@ -18,6 +18,13 @@ std::uint64_t EventLog::reserve(Event event) {
   return reserved_.back().id;
 }
 
+void EventLog::withdraw(std::size_t count) {
+  const Lock lock(mutex_);
+  reserved_.resize(reserved_.size() - count);
+  ++generation_;
+  changed_.notify_all();
+}
+
 void EventLog::settle(bool is_committed) {
   const Lock lock(mutex_);
   if (is_committed) {

@@ -25,6 +25,9 @@ class EventLog {
   // transaction at a time.
   std::uint64_t reserve(Event event);
 
+  // The last `count` of them never were: their part of the transaction was rolled back.
+  void withdraw(std::size_t count);
+
   // The transaction has ended; wakes everybody. Events of one that was not committed never were.
   void settle(bool is_committed);
 

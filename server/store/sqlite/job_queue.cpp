@@ -124,12 +124,17 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
       "record = ? WHERE id = ?",
       row.attempts, row.fence, now, worker, to_json(row.job), row.job.id);
   change.announce(row, EventKind::kStage);
-  change.commit();
   {
     // Before anybody else's transaction, which may ask the run to stop or end its lease.
     const Lock lock(live_mutex_);
     const Steady began = Steady::clock::now();
     live_[row.job.id] = {.fence = row.fence, .claimed = began, .lease_until = began + lease};
+  }
+  try {
+    change.commit();
+  } catch (...) {
+    forget_run(row.job.id, row.fence);
+    throw;
   }
   return Lease{row.job.id, row.fence, row.attempts, row.owner, row.job.parameters};
 }

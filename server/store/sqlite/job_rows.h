@@ -26,8 +26,9 @@ class SqliteJobStore::Change {
  public:
   Change(const SqliteJobStore& store, Durability durability = Durability::kFull)
       : log_(store.log_), transaction_(store.database_.writer(), durability) {}
+  // The transaction's lock is still held, so its events are the last.
   ~Change() {
-    if (announced_) log_.settle(committed_);
+    if (announced_ > 0 && transaction_.is_open()) log_.withdraw(announced_);
   }
   Change(const Change&) = delete;
   Change& operator=(const Change&) = delete;
@@ -39,15 +40,16 @@ class SqliteJobStore::Change {
   void announce(const Row& row, EventKind kind);
 
   void commit() {
+    if (announced_ > 0) {
+      transaction_.at_end([&log = log_](bool is_committed) { log.settle(is_committed); });
+    }
     transaction_.commit();
-    committed_ = true;
   }
 
  private:
   EventLog& log_;
-  bool announced_ = false;
-  bool committed_ = false;
-  Transaction transaction_;  // last: its lock is held until the events are settled
+  std::size_t announced_ = 0;
+  Transaction transaction_;  // last: its lock is held until the events are withdrawn
 };
 
 // The columns that row_of() reads.

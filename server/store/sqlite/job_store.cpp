@@ -217,7 +217,6 @@ Job SqliteJobStore::with_progress(const Row& row) const {
 }
 
 void SqliteJobStore::Change::announce(const Row& row, EventKind kind) {
-  announced_ = true;
   const std::uint64_t id = log_.reserve({.id = 0,
                                          .owner = row.owner,
                                          .job = row.job.id,
@@ -225,6 +224,7 @@ void SqliteJobStore::Change::announce(const Row& row, EventKind kind) {
                                          .state = row.job.state,
                                          .stage = row.job.stage,
                                          .progress = row.job.progress});
+  ++announced_;
   transaction_->run("INSERT INTO events VALUES(?, ?, ?, ?, ?, ?, ?)", id, row.owner, row.job.id,
                     kind, row.job.state, row.job.stage, row.job.progress);
 }

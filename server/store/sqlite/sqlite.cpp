@@ -1,5 +1,9 @@
 #include "server/store/sqlite/sqlite.h"
 
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
 #include <sqlite3.h>
 
 #include "proto/error.h"
@@ -12,14 +16,22 @@ constexpr int kBusyTimeoutMs = 10'000;
 // commit seldom has to do that, and pages that changed often are written once.
 constexpr const char* kLogPages = "PRAGMA wal_autocheckpoint=4000";
 
-[[noreturn]] void fail(sqlite3* handle, int code) {
+Error error_of(sqlite3* handle, int code) {
   const int primary = code & 0xFF;
   // Most of what SQLite calls an I/O error is a write that found no room, too.
   if (primary == SQLITE_FULL || code == SQLITE_IOERR_WRITE || code == SQLITE_IOERR_SHMSIZE) {
-    throw Error(ErrorCode::kOutOfSpace, "the data folder has no space left");
+    return {ErrorCode::kOutOfSpace, "the data folder has no space left"};
   }
   const std::string reason = handle == nullptr ? sqlite3_errstr(code) : sqlite3_errmsg(handle);
-  throw Error(ErrorCode::kInternal, "the database: " + reason);
+  return {ErrorCode::kInternal, "the database: " + reason};
+}
+
+[[noreturn]] void fail(sqlite3* handle, int code) { throw error_of(handle, code); }
+
+// Locks, and is counted meanwhile among those that are coming.
+Mutex& counted(Mutex& mutex, std::atomic<std::size_t>& coming) {
+  ++coming;
+  return mutex;
 }
 
 }  // namespace
@@ -97,10 +109,30 @@ void Connection::set_durability(Durability durability) {
   durability_ = durability;
 }
 
+bool Connection::has_open_transaction() const { return sqlite3_get_autocommit(handle_) == 0; }
+
 void Connection::roll_back() noexcept {
-  if (sqlite3_get_autocommit(handle_) == 0) {
-    sqlite3_exec(handle_, "ROLLBACK", nullptr, nullptr, nullptr);
+  if (has_open_transaction()) sqlite3_exec(handle_, "ROLLBACK", nullptr, nullptr, nullptr);
+}
+
+Error Connection::last_error() const {
+  return error_of(handle_, sqlite3_extended_errcode(handle_));
+}
+
+void Connection::end_batch(std::optional<Error> failure) noexcept {
+  const std::shared_ptr<Batch> batch = std::exchange(batch_, nullptr);
+  if (!failure && batch->members > 0) {
+    try {
+      run("COMMIT");
+    } catch (const Error& error) {
+      failure = error;
+    }
   }
+  roll_back();
+  batch->failure = std::move(failure);
+  batch->has_ended = true;
+  for (const auto& call : batch->at_end) call(!batch->failure);
+  batch_ended_.notify_all();
 }
 
 sqlite3_stmt* Connection::prepared(std::string_view sql) {
@@ -118,18 +150,66 @@ int Connection::changes() const { return sqlite3_changes(handle_); }
 std::int64_t Connection::all_changes() const { return sqlite3_total_changes64(handle_); }
 
 Transaction::Transaction(Connection& connection, Durability durability)
-    : lock_(connection.mutex()), connection_(connection) {
-  connection_.set_durability(durability);
-  connection_.run("BEGIN IMMEDIATE");
+    : connection_(connection), lock_(counted(connection.mutex(), connection.coming_)) {
+  --connection_.coming_;
+  try {
+    begin(durability);
+  } catch (...) {
+    leave();
+    throw;
+  }
 }
 
 Transaction::~Transaction() {
-  if (open_) connection_.roll_back();
+  if (open_) leave();
+}
+
+void Transaction::at_end(std::function<void(bool is_committed)> call) {
+  at_end_.push_back(std::move(call));
+}
+
+void Transaction::begin(Durability durability) {
+  std::shared_ptr<Batch>& batch = connection_.batch_;
+  // What needs no sync must not wait for one; and it cannot be asked for any more.
+  const bool is_too_weak = batch && batch->durability == Durability::kProcess;
+  if (is_too_weak && durability == Durability::kFull) connection_.end_batch();
+  if (!batch) {
+    connection_.set_durability(durability);
+    connection_.run("BEGIN IMMEDIATE");
+    batch = std::make_shared<Batch>();
+    batch->durability = durability;
+  }
+  connection_.run("SAVEPOINT part");
 }
 
 void Transaction::commit() {
-  connection_.run("COMMIT");
+  connection_.run("RELEASE part");
   open_ = false;
+  const std::shared_ptr<Batch> batch = connection_.batch_;
+  ++batch->members;
+  std::ranges::move(at_end_, std::back_inserter(batch->at_end));
+  // Whoever comes takes its part first, and commits for all, or leaves it to the next.
+  constexpr std::size_t kMostMembers = 64;
+  if (connection_.coming_ == 0 || batch->members == kMostMembers) {
+    connection_.end_batch();
+  } else {
+    connection_.batch_ended_.wait(lock_, [&] { return batch->has_ended; });
+  }
+  if (batch->failure) throw *batch->failure;
+}
+
+void Transaction::leave() noexcept {
+  Batch* const batch = connection_.batch_.get();
+  if (batch == nullptr) return;
+  // SQLite itself rolls back everything when the disk is full or fails.
+  if (!connection_.has_open_transaction()) return connection_.end_batch(connection_.last_error());
+  try {
+    connection_.run("ROLLBACK TO part");
+    connection_.run("RELEASE part");
+  } catch (const Error& error) {
+    return connection_.end_batch(error);
+  }
+  if (batch->members == 0 || connection_.coming_ == 0) connection_.end_batch();
 }
 
 }  // namespace isomesh::store

@@ -1,14 +1,20 @@
 // SQLite as C++ values: a connection, its statements, transactions. Private to this folder.
 #pragma once
 
+#include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <unordered_map>
+#include <vector>
 
+#include "base/error.h"
 #include "base/mutex.h"
 
 struct sqlite3;
@@ -59,6 +65,16 @@ enum class Durability {
   kProcess,  // what a power cut may take back, for changes that are made again without harm
 };
 
+// What several threads commit together: one transaction of SQLite, each thread's part a savepoint
+// in it. Guarded by the connection's mutex.
+struct Batch {
+  Durability durability = Durability::kFull;
+  std::size_t members = 0;  // whose part is done
+  bool has_ended = false;
+  std::optional<Error> failure;  // of the commit: then no part took place
+  std::vector<std::function<void(bool is_committed)>> at_end;
+};
+
 // One connection. What it does is done under the lock of a Transaction or a Reading.
 class Connection {
  public:
@@ -88,18 +104,25 @@ class Connection {
   // Several statements without parameters.
   void script(const char* sql);
 
-  // What the next transaction's commit outlives.
-  void set_durability(Durability durability);
-
-  // Rolls back what is open.
-  void roll_back() noexcept;
-
   // How many rows were changed since it was opened.
   std::int64_t all_changes() const;
 
   Mutex& mutex() { return mutex_; }
 
  private:
+  friend class Transaction;
+
+  // What the next transaction's commit outlives.
+  void set_durability(Durability durability);
+
+  // Rolls back what is open.
+  void roll_back() noexcept;
+  bool has_open_transaction() const;
+
+  // Those that hold the mutex share this.
+  void end_batch(std::optional<Error> failure = std::nullopt) noexcept;
+  Error last_error() const;
+
   sqlite3_stmt* prepared(std::string_view sql);
   int changes() const;
 
@@ -107,11 +130,17 @@ class Connection {
   Mutex mutex_;
   Durability durability_ = Durability::kFull;
   std::unordered_map<std::string, sqlite3_stmt*> statements_;
+  std::shared_ptr<Batch> batch_;         // of the transaction that is open
+  std::atomic<std::size_t> coming_ = 0;  // threads that wait to begin a transaction
+  Condition batch_ended_;
 };
 
-// All or nothing: what was not committed is rolled back when it goes.
+// All or nothing: what was not committed is rolled back when it goes. Those that come while others
+// wait for the disk are committed together, with one sync; nobody else sees any of it before that.
+// No Query of it may be in use when it commits.
 class Transaction {
  public:
+  // Throws Error kOutOfSpace or kInternal.
   explicit Transaction(Connection& connection, Durability durability = Durability::kFull);
   ~Transaction();
   Transaction(const Transaction&) = delete;
@@ -120,12 +149,25 @@ class Transaction {
   Connection* operator->() const { return &connection_; }
   Connection& connection() const { return connection_; }
 
+  // To be called, if commit() is, when it is known whether this was committed, before anybody
+  // else's transaction begins. May run in another thread. Must not throw.
+  void at_end(std::function<void(bool is_committed)> call);
+
+  // False once commit() has let go of it, whatever came of that.
+  bool is_open() const { return open_; }
+
+  // When it returns this is committed. Throws Error kOutOfSpace or kInternal: then it is rolled
+  // back. Others may have committed theirs meanwhile.
   void commit();
 
  private:
-  const Lock lock_;
+  void begin(Durability durability);
+  void leave() noexcept;
+
   Connection& connection_;
+  Lock lock_;
   bool open_ = true;
+  std::vector<std::function<void(bool is_committed)>> at_end_;
 };
 
 // Reads what is committed.

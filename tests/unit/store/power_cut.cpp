@@ -69,10 +69,16 @@ void PowerCut::leave(const std::filesystem::path& target) const {
   leave(folder_, target);
 }
 
+std::size_t PowerCut::syncs() const {
+  const std::lock_guard lock(recorders_mutex());
+  return syncs_;
+}
+
 void PowerCut::remember(int descriptor) {
   const std::filesystem::path path =
       std::filesystem::read_symlink("/proc/self/fd/" + std::to_string(descriptor));
   if (!path.native().starts_with(folder_.native())) return;
+  ++syncs_;
   struct stat status = {};
   ::fstat(descriptor, &status);
   if (!S_ISDIR(status.st_mode)) {

@@ -1,6 +1,7 @@
 // What a power cut leaves of a folder.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -23,6 +24,9 @@ class PowerCut {
   // Writes what would be there if the power failed now to `target`, an empty folder.
   void leave(const std::filesystem::path& target) const;
 
+  // How often something was brought to the disk below the folder.
+  std::size_t syncs() const;
+
   // Called after each sync of a descriptor, by one thread at a time.
   void remember(int descriptor);
 
@@ -30,6 +34,7 @@ class PowerCut {
   void leave(const std::filesystem::path& folder, const std::filesystem::path& target) const;
 
   const std::filesystem::path folder_;
+  std::size_t syncs_ = 0;
   std::map<ino_t, std::string> files_;
   std::map<std::filesystem::path, std::map<std::string, ino_t>> folders_;
 };
