@@ -46,6 +46,24 @@ struct FieldError {
   bool operator==(const FieldError&) const = default;
 };
 
+// A parameter by which a client can choose, where a request leaves open which of several is meant.
+struct Choice {
+  std::string parameter;  // of the query
+  std::string value;
+  std::string title;  // what it stands for, for a person
+
+  bool operator==(const Choice&) const = default;
+};
+
+// What a client can add to a request that was refused, so that it is not refused again.
+struct Remedy {
+  // The code that the parameter `accept` takes, of a refusal that a person may overrule.
+  std::string overridable = {};
+  std::vector<Choice> choices = {};
+
+  bool operator==(const Remedy&) const = default;
+};
+
 // Thrown by every layer. `what()` is the detail: one sentence that tells a person what is wrong,
 // without a path, an address or another client's data, because it is sent as it is.
 class Error : public std::runtime_error {
@@ -56,10 +74,23 @@ class Error : public std::runtime_error {
 
   ErrorCode code() const { return code_; }
   const std::vector<FieldError>& fields() const { return fields_; }
+  const Remedy& remedy() const { return remedy_; }
+
+  // The same in other words.
+  Error with_detail(const std::string& detail) const {
+    return Error(code_, detail, fields_).with_remedy(remedy_);
+  }
+  // The same with another remedy.
+  Error with_remedy(Remedy remedy) const {
+    Error other = *this;
+    other.remedy_ = std::move(remedy);
+    return other;
+  }
 
  private:
   ErrorCode code_;
   std::vector<FieldError> fields_;
+  Remedy remedy_;
 };
 
 // kInvalidParameter with one field at fault.

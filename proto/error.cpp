@@ -65,7 +65,8 @@ Problem to_problem(const Error& error, const std::string& instance) {
           .detail = ours ? "The service failed on this request; its log has the reason."
                          : std::string(error.what()),
           .instance = instance,
-          .errors = error.fields()};
+          .errors = error.fields(),
+          .remedy = error.remedy()};
 }
 
 Error to_error(const Problem& problem) {
@@ -73,7 +74,8 @@ Error to_error(const Problem& problem) {
   const ErrorCode code = type.starts_with(kTypePrefix)
                              ? error_code_of(type.substr(kTypePrefix.size()))
                              : ErrorCode::kInternal;
-  return {code, problem.detail.empty() ? problem.title : problem.detail, problem.errors};
+  Error error(code, problem.detail.empty() ? problem.title : problem.detail, problem.errors);
+  return error.with_remedy(problem.remedy);
 }
 
 }  // namespace isomesh

@@ -31,6 +31,7 @@ struct Problem {
   std::string detail;
   std::string instance;  // the request's path or the job's; may be empty
   std::vector<FieldError> errors;
+  Remedy remedy = {};  // on the wire its members stand among these
 
   bool operator==(const Problem&) const = default;
 };

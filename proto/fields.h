@@ -25,6 +25,11 @@ void visit(Is<IgnoredObject> auto& self, auto&& field) {
   field("reason", self.reason);
 }
 
+void visit(Is<Note> auto& self, auto&& field) {
+  field("code", self.code);
+  field("detail", self.detail);
+}
+
 void visit(Is<DicomInstance> auto& self, auto&& field) {
   field("sop_class_uid", self.sop_class_uid);
   field("sop_instance_uid", self.sop_instance_uid);
@@ -51,6 +56,7 @@ void visit(Is<DicomIdentity> auto& self, auto&& field) {
 
 void visit(Is<Volume> auto& self, auto&& field) {
   field("id", self.id);
+  field("name", self.name);
   field("format", self.format);
   field("dims", self.dims);
   field("type", self.type);
@@ -64,6 +70,7 @@ void visit(Is<Volume> auto& self, auto&& field) {
   field("modality", self.modality);
   field("presets", self.presets);
   field("ignored", self.ignored);
+  field("notes", self.notes);
   if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? self.dicom.has_value() : true) {
     field("dicom", self.dicom);
   }
@@ -143,6 +150,12 @@ void visit(Is<FieldError> auto& self, auto&& field) {
   field("message", self.message);
 }
 
+void visit(Is<Choice> auto& self, auto&& field) {
+  field("parameter", self.parameter);
+  field("value", self.value);
+  field("title", self.title);
+}
+
 void visit(Is<Problem> auto& self, auto&& field) {
   field("type", self.type);
   field("title", self.title);
@@ -153,6 +166,14 @@ void visit(Is<Problem> auto& self, auto&& field) {
   }
   if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? !self.errors.empty() : true) {
     field("errors", self.errors);
+  }
+  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? !self.remedy.overridable.empty()
+                                                               : true) {
+    field("overridable", self.remedy.overridable);
+  }
+  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? !self.remedy.choices.empty()
+                                                               : true) {
+    field("choices", self.remedy.choices);
   }
 }
 

@@ -200,11 +200,20 @@ std::string to_json(const std::vector<Job>& jobs, const std::string& next) {
   return page("jobs", write(jobs), next);
 }
 
+std::string volume_name_to_json(const std::optional<std::string>& name) {
+  Json body;
+  write_field(body, "name", name);
+  return body.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 Volume volume_from_record(std::string_view text) { return from_record<Volume>(text); }
 Job job_from_record(std::string_view text) { return from_record<Job>(text); }
 
 Volume volume_from_json(std::string_view text) { return from_text<Volume>(text); }
 Job job_from_json(std::string_view text) { return from_text<Job>(text); }
+std::vector<Note> notes_from_json(std::string_view text) {
+  return from_text<std::vector<Note>>(text);
+}
 Problem problem_from_json(std::string_view text) { return from_text<Problem>(text); }
 Histogram histogram_from_json(std::string_view text) { return from_text<Histogram>(text); }
 Estimate estimate_from_json(std::string_view text) { return from_text<Estimate>(text); }

@@ -4,6 +4,7 @@
 // so that an older client understands a newer server; reading a request refuses them.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -27,9 +28,13 @@ std::string to_json(const std::vector<Volume>& volumes, const std::string& next 
 // The same with "jobs".
 std::string to_json(const std::vector<Job>& jobs, const std::string& next = "");
 
+// The body of PATCH /v1/volumes/{id}.
+std::string volume_name_to_json(const std::optional<std::string>& name);
+
 // Reads an answer of the server. Throws Error kInternal when it is not what the API says.
 Volume volume_from_json(std::string_view text);
 Job job_from_json(std::string_view text);
+std::vector<Note> notes_from_json(std::string_view text);
 Problem problem_from_json(std::string_view text);
 Histogram histogram_from_json(std::string_view text);
 Estimate estimate_from_json(std::string_view text);
@@ -45,6 +50,10 @@ Job job_from_record(std::string_view text);
 // Reads the body of POST /v1/jobs. Throws Error kInvalidParameter that names every member which is
 // unknown, missing, of the wrong type or out of range.
 JobParameters parse_job_parameters(std::string_view body);
+
+// Reads the body of PATCH /v1/volumes/{id}, {"name": TEXT or null}: the name that the volume is to
+// have, empty for none. Throws as parse_job_parameters does.
+std::optional<std::string> parse_volume_name(std::string_view body);
 
 using QueryParameters =
     std::vector<std::pair<std::string, std::string>>;  // names and values, decoded

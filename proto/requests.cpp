@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/text.h"
 #include "proto/fields.h"
 #include "proto/json.h"
 
@@ -315,6 +316,24 @@ JobParameters parse_job_parameters(std::string_view body) {
   }
   for (const std::string& name : repetitions.names()) reader.add(name, "is given twice");
   return read_parameters(json, true, reader);
+}
+
+std::optional<std::string> parse_volume_name(std::string_view body) {
+  constexpr std::size_t kLongest = 255;
+  const Json json = Json::parse(body, nullptr, false);
+  if (!json.is_object()) {
+    throw Error(ErrorCode::kInvalidParameter, "the body must be one JSON object");
+  }
+  for (const auto& [name, unused] : json.items()) {
+    if (name != "name") throw invalid_parameter(name.substr(0, 64), "is not a known member");
+  }
+  if (!json.contains("name")) throw invalid_parameter("name", "is required");
+  if (json["name"].is_null()) return std::nullopt;
+  const std::string name = json["name"].is_string() ? json["name"].get<std::string>() : "";
+  if (trimmed(name).empty() || name.size() > kLongest || has_control_characters(name)) {
+    throw invalid_parameter("name", "must be null or a text of 1 to 255 bytes on one line");
+  }
+  return std::string(trimmed(name));
 }
 
 JobParameters parse_job_parameters(const QueryParameters& query, VolumeIn volume_in) {

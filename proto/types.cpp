@@ -21,6 +21,12 @@ struct Names<SampleType> {
 };
 
 template <>
+struct Names<NiftiForm> {
+  static constexpr std::array kTable = {std::pair{NiftiForm::kSform, "sform"},
+                                        std::pair{NiftiForm::kQform, "qform"}};
+};
+
+template <>
 struct Names<Interpolation> {
   static constexpr std::array kTable = {std::pair{Interpolation::kLinear, "linear"},
                                         std::pair{Interpolation::kMidpoint, "midpoint"}};
@@ -94,6 +100,7 @@ std::string mesh_path(const std::string& job, MeshFormat format) {
 }
 
 std::string_view to_string(SampleType value) { return name_of(value); }
+std::string_view to_string(NiftiForm value) { return name_of(value); }
 std::string_view to_string(Interpolation value) { return name_of(value); }
 std::string_view to_string(Smoothing value) { return name_of(value); }
 std::string_view to_string(MeshFormat value) { return name_of(value); }
@@ -110,6 +117,7 @@ std::optional<Enum> from_string(std::string_view name) {
 }
 
 template std::optional<SampleType> from_string(std::string_view);
+template std::optional<NiftiForm> from_string(std::string_view);
 template std::optional<Interpolation> from_string(std::string_view);
 template std::optional<Smoothing> from_string(std::string_view);
 template std::optional<MeshFormat> from_string(std::string_view);
@@ -124,6 +132,7 @@ std::vector<Enum> values_of() {
   return values;
 }
 
+template std::vector<NiftiForm> values_of();
 template std::vector<Interpolation> values_of();
 template std::vector<Smoothing> values_of();
 template std::vector<MeshFormat> values_of();
@@ -141,6 +150,7 @@ std::string names_of() {
 }
 
 template std::string names_of<SampleType>();
+template std::string names_of<NiftiForm>();
 template std::string names_of<Interpolation>();
 template std::string names_of<Smoothing>();
 template std::string names_of<MeshFormat>();

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "proto/error.h"
+#include "proto/notes.h"
 
 namespace isomesh {
 
@@ -97,8 +98,14 @@ struct DicomIdentity {
   bool operator==(const DicomIdentity&) const = default;
 };
 
+// The two ways in which a NIfTI header may say where its samples lie.
+enum class NiftiForm { kSform, kQform };
+
 struct Volume {
-  std::string id;      // hex SHA-256 of the canonical samples and geometry
+  std::string id;  // hex SHA-256 of the canonical samples and geometry
+  // What its owner calls it: the series or file that it came as, until it is renamed. May name a
+  // patient, so it is in no log. UTF-8; empty where nothing told one.
+  std::optional<std::string> name = {};
   std::string format;  // what was uploaded: "raw", "nifti", "nrrd", "metaimage", "dicom"
   std::array<std::uint32_t, 3> dims = {0, 0, 0};  // samples along x, y, z; x runs fastest
   SampleType type = SampleType::kUint8;
@@ -110,6 +117,9 @@ struct Volume {
   std::optional<std::string> modality;   // DICOM's: "CT", "MR", ...; empty when it is not told
   std::vector<Preset> presets;           // within `range`
   std::vector<IgnoredObject> ignored;
+  // What was decided, corrected or left open when the upload was read; each code once. Of the
+  // upload that came first, as all but samples and geometry is.
+  std::vector<Note> notes = {};
   std::optional<DicomIdentity> dicom;  // of a volume that came as DICOM
 
   std::uint64_t sample_count() const { return std::uint64_t{dims[0]} * dims[1] * dims[2]; }
@@ -341,6 +351,7 @@ struct JobEvent {
 
 // The names that the API uses for the values of the enumerations above.
 std::string_view to_string(SampleType value);
+std::string_view to_string(NiftiForm value);
 std::string_view to_string(Interpolation value);
 std::string_view to_string(Smoothing value);
 std::string_view to_string(MeshFormat value);
@@ -353,6 +364,7 @@ template <class Enum>
 std::optional<Enum> from_string(std::string_view name);
 
 extern template std::optional<SampleType> from_string(std::string_view);
+extern template std::optional<NiftiForm> from_string(std::string_view);
 extern template std::optional<Interpolation> from_string(std::string_view);
 extern template std::optional<Smoothing> from_string(std::string_view);
 extern template std::optional<MeshFormat> from_string(std::string_view);
@@ -364,6 +376,7 @@ extern template std::optional<Stage> from_string(std::string_view);
 template <class Enum>
 std::vector<Enum> values_of();
 
+extern template std::vector<NiftiForm> values_of();
 extern template std::vector<Interpolation> values_of();
 extern template std::vector<Smoothing> values_of();
 extern template std::vector<MeshFormat> values_of();
@@ -373,6 +386,7 @@ extern template std::vector<Priority> values_of();
 template <class Enum>
 std::string names_of();
 
+extern template std::string names_of<NiftiForm>();
 extern template std::string names_of<SampleType>();
 extern template std::string names_of<Interpolation>();
 extern template std::string names_of<Smoothing>();

@@ -34,6 +34,17 @@ Client client_of(const Options& options, const std::stop_token& stop) {
 
 void complain(const std::string& message) { std::cerr << "isomesh: " << message << '\n'; }
 
+// What was refused, and the options that would have it taken.
+void complain(const Error& error) {
+  complain(error.what());
+  std::cerr << remedy_report(error.remedy());
+}
+
+// What the server says about a volume besides what was asked; not for scripts.
+void tell_notes(const Volume& volume) {
+  for (const Note& note : volume.notes) complain("note: " + note.detail + " (" + note.code + ")");
+}
+
 Error reason_of(const Job& job) {
   if (job.error) return to_error(*job.error);
   return {ErrorCode::kCancelled, "the job was cancelled"};
@@ -42,12 +53,12 @@ Error reason_of(const Job& job) {
 // The exit status for how a job ended. Why it failed goes to standard error.
 int status_of(const Job& job) {
   if (job.state != JobState::kFailed && job.state != JobState::kCancelled) return kDone;
-  complain(reason_of(job).what());
+  complain(reason_of(job));
   return kRefused;
 }
 
 Volume upload(Client& client, const Options& options, ProgressBar& bar) {
-  UploadOptions how{.raw = options.raw, .series = options.series, .digest = options.digest};
+  UploadOptions how = options.upload;
   how.progress = [&](std::uint64_t done, std::uint64_t total) {
     bar.transfer(done < total ? "upload" : "check", done, total);
   };
@@ -121,6 +132,7 @@ int mesh(const Options& options, const std::stop_token& stop) {
   const Stopwatch uploading;
   const Volume volume = upload(client, options, bar);
   seen.upload = uploading.milliseconds();
+  tell_notes(volume);
 
   JobParameters parameters = options.parameters;
   parameters.volume = volume.id;
@@ -156,6 +168,7 @@ int upload(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
   ProgressBar bar;
   const Volume volume = upload(client, options, bar);
+  tell_notes(volume);
   // The bare id, for `$(isomesh upload ...)`.
   std::cout << (options.json ? to_json(volume) : volume.id) << '\n';
   return kDone;
@@ -250,6 +263,13 @@ int info(const Options& options, const std::stop_token& stop) {
   return kDone;
 }
 
+int rename(const Options& options, const std::stop_token& stop) {
+  const auto name = options.name.empty() ? std::nullopt : std::optional(options.name);
+  const Volume volume = client_of(options, stop).rename_volume(options.id, name);
+  std::cout << (options.json ? to_json(volume) : volume.id) << '\n';
+  return kDone;
+}
+
 int dispatch(const Options& options, const std::stop_token& stop) {
   switch (options.command) {
     case Command::kMesh:
@@ -268,6 +288,8 @@ int dispatch(const Options& options, const std::stop_token& stop) {
       return fetch(options, stop);
     case Command::kCancel:
       return cancel(options, stop);
+    case Command::kRename:
+      return rename(options, stop);
     case Command::kList:
       return list(options, stop);
     case Command::kInfo:
@@ -292,7 +314,7 @@ int run(const Options& options, const std::stop_token& stop) {
   try {
     return dispatch(options, stop);
   } catch (const Error& error) {
-    complain(error.what());
+    complain(error);
     return error.code() == ErrorCode::kUnreachable ? kServerUnreachable : kRefused;
   }
 }

@@ -11,6 +11,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/text.h"
 #include "proto/parameters.h"
 
 namespace isomesh::cli {
@@ -112,15 +113,34 @@ void add_file(CLI::App& app, Options& options) {
          "--dims and --type")
       ->required();
   add(app, "--series", "UID", "The DICOM series to take, where there are several",
-      [&](const std::string& text) { options.series = text; })
+      [&](const std::string& text) { options.upload.series = text; })
       ->group("Upload");
-  app.add_flag("--digest", options.digest, "Have the server check the file's SHA-256")
+  add(app, "--member", "NAME", "The archive's member to take, where it holds several volumes",
+      [&](const std::string& text) { options.upload.member = text; })
+      ->group("Upload");
+  add_number<std::uint32_t>(app, "--volume", "The volume to take of a file of several, from 0 on",
+                            [&](std::uint32_t number) { options.upload.volume = number; })
+      ->group("Upload");
+  add(app, "--accept", "CODE,..", "Take it in spite of what the server would refuse it for",
+      [&](const std::string& text) {
+        for (const std::string_view code : split(text, ','))
+          options.upload.accept.emplace_back(code);
+      })
+      ->group("Upload");
+  add_name<NiftiForm>(app, "--nifti-form", "Which form of a NIfTI header to go by: sform or qform",
+                      [&](NiftiForm form) { options.upload.nifti_form = form; })
+      ->group("Upload");
+  add(app, "--name", "TEXT", "What to call the volume (default: as the series or the file)",
+      [&](const std::string& text) { options.upload.name = text; })
+      ->group("Upload");
+  app.add_flag("--digest", options.upload.digest, "Have the server check the file's SHA-256")
       ->group("Upload");
 }
 
 void add_raw(CLI::App& app, Options& options) {
   const auto raw = [&options]() -> RawDescription& {
-    return options.raw ? *options.raw : options.raw.emplace();
+    auto& described = options.upload.raw;
+    return described ? *described : described.emplace();
   };
   auto* dims = add(app, "--dims", "X,Y,Z", "Samples along x, y and z; x runs fastest",
                    [raw](const std::string& text) {
@@ -373,6 +393,10 @@ class Parser {
     add_outputs(fetch, options_);
 
     add_id(command(Command::kCancel, "cancel", "Cancel a job"), options_, "JOB");
+
+    CLI::App& rename = command(Command::kRename, "rename", "Give a volume another name");
+    add_id(rename, options_, "VOLUME");
+    rename.add_option("NAME", options_.name, "What it is called; empty for no name")->required();
 
     CLI::App& list = command(Command::kList, "list", "List jobs, or volumes");
     add_name<JobState>(list, "--state", "Only jobs in this state",

@@ -21,6 +21,7 @@ enum class Command {
   kWait,
   kFetch,
   kCancel,
+  kRename,
   kList,
   kInfo,
 };
@@ -38,10 +39,8 @@ struct Options {
   std::filesystem::path authorities;  // of an https server; empty: the system's
   bool json = false;
 
-  std::filesystem::path file;  // mesh, upload
-  bool digest = false;         // mesh, upload
-  std::string series;          // mesh, upload
-  std::optional<RawDescription> raw;
+  std::filesystem::path file;     // mesh, upload
+  UploadOptions upload;           // mesh, upload; without progress
   std::string id;                 // of a job or, for submit and info, of a volume
   JobParameters parameters;       // mesh, submit, estimate
   std::string key;                // submit
@@ -49,6 +48,7 @@ struct Options {
   std::optional<JobState> state;  // list
   std::string cursor;             // list
   bool volumes = false;           // list
+  std::string name;               // rename
 };
 
 // Ends the program before any command runs: help, the version, or wrong usage. `text` belongs on

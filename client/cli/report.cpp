@@ -106,6 +106,7 @@ std::string mesh_report(const MeshSummary& mesh) {
 
 std::string volume_report(const Volume& volume) {
   Rows rows = {{"volume", volume.id},
+               {"name", volume.name.value_or("none")},
                {"format", volume.format},
                {"samples", dims_of(volume) + " " + std::string(to_string(volume.type)) + ", " +
                                human_bytes(volume.bytes)},
@@ -119,10 +120,27 @@ std::string volume_report(const Volume& volume) {
     rows.push_back({"iso of " + preset.name, human_number(preset.iso)});
   }
   rows.push_back({"created", volume.created});
+  for (const Note& note : volume.notes)
+    rows.push_back({"note", note.detail + " (" + note.code + ')'});
   for (const IgnoredObject& object : volume.ignored) {
     rows.push_back({"ignored", object.name + ": " + object.reason});
   }
   return in_columns({Align::kLeft, Align::kLeft}, rows);
+}
+
+std::string remedy_report(const Remedy& remedy) {
+  constexpr std::size_t kMost = 50;
+  Rows rows;
+  for (const Choice& choice : remedy.choices) {
+    if (rows.size() == kMost) break;
+    rows.push_back({"  --" + choice.parameter + ' ' + choice.value, choice.title});
+  }
+  if (remedy.choices.size() > kMost) {
+    rows.push_back({"  and " + std::to_string(remedy.choices.size() - kMost) + " more"});
+  }
+  std::string text = rows.empty() ? "" : in_columns({Align::kLeft, Align::kLeft}, rows);
+  if (!remedy.overridable.empty()) text += "  --accept " + remedy.overridable + '\n';
+  return text;
 }
 
 std::string histogram_report(const Histogram& histogram) {
@@ -196,13 +214,14 @@ std::string job_list(const std::vector<Job>& jobs) {
 }
 
 std::string volume_list(const std::vector<Volume>& volumes) {
-  Rows rows = {{"volume", "format", "samples", "type", "size", "created"}};
+  Rows rows = {{"volume", "format", "samples", "type", "size", "created", "name"}};
   for (const Volume& volume : volumes) {
     rows.push_back({volume.id, volume.format, dims_of(volume), std::string(to_string(volume.type)),
-                    human_bytes(volume.bytes), volume.created});
+                    human_bytes(volume.bytes), volume.created, volume.name.value_or("")});
   }
-  return in_columns(
-      {Align::kLeft, Align::kLeft, Align::kRight, Align::kLeft, Align::kRight, Align::kLeft}, rows);
+  return in_columns({Align::kLeft, Align::kLeft, Align::kRight, Align::kLeft, Align::kRight,
+                     Align::kLeft, Align::kLeft},
+                    rows);
 }
 
 std::string job_json(const Job& job, const std::vector<std::filesystem::path>& outputs,

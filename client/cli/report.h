@@ -26,6 +26,9 @@ std::string histogram_report(const Histogram& histogram);
 std::string estimate_report(const Estimate& estimate);
 std::string job_report(const Job& job);
 
+// What to add to the command so that it is not refused: a line for each choice. Empty without one.
+std::string remedy_report(const Remedy& remedy);
+
 // One line each under a heading.
 std::string job_list(const std::vector<Job>& jobs);
 std::string volume_list(const std::vector<Volume>& volumes);

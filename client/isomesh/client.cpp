@@ -107,8 +107,9 @@ Error refusal(const HttpAnswer& answer) {
   }
   Error error = to_error(problem);
   if (error.code() != ErrorCode::kInternal || answer.status == 500) return error;
-  return {code_of_status(answer.status), problem.detail.empty() ? status : problem.detail,
-          problem.errors};
+  return Error(code_of_status(answer.status), problem.detail.empty() ? status : problem.detail,
+               problem.errors)
+      .with_remedy(problem.remedy);
 }
 
 template <std::size_t N>
@@ -134,7 +135,19 @@ std::string upload_query(const UploadOptions& options) {
   Query pairs;
   if (options.raw) add_raw(*options.raw, pairs);
   if (!options.series.empty()) pairs.emplace_back("series", options.series);
+  if (!options.member.empty()) pairs.emplace_back("member", options.member);
+  if (options.volume) pairs.emplace_back("volume", std::to_string(*options.volume));
+  std::string accepted;
+  for (const std::string& code : options.accept) accepted += (accepted.empty() ? "" : ",") + code;
+  if (!accepted.empty()) pairs.emplace_back("accept", accepted);
+  if (options.nifti_form) pairs.emplace_back("nifti_form", to_string(*options.nifti_form));
   return pairs.empty() ? std::string() : query_string(pairs);
+}
+
+// Names of files may name patients: they go in a header, because logs hold targets.
+std::string disposition_of(const std::filesystem::path& path, const std::string& name) {
+  const auto file = (path.has_filename() ? path : path.parent_path()).filename();
+  return "attachment; filename*=UTF-8''" + percent_encode(name.empty() ? file.string() : name);
 }
 
 // The SHA-256 of the body, in base64.
@@ -268,7 +281,8 @@ Client& Client::operator=(Client&&) noexcept = default;
 Volume Client::upload(const std::filesystem::path& path, const UploadOptions& options) {
   const UploadBody file(path);
   HttpRequest request{.method = "POST", .target = "/v1/volumes" + upload_query(options)};
-  request.headers = {{"Content-Type", "application/octet-stream"}};
+  request.headers = {{"Content-Type", "application/octet-stream"},
+                     {"Content-Disposition", disposition_of(path, options.name)}};
   if (options.digest) {
     request.headers.emplace_back("Content-Digest", "sha-256=:" + digest_of(file) + ":");
   }
@@ -299,6 +313,13 @@ std::vector<Volume> Client::volumes() {
     std::ranges::move(page, std::back_inserter(all));
   } while (!cursor.empty());
   return all;
+}
+
+Volume Client::rename_volume(const std::string& id, const std::optional<std::string>& name) {
+  return volume_from_json(impl_->send({.method = "PATCH",
+                                       .target = volume_path(id),
+                                       .headers = {{"Content-Type", "application/json"}},
+                                       .body = volume_name_to_json(name)}));
 }
 
 void Client::erase_volume(const std::string& id) {

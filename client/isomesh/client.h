@@ -51,6 +51,12 @@ using JobProgress = std::function<void(const Job& job)>;
 struct UploadOptions {
   std::optional<RawDescription> raw = {};  // empty: the file says itself what it is
   std::string series = {};  // UID of the DICOM series to take, where the upload holds several
+  std::string member = {};  // the archive's member to take, where it holds several volumes
+  std::optional<std::uint32_t> volume = {};  // the volume to take of a file of several, from 0 on
+  // Codes of notes for which the server is not to refuse, as its refusal named them.
+  std::vector<std::string> accept = {};
+  std::optional<NiftiForm> nifti_form = {};  // empty: the sform, where there is one
+  std::string name = {};  // what the volume is called; empty: as the file or folder
   // Sends the file's SHA-256 ahead, so that the server refuses a body that changed on the way.
   // Costs a second reading of the file.
   bool digest = false;
@@ -97,6 +103,8 @@ class Client {
   Volume volume(const std::string& id);
   // All of them, the oldest first.
   std::vector<Volume> volumes();
+  // Gives the volume another name, or none.
+  Volume rename_volume(const std::string& id, const std::optional<std::string>& name);
   void erase_volume(const std::string& id);
   Histogram histogram(const std::string& id, std::uint32_t bins = 256);
   // Writes the picture, a PNG, to `target`.

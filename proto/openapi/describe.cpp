@@ -376,6 +376,34 @@ std::string formats() {
   return yaml.str();
 }
 
+// The codes of notes and what each means, and those of them that can be accepted.
+std::string notes() {
+  std::vector<std::string> all;
+  std::vector<std::string> acceptable;
+  for (const NoteDescription& note : note_descriptions()) {
+    all.emplace_back(note.name);
+    if (note.is_acceptable) acceptable.emplace_back(note.name);
+  }
+  Yaml yaml(2);
+  yaml.under("NoteCode", [&] {
+    yaml.line("description: |");
+    yaml.line("  A name that stays, for programs.");
+    for (const NoteDescription& note : note_descriptions()) {
+      yaml.line("  * `" + std::string(note.name) + "`: " + std::string(note.meaning));
+    }
+    yaml.line("type: string");
+    yaml.under("enum", [&] {
+      for (const std::string& name : all) yaml.line("- " + name);
+    });
+  });
+  yaml.under("AcceptableNote", [&] {
+    yaml.line("description: A note for which a volume is refused unless the query accepts it.");
+    yaml.line("type: string");
+    yaml.line("enum: " + in_brackets(acceptable));
+  });
+  return yaml.str();
+}
+
 // Where the line that holds `text` begins, and where the next one does.
 std::pair<std::size_t, std::size_t> line_with(const std::string& description,
                                               const std::string& text, std::size_t from) {
@@ -387,14 +415,20 @@ std::pair<std::size_t, std::size_t> line_with(const std::string& description,
 }  // namespace
 
 std::string with_parameters(const std::string& description) {
-  const std::map<std::string, std::string> parts = {{"schemas of parameters", schemas()},
-                                                    {"formats", formats()},
-                                                    {"parameters of a query", query()},
-                                                    {"query of an estimate", query_references()},
-                                                    {"query of a mesh", query_references()}};
+  struct Part {
+    std::string source;
+    std::string name;
+    std::string text;
+  };
+  const std::vector<Part> parts = {{"parameters.h", "schemas of parameters", schemas()},
+                                   {"parameters.h", "formats", formats()},
+                                   {"parameters.h", "parameters of a query", query()},
+                                   {"parameters.h", "query of an estimate", query_references()},
+                                   {"parameters.h", "query of a mesh", query_references()},
+                                   {"notes.h", "codes of notes", notes()}};
   std::string result = description;
-  for (const auto& [name, text] : parts) {
-    const std::size_t begin = line_with(result, "made of parameters.h: " + name, 0).second;
+  for (const auto& [source, name, text] : parts) {
+    const std::size_t begin = line_with(result, "made of " + source + ": " + name, 0).second;
     const std::size_t end = line_with(result, "end of " + name, begin).first;
     result.replace(begin, end - begin, text);
   }

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "proto/types.h"
 #include "server/mesh/context.h"
@@ -60,6 +61,7 @@ struct Provenance {
   double iso = 0;  // the value that was used, also where parameters say Otsu
   std::array<std::uint32_t, 3> dims = {0, 0, 0};
   Geometry geometry;
+  std::vector<Note> notes;  // of the volume, those that stand in meshes
 };
 
 // Binary glTF 2.0: the mesh as one primitive for each block of some 100 000 triangles, each a Draco

@@ -104,6 +104,10 @@ Json describe(const std::vector<DracoStream>& chunks, std::size_t binary_bytes,
                      {"direction", provenance.geometry.direction},
                      {"units", "mm"},
                      {"space", "LPS"}}}};
+  // Only where there are some: the meshes of other volumes keep their bytes.
+  for (const Note& note : provenance.notes) {
+    gltf["asset"]["extras"]["notes"].push_back({{"code", note.code}, {"detail", note.detail}});
+  }
   gltf["scene"] = 0;
   gltf["scenes"] = Json::array({{{"nodes", {0}}}});
   // Positions are LPS millimetres; glTF wants metres, Y up and the front towards +Z: a quarter turn

@@ -79,8 +79,9 @@ class LibraryBodyReader : public BodyReader {
   bool read(const TakePiece& take) override { return reader_(receiver_of(take)); }
 
   bool read_form(const BeginField& begin, const TakePiece& take) override {
-    return reader_([&](const httplib::MultipartFormData& field) { return begin(field.name); },
-                   receiver_of(take));
+    return reader_(
+        [&](const httplib::MultipartFormData& field) { return begin(field.name, field.filename); },
+        receiver_of(take));
   }
 
   bool is_whole() const override { return body_.is_whole(); }
@@ -111,13 +112,15 @@ class LibraryServer : public httplib::Server {
     });
     // Bodies can be read by handlers of this kind alone.
     if (takes_body()) {
-      Post("/", [this](const httplib::Request& /*in*/, httplib::Response& out,
-                       const httplib::ContentReader& reader) {
+      const auto read = [this](const httplib::Request& /*in*/, httplib::Response& out,
+                               const httplib::ContentReader& reader) {
         LibraryBodyReader body_reader(reader, body_);
         request_.body = &body_reader;
         answer_into(out);
         request_.body = nullptr;
-      });
+      };
+      Post("/", read);
+      Patch("/", read);
     }
     set_error_handler([this](const httplib::Request& /*in*/, httplib::Response& out) {
       if (is_answered_) return;
@@ -145,7 +148,7 @@ class LibraryServer : public httplib::Server {
     }
   }
 
-  bool takes_body() const { return request_.method == "POST"; }
+  bool takes_body() const { return request_.method == "POST" || request_.method == "PATCH"; }
 
   // Takes what the library has decoded, and gives it the rest of the head.
   void exchange_heads(httplib::Request& in) {

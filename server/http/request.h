@@ -34,7 +34,7 @@ struct RequestContext {
 class BodyReader {
  public:
   using TakePiece = std::function<bool(std::string_view piece)>;
-  using BeginField = std::function<bool(const std::string& name)>;
+  using BeginField = std::function<bool(const std::string& name, const std::string& file_name)>;
 
   virtual ~BodyReader() = default;
 
@@ -63,7 +63,7 @@ struct Request {
   net::Headers headers;
   std::optional<std::uint64_t> content_length;
   std::string remote_address;  // empty for a Unix socket
-  BodyReader* body = nullptr;  // of a POST only
+  BodyReader* body = nullptr;  // of a POST or PATCH only
   RequestContext context;
 
   bool has_header(std::string_view name) const;

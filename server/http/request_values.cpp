@@ -22,42 +22,6 @@ std::optional<double> number_of(std::string_view text) {
   return text.starts_with('+') ? std::nullopt : parse_double(text);
 }
 
-std::optional<std::uint64_t> whole_number(std::string_view text) {
-  return text.starts_with('+') ? std::nullopt : parse_uint64(text);
-}
-
-Error wrong_numbers(const std::string& name, std::size_t count) {
-  return invalid_parameter(name,
-                           "must be " + std::to_string(count) + " numbers with commas between");
-}
-
-template <std::size_t N>
-std::array<double, N> numbers_of(const std::string& name, std::string_view text) {
-  const std::vector<std::string_view> parts = split(text, ',');
-  std::array<double, N> numbers = {};
-  if (parts.size() != N) throw wrong_numbers(name, N);
-  for (std::size_t i = 0; i < N; ++i) {
-    const auto number = number_of(parts[i]);
-    if (!number) throw wrong_numbers(name, N);
-    numbers[i] = *number;
-  }
-  return numbers;
-}
-
-std::array<std::uint32_t, 3> dims_of(std::string_view text) {
-  const std::vector<std::string_view> parts = split(text, ',');
-  std::array<std::uint32_t, 3> dims = {};
-  if (parts.size() != dims.size()) throw wrong_numbers("dims", dims.size());
-  for (std::size_t i = 0; i < dims.size(); ++i) {
-    const auto number = whole_number(parts[i]);
-    if (!number || *number > std::numeric_limits<std::uint32_t>::max()) {
-      throw wrong_numbers("dims", dims.size());
-    }
-    dims[i] = static_cast<std::uint32_t>(*number);
-  }
-  return dims;
-}
-
 // The seconds of a preference `wait=N` (RFC 7240), among others in the header and before what may
 // describe it.
 std::optional<std::string_view> preferred_wait(std::string_view header) {
@@ -103,13 +67,25 @@ bool names_etag(std::string_view header, std::string_view etag) {
   return false;
 }
 
-bool is_uid(std::string_view text) {
-  constexpr std::size_t kLongestUid = 64;
-  return !text.empty() && text.size() <= kLongestUid &&
-         text.find_first_not_of("0123456789.") == std::string_view::npos;
+}  // namespace
+
+std::optional<std::uint64_t> whole_number(std::string_view text) {
+  return text.starts_with('+') ? std::nullopt : parse_uint64(text);
 }
 
-}  // namespace
+std::vector<double> numbers_of(const std::string& name, std::string_view text, std::size_t count) {
+  const Error wrong =
+      invalid_parameter(name, "must be " + std::to_string(count) + " numbers with commas between");
+  const std::vector<std::string_view> parts = split(text, ',');
+  if (parts.size() != count) throw wrong;
+  std::vector<double> numbers;
+  for (const std::string_view part : parts) {
+    const auto number = number_of(part);
+    if (!number) throw wrong;
+    numbers.push_back(*number);
+  }
+  return numbers;
+}
 
 void check_known(const Request& request, const std::set<std::string>& known) {
   std::vector<FieldError> errors;
@@ -170,66 +146,6 @@ std::string digest_header(std::string_view sha256) {
   return "sha-256=:" + to_base64(from_hex(sha256).value()) + ':';
 }
 
-const std::set<std::string>& raw_description_parameters() {
-  static const std::set<std::string> names = {"dims",   "type",      "spacing",
-                                              "origin", "direction", "byte_order"};
-  return names;
-}
-
-const std::set<std::string>& import_parameters() {
-  static const std::set<std::string> names = [] {
-    std::set<std::string> all = raw_description_parameters();
-    all.insert("series");
-    return all;
-  }();
-  return names;
-}
-
-process::ImportOptions import_options_of(const Request& request) {
-  process::ImportOptions options{.raw = raw_description_of(request), .series = {}};
-  if (!request.has_parameter("series")) return options;
-  options.series = request.parameter("series");
-  if (!is_uid(options.series)) {
-    throw invalid_parameter("series", "must be a DICOM UID: digits and dots, at most 64 of them");
-  }
-  if (options.raw) throw invalid_parameter("series", "raw samples have no series");
-  return options;
-}
-
-std::optional<RawDescription> raw_description_of(const Request& request) {
-  const auto text = [&](const char* name) { return request.parameter(name); };
-  if (!request.has_parameter("dims")) {
-    for (const std::string& name : raw_description_parameters()) {
-      if (request.has_parameter(name)) {
-        throw invalid_parameter("dims", "is required, because " + name + " describes raw samples");
-      }
-    }
-    return std::nullopt;
-  }
-  RawDescription raw;
-  raw.dims = dims_of(text("dims"));
-  const auto type = from_string<SampleType>(text("type"));
-  if (!type) throw invalid_parameter("type", "must be " + names_of<SampleType>());
-  raw.type = *type;
-  if (request.has_parameter("spacing")) {
-    raw.geometry.spacing = numbers_of<3>("spacing", text("spacing"));
-  }
-  if (request.has_parameter("origin")) {
-    raw.geometry.origin = numbers_of<3>("origin", text("origin"));
-  }
-  if (request.has_parameter("direction")) {
-    raw.geometry.direction = numbers_of<9>("direction", text("direction"));
-  }
-  if (request.has_parameter("byte_order")) {
-    const std::string_view order = text("byte_order");
-    if (order != "little" && order != "big") {
-      throw invalid_parameter("byte_order", "must be \"little\" or \"big\"");
-    }
-    raw.big_endian = order == "big";
-  }
-  return raw;
-}
-
 std::uint64_t whole_number_of(const Request& request, const std::string& name,
                               const WholeNumbers& among, std::uint64_t otherwise) {
   if (!request.has_parameter(name)) return otherwise;
@@ -243,12 +159,12 @@ std::uint64_t whole_number_of(const Request& request, const std::string& name,
 
 std::optional<std::array<double, 2>> interval_of(const Request& request, const std::string& name) {
   if (!request.has_parameter(name)) return std::nullopt;
-  const auto interval = numbers_of<2>(name, request.parameter(name));
+  const auto interval = numbers_of(name, request.parameter(name), 2);
   const bool finite = std::isfinite(interval[0]) && std::isfinite(interval[1]);
   if (!finite || interval[0] >= interval[1]) {
     throw invalid_parameter(name, "must be two finite numbers, the smaller first");
   }
-  return interval;
+  return std::array{interval[0], interval[1]};
 }
 
 std::optional<ByteRange> range_of(const Request& request, std::uint64_t size) {

@@ -9,11 +9,11 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "proto/json.h"
 #include "proto/types.h"
 #include "server/http/request.h"
-#include "server/process/import_message.h"
 
 namespace isomesh::http {
 
@@ -33,17 +33,11 @@ std::optional<std::string> sha256_of_content_digest(const Request& request);
 // What Repr-Digest holds for that SHA-256 in hex.
 std::string digest_header(std::string_view sha256);
 
-// Raw samples' description from `dims`, `type` and the rest; empty without `dims`.
-std::optional<RawDescription> raw_description_of(const Request& request);
+// A number without a sign; empty for anything else.
+std::optional<std::uint64_t> whole_number(std::string_view text);
 
-// The names of the parameters that raw_description_of reads.
-const std::set<std::string>& raw_description_parameters();
-
-// What the query says about a body that is a volume: raw samples' description, the series to take.
-process::ImportOptions import_options_of(const Request& request);
-
-// The names of the parameters that import_options_of reads.
-const std::set<std::string>& import_parameters();
+// So many numbers, of which some may be infinite or none, with commas between.
+std::vector<double> numbers_of(const std::string& name, std::string_view text, std::size_t count);
 
 struct WholeNumbers {
   std::uint64_t low = 0;

@@ -5,6 +5,7 @@
 
 #include "base/hex.h"
 #include "base/sha256.h"
+#include "server/http/import_query.h"
 #include "server/http/request_values.h"
 #include "server/store/files/files.h"
 
@@ -78,7 +79,8 @@ class Receiver {
   }
 
   // A form may hold one file and nothing else.
-  bool begin_field(const std::string& name) {
+  bool begin_field(const std::string& name, const std::string& file_name) {
+    file_name_ = plain_file_name(file_name);
     if (name != "file" || ++fields_ > 1) {
       failure_ = std::make_exception_ptr(
           invalid_parameter("file", "a form must have the one field `file`"));
@@ -99,6 +101,7 @@ class Receiver {
     if (bytes_ == 0) throw Error(ErrorCode::kInvalidParameter, "the body is empty");
   }
 
+  const std::string& file_name() const { return file_name_; }
   std::string digest() { return to_hex(digest_.finish()); }
 
  private:
@@ -110,6 +113,7 @@ class Receiver {
   Sha256 digest_;
   std::uint64_t bytes_ = 0;
   int fields_ = 0;
+  std::string file_name_;
   std::exception_ptr failure_;
 };
 
@@ -129,12 +133,15 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
   store::File file = store::File::create(path_);
   Receiver receiver(file, limits, stopping);
   const auto take = [&](std::string_view piece) { return receiver.take(piece); };
-  const bool complete =
-      is_form ? request.body->read_form(
-                    [&](const std::string& name) { return receiver.begin_field(name); }, take)
-              : request.body->read(take);
+  const bool complete = is_form ? request.body->read_form(
+                                      [&](const std::string& name, const std::string& file_name) {
+                                        return receiver.begin_field(name, file_name);
+                                      },
+                                      take)
+                                : request.body->read(take);
   receiver.check(*request.body, complete, is_form);
   if (expected && receiver.digest() != *expected) throw other_digest();
+  name_ = is_form ? receiver.file_name() : file_name_of(request.header("Content-Disposition"));
 }
 
 std::string read_text(const Request& request, std::size_t max_bytes) {

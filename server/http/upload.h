@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "server/http/request.h"
 #include "server/store/files/data_folder.h"
@@ -27,10 +28,14 @@ class Upload {
          const std::atomic<bool>& stopping, const Request& request);
 
   const std::filesystem::path& path() const { return path_; }
+  // What the client calls the file, without folders: the name in the form, or in the header
+  // Content-Disposition. May be empty, and may name a patient.
+  const std::string& name() const { return name_; }
 
  private:
   store::ScratchFolder scratch_;
   std::filesystem::path path_;
+  std::string name_;
 };
 
 // A small body, whole in memory. Throws Error kTooLarge beyond `max_bytes`, kUnsupportedMedia,

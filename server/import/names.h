@@ -11,6 +11,7 @@ namespace isomesh::import {
 
 using isomesh::bytes_per_sample;
 
+using process::ImportOptions;
 using process::ImportTask;
 
 using volume::CanonicalWriter;
@@ -21,6 +22,8 @@ using volume::geometry_of;
 using volume::normalised;
 using volume::SizeLimits;
 using volume::step_of;
+using volume::throw_choice;
+using volume::throw_overridable;
 using volume::throw_unusable;
 using volume::Vector3;
 using volume::volume_dims;

@@ -47,6 +47,9 @@ std::string how_it_ended(const std::optional<int>& status) {
 // canonical file.
 void check(const Volume& volume, const process::ImportTask& task) {
   if (!std::filesystem::exists(task.target)) throw_lying();
+  for (const Note& note : volume.notes) {
+    if (find_note(note.code) == nullptr) throw_lying();
+  }
   const volume::CanonicalVolume canonical(task.target);
   const volume::CanonicalHeader& header = canonical.header();
   const auto [low, high] = volume.range;

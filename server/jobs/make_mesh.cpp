@@ -177,9 +177,13 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   summary.bounds = {effect.after.low, effect.after.high};
 
   progress.enter(Stage::kEncode, kEncodeShare, &Timing::encode);
-  encode_and_measure(
-      {std::string(request.volume), parameters, request.iso, samples.dims, samples.geometry}, sinks,
-      progress, mesh, summary);
+  encode_and_measure({.volume = request.volume.id,
+                      .parameters = parameters,
+                      .iso = request.iso,
+                      .dims = samples.dims,
+                      .geometry = samples.geometry,
+                      .notes = notes_in_mesh(request.volume.notes)},
+                     sinks, progress, mesh, summary);
   return summary;
 }
 

@@ -66,7 +66,7 @@ struct SampleArray {
 
 // What a mesh is to be made of and what it may take.
 struct MeshRequest {
-  std::string_view volume;  // its id, for the files to name
+  const Volume& volume;  // its id and notes, for the files to name
   const MeshParameters& parameters;
   double iso;  // whatever the parameters say of it
   std::uint64_t memory_bytes;

@@ -49,7 +49,7 @@ PipelineResult run_pipeline(const Volume& volume, const MeshParameters& paramete
   PipelineResult result;
   result.mesh = make_mesh(
       {header.type, header.dims, header.geometry, canonical.samples().data()},
-      {volume.id, parameters, parameters.iso.value_or(volume.suggested_iso), limits.memory_bytes},
+      {volume, parameters, parameters.iso.value_or(volume.suggested_iso), limits.memory_bytes},
       sinks, progress, workspace.mesh);
   for (std::size_t i = 0; i < writers.size(); ++i) {
     const store::Blob blob = writers[i]->commit();

@@ -6,7 +6,8 @@ namespace isomesh::jobs {
 
 std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
                                            const std::filesystem::path& upload,
-                                           const process::ImportOptions& options) {
+                                           const process::ImportOptions& options,
+                                           const std::string& name) {
   const store::ScratchFolder scratch(folder_.scratch());
   const std::filesystem::path canonical = scratch.path() / "canonical";
   Volume volume = runner_.run({.source = upload,
@@ -20,6 +21,7 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
   blobs_.adopt(canonical, blob);
   volume.id = blob.key;
   volume.created = timestamp();
+  if (!volume.name && !name.empty()) volume.name = name;
   auto added = volumes_.add(owner, volume);
   blobs_.settle(blob.key);
   return added;

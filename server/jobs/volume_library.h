@@ -29,10 +29,19 @@ class VolumeLibrary {
         limits_(limits),
         runner_(runner) {}
 
-  // Imports an uploaded file, in a process of its own. Second: false when the owner had the same
-  // samples and geometry already. Throws what ImportRunner::run throws, and kOutOfSpace.
+  // Imports an uploaded file, in a process of its own. `name` is what the client calls it, for a
+  // volume that has no name of its own within the file. Second: false when the owner had the same
+  // samples and geometry already; the record stays what it was then. Throws what ImportRunner::run
+  // throws, and kOutOfSpace.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
-                              const process::ImportOptions& options = {});
+                              const process::ImportOptions& options = {},
+                              const std::string& name = {});
+
+  // Gives the owner's volume another name, or none. Throws Error kNotFound, kGone.
+  Volume rename(const std::string& owner, const std::string& id,
+                const std::optional<std::string>& name) {
+    return volumes_.rename(owner, id, name);
+  }
 
   // Ends the imports that run or wait, and refuses further ones.
   void stop_imports() { runner_.stop(); }

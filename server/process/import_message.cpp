@@ -48,12 +48,47 @@ RawDescription raw_from(const Json& json) {
   return raw;
 }
 
+template <class Value>
+Json optional_json(const std::optional<Value>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json to_json(const ImportOptions& options) {
+  const auto form = options.nifti_form ? std::optional(std::string(to_string(*options.nifti_form)))
+                                       : std::nullopt;
+  return {{"raw", options.raw ? to_json(*options.raw) : Json(nullptr)},
+          {"series", options.series},
+          {"volume", optional_json(options.volume)},
+          {"member", options.member},
+          {"accept", options.accept},
+          {"nifti_form", optional_json(form)}};
+}
+
+ImportOptions options_from(const Json& json) {
+  ImportOptions options;
+  if (!json.at("raw").is_null()) options.raw = raw_from(json.at("raw"));
+  json.at("series").get_to(options.series);
+  if (!json.at("volume").is_null()) options.volume = json.at("volume").get<std::uint32_t>();
+  json.at("member").get_to(options.member);
+  json.at("accept").get_to(options.accept);
+  if (!json.at("nifti_form").is_null()) {
+    options.nifti_form = from_string<NiftiForm>(json.at("nifti_form").get<std::string>());
+  }
+  return options;
+}
+
 Json to_json(const Error& error) {
   Json fields = Json::array();
   for (const FieldError& field : error.fields()) fields.push_back({field.field, field.message});
+  Json choices = Json::array();
+  for (const Choice& choice : error.remedy().choices) {
+    choices.push_back({choice.parameter, choice.value, choice.title});
+  }
   return {{"code", std::string(describe(error.code()).name)},
           {"detail", std::string(error.what())},
-          {"fields", fields}};
+          {"fields", fields},
+          {"overridable", error.remedy().overridable},
+          {"choices", choices}};
 }
 
 Error error_from(const Json& json) {
@@ -61,8 +96,14 @@ Error error_from(const Json& json) {
   for (const Json& field : json.at("fields")) {
     fields.push_back({field.at(0).get<std::string>(), field.at(1).get<std::string>()});
   }
-  return {error_code_of(json.at("code").get<std::string>()), json.at("detail").get<std::string>(),
-          std::move(fields)};
+  Remedy remedy = {.overridable = json.at("overridable").get<std::string>()};
+  for (const Json& choice : json.at("choices")) {
+    remedy.choices.push_back({choice.at(0).get<std::string>(), choice.at(1).get<std::string>(),
+                              choice.at(2).get<std::string>()});
+  }
+  const Error error(error_code_of(json.at("code").get<std::string>()),
+                    json.at("detail").get<std::string>(), std::move(fields));
+  return error.with_remedy(std::move(remedy));
 }
 
 // A format's name is checked before it goes into the log, because the process that sent it reads
@@ -91,8 +132,7 @@ std::string to_message(const ImportOrder& order) {
       {"source", task.source.string()},
       {"scratch", task.scratch.string()},
       {"target", task.target.string()},
-      {"raw", task.options.raw ? to_json(*task.options.raw) : Json(nullptr)},
-      {"series", task.options.series},
+      {"options", to_json(task.options)},
       {"max_sample_bytes", task.limits.max_sample_bytes},
       {"memory_bytes", order.bounds.memory_bytes},
       {"seconds", order.bounds.time.count()},
@@ -107,8 +147,7 @@ ImportOrder order_from(std::string_view message) {
     order.task.source = json.at("source").get<std::string>();
     order.task.scratch = json.at("scratch").get<std::string>();
     order.task.target = json.at("target").get<std::string>();
-    if (!json.at("raw").is_null()) order.task.options.raw = raw_from(json.at("raw"));
-    json.at("series").get_to(order.task.options.series);
+    order.task.options = options_from(json.at("options"));
     json.at("max_sample_bytes").get_to(order.task.limits.max_sample_bytes);
     json.at("memory_bytes").get_to(order.bounds.memory_bytes);
     order.bounds.time = std::chrono::seconds(json.at("seconds").get<std::int64_t>());

@@ -3,12 +3,14 @@
 // of which there is none.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "proto/error.h"
 #include "proto/types.h"
@@ -18,9 +20,23 @@ namespace isomesh::process {
 
 // What a request says about the uploaded file.
 struct ImportOptions {
-  std::optional<RawDescription> raw;  // empty: the file is of a format that says what it is
-  std::string series;                 // UID of the DICOM series to take; empty: the only one
+  std::optional<RawDescription> raw = {};  // empty: the file is of a format that says what it is
+  std::string series = {};                 // UID of the DICOM series to take; empty: the only one
+  // Which of the file's volumes to take, from 0 on; empty: the only one.
+  std::optional<std::uint32_t> volume = {};
+  // Which of an archive's volumes to take: the name of its member, or kDicomMember for what its
+  // DICOM files make; empty: the only one.
+  std::string member = {};
+  std::vector<std::string> accept = {};      // names of notes for which nothing is refused
+  std::optional<NiftiForm> nifti_form = {};  // empty: the sform, where there is one
+
+  bool accepts(NoteCode code) const {
+    return std::ranges::find(accept, describe(code).name) != accept.end();
+  }
 };
+
+// Stands for all DICOM files of an archive, whose members have other names.
+inline constexpr std::string_view kDicomMember = "*.dcm";
 
 struct ImportTask {
   std::filesystem::path source;   // what was uploaded

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -27,6 +28,10 @@ class VolumeStore {
 
   // Throws Error kNotFound, or kGone when it has expired.
   virtual Volume get(const Viewer& viewer, const std::string& id) const = 0;
+
+  // Gives the owner's record another name, or none, and returns it. Throws as get does.
+  virtual Volume rename(const std::string& owner, const std::string& id,
+                        const std::optional<std::string>& name) = 0;
 
   virtual bool contains(const Viewer& viewer, const std::string& id) const = 0;
 

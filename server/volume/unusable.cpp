@@ -1,9 +1,21 @@
 #include "server/volume/unusable.h"
 
-#include "base/error.h"
+#include <algorithm>
+#include <utility>
 
 namespace isomesh::volume {
 
 void throw_unusable(const std::string& reason) { throw Error(ErrorCode::kUnusableVolume, reason); }
+
+void throw_overridable(NoteCode code, const std::string& reason) {
+  throw Error(ErrorCode::kUnusableVolume, reason)
+      .with_remedy({.overridable = std::string(describe(code).name)});
+}
+
+void throw_choice(const std::string& reason, std::vector<Choice> choices) {
+  constexpr std::size_t kMost = 1000;
+  choices.resize(std::min(choices.size(), kMost));
+  throw Error(ErrorCode::kUnusableVolume, reason).with_remedy({.choices = std::move(choices)});
+}
 
 }  // namespace isomesh::volume

@@ -140,9 +140,10 @@ std::uint64_t Stages::run_job(int passes, MeshFormat format) {
   const jobs::Report nobody = [](Stage, double, const Timing&) {};
   jobs::Progress progress({}, nobody);
   const auto& [x, y, z] = samples_.dims;
+  const Volume volume;
   jobs::make_mesh({samples_.type, {x, y, z}, samples_.geometry, samples_.bytes.data()},
-                  {"", parameters, surface_.iso, std::numeric_limits<std::uint64_t>::max()}, sinks,
-                  progress, mesh_);
+                  {volume, parameters, surface_.iso, std::numeric_limits<std::uint64_t>::max()},
+                  sinks, progress, mesh_);
   return counting.bytes;
 }
 

@@ -83,8 +83,9 @@ void answer_preflight(const std::string& methods, Response& response) {
   response.status = 204;
   response.set_header("Access-Control-Allow-Methods", methods);
   response.set_header("Access-Control-Allow-Headers",
-                      "Authorization, Content-Digest, Content-Type, Idempotency-Key, If-Match, "
-                      "If-None-Match, If-Range, Last-Event-ID, Prefer, Range, traceparent");
+                      "Authorization, Content-Digest, Content-Disposition, Content-Type, "
+                      "Idempotency-Key, If-Match, If-None-Match, If-Range, Last-Event-ID, Prefer, "
+                      "Range, traceparent");
   response.set_header("Access-Control-Max-Age", "600");
 }
 

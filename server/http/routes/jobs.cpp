@@ -16,7 +16,6 @@ namespace isomesh::http {
 namespace {
 
 const std::string kJobs = "/v1/jobs";
-constexpr std::size_t kMostBodyBytes = 64 * 1024;
 constexpr const char* kJobCursor = "jobs";
 
 void answer_with(Response& response, int status, const Job& job) {
@@ -24,29 +23,10 @@ void answer_with(Response& response, int status, const Job& job) {
   answer_json(response, status, to_json(job));
 }
 
-// Browsers let pages of other origins send plain text without asking the server first, but not what
-// is declared as JSON.
-void check_is_json(const Request& request) {
-  const std::string_view type = split(request.header("Content-Type"), ';').front();
-  if (type.empty() || lower(type) == "application/json") return;
-  throw Error(ErrorCode::kUnsupportedMedia, "the body's Content-Type must be application/json");
-}
-
-// A body that is not here yet may come slowly, so reading it takes one of the places of uploads.
-std::string small_body(App& app, const Request& request) {
-  const bool may_be_slow = !request.body->is_whole();
-  const auto place = may_be_slow ? app.uploads.try_take() : std::nullopt;
-  if (may_be_slow && !place) {
-    throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
-  }
-  return read_text(request, kMostBodyBytes);
-}
-
 std::optional<Continuation> submit(App& app, const Request& request, Response& response) {
   check_known(request, {"wait"});
   const auto wait = wait_of(request);
-  check_is_json(request);
-  const std::string body = small_body(app, request);
+  const std::string body = json_body(app, request);
   store::JobSpec spec = {owner_of(request), parse_job_parameters(body), idempotency_key_of(request),
                          ""};
   const auto& callback = spec.parameters.callback;

@@ -9,6 +9,7 @@
 #include "proto/json.h"
 #include "server/codec/encode.h"
 #include "server/http/answers/sources.h"
+#include "server/http/import_query.h"
 #include "server/http/observe/outcomes.h"
 #include "server/http/request_values.h"
 #include "server/http/routes/routes.h"
@@ -65,7 +66,7 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
   const Slots::Place place = place_for_upload(app);
   const Upload file(app.services.folder, app.options.upload, app.stopping, request);
   const auto add = [&] {
-    return app.services.library.add(owner_of(request), file.path(), options);
+    return app.services.library.add(owner_of(request), file.path(), options, file.name());
   };
   parameters.volume = counting_refusals(app, request, add).first.id;
   // A key belongs to one request: the same volume (by its id), the same parameters and, as "mesh"

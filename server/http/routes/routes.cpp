@@ -7,7 +7,9 @@
 
 #include "base/log.h"
 #include "base/sha256.h"
+#include "base/text.h"
 #include "proto/json.h"
+#include "server/http/upload.h"
 
 namespace isomesh::http {
 namespace {
@@ -38,6 +40,14 @@ bool has_ended(const store::JobStore& jobs, const std::string& job) {
   } catch (const Error&) {
     return true;  // it is not there any more
   }
+}
+
+// Browsers let pages of other origins send plain text without asking the server first, but not what
+// is declared as JSON.
+void check_is_json(const Request& request) {
+  const std::string_view type = split(request.header("Content-Type"), ';').front();
+  if (type.empty() || lower(type) == "application/json") return;
+  throw Error(ErrorCode::kUnsupportedMedia, "the body's Content-Type must be application/json");
 }
 
 }  // namespace
@@ -126,6 +136,17 @@ Slots::Place place_for_upload(App& app) {
   auto place = app.uploads.try_take();
   if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
   return std::move(*place);
+}
+
+std::string json_body(App& app, const Request& request) {
+  constexpr std::size_t kMostBodyBytes = 64 * 1024;
+  check_is_json(request);
+  const bool may_be_slow = !request.body->is_whole();
+  const auto place = may_be_slow ? app.uploads.try_take() : std::nullopt;
+  if (may_be_slow && !place) {
+    throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
+  }
+  return read_text(request, kMostBodyBytes);
 }
 
 Job submitted(App& app, const store::JobSpec& spec, Response& response) {

@@ -60,6 +60,10 @@ void add_post(App& app, const std::string& pattern, const Run& run) {
   app.router.add("POST", pattern, handler_of(run));
 }
 template <class Run>
+void add_patch(App& app, const std::string& pattern, const Run& run) {
+  app.router.add("PATCH", pattern, handler_of(run));
+}
+template <class Run>
 void add_delete(App& app, const std::string& pattern, const Run& run) {
   app.router.add("DELETE", pattern, handler_of(run));
 }
@@ -76,6 +80,10 @@ inline constexpr std::uint64_t kUsualListLength = 100;
 
 // Throws Error kUnavailable when all places are taken, or nothing is accepted any more.
 Slots::Place place_for_upload(App& app);
+
+// The request's small body, which is JSON. One that is not here yet may come slowly, so reading it
+// takes one of the places of uploads. Throws as place_for_upload and read_text do.
+std::string json_body(App& app, const Request& request);
 
 // Submits a job. Throws what store::job_of throws, and then says in `response` when to come again.
 Job submitted(App& app, const store::JobSpec& spec, Response& response);

@@ -1,4 +1,5 @@
 #include "proto/json.h"
+#include "server/http/import_query.h"
 #include "server/http/observe/outcomes.h"
 #include "server/http/request_values.h"
 #include "server/http/routes/routes.h"
@@ -15,7 +16,7 @@ void upload(App& app, const Request& request, Response& response) {
   const Slots::Place place = place_for_upload(app);
   const Upload file(app.services.folder, app.options.upload, app.stopping, request);
   const auto [volume, is_new] = counting_refusals(app, request, [&] {
-    return app.services.library.add(owner_of(request), file.path(), options);
+    return app.services.library.add(owner_of(request), file.path(), options, file.name());
   });
   response.set_header("Location", kVolumes + '/' + volume.id);
   answer_json(response, is_new ? 201 : 200, to_json(volume));
@@ -51,6 +52,17 @@ void get(App& app, const Request& request, Response& response) {
   answer_tagged_json(request, response, to_json(volume));
 }
 
+// What a volume is called is all of it that can change.
+void rename(App& app, const Request& request, Response& response) {
+  check_known(request, {});
+  const std::string id = request.path_parameter("id");
+  const std::optional<std::string> name = parse_volume_name(json_body(app, request));
+  if (request.has_header("If-Match")) {
+    check_if_match(request, etag_of(to_json(app.services.volumes.get(viewer_of(request), id))));
+  }
+  answer_json(response, 200, to_json(app.services.library.rename(owner_of(request), id, name)));
+}
+
 void erase(App& app, const Request& request, Response& response) {
   check_known(request, {});
   const std::string id = request.path_parameter("id");
@@ -70,6 +82,8 @@ void add_volume_routes(App& app) {
           [&app](const auto& request, auto& response) { list(app, request, response); });
   add_get(app, kVolumes + "/{id}",
           [&app](const auto& request, auto& response) { get(app, request, response); });
+  add_patch(app, kVolumes + "/{id}",
+            [&app](const auto& request, auto& response) { rename(app, request, response); });
   add_delete(app, kVolumes + "/{id}",
              [&app](const auto& request, auto& response) { erase(app, request, response); });
 }

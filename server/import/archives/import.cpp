@@ -96,8 +96,7 @@ Volume read_slices(const Reader& reader, const std::vector<ArchiveMember>& membe
   std::vector<std::filesystem::path> files;
   files.reserve(members.size());
   for (const ArchiveMember& member : members) files.push_back(member.path);
-  const ImportTask& task = input.task;
-  return import_dicom(files, task.options.series, task.limits, task.target);
+  return import_dicom(files, input.task);
 }
 
 Volume read_members(const std::vector<ArchiveMember>& members, const Input& input) {
@@ -115,10 +114,12 @@ Volume read_members(const std::vector<ArchiveMember>& members, const Input& inpu
                    " volumes, where one is needed: " + names_of(volumes) + ".");
   }
   const auto& [member, reader] = volumes.front();
-  return read_input(*reader, {.path = member.path,
-                              .companions = companions_of(member, members),
-                              .task = input.task,
-                              .listener = input.listener});
+  Volume volume = read_input(*reader, {.path = member.path,
+                                       .companions = companions_of(member, members),
+                                       .task = input.task,
+                                       .listener = input.listener});
+  volume.name = std::string(base_of(member.name));
+  return volume;
 }
 
 }  // namespace

@@ -123,12 +123,12 @@ bool is_dicom(std::string_view head) {
   return dicom::find_beginning(std::as_bytes(std::span(head))).has_value();
 }
 
-Volume import_dicom(std::span<const std::filesystem::path> files, const std::string& series,
-                    const SizeLimits& limits, const std::filesystem::path& target) {
-  const std::filesystem::path scratch = target.parent_path();
+Volume import_dicom(std::span<const std::filesystem::path> files, const ImportTask& task) {
+  const auto& [source, scratch, target, options, limits] = task;
   const std::uint64_t most_bytes = limits.max_sample_bytes + dicom::kMostHeaderBytes;
   dicom::Upload upload = dicom::read_headers(files, scratch, most_bytes);
-  const std::vector<dicom::Source> sources = choose_series(std::move(upload.sources), series);
+  const std::vector<dicom::Source> sources =
+      choose_series(std::move(upload.sources), options.series);
   const dicom::Stack stack = dicom::make_stack(dicom::slices_of(sources));
   dicom::OpenFile file(sources, scratch, most_bytes);
   Volume volume = dicom::write_volume(stack, dicom::describe_volume(stack), file, limits, target);
@@ -136,13 +136,11 @@ Volume import_dicom(std::span<const std::filesystem::path> files, const std::str
   volume.presets = volume::presets_for(image.modality, image.rescale_type, volume.range);
   volume.ignored = std::move(upload.ignored);
   volume.dicom = dicom::identity_of(file.data());
+  if (!volume.dicom->series_description.empty()) volume.name = volume.dicom->series_description;
   volume.dicom->instances = dicom::instances_of(stack, sources);
   return volume;
 }
 
-Volume parse_dicom(const Input& input) {
-  const ImportTask& task = input.task;
-  return import_dicom({&input.path, 1}, task.options.series, task.limits, task.target);
-}
+Volume parse_dicom(const Input& input) { return import_dicom({&input.path, 1}, input.task); }
 
 }  // namespace isomesh::import

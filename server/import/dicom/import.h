@@ -15,19 +15,19 @@ namespace isomesh::import {
 bool is_dicom(std::string_view head);
 
 // The one volume that the images among `files` make: of slices in a file each, or of several frames
-// in one. `series` names the SeriesInstanceUID to take; it may be empty when there is only one.
+// in one. The task's options choose one of several series and volumes, and what is accepted; the
+// task's source is not looked at.
 // Files that are no images, and localisers, are left out and named in the volume's `ignored`. Of
 // several files the client is told the names, without folders, that they have here, which are those
-// of its upload. Temporary files lie beside `target`.
+// of its upload.
 //
 // Samples are what the modality means: rescaled by slope and intercept, MONOCHROME1 as it is stored
 // (no inversion), padding too. Integers stay integers where slopes and intercepts are integers.
 //
 // Throws Error kUnusableVolume with the reason, naming slices, when the images do not make one
-// trustworthy volume, and with one entry in `fields` per series, when there are several and
-// `series` names none of them; kTooLarge, kOutOfSpace, kInternal. Thread safe.
-Volume import_dicom(std::span<const std::filesystem::path> files, const std::string& series,
-                    const SizeLimits& limits, const std::filesystem::path& target);
+// trustworthy volume, with choices when there are several and none was chosen; kTooLarge,
+// kOutOfSpace, kInternal. Thread safe.
+Volume import_dicom(std::span<const std::filesystem::path> files, const ImportTask& task);
 
 // The volume of one file. Throws as import_dicom does.
 Volume parse_dicom(const Input& input);

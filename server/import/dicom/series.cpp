@@ -71,8 +71,8 @@ std::string count_of(std::int64_t count) {
   return std::to_string(count) + (count == 1 ? " slice" : " slices");
 }
 
-// One entry for each series: "1.2.3 (head, 93 slices)".
-std::vector<FieldError> list_series(std::span<const Source> sources) {
+// One entry for each series: "head, 93 slices".
+std::vector<Choice> list_series(std::span<const Source> sources) {
   struct Series {
     std::string description;
     std::int64_t slices = 0;
@@ -83,21 +83,21 @@ std::vector<FieldError> list_series(std::span<const Source> sources) {
     series.description = source.series_description;
     series.slices += source.frame_count;
   }
-  std::vector<FieldError> fields;
+  std::vector<Choice> choices;
   for (const auto& [uid, series] : all) {
     const std::string description = series.description.empty() ? "" : series.description + ", ";
-    fields.push_back({"series", uid + " (" + description + count_of(series.slices) + ')'});
+    choices.push_back({"series", uid, description + count_of(series.slices)});
   }
-  return fields;
+  return choices;
 }
 
-std::string joined_messages(const std::vector<FieldError>& fields) {
+std::string joined_titles(const std::vector<Choice>& choices) {
   constexpr std::size_t kMostNamed = 5;
   std::string text;
-  for (std::size_t i = 0; i < std::min(fields.size(), kMostNamed); ++i) {
-    text += (i == 0 ? "" : "; ") + fields[i].message;
+  for (std::size_t i = 0; i < std::min(choices.size(), kMostNamed); ++i) {
+    text += (i == 0 ? "" : "; ") + choices[i].title + " (" + choices[i].value + ')';
   }
-  return text + (fields.size() > kMostNamed ? "; ..." : "");
+  return text + (choices.size() > kMostNamed ? "; ..." : "");
 }
 
 }  // namespace
@@ -125,20 +125,17 @@ Upload read_headers(std::span<const std::filesystem::path> files,
 }
 
 std::vector<Source> choose_series(std::vector<Source> sources, const std::string& uid) {
-  const std::vector<FieldError> all = list_series(sources);
+  const std::vector<Choice> all = list_series(sources);
   if (!uid.empty()) {
     std::erase_if(sources, [&](const Source& source) { return source.series_uid != uid; });
     if (sources.empty()) {
-      throw Error(
-          ErrorCode::kUnusableVolume,
-          "The upload has no series " + in_quotes(uid) + ", but: " + joined_messages(all) + '.',
-          all);
+      throw_choice(
+          "The upload has no series " + in_quotes(uid) + ", but: " + joined_titles(all) + '.', all);
     }
   } else if (all.size() > 1) {
-    throw Error(ErrorCode::kUnusableVolume,
-                "The upload holds " + std::to_string(all.size()) +
-                    " series; choose one with series=UID: " + joined_messages(all) + '.',
-                all);
+    throw_choice("The upload holds " + std::to_string(all.size()) +
+                     " series; choose one with series=UID: " + joined_titles(all) + '.',
+                 all);
   }
   for (const Source& source : sources) {
     if (!source.fault) continue;

@@ -25,11 +25,14 @@ double milliseconds_since(std::int64_t begin_us) {
   return static_cast<double>(std::max<std::int64_t>(now_us() - begin_us, 1)) / 1000;
 }
 
-void check_volume(Connection& connection, const JobSpec& spec) {
+// The notes of the job's volume, which is to be there.
+std::vector<Note> notes_of_volume(Connection& connection, const JobSpec& spec) {
   const std::string& id = spec.parameters.volume;
-  Query volume =
-      connection.query("SELECT 1 FROM volumes WHERE owner = ? AND id = ?", spec.owner, id);
-  if (volume.next()) return;
+  Query volume = connection.query(
+      "SELECT coalesce(json_extract(record, '$.notes'), '[]') FROM volumes WHERE owner = ? AND id "
+      "= ?",
+      spec.owner, id);
+  if (volume.next()) return notes_from_json(volume.text(0));
   Query expired =
       connection.query("SELECT 1 FROM expired WHERE owner = ? AND id = ?", spec.owner, id);
   const bool is_gone = expired.next();
@@ -64,9 +67,10 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
         return {Submission::Kind::kExisting, with_progress(row_of(earlier)), {}};
       }
     }
-    check_volume(change.connection(), spec);
+    const std::vector<Note> notes = notes_of_volume(change.connection(), spec);
     row.owner = spec.owner;
-    row.result_key = result_key(spec.parameters.volume, spec.parameters, options_.mesher_version);
+    row.result_key =
+        result_key(spec.parameters.volume, notes, spec.parameters, options_.mesher_version);
     row.accepted = now_us();
     row.job.id = time_ordered_id();
     row.job.parameters = spec.parameters;

@@ -245,9 +245,11 @@ const Job& job_of(const Submission& submission) {
   return submission.job;
 }
 
-std::string result_key(const std::string& volume, const MeshParameters& parameters,
-                       const std::string& mesher_version) {
-  return sha256_of(mesher_version + '\n' + volume + '\n' + to_json(parameters));
+std::string result_key(const std::string& volume, const std::vector<Note>& notes,
+                       const MeshParameters& parameters, const std::string& mesher_version) {
+  std::string text = mesher_version + '\n' + volume + '\n' + to_json(parameters);
+  for (const Note& note : notes_in_mesh(notes)) text += '\n' + note.code + ": " + note.detail;
+  return sha256_of(text);
 }
 
 }  // namespace isomesh::store

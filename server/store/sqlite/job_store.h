@@ -101,7 +101,8 @@ class SqliteJobStore : public JobStore {
 };
 
 // The same for all jobs that make the same bytes, whatever else they are.
-std::string result_key(const std::string& volume, const MeshParameters& parameters,
-                       const std::string& mesher_version);
+// `notes` are the volume's: a mesh carries some of them.
+std::string result_key(const std::string& volume, const std::vector<Note>& notes,
+                       const MeshParameters& parameters, const std::string& mesher_version);
 
 }  // namespace isomesh::store

@@ -48,6 +48,18 @@ Volume SqliteVolumeStore::get(const Viewer& viewer, const std::string& id) const
   throw_missing(reading.connection(), viewer, id);
 }
 
+Volume SqliteVolumeStore::rename(const std::string& owner, const std::string& id,
+                                 const std::optional<std::string>& name) {
+  Transaction transaction(database_.writer());
+  auto volume = find(transaction.connection(), owner, id);
+  if (!volume) throw_missing(transaction.connection(), owner, id);
+  volume->name = name;
+  transaction->run("UPDATE volumes SET record = ? WHERE owner = ? AND id = ?", to_json(*volume),
+                   owner, id);
+  transaction.commit();
+  return *volume;
+}
+
 bool SqliteVolumeStore::contains(const Viewer& viewer, const std::string& id) const {
   const Reading reading(database_.reader());
   return find(reading.connection(), viewer, id).has_value();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +17,8 @@ class SqliteVolumeStore : public VolumeStore {
 
   std::pair<Volume, bool> add(const std::string& owner, const Volume& volume) override;
   Volume get(const Viewer& viewer, const std::string& id) const override;
+  Volume rename(const std::string& owner, const std::string& id,
+                const std::optional<std::string>& name) override;
   bool contains(const Viewer& viewer, const std::string& id) const override;
   std::vector<Volume> list(const Viewer& viewer, const std::string& after,
                            std::size_t limit) const override;

@@ -42,7 +42,7 @@ struct Outcome {
   std::string canonical;  // bytes of the whole file
   std::string error;      // empty when it was imported
   ErrorCode code = ErrorCode::kInternal;
-  std::vector<FieldError> fields;
+  Remedy remedy;  // what the refusal offers
 
   bool imported() const { return error.empty(); }
   std::string_view sample_bytes() const { return std::string_view(canonical).substr(kHeaderBytes); }

@@ -4,7 +4,7 @@ namespace isomesh::test {
 
 Volume JobsFixture::add_raw(const std::string& bytes, const RawDescription& description) {
   write_file(folder_ / "upload", bytes);
-  return library_.add("", folder_ / "upload", {.raw = description, .series = {}}).first;
+  return library_.add("", folder_ / "upload", {.raw = description}).first;
 }
 
 Volume JobsFixture::add_sphere() {

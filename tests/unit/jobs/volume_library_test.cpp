@@ -24,8 +24,7 @@ class VolumeLibraryTest : public test::JobsFixture {
                         {.raw = RawDescription{.dims = kDims,
                                                .type = SampleType::kUint8,
                                                .geometry = geometry,
-                                               .big_endian = false},
-                         .series = {}});
+                                               .big_endian = false}});
   }
 
   const std::string bytes_ = "abcdefghijklmnopqrstuvwx";
@@ -99,7 +98,7 @@ TEST_F(VolumeLibraryTest, SamplesStayUntilTheirLastOwnerGoes) {
   test::write_file(folder_ / "upload", bytes_);
   const RawDescription raw{
       .dims = kDims, .type = SampleType::kUint8, .geometry = {}, .big_endian = false};
-  const process::ImportOptions options{.raw = raw, .series = {}};
+  const process::ImportOptions options{.raw = raw};
   const std::string id = library_.add("one", folder_ / "upload", options).first.id;
   EXPECT_TRUE(library_.add("other", folder_ / "upload", options).second);
   EXPECT_EQ(blob_count(), 1U);
@@ -122,7 +121,7 @@ TEST_F(VolumeLibraryTest, OfManyEqualUploadsOneIsNew) {
     threads.emplace_back([&] {
       const RawDescription raw{
           .dims = kDims, .type = SampleType::kUint8, .geometry = {}, .big_endian = false};
-      if (library_.add("", folder_ / "upload", {.raw = raw, .series = {}}).second) ++added;
+      if (library_.add("", folder_ / "upload", {.raw = raw}).second) ++added;
     });
   }
   threads.clear();

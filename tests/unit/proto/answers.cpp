@@ -59,6 +59,8 @@ Volume dicom_volume() {
   volume.format = "dicom";
   volume.modality = "CT";
   volume.presets = {{"skin", -300}, {"bone", 250}};
+  volume.name = "M\xc3\xbcller CT";
+  volume.notes = {{"frame-of-reference", "Every slice has another one."}};
   volume.ignored = {{"DICOMDIR", "it is a directory of DICOM files"}};
   volume.dicom = DicomIdentity{.patient_name = "M\xc3\xbcller^Eva",
                                .patient_id = "4711",
@@ -104,7 +106,9 @@ Problem some_problem() {
           .status = 400,
           .detail = "iso: is required",
           .instance = "/v1/jobs",
-          .errors = {{"iso", "is required"}, {"volume", "is required"}}};
+          .errors = {{"iso", "is required"}, {"volume", "is required"}},
+          .remedy = {.overridable = "frame-of-reference",
+                     .choices = {{"volume", "0", "0 s"}, {"volume", "1", "2 s"}}}};
 }
 
 Job queued_job() {

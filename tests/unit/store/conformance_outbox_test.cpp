@@ -92,7 +92,7 @@ TEST(ResultKey, KnowsVolumeParametersAndVersionAlone) {
   JobParameters parameters;
   parameters.volume = "abc";
   const auto key = [&](const std::string& version) {
-    return result_key(parameters.volume, parameters, version);
+    return result_key(parameters.volume, {}, parameters, version);
   };
   const std::string first = key("1");
   parameters.priority = Priority::kStat;

@@ -270,7 +270,7 @@ std::string compressed(std::string_view transfer_syntax, const dicom::PixelLayou
   return result;
 }
 
-Outcome import_objects(const NamedFiles& files, const std::string& series,
+Outcome import_objects(const NamedFiles& files, const ImportOptions& options,
                        const SizeLimits& limits) {
   const Folder sources;
   const Folder target;
@@ -278,12 +278,16 @@ Outcome import_objects(const NamedFiles& files, const std::string& series,
   for (const auto& [name, bytes] : files) paths.push_back(sources.write(name, bytes));
   Outcome outcome;
   try {
-    outcome.volume = import_dicom(paths, series, limits, target.path("target"));
+    outcome.volume = import_dicom(paths, {.source = {},
+                                          .scratch = target.path(""),
+                                          .target = target.path("target"),
+                                          .options = options,
+                                          .limits = limits});
     outcome.canonical = read_file(target.path("target"));
   } catch (const Error& error) {
     outcome.code = error.code();
     outcome.error = error.what();
-    outcome.fields = error.fields();
+    outcome.remedy = error.remedy();
   }
   std::filesystem::remove(target.path("target"));
   if (target.entries() != 0) throw std::logic_error("an import left files behind");

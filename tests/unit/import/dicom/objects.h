@@ -97,7 +97,7 @@ std::string compressed(std::string_view transfer_syntax, const dicom::PixelLayou
 using NamedFiles = std::vector<std::pair<std::string, std::string>>;
 
 // Imports files by names and bytes as import_dicom does; scratch files that are left are an error.
-Outcome import_objects(const NamedFiles& files, const std::string& series = "",
+Outcome import_objects(const NamedFiles& files, const ImportOptions& options = {},
                        const SizeLimits& limits = {});
 
 }  // namespace isomesh::import::test

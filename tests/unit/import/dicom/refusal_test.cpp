@@ -222,16 +222,16 @@ TEST(DicomRefusal, OfASingleSlice) {
 
 TEST(DicomRefusal, OfWhatExceedsTheLimits) {
   const Outcome outcome =
-      import_objects(DicomSeries{}.files(), "", {.max_sample_bytes = 6 * 20 * 2 - 1});
+      import_objects(DicomSeries{}.files(), {}, {.max_sample_bytes = 6 * 20 * 2 - 1});
   EXPECT_EQ(outcome.code, ErrorCode::kTooLarge);
-  EXPECT_EQ(import_objects(DicomSeries{}.files(), "", {.max_sample_bytes = 6 * 20 * 2}).error, "");
+  EXPECT_EQ(import_objects(DicomSeries{}.files(), {}, {.max_sample_bytes = 6 * 20 * 2}).error, "");
 }
 
 TEST(DicomRefusal, OfAFileThatInflatesWithoutEnd) {
   DicomObject object = DicomSeries{}.slice(0);
   object.pixels(std::string(std::size_t{80} << 20, '\0'), 2);
   const Outcome outcome =
-      import_objects({{"bomb", object.file(kDeflate)}}, "", {.max_sample_bytes = 1 << 20});
+      import_objects({{"bomb", object.file(kDeflate)}}, {}, {.max_sample_bytes = 1 << 20});
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
   EXPECT_THAT(outcome.error, HasSubstr("deflated file holds more"));
 }
@@ -275,23 +275,23 @@ TEST(DicomChoice, IsAskedForWhenThereAreSeveralSeries) {
   const Outcome outcome = import_objects(two_series());
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
   EXPECT_THAT(outcome.error, HasSubstr("2 series"));
-  EXPECT_THAT(outcome.fields,
-              testing::ElementsAre(FieldError{"series", "1.2.3.4 (6 slices)"},
-                                   FieldError{"series", "1.2.3.9 (scout, 4 slices)"}));
+  EXPECT_THAT(outcome.remedy.choices,
+              testing::ElementsAre(Choice{"series", "1.2.3.4", "6 slices"},
+                                   Choice{"series", "1.2.3.9", "scout, 4 slices"}));
 }
 
 TEST(DicomChoice, TakesTheSeriesThatIsNamed) {
-  const Outcome outcome = import_objects(two_series(), "1.2.3.9");
+  const Outcome outcome = import_objects(two_series(), {.series = "1.2.3.9"});
   ASSERT_EQ(outcome.error, "");
   EXPECT_EQ(outcome.volume.dims[2], 4);
   EXPECT_EQ(outcome.volume.dicom->series_uid, "1.2.3.9");
 }
 
 TEST(DicomChoice, ListsAllForAnUnknownName) {
-  const Outcome outcome = import_objects(two_series(), "1.2");
+  const Outcome outcome = import_objects(two_series(), {.series = "1.2"});
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
   EXPECT_THAT(outcome.error, HasSubstr("\"1.2\""));
-  EXPECT_EQ(outcome.fields.size(), 2);
+  EXPECT_EQ(outcome.remedy.choices.size(), 2);
 }
 
 TEST(DicomChoice, IsNotHinderedByFaultsOfOthers) {
@@ -302,9 +302,9 @@ TEST(DicomChoice, IsNotHinderedByFaultsOfOthers) {
                                    .number(kSamplesPerPixel, 3)
                                    .text(kPhotometricInterpretation, "CS", "RGB")
                                    .file());
-  EXPECT_EQ(import_objects(files).fields.size(), 2);
-  EXPECT_EQ(import_objects(files, "1.2.3.4").error, "");
-  EXPECT_THAT(import_objects(files, "1.9").error, HasSubstr("in colour"));
+  EXPECT_EQ(import_objects(files).remedy.choices.size(), 2);
+  EXPECT_EQ(import_objects(files, {.series = "1.2.3.4"}).error, "");
+  EXPECT_THAT(import_objects(files, {.series = "1.9"}).error, HasSubstr("in colour"));
 }
 
 TEST(DicomIgnored, AreNamedWithTheirReasons) {

@@ -1,0 +1,172 @@
+#include "server/http/import_query.h"
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/errors.h"
+
+namespace isomesh::http {
+namespace {
+
+using test::code_thrown_by;
+using test::fields_of;
+using test::thrown_by;
+using testing::ElementsAre;
+using testing::UnorderedElementsAre;
+using Pairs = std::vector<std::pair<std::string, std::string>>;
+
+Request with_query(const Pairs& parameters) {
+  Request request;
+  request.query = parameters;
+  return request;
+}
+
+TEST(RawDescription, IsNoneWithoutDims) { EXPECT_FALSE(raw_description_of(Request())); }
+
+TEST(RawDescription, NeedsDimsAndTypeOnly) {
+  const auto raw = raw_description_of(with_query({{"dims", "3,4,5"}, {"type", "int16"}}));
+  ASSERT_TRUE(raw);
+  EXPECT_EQ(raw->dims, (std::array<std::uint32_t, 3>{3, 4, 5}));
+  EXPECT_EQ(raw->type, SampleType::kInt16);
+  EXPECT_EQ(raw->geometry, Geometry{});
+  EXPECT_FALSE(raw->big_endian);
+}
+
+TEST(RawDescription, TakesEveryParameter) {
+  const auto raw = raw_description_of(with_query({{"dims", "3, 4,5"},
+                                                  {"type", "float64"},
+                                                  {"spacing", "0.5,1e-1,2"},
+                                                  {"origin", "-1,0,1.5"},
+                                                  {"direction", "0,1,0,1,0,0,0,0,-1"},
+                                                  {"byte_order", "big"}}));
+  ASSERT_TRUE(raw);
+  EXPECT_EQ(raw->type, SampleType::kFloat64);
+  EXPECT_EQ(raw->geometry.spacing, (std::array<double, 3>{0.5, 0.1, 2}));
+  EXPECT_EQ(raw->geometry.origin, (std::array<double, 3>{-1, 0, 1.5}));
+  EXPECT_EQ(raw->geometry.direction, (std::array<double, 9>{0, 1, 0, 1, 0, 0, 0, 0, -1}));
+  EXPECT_TRUE(raw->big_endian);
+}
+
+TEST(RawDescription, WhatIsMalformedIsRefusedByName) {
+  for (const auto& [name, value] : Pairs{{"dims", ""},
+                                         {"dims", "3,4"},
+                                         {"dims", "3,4,5,6"},
+                                         {"dims", "3,4,-5"},
+                                         {"dims", "3,4,5.5"},
+                                         {"dims", "3,4,4294967296"},
+                                         {"dims", "a,b,c"},
+                                         {"dims", "3,,5"},
+                                         {"type", ""},
+                                         {"type", "int64"},
+                                         {"type", "UINT8"},
+                                         {"spacing", "1,1"},
+                                         {"spacing", "1,1,x"},
+                                         {"origin", "0"},
+                                         {"direction", "1,0,0,0,1,0,0,0"},
+                                         {"byte_order", "middle"},
+                                         {"byte_order", ""}}) {
+    Pairs query = {{"dims", "3,4,5"}, {"type", "uint8"}};
+    std::erase_if(query, [&, name = name](const auto& pair) { return pair.first == name; });
+    query.emplace_back(name, value);
+    const auto error = thrown_by([&] { raw_description_of(with_query(query)); });
+    ASSERT_TRUE(error) << name << '=' << value;
+    EXPECT_THAT(fields_of(*error), ElementsAre(name)) << value;
+  }
+}
+
+TEST(RawDescription, PartsOfItWithoutDimsAreRefused) {
+  for (const std::string name : {"type", "spacing", "origin", "direction", "byte_order"}) {
+    const auto error = thrown_by([&] { raw_description_of(with_query({{name, "1"}})); });
+    ASSERT_TRUE(error) << name;
+    EXPECT_THAT(fields_of(*error), ElementsAre("dims"));
+  }
+}
+
+TEST(ImportParameters, AreAllThatAreRead) {
+  EXPECT_THAT(import_parameters(),
+              UnorderedElementsAre("dims", "type", "spacing", "origin", "direction", "byte_order",
+                                   "series", "member", "volume", "accept", "nifti_form"));
+}
+
+TEST(ImportOptionsOf, TakesASeries) {
+  const auto options = import_options_of(with_query({{"series", "1.2.840.113619.2.30"}}));
+  EXPECT_EQ(options.series, "1.2.840.113619.2.30");
+  EXPECT_FALSE(options.raw);
+  EXPECT_TRUE(import_options_of(with_query({})).series.empty());
+}
+
+TEST(ImportOptionsOf, RefusesASeriesThatIsNoUid) {
+  for (const std::string& series : {std::string(), std::string("1.2.x"), std::string("../1"),
+                                    std::string("1.2 "), std::string(65, '1')}) {
+    const auto error = thrown_by([&] { import_options_of(with_query({{"series", series}})); });
+    ASSERT_TRUE(error) << series;
+    EXPECT_THAT(fields_of(*error), ElementsAre("series"));
+  }
+}
+
+TEST(ImportOptionsOf, RawSamplesHaveNothingToChoose) {
+  for (const auto& [name, value] : Pairs{{"series", "1.2"},
+                                         {"member", "a.nrrd"},
+                                         {"volume", "1"},
+                                         {"accept", "frame-of-reference"},
+                                         {"nifti_form", "sform"}}) {
+    const Pairs query = {{"dims", "3,4,5"}, {"type", "int16"}, {name, value}};
+    const auto error = thrown_by([&] { import_options_of(with_query(query)); });
+    ASSERT_TRUE(error) << name;
+    EXPECT_THAT(fields_of(*error), ElementsAre(name));
+  }
+}
+
+TEST(ImportOptionsOf, TakesWhatChoosesAndAccepts) {
+  const auto options = import_options_of(with_query({{"member", "sub/ct.nrrd"},
+                                                     {"volume", "0"},
+                                                     {"accept", "frame-of-reference"},
+                                                     {"nifti_form", "qform"}}));
+  EXPECT_EQ(options.member, "sub/ct.nrrd");
+  EXPECT_EQ(options.volume, 0U);
+  EXPECT_TRUE(options.accepts(NoteCode::kFrameOfReference));
+  EXPECT_EQ(options.nifti_form, NiftiForm::kQform);
+  const auto none = import_options_of(with_query({}));
+  EXPECT_FALSE(none.volume || none.nifti_form || none.accepts(NoteCode::kFrameOfReference));
+}
+
+TEST(ImportOptionsOf, RefusesOtherValues) {
+  for (const auto& [name, value] : Pairs{{"member", ""},
+                                         {"member", "a\nb"},
+                                         {"volume", "-1"},
+                                         {"volume", "4294967296"},
+                                         {"volume", "one"},
+                                         {"accept", ""},
+                                         {"accept", "missing-slices"},
+                                         {"accept", "forms-differ"},
+                                         {"accept", "frame-of-reference,"},
+                                         {"nifti_form", "both"}}) {
+    const auto error = thrown_by([&] { import_options_of(with_query({{name, value}})); });
+    ASSERT_TRUE(error) << name << '=' << value;
+    EXPECT_THAT(fields_of(*error), ElementsAre(name)) << value;
+  }
+}
+
+TEST(FileNameOf, IsWhatTheHeaderTells) {
+  EXPECT_EQ(file_name_of("attachment; filename=\"a b.nii.gz\""), "a b.nii.gz");
+  EXPECT_EQ(file_name_of("attachment; filename=ct.nrrd; x=y"), "ct.nrrd");
+  EXPECT_EQ(file_name_of("attachment; filename=\"x\"; FileName*=UTF-8''M%C3%BCller%20ct"),
+            "M\xC3\xBCller ct");
+  EXPECT_EQ(file_name_of("attachment; filename=\"..\\\\secret\\\\a.nii\""), "a.nii");
+  EXPECT_EQ(file_name_of("attachment; filename*=UTF-8''%2Fetc%2F%0A%zz%4"), "%zz%4");
+  EXPECT_EQ(file_name_of("attachment"), "");
+  EXPECT_EQ(file_name_of(""), "");
+}
+
+TEST(PlainFileName, IsCutBetweenCharacters) {
+  std::string name(254, 'a');
+  EXPECT_EQ(plain_file_name(name + "\xC3\xBC"), name);
+  EXPECT_EQ(plain_file_name(name + "b"), name + "b");
+}
+
+}  // namespace
+}  // namespace isomesh::http
