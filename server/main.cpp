@@ -167,7 +167,7 @@ int run(const Options& options, const sigset_t& signals) {
   const callbacks::CallbackTargets targets(options.callback_targets);
   if (options.threads > 0) mesh::set_thread_count(options.threads);
 
-  const store::DataFolder folder(options.data);
+  const store::DataFolder folder(options.data, options.disk_reserve);
   store::Database database(folder);
   const auto keep = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::duration<double, std::chrono::days::period>(options.keep_days));

@@ -112,6 +112,11 @@ void add_options(CLI::App& cli, Options& options) {
       ->envname("ISOMESH_MAX_DISK")
       ->transform(CLI::AsSizeValue(false))
       ->capture_default_str();
+  cli.add_option("--disk-reserve", options.disk_reserve,
+                 "Bytes kept on the disk so that a full one can be freed; a 32nd of it, 64 MiB at "
+                 "most, unless set")
+      ->envname("ISOMESH_DISK_RESERVE")
+      ->transform(CLI::AsSizeValue(false));
   cli.add_option("--lease-seconds", options.lease_seconds,
                  "How long a job stays with a worker that shows no sign of life")
       ->envname("ISOMESH_LEASE_SECONDS")

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,7 @@ struct Options {
   store::JobStoreOptions jobs;
   double keep_days = 30;
   std::uint64_t max_disk = 0;
+  std::optional<std::uint64_t> disk_reserve;  // empty: what is usual on a disk of that size
   store::OperatorsWord word;
   unsigned lease_seconds = 30;
   unsigned longest_job_minutes = 60;

@@ -43,6 +43,7 @@ Error incomplete(const BodyReader& body) {
 
 // Refuses a body that is longer than the free room before any of it is written.
 void check_room(const store::DataFolder& folder, const Request& request) {
+  folder.reserve().check_room();
   if (!request.content_length) return;
   std::error_code error;
   const auto space = std::filesystem::space(folder.scratch(), error);
@@ -55,8 +56,9 @@ void check_room(const store::DataFolder& folder, const Request& request) {
 // through, so that it is kept and ends the reading.
 class Receiver {
  public:
-  Receiver(store::File& file, const UploadLimits& limits, const std::atomic<bool>& stopping)
-      : file_(file), limits_(limits), stopping_(stopping) {}
+  Receiver(store::File& file, store::Reserve& reserve, const UploadLimits& limits,
+           const std::atomic<bool>& stopping)
+      : file_(file), reserve_(reserve), limits_(limits), stopping_(stopping) {}
 
   bool take(std::string_view data) {
     try {
@@ -69,6 +71,7 @@ class Receiver {
             "the upload took longer than " + std::to_string(limits_.max_time.count()) + " seconds");
       }
       const auto piece = std::as_bytes(std::span(data));
+      reserve_.check_room();
       file_.write(piece);
       digest_.update(piece);
       return true;
@@ -106,6 +109,7 @@ class Receiver {
 
  private:
   store::File& file_;
+  store::Reserve& reserve_;
   const UploadLimits& limits_;
   const std::atomic<bool>& stopping_;
   const std::chrono::steady_clock::time_point deadline_ =
@@ -131,7 +135,7 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
     throw invalid_parameter("Content-Digest", "is not supported with a form: send the bare file");
   }
   store::File file = store::File::create(path_);
-  Receiver receiver(file, limits, stopping);
+  Receiver receiver(file, folder.reserve(), limits, stopping);
   const auto take = [&](std::string_view piece) { return receiver.take(piece); };
   const bool complete = is_form ? request.body->read_form(
                                       [&](const std::string& name, const std::string& file_name) {

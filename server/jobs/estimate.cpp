@@ -6,6 +6,7 @@
 
 #include "proto/samples.h"
 #include "server/codec/encode.h"
+#include "server/jobs/stored_samples.h"
 #include "server/mesh/extract.h"
 #include "server/volume/canonical.h"
 
@@ -118,7 +119,7 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
 
 SurfaceSize Estimator::count(const Volume& volume, const mesh::ExtractOptions& options) {
   const auto size = counts_.get({volume.id, options.iso, options.scheme, options.close}, [&] {
-    const store::LocalBlob file = blobs_.local(volume.id);
+    const store::LocalBlob file = stored_samples(blobs_, volume.id, stop_.get_token());
     const volume::CanonicalVolume canonical(file.path);
     return with_sample(volume.type, [&](auto sample) {
       return count_as<decltype(sample)>(canonical, options, stop_.get_token());

@@ -64,7 +64,8 @@ class Estimator {
 
   // Triangles and vertices are exact, before the filter of components; the rest follows from them
   // and from the jobs that this daemon has finished. Throws Error kNotFound without the volume,
-  // kUnavailable when too many wait for an estimate already or after stop().
+  // kUnusableVolume when the stored samples are damaged, kUnavailable when too many wait for an
+  // estimate already or after stop().
   Estimate estimate(const store::Viewer& viewer, const JobParameters& parameters);
 
   // Ends the counting that is under way, for good.

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "server/jobs/stored_samples.h"
 #include "server/mesh/parallel.h"
 #include "server/volume/canonical.h"
 
@@ -35,7 +36,8 @@ volume::ValueCounts count_values(const volume::CanonicalVolume& canonical, const
 
 Histogram Histograms::of(const Volume& volume, std::size_t bins) {
   const auto values = counts_.get(volume.id, [&] {
-    return count_values(volume::CanonicalVolume(blobs_.local(volume.id).path), volume);
+    const store::LocalBlob file = stored_samples(blobs_, volume.id);
+    return count_values(volume::CanonicalVolume(file.path), volume);
   });
   return {volume.id, volume.range, volume::rebinned(*values, bins)};
 }

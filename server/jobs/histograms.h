@@ -20,7 +20,8 @@ class Histograms {
 
   explicit Histograms(const store::BlobStore& blobs) : blobs_(blobs) {}
 
-  // Throws Error kUnavailable when too many wait for one already, kInternal.
+  // Throws Error kUnavailable when too many wait for one already, kUnusableVolume when the
+  // stored samples are damaged, kInternal.
   Histogram of(const Volume& volume, std::size_t bins);
 
  private:

@@ -3,27 +3,10 @@
 #include <memory>
 #include <vector>
 
+#include "server/jobs/stored_samples.h"
 #include "server/volume/canonical.h"
 
 namespace isomesh::jobs {
-namespace {
-
-// The volume's file, once its bytes are known to be those that its id names: a mesh of samples that
-// a disk has spoilt would look like any other.
-store::LocalBlob checked_file(const Volume& volume, const store::BlobStore& blobs,
-                              const std::stop_token& stop) {
-  const Error spoilt(ErrorCode::kUnusableVolume, "the stored volume is damaged: upload it again");
-  try {
-    if (!blobs.is_intact(volume.id, stop)) throw spoilt;
-    return blobs.local(volume.id);
-  } catch (const Error& error) {
-    if (error.code() == ErrorCode::kNotFound) throw spoilt;
-    throw;
-  }
-}
-
-}  // namespace
-
 void Workspace::trim(std::size_t budget_bytes) {
   const std::size_t held = mesh.positions.capacity_bytes() + mesh.triangles.capacity_bytes();
   if (held > budget_bytes) *this = {};
@@ -34,7 +17,7 @@ PipelineResult run_pipeline(const Volume& volume, const MeshParameters& paramete
                             Workspace& workspace, std::stop_token stop, const Report& report) {
   Progress progress(stop, report);
   progress.enter(Stage::kLoad, kLoadShare, &Timing::load);
-  const store::LocalBlob file = checked_file(volume, blobs, stop);
+  const store::LocalBlob file = stored_samples(blobs, volume.id, stop);
   const volume::CanonicalVolume canonical(file.path);
   canonical.preload();
 

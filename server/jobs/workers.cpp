@@ -125,7 +125,9 @@ void Workers::work(const std::stop_token& stop, const std::string& name) {
   Workspace workspace;
   while (!stop.stop_requested()) {
     try {
-      if (const auto lease = jobs_.claim(name, options_.lease)) {
+      if (!blobs_.has_room()) {
+        pause(stop, kLongestIdle);
+      } else if (const auto lease = jobs_.claim(name, options_.lease)) {
         run(*lease, workspace);
         workspace.trim(kWorkspaceBudgetBytes);
       } else {

@@ -74,6 +74,9 @@ class BlobStore {
 
   virtual std::unique_ptr<BlobWriter> begin() const = 0;
 
+  // False while there is so little room that nothing new should be begun.
+  virtual bool has_room() const = 0;
+
   // Makes a finished file of this machine a blob on disk and removes it. `blob` is what digest_of
   // has just said of the file, so that is_intact() need not read it again. Throws Error
   // kOutOfSpace.
@@ -86,7 +89,8 @@ class BlobStore {
   virtual LocalBlob local(const std::string& key) const = 0;
 
   // Whether the bytes are those that the key names. A blob that was read whole and found intact is
-  // not read again for a while, as long as nothing has touched it. Throws Error kNotFound, and
+  // not read again for a while, as long as nothing has touched it; one that several ask for is read
+  // once. Throws Error kNotFound, and
   // kCancelled when `stop` is requested while it reads.
   virtual bool is_intact(const std::string& key, const std::stop_token& stop) const = 0;
 
@@ -113,5 +117,9 @@ class BlobStore {
   // Removes what has been in quarantine since before that time. Returns how many.
   virtual std::size_t empty_quarantine(Time before) const = 0;
 };
+
+// The same as is_intact, and false when it is not there.
+bool is_there_and_intact(const BlobStore& blobs, const std::string& key,
+                         const std::stop_token& stop);
 
 }  // namespace isomesh::store

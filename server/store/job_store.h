@@ -133,9 +133,16 @@ class JobStore {
  public:
   virtual ~JobStore() = default;
 
-  // Stores a job. One whose mesh the owner has already is finished at once, with `reused` set.
+  // Stores a job. One whose mesh the owner has already, undamaged, is finished at once, with
+  // `reused` set.
   // Throws Error kNotFound or kGone when the owner has no such volume.
   virtual Submission submit(const JobSpec& spec) = 0;
+
+  // Has the mesh of a job that succeeded made again, because its blobs are damaged: by a job like
+  // it, which makes the same bytes. Returns that job: one that is under way already, or has failed,
+  // or a new one. Throws Error kNotFound or kGone, kGone also when the mesh cannot be made again,
+  // and kUnavailable when the queue is full.
+  virtual Job remake(const std::string& id) = 0;
 
   // The next job by priority, then age, for `lease` from now. A job whose like is running for the
   // same owner is left until that one has ended. Empty when there is none.

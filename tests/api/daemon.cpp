@@ -8,8 +8,10 @@ namespace isomesh::test {
 namespace {
 
 std::vector<std::string> command_line(const std::filesystem::path& data, const std::string& listen,
-                                      const std::vector<std::string>& arguments) {
-  std::vector<std::string> command = {ISOMESHD, "--listen", listen, "--data", data};
+                                      const std::vector<std::string>& arguments,
+                                      const std::vector<std::string>& prefix = {}) {
+  std::vector<std::string> command = prefix;
+  command.insert(command.end(), {ISOMESHD, "--listen", listen, "--data", data});
   command.insert(command.end(), arguments.begin(), arguments.end());
   return command;
 }
@@ -26,8 +28,8 @@ Daemon::Daemon(const std::vector<std::string>& arguments)
 }
 
 Daemon::Daemon(const std::filesystem::path& data, const std::string& listen,
-               const std::vector<std::string>& arguments)
-    : data_(data), process_(command_line(data, listen, arguments)) {
+               const std::vector<std::string>& arguments, const std::vector<std::string>& prefix)
+    : data_(data), process_(command_line(data, listen, arguments, prefix)) {
   begin();
 }
 

@@ -20,9 +20,11 @@ class Daemon {
  public:
   // `arguments` are added to those. Throws std::runtime_error when it does not listen.
   explicit Daemon(const std::vector<std::string>& arguments = {});
-  // On a data folder that outlives it and the address of a --listen.
+  // On a data folder that outlives it and the address of a --listen; `prefix` comes before its
+  // program's name.
   Daemon(const std::filesystem::path& data, const std::string& listen,
-         const std::vector<std::string>& arguments = {});
+         const std::vector<std::string>& arguments = {},
+         const std::vector<std::string>& prefix = {});
 
   // As its first line names it: http://127.0.0.1:PORT or unix:PATH.
   const std::string& url() const { return url_; }

@@ -136,6 +136,17 @@ void probe_meshes(Statuses& statuses, const Job& job, const Job& running) {
   statuses.probe("GET /", "/", {}, {{"If-None-Match", "*"}});
 }
 
+// What is asked of a volume whose samples the disk has spoilt.
+void probe_damaged(Statuses& statuses, const Daemon& daemon) {
+  const std::string id =
+      volume_from_json(daemon.send("POST", "/v1/volumes?dims=2,2,2&type=uint8", "87654321").body)
+          .id;
+  write_file(daemon.data() / "blobs" / id.substr(0, 2) / id, "spoilt");
+  statuses.probe("GET /v1/volumes/{id}/histogram", "/v1/volumes/" + id + "/histogram");
+  statuses.probe("GET /v1/volumes/{id}/slice.png", "/v1/volumes/" + id + "/slice.png");
+  statuses.probe("GET /v1/estimate", "/v1/estimate?iso=1&volume=" + id);
+}
+
 // Both ways: what is answered is described, and what is described is answered.
 TEST_F(OpenApiTest, TheStatusesAreThoseOfTheServer) {
   const Job running = long_job(daemon_);
@@ -143,6 +154,7 @@ TEST_F(OpenApiTest, TheStatusesAreThoseOfTheServer) {
   probe_jobs(statuses, job_);
   probe_meshes(statuses, job_, running);
   probe_volumes(statuses, running, job_.parameters.volume);
+  probe_damaged(statuses, daemon_);
   for (const auto& path : api_.paths()) {
     for (const auto& operation : path.second) {
       std::string name = operation.first.as<std::string>();

@@ -6,6 +6,7 @@
 #include "server/http/answers/sources.h"
 #include "server/http/request_values.h"
 #include "server/http/routes/routes.h"
+#include "server/jobs/stored_samples.h"
 #include "server/volume/slice.h"
 
 namespace isomesh::http {
@@ -59,8 +60,8 @@ void slice(App& app, const Request& request, Response& response) {
                            std::to_string(choice.index) + '.' + to_text(choice.window[0]) + '.' +
                            to_text(choice.window[1]) + '"';
   if (is_known(request, response, etag)) return;
-  const auto canonical =
-      std::make_shared<const volume::CanonicalVolume>(app.services.blobs.local(volume.id).path);
+  const auto canonical = std::make_shared<const volume::CanonicalVolume>(
+      jobs::stored_samples(app.services.blobs, volume.id).path);
   auto picture = std::make_unique<volume::SlicePng>(canonical, choice);
   const bool in_chunks = request.version != "HTTP/1.0";
   response.status = 200;

@@ -5,6 +5,8 @@
 #include <set>
 #include <vector>
 
+#include <spdlog/spdlog.h>
+
 #include "base/sha256.h"
 #include "proto/json.h"
 #include "server/codec/encode.h"
@@ -88,6 +90,15 @@ std::optional<Continuation> mesh_in_one(App& app, const Request& request, Respon
   return answer_at_end(app, request, response, job, kLongestJob, answer);
 }
 
+// Has a damaged file made again, and says what becomes of that.
+void check_intact(const App& app, const Job& job, const MeshFile& file) {
+  if (store::is_there_and_intact(app.services.blobs, file.sha256, {})) return;
+  spdlog::error("the mesh of job {} is damaged", job.id);
+  const Job again = app.services.jobs.remake(job.id);
+  if (again.error) throw to_error(*again.error);
+  throw Error(ErrorCode::kUnavailable, "the stored mesh was damaged and is made again");
+}
+
 }  // namespace
 
 void answer_mesh(const App& app, const Request& request, Response& response, const Job& job,
@@ -120,6 +131,7 @@ void answer_mesh(const App& app, const Request& request, Response& response, con
     response.status = 304;
     return;
   }
+  check_intact(app, job, file);
   const ByteRange range = part.value_or(ByteRange{0, file.bytes});
   response.status = part ? 206 : 200;
   if (part) {

@@ -9,6 +9,9 @@ void add_service_routes(App& app) {
   add_get(app, "/readyz", [&app](const auto& /*request*/, auto& response) {
     if (app.draining) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
     if (app.services.jobs.is_full()) throw Error(ErrorCode::kUnavailable, "the queue is full");
+    if (!app.services.blobs.has_room()) {
+      throw Error(ErrorCode::kUnavailable, "the disk is full: nothing new is accepted");
+    }
     response.set_body("ok\n", "text/plain");
   });
   add_get(app, "/openapi.yaml", [](const auto& /*request*/, auto& response) {

@@ -89,6 +89,7 @@ class FileBlobStore::Writer : public BlobWriter {
   }
 
   void write(std::span<const std::byte> bytes) override {
+    store_.folder_.reserve().check_room();  // which is there to free more, not to be filled
     file_.write(bytes);
     digest_.update(bytes);
     bytes_ += bytes.size();
@@ -96,7 +97,7 @@ class FileBlobStore::Writer : public BlobWriter {
 
   Blob commit() override {
     const std::string key = to_hex(digest_.finish());
-    store_.publish_as(path_, file_, key);
+    store_.believe(key, store_.publish_as(path_, file_, key));
     return {key, bytes_};
   }
 
@@ -108,6 +109,23 @@ class FileBlobStore::Writer : public BlobWriter {
   std::uint64_t bytes_ = 0;
 };
 
+// Has others that ask for the same blob wait.
+class FileBlobStore::CheckUnderWay {
+ public:
+  CheckUnderWay(const FileBlobStore& store, const std::string& key) : store_(store), key_(key) {}
+  ~CheckUnderWay() {
+    const Lock lock(store_.intact_mutex_);
+    store_.under_check_.erase(key_);
+    store_.checked_.notify_all();
+  }
+  CheckUnderWay(const CheckUnderWay&) = delete;
+  CheckUnderWay& operator=(const CheckUnderWay&) = delete;
+
+ private:
+  const FileBlobStore& store_;
+  const std::string& key_;
+};
+
 Blob digest_of(const std::filesystem::path& path) {
   const File file = File::open(path);
   file.begin_sync();
@@ -117,6 +135,7 @@ Blob digest_of(const std::filesystem::path& path) {
 std::unique_ptr<BlobWriter> FileBlobStore::begin() const { return std::make_unique<Writer>(*this); }
 
 void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) const {
+  folder_.reserve().check_room();
   believe(blob.key, publish_as(file, File::open(file), blob.key));
 }
 
@@ -129,18 +148,31 @@ LocalBlob FileBlobStore::local(const std::string& key) const {
   return {found(key)};
 }
 
+bool is_there_and_intact(const BlobStore& blobs, const std::string& key,
+                         const std::stop_token& stop) {
+  try {
+    return blobs.is_intact(key, stop);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kNotFound) return false;
+    throw;
+  }
+}
+
 bool FileBlobStore::is_intact(const std::string& key, const std::stop_token& stop) const {
   const std::filesystem::path place = found(key);
   const std::string traits = traits_of(place);
-  const auto now = std::chrono::steady_clock::now();
   {
-    const Lock lock(intact_mutex_);
+    Lock lock(intact_mutex_);
+    checked_.wait(lock,
+                  [&]() ISOMESH_REQUIRES(intact_mutex_) { return !under_check_.contains(key); });
     const auto known = intact_.find(key);
     if (known != intact_.end() && known->second.traits == traits &&
-        now - known->second.when < kBelieved) {
+        Steady::clock::now() - known->second.when < kBelieved) {
       return true;
     }
+    under_check_.insert(key);
   }
+  const CheckUnderWay check(*this, key);
   const bool is_intact = digest_of(File::open(place), stop).key == key;
   if (is_intact) believe(key, traits);
   return is_intact;

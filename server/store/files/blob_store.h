@@ -20,11 +20,12 @@ class FileBlobStore : public BlobStore {
   explicit FileBlobStore(const DataFolder& folder) : folder_(folder) {}
 
   std::unique_ptr<BlobWriter> begin() const override;
+  bool has_room() const override { return folder_.reserve().has_room(); }
   void adopt(const std::filesystem::path& file, const Blob& blob) const override;
   std::unique_ptr<BlobReader> open(const std::string& key) const override;
   LocalBlob local(const std::string& key) const override;
-  // A file that was read whole, by digest_of before it was adopted or by this, is believed for an
-  // hour, unless its device, inode, size or times change.
+  // A file that was hashed whole, to become a blob or by this, is believed for an hour, unless its
+  // device, inode, size or times change.
   bool is_intact(const std::string& key, const std::stop_token& stop) const override;
   std::optional<std::uint64_t> size(const std::string& key) const override;
   void erase(const std::string& key) const override;
@@ -39,6 +40,7 @@ class FileBlobStore : public BlobStore {
 
  private:
   class Writer;
+  class CheckUnderWay;
 
   // When a file was found intact, and what it looked like then.
   struct Check {
@@ -72,6 +74,8 @@ class FileBlobStore : public BlobStore {
   mutable bool has_folders_ ISOMESH_GUARDED_BY(folders_mutex_) = false;  // all, on the disk
   mutable Mutex intact_mutex_;
   mutable std::map<std::string, Check> intact_ ISOMESH_GUARDED_BY(intact_mutex_);
+  mutable Condition checked_;
+  mutable std::set<std::string> under_check_ ISOMESH_GUARDED_BY(intact_mutex_);
 };
 
 }  // namespace isomesh::store

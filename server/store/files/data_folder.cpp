@@ -13,7 +13,8 @@
 
 namespace isomesh::store {
 
-DataFolder::DataFolder(const std::filesystem::path& root) : root_(root) {
+DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uint64_t> reserve)
+    : root_(root) {
   std::error_code error;
   std::filesystem::create_directories(root_, error);
   if (!error) root_ = std::filesystem::canonical(root_, error);
@@ -28,8 +29,12 @@ DataFolder::DataFolder(const std::filesystem::path& root) : root_(root) {
     throw Error(ErrorCode::kUnavailable, "another isomeshd is using the data folder");
   }
   std::filesystem::remove_all(scratch());
+  // Before anything is written: on a full disk it makes the room for that.
+  reserve_ =
+      std::make_unique<Reserve>(root_ / "reserve", reserve.value_or(Reserve::usual_bytes(root_)));
   for (const auto& folder : {blobs(), quarantine(), scratch()}) {
-    std::filesystem::create_directories(folder);
+    std::filesystem::create_directories(folder, error);
+    if (error) throw_system_error("making a folder", error.value());
   }
   sync_folder(root_);
 }

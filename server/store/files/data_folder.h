@@ -1,17 +1,23 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
+
+#include "server/store/files/reserve.h"
 
 namespace isomesh::store {
 
 // The one folder that a daemon keeps everything in. Holding it locks it: a second daemon on the
-// same folder is refused. Immutable after construction.
+// same folder is refused. Thread safe.
 class DataFolder {
  public:
   // Creates what is missing and empties the scratch folder, which holds what a crash cut short.
-  // Throws Error kUnavailable when another process holds the folder, kInternal otherwise.
-  explicit DataFolder(const std::filesystem::path& root);
+  // Keeps so many bytes in reserve; by default as many as are usual on a disk of that size. Throws
+  // Error kUnavailable when another process holds the folder, kOutOfSpace or kInternal otherwise.
+  explicit DataFolder(const std::filesystem::path& root, std::optional<std::uint64_t> reserve = 0);
   ~DataFolder();
   DataFolder(const DataFolder&) = delete;
   DataFolder& operator=(const DataFolder&) = delete;
@@ -23,10 +29,12 @@ class DataFolder {
   std::filesystem::path quarantine() const { return root_ / "quarantine"; }
   std::filesystem::path records() const { return root_ / "isomesh.sqlite"; }  // the database
   std::filesystem::path scratch() const { return root_ / "scratch"; }         // unfinished files
+  Reserve& reserve() const { return *reserve_; }
 
  private:
   std::filesystem::path root_;
   int lock_ = -1;
+  std::unique_ptr<Reserve> reserve_;
 };
 
 // A folder of its own below `parent`, removed with all it holds when it goes. Not thread safe.

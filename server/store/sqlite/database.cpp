@@ -1,5 +1,6 @@
 #include "server/store/sqlite/database.h"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -138,11 +139,29 @@ Connection::Mode migrated(const std::filesystem::path& file) {
   return Connection::Mode::kWrite;
 }
 
+// How long the log of changes may be before they are brought into the file itself: 16 MiB, so that
+// a commit seldom has to do that, and pages that changed often are written once; less on a small
+// disk.
+std::uint64_t log_bytes(std::uint64_t disk) {
+  constexpr std::uint64_t kShare = 256;
+  return std::clamp<std::uint64_t>(disk / kShare, std::uint64_t{1} << 20, std::uint64_t{16} << 20);
+}
+
 }  // namespace
 
 Database::Database(const DataFolder& folder)
-    : writer_(folder.records(), migrated(folder.records())),
-      reader_(folder.records(), Connection::Mode::kRead) {}
+    : folder_(folder),
+      writer_(folder.records(), migrated(folder.records())),
+      reader_(folder.records(), Connection::Mode::kRead) {
+  writer_.limit_log(log_bytes(folder.reserve().capacity()));
+}
+
+bool Database::make_way() {
+  const bool is_let_go = folder_.reserve().let_go();
+  const Lock writing(writer_.mutex());
+  writer_.empty_log();
+  return is_let_go;
+}
 
 std::int64_t Database::changes() {
   const Reading reading(writer_);

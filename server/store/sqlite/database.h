@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "base/error.h"
 #include "server/store/expiry.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/sqlite/sqlite.h"
@@ -25,7 +26,22 @@ class Database {
   // How many rows were changed since it was opened.
   std::int64_t changes();
 
+  // Does what frees room, or has to be kept in mind whatever the disk is like: where there is no
+  // room for that, the reserve is let go first. `run` is one transaction. Throws what it throws.
+  template <class Run>
+  auto freeing(const Run& run) {
+    try {
+      return run();
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kOutOfSpace || !make_way()) throw;
+    }
+    return run();
+  }
+
  private:
+  bool make_way();
+
+  const DataFolder& folder_;
   Connection writer_;
   Connection reader_;
 };

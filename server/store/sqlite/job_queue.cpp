@@ -1,4 +1,5 @@
-// What changes jobs, one transaction a function; job_store.cpp has what can be asked.
+// What changes jobs, one transaction a function; job_store.cpp has what can be asked, job_reuse.cpp
+// which meshes serve more than one.
 #include <algorithm>
 
 #include "base/clock.h"
@@ -25,16 +26,10 @@ double milliseconds_since(std::int64_t begin_us) {
   return static_cast<double>(std::max<std::int64_t>(now_us() - begin_us, 1)) / 1000;
 }
 
-// The notes of the job's volume, which is to be there.
-std::vector<Note> notes_of_volume(Connection& connection, const JobSpec& spec) {
-  const std::string& id = spec.parameters.volume;
-  Query volume = connection.query(
-      "SELECT coalesce(json_extract(record, '$.notes'), '[]') FROM volumes WHERE owner = ? AND id "
-      "= ?",
-      spec.owner, id);
-  if (volume.next()) return notes_from_json(volume.text(0));
-  Query expired =
-      connection.query("SELECT 1 FROM expired WHERE owner = ? AND id = ?", spec.owner, id);
+// The job's volume is not there.
+[[noreturn]] void throw_no_volume(Connection& connection, const JobSpec& spec) {
+  Query expired = connection.query("SELECT 1 FROM expired WHERE owner = ? AND id = ?", spec.owner,
+                                   spec.parameters.volume);
   const bool is_gone = expired.next();
   const std::string detail =
       is_gone ? "the volume has expired: upload it again" : "there is no volume with this id";
@@ -53,6 +48,9 @@ Problem lost_worker(const Job& job, int attempts) {
 
 Submission SqliteJobStore::submit(const JobSpec& spec) {
   Row row;
+  row.owner = spec.owner;
+  // Read before the transaction, because others wait for that.
+  const auto spoilt = spoilt_mesh_for(spec);
   {
     Change change(*this);
     if (!spec.idempotency_key.empty()) {
@@ -67,17 +65,19 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
         return {Submission::Kind::kExisting, with_progress(row_of(earlier)), {}};
       }
     }
-    const std::vector<Note> notes = notes_of_volume(change.connection(), spec);
-    row.owner = spec.owner;
-    row.result_key =
-        result_key(spec.parameters.volume, notes, spec.parameters, options_.mesher_version);
+    const auto result_key = result_key_of(change.connection(), spec);
+    if (!result_key) throw_no_volume(change.connection(), spec);
+    row.result_key = *result_key;
     row.accepted = now_us();
     row.job.id = time_ordered_id();
     row.job.parameters = spec.parameters;
     row.job.created = timestamp();
-    const auto mesh = mesh_like(change.connection(), row);
+    const auto mesh = mesh_like(change.connection(), row, spoilt);
     if (refusing_ || (!mesh && count_queued(change.connection()) >= options_.max_queued)) {
       return {Submission::Kind::kBusy, {}, kRetryAfter};
+    }
+    if (!mesh && !blobs_.has_room()) {
+      throw Error(ErrorCode::kOutOfSpace, "there is no room on the disk for another job");
     }
     const std::optional<std::string> key =
         spec.idempotency_key.empty() ? std::nullopt : std::optional(spec.idempotency_key);
@@ -173,7 +173,7 @@ Standing SqliteJobStore::renew(const Lease& lease, const Progress& progress,
 
 bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
   bool has_mesh = false;
-  {
+  const bool is_held = database_.freeing([&] {
     Change change(*this);
     auto held = leased(change.connection(), lease);
     if (!held) return false;
@@ -194,7 +194,9 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
       end(change, row, JobState::kFailed);
     }
     change.commit();
-  }
+    return true;
+  });
+  if (!is_held) return false;
   forget_run(lease.id, lease.fence);
   if (has_mesh) {
     for (const auto& [format, file] : outcome.mesh->files) blobs_.settle(file.sha256);
@@ -205,7 +207,7 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
 }
 
 bool SqliteJobStore::put_back(const Lease& lease, std::chrono::milliseconds delay) {
-  {
+  const bool is_held = database_.freeing([&] {
     Change change(*this);
     auto held = leased(change.connection(), lease);
     if (!held) return false;
@@ -216,15 +218,16 @@ bool SqliteJobStore::put_back(const Lease& lease, std::chrono::milliseconds dela
       queue_again(change, *held, delay);
     }
     change.commit();
-  }
+    return true;
+  });
+  if (!is_held) return false;
   forget_run(lease.id, lease.fence);
   wake_workers();
   return true;
 }
 
 std::size_t SqliteJobStore::reap() {
-  std::size_t reaped = 0;
-  {
+  const std::size_t reaped = database_.freeing([&] {
     Change change(*this);
     std::vector<Row> rows;
     {
@@ -244,15 +247,15 @@ std::size_t SqliteJobStore::reap() {
       }
       forget_run(row.job.id, row.fence);
     }
-    reaped = rows.size();
     change.commit();
-  }
+    return rows.size();
+  });
   if (reaped > 0) wake_workers();
   return reaped;
 }
 
 std::size_t SqliteJobStore::reap_predecessor() {
-  {
+  database_.freeing([&] {
     Transaction transaction(database_.writer());
     std::int64_t running = 0;
     {
@@ -266,13 +269,12 @@ std::size_t SqliteJobStore::reap_predecessor() {
         "AND (is_long = 0 OR ? > 1)",
         running);
     transaction.commit();
-  }
+  });
   return reap();
 }
 
 Job SqliteJobStore::cancel(const Viewer& viewer, const std::string& id) {
-  Job job;
-  {
+  return database_.freeing([&] {
     Change change(*this);
     Row row = found(change.connection(), viewer, id);
     if (row.job.state == JobState::kQueued) {
@@ -286,9 +288,8 @@ Job SqliteJobStore::cancel(const Viewer& viewer, const std::string& id) {
       const auto run = live_.find(id);
       if (run != live_.end() && run->second.fence == row.fence) run->second.cancelling = true;
     }
-    job = with_progress(row);
-  }
-  return job;
+    return with_progress(row);
+  });
 }
 
 std::optional<SqliteJobStore::Row> SqliteJobStore::leased(Connection& connection,
@@ -303,19 +304,6 @@ bool SqliteJobStore::is_held(const std::string& id, std::uint64_t fence) const {
   const auto run = live_.find(id);
   return run != live_.end() && run->second.fence == fence &&
          run->second.lease_until >= Steady::clock::now();
-}
-
-std::optional<MeshSummary> SqliteJobStore::mesh_like(Connection& connection, const Row& row) const {
-  Query query = connection.query(
-      "SELECT record FROM jobs WHERE owner = ? AND result_key = ? AND state = 2 ORDER BY id DESC "
-      "LIMIT 1",
-      row.owner, row.result_key);
-  if (!query.next()) return std::nullopt;
-  auto mesh = job_from_record(query.text(0)).mesh;
-  const bool is_there = mesh && std::ranges::all_of(mesh->files, [&](const auto& named) {
-                          return blobs_.size(named.second.sha256) == named.second.bytes;
-                        });
-  return is_there ? std::move(mesh) : std::nullopt;
 }
 
 void SqliteJobStore::end(Change& change, Row& row, JobState state) const {

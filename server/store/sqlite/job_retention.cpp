@@ -20,22 +20,24 @@ std::vector<Expirable> SqliteJobStore::ended(Time before, Ended which, std::size
 }
 
 Expired SqliteJobStore::expire(std::span<const Expirable> jobs, std::uint64_t enough) {
-  Transaction transaction(database_.writer());
-  Expired expired;
-  for (const Expirable& job : jobs) {
-    if (expired.bytes >= enough) break;
-    const std::vector<Blob> blobs =
-        read_blobs(transaction->query("SELECT blob, bytes FROM meshes WHERE job = ?", job.id));
-    const int removed =
-        transaction->run("DELETE FROM jobs WHERE id = ? AND finished IS NOT NULL", job.id);
-    if (removed == 0) continue;
-    transaction->run("DELETE FROM events WHERE job = ?", job.id);
-    remember_expired(transaction.connection(), job);
-    ++expired.records;
-    add_unnamed(transaction.connection(), blobs, expired);
-  }
-  transaction.commit();
-  return expired;
+  return database_.freeing([&] {
+    Transaction transaction(database_.writer());
+    Expired expired;
+    for (const Expirable& job : jobs) {
+      if (expired.bytes >= enough) break;
+      const std::vector<Blob> blobs =
+          read_blobs(transaction->query("SELECT blob, bytes FROM meshes WHERE job = ?", job.id));
+      const int removed =
+          transaction->run("DELETE FROM jobs WHERE id = ? AND finished IS NOT NULL", job.id);
+      if (removed == 0) continue;
+      transaction->run("DELETE FROM events WHERE job = ?", job.id);
+      remember_expired(transaction.connection(), job);
+      ++expired.records;
+      add_unnamed(transaction.connection(), blobs, expired);
+    }
+    transaction.commit();
+    return expired;
+  });
 }
 
 std::uint64_t SqliteJobStore::named_bytes() const {
@@ -54,15 +56,19 @@ std::optional<Steady> SqliteJobStore::oldest_run() const {
 }
 
 void SqliteJobStore::forget_expired(Time before) {
-  Transaction transaction(database_.writer(), Durability::kProcess);
-  transaction->run("DELETE FROM expired WHERE at < ?", to_us(before));
-  transaction.commit();
+  database_.freeing([&] {
+    Transaction transaction(database_.writer(), Durability::kProcess);
+    transaction->run("DELETE FROM expired WHERE at < ?", to_us(before));
+    transaction.commit();
+  });
 }
 
 void SqliteJobStore::forget_events(Time before) {
-  Transaction transaction(database_.writer(), Durability::kProcess);
-  transaction->run("DELETE FROM events WHERE id < ?", to_us(before));
-  transaction.commit();
+  database_.freeing([&] {
+    Transaction transaction(database_.writer(), Durability::kProcess);
+    transaction->run("DELETE FROM events WHERE id < ?", to_us(before));
+    transaction.commit();
+  });
 }
 
 }  // namespace isomesh::store

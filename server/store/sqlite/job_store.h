@@ -22,6 +22,7 @@ class SqliteJobStore : public JobStore {
   SqliteJobStore(Database& database, const BlobStore& blobs, JobStoreOptions options);
 
   Submission submit(const JobSpec& spec) override;
+  Job remake(const std::string& id) override;
   std::optional<Lease> claim(const std::string& worker, std::chrono::milliseconds lease) override;
   bool wait_for_work(const std::stop_token& stop, std::chrono::milliseconds longest) override;
   Standing renew(const Lease& lease, const Progress& progress,
@@ -69,7 +70,14 @@ class SqliteJobStore : public JobStore {
   // Throws Error kGone or kNotFound for a row that is not there.
   static Row found(Connection& connection, const Viewer& viewer, const std::string& id);
   std::optional<Row> leased(Connection& connection, const Lease& lease) const;
-  std::optional<MeshSummary> mesh_like(Connection& connection, const Row& row) const;
+  // What a job like it has made; empty when that is `spoilt`.
+  std::optional<MeshSummary> mesh_like(Connection& connection, const Row& row,
+                                       const std::optional<MeshSummary>& spoilt) const;
+  // What a job like this one has made, when the bytes of its blobs are damaged; empty otherwise.
+  // Reads them.
+  std::optional<MeshSummary> spoilt_mesh_for(const JobSpec& spec) const;
+  // Empty when its volume is not there.
+  std::optional<std::string> result_key_of(Connection& connection, const JobSpec& spec) const;
   void end(Change& change, Row& row, JobState state) const;
   void succeed(Change& change, Row& row, const MeshSummary& mesh) const;
   void succeed_alike(Change& change, const Row& row, const MeshSummary& mesh) const;

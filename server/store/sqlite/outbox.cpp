@@ -46,16 +46,20 @@ std::optional<Time> SqliteOutbox::next_after(Time now) const {
 }
 
 void SqliteOutbox::remove(const std::string& job) {
-  Transaction transaction(database_.writer(), Durability::kProcess);
-  transaction->run("DELETE FROM callbacks WHERE job = ?", job);
-  transaction.commit();
+  database_.freeing([&] {
+    Transaction transaction(database_.writer(), Durability::kProcess);
+    transaction->run("DELETE FROM callbacks WHERE job = ?", job);
+    transaction.commit();
+  });
 }
 
 void SqliteOutbox::postpone(const std::string& job, Time next) {
-  Transaction transaction(database_.writer(), Durability::kProcess);
-  transaction->run("UPDATE callbacks SET attempts = attempts + 1, next = ? WHERE job = ?",
-                   to_us(next), job);
-  transaction.commit();
+  database_.freeing([&] {
+    Transaction transaction(database_.writer(), Durability::kProcess);
+    transaction->run("UPDATE callbacks SET attempts = attempts + 1, next = ? WHERE job = ?",
+                     to_us(next), job);
+    transaction.commit();
+  });
 }
 
 std::size_t SqliteOutbox::count() const {

@@ -12,10 +12,6 @@ namespace isomesh::store {
 namespace {
 
 constexpr int kBusyTimeoutMs = 10'000;
-// How long the log of changes grows before they are brought into the file itself: 16 MiB, so that a
-// commit seldom has to do that, and pages that changed often are written once.
-constexpr const char* kLogPages = "PRAGMA wal_autocheckpoint=4000";
-
 Error error_of(sqlite3* handle, int code) {
   const int primary = code & 0xFF;
   // Most of what SQLite calls an I/O error is a write that found no room, too.
@@ -86,7 +82,6 @@ Connection::Connection(const std::filesystem::path& path, Mode mode) {
     sqlite3_busy_timeout(handle_, kBusyTimeoutMs);
     if (mode == Mode::kRead) return;
     script("PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON;");
-    script(kLogPages);
   } catch (...) {
     sqlite3_close(handle_);
     throw;
@@ -108,6 +103,25 @@ void Connection::set_durability(Durability durability) {
   script(durability == Durability::kFull ? "PRAGMA synchronous=FULL" : "PRAGMA synchronous=NORMAL");
   durability_ = durability;
 }
+
+void Connection::limit_log(std::uint64_t bytes) {
+  Query page = query("PRAGMA page_size");
+  page.next();
+  log_pages_ = static_cast<int>(bytes / static_cast<std::uint64_t>(page.integer(0)));
+  script(("PRAGMA journal_size_limit=" + std::to_string(bytes)).c_str());
+  sqlite3_wal_hook(handle_, look_at_log, this);
+}
+
+// After a commit, which counts whatever becomes of this: what fails is tried after the next one.
+int Connection::look_at_log(void* connection, sqlite3* handle, const char* name, int pages) {
+  const int limit = static_cast<Connection*>(connection)->log_pages_;
+  if (pages < limit) return SQLITE_OK;
+  const int mode = pages < 2 * limit ? SQLITE_CHECKPOINT_PASSIVE : SQLITE_CHECKPOINT_TRUNCATE;
+  sqlite3_wal_checkpoint_v2(handle, name, mode, nullptr, nullptr);
+  return SQLITE_OK;
+}
+
+void Connection::empty_log() { script("PRAGMA wal_checkpoint(TRUNCATE)"); }
 
 bool Connection::has_open_transaction() const { return sqlite3_get_autocommit(handle_) == 0; }
 

@@ -104,6 +104,13 @@ class Connection {
   // Several statements without parameters.
   void script(const char* sql);
 
+  // From now on the log of changes is brought into the file when it is so long; at twice that it is
+  // cut, for which those who read are waited for.
+  void limit_log(std::uint64_t bytes);
+
+  // Does both now. Throws Error kOutOfSpace or kInternal.
+  void empty_log();
+
   // How many rows were changed since it was opened.
   std::int64_t all_changes() const;
 
@@ -123,10 +130,12 @@ class Connection {
   void end_batch(std::optional<Error> failure = std::nullopt) noexcept;
   Error last_error() const;
 
+  static int look_at_log(void* connection, sqlite3* handle, const char* name, int pages);
   sqlite3_stmt* prepared(std::string_view sql);
   int changes() const;
 
   sqlite3* handle_ = nullptr;
+  int log_pages_ = 0;
   Mutex mutex_;
   Durability durability_ = Durability::kFull;
   std::unordered_map<std::string, sqlite3_stmt*> statements_;

@@ -82,19 +82,21 @@ std::vector<Volume> SqliteVolumeStore::list(const Viewer& viewer, const std::str
 }
 
 void SqliteVolumeStore::erase(const std::string& owner, const std::string& id) {
-  Transaction transaction(database_.writer());
-  if (!find(transaction.connection(), owner, id)) {
-    throw_missing(transaction.connection(), owner, id);
-  }
-  {
-    Query needed = transaction->query(
-        "SELECT 1 FROM jobs WHERE volume = ? AND owner = ? AND state < 2 LIMIT 1", id, owner);
-    if (needed.next()) {
-      throw Error(ErrorCode::kNotReady, "jobs that are not finished need this volume");
+  database_.freeing([&] {
+    Transaction transaction(database_.writer());
+    if (!find(transaction.connection(), owner, id)) {
+      throw_missing(transaction.connection(), owner, id);
     }
-  }
-  transaction->run("DELETE FROM volumes WHERE owner = ? AND id = ?", owner, id);
-  transaction.commit();
+    {
+      Query needed = transaction->query(
+          "SELECT 1 FROM jobs WHERE volume = ? AND owner = ? AND state < 2 LIMIT 1", id, owner);
+      if (needed.next()) {
+        throw Error(ErrorCode::kNotReady, "jobs that are not finished need this volume");
+      }
+    }
+    transaction->run("DELETE FROM volumes WHERE owner = ? AND id = ?", owner, id);
+    transaction.commit();
+  });
 }
 
 bool SqliteVolumeStore::names(const std::string& blob) const {
@@ -117,23 +119,25 @@ std::vector<Expirable> SqliteVolumeStore::unused(Time before, std::size_t limit)
 }
 
 Expired SqliteVolumeStore::expire(std::span<const Expirable> volumes, std::uint64_t enough) {
-  Transaction transaction(database_.writer());
-  Expired expired;
-  for (const Expirable& volume : volumes) {
-    if (expired.bytes >= enough) break;
-    const std::vector<Blob> blobs = read_blobs(transaction->query(
-        "SELECT id, bytes FROM volumes WHERE owner = ? AND id = ?", volume.owner, volume.id));
-    const int removed = transaction->run(
-        "DELETE FROM volumes WHERE owner = ?1 AND id = ?2 AND used = ?3 AND NOT EXISTS (SELECT 1 "
-        "FROM jobs WHERE volume = ?2 AND owner = ?1 AND state < 2)",
-        volume.owner, volume.id, to_us(volume.last_used));
-    if (removed == 0) continue;
-    remember_expired(transaction.connection(), volume);
-    ++expired.records;
-    add_unnamed(transaction.connection(), blobs, expired);
-  }
-  transaction.commit();
-  return expired;
+  return database_.freeing([&] {
+    Transaction transaction(database_.writer());
+    Expired expired;
+    for (const Expirable& volume : volumes) {
+      if (expired.bytes >= enough) break;
+      const std::vector<Blob> blobs = read_blobs(transaction->query(
+          "SELECT id, bytes FROM volumes WHERE owner = ? AND id = ?", volume.owner, volume.id));
+      const int removed = transaction->run(
+          "DELETE FROM volumes WHERE owner = ?1 AND id = ?2 AND used = ?3 AND NOT EXISTS (SELECT 1 "
+          "FROM jobs WHERE volume = ?2 AND owner = ?1 AND state < 2)",
+          volume.owner, volume.id, to_us(volume.last_used));
+      if (removed == 0) continue;
+      remember_expired(transaction.connection(), volume);
+      ++expired.records;
+      add_unnamed(transaction.connection(), blobs, expired);
+    }
+    transaction.commit();
+    return expired;
+  });
 }
 
 std::uint64_t SqliteVolumeStore::named_bytes() const {

@@ -1,0 +1,106 @@
+// What becomes of files that a disk has spoilt.
+#include <string>
+
+#include "tests/api/problems.h"
+#include "tests/faults/fixture.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+using testing::HasSubstr;
+
+class Damage : public FaultTest {
+ protected:
+  std::filesystem::path file_of(const std::string& key) {
+    return daemon().data() / "blobs" / key.substr(0, 2) / key;
+  }
+
+  // Changes one byte in the middle.
+  void spoil(const std::string& key) {
+    std::string bytes = read_file(file_of(key));
+    bytes[bytes.size() / 2] ^= 1;
+    write_file(file_of(key), bytes);
+  }
+
+  static const MeshFile& mesh(const Job& job) { return job.mesh->files.at(MeshFormat::kDrc); }
+};
+
+TEST_F(Damage, AMeshIsNotServedAndMadeAgain) {
+  start();
+  const Job job = finished_job(daemon());
+  const std::string bytes = mesh_of(job);
+  spoil(mesh(job).sha256);
+  const Answer refused = daemon().get(mesh(job).href);
+  EXPECT_TRUE(is_problem(refused, ErrorCode::kUnavailable));
+  EXPECT_THAT(refused.body, HasSubstr("made again"));
+  EXPECT_FALSE(refused.header("retry-after").empty());
+  ASSERT_TRUE(eventually([&] { return daemon().get(mesh(job).href).status == 200; }));
+  EXPECT_EQ(mesh_of(job), bytes);
+  EXPECT_EQ(daemon().client().jobs().jobs.size(), 2U) << "it was made again once";
+  EXPECT_EQ(this->job(job.id), job);
+}
+
+TEST_F(Damage, AMissingMeshIsMadeAgain) {
+  start();
+  const Job job = finished_job(daemon());
+  const std::string bytes = mesh_of(job);
+  std::filesystem::remove(file_of(mesh(job).sha256));
+  EXPECT_TRUE(is_problem(daemon().get(mesh(job).href), ErrorCode::kUnavailable));
+  ASSERT_TRUE(eventually([&] { return daemon().get(mesh(job).href).status == 200; }));
+  EXPECT_EQ(mesh_of(job), bytes);
+}
+
+TEST_F(Damage, AMeshIsNotHandedOutAgain) {
+  start();
+  const Job job = finished_job(daemon());
+  const std::string bytes = mesh_of(job);
+  EXPECT_TRUE(finished_job(daemon()).reused);
+  spoil(mesh(job).sha256);
+  const Job again = finished_job(daemon());
+  EXPECT_FALSE(again.reused);
+  EXPECT_EQ(mesh_of(again), bytes);
+  EXPECT_EQ(mesh_of(job), bytes);
+}
+
+TEST_F(Damage, AMeshWithoutItsVolumeIsGone) {
+  start();
+  const Job job = finished_job(daemon());
+  spoil(mesh(job).sha256);
+  EXPECT_EQ(daemon().send("DELETE", "/v1/volumes/" + job.parameters.volume).status, 204);
+  const Answer gone = daemon().get(mesh(job).href);
+  EXPECT_TRUE(is_problem(gone, ErrorCode::kGone));
+  EXPECT_THAT(gone.body, HasSubstr("damaged"));
+}
+
+TEST_F(Damage, AMeshThatCannotBeMadeAgainSaysWhy) {
+  start();
+  const Job job = finished_job(daemon());
+  spoil(mesh(job).sha256);
+  spoil(job.parameters.volume);
+  EXPECT_TRUE(is_problem(daemon().get(mesh(job).href), ErrorCode::kUnavailable));
+  ASSERT_TRUE(eventually([&] { return daemon().get(mesh(job).href).status == 422; }));
+  EXPECT_THAT(daemon().get(mesh(job).href).body, HasSubstr("upload it again"));
+  EXPECT_EQ(daemon().client().jobs().jobs.size(), 2U);
+  // Which mends it, with the next job like it.
+  finished_job(daemon());
+  EXPECT_EQ(daemon().get(mesh(job).href).status, 200);
+}
+
+TEST_F(Damage, NothingIsToldOfASpoiltVolume) {
+  start();
+  const Volume volume = small_volume();
+  spoil(volume.id);
+  const std::string path = "/v1/volumes/" + volume.id;
+  for (const std::string& target :
+       {path + "/slice.png", path + "/histogram", "/v1/estimate?iso=100&volume=" + volume.id}) {
+    const Answer refused = daemon().get(target);
+    EXPECT_TRUE(is_problem(refused, ErrorCode::kUnusableVolume)) << target;
+    EXPECT_THAT(refused.body, HasSubstr("damaged"));
+  }
+  small_volume();
+  EXPECT_EQ(daemon().get(path + "/slice.png").status, 200);
+}
+
+}  // namespace
+}  // namespace isomesh
