@@ -1,9 +1,11 @@
 #include "server/jobs/pipeline.h"
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "server/jobs/stored_samples.h"
+#include "server/mesh/parallel.h"
 #include "server/volume/canonical.h"
 
 namespace isomesh::jobs {
@@ -29,6 +31,10 @@ PipelineResult run_pipeline(const Volume& volume, const MeshParameters& paramete
     sinks.emplace_back([&writer](std::span<const std::byte> bytes) { writer.write(bytes); });
   }
   const volume::CanonicalHeader& header = canonical.header();
+  // Of 64^3 samples; jobs side by side keep the processors busy.
+  constexpr std::uint64_t kFewSampleBytes = std::uint64_t{1} << 18;
+  std::optional<mesh::OneThread> alone;
+  if (header.sample_bytes() <= kFewSampleBytes) alone.emplace();
   PipelineResult result;
   result.mesh = make_mesh(
       {header.type, header.dims, header.geometry, canonical.samples().data()},

@@ -18,6 +18,8 @@
 namespace isomesh::mesh {
 namespace {
 
+thread_local bool is_one_thread = false;
+
 int default_thread_count() {
   return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 }
@@ -111,8 +113,12 @@ void parallel_for(const Context& context, std::size_t tasks,
                   const std::function<void(std::size_t)>& body) {
   if (tasks == 0) return context.throw_if_stopped();
   Loop loop(context, tasks, body);
-  run_tasks(loop, tasks);
+  if (!is_one_thread && tasks > 1) return run_tasks(loop, tasks);
+  for (std::size_t task = 0; task < tasks; ++task) loop.run(task);
 }
+
+OneThread::OneThread() { is_one_thread = true; }
+OneThread::~OneThread() { is_one_thread = false; }
 
 #ifdef ISOMESH_PARALLEL_TBB
 
@@ -121,13 +127,13 @@ void set_thread_count(int threads) {
   arena() = std::make_unique<Arena>(std::max(1, threads));
 }
 
-int thread_count() { return arena()->arena.max_concurrency(); }
+int thread_count() { return is_one_thread ? 1 : arena()->arena.max_concurrency(); }
 
 #else
 
 void set_thread_count(int threads) { threads_setting() = std::max(1, threads); }
 
-int thread_count() { return threads_setting(); }
+int thread_count() { return is_one_thread ? 1 : threads_setting().load(); }
 
 #endif
 

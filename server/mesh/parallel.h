@@ -14,9 +14,20 @@ namespace isomesh::mesh {
 void parallel_for(const Context& context, std::size_t tasks,
                   const std::function<void(std::size_t)>& body);
 
+// While it lives, the loops that its thread begins run on that thread alone: with little to do,
+// waking the others takes longer. Not to be nested.
+class OneThread {
+ public:
+  OneThread();
+  ~OneThread();
+  OneThread(const OneThread&) = delete;
+  OneThread& operator=(const OneThread&) = delete;
+};
+
 // How many threads all loops share, at least 1; the default is the number of processors. To be
 // called while no kernel runs.
 void set_thread_count(int threads);
+// 1 where OneThread says so.
 int thread_count();
 
 }  // namespace isomesh::mesh

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <mutex>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -86,6 +87,27 @@ TEST(SetThreadCount, IsWhatThreadCountTells) {
     EXPECT_EQ(thread_count(), 3);
   }
   EXPECT_EQ(thread_count(), before);
+}
+
+TEST(OneThread, KeepsLoopsOnTheThreadThatBeginsThem) {
+  {
+    const OneThread alone;
+    const std::thread::id here = std::this_thread::get_id();
+    EXPECT_EQ(thread_count(), 1);
+    std::size_t last = 0;
+    parallel_for({}, 50, [&](std::size_t task) {
+      EXPECT_EQ(std::this_thread::get_id(), here);
+      EXPECT_GE(task, last);
+      last = task;
+    });
+    EXPECT_EQ(last, 49U);
+    EXPECT_THROW(parallel_for({}, 2, [](std::size_t) { throw std::runtime_error("x"); }),
+                 std::runtime_error);
+  }
+  const int before = thread_count();
+  set_thread_count(3);
+  EXPECT_EQ(thread_count(), 3);
+  set_thread_count(before);
 }
 
 TEST(Context, ThrowsOnlyWhenStopped) {
