@@ -46,8 +46,10 @@ class LibraryStream : public httplib::Stream {
       head_read_ += count;
       return static_cast<ssize_t>(count);
     }
-    const auto count = body_.read({target, size});
-    return count ? static_cast<ssize_t>(*count) : -1;
+    if (ahead_read_ == ahead_.size() && !read_ahead()) return -1;
+    const std::size_t count = ahead_.copy(target, size, ahead_read_);
+    ahead_read_ += count;
+    return static_cast<ssize_t>(count);
   }
 
   ssize_t write(const char* bytes, std::size_t size) override {
@@ -65,8 +67,20 @@ class LibraryStream : public httplib::Stream {
   std::string take_written() { return std::move(written_); }
 
  private:
+  // The library reads a body in pieces that are too small to ask the system for each.
+  bool read_ahead() {
+    constexpr std::size_t kPieceBytes = std::size_t{64} << 10;
+    ahead_.resize(kPieceBytes);
+    const auto count = body_.read(ahead_);
+    ahead_.resize(count.value_or(0));
+    ahead_read_ = 0;
+    return count.has_value();
+  }
+
   const std::string head_;
   std::size_t head_read_ = 0;
+  std::string ahead_;  // of the body
+  std::size_t ahead_read_ = 0;
   net::IncomingBody& body_;
   std::string written_;
 };

@@ -57,8 +57,12 @@ void check_room(const store::DataFolder& folder, const Request& request) {
 class Receiver {
  public:
   Receiver(store::File& file, store::Reserve& reserve, const UploadLimits& limits,
-           const std::atomic<bool>& stopping)
-      : file_(file), reserve_(reserve), limits_(limits), stopping_(stopping) {}
+           const std::atomic<bool>& stopping, bool is_digested)
+      : file_(file),
+        reserve_(reserve),
+        limits_(limits),
+        stopping_(stopping),
+        is_digested_(is_digested) {}
 
   bool take(std::string_view data) {
     try {
@@ -70,10 +74,8 @@ class Receiver {
             ErrorCode::kRequestTimeout,
             "the upload took longer than " + std::to_string(limits_.max_time.count()) + " seconds");
       }
-      const auto piece = std::as_bytes(std::span(data));
-      reserve_.check_room();
-      file_.write(piece);
-      digest_.update(piece);
+      held_.append(data);
+      if (held_.size() >= kPieceBytes) write_held();
       return true;
     } catch (...) {
       failure_ = std::current_exception();
@@ -92,8 +94,8 @@ class Receiver {
     return true;
   }
 
-  // Throws what ended the reading.
-  void check(const BodyReader& body, bool complete, bool is_form) const {
+  // Writes the last of it. Throws what ended the reading.
+  void finish(const BodyReader& body, bool complete, bool is_form) {
     if (failure_) std::rethrow_exception(failure_);
     if (!complete && stopping_)
       throw Error(ErrorCode::kUnavailable, "the service is shutting down");
@@ -102,16 +104,29 @@ class Receiver {
       throw invalid_parameter("file", "the form has no field `file`");
     }
     if (bytes_ == 0) throw Error(ErrorCode::kInvalidParameter, "the body is empty");
+    write_held();
   }
 
   const std::string& file_name() const { return file_name_; }
   std::string digest() { return to_hex(digest_.finish()); }
 
  private:
+  static constexpr std::size_t kPieceBytes = std::size_t{256} << 10;
+
+  void write_held() {
+    const auto piece = std::as_bytes(std::span(held_));
+    reserve_.check_room();
+    file_.write(piece);
+    if (is_digested_) digest_.update(piece);
+    held_.clear();
+  }
+
   store::File& file_;
   store::Reserve& reserve_;
   const UploadLimits& limits_;
   const std::atomic<bool>& stopping_;
+  const bool is_digested_;
+  std::string held_;  // what is not written yet
   const std::chrono::steady_clock::time_point deadline_ =
       std::chrono::steady_clock::now() + limits_.max_time;
   Sha256 digest_;
@@ -135,7 +150,7 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
     throw invalid_parameter("Content-Digest", "is not supported with a form: send the bare file");
   }
   store::File file = store::File::create(path_);
-  Receiver receiver(file, folder.reserve(), limits, stopping);
+  Receiver receiver(file, folder.reserve(), limits, stopping, expected.has_value());
   const auto take = [&](std::string_view piece) { return receiver.take(piece); };
   const bool complete = is_form ? request.body->read_form(
                                       [&](const std::string& name, const std::string& file_name) {
@@ -143,7 +158,7 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
                                       },
                                       take)
                                 : request.body->read(take);
-  receiver.check(*request.body, complete, is_form);
+  receiver.finish(*request.body, complete, is_form);
   if (expected && receiver.digest() != *expected) throw other_digest();
   name_ = is_form ? receiver.file_name() : file_name_of(request.header("Content-Disposition"));
 }
