@@ -193,6 +193,7 @@ void visit(Is<Job> auto& self, auto&& field) {
   field("mesh", self.mesh);
   field("error", self.error);
   field("reused", self.reused);
+  field("waiting_for", self.waiting_for);
 }
 
 void visit(Is<JobEvent> auto& self, auto&& field) {

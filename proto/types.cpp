@@ -69,6 +69,11 @@ struct Names<Stage> {
       std::pair{Stage::kEncode, "encode"},   std::pair{Stage::kDone, "done"}};
 };
 
+template <>
+struct Names<WaitingFor> {
+  static constexpr std::array kTable = {std::pair{WaitingFor::kDisk, "disk"}};
+};
+
 template <class Enum>
 std::string_view name_of(Enum value) {
   for (const auto& [known, name] : Names<Enum>::kTable) {
@@ -107,6 +112,7 @@ std::string_view to_string(MeshFormat value) { return name_of(value); }
 std::string_view to_string(Priority value) { return name_of(value); }
 std::string_view to_string(JobState value) { return name_of(value); }
 std::string_view to_string(Stage value) { return name_of(value); }
+std::string_view to_string(WaitingFor value) { return name_of(value); }
 
 template <class Enum>
 std::optional<Enum> from_string(std::string_view name) {
@@ -124,6 +130,7 @@ template std::optional<MeshFormat> from_string(std::string_view);
 template std::optional<Priority> from_string(std::string_view);
 template std::optional<JobState> from_string(std::string_view);
 template std::optional<Stage> from_string(std::string_view);
+template std::optional<WaitingFor> from_string(std::string_view);
 
 template <class Enum>
 std::vector<Enum> values_of() {
@@ -156,5 +163,6 @@ template std::string names_of<Smoothing>();
 template std::string names_of<MeshFormat>();
 template std::string names_of<Priority>();
 template std::string names_of<JobState>();
+template std::string names_of<WaitingFor>();
 
 }  // namespace isomesh

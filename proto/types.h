@@ -191,6 +191,9 @@ double default_lambda(Smoothing smoothing);
 enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };
 enum class Stage { kQueue, kLoad, kExtract, kSmooth, kEncode, kDone };
 
+// What a queued job waits for besides a worker.
+enum class WaitingFor { kDisk };  // room for its files
+
 // True for the three states that a job does not leave again.
 bool is_final(JobState state);
 
@@ -304,6 +307,7 @@ struct Job {
   std::optional<MeshSummary> mesh;  // of a job that succeeded
   std::optional<Problem> error;     // of a job that failed
   bool reused = false;              // took the mesh of a job like it instead of making one
+  std::optional<WaitingFor> waiting_for = {};
 
   bool operator==(const Job&) const = default;
 };
@@ -358,6 +362,7 @@ std::string_view to_string(MeshFormat value);
 std::string_view to_string(Priority value);
 std::string_view to_string(JobState value);
 std::string_view to_string(Stage value);
+std::string_view to_string(WaitingFor value);
 
 // The inverse: empty for a name that is none of them.
 template <class Enum>
@@ -371,6 +376,7 @@ extern template std::optional<MeshFormat> from_string(std::string_view);
 extern template std::optional<Priority> from_string(std::string_view);
 extern template std::optional<JobState> from_string(std::string_view);
 extern template std::optional<Stage> from_string(std::string_view);
+extern template std::optional<WaitingFor> from_string(std::string_view);
 
 // All values that have a name, in the order of the contract.
 template <class Enum>
@@ -393,5 +399,6 @@ extern template std::string names_of<Smoothing>();
 extern template std::string names_of<MeshFormat>();
 extern template std::string names_of<Priority>();
 extern template std::string names_of<JobState>();
+extern template std::string names_of<WaitingFor>();
 
 }  // namespace isomesh

@@ -172,7 +172,7 @@ int run(const Options& options, const sigset_t& signals) {
   const auto keep = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::duration<double, std::chrono::days::period>(options.keep_days));
   store::Identity identity(database, folder, options.word, {.tolerance = clock_tolerance(keep)});
-  const store::FileBlobStore blobs(folder);
+  store::FileBlobStore blobs(folder);
   store::SqliteVolumeStore volumes(database);
   store::JobStoreOptions job_options = options.jobs;
   job_options.mesher_version = jobs::kMesherVersion;
@@ -185,6 +185,8 @@ int run(const Options& options, const sigset_t& signals) {
   retention_options.max_bytes = options.max_disk;
   retention_options.now = [&identity] { return identity.now(); };
   store::Retention retention(jobs, volumes, blobs, folder.scratch(), retention_options);
+  blobs.limit_room(options.max_disk,
+                   [&retention](std::uint64_t bytes) { retention.make_room(bytes); });
   jobs::RunnerOptions runner = options.runner;
   runner.bounds.time = std::chrono::seconds(options.import_seconds);
   runner.program = beside_this_program("isomesh-import");

@@ -40,6 +40,13 @@ std::string bar_line(const std::string& label, double share, const std::string& 
   return line;
 }
 
+std::string note_of(const Job& job) {
+  if (job.state != JobState::kQueued) return "";
+  return job.waiting_for
+             ? "waiting for room on the server's " + std::string(to_string(*job.waiting_for))
+             : "waiting for a worker";
+}
+
 ProgressBar::ProgressBar() : visible_(::isatty(STDERR_FILENO) == 1) {}
 
 ProgressBar::~ProgressBar() { clear(); }
@@ -50,8 +57,7 @@ void ProgressBar::transfer(const std::string& label, std::uint64_t done, std::ui
 }
 
 void ProgressBar::job(const Job& job) {
-  draw(std::string(to_string(job.stage)), job.progress,
-       job.state == JobState::kQueued ? "waiting for a worker" : "");
+  draw(std::string(to_string(job.stage)), job.progress, note_of(job));
 }
 
 void ProgressBar::clear() {

@@ -14,6 +14,9 @@ namespace isomesh::cli {
 std::string bar_line(const std::string& label, double share, const std::string& note,
                      std::size_t columns);
 
+// What a job waits for; empty once it runs. Pure.
+std::string note_of(const Job& job);
+
 // Draws on standard error when that is a terminal, and does nothing otherwise. One thread at a
 // time.
 class ProgressBar {

@@ -46,6 +46,28 @@ void check_memory(const mesh::SurfaceCount& count, const MeshParameters& paramet
                   std::to_string(allowed / kMebibyte) + " MiB are allowed");
 }
 
+// What the files take at least. STL's size is known; the others' are guesses, of which half counts.
+std::uint64_t least_file_bytes(const mesh::SurfaceSize& surface, const MeshParameters& parameters) {
+  double bytes = 0;
+  for (const MeshFormat format : parameters.formats) {
+    const double guess = codec::describe(format).bytes(surface, parameters);
+    bytes += format == MeshFormat::kStl ? guess : guess / 2;
+  }
+  return static_cast<std::uint64_t>(bytes);
+}
+
+void check_disk(const mesh::Mesh& mesh, const MeshRequest& request) {
+  const std::uint64_t needed =
+      least_file_bytes({mesh.triangles.size(), mesh.positions.size()}, request.parameters);
+  if (needed <= request.disk_bytes) return;
+  constexpr std::uint64_t kKibibyte = 1 << 10;
+  throw Error(ErrorCode::kTooLarge,
+              "the surface has " + std::to_string(mesh.triangles.size()) +
+                  " triangles; its files would take " + std::to_string(needed / kKibibyte) +
+                  " KiB or more, and the disk can never hold more than " +
+                  std::to_string(request.disk_bytes / kKibibyte) + " KiB of them");
+}
+
 template <class T>
 void extract_as(const SampleArray& samples, const MeshRequest& request, const Progress& progress,
                 mesh::Mesh& mesh) {
@@ -161,6 +183,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
     const mesh::Dropped dropped = keep_components(parameters.components, progress.quiet(), mesh);
     summary.dropped = {dropped.components, dropped.triangles};
   }
+  check_disk(mesh, request);
   summary.triangles = mesh.triangles.size();
   summary.vertices = mesh.positions.size();
 

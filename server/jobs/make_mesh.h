@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
 #include <stop_token>
 #include <string_view>
@@ -70,6 +71,8 @@ struct MeshRequest {
   const MeshParameters& parameters;
   double iso;  // whatever the parameters say of it
   std::uint64_t memory_bytes;
+  // Of all files together; the disk may hold other things now, but never more than that.
+  std::uint64_t disk_bytes = std::numeric_limits<std::uint64_t>::max();
 };
 
 // How much memory a job with a surface of that size takes at its peak, beside its mapped volume:
@@ -80,7 +83,7 @@ std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParame
 // their order. The files of the summary are empty. `mesh` is worked in, and left as it was encoded.
 // `progress` enters the stages; the caller ends the last one, when the bytes are where they belong.
 // Throws Error kCancelled, kTooLarge with the estimate when the job would take more than it may
-// (told before memory is taken), and kInternal.
+// (told before memory is taken) or than the disk could ever hold, and kInternal.
 MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
                       std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh);
 

@@ -1,5 +1,6 @@
 #include "server/jobs/workers.h"
 
+#include <algorithm>
 #include <array>
 #include <exception>
 #include <new>
@@ -21,8 +22,10 @@ constexpr std::size_t kWorkspaceBudgetBytes = std::size_t{1} << 30;
 constexpr milliseconds kBetweenRenewals{100};
 constexpr milliseconds kBetweenReaps{1000};
 constexpr milliseconds kLongestIdle{1000};
-// How long a job that found the disk full waits before it is run again.
+// How long a job that found the disk full waits before it is run again: the first time, and at
+// most. It doubles each time.
 constexpr milliseconds kFullDiskDelay{5000};
+constexpr milliseconds kLongestFullDiskDelay{60'000};
 // How long until a job's end that found the disk full is told the queue again.
 constexpr milliseconds kFullDiskRetry{500};
 
@@ -181,6 +184,7 @@ void Workers::run(const store::Lease& lease, Workspace& workspace) {
   {
     const Lock lock(runs_mutex_);
     std::erase(runs_, run);
+    if (run->reason() != Reason::kFullDisk) full_disk_delays_.erase(lease.id);
   }
   conclude(*run, outcome);
 }
@@ -202,7 +206,9 @@ void Workers::conclude(const Run& run, store::Outcome outcome) {
       return jobs_.put_back(lease, milliseconds(0));
     }
     if (!outcome.mesh && run.reason() == Reason::kFullDisk) {
-      return jobs_.put_back(lease, kFullDiskDelay);
+      const milliseconds delay = full_disk_delay(lease.id);
+      spdlog::warn("job {} waits for room on the disk, {} s", lease.id, delay.count() / 1000);
+      return jobs_.put_back(lease, delay, WaitingFor::kDisk);
     }
     return jobs_.finish(lease, outcome);
   };
@@ -216,6 +222,15 @@ void Workers::conclude(const Run& run, store::Outcome outcome) {
     }
     pause(running_.get_token(), kFullDiskRetry);
   }
+}
+
+// Known to this process only: after a restart it is tried again soon.
+milliseconds Workers::full_disk_delay(const std::string& job) {
+  const Lock lock(runs_mutex_);
+  milliseconds& next = full_disk_delays_.try_emplace(job, kFullDiskDelay).first->second;
+  const milliseconds delay = next;
+  next = std::min(2 * next, kLongestFullDiskDelay);
+  return delay;
 }
 
 void Workers::renew(Run& run) {

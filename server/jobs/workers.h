@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <map>
 #include <memory>
 #include <stop_token>
 #include <string>
@@ -45,6 +46,7 @@ class Workers {
   void work(const std::stop_token& stop, const std::string& name);
   void run(const store::Lease& lease, Workspace& workspace);
   void conclude(const Run& run, store::Outcome outcome);
+  std::chrono::milliseconds full_disk_delay(const std::string& job);
   void renew(Run& run);
   void look_after_leases(const std::stop_token& stop);
   void reap();
@@ -60,6 +62,9 @@ class Workers {
   std::size_t alive_ ISOMESH_GUARDED_BY(alive_mutex_);  // threads that may still run a job
   Mutex runs_mutex_;
   std::vector<std::shared_ptr<Run>> runs_ ISOMESH_GUARDED_BY(runs_mutex_);  // under way
+  // How long jobs that wait for room on the disk wait the next time.
+  std::map<std::string, std::chrono::milliseconds> full_disk_delays_
+      ISOMESH_GUARDED_BY(runs_mutex_);
   std::vector<std::jthread> threads_;
   std::jthread leases_;  // last: joined first
 };

@@ -32,7 +32,7 @@ class BlobWriter {
  public:
   virtual ~BlobWriter() = default;
 
-  // Throws Error kOutOfSpace.
+  // Throws Error kOutOfSpace, and kTooLarge when there could never be enough room.
   virtual void write(std::span<const std::byte> bytes) = 0;
 
   // Afterwards the blob is there and on disk. To be called once. Throws Error kOutOfSpace.
@@ -76,6 +76,12 @@ class BlobStore {
 
   // False while there is so little room that nothing new should be begun.
   virtual bool has_room() const = 0;
+
+  // What all blobs take, those in quarantine and those that are being written included.
+  virtual std::uint64_t bytes() const = 0;
+
+  // What they could take together if nothing else were stored.
+  virtual std::uint64_t capacity() const = 0;
 
   // Makes a finished file of this machine a blob on disk and removes it. `blob` is what digest_of
   // has just said of the file, so that is_intact() need not read it again. Throws Error

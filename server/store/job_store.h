@@ -113,6 +113,7 @@ enum class Ended {
 struct QueueDepth {
   std::array<std::size_t, 3> queued = {};  // by Priority
   std::size_t running = 0;
+  std::size_t waiting_for_disk = 0;  // of the queued
 
   std::size_t all_queued() const { return queued[0] + queued[1] + queued[2]; }
 };
@@ -162,8 +163,10 @@ class JobStore {
   virtual bool finish(const Lease& lease, const Outcome& outcome) = 0;
 
   // Gives a job back that could not be run now; it is claimed again after `delay`, and the attempt
-  // does not count. One that was asked to cancel ends cancelled. False when the lease is lost.
-  virtual bool put_back(const Lease& lease, std::chrono::milliseconds delay) = 0;
+  // does not count. Until then it says what it waits for. One that was asked to cancel ends
+  // cancelled. False when the lease is lost.
+  virtual bool put_back(const Lease& lease, std::chrono::milliseconds delay,
+                        std::optional<WaitingFor> waiting_for = {}) = 0;
 
   // Ends the runs whose leases have run out: their jobs are queued again, have failed after the
   // last attempt, or are cancelled. Anyone may call. Returns how many there were.

@@ -26,7 +26,7 @@ Retention::Gone Retention::enforce() {
   {
     const Lock lock(mutex_);
     expire_old(now, gone);
-    if (options_.max_bytes > 0) expire_beyond(options_.max_bytes, gone);
+    if (options_.max_bytes > 0) shrink_to(options_.max_bytes, gone);
     gone.blobs += erase_garbage();
     sweep_blobs(gone);
   }
@@ -40,7 +40,7 @@ void Retention::make_room(std::uint64_t bytes) {
   if (options_.max_bytes == 0) return;
   const Lock lock(mutex_);
   Gone gone;
-  if (bytes <= options_.max_bytes && expire_beyond(options_.max_bytes - bytes, gone)) return;
+  if (bytes <= options_.max_bytes && shrink_to(options_.max_bytes - bytes, gone)) return;
   throw Error(ErrorCode::kOutOfSpace, "the room for volumes and meshes is used up");
 }
 
@@ -57,15 +57,28 @@ void Retention::expire_old(Time now, Gone& gone) {
   }
 }
 
-bool Retention::expire_beyond(std::uint64_t max_bytes, Gone& gone) {
+bool Retention::shrink_to(std::uint64_t max_bytes, Gone& gone) {
   while (true) {
-    const std::uint64_t named = named_bytes();
-    if (named <= max_bytes) return true;
+    const std::uint64_t used = blobs_.bytes();
+    if (used <= max_bytes) return true;
+    if (const std::size_t erased = erase_garbage() + blobs_.empty_quarantine(Time::max())) {
+      gone.blobs += erased;
+      continue;
+    }
+    // What has expired and cannot go yet will: no more is to expire for that.
+    const std::uint64_t going = garbage_bytes();
+    if (used <= max_bytes + going) return false;
     // Jobs without a mesh take no room, and go by their age alone.
     const std::vector<Expirable> items = oldest(Time::max(), Ended::kWithMesh);
     if (items.empty()) return false;
-    expire(items, named - max_bytes, gone);
+    expire(items, used - max_bytes - going, gone);
   }
+}
+
+std::uint64_t Retention::garbage_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const std::string& key : garbage_) bytes += blobs_.size(key).value_or(0);
+  return bytes;
 }
 
 std::vector<Expirable> Retention::oldest(Time before, Ended which) const {

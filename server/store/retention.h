@@ -67,7 +67,8 @@ class Retention {
  private:
   void expire_old(Time now, Gone& gone) ISOMESH_REQUIRES(mutex_);
   // False when what queued and running jobs need is more than that.
-  bool expire_beyond(std::uint64_t max_bytes, Gone& gone) ISOMESH_REQUIRES(mutex_);
+  bool shrink_to(std::uint64_t max_bytes, Gone& gone) ISOMESH_REQUIRES(mutex_);
+  std::uint64_t garbage_bytes() const ISOMESH_REQUIRES(mutex_);
   std::vector<Expirable> oldest(Time before, Ended which) const;
   void expire(std::span<const Expirable> items, std::uint64_t enough, Gone& gone)
       ISOMESH_REQUIRES(mutex_);

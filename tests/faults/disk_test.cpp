@@ -99,6 +99,43 @@ TEST_F(Disk, WhatIsTooOldStillExpires) {
   EXPECT_TRUE(eventually([&] { return daemon().get("/v1/jobs/" + job.id).status == 410; }));
 }
 
+// Its triangles are known before a byte of it is written.
+TEST_F(Disk, AJobThatCanNeverFitFailsAndSaysSo) {
+  start();
+  const Volume volume = upload(daemon(), long_upload());
+  const std::string members = R"("formats": ["stl"], "passes": 0)";
+  const Job failed = daemon().client().wait(submit(daemon(), volume, 50, members).id);
+  EXPECT_EQ(failed.state, JobState::kFailed);
+  ASSERT_TRUE(failed.error);
+  EXPECT_EQ(failed.error->status, 413);
+  EXPECT_THAT(failed.error->detail, HasSubstr("the disk can never hold"));
+  EXPECT_EQ(daemon().get("/readyz").status, 200);
+}
+
+TEST_F(Disk, AJobThatMayFitLaterWaitsAndSaysSo) {
+  start();
+  const RawUpload raw = raw_upload(noise<std::uint8_t>({0, 100}, {48, 48, 48}, 11));
+  const Volume volume = upload(daemon(), raw);
+  disk_.fill("foreign", 8 * kMebibyte);
+  const std::string members = R"("formats": ["stl"], "passes": 0)";
+  const std::string id = submit(daemon(), volume, 50, members).id;
+  Job seen;
+  ASSERT_TRUE(eventually([&] {
+    seen = daemon().client().job(id);
+    return seen.waiting_for || is_final(seen.state);
+  })) << daemon().errors();
+  EXPECT_EQ(seen.state, JobState::kQueued);
+  EXPECT_EQ(seen.waiting_for, WaitingFor::kDisk);
+  const Answer ready = daemon().get("/readyz");
+  EXPECT_TRUE(is_problem(ready, ErrorCode::kUnavailable));
+  EXPECT_THAT(ready.body, HasSubstr("disk"));
+  std::filesystem::remove(disk_.outside() / "foreign");
+  const Job done = daemon().client().wait(id);
+  EXPECT_EQ(done.state, JobState::kSucceeded);
+  EXPECT_EQ(done.waiting_for, std::nullopt);
+  EXPECT_TRUE(becomes_ready());
+}
+
 // 1 000 jobs and their events are some megabytes of changes.
 TEST_F(Disk, TheLogOfChangesStaysSmall) {
   start({"--max-queue", "2000", "--workers", "1"});

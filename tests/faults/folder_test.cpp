@@ -58,6 +58,43 @@ TEST_F(Folder, TheOldestGoesWhenAllIsTooMuch) {
   EXPECT_EQ(daemon().get("/v1/volumes/" + second.id).status, 200);
 }
 
+// The files of volumes and meshes that are there, and those that wait to be removed.
+std::uint64_t stored_bytes(const std::filesystem::path& data) {
+  std::uint64_t bytes = 0;
+  for (const auto* folder : {"blobs", "quarantine"}) {
+    for (const std::string& name : files_below(data / folder)) {
+      std::error_code gone;
+      const std::uintmax_t size = std::filesystem::file_size(data / folder / name, gone);
+      if (!gone && name != "identity") bytes += size;
+    }
+  }
+  return bytes;
+}
+
+// While jobs write, not when somebody looks later.
+TEST_F(Folder, TheRoomForAllIsKeptByWhatJobsWrite) {
+  constexpr std::uint64_t kMost = 500'000;
+  start({"--max-disk", std::to_string(kMost), "--workers", "1"});
+  const Volume volume = small_volume();
+  std::uint64_t written = 0;
+  for (int n = 0; n < 20; ++n) {
+    const Job job = ended(submit(daemon(), volume, 60 + n, R"("formats": ["stl"])").id);
+    ASSERT_EQ(job.state, JobState::kSucceeded);
+    written += job.mesh->files.at(MeshFormat::kStl).bytes;
+    EXPECT_LE(stored_bytes(folder_ / "data"), kMost);
+    EXPECT_EQ(daemon().get("/v1/jobs/" + job.id + "/mesh.stl").status, 200);
+  }
+  EXPECT_GT(written, 2 * kMost) << "more than fits was written";
+  // One that is larger than all the room is no matter of time.
+  const Job large =
+      ended(submit(daemon(),
+                   upload(daemon(), raw_upload(noise<std::uint8_t>({0, 100}, {32, 32, 32}, 11))),
+                   50, R"("formats": ["stl"])")
+                .id);
+  EXPECT_EQ(large.state, JobState::kFailed);
+  EXPECT_EQ(large.error->status, 413);
+}
+
 // The sweeper would take all files for litter.
 TEST_F(Folder, WithoutItsDatabaseIsRefusedUnlessAdopted) {
   start();

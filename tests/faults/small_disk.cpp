@@ -25,15 +25,15 @@ std::filesystem::path SmallDisk::outside() const {
   return "/proc/" + std::to_string(holder_->id()) + "/root" + folder_.path().string();
 }
 
-void SmallDisk::fill(const std::string& name) const {
+void SmallDisk::fill(const std::string& name, std::uint64_t leave) const {
   const Descriptor file(::open((outside() / name).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600));
   if (file.number() < 0) throw std::runtime_error("the disk cannot be filled");
-  for (off_t place = 0; free_bytes() > 0;) {
-    const auto more = static_cast<off_t>(free_bytes());
+  for (off_t place = 0; free_bytes() > leave;) {
+    const auto more = static_cast<off_t>(free_bytes() - leave);
     if (::posix_fallocate(file.number(), place, more) != 0) break;
     place += more;
   }
-  if (free_bytes() > 0) throw std::runtime_error("the disk is not full");
+  if (free_bytes() > leave) throw std::runtime_error("the disk is not full");
 }
 
 }  // namespace isomesh::test

@@ -28,8 +28,8 @@ class SmallDisk {
   std::filesystem::path outside() const;
 
   std::uint64_t free_bytes() const { return std::filesystem::space(outside()).available; }
-  // Leaves not a byte free, in a file of that name.
-  void fill(const std::string& name) const;
+  // Leaves so many bytes free, and puts the others into a file of that name.
+  void fill(const std::string& name, std::uint64_t leave = 0) const;
 
  private:
   TemporaryFolder folder_;

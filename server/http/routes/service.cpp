@@ -12,6 +12,9 @@ void add_service_routes(App& app) {
     if (!app.services.blobs.has_room()) {
       throw Error(ErrorCode::kUnavailable, "the disk is full: nothing new is accepted");
     }
+    if (app.services.jobs.depth().waiting_for_disk > 0) {
+      throw Error(ErrorCode::kUnavailable, "jobs wait for room on the disk");
+    }
     response.set_body("ok\n", "text/plain");
   });
   add_get(app, "/openapi.yaml", [](const auto& /*request*/, auto& response) {

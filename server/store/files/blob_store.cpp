@@ -54,6 +54,13 @@ Blob digest_of(const File& file, const std::stop_token& stop) {
   return {to_hex(digest.finish()), offset};
 }
 
+// 0 when it is not there.
+std::uint64_t size_of(const std::filesystem::path& file) {
+  std::error_code absent;
+  const std::uintmax_t bytes = std::filesystem::file_size(file, absent);
+  return absent ? 0 : bytes;
+}
+
 void touch(const std::filesystem::path& file) {
   timespec now = {};
   ::clock_gettime(CLOCK_REALTIME, &now);
@@ -86,18 +93,25 @@ class FileBlobStore::Writer : public BlobWriter {
   ~Writer() override {
     std::error_code ignored;  // a blob that was committed is no longer here
     std::filesystem::remove(path_, ignored);
+    store_.room_.give(taken_);
   }
 
   void write(std::span<const std::byte> bytes) override {
+    bytes_ += bytes.size();
+    if (bytes_ > store_.capacity()) {
+      throw Error(ErrorCode::kTooLarge, "the file takes more than all the room that there is");
+    }
     store_.folder_.reserve().check_room();  // which is there to free more, not to be filled
+    store_.room_.take(bytes.size());
+    taken_ += bytes.size();
     file_.write(bytes);
     digest_.update(bytes);
-    bytes_ += bytes.size();
   }
 
   Blob commit() override {
     const std::string key = to_hex(digest_.finish());
-    store_.believe(key, store_.publish_as(path_, file_, key));
+    store_.believe(key, store_.publish_as(path_, file_, key, bytes_));
+    taken_ = 0;
     return {key, bytes_};
   }
 
@@ -107,6 +121,7 @@ class FileBlobStore::Writer : public BlobWriter {
   File file_;
   Sha256 digest_;
   std::uint64_t bytes_ = 0;
+  std::uint64_t taken_ = 0;  // of the room, until it is a blob
 };
 
 // Has others that ask for the same blob wait.
@@ -132,11 +147,31 @@ Blob digest_of(const std::filesystem::path& path) {
   return digest_of(file, {});
 }
 
+FileBlobStore::FileBlobStore(const DataFolder& folder) : folder_(folder) {
+  for (const std::string& key : all_keys()) room_.take(size_of(path_of(key)));
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.quarantine())) {
+    room_.take(size_of(entry.path()));
+  }
+}
+
+std::uint64_t FileBlobStore::capacity() const {
+  const std::uint64_t disk = folder_.reserve().capacity();
+  return room_.max_bytes() == 0 ? disk : std::min(disk, room_.max_bytes());
+}
+
 std::unique_ptr<BlobWriter> FileBlobStore::begin() const { return std::make_unique<Writer>(*this); }
 
 void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) const {
   folder_.reserve().check_room();
-  believe(blob.key, publish_as(file, File::open(file), blob.key));
+  // One that is there already makes place for this one.
+  const std::uint64_t more = blob.bytes - std::min(blob.bytes, size(blob.key).value_or(0));
+  room_.take(more);
+  try {
+    believe(blob.key, publish_as(file, File::open(file), blob.key, more));
+  } catch (...) {
+    room_.give(more);
+    throw;
+  }
 }
 
 std::unique_ptr<BlobReader> FileBlobStore::open(const std::string& key) const {
@@ -193,8 +228,9 @@ std::optional<std::uint64_t> FileBlobStore::size(const std::string& key) const {
 }
 
 void FileBlobStore::erase(const std::string& key) const {
+  const std::uint64_t bytes = size_of(path_of(key));
   std::error_code ignored;
-  std::filesystem::remove(path_of(key), ignored);
+  if (std::filesystem::remove(path_of(key), ignored)) room_.give(bytes);
 }
 
 std::filesystem::path FileBlobStore::found(const std::string& key) const {
@@ -264,7 +300,9 @@ std::size_t FileBlobStore::empty_quarantine(Time before) const {
     if (::stat(entry.path().c_str(), &status) != 0) continue;
     const auto since = std::chrono::seconds(status.st_mtim.tv_sec);
     if (since >= before.time_since_epoch()) continue;
-    removed += std::filesystem::remove(entry.path(), gone) ? 1 : 0;
+    if (!std::filesystem::remove(entry.path(), gone)) continue;
+    room_.give(static_cast<std::uint64_t>(status.st_size));
+    ++removed;
   }
   return removed;
 }
@@ -282,13 +320,19 @@ std::vector<std::string> FileBlobStore::all_keys() const {
 }
 
 std::string FileBlobStore::publish_as(const std::filesystem::path& path, const File& file,
-                                      const std::string& key) const {
+                                      const std::string& key, std::uint64_t taken) const {
   // The time is a finer one than the system gives to files that are written, so a write within the
   // same tick changes it.
   touch(path);
   const std::filesystem::path place = path_of(key);
   make_folder_for(place);
+  const std::uint64_t bytes = size_of(path);
   std::string traits;
+  const auto stored = [&](std::uint64_t replaced) ISOMESH_REQUIRES(places_) {
+    room_.settle(taken + replaced, bytes);
+    note_unsettled(key);
+    traits = traits_of(place);
+  };
   // Where nothing is there, no record that survives can name the place before both are synced. The
   // file's sync then brings its name to disk too on most file systems, and the folder's finds
   // nothing to do. What is there may be named already and must not be lost in between.
@@ -296,17 +340,20 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
   {
     const Lock lock(places_);
     has_moved = move_to_free_place(path, place);
-    if (has_moved) {
-      note_unsettled(key);
-      traits = traits_of(place);
-    }
+    if (has_moved) stored(0);
   }
-  file.sync();
+  try {
+    file.sync();
+  } catch (...) {
+    // It stays counted until it is swept, and whoever took the bytes gives them back.
+    if (has_moved) room_.settle(0, taken);
+    throw;
+  }
   if (!has_moved) {
     const Lock lock(places_);
+    const std::uint64_t replaced = size_of(place);
     move_to(path, place);
-    note_unsettled(key);
-    traits = traits_of(place);
+    stored(replaced);
   }
   sync_folder(place.parent_path());
   return traits;

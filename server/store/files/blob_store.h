@@ -6,22 +6,32 @@
 #include <set>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/mutex.h"
 #include "server/store/blob_store.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/files/files.h"
+#include "server/store/files/room.h"
 
 namespace isomesh::store {
 
 // Blobs as files of the data folder, which must outlive it.
 class FileBlobStore : public BlobStore {
  public:
-  explicit FileBlobStore(const DataFolder& folder) : folder_(folder) {}
+  explicit FileBlobStore(const DataFolder& folder);
+
+  // How many bytes all blobs may take, 0 for as many as the disk holds, and what makes room. To be
+  // called before anything is stored.
+  void limit_room(std::uint64_t max_bytes, Room::Make make) {
+    room_.limit(max_bytes, std::move(make));
+  }
 
   std::unique_ptr<BlobWriter> begin() const override;
   bool has_room() const override { return folder_.reserve().has_room(); }
+  std::uint64_t bytes() const override { return room_.used(); }
+  std::uint64_t capacity() const override;
   void adopt(const std::filesystem::path& file, const Blob& blob) const override;
   std::unique_ptr<BlobReader> open(const std::string& key) const override;
   LocalBlob local(const std::string& key) const override;
@@ -56,9 +66,10 @@ class FileBlobStore : public BlobStore {
   };
 
   void believe(const std::string& key, const std::string& traits) const;
-  // `file` is the open one of that path. Returns its traits in its place.
+  // `file` is the open one of that path, and `taken` of its bytes are taken from the room already.
+  // Returns its traits in its place.
   std::string publish_as(const std::filesystem::path& path, const File& file,
-                         const std::string& key) const;
+                         const std::string& key, std::uint64_t taken) const;
   void make_folder_for(const std::filesystem::path& place) const;
   // As path_of, for reading: what is in quarantine is put back.
   std::filesystem::path found(const std::string& key) const;
@@ -67,6 +78,7 @@ class FileBlobStore : public BlobStore {
   bool is_unsettled(const std::string& key, Steady since) const ISOMESH_REQUIRES(places_);
 
   const DataFolder& folder_;
+  mutable Room room_;
   // Held while a file takes its place or is swept, so that the sweeper never erases a file that has
   // just been put there anew.
   mutable Mutex places_;

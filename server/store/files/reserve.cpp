@@ -64,7 +64,7 @@ std::uint64_t Reserve::free_bytes() const { return space_of(file_.parent_path())
 
 std::uint64_t Reserve::capacity() const {
   const std::uint64_t all = space_of(file_.parent_path()).capacity;
-  return all - std::min(all, bytes_);
+  return all - std::min(all, bytes_ + bytes_ / kMargin);
 }
 
 std::uint64_t Reserve::usual_bytes(const std::filesystem::path& folder) {

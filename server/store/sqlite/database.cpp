@@ -99,6 +99,9 @@ CREATE TABLE callbacks(       -- of jobs that have ended, until they are deliver
 CREATE INDEX callbacks_by_time ON callbacks(next);
 )sql",
                                R"sql(
+ALTER TABLE jobs ADD COLUMN waiting_for INTEGER;  -- of queued ones, see WaitingFor
+CREATE INDEX jobs_waiting ON jobs(waiting_for) WHERE state = 0 AND waiting_for IS NOT NULL;
+
 CREATE TABLE identity(        -- one row: see Identity
   id TEXT NOT NULL,
   number INTEGER NOT NULL,

@@ -121,11 +121,12 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   row.attempts += 1;
   row.job.state = JobState::kRunning;
   row.job.stage = Stage::kLoad;
+  row.job.waiting_for.reset();
   row.job.started = timestamp();
   row.job.timing.queue = milliseconds_since(row.accepted);
   change->run(
       "UPDATE jobs SET state = 1, attempts = ?, fence = ?, claimed = ?, is_long = 0, worker = ?, "
-      "record = ? WHERE id = ?",
+      "waiting_for = NULL, record = ? WHERE id = ?",
       row.attempts, row.fence, now, worker, to_json(row.job), row.job.id);
   change.announce(row, EventKind::kStage);
   {
@@ -206,7 +207,8 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
   return true;
 }
 
-bool SqliteJobStore::put_back(const Lease& lease, std::chrono::milliseconds delay) {
+bool SqliteJobStore::put_back(const Lease& lease, std::chrono::milliseconds delay,
+                              std::optional<WaitingFor> waiting_for) {
   const bool is_held = database_.freeing([&] {
     Change change(*this);
     auto held = leased(change.connection(), lease);
@@ -215,6 +217,7 @@ bool SqliteJobStore::put_back(const Lease& lease, std::chrono::milliseconds dela
       end(change, *held, JobState::kCancelled);
     } else {
       held->attempts -= 1;
+      held->job.waiting_for = waiting_for;
       queue_again(change, *held, delay);
     }
     change.commit();
@@ -308,6 +311,7 @@ bool SqliteJobStore::is_held(const std::string& id, std::uint64_t fence) const {
 
 void SqliteJobStore::end(Change& change, Row& row, JobState state) const {
   row.job.state = state;
+  row.job.waiting_for.reset();
   row.job.finished = timestamp();
   row.job.timing.total = milliseconds_since(row.accepted);
   const std::int64_t now = now_us();
@@ -354,9 +358,11 @@ void SqliteJobStore::queue_again(Change& change, Row& row, std::chrono::millisec
   row.job.started.reset();
   row.job.timing = {};
   change->run(
-      "UPDATE jobs SET state = 0, attempts = ?, not_before = ?, record = ? "
-      "WHERE id = ?",
-      row.attempts, now_us() + microseconds(delay), to_json(row.job), row.job.id);
+      "UPDATE jobs SET state = 0, attempts = ?, not_before = ?, waiting_for = ?, record = ? WHERE "
+      "id "
+      "= ?",
+      row.attempts, now_us() + microseconds(delay), row.job.waiting_for, to_json(row.job),
+      row.job.id);
   change.announce(row, EventKind::kStage);
 }
 

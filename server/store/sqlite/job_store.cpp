@@ -106,6 +106,11 @@ QueueDepth SqliteJobStore::depth() const {
   Query running = reading->query("SELECT count(*) FROM jobs WHERE state = 1");
   running.next();
   depth.running = static_cast<std::size_t>(running.integer(0));
+  Query waiting = reading->query(
+      "SELECT count(*) FROM jobs WHERE state = 0 AND waiting_for IS NOT NULL AND waiting_for = ?",
+      WaitingFor::kDisk);
+  waiting.next();
+  depth.waiting_for_disk = static_cast<std::size_t>(waiting.integer(0));
   return depth;
 }
 
@@ -202,6 +207,7 @@ SqliteJobStore::Row SqliteJobStore::found(Connection& connection, const Viewer& 
 
 Job SqliteJobStore::with_progress(const Row& row) const {
   Job job = row.job;
+  if (job.state == JobState::kQueued && !blobs_.has_room()) job.waiting_for = WaitingFor::kDisk;
   const Lock lock(live_mutex_);
   const auto live = live_.find(job.id);
   const bool is_told = job.state == JobState::kRunning && live != live_.end() &&

@@ -28,7 +28,8 @@ class SqliteJobStore : public JobStore {
   Standing renew(const Lease& lease, const Progress& progress,
                  std::chrono::milliseconds length) override;
   bool finish(const Lease& lease, const Outcome& outcome) override;
-  bool put_back(const Lease& lease, std::chrono::milliseconds delay) override;
+  bool put_back(const Lease& lease, std::chrono::milliseconds delay,
+                std::optional<WaitingFor> waiting_for) override;
   std::size_t reap() override;
   // Whoever has the data folder's lock knows that no other process holds a lease.
   std::size_t reap_predecessor() override;

@@ -62,5 +62,14 @@ TEST(BarLine, StaysWithinTheTerminalAndSurvivesAnyShare) {
   EXPECT_EQ(bar_line("load", 0.999, "", 80), "load     [###############################.]  99 %");
 }
 
+TEST(BarLine, SaysWhatAJobWaitsFor) {
+  Job job;
+  EXPECT_EQ(note_of(job), "waiting for a worker");
+  job.waiting_for = WaitingFor::kDisk;
+  EXPECT_EQ(note_of(job), "waiting for room on the server's disk");
+  job.state = JobState::kRunning;
+  EXPECT_EQ(note_of(job), "");
+}
+
 }  // namespace
 }  // namespace isomesh::cli

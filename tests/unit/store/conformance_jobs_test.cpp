@@ -171,6 +171,21 @@ TEST_P(JobConformance, AJobThatIsPutBackIsAsIfItHadNotRun) {
   EXPECT_EQ(claimed().id, next);
 }
 
+TEST_P(JobConformance, AJobThatIsPutBackSaysWhatItWaitsForUntilItRuns) {
+  const std::string id = submit().id;
+  jobs().put_back(claimed(), milliseconds(0), WaitingFor::kDisk);
+  EXPECT_EQ(jobs().get("", id).waiting_for, WaitingFor::kDisk);
+  EXPECT_EQ(jobs().depth().waiting_for_disk, 1U);
+  restart();
+  EXPECT_EQ(jobs().get("", id).waiting_for, WaitingFor::kDisk);
+  const Lease lease = claimed();
+  EXPECT_EQ(jobs().get("", id).waiting_for, std::nullopt);
+  EXPECT_EQ(jobs().depth().waiting_for_disk, 0U);
+  jobs().put_back(lease, milliseconds(0), WaitingFor::kDisk);
+  EXPECT_EQ(jobs().cancel("", id).waiting_for, std::nullopt);
+  EXPECT_EQ(jobs().depth().waiting_for_disk, 0U);
+}
+
 TEST_P(JobConformance, AJobThatIsPutBackForLaterLetsOthersGoFirst) {
   submit();
   const std::string next = submit().id;

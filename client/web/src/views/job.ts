@@ -81,7 +81,9 @@ class ProgressPanel {
     this.bar.value = job.progress;
     this.text.textContent =
       job.state === 'queued'
-        ? `Waiting in the queue as ${job.priority}`
+        ? job.waiting_for
+          ? `Waiting for room on the server's ${job.waiting_for}`
+          : `Waiting in the queue as ${job.priority}`
         : `${job.stage}, ${Math.round(100 * job.progress)} % in all`;
   }
 }

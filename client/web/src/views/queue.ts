@@ -35,6 +35,7 @@ function progressOf(job: Job): Node | string {
   }
   if (job.mesh) return `${formatCount(job.mesh.triangles)} triangles`;
   if (job.error) return job.error.detail;
+  if (job.waiting_for) return `waits for room on the ${job.waiting_for}`;
   return '';
 }
 

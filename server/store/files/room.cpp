@@ -1,0 +1,51 @@
+#include "server/store/files/room.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "proto/error.h"
+
+namespace isomesh::store {
+
+void Room::limit(std::uint64_t max_bytes, Make make) {
+  max_bytes_ = max_bytes;
+  make_ = std::move(make);
+}
+
+void Room::take(std::uint64_t bytes) {
+  // Others may take what was made.
+  constexpr int kTries = 3;
+  for (int n = 0; n < kTries; ++n) {
+    if (try_take(bytes)) return;
+    if (bytes > max_bytes_) break;
+    make_(bytes);
+  }
+  if (!try_take(bytes)) {
+    throw Error(ErrorCode::kOutOfSpace, "the room for volumes and meshes is used up");
+  }
+}
+
+bool Room::try_take(std::uint64_t bytes) {
+  const Lock lock(mutex_);
+  const bool fits = max_bytes_ == 0 || (bytes <= max_bytes_ && used_ <= max_bytes_ - bytes);
+  if (fits) used_ += bytes;
+  return fits;
+}
+
+void Room::settle(std::uint64_t taken, std::uint64_t bytes) {
+  const Lock lock(mutex_);
+  used_ += bytes;
+  used_ -= std::min(used_, taken);
+}
+
+void Room::give(std::uint64_t bytes) {
+  const Lock lock(mutex_);
+  used_ -= std::min(used_, bytes);
+}
+
+std::uint64_t Room::used() const {
+  const Lock lock(mutex_);
+  return used_;
+}
+
+}  // namespace isomesh::store
