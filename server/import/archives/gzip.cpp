@@ -1,6 +1,9 @@
 #include "server/import/archives/gzip.h"
 
 #include <algorithm>
+#include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include <zlib.h>
@@ -54,6 +57,11 @@ void set_output(z_stream& stream, std::span<std::byte> output) {
               "The compressed data is truncated: the file ends before its stream does.");
 }
 
+[[noreturn]] void throw_followed() {
+  throw Error(ErrorCode::kUnusableVolume,
+              "Something that is not compressed data follows the compressed data.");
+}
+
 // Gives zlib the range's bytes, piece by piece.
 class Feed {
  public:
@@ -76,15 +84,50 @@ class Feed {
   std::vector<std::byte> piece_;
 };
 
-// Some writers fill the last block up with zeros. Nothing else may follow.
-void require_only_padding(Feed& feed, z_stream& stream) {
+// What gzip writes behind its data.
+struct Trailer {
+  std::uint32_t checksum = 0;
+  std::uint32_t bytes = 0;  // modulo 2^32
+
+  void add(std::span<const std::byte> inflated) {
+    const auto count = static_cast<uInt>(inflated.size());
+    checksum = static_cast<std::uint32_t>(
+        crc32(checksum, reinterpret_cast<const Bytef*>(inflated.data()), count));
+    bytes += count;
+  }
+
+  std::string text() const {
+    std::string result;
+    for (const std::uint32_t word : {checksum, bytes}) {
+      for (unsigned shift = 0; shift < 32; shift += 8) {
+        result += static_cast<char>(word >> shift & 0xFFU);
+      }
+    }
+    return result;
+  }
+};
+
+// Some writers fill the last block up with zeros, and some that write bare deflated data leave
+// gzip's trailer behind it. Nothing else may follow.
+void require_only_padding(Feed& feed, z_stream& stream, const std::optional<Trailer>& trailer) {
+  std::string rest;
   do {
-    const std::span rest(stream.next_in, stream.avail_in);
-    if (std::any_of(rest.begin(), rest.end(), [](Bytef byte) { return byte != 0; })) {
-      throw Error(ErrorCode::kUnusableVolume,
-                  "Something that is not compressed data follows the compressed data.");
+    for (const Bytef byte : std::span(stream.next_in, stream.avail_in)) {
+      if (rest.size() < sizeof(Trailer) && (byte != 0 || !rest.empty())) {
+        rest += static_cast<char>(byte);
+      } else if (byte != 0) {
+        throw_followed();
+      }
     }
   } while (feed.refill(stream));
+  if (rest.empty()) return;
+  // A checksum may begin with zeros, which were taken for padding, and end with them.
+  std::string expected = trailer ? trailer->text() : std::string();
+  expected.erase(0, std::min(expected.find_first_not_of('\0'), expected.size()));
+  if (expected.empty() || !rest.starts_with(expected) ||
+      rest.find_first_not_of('\0', expected.size()) != rest.npos) {
+    throw_followed();
+  }
 }
 
 bool another_member_follows(Feed& feed, z_stream& stream) {
@@ -117,6 +160,7 @@ std::uint64_t inflate_range(const InputFile& file, const CompressedRange& range,
   Feed feed(file, range);
   std::vector<std::byte> output(kPieceBytes);
   std::uint64_t produced = 0;
+  Trailer trailer;
   for (;;) {
     // More input is asked for only when the output was not full: a full one may mean that zlib
     // holds bytes back that it has decoded already.
@@ -129,13 +173,15 @@ std::uint64_t inflate_range(const InputFile& file, const CompressedRange& range,
       const std::size_t count = output.size() - stream.avail_out;
       if (count > limit - produced) return limit + 1;
       produced += count;
+      if (wrapping == Wrapping::kNone) trailer.add(std::span(output).first(count));
       if (count > 0) sink(std::span(output).first(count));
     } while (status != Z_STREAM_END && stream.avail_out == 0);
     if (status != Z_STREAM_END) continue;
-    if (!another_member_follows(feed, stream)) break;
+    if (wrapping == Wrapping::kNone || !another_member_follows(feed, stream)) break;
     inflateReset(&stream);
   }
-  require_only_padding(feed, stream);
+  require_only_padding(feed, stream,
+                       wrapping == Wrapping::kNone ? std::optional(trailer) : std::nullopt);
   return produced;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 #include "base/text.h"
@@ -108,6 +109,19 @@ std::optional<std::uint32_t> DataSet::unsigned_number(Tag tag) const {
     number = number << 8 | byte;
   }
   return number;
+}
+
+std::vector<double> DataSet::binary_reals(Tag tag) const {
+  const Element* element = find(tag);
+  if (element == nullptr || element->value.size() % sizeof(double) != 0) return {};
+  std::vector<double> result;
+  for (std::size_t at = 0; at < element->value.size(); at += sizeof(double)) {
+    std::array<char, sizeof(double)> bytes;
+    std::copy_n(element->value.data() + at, bytes.size(), bytes.begin());
+    if (big_endian) std::ranges::reverse(bytes);
+    result.push_back(std::bit_cast<double>(bytes));
+  }
+  return result;
 }
 
 DicomFile::DicomFile(const std::filesystem::path& path, const std::filesystem::path& scratch,

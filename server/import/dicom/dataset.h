@@ -34,7 +34,8 @@ struct Element {
 // Longer values are not read, because no volume needs one.
 inline constexpr std::uint64_t kLongestValue = 4096;
 
-// The elements of a file or of one item of a sequence, without private ones.
+// The elements of a file or of one item of a sequence, without private ones but for those of
+// private_elements.h.
 class DataSet {
  public:
   std::vector<Element> elements;
@@ -58,6 +59,9 @@ class DataSet {
 
   // Binary numbers of 16 (US) or 32 bits (UL).
   std::optional<std::uint32_t> unsigned_number(Tag tag) const;
+
+  // Binary numbers of double precision (FD). Empty when there are none.
+  std::vector<double> binary_reals(Tag tag) const;
 };
 
 // A run of bytes in a file.

@@ -5,18 +5,13 @@
 
 #include "base/text.h"
 #include "server/import/dicom/tags.h"
+#include "server/import/dicom/vectors.h"
 #include "server/import/source.h"
 
 namespace isomesh::import::dicom {
 namespace {
 
 constexpr double kSamePlace = 1e-3;  // mm
-
-Vector3 normal_of(const Plane& plane) {
-  const Vector3& a = plane.along_row;
-  const Vector3& b = plane.along_column;
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 std::vector<double> offsets_of(const DataSet& data, std::size_t frames) {
   std::vector<double> offsets = data.numbers(kGridFrameOffsetVector);
@@ -31,7 +26,7 @@ std::vector<double> offsets_of(const DataSet& data, std::size_t frames) {
 std::vector<double> distances_of(const DataSet& data, const Plane& first, std::size_t frames) {
   std::vector<double> offsets = offsets_of(data, frames);
   if (offsets.front() == 0) return offsets;
-  const double along_z = normal_of(first)[2];
+  const double along_z = cross(first.along_row, first.along_column)[2];
   if (std::abs(std::abs(along_z) - 1) > kSamePlace ||
       std::abs(offsets.front() - first.position[2]) > kSamePlace) {
     throw_unusable("The DICOM dose's offsets " + tag_name(kGridFrameOffsetVector) +
@@ -56,12 +51,10 @@ void place_dose(const DataSet& data, std::span<Frame> frames) {
   for (Frame& frame : frames) frame.rescale = {scaling[0], 0};
   if (frames.size() == 1) return;
   const Plane first = frames.front().plane;
-  const Vector3 normal = normal_of(first);
+  const Vector3 normal = cross(first.along_row, first.along_column);
   const std::vector<double> distances = distances_of(data, first, frames.size());
   for (std::size_t at = 0; at < frames.size(); ++at) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      frames[at].plane.position[axis] = first.position[axis] + distances[at] * normal[axis];
-    }
+    frames[at].plane.position = moved(first.position, normal, distances[at]);
   }
 }
 

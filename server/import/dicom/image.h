@@ -17,13 +17,18 @@ namespace isomesh::import::dicom {
 struct PixelLayout {
   std::uint32_t columns = 0;
   std::uint32_t rows = 0;
-  unsigned bits_allocated = 16;  // 8, 16 or 32
+  unsigned bits_allocated = 16;  // 1, 8, 16, 32 or 64
   unsigned bits_stored = 16;
   unsigned high_bit = 15;
   bool is_signed = false;
+  bool is_float = false;
 
   std::uint64_t samples() const { return std::uint64_t{columns} * rows; }
-  std::uint64_t frame_bytes() const { return samples() * (bits_allocated / 8); }
+  // Frames of single bits follow one another without a gap.
+  std::uint64_t bytes_of(std::uint64_t frames) const {
+    return (samples() * frames * bits_allocated + 7) / 8;
+  }
+  std::uint64_t frame_bytes() const { return bytes_of(1); }
   bool operator==(const PixelLayout&) const = default;
 };
 
@@ -36,9 +41,9 @@ struct Plane {
   std::array<double, 2> spacing = {};  // mm, along the row and along the column
 };
 
-// An attribute in which frames at the same position may differ, by its name in PS3.6.
+// The value of an attribute in which frames at the same position may differ.
 struct Phase {
-  std::string_view name;
+  std::size_t attribute = 0;  // its place in phase_names() (attributes.h)
   std::string value;
 
   bool operator==(const Phase&) const = default;
@@ -48,7 +53,23 @@ struct Frame {
   std::uint32_t number = 0;  // from 0, in its object
   Plane plane;
   Rescale rescale;
-  std::vector<Phase> phases;
+  std::uint32_t segment = 0;  // of a segmentation whose frames are one segment's; 0: none
+  std::vector<Phase> phases;  // the frame's own
+};
+
+// A segment of a segmentation.
+struct Segment {
+  std::uint32_t number = 0;
+  std::string label;  // UTF-8
+
+  bool operator==(const Segment&) const = default;
+};
+
+// What only segmentations (PS3.3, A.51 and A.108) have.
+struct Segmentation {
+  std::vector<Segment> segments;
+  bool is_binary = false;                // else a label map
+  std::optional<double> slice_distance;  // mm
 };
 
 struct Image {
@@ -58,12 +79,14 @@ struct Image {
   std::string rescale_type;  // the unit of rescaled samples: "HU" of a CT; may be empty
   std::string photometric;   // "MONOCHROME1" or "MONOCHROME2"
   std::optional<std::int64_t> instance_number;
-  PixelLayout layout;
+  PixelLayout stored;  // of a frame in the file
+  PixelLayout layout;  // of each of `frames`
+  // Above 0 the file has one frame, in which `frames` lie as tiles, so many side by side.
+  std::uint32_t tiles_per_row = 0;
   std::vector<Frame> frames;
+  std::vector<Phase> phases;  // of the whole object
+  std::optional<Segmentation> segmentation;
 };
-
-// Why an object is no part of a volume: a localiser, a report, ... Empty when it is an image.
-std::optional<std::string> reason_to_ignore(const DicomFile& file);
 
 // Throws Error kUnusableVolume with the reason when the object holds no pixels, fewer than it
 // tells, other ones than plain integers, or does not tell where its frames lie.

@@ -1,15 +1,17 @@
 #include "server/import/dicom/import.h"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "proto/error.h"
 #include "server/import/dicom/beginning.h"
-#include "server/import/dicom/decode.h"
+#include "server/import/dicom/choice.h"
 #include "server/import/dicom/pixels.h"
+#include "server/import/dicom/segmentation.h"
 #include "server/import/dicom/series.h"
-#include "server/import/dicom/stack.h"
 #include "server/import/dicom/tags.h"
 #include "server/import/dicom/values.h"
 #include "server/import/source.h"
@@ -29,7 +31,7 @@ class OpenFile {
   OpenFile(std::span<const Source> sources, std::filesystem::path scratch, std::uint64_t most_bytes)
       : sources_(sources), scratch_(std::move(scratch)), most_bytes_(most_bytes) {}
 
-  const FrameReader& reader(std::size_t index) {
+  FrameReader& reader(std::size_t index) {
     if (!file_ || index_ != index) {
       reader_.reset();
       file_.emplace(sources_[index].path, scratch_, most_bytes_);
@@ -59,6 +61,20 @@ std::vector<Slice> slices_of(std::span<const Source> sources) {
   return slices;
 }
 
+bool are_labels(const Stack& stack) { return stack.plane_count > 0; }
+
+void read_slice(const Stack& stack, std::size_t place, OpenFile& file,
+                std::span<std::byte> stored) {
+  const Slice& slice = stack.slices[place];
+  try {
+    file.reader(slice.file).read(slice.frame->number, stored);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kUnusableVolume) throw;
+    throw_unusable("The DICOM image cannot be read: " + stack.name(place) + ": " + error.what() +
+                   '.');
+  }
+}
+
 // False when a sample does not fit into the type.
 bool write_samples(const Stack& stack, SampleType type, OpenFile& file,
                    std::span<std::byte> target) {
@@ -67,13 +83,7 @@ bool write_samples(const Stack& stack, SampleType type, OpenFile& file,
     const Slice& slice = stack.slices[place];
     const PixelLayout& layout = slice.image->layout;
     stored.resize(layout.frame_bytes());
-    try {
-      file.reader(slice.file).read(slice.frame->number, stored);
-    } catch (const Error& error) {
-      if (error.code() != ErrorCode::kUnusableVolume) throw;
-      throw_unusable("The DICOM image cannot be read: " + stack.name(place) + ": " + error.what() +
-                     '.');
-    }
+    read_slice(stack, place, file, stored);
     const std::span<std::byte> plane = target.first(layout.samples() * bytes_per_sample(type));
     if (!convert_frame(stored, layout, slice.frame->rescale, type, plane)) return false;
     target = target.subspan(plane.size());
@@ -81,13 +91,25 @@ bool write_samples(const Stack& stack, SampleType type, OpenFile& file,
   return true;
 }
 
-Volume write_volume(const Stack& stack, Volume volume, OpenFile& file, const SizeLimits& limits,
-                    const std::filesystem::path& target) {
-  for (const SampleType type : candidate_types(stack.slices)) {
-    check_limits(volume.sample_count(), type, limits);
+bool write_stack(const Stack& stack, SampleType type, OpenFile& file, std::span<std::byte> target) {
+  if (!are_labels(stack)) return write_samples(stack, type, file, target);
+  write_labels(
+      stack, type,
+      [&](std::size_t place, std::span<std::byte> stored) {
+        read_slice(stack, place, file, stored);
+      },
+      target);
+  return true;
+}
+
+Volume write_volume(const Stack& stack, Volume volume, OpenFile& file, const ImportTask& task) {
+  const std::vector<SampleType> types =
+      are_labels(stack) ? std::vector{label_type(stack.slices)} : candidate_types(stack.slices);
+  for (const SampleType type : types) {
+    check_limits(volume.sample_count(), type, task.limits);
     volume.type = type;
-    CanonicalWriter writer(target, {volume.dims, type, volume.geometry});
-    if (write_samples(stack, type, file, writer.samples())) return finish(writer, volume);
+    CanonicalWriter writer(task.target, {volume.dims, type, volume.geometry});
+    if (write_stack(stack, type, file, writer.samples())) return finish(writer, volume);
   }
   throw Error(ErrorCode::kInternal, "No type holds a DICOM volume's samples.");
 }
@@ -96,8 +118,7 @@ Volume describe_volume(const Stack& stack) {
   const Image& image = *stack.slices.front().image;
   Volume volume;
   volume.format = "dicom";
-  volume.dims = {image.layout.columns, image.layout.rows,
-                 static_cast<std::uint32_t>(stack.slices.size())};
+  volume.dims = {image.layout.columns, image.layout.rows, stack.depth()};
   volume.geometry = normalised(stack.geometry);
   if (const auto fault = find_fault(volume.dims, volume.geometry)) {
     throw_unusable("The series' geometry cannot be used: " + fault->message + ".");
@@ -106,14 +127,18 @@ Volume describe_volume(const Stack& stack) {
   return volume;
 }
 
-std::vector<DicomInstance> instances_of(const Stack& stack, std::span<const Source> sources) {
-  std::vector<DicomInstance> instances;
+DicomIdentity identify(const Stack& stack, std::span<const Source> sources, const DataSet& data) {
+  DicomIdentity identity = identity_of(data);
   std::vector<bool> seen(sources.size());
   for (const Slice& slice : stack.slices) {
-    if (!seen[slice.file]) instances.push_back(sources[slice.file].instance);
+    if (!seen[slice.file]) identity.instances.push_back(sources[slice.file].instance);
     seen[slice.file] = true;
+    // One that not all slices have is that of none.
+    if (slice.image->frame_of_reference_uid != stack.slices.front().image->frame_of_reference_uid) {
+      identity.frame_of_reference_uid.clear();
+    }
   }
-  return instances;
+  return identity;
 }
 
 }  // namespace
@@ -124,20 +149,20 @@ bool is_dicom(std::string_view head) {
 }
 
 Volume import_dicom(std::span<const std::filesystem::path> files, const ImportTask& task) {
-  const auto& [source, scratch, target, options, limits] = task;
-  const std::uint64_t most_bytes = limits.max_sample_bytes + dicom::kMostHeaderBytes;
-  dicom::Upload upload = dicom::read_headers(files, scratch, most_bytes);
+  const std::uint64_t most_bytes = task.limits.max_sample_bytes + dicom::kMostHeaderBytes;
+  dicom::Upload upload = dicom::read_headers(files, task.scratch, most_bytes);
   const std::vector<dicom::Source> sources =
-      choose_series(std::move(upload.sources), options.series);
-  const dicom::Stack stack = dicom::make_stack(dicom::slices_of(sources));
-  dicom::OpenFile file(sources, scratch, most_bytes);
-  Volume volume = dicom::write_volume(stack, dicom::describe_volume(stack), file, limits, target);
+      choose_series(std::move(upload.sources), task.options.series);
+  std::vector<Note> notes = std::move(upload.notes);
+  const dicom::Stack stack = dicom::choose_stack(dicom::slices_of(sources), task.options, notes);
+  dicom::OpenFile file(sources, task.scratch, most_bytes);
+  Volume volume = dicom::write_volume(stack, dicom::describe_volume(stack), file, task);
   const dicom::Image& image = *stack.slices.front().image;
   volume.presets = volume::presets_for(image.modality, image.rescale_type, volume.range);
   volume.ignored = std::move(upload.ignored);
-  volume.dicom = dicom::identity_of(file.data());
+  std::ranges::move(notes, std::back_inserter(volume.notes));
+  volume.dicom = dicom::identify(stack, sources, file.data());
   if (!volume.dicom->series_description.empty()) volume.name = volume.dicom->series_description;
-  volume.dicom->instances = dicom::instances_of(stack, sources);
   return volume;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "base/files.h"
+#include "server/import/dicom/private_elements.h"
 #include "server/import/dicom/tags.h"
 #include "server/import/dicom/text.h"
 #include "server/import/source.h"
@@ -37,6 +38,14 @@ struct Head {
 bool is_needed_sequence(Tag tag) {
   switch (tag) {
     case kFrameContentSequence:
+    case kSegmentSequence:
+    case kSegmentIdentificationSequence:
+    case kMrEchoSequence:
+    case kMrDiffusionSequence:
+    case kDiffusionGradientSequence:
+    case kCardiacSequence:
+    case kMrImageFrameTypeSequence:
+    case kGridFrames:
     case kPlanePositionSequence:
     case kPlaneOrientationSequence:
     case kModalityLutSequence:
@@ -50,7 +59,10 @@ bool is_needed_sequence(Tag tag) {
   }
 }
 
-bool is_private(Tag tag) { return (tag >> 16 & 1U) != 0; }
+// Some programs leave representations blank that they do not know, before lengths of 16 bits.
+bool is_blank(std::string_view vr) {
+  return vr == "  " || vr == "??" || vr == std::string_view("\0\0", 2);
+}
 
 bool is_pixel_data(Tag tag) {
   return tag == kPixelData || tag == kFloatPixelData || tag == kDoubleFloatPixelData;
@@ -95,7 +107,7 @@ class Parser {
         result.pixels = read_pixels(head, encoding);
         break;
       }
-      read_element(head, encoding, end(), 0, result.data);
+      read_outer_element(head, encoding, result.data);
     }
     return result;
   }
@@ -146,11 +158,11 @@ class Parser {
       return head;
     }
     head.vr = window(at_, 2);
-    if (!is_representation(head.vr)) {
+    if (!is_representation(head.vr) && !is_blank(head.vr)) {
       throw_unusable("The DICOM file is corrupt: its element " + tag_name(head.tag) +
                      " has no value representation.");
     }
-    if (has_short_length(head.vr)) {
+    if (has_short_length(head.vr) || is_blank(head.vr)) {
       head.length = number(at_ + 2, 2, encoding.big_endian);
       at_ += 4;
       return head;
@@ -161,10 +173,11 @@ class Parser {
     return head;
   }
 
-  std::string read_value(const Head& head, std::uint64_t limit) {
+  std::string read_value(const Head& head, std::uint64_t limit,
+                         std::uint64_t longest = kLongestValue) {
     require(head.length, limit, head.tag);
     std::string value;
-    if (head.length <= kLongestValue) value = window(at_, head.length);
+    if (head.length <= longest) value = window(at_, head.length);
     at_ += head.length;
     return value;
   }
@@ -176,7 +189,6 @@ class Parser {
   }
 
   void keep(DataSet& set, Element element) {
-    if (is_private(element.tag)) return;
     count_part();
     kept_bytes_ += element.value.size();
     if (kept_bytes_ > kMostKeptBytes) {
@@ -186,24 +198,42 @@ class Parser {
     set.elements.push_back(std::move(element));
   }
 
+  // Reads an element of a file's data set, of which some private ones are needed, too.
+  void read_outer_element(const Head& head, const Encoding& encoding, DataSet& set) {
+    if (!is_private(head.tag)) return read_element(head, encoding, end(), 0, set);
+    const auto needed = blocks_.needed(head.tag);
+    Head known = head;
+    if (needed) known.tag = *needed;
+    Element element = read_content(known, encoding, end(), 0);
+    if (needed) return keep(set, std::move(element));
+    blocks_.reserve(head.tag, without_padding(element.value));
+  }
+
   void read_element(const Head& head, const Encoding& encoding, std::uint64_t limit, unsigned depth,
                     DataSet& set) {
-    Element element;
-    element.tag = head.tag;
     if (is_pixel_data(head.tag) && head.has_undefined_length()) {
       read_fragments(encoding, limit);  // an icon's, which are passed over
       return;
     }
+    Element element = read_content(head, encoding, limit, depth);
+    if (!is_private(head.tag)) keep(set, std::move(element));
+  }
+
+  Element read_content(const Head& head, const Encoding& encoding, std::uint64_t limit,
+                       unsigned depth) {
+    Element element;
+    element.tag = head.tag;
     const bool is_sequence =
         head.vr == "SQ" || head.has_undefined_length() || is_needed_sequence(head.tag);
-    if (is_sequence) {
-      // Systems that do not know an element pass it on as UN, with its items in implicit encoding.
-      const Encoding inside = head.vr == "UN" ? Encoding{false, false} : encoding;
-      read_items(head, inside, limit, depth + 1, element);
-    } else {
-      element.value = read_value(head, limit);
+    if (!is_sequence) {
+      element.value = read_value(
+          head, limit, head.tag == kCsaImageHeader ? kLongestPrivateValue : kLongestValue);
+      return element;
     }
-    keep(set, std::move(element));
+    // Systems that do not know an element pass it on as UN, with its items in implicit encoding.
+    const Encoding inside = head.vr == "UN" ? Encoding{false, false} : encoding;
+    read_items(head, inside, limit, depth + 1, element);
+    return element;
   }
 
   void read_items(const Head& head, const Encoding& encoding, std::uint64_t limit, unsigned depth,
@@ -224,7 +254,9 @@ class Parser {
       }
       count_part();
       DataSet set = read_item(item, encoding, end, depth);
-      if (!is_private(sequence.tag)) sequence.items.push_back(std::move(set));
+      if (!is_private(sequence.tag) || sequence.tag == kGridFrames) {
+        sequence.items.push_back(std::move(set));
+      }
     }
   }
 
@@ -283,6 +315,7 @@ class Parser {
   std::uint64_t at_;
   std::string window_;
   std::uint64_t window_begin_ = 0;
+  PrivateBlocks blocks_;
   std::size_t parts_ = 0;
   std::size_t kept_bytes_ = 0;
 };

@@ -6,6 +6,7 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "server/import/dicom/import.h"
+#include "server/import/dicom/object_kinds.h"
 #include "server/import/dicom/tags.h"
 #include "server/import/dicom/text.h"
 #include "server/import/source.h"
@@ -38,11 +39,19 @@ DicomInstance instance_of(const DicomFile& file) {
   return instance;
 }
 
+// Some programs write no UIDs. What is then the series' name is none that a UID can be: those do
+// not end with a part 0 behind a single number.
+std::string series_name(const DataSet& data) {
+  std::string uid = utf8(data, kSeriesInstanceUid);
+  if (!uid.empty()) return uid;
+  return std::to_string(data.integer(kSeriesNumber).value_or(0)) + ".0";
+}
+
 Source describe_source(const std::filesystem::path& path, const DicomFile& file) {
   const DataSet& data = file.data();
   Source source;
   source.path = path;
-  source.series_uid = utf8(data, kSeriesInstanceUid);
+  source.series_uid = series_name(data);
   source.series_description = utf8(data, kSeriesDescription);
   source.frame_count = std::max<std::int64_t>(data.integer(kNumberOfFrames).value_or(1), 1);
   source.instance = instance_of(file);
@@ -59,13 +68,54 @@ bool begins_as_dicom(const std::filesystem::path& path) {
   return is_dicom(head);
 }
 
-void read_header(const std::filesystem::path& path, const std::filesystem::path& scratch,
-                 std::uint64_t most_bytes, Upload& upload) {
-  if (!begins_as_dicom(path)) return ignore(upload, path, "it is no DICOM file");
-  const DicomFile file(path, scratch, most_bytes);
-  if (const auto reason = reason_to_ignore(file)) return ignore(upload, path, *reason);
-  upload.sources.push_back(describe_source(path, file));
+bool same_bytes(const std::filesystem::path& one, const std::filesystem::path& other) {
+  constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
+  const InputFile a(one);
+  const InputFile b(other);
+  if (a.size() != b.size()) return false;
+  for (std::uint64_t at = 0; at < a.size(); at += kPieceBytes) {
+    if (a.text(at, kPieceBytes) != b.text(at, kPieceBytes)) return false;
+  }
+  return true;
 }
+
+// Reads the files of one upload.
+class HeaderReader {
+ public:
+  HeaderReader(std::filesystem::path scratch, std::uint64_t most_bytes)
+      : scratch_(std::move(scratch)), most_bytes_(most_bytes) {}
+
+  void read(const std::filesystem::path& path) {
+    if (!begins_as_dicom(path)) return ignore(upload_, path, "it is no DICOM file");
+    const DicomFile file(path, scratch_, most_bytes_);
+    if (const auto reason = reason_to_ignore(file)) return ignore(upload_, path, *reason);
+    Source source = describe_source(path, file);
+    const std::string& uid = source.instance.sop_instance_uid;
+    const auto [known, is_new] = first_with_uid_.try_emplace(uid, path);
+    if (!is_new && same_bytes(known->second, path)) {
+      ++doubles_;
+      return ignore(upload_, path, "it is the same as " + in_quotes(name_of(known->second)));
+    }
+    upload_.sources.push_back(std::move(source));
+  }
+
+  Upload finish() {
+    if (doubles_ > 0) {
+      upload_.notes.push_back(
+          note_of(NoteCode::kDuplicateFile,
+                  std::to_string(doubles_) + (doubles_ == 1 ? " file" : " files") +
+                      " came more than once, byte for byte, and each was taken once."));
+    }
+    return std::move(upload_);
+  }
+
+ private:
+  std::filesystem::path scratch_;
+  std::uint64_t most_bytes_;
+  Upload upload_;
+  std::map<std::string, std::filesystem::path> first_with_uid_;
+  std::size_t doubles_ = 0;
+};
 
 std::string count_of(std::int64_t count) {
   return std::to_string(count) + (count == 1 ? " slice" : " slices");
@@ -75,18 +125,23 @@ std::string count_of(std::int64_t count) {
 std::vector<Choice> list_series(std::span<const Source> sources) {
   struct Series {
     std::string description;
+    std::string modality;
     std::int64_t slices = 0;
   };
   std::map<std::string, Series> all;
   for (const Source& source : sources) {
     Series& series = all[source.series_uid];
     series.description = source.series_description;
+    series.modality = source.image.modality;
     series.slices += source.frame_count;
   }
   std::vector<Choice> choices;
   for (const auto& [uid, series] : all) {
-    const std::string description = series.description.empty() ? "" : series.description + ", ";
-    choices.push_back({"series", uid, description + count_of(series.slices)});
+    std::string title;
+    for (const std::string& part : {series.description, series.modality}) {
+      if (!part.empty()) title += part + ", ";
+    }
+    choices.push_back({"series", uid, title + count_of(series.slices)});
   }
   return choices;
 }
@@ -104,15 +159,16 @@ std::string joined_titles(const std::vector<Choice>& choices) {
 
 Upload read_headers(std::span<const std::filesystem::path> files,
                     const std::filesystem::path& scratch, std::uint64_t most_bytes) {
-  Upload upload;
+  HeaderReader reader(scratch, most_bytes);
   for (const std::filesystem::path& path : files) {
     try {
-      read_header(path, scratch, most_bytes, upload);
+      reader.read(path);
     } catch (const Error& error) {
       if (files.size() == 1) throw;
       rethrow_for(path, error);
     }
   }
+  Upload upload = reader.finish();
   if (files.size() > 1) {
     for (Source& source : upload.sources) source.image.file_name = name_of(source.path);
   }

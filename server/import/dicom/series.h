@@ -16,7 +16,7 @@ namespace isomesh::import::dicom {
 // A file of the upload that holds images.
 struct Source {
   std::filesystem::path path;
-  std::string series_uid;
+  std::string series_uid;          // "3.0" of series 3 where there is none
   std::string series_description;  // UTF-8
   std::int64_t frame_count = 1;    // as it tells, unchecked
   DicomInstance instance;
@@ -27,15 +27,16 @@ struct Source {
 struct Upload {
   std::vector<Source> sources;
   std::vector<IgnoredObject> ignored;
+  std::vector<Note> notes;
 };
 
-// Reads the headers of all files. Throws Error kUnusableVolume when a DICOM file is truncated or
-// corrupt, or none holds images.
+// Reads the headers of all files. One that came twice, byte for byte, is taken once. Throws Error
+// kUnusableVolume when a DICOM file is truncated or corrupt, or none holds images.
 Upload read_headers(std::span<const std::filesystem::path> files,
                     const std::filesystem::path& scratch, std::uint64_t most_bytes);
 
 // The sources of the series, or of the only one when `uid` is empty. Throws Error kUnusableVolume
-// when that leaves a choice, with all series in its fields, or a source has a fault.
+// when that leaves a choice, with all series in its choices, or a source has a fault.
 std::vector<Source> choose_series(std::vector<Source> sources, const std::string& uid);
 
 // The identity that a mesh needs to be sent back to the archive. `data` is of any image of the

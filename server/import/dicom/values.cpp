@@ -100,9 +100,26 @@ bool convert(std::span<const std::byte> stored, const PixelLayout& layout, const
   return true;
 }
 
+template <class Stored, class Value>
+bool convert_reals(std::span<const std::byte> stored, const Rescale& rescale, std::byte* target) {
+  for (std::size_t at = 0; at < stored.size(); at += sizeof(Stored), target += sizeof(Value)) {
+    Stored sample;
+    std::memcpy(&sample, stored.data() + at, sizeof(Stored));
+    const auto value = static_cast<Value>(sample * rescale.slope + rescale.intercept);
+    std::memcpy(target, &value, sizeof(Value));
+  }
+  return true;
+}
+
 template <class Value>
 bool convert_to(std::span<const std::byte> stored, const PixelLayout& layout,
                 const Rescale& rescale, std::byte* target) {
+  if constexpr (std::is_floating_point_v<Value>) {
+    if (layout.is_float && layout.bits_allocated == 32) {
+      return convert_reals<float, Value>(stored, rescale, target);
+    }
+    if (layout.is_float) return convert_reals<double, Value>(stored, rescale, target);
+  }
   switch (layout.bits_allocated) {
     case 8:
       return convert<std::uint8_t, Value>(stored, layout, rescale, target);
@@ -118,13 +135,14 @@ bool convert_to(std::span<const std::byte> stored, const PixelLayout& layout,
 std::vector<SampleType> candidate_types(std::span<const Slice> slices) {
   unsigned bits_allocated = 0;
   bool integral = true;
+  bool fits_float = true;
   for (const Slice& slice : slices) {
-    bits_allocated = std::max(bits_allocated, slice.image->layout.bits_allocated);
-    integral = integral && is_integral(slice.frame->rescale);
+    const PixelLayout& layout = slice.image->layout;
+    bits_allocated = std::max(bits_allocated, layout.bits_allocated);
+    integral = integral && !layout.is_float && is_integral(slice.frame->rescale);
+    fits_float = fits_float && layout.bits_allocated <= (layout.is_float ? 32 : 16);
   }
-  if (!integral) {
-    return {bits_allocated > 16 ? SampleType::kFloat64 : SampleType::kFloat32};
-  }
+  if (!integral) return {fits_float ? SampleType::kFloat32 : SampleType::kFloat64};
   Range all = value_range(slices.front().image->layout, slices.front().frame->rescale);
   for (const Slice& slice : slices) {
     const Range values = value_range(slice.image->layout, slice.frame->rescale);

@@ -227,10 +227,21 @@ TEST(DicomValues, AreScaledSliceBySlice) {
 TEST(DicomValues, WithoutAMeaningAreRefused) {
   const DicomSeries series;
   for (const auto& [slope, intercept] :
-       {std::pair{"0", "0"}, std::pair{"nan", "0"}, std::pair{"1", ""}, std::pair{"1e999", "0"}}) {
+       {std::pair{"0", "0"}, std::pair{"nan", "0"}, std::pair{"1", "x"}, std::pair{"1e999", "0"}}) {
     EXPECT_THAT(import_scaled(series, {{slope, intercept, {}}}).error, HasSubstr("rescale slope"))
         << slope;
   }
+}
+
+TEST(DicomValues, AreScaledByWhatIsTold) {
+  const DicomSeries series;
+  const auto first_of = [&](const char* slope, const char* intercept) {
+    const Outcome outcome = import_scaled(series, {{slope, intercept, {}}});
+    EXPECT_EQ(outcome.error, "");
+    return samples_of<std::int16_t>(outcome)[0];
+  };
+  EXPECT_EQ(first_of("3", ""), series.stored(0, 0, 0) * 3);
+  EXPECT_EQ(first_of("", "-5"), series.stored(0, 0, 0) - 5);
 }
 
 TEST(DicomValues, AreCutOutOfTheirBits) {

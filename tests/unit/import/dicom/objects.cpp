@@ -31,7 +31,8 @@ std::string tag_bytes(dicom::Tag tag, bool big_endian) {
 }
 
 bool has_long_length(std::string_view vr) {
-  return vr == "OB" || vr == "OW" || vr == "SQ" || vr == "UN" || vr == "UT" || vr == "OF";
+  return vr == "OB" || vr == "OW" || vr == "SQ" || vr == "UN" || vr == "UT" || vr == "OF" ||
+         vr == "OD";
 }
 
 std::string head(dicom::Tag tag, std::string_view vr, std::uint32_t length, bool is_explicit,
@@ -76,6 +77,13 @@ DicomObject& DicomObject::number(dicom::Tag tag, unsigned value) {
   element.vr = "US";
   element.bytes = test::number(value, 2, false);
   element.bytes_per_word = 2;
+  return *this;
+}
+
+DicomObject& DicomObject::bytes(dicom::Tag tag, std::string_view vr, std::string value) {
+  Value& element = values_[tag] = {};
+  element.vr = vr;
+  element.bytes = std::move(value);
   return *this;
 }
 

@@ -1,0 +1,236 @@
+// Slices that lie as tiles in one frame.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/import/dicom/csa_header.h"
+#include "server/import/dicom/private_elements.h"
+#include "server/import/dicom/tags.h"
+#include "tests/unit/import/dicom/csa_writer.h"
+#include "tests/unit/import/dicom/objects.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using namespace dicom;
+using testing::HasSubstr;
+
+constexpr std::uint32_t kColumns = 3;
+constexpr std::uint32_t kRows = 2;
+constexpr std::uint32_t kSlices = 5;
+
+std::uint16_t sample(std::uint32_t i, std::uint32_t j, std::uint32_t k) {
+  return static_cast<std::uint16_t>(k * 100 + j * 10 + i + 1);
+}
+
+// Tiles in rows of `across`, of which those behind the last slice are empty.
+std::string tiles(std::uint32_t across, std::uint32_t down) {
+  std::string bytes;
+  for (std::uint32_t y = 0; y < down * kRows; ++y) {
+    for (std::uint32_t x = 0; x < across * kColumns; ++x) {
+      const std::uint32_t k = y / kRows * across + x / kColumns;
+      const unsigned value = k < kSlices ? sample(x % kColumns, y % kRows, k) : 0;
+      bytes += static_cast<char>(value & 0xFF);
+      bytes += static_cast<char>(value >> 8);
+    }
+  }
+  return bytes;
+}
+
+DicomObject tiled(std::uint32_t across, std::uint32_t down) {
+  DicomSeries series;
+  series.columns = across * kColumns;
+  series.rows = down * kRows;
+  series.bits_stored = 16;
+  series.high_bit = 15;
+  series.between_rows = 2;
+  series.between_columns = 3;
+  return series.slice(0).text(kImagePosition, "DS", "10\\20\\30").pixels(tiles(across, down), 2);
+}
+
+CsaFields csa_fields(const std::vector<std::string>& normal) {
+  return {{"EchoLinePosition", {"32      "}},
+          {"NumberOfImagesInMosaic", {"5       "}},
+          {"SliceNormalVector", normal}};
+}
+
+// Five slices in three by three tiles, so that the first tile lies 3 columns of 3 mm and 2 rows of
+// 2 mm from where the position says.
+DicomObject siemens(const CsaFields& fields, bool is_newer = true) {
+  return tiled(3, 3)
+      .text(kImageType, "CS", "ORIGINAL\\PRIMARY\\M\\ND\\MOSAIC")
+      .text(kSpacingBetweenSlices, "DS", "4.5")
+      .text(0x00290010, "LO", "SIEMENS CSA HEADER")
+      .bytes(kCsaImageHeader, "OB", csa_header(fields, is_newer));
+}
+
+DicomObject siemens() { return siemens(csa_fields({"0", "0", "1"})); }
+
+DicomObject united_imaging() {
+  std::vector<DicomObject> frames;
+  for (std::uint32_t k = 0; k < kSlices; ++k) {
+    frames.push_back(
+        DicomObject().text(kImagePosition, "DS", "1\\2\\" + std::to_string(30 - 4 * int(k))));
+  }
+  return tiled(3, 2)
+      .text(kImageType, "CS", "ORIGINAL\\PRIMARY\\M\\VFRAME")
+      .text(0x00650010, "LO", "Image Private Header")
+      .text(kGridImages, "DS", "5")
+      .items(kGridFrames, frames);
+}
+
+Outcome import_one(const DicomObject& object, std::string_view syntax = kExplicit) {
+  return import_objects({{"mosaic", object.file(syntax)}});
+}
+
+void expect_slices(const Outcome& outcome, bool reversed = false) {
+  ASSERT_EQ(outcome.error, "");
+  ASSERT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{kColumns, kRows, kSlices}));
+  const auto samples = samples_of<std::int16_t>(outcome);
+  std::size_t at = 0;
+  for (std::uint32_t k = 0; k < kSlices; ++k) {
+    for (std::uint32_t j = 0; j < kRows; ++j) {
+      for (std::uint32_t i = 0; i < kColumns; ++i) {
+        ASSERT_EQ(samples[at++], sample(i, j, reversed ? kSlices - 1 - k : k));
+      }
+    }
+  }
+}
+
+using Numbers = std::array<double, 3>;
+
+TEST(DicomMosaic, IsUnfoldedWhereItsFirstTileLies) {
+  for (const std::string_view syntax : {kImplicit, kExplicit, kDeflate, kBigEndian}) {
+    const Outcome outcome = import_one(siemens(), syntax);
+    expect_slices(outcome);
+    EXPECT_EQ(outcome.volume.geometry.origin, (Numbers{10 + 3 * 3, 20 + 2 * 2, 30}));
+    EXPECT_EQ(outcome.volume.geometry.spacing, (Numbers{3, 2, 4.5}));
+  }
+}
+
+TEST(DicomMosaic, FollowsItsNormalEitherWay) {
+  const Outcome outcome = import_one(siemens(csa_fields({"0", "0", "-1"})));
+  // The stack begins with the last tile, which lies lowest along the image's own normal.
+  expect_slices(outcome, true);
+  EXPECT_EQ(outcome.volume.geometry.origin, (Numbers{19, 24, 30 - 4 * 4.5}));
+  EXPECT_EQ(outcome.volume.geometry.direction[8], 1);
+}
+
+TEST(DicomMosaic, HasAHeaderInEitherLayoutAndBlock) {
+  expect_slices(import_one(siemens(csa_fields({"0", "0", "1"}), false)));
+  const DicomObject moved = tiled(3, 3)
+                                .text(kImageType, "CS", "MOSAIC")
+                                .text(kSpacingBetweenSlices, "DS", "4.5")
+                                .text(0x00290010, "LO", "SOMEBODY ELSE")
+                                .text(0x00290012, "LO", "SIEMENS CSA HEADER")
+                                .bytes(0x00291010, "OB", "not the header")
+                                .bytes(0x00291210, "OB", csa_header(csa_fields({"0", "0", "1"})));
+  expect_slices(import_one(moved));
+}
+
+TEST(DicomMosaic, TellsTheNumberInTwoPlaces) {
+  CsaFields fields = csa_fields({"0", "0", "1"});
+  fields.erase(fields.begin() + 1);
+  expect_slices(import_one(
+      siemens(fields).text(0x00190010, "LO", "SIEMENS MR HEADER").number(kMosaicImages, 5)));
+}
+
+TEST(DicomMosaic, IsRefusedWhenItDoesNotSayWhereSlicesLie) {
+  EXPECT_THAT(import_one(siemens().erase(kCsaImageHeader)).error, HasSubstr("header"));
+  EXPECT_THAT(import_one(siemens({})).error, HasSubstr("how many"));
+  EXPECT_THAT(import_one(siemens(csa_fields({}))).error, HasSubstr("SliceNormalVector"));
+  EXPECT_THAT(import_one(siemens(csa_fields({"0", "1", "0"}))).error, HasSubstr("normal"));
+  EXPECT_THAT(import_one(siemens(csa_fields({"0", "0", "3"}))).error, HasSubstr("unit vectors"));
+  EXPECT_THAT(import_one(siemens().erase(kSpacingBetweenSlices)).error, HasSubstr("how far apart"));
+  CsaFields many = csa_fields({"0", "0", "1"});
+  many[1].second = {"17"};
+  EXPECT_THAT(import_one(siemens(many)).error, HasSubstr("no 5 x 5 tiles"));
+  many[1].second = {"1e9"};
+  EXPECT_THAT(import_one(siemens(many)).error, HasSubstr("no number of slices"));
+}
+
+TEST(DicomMosaic, TakesTheThicknessWhereNoDistanceIsTold) {
+  const Outcome outcome =
+      import_one(siemens().erase(kSpacingBetweenSlices).text(kSliceThickness, "DS", "4"));
+  expect_slices(outcome);
+  EXPECT_EQ(outcome.volume.geometry.spacing[2], 4);
+}
+
+// Scanners that have unfolded it leave the word.
+TEST(DicomMosaic, IsNoneWithFunctionalGroups) {
+  const DicomSeries series;
+  const DicomObject object =
+      series.enhanced({0, 1, 2}).text(kImageType, "CS", "ORIGINAL\\PRIMARY\\M\\MOSAIC");
+  const Outcome outcome = import_one(object);
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.dims[2], 3);
+}
+
+TEST(DicomMosaic, IsAVolumeOfItsSeries) {
+  NamedFiles files;
+  for (int number = 1; number <= 3; ++number) {
+    files.emplace_back("M" + std::to_string(number),
+                       siemens()
+                           .text(kInstanceNumber, "IS", std::to_string(number))
+                           .text(kAcquisitionTime, "TM", std::to_string(120000 + number))
+                           // Corrected for motion: no two lie at the same place.
+                           .text(kImagePosition, "DS", "10\\20\\30." + std::to_string(number))
+                           .file());
+  }
+  const Outcome all = import_objects(files);
+  EXPECT_THAT(all.error, HasSubstr("3 volumes, which differ in AcquisitionTime"));
+  ASSERT_EQ(all.remedy.choices.size(), 3);
+  EXPECT_EQ(all.remedy.choices[1], (Choice{"volume", "1", "AcquisitionTime 120002, 5 slices"}));
+  const Outcome second = import_objects(files, {.volume = 1});
+  expect_slices(second);
+  EXPECT_EQ(second.volume.geometry.origin[2], 30.2);
+  ASSERT_EQ(second.volume.notes.size(), 1);
+  EXPECT_EQ(second.volume.notes[0].code, "volume-chosen");
+  EXPECT_EQ(second.volume.dicom->instances.size(), 1);
+}
+
+TEST(DicomGrid, HasAPlaceForEachSlice) {
+  for (const std::string_view syntax : {kImplicit, kExplicit, kBigEndian}) {
+    const Outcome outcome = import_one(united_imaging(), syntax);
+    expect_slices(outcome, true);
+    EXPECT_EQ(outcome.volume.geometry.origin, (Numbers{1, 2, 30 - 16}));
+    EXPECT_EQ(outcome.volume.geometry.spacing, (Numbers{3, 2, 4}));
+  }
+}
+
+TEST(DicomGrid, IsRefusedWhenPlacesAreMissing) {
+  EXPECT_THAT(import_one(united_imaging().text(kGridImages, "DS", "6")).error,
+              HasSubstr("a grid of 6 slices, and 5 are described"));
+  EXPECT_THAT(import_one(united_imaging().items(kGridFrames, {})).error, HasSubstr("0 are"));
+  EXPECT_THAT(
+      import_one(united_imaging().items(kGridFrames, std::vector<DicomObject>(kSlices))).error,
+      HasSubstr("position"));
+}
+
+TEST(CsaHeaderTest, IsReadOrRefusedWhereverItEnds) {
+  for (const bool is_newer : {true, false}) {
+    const std::string whole = csa_header(csa_fields({"0", "0", "1"}), is_newer);
+    const CsaHeader header = parse_csa_header(whole);
+    EXPECT_EQ(csa_numbers(header, "NumberOfImagesInMosaic"), std::vector<double>{5});
+    EXPECT_EQ(csa_numbers(header, "SliceNormalVector"), (std::vector<double>{0, 0, 1}));
+    EXPECT_TRUE(csa_numbers(header, "Nothing").empty());
+    for (std::size_t size = 0; size < whole.size(); ++size) {
+      EXPECT_THROW(parse_csa_header(whole.substr(0, size)), Error) << size;
+    }
+  }
+}
+
+TEST(CsaHeaderTest, BoundsItsCounts) {
+  std::string header = csa_header(csa_fields({"0", "0", "1"}));
+  header.replace(8, 4, "\xFF\xFF\xFF\xFF");
+  EXPECT_THROW(parse_csa_header(header), Error);
+  header = csa_header(csa_fields({"0", "0", "1"}));
+  header.replace(16 + 76, 4, "\xFF\xFF\xFF\x7F");
+  EXPECT_THROW(parse_csa_header(header), Error);
+  // The length of the first value.
+  header = csa_header(csa_fields({"0", "0", "1"}));
+  header.replace(16 + 84 + 4, 4, "\xFF\xFF\xFF\xFF");
+  EXPECT_THROW(parse_csa_header(header), Error);
+}
+
+}  // namespace
+}  // namespace isomesh::import::test

@@ -1,0 +1,320 @@
+// Series of several volumes, and what may be overlooked in a series.
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/import/dicom/tags.h"
+#include "tests/unit/import/dicom/objects.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using namespace dicom;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr std::uint32_t kVolumes = 3;
+
+using Change = std::function<void(DicomObject&, std::uint32_t volume, std::uint32_t slice)>;
+
+// Every slice in `kVolumes` versions, whose first sample is the volume's number.
+NamedFiles several(const Change& change) {
+  const DicomSeries series;
+  NamedFiles files;
+  for (std::uint32_t slice = 0; slice < series.slices; ++slice) {
+    for (std::uint32_t volume = 0; volume < kVolumes; ++volume) {
+      std::string pixels = series.native_bytes(slice);
+      pixels[0] = static_cast<char>(volume);
+      pixels[1] = 0;
+      DicomObject object = series.slice(slice);
+      object.pixels(pixels, 2)
+          .text(kSopInstanceUid, "UI", "1.2." + std::to_string(slice * kVolumes + volume))
+          .erase(kInstanceNumber);
+      change(object, volume, slice);
+      files.emplace_back("F" + std::to_string(files.size()), object.file());
+    }
+  }
+  return files;
+}
+
+NamedFiles with_echoes() {
+  return several([](DicomObject& object, std::uint32_t volume, std::uint32_t slice) {
+    // Numbers are compared as such: 10.5 comes after 5.25.
+    object.text(kEchoTime, "DS", volume == 0 ? "5.25" : volume == 1 ? "10.50" : "100");
+    // What changes from slice to slice tells nothing.
+    object.text(kAcquisitionTime, "TM", std::to_string(100000 + slice * 7 + volume));
+  });
+}
+
+void expect_all_volumes(const NamedFiles& files) {
+  for (std::uint32_t volume = 0; volume < kVolumes; ++volume) {
+    const Outcome outcome = import_objects(files, {.volume = volume});
+    ASSERT_EQ(outcome.error, "");
+    EXPECT_EQ(outcome.volume.dims[2], 6);
+    for (std::size_t slice = 0; slice < 6; ++slice) {
+      ASSERT_EQ(samples_of<std::int16_t>(outcome)[slice * 20], volume);
+    }
+    EXPECT_EQ(outcome.volume.notes.at(0).code, "volume-chosen");
+    EXPECT_EQ(outcome.volume.dicom->instances.size(), 6);
+  }
+}
+
+TEST(DicomVolumes, AreOfferedWithWhatTheyDifferIn) {
+  const Outcome outcome = import_objects(with_echoes());
+  EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
+  EXPECT_THAT(outcome.error, HasSubstr("3 volumes, which differ in EchoTime"));
+  EXPECT_THAT(outcome.remedy.choices, ElementsAre(Choice{"volume", "0", "EchoTime 5.25, 6 slices"},
+                                                  Choice{"volume", "1", "EchoTime 10.50, 6 slices"},
+                                                  Choice{"volume", "2", "EchoTime 100, 6 slices"}));
+  expect_all_volumes(with_echoes());
+  EXPECT_THAT(import_objects(with_echoes(), {.volume = 3}).error,
+              HasSubstr("none of them is volume 3"));
+}
+
+TEST(DicomVolumes, AreToldApartByTheAttributeThatDoes) {
+  const auto double_bytes = [](double value) {
+    return std::string(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  const std::pair<const char*, Change> changes[] = {
+      {"TemporalPositionIdentifier",
+       [](DicomObject& object, std::uint32_t volume, std::uint32_t) {
+         object.text(kTemporalPositionIdentifier, "IS", std::to_string(volume + 9));
+       }},
+      {"DiffusionBValue",
+       [&](DicomObject& object, std::uint32_t volume, std::uint32_t) {
+         object.bytes(kDiffusionBValue, "FD", double_bytes(volume * 1000.0));
+       }},
+      {"ImageType",
+       [](DicomObject& object, std::uint32_t volume, std::uint32_t) {
+         object.text(kImageType, "CS", std::string("ORIGINAL\\PRIMARY\\") + "MPR"[volume]);
+         if (volume == 2) object.text(kImageType, "CS", "ORIGINAL\\PRIMARY\\R");
+       }},
+  };
+  for (const auto& [name, change] : changes) {
+    EXPECT_THAT(import_objects(several(change)).error,
+                HasSubstr("3 volumes, which differ in " + std::string(name)));
+  }
+}
+
+TEST(DicomVolumes, AreToldApartByTwoAttributes) {
+  const DicomSeries series;
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    for (int each = 0; each < 4; ++each) {
+      files.emplace_back("F" + std::to_string(files.size()),
+                         series.slice(k)
+                             .text(kEchoTime, "DS", each % 2 == 0 ? "5" : "9")
+                             .text(kInversionTime, "DS", each < 2 ? "100" : "700")
+                             .file());
+    }
+  }
+  const Outcome outcome = import_objects(files);
+  EXPECT_THAT(outcome.error, HasSubstr("4 volumes, which differ in EchoTime and InversionTime"));
+  EXPECT_EQ(outcome.remedy.choices.at(1).title, "EchoTime 5, InversionTime 700, 6 slices");
+  EXPECT_EQ(import_objects(files, {.volume = 3}).error, "");
+}
+
+TEST(DicomVolumes, AreToldApartByTheOrderOfAcquisition) {
+  const auto numbered = [](const std::function<std::uint32_t(std::uint32_t, std::uint32_t)>& by) {
+    return several([by](DicomObject& object, std::uint32_t volume, std::uint32_t slice) {
+      object.text(kInstanceNumber, "IS", std::to_string(by(volume, slice)));
+    });
+  };
+  const NamedFiles one_after_the_other =
+      numbered([](std::uint32_t volume, std::uint32_t slice) { return volume * 6 + slice + 1; });
+  EXPECT_THAT(import_objects(one_after_the_other).error, HasSubstr("order of acquisition"));
+  expect_all_volumes(one_after_the_other);
+  expect_all_volumes(
+      numbered([](std::uint32_t volume, std::uint32_t slice) { return slice * 3 + volume + 1; }));
+  const NamedFiles without_order = numbered([](std::uint32_t volume, std::uint32_t slice) {
+    const bool is_swapped = volume == slice && volume < 2;
+    return is_swapped ? 7 - volume * 7 : volume * 6 + slice;
+  });
+  const Outcome refused = import_objects(without_order);
+  EXPECT_THAT(refused.error, HasSubstr("3 slices at each of its 6 positions"));
+  EXPECT_TRUE(refused.remedy.choices.empty());
+}
+
+TEST(DicomVolumes, OfSeveralFramesAreOneAnObject) {
+  const DicomSeries series;
+  NamedFiles files;
+  for (int number = 1; number <= 2; ++number) {
+    files.emplace_back(
+        "E" + std::to_string(number),
+        series.enhanced({0, 1, 2, 3}).text(kInstanceNumber, "IS", std::to_string(number)).file());
+  }
+  EXPECT_THAT(import_objects(files).error, HasSubstr("2 volumes, which differ in InstanceNumber"));
+  EXPECT_EQ(import_objects(files, {.volume = 1}).volume.dims[2], 4);
+}
+
+TEST(DicomVolumes, ThatWereBrokenOffAreNotTaken) {
+  NamedFiles files = with_echoes();
+  files.pop_back();  // the last slice of the third echo
+  const Outcome outcome = import_objects(files);
+  EXPECT_EQ(outcome.remedy.choices.at(2).title, "EchoTime 100, 5 slices of 6");
+  EXPECT_EQ(import_objects(files, {.volume = 1}).error, "");
+  EXPECT_THAT(import_objects(files, {.volume = 2}).error, HasSubstr("broken off: 5 of its 6"));
+}
+
+TEST(DicomVolumes, OfOtherOrientationsAreOffered) {
+  const DicomSeries axial;
+  DicomSeries coronal;
+  coronal.along_column = {0, 0, -1};
+  coronal.step = {0, 3, 0};
+  coronal.slices = 4;
+  NamedFiles files = axial.files();
+  for (std::uint32_t k = 0; k < coronal.slices; ++k) {
+    files.emplace_back(
+        "C" + std::to_string(k),
+        coronal.slice(k).text(kSopInstanceUid, "UI", "1.9." + std::to_string(k)).file());
+  }
+  const Outcome outcome = import_objects(files);
+  EXPECT_THAT(outcome.remedy.choices,
+              ElementsAre(Choice{"volume", "0", "6 slices of 5 x 4 samples across (0, 0, 1)"},
+                          Choice{"volume", "1", "4 slices of 5 x 4 samples across (0, 1, 0)"}));
+  EXPECT_EQ(import_objects(files, {.volume = 1}).volume.dims[2], 4);
+}
+
+TEST(DicomVolumes, ThatAreAloneNeedNoChoice) {
+  EXPECT_EQ(import_objects(DicomSeries{}.files(), {.volume = 0}).error, "");
+  EXPECT_THAT(import_objects(DicomSeries{}.files(), {.volume = 1}).error,
+              HasSubstr("holds 1 volume, and none of them is volume 1"));
+}
+
+// --- Frames of reference -------------------------------------------------------------------------
+
+NamedFiles with_frames_of_reference(const std::function<std::string(std::uint32_t)>& uid,
+                                    const DicomSeries& series = {}) {
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    files.emplace_back("F" + std::to_string(k),
+                       series.slice(k).text(kFrameOfReferenceUid, "UI", uid(k)).file());
+  }
+  return files;
+}
+
+std::string one_each(std::uint32_t slice) {
+  return slice == 2 ? "" : "1.2." + std::to_string(slice + 1);
+}
+
+std::string in_groups(std::uint32_t slice) { return slice < 3 ? "1.2.1" : "1.2.2"; }
+
+TEST(DicomFramesOfReference, OfEachSliceAreNoted) {
+  const Outcome outcome = import_objects(with_frames_of_reference(one_each));
+  ASSERT_EQ(outcome.error, "");
+  ASSERT_EQ(outcome.volume.notes.size(), 1);
+  EXPECT_EQ(outcome.volume.notes[0].code, "frame-of-reference");
+  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("5 frames of reference"));
+  EXPECT_EQ(outcome.volume.dicom->frame_of_reference_uid, "");
+}
+
+TEST(DicomFramesOfReference, ThatFormGroupsMayBeAccepted) {
+  const NamedFiles files = with_frames_of_reference(in_groups);
+  const Outcome refused = import_objects(files);
+  EXPECT_EQ(refused.code, ErrorCode::kUnusableVolume);
+  EXPECT_EQ(refused.remedy.overridable, "frame-of-reference");
+  EXPECT_THAT(refused.error, HasSubstr("2 frames of reference"));
+  const Outcome accepted = import_objects(files, {.accept = {"frame-of-reference"}});
+  ASSERT_EQ(accepted.error, "");
+  EXPECT_EQ(accepted.volume.notes.at(0).code, "frame-of-reference");
+  EXPECT_THAT(accepted.volume.notes.at(0).detail, HasSubstr("was accepted"));
+}
+
+// What is wrong with the lattice is never overlooked, and nothing else is offered then.
+TEST(DicomFramesOfReference, DoNotHideWhatIsMissing) {
+  for (const auto& uid : {one_each, in_groups}) {
+    NamedFiles files = with_frames_of_reference(uid);
+    files.erase(files.begin() + 4);
+    const Outcome outcome = import_objects(files, {.accept = {"frame-of-reference"}});
+    EXPECT_THAT(outcome.error, HasSubstr("slice 5 of 6 is missing"));
+    EXPECT_EQ(outcome.remedy.overridable, "");
+  }
+  EXPECT_EQ(import_objects(DicomSeries{}.files()).volume.notes.size(), 0);
+}
+
+// --- What lies beside a series -------------------------------------------------------------------
+
+TEST(DicomUpload, TakesAFileOnceThatCameTwice) {
+  NamedFiles files = DicomSeries{}.files();
+  files.emplace_back("copy", files[1].second);
+  files.emplace_back("another", files[2].second);
+  const Outcome outcome = import_objects(files);
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.canonical, import_objects(DicomSeries{}.files()).canonical);
+  EXPECT_THAT(outcome.volume.ignored,
+              ElementsAre(IgnoredObject{"copy", "it is the same as \"IM9\""},
+                          IgnoredObject{"another", "it is the same as \"IM10\""}));
+  ASSERT_EQ(outcome.volume.notes.size(), 1);
+  EXPECT_EQ(outcome.volume.notes[0].code, "duplicate-file");
+  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("2 files came more than once"));
+  // The same name for another content is no copy.
+  files.back().second = DicomSeries{}.slice(2).number(kRows, 4).text(kStudyId, "SH", "x").file();
+  EXPECT_THAT(import_objects(files).error, HasSubstr("more than once"));
+}
+
+TEST(DicomUpload, LeavesOutRawDataReportsAndPresentations) {
+  const std::pair<const char*, const char*> kinds[] = {
+      {"66", "it is raw data (modality \"MR\")"},
+      {"88.33", "it is a report (modality \"MR\")"},
+      {"11.1", "it is a presentation state (modality \"MR\")"},
+      {"104.1", "it is an encapsulated document (modality \"MR\")"}};
+  for (const auto& [sop_class, reason] : kinds) {
+    NamedFiles files = DicomSeries{}.files();
+    files.emplace_back(
+        "beside", DicomSeries{}
+                      .slice(0)
+                      .text(kSopClassUid, "UI", std::string("1.2.840.10008.5.1.4.1.1.") + sop_class)
+                      .text(kModality, "CS", "MR")
+                      .erase(kPhotometricInterpretation)
+                      .file());
+    const Outcome outcome = import_objects(files);
+    ASSERT_EQ(outcome.error, "");
+    EXPECT_THAT(outcome.volume.ignored, ElementsAre(IgnoredObject{"beside", reason}));
+  }
+}
+
+TEST(DicomUpload, NamesASeriesWithoutUidByItsNumber) {
+  NamedFiles files = DicomSeries{}.files();
+  const DicomSeries other;
+  for (std::uint32_t k = 0; k < 3; ++k) {
+    files.emplace_back("N" + std::to_string(k), other.slice(k)
+                                                    .erase(kSeriesInstanceUid)
+                                                    .text(kSeriesNumber, "IS", "3")
+                                                    .text(kSeriesDescription, "LO", "neck")
+                                                    .file());
+  }
+  const Outcome all = import_objects(files);
+  EXPECT_THAT(all.remedy.choices, ElementsAre(Choice{"series", "1.2.3.4", "CT, 6 slices"},
+                                              Choice{"series", "3.0", "neck, CT, 3 slices"}));
+  EXPECT_THAT(all.error, HasSubstr("neck, CT, 3 slices (3.0)"));
+  EXPECT_EQ(import_objects(files, {.series = "3.0"}).volume.dims[2], 3);
+}
+
+TEST(DicomUpload, NamesTheOneThatDiffersWhereverItComes) {
+  for (const std::size_t odd : {0U, 3U}) {
+    DicomSeries series;
+    NamedFiles files;
+    for (std::uint32_t k = 0; k < series.slices; ++k) {
+      DicomObject object = series.slice(k);
+      if (k == odd) object.text(kPixelSpacing, "DS", "0.5\\0.8");
+      files.emplace_back("F" + std::to_string(k), object.file());
+    }
+    EXPECT_THAT(import_objects(files).error,
+                AllOf(HasSubstr("1 of its 6 slices differs in pixel spacing"),
+                      HasSubstr("\"F" + std::to_string(odd) + "\" from")));
+  }
+}
+
+TEST(DicomUpload, OfOneSliceSaysThatItIsOne) {
+  DicomObject object = DicomSeries{}.slice(0);
+  object.erase(kImagePosition).erase(kImageOrientation);
+  EXPECT_THAT(
+      import_objects({{"one", object.file()}}).error,
+      AllOf(HasSubstr("one slice"), HasSubstr("position (0020,0032)"), Not(HasSubstr("frames"))));
+}
+
+}  // namespace
+}  // namespace isomesh::import::test
