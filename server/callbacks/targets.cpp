@@ -11,6 +11,7 @@
 #include <curl/curl.h>
 #include <netinet/in.h>
 
+#include "base/hex.h"
 #include "base/text.h"
 
 namespace isomesh::callbacks {
@@ -37,6 +38,54 @@ bool is_ambiguous(const std::string& path) {
     if (text.find(trick) != std::string::npos) return true;
   }
   return text.ends_with("/..") || text.ends_with("/.");
+}
+
+std::optional<std::string> decoded(const std::string& text) {
+  std::string result;
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    if (text[at] != '%') {
+      result += text[at];
+      continue;
+    }
+    const auto byte = from_hex(lower(text.substr(at + 1, 2)));
+    if (!byte || byte->size() != 1 || static_cast<unsigned char>(byte->front()) < ' ') {
+      return std::nullopt;
+    }
+    result += *byte;
+    at += 2;
+  }
+  return result;
+}
+
+// Servers of Java take what follows a semicolon out of each segment.
+std::string without_parameters(const std::string& path) {
+  std::string result;
+  bool is_parameter = false;
+  for (const char c : path) {
+    is_parameter = c == ';' || (is_parameter && c != '/');
+    if (!is_parameter) result += c;
+  }
+  return result;
+}
+
+// The path as the most forgiving of servers behind servers may read it: decoded as often as it can
+// be, without parameters. Nothing for one that is ambiguous on the way.
+std::optional<std::string> as_read(std::string path) {
+  constexpr int kMostDecodings = 4;
+  for (int n = 0; n < kMostDecodings; ++n) {
+    if (is_ambiguous(path) || is_ambiguous(without_parameters(path))) return std::nullopt;
+    if (path.find('%') == std::string::npos) return without_parameters(path);
+    const auto next = decoded(path);
+    if (!next) return std::nullopt;
+    path = *next;
+  }
+  return std::nullopt;
+}
+
+// Whether the path is the prefix, or lies below it.
+bool lies_below(const std::string& path, const std::string& prefix) {
+  return path.starts_with(prefix) &&
+         (prefix.ends_with('/') || path.size() == prefix.size() || path[prefix.size()] == '/');
 }
 
 bool is_address(const std::string& host) {
@@ -113,7 +162,9 @@ std::optional<CallbackTargets::Url> CallbackTargets::parse(const std::string& te
     return std::nullopt;
   }
   if (*scheme != "http" && *scheme != "https") return std::nullopt;
-  return Url{*scheme, lower(*host), *port, *path};
+  const auto read = as_read(*path);
+  if (!read) return std::nullopt;
+  return Url{*scheme, lower(*host), *port, *path, *read};
 }
 
 CallbackTargets::CallbackTargets(const std::vector<std::string>& allowed) {
@@ -136,10 +187,8 @@ std::optional<Reach> CallbackTargets::reach_of(const std::string& text) const {
   const auto url = parse(text);
   if (!url) return std::nullopt;
   for (const Entry& entry : entries_) {
-    const std::string& prefix = entry.url.path;
-    const bool path_begins = url->path.starts_with(prefix) &&
-                             (prefix.ends_with('/') || url->path.size() == prefix.size() ||
-                              url->path[prefix.size()] == '/');
+    const bool path_begins =
+        lies_below(url->path, entry.url.path) && lies_below(url->read_path, entry.url.read_path);
     if (url->scheme == entry.url.scheme && url->host == entry.url.host &&
         url->port == entry.url.port && path_begins) {
       return entry.reach;

@@ -49,6 +49,7 @@ class CallbackTargets {
     std::string host;
     std::string port;
     std::string path;
+    std::string read_path;  // as the most forgiving server may read it
   };
   struct Entry {
     Url url;

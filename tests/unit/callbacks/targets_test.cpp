@@ -23,7 +23,8 @@ const CallbackTargets kTargets({"https://ris.example.org/hooks/iso",
 TEST(CallbackTargets, AllowWhatBeginsAsAnEntry) {
   for (const std::string url :
        {"https://ris.example.org/hooks/iso", "https://ris.example.org/hooks/iso/job?x=1",
-        "https://RIS.example.org:443/hooks/iso", "http://plain.example.org:8080/any/where",
+        "https://RIS.example.org:443/hooks/iso", "https://ris.example.org/hooks/iso/a;b=c/d%20e",
+        "https://ris.example.org/hooks/iso?a=%25", "http://plain.example.org:8080/any/where",
         "http://plain.example.org:8080", "https://pacs.hospital.lan/a",
         "http://127.0.0.1:9000/in"}) {
     EXPECT_NO_THROW(kTargets.check(url)) << url;
@@ -48,6 +49,18 @@ TEST(CallbackTargets, AllowNothingElse) {
                                 "https://ris.example.org/hooks/iso/%2e%2e/x",
                                 "https://ris.example.org/hooks/iso%2Fx",
                                 "https://ris.example.org/hooks/iso\\x",
+                                "https://ris.example.org/hooks/iso/..;/admin",
+                                "https://ris.example.org/hooks/iso/..;x=1/admin",
+                                "https://ris.example.org/hooks/iso/.;/x",
+                                "https://ris.example.org/hooks/iso/;/x",
+                                "https://ris.example.org/hooks/iso/%252e%252e/admin",
+                                "https://ris.example.org/hooks/iso%252fx",
+                                "https://ris.example.org/hooks/iso/%25252e%25252e/admin",
+                                "https://ris.example.org/hooks/iso/..%3b/admin",
+                                "https://ris.example.org/hooks/iso/..%253b/admin",
+                                "https://ris.example.org/hooks/iso/%00",
+                                "https://ris.example.org/hooks/iso/%zz",
+                                "https://ris.example.org/hooks/iso/%",
                                 "https://ris.example.org//hooks/iso",
                                 "file:///etc/passwd",
                                 "gopher://plain.example.org:8080/",
