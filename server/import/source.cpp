@@ -30,6 +30,24 @@ void check_raw_part(const std::string& name, std::uint64_t found, std::uint64_t 
 
 }  // namespace
 
+std::uint64_t SourceVolume::most_encoded_bytes() const {
+  constexpr std::uint64_t kTextPerSample = 32;  // "-1.7976931348623157e+308", and white space
+  constexpr std::uint64_t kHexPerByte = 4;
+  switch (encoding) {
+    case Encoding::kText:
+      return sample_count() * kTextPerSample;
+    case Encoding::kHex:
+      return stored_bytes() * kHexPerByte;
+    case Encoding::kRaw:
+    case Encoding::kDeflate:
+    case Encoding::kVtk:
+      break;
+  }
+  // Whatever deflate cannot compress it stores, with a few bytes for each block.
+  constexpr std::uint64_t kStoredShare = 100;
+  return stored_bytes() + stored_bytes() / kStoredShare;
+}
+
 void check_limits(const SourceVolume& volume, const SizeLimits& limits) {
   check_limits(volume.sample_count(), canonical_type(volume.layout), limits);
 }

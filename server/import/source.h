@@ -58,6 +58,8 @@ struct SourceVolume {
   std::uint64_t sample_count() const { return std::uint64_t{dims[0]} * dims[1] * dims[2]; }
   // What the samples take up in the file, once decoded.
   std::uint64_t stored_bytes() const { return sample_count() * bytes_per_sample(layout.type); }
+  // What they take up at most as they are encoded, with generous white space.
+  std::uint64_t most_encoded_bytes() const;
 };
 
 // Throws Error kTooLarge when the volume's canonical samples would exceed the limits.

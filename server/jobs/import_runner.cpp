@@ -73,7 +73,24 @@ Volume volume_of(process::ImportReport report, const process::ImportTask& task) 
   return *std::move(report.volume);
 }
 
+// Of a file that is not there, nothing: the import says so.
+std::uint64_t size_of(const std::filesystem::path& upload) {
+  std::error_code absent;
+  const std::uintmax_t bytes = std::filesystem::file_size(upload, absent);
+  return absent ? 0 : bytes;
+}
+
 }  // namespace
+
+process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::ImportBounds& most) {
+  constexpr std::uint64_t kBytesPerSecond = 64 * 1024;
+  constexpr std::uint64_t kSecondsAtLeast = 20;
+  process::ImportBounds bounds = most;
+  const std::uint64_t seconds = kSecondsAtLeast + upload_bytes / kBytesPerSecond;
+  bounds.time = std::chrono::seconds(std::min<std::uint64_t>(
+      seconds, static_cast<std::uint64_t>(std::max<std::int64_t>(most.time.count(), 0))));
+  return bounds;
+}
 
 ImportRunner::ImportRunner(const RunnerOptions& options)
     : options_(options), prepared_(options.program, options.at_once) {
@@ -102,7 +119,7 @@ Volume ImportRunner::run(const process::ImportTask& task) {
 
 std::optional<Volume> ImportRunner::run_in(process::Child child, const process::ImportTask& task) {
   using Ending = process::Heard::Ending;
-  child.tell(process::to_message({task, options_.bounds}));
+  child.tell(process::to_message({task, bounds_for(size_of(task.source), options_.bounds)}));
   const auto deadline = Clock::now() + options_.bounds.time;
   const process::Heard heard = child.listen(kMostAnswerBytes, deadline, stop_.get_token());
   if (heard.ending == Ending::kStopped) {

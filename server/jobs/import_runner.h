@@ -19,6 +19,10 @@ struct RunnerOptions {
   std::filesystem::path program;  // isomesh-import
 };
 
+// The bounds of one import: no more than `most`, and less processor time for a small upload, which
+// takes long only when it is made to. What is small unpacked is read at many megabytes a second.
+process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::ImportBounds& most);
+
 // Thread safe.
 class ImportRunner {
  public:

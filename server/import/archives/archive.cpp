@@ -100,11 +100,15 @@ class Reader {
     return static_cast<std::size_t>(count);
   }
 
+  // Known once the first member is.
+  bool is_tar() const {
+    return (::archive_format(archive_.get()) & ARCHIVE_FORMAT_BASE_MASK) == ARCHIVE_FORMAT_TAR;
+  }
+
   // A TAR ends with at least two blocks of zeros and nothing else. The library does not require
   // them, but an archive that lacks them may have been cut between two members.
   void require_end() const {
-    const int format = ::archive_format(archive_.get()) & ARCHIVE_FORMAT_BASE_MASK;
-    if (format != ARCHIVE_FORMAT_TAR) return;
+    if (!is_tar()) return;
     std::uint64_t at = (before_next_ + kTarBlock - 1) / kTarBlock * kTarBlock;
     if (file_.size() < at + 2 * kTarBlock) {
       throw_unusable("The archive is truncated: its end is missing.");
@@ -195,6 +199,10 @@ class Unpacker {
       throw Error(ErrorCode::kTooLarge, "The archive's members are more than the " +
                                             std::to_string(limits_.max_bytes) +
                                             " bytes that are accepted.");
+    }
+    // A TAR compresses nothing, but it can hold files of which only parts are written.
+    if (reader_.is_tar() && total_ + further > file_.size()) {
+      throw_unusable("The archive's members are larger than it is: it holds sparse files.");
     }
     if (total_ + further > most_unpacked_bytes(file_.size())) {
       throw_unusable("The archive unpacks to more than " + std::to_string(kMostUnpackedPerByte) +

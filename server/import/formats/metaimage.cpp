@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "base/files.h"
 #include "base/text.h"
 #include "server/import/formats/file_pattern.h"
+#include "server/import/reader.h"
 #include "server/import/units.h"
 
 namespace isomesh::import {
@@ -49,8 +51,7 @@ void add_field(Fields& fields, std::string_view line) {
   }
 }
 
-Header read_header(const InputFile& file) {
-  const std::string text = file.text(0, kMostHeaderBytes);
+Header read_header(const std::string& text) {
   Header header;
   std::size_t next = 0;
   while (next < text.size()) {
@@ -258,6 +259,16 @@ Geometry geometry_of(const Fields& fields, std::size_t axes) {
   return geometry;
 }
 
+// Their dims, type and encoding.
+SourceVolume samples_of(const Fields& fields, const std::vector<std::uint64_t>& sizes) {
+  SourceVolume volume;
+  volume.dims = volume_dims(sizes);
+  volume.encoding = encoding_of(fields);
+  volume.layout.type = type_of(fields);
+  volume.layout.big_endian = is_big_endian(fields);
+  return volume;
+}
+
 }  // namespace
 
 bool is_metaimage(std::string_view head) {
@@ -266,7 +277,7 @@ bool is_metaimage(std::string_view head) {
 }
 
 SourceVolume parse_metaimage(const InputFile& file, const Companions& companions) {
-  const Header header = read_header(file);
+  const Header header = read_header(file.text(0, kMostHeaderBytes));
   const Fields& fields = header.fields;
   const std::string_view object = optional(fields, "ObjectType");
   if (!object.empty() && object != "Image") {
@@ -274,11 +285,7 @@ SourceVolume parse_metaimage(const InputFile& file, const Companions& companions
   }
   const std::vector<std::uint64_t> sizes = sizes_of(fields);
   check_samples_are_plain(fields);
-  SourceVolume volume;
-  volume.dims = volume_dims(sizes);
-  volume.encoding = encoding_of(fields);
-  volume.layout.type = type_of(fields);
-  volume.layout.big_endian = is_big_endian(fields);
+  SourceVolume volume = samples_of(fields, sizes);
   if (is_detached(fields)) {
     volume.data_files =
         data_files_of(data_names(file, header), companions, volume, data_skip(fields));
@@ -288,6 +295,15 @@ SourceVolume parse_metaimage(const InputFile& file, const Companions& companions
   volume.geometry = geometry_of(fields, sizes.size());
   scale_to_millimetres(volume.geometry, optional(fields, "DistanceUnits"));
   return volume;
+}
+
+std::uint64_t most_metaimage_bytes(const InputFile& file, const SizeLimits& limits) {
+  const std::string head = file.text(0, kMostHeaderBytes);
+  const Header header = read_header(inflate_head(std::as_bytes(std::span(head)), kMostHeaderBytes));
+  if (is_detached(header.fields)) return kMostHeaderBytes + kHeadroomBytes;
+  const SourceVolume volume = samples_of(header.fields, sizes_of(header.fields));
+  check_limits(volume, limits);
+  return header.bytes + volume.most_encoded_bytes() + kHeadroomBytes;
 }
 
 }  // namespace isomesh::import

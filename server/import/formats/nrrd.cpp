@@ -4,6 +4,7 @@
 #include <array>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "base/text.h"
 #include "server/import/formats/file_pattern.h"
 #include "server/import/formats/nrrd_space.h"
+#include "server/import/reader.h"
 
 namespace isomesh::import {
 namespace {
@@ -55,8 +57,7 @@ bool names_list(const Fields& fields) {
   return found != fields.end() && found->second.starts_with("LIST");
 }
 
-Header read_header(const InputFile& file) {
-  const std::string text = file.text(0, kMostHeaderBytes);
+Header read_header(const std::string& text) {
   Header header;
   std::size_t next = 0;
   for (bool first = true;; first = false) {
@@ -153,10 +154,15 @@ std::uint64_t skip_lines(const InputFile& file, std::uint64_t offset, std::uint6
   constexpr std::size_t kPieceBytes = std::size_t{1} << 16;
   while (lines > 0) {
     const std::string piece = file.text(offset, kPieceBytes);
-    const std::size_t end = piece.find('\n');
     if (piece.empty()) throw_unusable("The file ends before the lines that are to be skipped do.");
-    offset += end == std::string::npos ? piece.size() : end + 1;
-    if (end != std::string::npos) --lines;
+    std::size_t begin = 0;
+    for (std::size_t end = 0; lines > 0 && end != std::string::npos;) {
+      end = piece.find('\n', begin);
+      if (end == std::string::npos) break;
+      begin = end + 1;
+      --lines;
+    }
+    offset += lines > 0 ? piece.size() : begin;
   }
   return offset;
 }
@@ -216,6 +222,16 @@ std::vector<DataFile> data_files(const InputFile& file, const Header& header,
   return data_files_of(data_names(file, header), companions, volume, skip);
 }
 
+// Their dims, type and encoding.
+SourceVolume samples_of(const Fields& fields, const std::vector<std::uint64_t>& sizes) {
+  SourceVolume volume;
+  volume.dims = volume_dims(lattice_sizes(fields, sizes));
+  volume.encoding = encoding_of(fields);
+  volume.layout.type = type_of(fields);
+  volume.layout.big_endian = is_big_endian(fields, volume.layout.type, volume.encoding);
+  return volume;
+}
+
 }  // namespace
 
 bool is_nrrd(std::string_view head) {
@@ -224,14 +240,10 @@ bool is_nrrd(std::string_view head) {
 }
 
 SourceVolume parse_nrrd(const InputFile& file, const Companions& companions) {
-  const Header header = read_header(file);
+  const Header header = read_header(file.text(0, kMostHeaderBytes));
   const Fields& fields = header.fields;
   const std::vector<std::uint64_t> sizes = sizes_of(fields);
-  SourceVolume volume;
-  volume.dims = volume_dims(lattice_sizes(fields, sizes));
-  volume.encoding = encoding_of(fields);
-  volume.layout.type = type_of(fields);
-  volume.layout.big_endian = is_big_endian(fields, volume.layout.type, volume.encoding);
+  SourceVolume volume = samples_of(fields, sizes);
   if (fields.contains(kDataFile)) {
     volume.data_files = data_files(file, header, companions, volume);
   } else {
@@ -240,6 +252,19 @@ SourceVolume parse_nrrd(const InputFile& file, const Companions& companions) {
   }
   volume.geometry = nrrd_geometry(fields, sizes);
   return volume;
+}
+
+std::uint64_t most_nrrd_bytes(const InputFile& file, const SizeLimits& limits) {
+  constexpr std::int64_t kMostSkipped = std::int64_t{64} << 20;
+  const std::string head = file.text(0, kMostHeaderBytes);
+  const Header header = read_header(inflate_head(std::as_bytes(std::span(head)), kMostHeaderBytes));
+  if (header.fields.contains(kDataFile)) return kMostHeaderBytes + kHeadroomBytes;
+  const SourceVolume volume = samples_of(header.fields, sizes_of(header.fields));
+  check_limits(volume, limits);
+  const std::int64_t skipped =
+      std::clamp<std::int64_t>(skip_field(header.fields, "byteskip"), 0, kMostSkipped);
+  return header.bytes + static_cast<std::uint64_t>(skipped) + volume.most_encoded_bytes() +
+         kHeadroomBytes;
 }
 
 }  // namespace isomesh::import

@@ -69,6 +69,7 @@ class Parser {
       if (failure_) std::rethrow_exception(failure_);
       if (done_ || (status == XML_STATUS_OK && last)) break;
       if (status != XML_STATUS_OK) throw_malformed();
+      check_progress(next);
     }
     return std::move(document_);
   }
@@ -77,6 +78,15 @@ class Parser {
   struct Free {
     void operator()(XML_Parser parser) const { ::XML_ParserFree(parser); }
   };
+
+  // The library looks at a tag or comment from its beginning again for each piece of it.
+  void check_progress(std::uint64_t read) const {
+    constexpr std::uint64_t kLongest = std::uint64_t{1} << 20;
+    if (read > kLongest && position() < read - kLongest) {
+      throw_unusable("The VTK file has a tag or a comment of more than " +
+                     std::to_string(kLongest) + " bytes.");
+    }
+  }
 
   [[noreturn]] void throw_malformed() const {
     const char* reason = ::XML_ErrorString(::XML_GetErrorCode(parser_.get()));
@@ -122,7 +132,8 @@ class Parser {
   }
 
   std::uint64_t position() const {
-    return static_cast<std::uint64_t>(::XML_GetCurrentByteIndex(parser_.get()));
+    return static_cast<std::uint64_t>(
+        std::max(::XML_GetCurrentByteIndex(parser_.get()), XML_Index{0}));
   }
   std::uint64_t behind_tag() const {
     return position() + static_cast<std::uint64_t>(::XML_GetCurrentByteCount(parser_.get()));

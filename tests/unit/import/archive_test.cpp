@@ -1,3 +1,6 @@
+#include <iomanip>
+#include <sstream>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -226,6 +229,30 @@ TEST(Archive, IsBounded) {
     many[at] = {std::to_string(at), "", Kind::kFolder};
   }
   EXPECT_THAT(import_bytes(tar(many)).error, HasSubstr("more than 20000 members"));
+}
+
+// A TAR of a member of which nothing is written but its size (type S of GNU's tar).
+std::string sparse_tar(std::uint64_t bytes) {
+  const auto octal = [](std::uint64_t number) {
+    std::ostringstream text;
+    text << std::oct << std::setw(11) << std::setfill('0') << number << '\0';
+    return text.str();
+  };
+  std::string file = tar({{"sparse", ""}});
+  file[156] = 'S';
+  file.replace(257, 8, std::string("ustar  \0", 8));
+  file.replace(345, 155, std::string(155, '\0'));
+  file.replace(386, 24, octal(bytes) + octal(0));
+  file.replace(483, 12, octal(bytes));
+  file.replace(148, 8, std::string(8, ' '));
+  std::uint64_t sum = 0;
+  for (const char c : file.substr(0, 512)) sum += static_cast<unsigned char>(c);
+  file.replace(148, 8, octal(sum).substr(5, 6) + std::string("\0 ", 2));
+  return file;
+}
+
+TEST(Archive, SparseFilesAreRefused) {
+  EXPECT_THAT(import_bytes(sparse_tar(50'000'000)).error, HasSubstr("sparse"));
 }
 
 TEST(Archive, SomethingBehindATarIsRefused) {

@@ -63,6 +63,12 @@ TEST(MetaImage, ReadsText) {
   EXPECT_FALSE(import_metaimage(lines, "-300 70000").imported());
 }
 
+// What may be unpacked follows from the header, not from what is accepted at most.
+TEST(MetaImage, InsideGzipItMayBeAsLargeAsItsHeaderTells) {
+  const std::string bomb = gzip(metaimage(small_metaimage(), std::string(10'000'000, '\0')));
+  EXPECT_THAT(import_bytes(bomb).error, testing::HasSubstr("The compressed file holds more than"));
+}
+
 TEST(MetaImage, LiesInLps) {
   Lines lines = with(small_metaimage(), "TransformMatrix", "0 1 0 0 0 1 1 0 0");
   lines = with(with(lines, "Offset", "10 20 30"), "ElementSpacing", "2 3 4");

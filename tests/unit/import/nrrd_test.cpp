@@ -225,6 +225,39 @@ TEST(Nrrd, RefusesHeadersThatContradictThemselves) {
   EXPECT_THAT(import_bytes("NRRD0004\ntype: uint8\n").error, HasSubstr("does not end"));
 }
 
+// What may be unpacked follows from the header, not from what is accepted at most.
+TEST(Nrrd, InsideGzipItMayBeAsLargeAsItsHeaderTells) {
+  const std::string bomb = gzip(nrrd(small_nrrd(), std::string(10'000'000, '\0')));
+  EXPECT_THAT(import_bytes(bomb).error, HasSubstr("The compressed file holds more than"));
+  const Lines text = with(small_nrrd(), "encoding", "ascii");
+  EXPECT_THAT(import_bytes(gzip(nrrd(text, std::string(10'000'000, ' ')))).error,
+              HasSubstr("The compressed file holds more than"));
+  const std::string skipped(100'000, '\n');
+  EXPECT_EQ(import_bytes(gzip(nrrd(with(small_nrrd(), "line skip", "100000"),
+                                   skipped + std::string(kSmallSamples))))
+                .error,
+            "");
+}
+
+// Each line was looked for in a block of its own.
+TEST(Nrrd, SkipsManyLines) {
+  const auto with_lines = [](std::size_t lines) {
+    return import_nrrd(with(small_nrrd(), "line skip", "1000000"),
+                       std::string(lines, '\n') + std::string(kSmallSamples));
+  };
+  EXPECT_EQ(with_lines(1'000'000).error, "");
+  EXPECT_THAT(with_lines(1000).error, HasSubstr("lines that are to be skipped"));
+}
+
+TEST(Nrrd, FieldsOfManyNumbersAreRefused) {
+  std::string many;
+  for (int n = 0; n < 500; ++n) many += "1 ";
+  for (const std::string field :
+       {"sizes", "spacings", "axis mins", "space directions", "space origin"}) {
+    EXPECT_EQ(import_with(field, many).code, ErrorCode::kUnusableVolume) << field;
+  }
+}
+
 TEST(Nrrd, RefusesTextThatIsNotItsSamples) {
   const Lines lines = with(with(small_nrrd(), "encoding", "ascii"), "sizes", "2 1 1");
   EXPECT_TRUE(import_nrrd(lines, "1 2").imported());

@@ -118,6 +118,17 @@ TEST(Vti, CountsThatLieAreRefused) {
   }
 }
 
+// The XML library takes a time that grows with the square of a comment's length.
+TEST(Vti, EndlessCommentsAreRefused) {
+  const std::string file = vti({}, kSmallSamples);
+  const std::size_t behind = file.find('>', file.find("<VTKFile")) + 1;
+  const auto with_comment = [&](std::size_t bytes) {
+    return file.substr(0, behind) + "<!--" + std::string(bytes, 'x') + "-->" + file.substr(behind);
+  };
+  EXPECT_EQ(import_bytes(with_comment(100'000)).error, "");
+  EXPECT_THAT(import_bytes(with_comment(3'000'000)).error, HasSubstr("a tag or a comment of more"));
+}
+
 TEST(Vti, EntitiesAreRefused) {
   const std::string file = "<?xml version=\"1.0\"?>\n<!DOCTYPE VTKFile [<!ENTITY a \"b\">]>\n" +
                            vti({}, kSmallSamples).substr(22);

@@ -165,5 +165,15 @@ TEST(ImportRunner, RawDescriptionsAreCheckedBeforeAnythingStarts) {
   }
 }
 
+// A file of ten kilobytes that keeps a reader busy for minutes is made to.
+TEST(ImportBounds, ASmallUploadGetsLittleTime) {
+  const process::ImportBounds most;
+  EXPECT_EQ(bounds_for(10'000, most).time, std::chrono::seconds(20));
+  EXPECT_EQ(bounds_for(std::uint64_t{1} << 20, most).time, std::chrono::seconds(36));
+  EXPECT_EQ(bounds_for(std::uint64_t{1} << 40, most).time, most.time);
+  EXPECT_EQ(bounds_for(0, {.time = std::chrono::seconds(1)}).time, std::chrono::seconds(1));
+  EXPECT_EQ(bounds_for(0, most).memory_bytes, most.memory_bytes);
+}
+
 }  // namespace
 }  // namespace isomesh::jobs
