@@ -32,17 +32,19 @@ struct JobSpec {
 struct Submission {
   enum class Kind {
     kNew,
-    kExisting,  // the job that the same key and request made before
-    kConflict,  // the key came with another request before
-    kBusy,      // nothing was stored: the queue is full, or accepts nothing any more
+    kExisting,     // the job that the same key and request made before
+    kConflict,     // the key came with another request before
+    kBusy,         // nothing was stored: the queue is full, or accepts nothing any more
+    kOwnersShare,  // nothing was stored: the owner has its share of the queue
   };
 
   Kind kind = Kind::kNew;
   Job job;                              // of kNew and kExisting
-  std::chrono::seconds retry_after{0};  // of kBusy
+  std::chrono::seconds retry_after{0};  // of kBusy and kOwnersShare
 };
 
-// The submission's job. Throws Error kKeyReused for kConflict and kUnavailable for kBusy.
+// The submission's job. Throws Error kKeyReused for kConflict, kUnavailable for kBusy and
+// kTooManyRequests for kOwnersShare.
 const Job& job_of(const Submission& submission);
 
 // A worker's right to run a job until its time is over. The fence grows with every claim of a job:

@@ -40,9 +40,9 @@ class VolumeStore {
       const Viewer& viewer, const std::string& after = {},
       std::size_t limit = std::numeric_limits<std::size_t>::max()) const = 0;
 
-  // Throws Error kNotFound, kGone, and kNotReady while a queued or running job of the owner needs
-  // the volume.
-  virtual void erase(const std::string& owner, const std::string& id) = 0;
+  // Every record of that id that the viewer sees. Throws Error kNotFound, kGone, and kNotReady
+  // while a queued or running job of one of their owners needs the volume.
+  virtual void erase(const Viewer& viewer, const std::string& id) = 0;
 
   // Whether any record, of a volume or of a mesh, names the blob.
   virtual bool names(const std::string& blob) const = 0;

@@ -153,9 +153,10 @@ std::uint64_t log_bytes(std::uint64_t disk) {
 }  // namespace
 
 Database::Database(const DataFolder& folder)
-    : folder_(folder),
-      writer_(folder.records(), migrated(folder.records())),
-      reader_(folder.records(), Connection::Mode::kRead) {
+    : folder_(folder), writer_(folder.records(), migrated(folder.records())) {
+  for (auto& reader : readers_) {
+    reader = std::make_unique<Connection>(folder.records(), Connection::Mode::kRead);
+  }
   writer_.limit_log(log_bytes(folder.reserve().capacity()));
 }
 
@@ -169,6 +170,13 @@ bool Database::make_way() {
 std::int64_t Database::changes() {
   const Reading reading(writer_);
   return reading->all_changes();
+}
+
+Connection& Database::reader() {
+  for (const auto& reader : readers_) {
+    if (!reader->is_busy()) return *reader;
+  }
+  return *readers_[next_++ % kReaders];
 }
 
 std::int64_t now_us() { return to_us(std::chrono::system_clock::now()); }

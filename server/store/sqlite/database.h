@@ -1,6 +1,10 @@
 #pragma once
 
+#include <array>
+#include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string_view>
 
 #include "base/error.h"
@@ -11,7 +15,8 @@
 namespace isomesh::store {
 
 // The records of a data folder: one SQLite file (WAL, synchronous=FULL), with a connection that
-// writes and one that reads, so that readers do not wait for the disk. Thread safe; `folder` must
+// writes and some that read side by side, so that readers wait neither for the disk nor for whoever
+// reads much. Thread safe; `folder` must
 // outlive it.
 class Database {
  public:
@@ -21,7 +26,8 @@ class Database {
   explicit Database(const DataFolder& folder);
 
   Connection& writer() { return writer_; }
-  Connection& reader() { return reader_; }
+  // One that nobody uses, where there is one.
+  Connection& reader();
 
   // How many rows were changed since it was opened.
   std::int64_t changes();
@@ -43,7 +49,9 @@ class Database {
 
   const DataFolder& folder_;
   Connection writer_;
-  Connection reader_;
+  static constexpr std::size_t kReaders = 6;
+  std::array<std::unique_ptr<Connection>, kReaders> readers_;
+  std::atomic<std::size_t> next_ = 0;  // whose turn it is when all are used
 };
 
 // Microseconds since 1970: how the tables keep time.

@@ -76,6 +76,9 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
     if (refusing_ || (!mesh && count_queued(change.connection()) >= options_.max_queued)) {
       return {Submission::Kind::kBusy, {}, kRetryAfter};
     }
+    if (!mesh && !has_share_of_queue(change.connection(), spec, options_.max_queued)) {
+      return {Submission::Kind::kOwnersShare, {}, kRetryAfter};
+    }
     if (!mesh && !blobs_.has_room()) {
       throw Error(ErrorCode::kOutOfSpace, "there is no room on the disk for another job");
     }

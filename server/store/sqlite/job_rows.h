@@ -63,4 +63,8 @@ inline constexpr std::int64_t kLongestWaitUs = std::int64_t{3600} * 1'000'000;
 // How many jobs wait.
 std::size_t count_queued(Connection& connection);
 
+// Whether the queue has room for one more of that owner: a share of it (base/share.h), and for
+// urgent ones a share of an eighth of it, since everybody else's wait for those.
+bool has_share_of_queue(Connection& connection, const JobSpec& spec, std::size_t max_queued);
+
 }  // namespace isomesh::store

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/sha256.h"
+#include "base/share.h"
 #include "proto/json.h"
 #include "server/store/sqlite/job_rows.h"
 
@@ -50,15 +51,32 @@ JobAccount SqliteJobStore::account(const std::string& id) const {
 
 std::vector<Job> SqliteJobStore::list(const Viewer& viewer, std::optional<JobState> state,
                                       const std::string& after, std::size_t limit) const {
-  const Reading reading(database_.reader());
+  // What is in the records is looked at without the connection, so that others do not wait for it.
+  struct Found {
+    std::string record;
+    std::uint64_t fence;
+  };
+  std::vector<Found> found;
   // A condition that is not there costs no index.
   const std::string sql =
-      std::string("SELECT ") + kRowColumns + " FROM jobs WHERE " +
+      std::string("SELECT record, fence FROM jobs WHERE ") +
       (viewer ? "owner = ?1" : "?1 IS NULL") + (state ? " AND state = ?2" : " AND ?2 IS NULL") +
       (after.empty() ? " AND ?3 = ''" : " AND id < ?3") + " ORDER BY id DESC LIMIT ?4";
-  Query query = reading->query(sql, viewer, state, after, limit);
+  {
+    const Reading reading(database_.reader());
+    Query query = reading->query(sql, viewer, state, after, limit);
+    while (query.next()) {
+      found.push_back({query.text(0), static_cast<std::uint64_t>(query.integer(1))});
+    }
+  }
   std::vector<Job> jobs;
-  while (query.next()) jobs.push_back(with_progress(row_of(query)));
+  jobs.reserve(found.size());
+  for (const Found& each : found) {
+    Row row;
+    row.job = job_from_record(each.record);
+    row.fence = each.fence;
+    jobs.push_back(with_progress(row));
+  }
   return jobs;
 }
 
@@ -241,7 +259,24 @@ std::size_t count_queued(Connection& connection) {
   return static_cast<std::size_t>(query.integer(0));
 }
 
+bool has_share_of_queue(Connection& connection, const JobSpec& spec, std::size_t max_queued) {
+  constexpr std::size_t kStatShare = 8;
+  if (spec.owner.empty()) return true;
+  const bool is_stat = spec.parameters.priority == Priority::kStat;
+  Query query = connection.query(
+      "SELECT count(*), sum(owner = ?1) FROM jobs WHERE state = 0 AND (?2 = 0 OR priority = ?3)",
+      spec.owner, is_stat, Priority::kStat);
+  query.next();
+  const auto queued = static_cast<std::size_t>(query.integer(0));
+  const auto own = static_cast<std::size_t>(query.integer(1));
+  const std::size_t room = is_stat ? std::max<std::size_t>(max_queued / kStatShare, 1) : max_queued;
+  return has_share(spec.owner, own, room - std::min(room, queued));
+}
+
 const Job& job_of(const Submission& submission) {
+  if (submission.kind == Submission::Kind::kOwnersShare) {
+    throw Error(ErrorCode::kTooManyRequests, "too many of your jobs wait already");
+  }
   if (submission.kind == Submission::Kind::kConflict) {
     throw Error(ErrorCode::kKeyReused, "the idempotency key came with another request before");
   }

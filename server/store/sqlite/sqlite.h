@@ -116,7 +116,11 @@ class Connection {
 
   Mutex& mutex() { return mutex_; }
 
+  // Whether a Reading has it or waits for it; another thread may change that at once.
+  bool is_busy() const { return readings_ > 0; }
+
  private:
+  friend class Reading;
   friend class Transaction;
 
   // What the next transaction's commit outlives.
@@ -137,6 +141,7 @@ class Connection {
   sqlite3* handle_ = nullptr;
   int log_pages_ = 0;
   Mutex mutex_;
+  std::atomic<int> readings_ = 0;
   Durability durability_ = Durability::kFull;
   std::unordered_map<std::string, sqlite3_stmt*> statements_;
   std::shared_ptr<Batch> batch_;         // of the transaction that is open
@@ -179,15 +184,26 @@ class Transaction {
   std::vector<std::function<void(bool is_committed)>> at_end_;
 };
 
-// Reads what is committed.
+// Reads what is committed. Holds its connection, so what takes long with what was read is to be
+// done afterwards.
 class Reading {
  public:
-  explicit Reading(Connection& connection) : lock_(connection.mutex()), connection_(connection) {}
+  explicit Reading(Connection& connection)
+      : count_(connection.readings_), lock_(connection.mutex()), connection_(connection) {}
 
   Connection* operator->() const { return &connection_; }
   Connection& connection() const { return connection_; }
 
  private:
+  struct Count {
+    explicit Count(std::atomic<int>& readings) : readings_(readings) { ++readings_; }
+    ~Count() { --readings_; }
+    Count(const Count&) = delete;
+    Count& operator=(const Count&) = delete;
+    std::atomic<int>& readings_;
+  };
+
+  const Count count_;  // first, so that who waits is counted
   const Lock lock_;
   Connection& connection_;
 };

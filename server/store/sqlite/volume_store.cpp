@@ -67,6 +67,16 @@ bool SqliteVolumeStore::contains(const Viewer& viewer, const std::string& id) co
 
 std::vector<Volume> SqliteVolumeStore::list(const Viewer& viewer, const std::string& after,
                                             std::size_t limit) const {
+  std::vector<Volume> volumes;
+  for (const std::string& record : records(viewer, after, limit)) {
+    volumes.push_back(volume_from_record(record));
+  }
+  return volumes;
+}
+
+// Without a look at what is in them, so that others do not wait for that.
+std::vector<std::string> SqliteVolumeStore::records(const Viewer& viewer, const std::string& after,
+                                                    std::size_t limit) const {
   const std::size_t space = after.find(' ');
   const std::int64_t created = us_of_timestamp(after.substr(0, space));
   const std::string id = space == std::string::npos ? "" : after.substr(space + 1);
@@ -76,25 +86,28 @@ std::vector<Volume> SqliteVolumeStore::list(const Viewer& viewer, const std::str
       "ORDER BY created, id LIMIT ?4",
       viewer, after.empty() ? std::int64_t{-1} : created, id,
       static_cast<std::int64_t>(std::min<std::size_t>(limit, 1 << 30)));
-  std::vector<Volume> volumes;
-  while (query.next()) volumes.push_back(volume_from_record(query.text(0)));
-  return volumes;
+  std::vector<std::string> records;
+  while (query.next()) records.push_back(query.text(0));
+  return records;
 }
 
-void SqliteVolumeStore::erase(const std::string& owner, const std::string& id) {
+void SqliteVolumeStore::erase(const Viewer& viewer, const std::string& id) {
   database_.freeing([&] {
     Transaction transaction(database_.writer());
-    if (!find(transaction.connection(), owner, id)) {
-      throw_missing(transaction.connection(), owner, id);
+    if (!find(transaction.connection(), viewer, id)) {
+      throw_missing(transaction.connection(), viewer, id);
     }
     {
       Query needed = transaction->query(
-          "SELECT 1 FROM jobs WHERE volume = ? AND owner = ? AND state < 2 LIMIT 1", id, owner);
+          "SELECT 1 FROM jobs WHERE volume = ?1 AND (?2 IS NULL OR owner = ?2) AND state < 2 LIMIT "
+          "1",
+          id, viewer);
       if (needed.next()) {
         throw Error(ErrorCode::kNotReady, "jobs that are not finished need this volume");
       }
     }
-    transaction->run("DELETE FROM volumes WHERE owner = ? AND id = ?", owner, id);
+    transaction->run("DELETE FROM volumes WHERE id = ?1 AND (?2 IS NULL OR owner = ?2)", id,
+                     viewer);
     transaction.commit();
   });
 }

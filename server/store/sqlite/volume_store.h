@@ -22,13 +22,16 @@ class SqliteVolumeStore : public VolumeStore {
   bool contains(const Viewer& viewer, const std::string& id) const override;
   std::vector<Volume> list(const Viewer& viewer, const std::string& after,
                            std::size_t limit) const override;
-  void erase(const std::string& owner, const std::string& id) override;
+  void erase(const Viewer& viewer, const std::string& id) override;
   bool names(const std::string& blob) const override;
   std::vector<Expirable> unused(Time before, std::size_t limit) const override;
   Expired expire(std::span<const Expirable> volumes, std::uint64_t enough) override;
   std::uint64_t named_bytes() const override;
 
  private:
+  std::vector<std::string> records(const Viewer& viewer, const std::string& after,
+                                   std::size_t limit) const;
+
   Database& database_;
 };
 

@@ -287,6 +287,40 @@ TEST_P(JobConformance, NothingIsAcceptedOnceItIsClosed) {
 
 // --- Limits
 
+TEST_P(JobConformance, OneOwnerDoesNotFillTheQueue) {
+  make({.max_queued = 8});
+  for (const char* owner : {"greedy", "third"}) add_volume(owner, kVolume);
+  const auto submit_as = [&](const std::string& owner, Priority priority) {
+    return jobs().submit({owner, unlike(priority), "", ""}).kind;
+  };
+  for (int n = 0; n < 4; ++n) {
+    EXPECT_EQ(submit_as("greedy", Priority::kRoutine), Submission::Kind::kNew) << n;
+  }
+  const Submission refused = jobs().submit({"greedy", unlike(Priority::kBulk), "", ""});
+  EXPECT_EQ(refused.kind, Submission::Kind::kOwnersShare);
+  EXPECT_GT(refused.retry_after.count(), 0);
+  EXPECT_EQ(code_thrown_by([&] { job_of(refused); }), ErrorCode::kTooManyRequests);
+  EXPECT_EQ(submit_as("other", Priority::kRoutine), Submission::Kind::kNew);
+  EXPECT_EQ(submit_as("other", Priority::kRoutine), Submission::Kind::kNew);
+  EXPECT_EQ(submit_as("third", Priority::kRoutine), Submission::Kind::kNew);
+  EXPECT_FALSE(jobs().is_full());
+}
+
+// All others wait for urgent jobs, so an owner has fewer of them.
+TEST_P(JobConformance, OneOwnersUrgentJobsAreFew) {
+  make({.max_queued = 64});
+  add_volume("urgent", kVolume);
+  for (int n = 0; n < 4; ++n) {
+    EXPECT_EQ(jobs().submit({"urgent", unlike(Priority::kStat), "", ""}).kind,
+              Submission::Kind::kNew);
+  }
+  EXPECT_EQ(jobs().submit({"urgent", unlike(Priority::kStat), "", ""}).kind,
+            Submission::Kind::kOwnersShare);
+  EXPECT_EQ(jobs().submit({"urgent", unlike(Priority::kRoutine), "", ""}).kind,
+            Submission::Kind::kNew);
+  EXPECT_EQ(jobs().submit({"other", unlike(Priority::kStat), "", ""}).kind, Submission::Kind::kNew);
+}
+
 TEST_P(JobConformance, AFullQueueAcceptsNothing) {
   make({.max_queued = 3});
   for (int n = 0; n < 3; ++n) submit(unlike(Priority{n}));

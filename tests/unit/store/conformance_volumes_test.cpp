@@ -82,6 +82,17 @@ TEST_P(VolumeConformance, OwnersHaveRecordsOfTheirOwn) {
   EXPECT_FALSE(volumes().names("aa"));
 }
 
+// Who sees everybody's erases what it sees.
+TEST_P(VolumeConformance, TheServiceErasesEveryOwnersRecord) {
+  volumes().add("one", volume_of("aa"));
+  volumes().add("other", volume_of("aa"));
+  volumes().add("other", volume_of("bb"));
+  volumes().erase(std::nullopt, "aa");
+  EXPECT_FALSE(volumes().names("aa"));
+  EXPECT_TRUE(volumes().names("bb"));
+  EXPECT_EQ(code_thrown_by([&] { volumes().erase(std::nullopt, "aa"); }), ErrorCode::kNotFound);
+}
+
 TEST_P(VolumeConformance, ListsTheOldestFirstInPages) {
   const Volume second = volume_of("bb", "2024-02-01T00:00:00.000Z");
   volumes().add("", volume_of("cc", "2024-01-01T00:00:00.000Z"));

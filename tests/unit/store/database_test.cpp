@@ -28,6 +28,15 @@ TEST_F(DatabaseTest, IsForItsOwnerOnly) {
   }
 }
 
+// Whoever reads much holds nobody up. With one connection the second reading would wait for ever.
+TEST_F(DatabaseTest, ReadersReadSideBySide) {
+  Database database(data_);
+  SqliteVolumeStore volumes(database);
+  const Reading much(database.reader());
+  const Reading more(database.reader());
+  EXPECT_TRUE(volumes.list(std::nullopt, "", 10).empty());
+}
+
 TEST_F(DatabaseTest, OfANewerVersionIsRefusedAndLeftAsItIs) {
   { const Database database(data_); }
   { Connection(data_.records(), Connection::Mode::kWrite).script("PRAGMA user_version=99"); }
