@@ -43,7 +43,7 @@ PipelineResult run_pipeline(const Volume& volume, const MeshParameters& paramete
   const std::uint64_t disk_bytes = capacity - std::min(capacity, file_bytes);
   PipelineResult result;
   result.mesh = make_mesh({header.type, header.dims, header.geometry, canonical.samples().data()},
-                          {volume.id, parameters, parameters.iso.value_or(volume.suggested_iso),
+                          {volume, parameters, parameters.iso.value_or(volume.suggested_iso),
                            limits.memory_bytes, disk_bytes},
                           sinks, progress, workspace.mesh);
   for (std::size_t i = 0; i < writers.size(); ++i) {
