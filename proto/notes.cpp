@@ -51,6 +51,16 @@ constexpr NoteDescription kDescriptions[] = {
                 "is taken from their positions.",
      .is_acceptable = true,
      .is_in_mesh = true},
+    {.code = NoteCode::kEmptyPlanes,
+     .name = "empty-planes",
+     .meaning =
+         "A DICOM segmentation leaves out frames that show nothing; they are planes of zeros.",
+     .is_in_mesh = true},
+    {.code = NoteCode::kDistanceAssumed,
+     .name = "distance-assumed",
+     .meaning = "The DICOM image does not tell how far apart its slices are; the thickness of a "
+                "slice was taken.",
+     .is_in_mesh = true},
 };
 
 }  // namespace

@@ -20,6 +20,8 @@ enum class NoteCode {
   kDuplicateFile,     // a file came twice and was taken once
   kLooksLikeLabels,   // few whole values in flat regions: a job's `labels` suits it, not `iso`
   kFrameOfReference,  // DICOM: slices do not share one frame of reference
+  kEmptyPlanes,       // DICOM: frames that a segmentation leaves out; they are planes of zeros
+  kDistanceAssumed,   // DICOM: the distance between slices is not told; taken from the thickness
 };
 
 struct NoteDescription {

@@ -3,6 +3,7 @@
 #include "proto/json.h"
 #include "server/process/import_message.h"
 #include "server/volume/canonical.h"
+#include "tests/fuzz/dicom_corpus.h"
 #include "tests/fuzz/draco_target.h"
 #include "tests/fuzz/targets.h"
 #include "tests/unit/import/archives.h"
@@ -110,13 +111,16 @@ std::string dicom_file(const std::string& syntax) {
 }
 
 std::vector<std::string> dicom_files() {
-  return {dicom_file("1.2.840.10008.1.2.1"),
-          dicom_meta("1.2.840.10008.1.2.1") + dicom_data(),
-          dicom_data(),
-          dicom_file("1.2.840.10008.1.2.5"),
-          dicom_file("1.2.840.10008.1.2.4.70"),
-          dicom_file("1.2.840.10008.1.2.4.80"),
-          dicom_file("1.2.840.10008.1.2.4.90")};
+  std::vector<std::string> files = dicom_objects();
+  const std::vector<std::string> slices = {dicom_file("1.2.840.10008.1.2.1"),
+                                           dicom_meta("1.2.840.10008.1.2.1") + dicom_data(),
+                                           dicom_data(),
+                                           dicom_file("1.2.840.10008.1.2.5"),
+                                           dicom_file("1.2.840.10008.1.2.4.70"),
+                                           dicom_file("1.2.840.10008.1.2.4.80"),
+                                           dicom_file("1.2.840.10008.1.2.4.90")};
+  files.insert(files.end(), slices.begin(), slices.end());
+  return files;
 }
 
 std::vector<std::string> canonical_files() { return {import_bytes(nifti({}, kSamples)).canonical}; }
@@ -147,6 +151,7 @@ std::vector<std::string> corpus(std::string_view name) {
   if (name == "metaimage") return metaimage_files();
   if (name == "vti") return vti_files();
   if (name == "dicom") return dicom_files();
+  if (name == "csa") return csa_headers();
   if (name == "archive") return archive_files();
   if (name == "raw") return raw_files();
   if (name == "canonical") return canonical_files();

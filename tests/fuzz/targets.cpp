@@ -12,6 +12,7 @@
 
 #include "proto/error.h"
 #include "proto/json.h"
+#include "server/import/dicom/csa_header.h"
 #include "server/import/import.h"
 #include "server/import/readers.h"
 #include "server/process/import_message.h"
@@ -155,6 +156,10 @@ constexpr Target kTargets[] = {
     {"metaimage", [](Bytes bytes) { import_only("metaimage", bytes); }},
     {"vti", [](Bytes bytes) { import_only("vti", bytes); }},
     {"dicom", [](Bytes bytes) { import_only("dicom", bytes); }},
+    {"csa",
+     [](Bytes bytes) {
+       read_text(bytes, [](auto text) { import::dicom::parse_csa_header(text); });
+     }},
     {"archive", [](Bytes bytes) { import_only("archive", bytes); }},
     {"raw", import_raw},
     {"canonical", open_canonical},

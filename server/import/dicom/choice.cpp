@@ -95,18 +95,36 @@ SeriesVolumes one_a_segment(const std::vector<Slice>& slices) {
   return all;
 }
 
-Stack choose_labels(std::vector<Slice> slices, const ImportOptions& options,
-                    std::vector<Note>& notes) {
-  SeriesVolumes objects = one_an_object(slices);
-  if (objects.volumes.size() > 1) {
-    return make_label_stack(chosen_of(std::move(objects), options, notes));
+// Planes without a frame are planes without a label.
+void note_empty_planes(const Stack& stack, std::vector<Note>& notes) {
+  std::uint32_t filled = 0;
+  for (std::size_t i = 0; i < stack.planes.size(); ++i) {
+    if (i == 0 || stack.planes[i] != stack.planes[i - 1]) ++filled;
   }
+  if (filled == stack.plane_count) return;
+  notes.push_back(
+      note_of(NoteCode::kEmptyPlanes, std::to_string(stack.plane_count - filled) + " of the " +
+                                          std::to_string(stack.plane_count) +
+                                          " planes have no frame; their samples are 0."));
+}
+
+std::vector<Slice> choose_label_slices(std::vector<Slice> slices, const ImportOptions& options,
+                                       std::vector<Note>& notes) {
+  SeriesVolumes objects = one_an_object(slices);
+  if (objects.volumes.size() > 1) return chosen_of(std::move(objects), options, notes);
   if (!options.volume || !slices.front().image->segmentation->is_binary) {
-    return make_label_stack(chosen_of({"", {{"", std::move(slices), 0}}}, options, notes));
+    return chosen_of({"", {{"", std::move(slices), 0}}}, options, notes);
   }
   std::vector<Slice> chosen = chosen_of(one_a_segment(slices), options, notes);
   if (chosen.empty()) throw_unusable("The segmentation has no frames of the segment.");
-  return make_label_stack(std::move(chosen));
+  return chosen;
+}
+
+Stack choose_labels(std::vector<Slice> slices, const ImportOptions& options,
+                    std::vector<Note>& notes) {
+  Stack stack = make_label_stack(choose_label_slices(std::move(slices), options, notes));
+  note_empty_planes(stack, notes);
+  return stack;
 }
 
 }  // namespace
@@ -120,6 +138,12 @@ Stack choose_stack(std::vector<Slice> slices, const ImportOptions& options,
     throw_unusable("The series is no single volume: it mixes images and segmentations.");
   }
   Stack stack = make_stack(chosen_of(split_volumes(std::move(slices)), options, notes));
+  if (stack.slices.front().image->is_distance_assumed) {
+    notes.push_back(note_of(NoteCode::kDistanceAssumed,
+                            "The slices of the mosaic are taken to be as far apart as they are "
+                            "thick, " +
+                                in_mm(stack.geometry.spacing[2]) + '.'));
+  }
   if (auto note = note_on_frames_of_reference(stack.slices, options)) {
     notes.push_back(std::move(*note));
   }

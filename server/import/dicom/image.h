@@ -83,6 +83,7 @@ struct Image {
   PixelLayout layout;  // of each of `frames`
   // Above 0 the file has one frame, in which `frames` lie as tiles, so many side by side.
   std::uint32_t tiles_per_row = 0;
+  bool is_distance_assumed = false;  // the tiles' slices are as far apart as they are thick
   std::vector<Frame> frames;
   std::vector<Phase> phases;  // of the whole object
   std::optional<Segmentation> segmentation;

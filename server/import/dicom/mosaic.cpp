@@ -91,12 +91,14 @@ Vector3 slice_normal(const Plane& plane, const CsaHeader& header) {
   return moved({}, own, std::copysign(1, along));
 }
 
-double slice_distance(const DataSet& data, const CsaHeader& header) {
+double slice_distance(const DataSet& data, const CsaHeader& header, Image& image) {
   for (const auto& told :
-       {data.numbers(kSpacingBetweenSlices), csa_numbers(header, "SpacingBetweenSlices"),
-        data.numbers(kSliceThickness)}) {
+       {data.numbers(kSpacingBetweenSlices), csa_numbers(header, "SpacingBetweenSlices")}) {
     if (!told.empty() && told.front() > 0) return told.front();
   }
+  image.is_distance_assumed = true;
+  const auto thickness = data.numbers(kSliceThickness);
+  if (!thickness.empty() && thickness.front() > 0) return thickness.front();
   throw_unusable("The DICOM image is a mosaic of slices and does not tell how far apart they are " +
                  tag_name(kSpacingBetweenSlices) + ".");
 }
@@ -108,7 +110,7 @@ void unfold_siemens(const DataSet& data, Image& image) {
   const Tiling tiling = tiling_of(slice_count(data, header), true);
   const Plane plane = image.frames.front().plane;
   const Vector3 normal = slice_normal(plane, header);
-  const double distance = slice_distance(data, header);
+  const double distance = slice_distance(data, header, image);
   cut(tiling, image);
   const auto half_less = [](std::uint32_t whole, std::uint32_t tile) {
     return (static_cast<double>(whole) - static_cast<double>(tile)) / 2;

@@ -6,7 +6,7 @@
 #include "server/import/dicom/private_elements.h"
 #include "server/import/dicom/tags.h"
 #include "tests/unit/import/dicom/csa_writer.h"
-#include "tests/unit/import/dicom/objects.h"
+#include "tests/unit/import/dicom/mosaics.h"
 
 namespace isomesh::import::test {
 namespace {
@@ -14,83 +14,19 @@ namespace {
 using namespace dicom;
 using testing::HasSubstr;
 
-constexpr std::uint32_t kColumns = 3;
-constexpr std::uint32_t kRows = 2;
-constexpr std::uint32_t kSlices = 5;
-
-std::uint16_t sample(std::uint32_t i, std::uint32_t j, std::uint32_t k) {
-  return static_cast<std::uint16_t>(k * 100 + j * 10 + i + 1);
-}
-
-// Tiles in rows of `across`, of which those behind the last slice are empty.
-std::string tiles(std::uint32_t across, std::uint32_t down) {
-  std::string bytes;
-  for (std::uint32_t y = 0; y < down * kRows; ++y) {
-    for (std::uint32_t x = 0; x < across * kColumns; ++x) {
-      const std::uint32_t k = y / kRows * across + x / kColumns;
-      const unsigned value = k < kSlices ? sample(x % kColumns, y % kRows, k) : 0;
-      bytes += static_cast<char>(value & 0xFF);
-      bytes += static_cast<char>(value >> 8);
-    }
-  }
-  return bytes;
-}
-
-DicomObject tiled(std::uint32_t across, std::uint32_t down) {
-  DicomSeries series;
-  series.columns = across * kColumns;
-  series.rows = down * kRows;
-  series.bits_stored = 16;
-  series.high_bit = 15;
-  series.between_rows = 2;
-  series.between_columns = 3;
-  return series.slice(0).text(kImagePosition, "DS", "10\\20\\30").pixels(tiles(across, down), 2);
-}
-
-CsaFields csa_fields(const std::vector<std::string>& normal) {
-  return {{"EchoLinePosition", {"32      "}},
-          {"NumberOfImagesInMosaic", {"5       "}},
-          {"SliceNormalVector", normal}};
-}
-
-// Five slices in three by three tiles, so that the first tile lies 3 columns of 3 mm and 2 rows of
-// 2 mm from where the position says.
-DicomObject siemens(const CsaFields& fields, bool is_newer = true) {
-  return tiled(3, 3)
-      .text(kImageType, "CS", "ORIGINAL\\PRIMARY\\M\\ND\\MOSAIC")
-      .text(kSpacingBetweenSlices, "DS", "4.5")
-      .text(0x00290010, "LO", "SIEMENS CSA HEADER")
-      .bytes(kCsaImageHeader, "OB", csa_header(fields, is_newer));
-}
-
-DicomObject siemens() { return siemens(csa_fields({"0", "0", "1"})); }
-
-DicomObject united_imaging() {
-  std::vector<DicomObject> frames;
-  for (std::uint32_t k = 0; k < kSlices; ++k) {
-    frames.push_back(
-        DicomObject().text(kImagePosition, "DS", "1\\2\\" + std::to_string(30 - 4 * int(k))));
-  }
-  return tiled(3, 2)
-      .text(kImageType, "CS", "ORIGINAL\\PRIMARY\\M\\VFRAME")
-      .text(0x00650010, "LO", "Image Private Header")
-      .text(kGridImages, "DS", "5")
-      .items(kGridFrames, frames);
-}
-
 Outcome import_one(const DicomObject& object, std::string_view syntax = kExplicit) {
   return import_objects({{"mosaic", object.file(syntax)}});
 }
 
 void expect_slices(const Outcome& outcome, bool reversed = false) {
   ASSERT_EQ(outcome.error, "");
-  ASSERT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{kColumns, kRows, kSlices}));
+  ASSERT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{kTileColumns, kTileRows, kTiles}));
   const auto samples = samples_of<std::int16_t>(outcome);
   std::size_t at = 0;
-  for (std::uint32_t k = 0; k < kSlices; ++k) {
-    for (std::uint32_t j = 0; j < kRows; ++j) {
-      for (std::uint32_t i = 0; i < kColumns; ++i) {
-        ASSERT_EQ(samples[at++], sample(i, j, reversed ? kSlices - 1 - k : k));
+  for (std::uint32_t k = 0; k < kTiles; ++k) {
+    for (std::uint32_t j = 0; j < kTileRows; ++j) {
+      for (std::uint32_t i = 0; i < kTileColumns; ++i) {
+        ASSERT_EQ(samples[at++], tile_sample(i, j, reversed ? kTiles - 1 - k : k));
       }
     }
   }
@@ -100,7 +36,7 @@ using Numbers = std::array<double, 3>;
 
 TEST(DicomMosaic, IsUnfoldedWhereItsFirstTileLies) {
   for (const std::string_view syntax : {kImplicit, kExplicit, kDeflate, kBigEndian}) {
-    const Outcome outcome = import_one(siemens(), syntax);
+    const Outcome outcome = import_one(siemens_mosaic(), syntax);
     expect_slices(outcome);
     EXPECT_EQ(outcome.volume.geometry.origin, (Numbers{10 + 3 * 3, 20 + 2 * 2, 30}));
     EXPECT_EQ(outcome.volume.geometry.spacing, (Numbers{3, 2, 4.5}));
@@ -108,7 +44,7 @@ TEST(DicomMosaic, IsUnfoldedWhereItsFirstTileLies) {
 }
 
 TEST(DicomMosaic, FollowsItsNormalEitherWay) {
-  const Outcome outcome = import_one(siemens(csa_fields({"0", "0", "-1"})));
+  const Outcome outcome = import_one(siemens_mosaic(csa_fields({"0", "0", "-1"})));
   // The stack begins with the last tile, which lies lowest along the image's own normal.
   expect_slices(outcome, true);
   EXPECT_EQ(outcome.volume.geometry.origin, (Numbers{19, 24, 30 - 4 * 4.5}));
@@ -116,8 +52,8 @@ TEST(DicomMosaic, FollowsItsNormalEitherWay) {
 }
 
 TEST(DicomMosaic, HasAHeaderInEitherLayoutAndBlock) {
-  expect_slices(import_one(siemens(csa_fields({"0", "0", "1"}), false)));
-  const DicomObject moved = tiled(3, 3)
+  expect_slices(import_one(siemens_mosaic(csa_fields({"0", "0", "1"}), false)));
+  const DicomObject moved = tiled_object(3, 3)
                                 .text(kImageType, "CS", "MOSAIC")
                                 .text(kSpacingBetweenSlices, "DS", "4.5")
                                 .text(0x00290010, "LO", "SOMEBODY ELSE")
@@ -131,28 +67,32 @@ TEST(DicomMosaic, TellsTheNumberInTwoPlaces) {
   CsaFields fields = csa_fields({"0", "0", "1"});
   fields.erase(fields.begin() + 1);
   expect_slices(import_one(
-      siemens(fields).text(0x00190010, "LO", "SIEMENS MR HEADER").number(kMosaicImages, 5)));
+      siemens_mosaic(fields).text(0x00190010, "LO", "SIEMENS MR HEADER").number(kMosaicImages, 5)));
 }
 
 TEST(DicomMosaic, IsRefusedWhenItDoesNotSayWhereSlicesLie) {
-  EXPECT_THAT(import_one(siemens().erase(kCsaImageHeader)).error, HasSubstr("header"));
-  EXPECT_THAT(import_one(siemens({})).error, HasSubstr("how many"));
-  EXPECT_THAT(import_one(siemens(csa_fields({}))).error, HasSubstr("SliceNormalVector"));
-  EXPECT_THAT(import_one(siemens(csa_fields({"0", "1", "0"}))).error, HasSubstr("normal"));
-  EXPECT_THAT(import_one(siemens(csa_fields({"0", "0", "3"}))).error, HasSubstr("unit vectors"));
-  EXPECT_THAT(import_one(siemens().erase(kSpacingBetweenSlices)).error, HasSubstr("how far apart"));
+  EXPECT_THAT(import_one(siemens_mosaic().erase(kCsaImageHeader)).error, HasSubstr("header"));
+  EXPECT_THAT(import_one(siemens_mosaic({})).error, HasSubstr("how many"));
+  EXPECT_THAT(import_one(siemens_mosaic(csa_fields({}))).error, HasSubstr("SliceNormalVector"));
+  EXPECT_THAT(import_one(siemens_mosaic(csa_fields({"0", "1", "0"}))).error, HasSubstr("normal"));
+  EXPECT_THAT(import_one(siemens_mosaic(csa_fields({"0", "0", "3"}))).error,
+              HasSubstr("unit vectors"));
+  EXPECT_THAT(import_one(siemens_mosaic().erase(kSpacingBetweenSlices)).error,
+              HasSubstr("how far apart"));
   CsaFields many = csa_fields({"0", "0", "1"});
   many[1].second = {"17"};
-  EXPECT_THAT(import_one(siemens(many)).error, HasSubstr("no 5 x 5 tiles"));
+  EXPECT_THAT(import_one(siemens_mosaic(many)).error, HasSubstr("no 5 x 5 tiles"));
   many[1].second = {"1e9"};
-  EXPECT_THAT(import_one(siemens(many)).error, HasSubstr("no number of slices"));
+  EXPECT_THAT(import_one(siemens_mosaic(many)).error, HasSubstr("no number of slices"));
 }
 
 TEST(DicomMosaic, TakesTheThicknessWhereNoDistanceIsTold) {
   const Outcome outcome =
-      import_one(siemens().erase(kSpacingBetweenSlices).text(kSliceThickness, "DS", "4"));
+      import_one(siemens_mosaic().erase(kSpacingBetweenSlices).text(kSliceThickness, "DS", "4"));
   expect_slices(outcome);
   EXPECT_EQ(outcome.volume.geometry.spacing[2], 4);
+  ASSERT_EQ(outcome.volume.notes.size(), 1);
+  EXPECT_EQ(outcome.volume.notes[0].code, "distance-assumed");
 }
 
 // Scanners that have unfolded it leave the word.
@@ -169,7 +109,7 @@ TEST(DicomMosaic, IsAVolumeOfItsSeries) {
   NamedFiles files;
   for (int number = 1; number <= 3; ++number) {
     files.emplace_back("M" + std::to_string(number),
-                       siemens()
+                       siemens_mosaic()
                            .text(kInstanceNumber, "IS", std::to_string(number))
                            .text(kAcquisitionTime, "TM", std::to_string(120000 + number))
                            // Corrected for motion: no two lie at the same place.
@@ -190,7 +130,7 @@ TEST(DicomMosaic, IsAVolumeOfItsSeries) {
 
 TEST(DicomGrid, HasAPlaceForEachSlice) {
   for (const std::string_view syntax : {kImplicit, kExplicit, kBigEndian}) {
-    const Outcome outcome = import_one(united_imaging(), syntax);
+    const Outcome outcome = import_one(united_imaging_grid(), syntax);
     expect_slices(outcome, true);
     EXPECT_EQ(outcome.volume.geometry.origin, (Numbers{1, 2, 30 - 16}));
     EXPECT_EQ(outcome.volume.geometry.spacing, (Numbers{3, 2, 4}));
@@ -198,11 +138,11 @@ TEST(DicomGrid, HasAPlaceForEachSlice) {
 }
 
 TEST(DicomGrid, IsRefusedWhenPlacesAreMissing) {
-  EXPECT_THAT(import_one(united_imaging().text(kGridImages, "DS", "6")).error,
+  EXPECT_THAT(import_one(united_imaging_grid().text(kGridImages, "DS", "6")).error,
               HasSubstr("a grid of 6 slices, and 5 are described"));
-  EXPECT_THAT(import_one(united_imaging().items(kGridFrames, {})).error, HasSubstr("0 are"));
+  EXPECT_THAT(import_one(united_imaging_grid().items(kGridFrames, {})).error, HasSubstr("0 are"));
   EXPECT_THAT(
-      import_one(united_imaging().items(kGridFrames, std::vector<DicomObject>(kSlices))).error,
+      import_one(united_imaging_grid().items(kGridFrames, std::vector<DicomObject>(kTiles))).error,
       HasSubstr("position"));
 }
 

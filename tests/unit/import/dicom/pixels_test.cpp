@@ -207,5 +207,55 @@ TEST(DicomObjects, AreReadByGdcm) {
   }
 }
 
+// --- Floating-point numbers ----------------------------------------------------------------------
+
+// Frames of which the samples are `at`, `at` + 0.25, ...
+template <class Real>
+DicomObject real_object(Tag tag, const char* vr) {
+  const DicomSeries series;
+  std::string bytes;
+  for (std::size_t at = 0; at < 3 * series.layout().samples(); ++at) {
+    const Real value = static_cast<Real>(at) * static_cast<Real>(0.25) - 3;
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  return series.enhanced({0, 1, 2})
+      .erase(kPixelData)
+      .erase(kBitsStored)
+      .erase(kHighBit)
+      .erase(kPixelRepresentation)
+      .number(kBitsAllocated, sizeof(Real) * 8)
+      .bytes(tag, vr, bytes);
+}
+
+template <class Real>
+void expect_reals(const DicomObject& object, SampleType type) {
+  const Outcome outcome = import_objects({{"map", object.file()}});
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.type, type);
+  const auto samples = samples_of<Real>(outcome);
+  for (std::size_t at = 0; at < samples.size(); ++at) {
+    ASSERT_EQ(samples[at], static_cast<Real>(at) * static_cast<Real>(0.25) - 3);
+  }
+}
+
+TEST(DicomReals, AreReadAsTheyAre) {
+  expect_reals<float>(real_object<float>(kFloatPixelData, "OF"), SampleType::kFloat32);
+  expect_reals<double>(real_object<double>(kDoubleFloatPixelData, "OD"), SampleType::kFloat64);
+}
+
+TEST(DicomReals, AreScaled) {
+  DicomObject object = real_object<float>(kFloatPixelData, "OF");
+  object.text(kRescaleSlope, "DS", "2").text(kRescaleIntercept, "DS", "1");
+  const Outcome outcome = import_objects({{"map", object.file()}});
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(samples_of<float>(outcome)[4], -3);
+}
+
+TEST(DicomReals, AreRefusedWhenSomeAreMissing) {
+  DicomObject object = real_object<double>(kDoubleFloatPixelData, "OD");
+  object.bytes(kDoubleFloatPixelData, "OD", std::string(400, 'x'));
+  EXPECT_THAT(import_objects({{"map", object.file()}}).error, HasSubstr("take 480 bytes, and 400"));
+}
+
 }  // namespace
 }  // namespace isomesh::import::test

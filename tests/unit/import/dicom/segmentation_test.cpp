@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/import/dicom/tags.h"
-#include "tests/unit/import/dicom/objects.h"
+#include "tests/unit/import/dicom/segments.h"
 
 namespace isomesh::import::test {
 namespace {
@@ -11,106 +11,13 @@ namespace {
 using namespace dicom;
 using testing::HasSubstr;
 
-constexpr std::uint32_t kColumns = 5;
-constexpr std::uint32_t kRows = 3;
-constexpr std::uint32_t kSamples = kColumns * kRows;
-
-// A frame at z, of a segment or, with 0, of labels.
-struct SegmentFrame {
-  double z = 0;
-  unsigned segment = 0;
-  std::vector<unsigned> labels;  // of samples that have one, by their place
-};
-
-struct SegmentObject {
-  std::vector<SegmentFrame> frames;
-  std::vector<std::string> segments = {"liver", "spleen"};
-  std::string type = "BINARY";
-  std::string slice_distance = {};
-  std::string uid = "1.2.3.4";
-};
-
-// Bits one after another, across frames.
-std::string packed(const std::vector<SegmentFrame>& frames) {
-  std::string bytes((frames.size() * kSamples + 15) / 16 * 2, '\0');
-  for (std::size_t frame = 0; frame < frames.size(); ++frame) {
-    for (const unsigned place : frames[frame].labels) {
-      const std::size_t bit = frame * kSamples + place;
-      bytes[bit / 8] = static_cast<char>(bytes[bit / 8] | 1 << bit % 8);
-    }
-  }
-  return bytes;
-}
-
-// Each sample that has a label has the label 7.
-std::string unpacked(const std::vector<SegmentFrame>& frames) {
-  std::string bytes(frames.size() * kSamples, '\0');
-  for (std::size_t frame = 0; frame < frames.size(); ++frame) {
-    for (const unsigned place : frames[frame].labels) bytes[frame * kSamples + place] = 7;
-  }
-  return bytes;
-}
-
-DicomObject object_of(const SegmentObject& what) {
-  DicomSeries series;
-  series.columns = kColumns;
-  series.rows = kRows;
-  series.uid = what.uid;
-  DicomObject object = series.enhanced({0});
-  std::vector<DicomObject> frames;
-  for (const SegmentFrame& each : what.frames) {
-    DicomObject frame;
-    frame.items(kPlanePositionSequence,
-                {DicomObject().text(kImagePosition, "DS", "0\\0\\" + std::to_string(each.z))});
-    if (each.segment > 0) {
-      frame.items(kSegmentIdentificationSequence,
-                  {DicomObject().number(kReferencedSegmentNumber, each.segment)});
-    }
-    frames.push_back(frame);
-  }
-  std::vector<DicomObject> segments;
-  for (const std::string& label : what.segments) {
-    segments.push_back(DicomObject()
-                           .number(kSegmentNumber, static_cast<unsigned>(segments.size() + 1))
-                           .text(kSegmentLabel, "LO", label));
-  }
-  DicomObject measures;
-  measures.text(kPixelSpacing, "DS", "0.5\\0.75");
-  if (!what.slice_distance.empty()) {
-    measures.text(kSpacingBetweenSlices, "DS", what.slice_distance);
-  }
-  DicomObject orientation;
-  orientation.text(kImageOrientation, "DS", "1\\0\\0\\0\\1\\0");
-  DicomObject shared;
-  shared.items(kPlaneOrientationSequence, {orientation}).items(kPixelMeasuresSequence, {measures});
-  const bool is_binary = what.type == "BINARY";
-  object.text(kModality, "CS", "SEG")
-      .text(kNumberOfFrames, "IS", std::to_string(frames.size()))
-      .text(kSegmentationType, "CS", what.type)
-      .items(kSegmentSequence, segments)
-      .items(kSharedFunctionalGroups, {shared})
-      .items(kPerFrameFunctionalGroups, frames)
-      .number(kBitsAllocated, is_binary ? 1 : 8)
-      .number(kBitsStored, is_binary ? 1 : 8)
-      .number(kHighBit, is_binary ? 0 : 7)
-      .pixels(is_binary ? packed(what.frames) : unpacked(what.frames), 1);
-  return object;
-}
-
 Outcome import_labels(const SegmentObject& object, const ImportOptions& options = {},
                       std::string_view syntax = kExplicit) {
-  return import_objects({{"seg", object_of(object).file(syntax)}}, options);
+  return import_objects({{"seg", segmentation(object).file(syntax)}}, options);
 }
 
 unsigned label_at(const Outcome& outcome, unsigned place, unsigned plane) {
-  return samples_of<std::uint8_t>(outcome).at(plane * kSamples + place);
-}
-
-SegmentObject two_segments() {
-  return {.frames = {{.z = 0, .segment = 1, .labels = {0, 7}},
-                     {.z = 2, .segment = 1, .labels = {14}},
-                     {.z = 2, .segment = 2, .labels = {3}},
-                     {.z = 4, .segment = 2, .labels = {1}}}};
+  return samples_of<std::uint8_t>(outcome).at(plane * kSegmentSamples + place);
 }
 
 TEST(DicomSegmentation, OfSeveralSegmentsIsOneLabelMap) {
@@ -118,13 +25,14 @@ TEST(DicomSegmentation, OfSeveralSegmentsIsOneLabelMap) {
     const Outcome outcome = import_labels(two_segments(), {}, syntax);
     ASSERT_EQ(outcome.error, "") << syntax;
     EXPECT_EQ(outcome.volume.type, SampleType::kUint8);
-    EXPECT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{kColumns, kRows, 3}));
+    EXPECT_EQ(outcome.volume.dims,
+              (std::array<std::uint32_t, 3>{kSegmentColumns, kSegmentRows, 3}));
     EXPECT_EQ(outcome.volume.geometry.spacing, (std::array<double, 3>{0.75, 0.5, 2}));
-    std::vector<std::uint8_t> expected(kSamples * 3);
+    std::vector<std::uint8_t> expected(kSegmentSamples * 3);
     expected[0] = expected[7] = 1;
-    expected[kSamples + 14] = 1;
-    expected[kSamples + 3] = 2;
-    expected[2 * kSamples + 1] = 2;
+    expected[kSegmentSamples + 14] = 1;
+    expected[kSegmentSamples + 3] = 2;
+    expected[2 * kSegmentSamples + 1] = 2;
     EXPECT_EQ(samples_of<std::uint8_t>(outcome), expected) << syntax;
   }
 }
@@ -135,7 +43,7 @@ TEST(DicomSegmentation, WithHighNumbersHasWiderLabels) {
   object.frames[3].segment = 300;
   const Outcome outcome = import_labels(object);
   ASSERT_EQ(outcome.error, "");
-  EXPECT_EQ(samples_of<std::uint16_t>(outcome)[kSamples + 3], 300);
+  EXPECT_EQ(samples_of<std::uint16_t>(outcome)[kSegmentSamples + 3], 300);
 }
 
 TEST(DicomSegmentation, WithOverlapsOffersItsSegments) {
@@ -164,8 +72,11 @@ TEST(DicomSegmentation, HasEmptyPlanesWhereFramesAreLeftOut) {
   ASSERT_EQ(told.error, "");
   EXPECT_EQ(told.volume.dims[2], 5);
   EXPECT_EQ(told.volume.geometry.spacing[2], 1);
+  ASSERT_EQ(told.volume.notes.size(), 1);
+  EXPECT_EQ(told.volume.notes[0].code, "empty-planes");
+  EXPECT_THAT(told.volume.notes[0].detail, HasSubstr("2 of the 5 planes"));
   EXPECT_EQ(label_at(told, 14, 2), 1);
-  for (unsigned place = 0; place < kSamples; ++place) {
+  for (unsigned place = 0; place < kSegmentSamples; ++place) {
     EXPECT_EQ(label_at(told, place, 1) + label_at(told, place, 3), 0);
   }
   // What is told of the distance holds where positions agree with it, and these do not.
@@ -221,7 +132,8 @@ TEST(DicomSegmentation, OfLabelsKeepsThem) {
   EXPECT_EQ(outcome.volume.range, (std::array<double, 2>{0, 7}));
   // Colours for the labels do not change them.
   const Outcome coloured = import_objects(
-      {{"seg", object_of(object).text(kPhotometricInterpretation, "CS", "PALETTE COLOR").file()}});
+      {{"seg",
+        segmentation(object).text(kPhotometricInterpretation, "CS", "PALETTE COLOR").file()}});
   EXPECT_EQ(coloured.canonical, outcome.canonical);
 }
 
@@ -233,13 +145,14 @@ TEST(DicomSegmentation, AloneMayHaveMissingFrames) {
                                            {.z = 8, .labels = {3}}},
                                 .type = "LABELMAP"};
   EXPECT_EQ(import_labels(object).volume.dims[2], 5);
-  const DicomObject image = object_of(object).erase(kSegmentationType).text(kModality, "CS", "CT");
+  const DicomObject image =
+      segmentation(object).erase(kSegmentationType).text(kModality, "CS", "CT");
   EXPECT_THAT(import_objects({{"image", image.file()}}).error, HasSubstr("missing"));
 }
 
 TEST(DicomSegmentation, IsAVolumeOfItsSeries) {
-  const NamedFiles files = {{"one", object_of(two_segments()).file()},
-                            {"two", object_of(two_segments())
+  const NamedFiles files = {{"one", segmentation(two_segments()).file()},
+                            {"two", segmentation(two_segments())
                                         .text(kSopInstanceUid, "UI", "1.2.3.9")
                                         .text(kInstanceNumber, "IS", "2")
                                         .file()}};

@@ -1,0 +1,31 @@
+#include "tests/fuzz/dicom_corpus.h"
+
+#include "server/import/dicom/tags.h"
+#include "tests/unit/import/dicom/mosaics.h"
+#include "tests/unit/import/dicom/segments.h"
+
+namespace isomesh::fuzz {
+
+using namespace import::test;
+
+std::vector<std::string> dicom_objects() {
+  std::vector<std::string> files;
+  const SegmentObject labels = {.frames = {{.z = 0, .labels = {2}}, {.z = 5, .labels = {3}}},
+                                .type = "LABELMAP",
+                                .slice_distance = "2.5"};
+  for (const DicomObject& object :
+       {siemens_mosaic(), siemens_mosaic(csa_fields({"0", "0", "-1"}), false),
+        united_imaging_grid(), segmentation(two_segments()), segmentation(labels),
+        DicomSeries{}.enhanced({0, 1, 2}), DicomSeries{}.enhanced({0, 1, 2, 0, 1, 2})}) {
+    for (const std::string_view syntax : {kImplicit, kExplicit, kBigEndian}) {
+      files.push_back(object.file(syntax));
+    }
+  }
+  return files;
+}
+
+std::vector<std::string> csa_headers() {
+  return {csa_header(csa_fields({"0", "0", "1"})), csa_header(csa_fields({"0", "0", "1"}), false)};
+}
+
+}  // namespace isomesh::fuzz

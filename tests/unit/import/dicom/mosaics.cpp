@@ -1,0 +1,75 @@
+#include "tests/unit/import/dicom/mosaics.h"
+
+#include <string>
+#include <vector>
+
+#include "server/import/dicom/private_elements.h"
+#include "server/import/dicom/tags.h"
+
+namespace isomesh::import::test {
+
+using namespace dicom;
+
+namespace {
+
+// Tiles in rows of `across`, of which those behind the last slice are empty.
+std::string tiles(std::uint32_t across, std::uint32_t down) {
+  std::string bytes;
+  for (std::uint32_t y = 0; y < down * kTileRows; ++y) {
+    for (std::uint32_t x = 0; x < across * kTileColumns; ++x) {
+      const std::uint32_t k = y / kTileRows * across + x / kTileColumns;
+      const unsigned value = k < kTiles ? tile_sample(x % kTileColumns, y % kTileRows, k) : 0;
+      bytes += static_cast<char>(value & 0xFF);
+      bytes += static_cast<char>(value >> 8);
+    }
+  }
+  return bytes;
+}
+
+}  // namespace
+
+std::uint16_t tile_sample(std::uint32_t i, std::uint32_t j, std::uint32_t k) {
+  return static_cast<std::uint16_t>(k * 100 + j * 10 + i + 1);
+}
+
+DicomObject tiled_object(std::uint32_t across, std::uint32_t down) {
+  DicomSeries series;
+  series.columns = across * kTileColumns;
+  series.rows = down * kTileRows;
+  series.bits_stored = 16;
+  series.high_bit = 15;
+  series.between_rows = 2;
+  series.between_columns = 3;
+  return series.slice(0).text(kImagePosition, "DS", "10\\20\\30").pixels(tiles(across, down), 2);
+}
+
+CsaFields csa_fields(const std::vector<std::string>& normal) {
+  return {{"EchoLinePosition", {"32      "}},
+          {"NumberOfImagesInMosaic", {"5       "}},
+          {"SliceNormalVector", normal}};
+}
+
+DicomObject siemens_mosaic(const CsaFields& fields, bool is_newer) {
+  return tiled_object(3, 3)
+      .text(kImageType, "CS", "ORIGINAL\\PRIMARY\\M\\ND\\MOSAIC")
+      .text(kSpacingBetweenSlices, "DS", "4.5")
+      .text(0x00290010, "LO", "SIEMENS CSA HEADER")
+      .bytes(kCsaImageHeader, "OB", csa_header(fields, is_newer));
+}
+
+DicomObject siemens_mosaic() { return siemens_mosaic(csa_fields({"0", "0", "1"})); }
+
+DicomObject united_imaging_grid() {
+  std::vector<DicomObject> frames;
+  for (std::uint32_t k = 0; k < kTiles; ++k) {
+    frames.push_back(
+        DicomObject().text(kImagePosition, "DS", "1\\2\\" + std::to_string(30 - 4 * int(k))));
+  }
+  return tiled_object(3, 2)
+      .text(kImageType, "CS", "ORIGINAL\\PRIMARY\\M\\VFRAME")
+      .text(0x00650010, "LO", "Image Private Header")
+      .text(kGridImages, "DS", "5")
+      .items(kGridFrames, frames);
+}
+
+}  // namespace isomesh::import::test

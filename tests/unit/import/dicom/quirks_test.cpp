@@ -1,0 +1,78 @@
+// What some programs write that the standard does not know.
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include "server/import/dicom/tags.h"
+#include "tests/unit/import/dicom/objects.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using namespace dicom;
+using testing::HasSubstr;
+
+TEST(DicomFiles, MayHaveBlankRepresentations) {
+  const DicomSeries series;
+  for (const std::string_view blank : {std::string_view("  "), std::string_view("\0\0", 2)}) {
+    NamedFiles files;
+    for (std::uint32_t k = 0; k < series.slices; ++k) {
+      files.emplace_back("F" + std::to_string(k), series.slice(k)
+                                                      .bytes(kPixelPaddingValue, blank, "ab")
+                                                      .bytes(0x00200010, blank, "")
+                                                      .file());
+    }
+    EXPECT_EQ(import_objects(files).canonical, import_objects(series.files()).canonical);
+  }
+}
+
+// Deflated files, each changed, as an import of them.
+Outcome import_deflated(const std::function<void(std::string&, const std::string&)>& change) {
+  const DicomSeries series;
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    std::string file = series.slice(k).file(kDeflate);
+    change(file, series.slice(k).bare());
+    files.emplace_back("F" + std::to_string(k), file);
+  }
+  return import_objects(files);
+}
+
+std::string trailer_of(const std::string& data) {
+  const auto word = [](std::uint64_t value) {
+    std::string bytes;
+    for (unsigned shift = 0; shift < 32; shift += 8) {
+      bytes += static_cast<char>(value >> shift & 0xFF);
+    }
+    return bytes;
+  };
+  const auto* bytes = reinterpret_cast<const unsigned char*>(data.data());
+  return word(crc32(0, bytes, static_cast<unsigned>(data.size()))) + word(data.size());
+}
+
+TEST(DicomFiles, MayHaveAChecksumBehindDeflatedData) {
+  const std::string expected = import_objects(DicomSeries{}.files()).canonical;
+  const Outcome plain = import_deflated([](std::string&, const std::string&) {});
+  EXPECT_EQ(plain.canonical, expected);
+  const Outcome checked =
+      import_deflated([](std::string& file, const std::string& data) { file += trailer_of(data); });
+  EXPECT_EQ(checked.canonical, expected);
+  const Outcome padded = import_deflated([](std::string& file, const std::string& data) {
+    file += '\0' + trailer_of(data) + std::string(20, '\0');
+  });
+  EXPECT_EQ(padded.canonical, expected);
+  const Outcome wrong = import_deflated([](std::string& file, const std::string& data) {
+    std::string trailer = trailer_of(data);
+    trailer[1] = static_cast<char>(trailer[1] + 1);
+    file += trailer;
+  });
+  EXPECT_THAT(wrong.error, HasSubstr("follows the compressed data"));
+  const Outcome more = import_deflated(
+      [](std::string& file, const std::string& data) { file += trailer_of(data) + "x"; });
+  EXPECT_THAT(more.error, HasSubstr("follows the compressed data"));
+}
+
+}  // namespace
+}  // namespace isomesh::import::test
