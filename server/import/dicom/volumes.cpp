@@ -18,6 +18,10 @@ namespace {
 
 using Slices = std::vector<Slice>;
 
+constexpr std::uint64_t kMostPlaces = std::uint64_t{1} << 28;
+// Of more slices than this only single attributes are tried.
+constexpr std::size_t kManySlices = std::size_t{1} << 16;
+
 std::string phase_of(const Slice& slice, std::size_t attribute) {
   for (const auto* phases : {&slice.frame->phases, &slice.image->phases}) {
     const auto found = std::ranges::find(*phases, attribute, &Phase::attribute);
@@ -83,6 +87,11 @@ Positions positions_of(const std::vector<Placed>& placed) {
 // and no volume two slices at one.
 std::optional<std::vector<std::uint32_t>> volumes_by(std::span<const Criterion* const> criteria,
                                                      const Positions& positions) {
+  // Too few values for so many volumes, and what would take the memory of no series that there is.
+  std::uint64_t combinations = 1;
+  for (const Criterion* criterion : criteria) combinations *= criterion->values.size();
+  const std::uint64_t places = std::uint64_t{positions.most_at_one} * positions.count;
+  if (combinations < positions.most_at_one || places > kMostPlaces) return std::nullopt;
   std::vector<std::uint64_t> keys(positions.of_slices.size());
   for (const Criterion* criterion : criteria) {
     for (std::size_t i = 0; i < keys.size(); ++i) {
@@ -223,7 +232,7 @@ std::string names_of(std::span<const Criterion* const> criteria) {
 // Calls `use` with every one, then every two, then every three of the criteria, until it returns
 // true.
 template <class Use>
-bool for_few(const std::vector<Criterion>& criteria, const Use& use) {
+bool for_few(const std::vector<Criterion>& criteria, std::size_t slices, const Use& use) {
   std::vector<const Criterion*> chosen;
   const auto choose = [&](auto&& self, std::size_t from, std::size_t count) -> bool {
     if (count == 0) return use(std::span<const Criterion* const>(chosen));
@@ -234,7 +243,8 @@ bool for_few(const std::vector<Criterion>& criteria, const Use& use) {
     }
     return false;
   };
-  for (const std::size_t count : {1U, 2U, 3U}) {
+  const std::size_t most = slices > kManySlices ? 1 : 3;
+  for (std::size_t count = 1; count <= most; ++count) {
     if (choose(choose, 0, count)) return true;
   }
   return false;
@@ -249,13 +259,13 @@ SeriesVolumes split_by_phase(Slices slices) {
     return SeriesVolumes{"", {{std::move(title), std::move(slices), 0}}};
   };
   if (positions.most_at_one == 1 || positions.count == 1) return whole();
-  const bool was_split =
-      for_few(criteria_of(placed, positions), [&](std::span<const Criterion* const> chosen) {
-        const auto volumes = volumes_by(chosen, positions);
-        if (!volumes) return false;
-        result = {names_of(chosen), gathered(placed, *volumes, chosen)};
-        return true;
-      });
+  const bool was_split = for_few(criteria_of(placed, positions), placed.size(),
+                                 [&](std::span<const Criterion* const> chosen) {
+                                   const auto volumes = volumes_by(chosen, positions);
+                                   if (!volumes) return false;
+                                   result = {names_of(chosen), gathered(placed, *volumes, chosen)};
+                                   return true;
+                                 });
   if (was_split) return result;
   if (const auto volumes = volumes_by_order(placed, positions)) {
     return {"the order of acquisition", gathered(placed, *volumes, {})};
@@ -267,7 +277,7 @@ SeriesVolumes split_by_phase(Slices slices) {
 template <class IsSame>
 std::vector<Slices> grouped(const Slices& slices, const IsSame& is_same) {
   // Series have few groups; what has many is no volume, and is not to take long.
-  constexpr std::size_t kMostGroups = 1000;
+  constexpr std::size_t kMostGroups = 100;
   std::vector<Slices> groups;
   for (const Slice& slice : slices) {
     auto group = std::ranges::find_if(
@@ -305,7 +315,7 @@ SeriesVolumes one_a_mosaic(const Slices& slices) {
   std::vector<const Criterion*> chosen;
   std::vector<std::uint32_t> order(count);
   std::iota(order.begin(), order.end(), 0U);
-  for_few(criteria, [&](std::span<const Criterion* const> few) {
+  for_few(criteria, firsts.size(), [&](std::span<const Criterion* const> few) {
     const auto volumes = volumes_by(few, positions);
     if (!volumes) return false;
     order = *volumes;
