@@ -177,6 +177,13 @@ void visit(Is<Problem> auto& self, auto&& field) {
   }
 }
 
+void visit(Is<UploadedVolume> auto& self, auto&& field) {
+  field("member", self.member);
+  field("status", self.status);
+  field("volume", self.volume);
+  field("problem", self.problem);
+}
+
 // `volume` and `priority` stand beside the parameters too; the members inside are the truth.
 void visit(Is<Job> auto& self, auto&& field) {
   field("id", self.id);

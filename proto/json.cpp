@@ -196,6 +196,12 @@ std::string to_json(const std::vector<Volume>& volumes, const std::string& next)
   return page("volumes", write(volumes), next);
 }
 
+std::string to_json(const std::vector<UploadedVolume>& volumes) {
+  Json list;
+  write_field(list, "volumes", volumes);
+  return list.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 std::string to_json(const std::vector<Job>& jobs, const std::string& next) {
   return page("jobs", write(jobs), next);
 }
@@ -211,6 +217,9 @@ Job job_from_record(std::string_view text) { return from_record<Job>(text); }
 
 Volume volume_from_json(std::string_view text) { return from_text<Volume>(text); }
 Job job_from_json(std::string_view text) { return from_text<Job>(text); }
+std::vector<UploadedVolume> uploaded_volumes_from_json(std::string_view text) {
+  return from_text<std::vector<UploadedVolume>>(text, "volumes");
+}
 std::vector<Note> notes_from_json(std::string_view text) {
   return from_text<std::vector<Note>>(text);
 }

@@ -25,7 +25,9 @@ std::string to_json(const Estimate& estimate);
 std::string to_json(const JobEvent& event);
 // {"volumes": [...], "next": cursor}; `next` is null on the last page.
 std::string to_json(const std::vector<Volume>& volumes, const std::string& next = "");
-// The same with "jobs".
+// {"volumes": [...]}: the answer to an upload of several.
+std::string to_json(const std::vector<UploadedVolume>& volumes);
+// As a page of volumes, with "jobs".
 std::string to_json(const std::vector<Job>& jobs, const std::string& next = "");
 
 // The body of PATCH /v1/volumes/{id}.
@@ -34,6 +36,7 @@ std::string volume_name_to_json(const std::optional<std::string>& name);
 // Reads an answer of the server. Throws Error kInternal when it is not what the API says.
 Volume volume_from_json(std::string_view text);
 Job job_from_json(std::string_view text);
+std::vector<UploadedVolume> uploaded_volumes_from_json(std::string_view text);
 std::vector<Note> notes_from_json(std::string_view text);
 Problem problem_from_json(std::string_view text);
 Histogram histogram_from_json(std::string_view text);

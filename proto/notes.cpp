@@ -38,6 +38,11 @@ constexpr NoteDescription kDescriptions[] = {
     {.code = NoteCode::kTrailingBytes,
      .name = "trailing-bytes",
      .meaning = "The data is longer than the header tells; what is too much was left out."},
+    {.code = NoteCode::kValuesRescaled,
+     .name = "values-rescaled",
+     .meaning = "The samples were changed by the header's slope and offset, which other programs "
+                "pass over.",
+     .is_in_mesh = true},
     {.code = NoteCode::kDuplicateFile,
      .name = "duplicate-file",
      .meaning = "A file came more than once and was taken once."},

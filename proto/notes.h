@@ -17,6 +17,7 @@ enum class NoteCode {
   kUnitUnknown,       // the file's unit is no length; taken for millimetres
   kNonFiniteSamples,  // some samples are no numbers or infinite; they are outside of any surface
   kTrailingBytes,     // the data is longer than the header tells
+  kValuesRescaled,    // by a slope that other programs pass over
   kDuplicateFile,     // a file came twice and was taken once
   kLooksLikeLabels,   // few whole values in flat regions: a job's `labels` suits it, not `iso`
   kFrameOfReference,  // DICOM: slices do not share one frame of reference

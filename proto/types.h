@@ -126,6 +126,16 @@ struct Volume {
   bool operator==(const Volume&) const = default;
 };
 
+// What became of one volume of an upload that holds several.
+struct UploadedVolume {
+  std::string member;  // of the archive
+  int status = 0;      // as if it had come alone: 201, 200, or that of the problem
+  std::optional<Volume> volume = {};
+  std::optional<Problem> problem = {};
+
+  bool operator==(const UploadedVolume&) const = default;
+};
+
 enum class Scheme { kFive = 5, kSix = 6 };  // tetrahedra per cell
 enum class Interpolation { kLinear, kMidpoint };
 enum class Smoothing { kLaplacian, kTaubin };

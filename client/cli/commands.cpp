@@ -57,14 +57,24 @@ int status_of(const Job& job) {
   return kRefused;
 }
 
-Volume upload(Client& client, const Options& options, ProgressBar& bar) {
+std::vector<UploadedVolume> upload_all(Client& client, const Options& options, ProgressBar& bar) {
   UploadOptions how = options.upload;
   how.progress = [&](std::uint64_t done, std::uint64_t total) {
     bar.transfer(done < total ? "upload" : "check", done, total);
   };
-  Volume volume = client.upload(options.file, how);
+  std::vector<UploadedVolume> volumes = client.upload_all(options.files, how);
   bar.clear();
-  return volume;
+  for (const UploadedVolume& each : volumes) {
+    if (each.volume) tell_notes(*each.volume);
+  }
+  return volumes;
+}
+
+// The volume of an upload that holds one.
+Volume upload(Client& client, const Options& options, ProgressBar& bar) {
+  std::vector<UploadedVolume> volumes = upload_all(client, options, bar);
+  if (volumes.size() == 1 && volumes.front().volume) return std::move(*volumes.front().volume);
+  throw several_volumes(volumes);
 }
 
 void fetch(Client& client, const std::string& id, const Output& output, ProgressBar& bar) {
@@ -132,7 +142,6 @@ int mesh(const Options& options, const std::stop_token& stop) {
   const Stopwatch uploading;
   const Volume volume = upload(client, options, bar);
   seen.upload = uploading.milliseconds();
-  tell_notes(volume);
 
   JobParameters parameters = options.parameters;
   parameters.volume = volume.id;
@@ -167,11 +176,21 @@ int mesh(const Options& options, const std::stop_token& stop) {
 int upload(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
   ProgressBar bar;
-  const Volume volume = upload(client, options, bar);
-  tell_notes(volume);
-  // The bare id, for `$(isomesh upload ...)`.
-  std::cout << (options.json ? to_json(volume) : volume.id) << '\n';
-  return kDone;
+  const std::vector<UploadedVolume> volumes = upload_all(client, options, bar);
+  const bool is_one = volumes.size() == 1 && volumes.front().volume;
+  if (options.json) {
+    std::cout << (is_one ? to_json(*volumes.front().volume) : to_json(volumes)) << '\n';
+  }
+  int status = kDone;
+  for (const UploadedVolume& each : volumes) {
+    // The bare id, for `$(isomesh upload ...)`.
+    if (each.volume && !options.json) std::cout << each.volume->id << '\n';
+    if (!each.problem) continue;
+    const Error error = to_error(*each.problem);
+    complain(error.with_detail(each.member + ": " + error.what()));
+    status = kRefused;
+  }
+  return status;
 }
 
 int estimate(const Options& options, const std::stop_token& stop) {

@@ -101,16 +101,18 @@ CLI::Option* add_name(CLI::App& app, const std::string& name, const std::string&
 }
 
 void add_file(CLI::App& app, Options& options) {
-  app.add_option_function<std::string>(
+  app.add_option_function<std::vector<std::string>>(
          "FILE",
-         [&](const std::string& text) {
-           options.file = text;
-           std::error_code error;
-           if (!std::filesystem::exists(options.file, error))
-             refuse("FILE", text + " is not there");
+         [&](const std::vector<std::string>& paths) {
+           for (const std::string& path : paths) {
+             std::error_code error;
+             if (!std::filesystem::exists(path, error)) refuse("FILE", path + " is not there");
+             options.files.emplace_back(path);
+           }
          },
          "NIfTI, NRRD, MetaImage, VTI, DICOM, a folder or archive of one, or raw samples with "
-         "--dims and --type")
+         "--dims and --type; several files that belong together, such as .hdr and .img")
+      ->type_name("FILE")
       ->required();
   add(app, "--series", "UID", "The DICOM series to take, where there are several",
       [&](const std::string& text) { options.upload.series = text; })

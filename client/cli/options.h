@@ -39,16 +39,16 @@ struct Options {
   std::filesystem::path authorities;  // of an https server; empty: the system's
   bool json = false;
 
-  std::filesystem::path file;     // mesh, upload
-  UploadOptions upload;           // mesh, upload; without progress
-  std::string id;                 // of a job or, for submit and info, of a volume
-  JobParameters parameters;       // mesh, submit, estimate
-  std::string key;                // submit
-  std::vector<Output> outputs;    // mesh, fetch
-  std::optional<JobState> state;  // list
-  std::string cursor;             // list
-  bool volumes = false;           // list
-  std::string name;               // rename
+  std::vector<std::filesystem::path> files;  // mesh, upload; several are sent together
+  UploadOptions upload;                      // mesh, upload; without progress
+  std::string id;                            // of a job or, for submit and info, of a volume
+  JobParameters parameters;                  // mesh, submit, estimate
+  std::string key;                           // submit
+  std::vector<Output> outputs;               // mesh, fetch
+  std::optional<JobState> state;             // list
+  std::string cursor;                        // list
+  bool volumes = false;                      // list
+  std::string name;                          // rename
 };
 
 // Ends the program before any command runs: help, the version, or wrong usage. `text` belongs on

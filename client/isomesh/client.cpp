@@ -238,12 +238,14 @@ class Client::Impl {
   explicit Impl(ClientOptions&& options)
       : stop_(options.stop), transport_(transport_options(std::move(options))) {}
 
-  // Returns the body of a successful answer; every other answer is thrown as an Error.
-  std::string send(const HttpRequest& request) const {
+  // Returns a successful answer; every other answer is thrown as an Error.
+  HttpAnswer answer(const HttpRequest& request) const {
     HttpAnswer answer = transport_.send(request);
     if (answer.status < 200 || answer.status >= 300) throw refusal(answer);
-    return std::move(answer.body);
+    return answer;
   }
+
+  std::string send(const HttpRequest& request) const { return answer(request).body; }
 
   // Sends a request that may be repeated when its connection breaks. `before` runs ahead of each
   // try.
@@ -275,14 +277,32 @@ class Client::Impl {
 
 Client::Client(ClientOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
 Client::~Client() = default;
+Error several_volumes(const std::vector<UploadedVolume>& volumes) {
+  Remedy remedy;
+  for (const UploadedVolume& each : volumes) {
+    remedy.choices.push_back(
+        {"member", each.member, each.problem ? each.problem->detail : "stored"});
+  }
+  return Error(ErrorCode::kUnusableVolume, "the upload holds " + std::to_string(volumes.size()) +
+                                               " volumes, where one is needed")
+      .with_remedy(std::move(remedy));
+}
+
 Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
 
 Volume Client::upload(const std::filesystem::path& path, const UploadOptions& options) {
-  const UploadBody file(path);
+  std::vector<UploadedVolume> volumes = upload_all({path}, options);
+  if (volumes.size() == 1 && volumes.front().volume) return std::move(*volumes.front().volume);
+  throw several_volumes(volumes);
+}
+
+std::vector<UploadedVolume> Client::upload_all(const std::vector<std::filesystem::path>& paths,
+                                               const UploadOptions& options) {
+  const UploadBody file(paths);
   HttpRequest request{.method = "POST", .target = "/v1/volumes" + upload_query(options)};
   request.headers = {{"Content-Type", "application/octet-stream"},
-                     {"Content-Disposition", disposition_of(path, options.name)}};
+                     {"Content-Disposition", disposition_of(paths.front(), options.name)}};
   if (options.digest) {
     request.headers.emplace_back("Content-Digest", "sha-256=:" + digest_of(file) + ":");
   }
@@ -294,7 +314,10 @@ Volume Client::upload(const std::filesystem::path& path, const UploadOptions& op
       options.progress(file.size(), file.size());
     }
   };
-  return volume_from_json(impl_->send(request));
+  constexpr int kMultiStatus = 207;
+  const HttpAnswer answer = impl_->answer(request);
+  if (answer.status == kMultiStatus) return uploaded_volumes_from_json(answer.body);
+  return {{.member = {}, .status = answer.status, .volume = volume_from_json(answer.body)}};
 }
 
 Volume Client::volume(const std::string& id) {

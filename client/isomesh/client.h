@@ -71,6 +71,10 @@ struct SliceOptions {
   std::optional<std::array<double, 2>> window = {};  // black and white: the volume's range
 };
 
+// The error of an upload of which one volume is wanted and that holds several: its choices are
+// them.
+Error several_volumes(const std::vector<UploadedVolume>& volumes);
+
 // What happens to a job, as it happens.
 using JobListener = std::function<void(const JobEvent& event)>;
 
@@ -99,7 +103,14 @@ class Client {
 
   // Sends a file from disk in pieces; a folder, or a header (.mhd, .nhdr) with the data that it
   // names, as a TAR that is made on the way. The same samples again give the same volume.
+  // Throws kUnusableVolume with the choices where the upload holds several volumes, which are
+  // stored nevertheless.
   Volume upload(const std::filesystem::path& path, const UploadOptions& options = {});
+  // The same for an upload that may hold several volumes: each is answered for. One that is alone
+  // has an empty member; its refusal is thrown. With several paths those files are sent together,
+  // such as the .hdr and the .img of a volume.
+  std::vector<UploadedVolume> upload_all(const std::vector<std::filesystem::path>& paths,
+                                         const UploadOptions& options = {});
   Volume volume(const std::string& id);
   // All of them, the oldest first.
   std::vector<Volume> volumes();

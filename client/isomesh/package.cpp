@@ -98,9 +98,12 @@ std::vector<std::string> names_like(const fs::path& folder, std::string_view sai
 std::vector<PackedFile> header_and_data(const fs::path& path, char sign, std::string_view name) {
   std::vector<PackedFile> files = {{path.filename().string(), path}};
   const auto add = [&](const std::string& data) {
-    // Data in another folder is not sent: the server refuses a header that names a path.
-    const bool plain = !data.empty() && data.find_first_of("/\\") == std::string::npos;
-    if (plain && data != files.front().name) files.push_back({data, path.parent_path() / data});
+    // Data outside of the header's folder is not sent: the server refuses such a header.
+    const fs::path below = fs::path(data).lexically_normal();
+    const bool outside = data.empty() || below.is_absolute() || below.string().starts_with("..");
+    if (!outside && below != files.front().name) {
+      files.push_back({below.generic_string(), path.parent_path() / below});
+    }
   };
   const std::vector<std::string> lines = lines_of(path);
   for (std::size_t at = 0; at < lines.size(); ++at) {
@@ -114,6 +117,20 @@ std::vector<PackedFile> header_and_data(const fs::path& path, char sign, std::st
       add(*data);
     }
     break;
+  }
+  return files;
+}
+
+// The header and the image of a pair, whichever of them was named.
+std::vector<PackedFile> pair_of(const fs::path& path) {
+  std::vector<PackedFile> files;
+  std::error_code error;
+  for (const char* suffix : {".hdr", ".img", ".img.gz"}) {
+    fs::path one = path;
+    one.replace_extension(suffix);
+    if (one == path || fs::is_regular_file(one, error)) {
+      files.push_back({one.filename().string(), one});
+    }
   }
   return files;
 }
@@ -182,12 +199,30 @@ std::vector<PackedFile> files_of_upload(const std::filesystem::path& path) {
   const std::string suffix = lower(path.extension().string());
   if (suffix == ".mhd") return header_and_data(path, '=', "elementdatafile");
   if (suffix == ".nhdr") return header_and_data(path, ':', "datafile");
+  if (suffix == ".hdr" || suffix == ".img") return pair_of(path);
   return {{path.filename().string(), path}};
 }
 
-UploadBody::UploadBody(const std::filesystem::path& path) {
-  const std::vector<PackedFile> files = files_of_upload(path);
-  if (files.size() == 1 && !fs::is_directory(path)) {
+std::vector<PackedFile> files_of_upload(const std::vector<std::filesystem::path>& paths) {
+  std::vector<PackedFile> files;
+  for (const fs::path& path : paths) {
+    for (PackedFile& file : files_of_upload(path)) {
+      const auto same = std::ranges::find(files, file.name, &PackedFile::name);
+      std::error_code error;
+      if (same == files.end()) {
+        files.push_back(std::move(file));
+      } else if (!fs::equivalent(same->path, file.path, error)) {
+        throw Error(ErrorCode::kInvalidParameter,
+                    file.path.string() + ": another file of that name is sent with it");
+      }
+    }
+  }
+  return files;
+}
+
+UploadBody::UploadBody(const std::vector<std::filesystem::path>& paths) {
+  const std::vector<PackedFile> files = files_of_upload(paths);
+  if (files.size() == 1 && !fs::is_directory(paths.front())) {
     add_file(files.front().path, InputFile::chosen(files.front().path).size());
     return;
   }

@@ -21,9 +21,13 @@ struct PackedFile {
 
 // The files that belong to an upload of `path`: of a folder all regular ones below it, sorted by
 // name, without hidden ones and links; of a MetaImage or NRRD header (.mhd, .nhdr) it and the files
-// beside it that it names, or that a pattern in it may name; of any other file itself.
+// beside it that it names, or that a pattern in it may name; of a NIfTI or Analyze header (.hdr) or
+// its image (.img) both; of any other file itself.
 // Throws Error kInvalidParameter for a folder that holds none, or one of more than 20000.
 std::vector<PackedFile> files_of_upload(const std::filesystem::path& path);
+// The same for several paths that are sent together: all of them as if they lay in one folder.
+// Throws also for two files of one name.
+std::vector<PackedFile> files_of_upload(const std::vector<std::filesystem::path>& paths);
 
 // A body of known size that is made while it is read, so it is never held whole. The same files
 // make the same bytes, whatever their times and owners are.
@@ -31,7 +35,9 @@ class UploadBody {
  public:
   // Takes the sizes of all files. Throws Error kInvalidParameter that names a file which cannot be
   // read.
-  explicit UploadBody(const std::filesystem::path& path);
+  explicit UploadBody(const std::filesystem::path& path)
+      : UploadBody(std::vector<std::filesystem::path>{path}) {}
+  explicit UploadBody(const std::vector<std::filesystem::path>& paths);
 
   std::uint64_t size() const { return size_; }
 

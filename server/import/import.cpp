@@ -26,6 +26,9 @@ Volume import_volume(const ImportTask& task, const FormatListener& listener) {
   if (task.options.raw) return read_raw_input(input);
   const Reader* reader = sniff(InputFile(task.source));
   if (reader == nullptr) throw_unknown_format();
+  if (!task.options.member.empty() && reader->content != Content::kFiles) {
+    throw invalid_parameter("member", "chooses among an archive's members, and this is no archive");
+  }
   return read_input(*reader, input);
 }
 

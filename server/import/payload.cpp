@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <string>
 #include <type_traits>
@@ -9,6 +10,7 @@
 
 #include "base/files.h"
 #include "base/text.h"
+#include "server/import/archives/bzip2.h"
 #include "server/import/formats/vtk_data.h"
 
 namespace isomesh::import {
@@ -26,6 +28,7 @@ struct Part {
   const InputFile& file;
   CompressedRange range;
   std::uint64_t bytes = 0;  // once decoded
+  Skip skip = 0;            // of what is decoded
   StoredType type = StoredType::kUint8;
 };
 
@@ -34,12 +37,22 @@ struct Part {
                  std::to_string(expected) + " bytes.");
 }
 
-void inflate_part(const Part& part, ScratchFile& scratch) {
-  const std::uint64_t found =
-      inflate_range(part.file, part.range, part.bytes,
-                    [&](std::span<const std::byte> piece) { scratch.write(piece); });
-  if (found > part.bytes) throw_long(part.bytes);
-  if (found < part.bytes) throw_short(part.bytes, found);
+// As inflate_range, of any kind of stream.
+using StreamDecoder = std::function<std::uint64_t(const InputFile&, const CompressedRange&,
+                                                  std::uint64_t limit, const ByteSink&)>;
+
+// How many bytes a header within encoded data may have.
+constexpr std::uint64_t kMostSkipped = std::uint64_t{1} << 20;
+
+// Writes the decoded bytes, those that are to be skipped among them.
+void decode_stream(const Part& part, ScratchFile& scratch, const StreamDecoder& decode) {
+  const std::uint64_t known = part.skip.value_or(0);
+  const std::uint64_t most = part.bytes + (part.skip ? known : kMostSkipped);
+  const std::uint64_t found = decode(
+      part.file, part.range, most, [&](std::span<const std::byte> piece) { scratch.write(piece); });
+  if (found > most) throw_long(part.bytes);
+  const std::uint64_t needed = part.bytes + known;
+  if (found < needed) throw_short(part.bytes, found - std::min(found, known));
 }
 
 void copy_part(const Part& part, ScratchFile& scratch) {
@@ -165,7 +178,10 @@ void decode_part(const SourceVolume& volume, const Part& part, const std::filesy
     case Encoding::kRaw:
       return copy_part(part, scratch);
     case Encoding::kDeflate:
-      return inflate_part(part, scratch);
+      return decode_stream(part, scratch,
+                           [](const auto&... arguments) { return inflate_range(arguments...); });
+    case Encoding::kBzip2:
+      return decode_stream(part, scratch, unzip2_range);
     case Encoding::kText:
       return decode_text(part, scratch);
     case Encoding::kHex:
@@ -175,15 +191,13 @@ void decode_part(const SourceVolume& volume, const Part& part, const std::filesy
   }
 }
 
-// Less than a block or a slice may follow the samples, because some programs fill their last block
-// up. A whole slice more than the header tells means that the header describes another volume.
-void check_size(const InputFile& file, const SourceVolume& volume) {
-  constexpr std::uint64_t kBlockBytes = 4096;
+// How many bytes follow the samples.
+std::uint64_t trailing_bytes(const InputFile& file, const SourceVolume& volume) {
   const std::uint64_t expected = volume.stored_bytes();
   const std::uint64_t found = file.size() - std::min(volume.payload.offset, file.size());
   if (found < expected) throw_short(expected, found);
-  const std::uint64_t slice = expected / volume.dims[2];
-  if (found - expected > kBlockBytes && found - expected >= slice) throw_long(expected);
+  if (!may_trail(found - expected, volume)) throw_long(expected);
+  return found - expected;
 }
 
 }  // namespace
@@ -193,27 +207,61 @@ Payload::Payload(const InputFile& file, const SourceVolume& volume,
     : file_(file), layout_(volume.layout) {
   const bool is_raw = volume.encoding == Encoding::kRaw;
   if (is_raw && volume.data_files.empty()) {
-    check_size(file, volume);
+    if (const auto bytes = trailing_bytes(file, volume)) notes_.push_back(trailing_note(bytes));
     offset_ = volume.payload.offset;
-    return;
-  }
-  if (is_raw && volume.data_files.size() == 1) {
+  } else if (is_raw && volume.data_files.size() == 1) {
     decoded_.emplace(volume.data_files[0].path);
     offset_ = volume.data_files[0].range.offset;
-    return;
+  } else {
+    decode(volume, scratch);
   }
+  if (volume.chosen.is_interleaved) {
+    pick_interleaved(volume, scratch);
+  } else {
+    offset_ += volume.chosen.index * volume.volume_bytes();
+  }
+}
+
+void Payload::decode(const SourceVolume& volume, const std::filesystem::path& scratch) {
   scratch_.emplace(scratch, ".samples");
+  const StoredType type = layout_.type;
   if (volume.encoding == Encoding::kText) layout_.big_endian = false;
   if (volume.data_files.empty()) {
-    decode_part(volume, {file, volume.payload, volume.stored_bytes(), volume.layout.type}, scratch,
-                *scratch_);
+    decode_part(volume, {file_, volume.payload, volume.stored_bytes(), volume.decoded_skip, type},
+                scratch, *scratch_);
   }
   for (const DataFile& data : volume.data_files) {
     const InputFile part(data.path);
     const std::uint64_t share = volume.stored_bytes() / volume.data_files.size();
-    decode_part(volume, {part, data.range, share, volume.layout.type}, scratch, *scratch_);
+    decode_part(volume, {part, data.range, share, volume.decoded_skip, type}, scratch, *scratch_);
   }
   decoded_.emplace(scratch_->path());
+  offset_ = volume.decoded_skip.value_or(decoded_->size() - volume.stored_bytes());
+}
+
+// Copies every count-th sample of the file into one that holds nothing else.
+void Payload::pick_interleaved(const SourceVolume& volume, const std::filesystem::path& scratch) {
+  const std::size_t size = bytes_per_sample(layout_.type);
+  const std::size_t step = size * volume.chosen.count;
+  const std::size_t at_once = std::max<std::size_t>(kPieceBytes / step, 1);
+  ScratchFile& picked = picked_.emplace(scratch, ".volume");
+  std::vector<std::byte> piece(at_once * step);
+  std::vector<std::byte> samples;
+  for (std::uint64_t left = volume.sample_count(); left > 0;) {
+    const std::size_t count = std::min<std::uint64_t>(left, at_once);
+    const std::span<std::byte> whole = std::span(piece).first(count * step);
+    if (this->file().read(offset_, whole) != whole.size()) throw_short(volume.stored_bytes(), 0);
+    samples.clear();
+    for (std::size_t at = volume.chosen.index * size; at < whole.size(); at += step) {
+      samples.insert(samples.end(), whole.begin() + static_cast<std::ptrdiff_t>(at),
+                     whole.begin() + static_cast<std::ptrdiff_t>(at + size));
+    }
+    picked.write(samples);
+    offset_ += whole.size();
+    left -= count;
+  }
+  decoded_.emplace(picked.path());
+  offset_ = 0;
 }
 
 }  // namespace isomesh::import

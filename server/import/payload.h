@@ -4,14 +4,15 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "base/files.h"
 #include "server/import/source.h"
 
 namespace isomesh::import {
 
-// The plain bytes of a volume's samples. They lie in the file that they came in where they are
-// plain and in one piece there, otherwise in a scratch file, which is removed with this object.
+// The plain bytes of the chosen volume's samples. They lie in the file that they came in where they
+// are plain and in one piece there, otherwise in a scratch file, which is removed with this object.
 // Bytes decoded from text are little-endian.
 class Payload {
  public:
@@ -23,13 +24,20 @@ class Payload {
   const InputFile& file() const { return decoded_ ? *decoded_ : file_; }
   std::uint64_t offset() const { return offset_; }
   const SampleLayout& layout() const { return layout_; }
+  // What was found while the bytes were looked for.
+  const std::vector<Note>& notes() const { return notes_; }
 
  private:
+  void decode(const SourceVolume& volume, const std::filesystem::path& scratch);
+  void pick_interleaved(const SourceVolume& volume, const std::filesystem::path& scratch);
+
   const InputFile& file_;
   std::optional<ScratchFile> scratch_;
+  std::optional<ScratchFile> picked_;
   std::optional<InputFile> decoded_;
   std::uint64_t offset_ = 0;
   SampleLayout layout_;
+  std::vector<Note> notes_;
 };
 
 }  // namespace isomesh::import

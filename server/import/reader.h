@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/files.h"
 #include "proto/types.h"
@@ -43,7 +45,12 @@ struct Reader {
   Volume (*parse)(const Input& input) = nullptr;
   // How many bytes the compressed file may inflate to, before it is taken for a bomb. Null: as many
   // as samples are accepted, and the headroom.
-  std::uint64_t (*most_inflated_bytes)(const InputFile& file, const SizeLimits& limits) = nullptr;
+  std::uint64_t (*most_inflated_bytes)(const InputFile& file, const SizeLimits& limits,
+                                       const ImportOptions& options) = nullptr;
+  // The companions that hold the samples of a header, so that they are no volumes of their own.
+  // Null for formats whose headers name none. Throws as `parse` does.
+  std::vector<std::string> (*data_names)(const InputFile& file,
+                                         const Companions& companions) = nullptr;
 };
 
 }  // namespace isomesh::import

@@ -17,10 +17,11 @@ namespace isomesh::import {
 namespace {
 
 // For the formats of which a header describes the samples.
-template <SourceVolume (*kParse)(const InputFile&, const Companions&)>
+template <SourceVolume (*kParse)(const InputFile&, const Companions&, const ImportOptions&)>
 Volume parse_with(const Input& input) {
   const InputFile file(input.path);
-  return write_canonical(file, kParse(file, input.companions), input.task);
+  const ImportTask& task = input.task;
+  return write_canonical(file, kParse(file, input.companions, task.options), task);
 }
 
 constexpr Reader kRaw = {.name = "raw", .title = "raw samples", .parse = parse_raw};
@@ -31,17 +32,20 @@ constexpr Reader kReaders[] = {
      .title = "NIfTI",
      .sniff = is_nifti,
      .parse = parse_with<parse_nifti>,
-     .most_inflated_bytes = most_nifti_bytes},
+     .most_inflated_bytes = most_nifti_bytes,
+     .data_names = nifti_data_names},
     {.name = "nrrd",
      .title = "NRRD",
      .sniff = is_nrrd,
      .parse = parse_with<parse_nrrd>,
-     .most_inflated_bytes = most_nrrd_bytes},
+     .most_inflated_bytes = most_nrrd_bytes,
+     .data_names = nrrd_data_names},
     {.name = "metaimage",
      .title = "MetaImage",
      .sniff = is_metaimage,
      .parse = parse_with<parse_metaimage>,
-     .most_inflated_bytes = most_metaimage_bytes},
+     .most_inflated_bytes = most_metaimage_bytes,
+     .data_names = metaimage_data_names},
     {.name = "vti", .title = "VTI", .sniff = is_vti, .parse = parse_with<parse_vti>},
     {.name = "dicom",
      .title = "DICOM",
@@ -88,6 +92,17 @@ void tell(const Reader& reader, const Input& input) {
   if (input.listener) input.listener(reader.name);
 }
 
+// What chooses within files of another kind is a mistake.
+void check_options(const Reader& reader, const ImportOptions& options) {
+  const bool is_volume = reader.content == Content::kVolume;
+  if (is_volume && !options.series.empty()) {
+    throw invalid_parameter("series", "chooses among DICOM series, and this is no DICOM");
+  }
+  if (options.nifti_form && reader.content != Content::kFiles && reader.name != "nifti") {
+    throw invalid_parameter("nifti_form", "is of NIfTI files, and this is none");
+  }
+}
+
 }  // namespace
 
 std::span<const Reader> readers() { return kReaders; }
@@ -104,14 +119,12 @@ const Reader* sniff(const InputFile& file) {
 
 Volume read_input(const Reader& reader, Input input) {
   tell(reader, input);
-  if (reader.content == Content::kVolume && !input.task.options.series.empty()) {
-    throw invalid_parameter("series", "chooses among DICOM series, and this is no DICOM");
-  }
+  check_options(reader, input.task.options);
   const InputFile file(input.path);
   if (!is_compressed(file)) return parse(reader, input);
   const SizeLimits& limits = input.task.limits;
   const std::uint64_t most = reader.most_inflated_bytes != nullptr
-                                 ? reader.most_inflated_bytes(file, limits)
+                                 ? reader.most_inflated_bytes(file, limits, input.task.options)
                                  : limits.max_sample_bytes + kHeadroomBytes;
   ScratchFile plain(input.task.scratch, ".plain");
   gunzip(file, most, plain);

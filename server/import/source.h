@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -21,9 +22,10 @@ namespace isomesh::import {
 enum class Encoding {
   kRaw,
   kDeflate,  // a gzip or zlib stream
-  kText,     // numbers between white space
-  kHex,      // pairs of hexadecimal digits, white space between them ignored
-  kVtk,      // see VtkEncoding
+  kBzip2,
+  kText,  // numbers between white space
+  kHex,   // pairs of hexadecimal digits, white space between them ignored
+  kVtk,   // see VtkEncoding
 };
 
 // How VTK encodes an array: a header of counts comes first, then its bytes, which may be compressed
@@ -35,9 +37,16 @@ struct VtkEncoding {
   bool big_endian = false;
 };
 
-// The other files of the folder in an archive in which a header lies, by their names. A file that
-// came alone has none.
-using Companions = std::map<std::string, std::filesystem::path, std::less<>>;
+// What came with a file in the same archive.
+struct Companions {
+  std::string name;  // of the file itself, without folders; empty for one that came alone
+  // The other files of its folder and of the folders in that, by their paths from there.
+  std::map<std::string, std::filesystem::path, std::less<>> files;
+};
+
+// The companion that a header names, "./" before it or not. Throws Error kUnusableVolume where it
+// did not come, and for a path that leads out of the header's folder.
+const std::filesystem::path& companion(const std::string& name, const Companions& companions);
 
 // A file that holds samples and no header.
 struct DataFile {
@@ -45,19 +54,34 @@ struct DataFile {
   CompressedRange range;
 };
 
+// Which of a file's volumes is read. They lie one behind the other, or sample by sample.
+struct VolumeOfFile {
+  std::uint64_t index = 0;
+  std::uint64_t count = 1;
+  bool is_interleaved = false;
+};
+
+// Where the samples begin in what their encoding holds: so many bytes behind its beginning, or, if
+// empty, where they end with it.
+using Skip = std::optional<std::uint64_t>;
+
 struct SourceVolume {
   std::array<std::uint32_t, 3> dims = {0, 0, 0};
+  VolumeOfFile chosen;
   SampleLayout layout;
   Encoding encoding = Encoding::kRaw;
+  Skip decoded_skip = 0;    // of encoded samples
   CompressedRange payload;  // where the samples lie, unless there are data files
   VtkEncoding vtk;          // for Encoding::kVtk
   // Of a header without samples: the files that hold equal parts of them, in this order.
   std::vector<DataFile> data_files;
   Geometry geometry;
+  std::vector<Note> notes;
 
   std::uint64_t sample_count() const { return std::uint64_t{dims[0]} * dims[1] * dims[2]; }
-  // What the samples take up in the file, once decoded.
-  std::uint64_t stored_bytes() const { return sample_count() * bytes_per_sample(layout.type); }
+  // What the samples of one volume and of all volumes take up in the file, once decoded.
+  std::uint64_t volume_bytes() const { return sample_count() * bytes_per_sample(layout.type); }
+  std::uint64_t stored_bytes() const { return volume_bytes() * chosen.count; }
   // What they take up at most as they are encoded, with generous white space.
   std::uint64_t most_encoded_bytes() const;
 };
@@ -65,15 +89,32 @@ struct SourceVolume {
 // Throws Error kTooLarge when the volume's canonical samples would exceed the limits.
 void check_limits(const SourceVolume& volume, const SizeLimits& limits);
 
-// How many bytes of a data file come before its samples. Empty: as many as there are, so that the
-// samples end with the file.
-using Skip = std::optional<std::uint64_t>;
-
 // The data files that a header names, in its order. Each holds the same share of `volume`'s
-// samples. Throws Error kUnusableVolume for a name that is a path or none of a companion, for a
-// file of another size than its share and the skip, and where the samples' place cannot be known.
+// samples, behind `skip` of it. A single file may be longer by less than a slice, which is noted in
+// `volume`. Throws Error kUnusableVolume for a name that is none of a companion, for a file of
+// another size than its share and the skip, and where the samples' place cannot be known.
 std::vector<DataFile> data_files_of(const std::vector<std::string>& names,
-                                    const Companions& companions, const SourceVolume& volume,
-                                    const Skip& skip);
+                                    const Companions& companions, const Skip& skip,
+                                    SourceVolume& volume);
+
+// Whether that many bytes more than the header tells may be left out: some programs fill their last
+// block up. A whole slice more means that the header describes another volume.
+bool may_trail(std::uint64_t bytes, const SourceVolume& volume);
+Note trailing_note(std::uint64_t bytes);
+
+// How the volumes of one file differ.
+struct Difference {
+  std::string what;                                       // such as "time"
+  std::function<std::string(std::uint64_t index)> title;  // of one volume, such as "6 s"
+};
+
+// How many volumes a file holds of which a header tells these sizes. Throws Error kUnusableVolume
+// for numbers that are not believable.
+std::uint64_t volumes_beyond(std::span<const std::uint64_t> sizes);
+
+// Sets which of `count` volumes is read, with a note where there are several. Throws Error
+// kUnusableVolume with the choices where the options leave it open or choose one that is not there.
+void choose_volume(std::uint64_t count, const Difference& difference, const ImportOptions& options,
+                   SourceVolume& volume);
 
 }  // namespace isomesh::import

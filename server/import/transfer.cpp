@@ -1,9 +1,16 @@
 #include "server/import/transfer.h"
 
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <span>
+#include <type_traits>
 #include <utility>
 
 #include "proto/error.h"
+#include "proto/samples.h"
 #include "server/import/payload.h"
+#include "server/volume/labels.h"
 #include "server/volume/statistics.h"
 
 namespace isomesh::import {
@@ -15,6 +22,20 @@ Geometry usable_geometry(const SourceVolume& source) {
     throw_unusable("The file's geometry cannot be used: " + fault->message + ".");
   }
   return geometry;
+}
+
+// The smallest sample is outside for every iso-value above it, and keeps the surface beside it
+// where the other samples have it.
+void replace_non_finite(std::span<std::byte> samples, SampleType type, double smallest) {
+  with_sample(type, [&](auto sample) {
+    using Sample = decltype(sample);
+    if constexpr (std::is_floating_point_v<Sample>) {
+      auto* first = reinterpret_cast<Sample*>(samples.data());
+      std::replace_if(
+          first, first + samples.size() / sizeof(Sample),
+          [](Sample value) { return !std::isfinite(value); }, static_cast<Sample>(smallest));
+    }
+  });
 }
 
 }  // namespace
@@ -36,15 +57,29 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
   if (source.encoding != Encoding::kRaw) check_limits(source, task.limits);
   const Payload payload(file, source, task.scratch);
   check_limits(source, task.limits);
+  volume.notes = source.notes;
+  std::ranges::copy(payload.notes(), std::back_inserter(volume.notes));
   return write_canonical({payload.file(), payload.offset(), payload.layout()}, std::move(volume),
                          task.target);
 }
 
 Volume finish(CanonicalWriter& writer, Volume volume) {
-  const volume::Statistics statistics = volume::measure(writer.samples(), volume.type);
+  volume::Statistics statistics = volume::measure(writer.samples(), volume.type);
   if (statistics.non_finite > 0) {
-    throw_unusable(std::to_string(statistics.non_finite) + " of its " +
-                   std::to_string(volume.sample_count()) + " samples are not finite numbers.");
+    const std::string count = std::to_string(statistics.non_finite) + " of its " +
+                              std::to_string(volume.sample_count()) + " samples are not finite ";
+    if (statistics.non_finite == volume.sample_count()) throw_unusable(count + "numbers.");
+    replace_non_finite(writer.samples(), volume.type, statistics.range[0]);
+    statistics = volume::measure(writer.samples(), volume.type);
+    volume.notes.push_back(
+        note_of(NoteCode::kNonFiniteSamples, count + "numbers; they lie outside of the surface."));
+  }
+  if (const auto values = volume::label_count(writer.samples(), volume.type, volume.dims)) {
+    volume.notes.push_back(note_of(
+        NoteCode::kLooksLikeLabels,
+        "The samples are " + std::to_string(*values) +
+            " whole values in flat regions, as labels are: the parameter labels makes a surface of "
+            "each, where an iso-value makes one of all above it."));
   }
   volume.range = statistics.range;
   volume.suggested_iso = statistics.otsu;

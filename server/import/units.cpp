@@ -9,6 +9,11 @@
 namespace isomesh::import {
 namespace {
 
+bool counts_samples(std::string_view unit) {
+  static constexpr std::string_view kNames[] = {"pixel", "pixels", "voxel", "voxels", "px"};
+  return std::ranges::find(kNames, lower(trimmed(unit))) != std::end(kNames);
+}
+
 double millimetres_per(std::string_view unit) {
   struct Row {
     double millimetres;
@@ -33,7 +38,13 @@ double millimetres_per(std::string_view unit) {
 
 }  // namespace
 
-void scale_to_millimetres(Geometry& geometry, std::string_view unit) {
+void scale_to_millimetres(Geometry& geometry, std::string_view unit, std::vector<Note>& notes) {
+  if (counts_samples(unit)) {
+    notes.push_back(note_of(NoteCode::kUnitUnknown,
+                            "The file's unit, " + in_quotes(unit) +
+                                ", is no length; one of it was taken for one millimetre."));
+    return;
+  }
   const double millimetres = millimetres_per(unit);
   if (millimetres == 1) return;
   for (double& value : geometry.origin) value *= millimetres;

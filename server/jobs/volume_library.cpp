@@ -1,8 +1,18 @@
 #include "server/jobs/volume_library.h"
 
 #include "base/clock.h"
+#include "proto/error.h"
 
 namespace isomesh::jobs {
+namespace {
+
+// Whether the upload was refused only because it holds several volumes.
+bool leaves_members_open(const Error& error, const process::ImportOptions& options) {
+  const std::vector<Choice>& choices = error.remedy().choices;
+  return options.member.empty() && !choices.empty() && choices.front().parameter == "member";
+}
+
+}  // namespace
 
 std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
                                            const std::filesystem::path& upload,
@@ -25,6 +35,36 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
   auto added = volumes_.add(owner, volume);
   blobs_.settle(blob.key);
   return added;
+}
+
+std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
+                                                   const std::filesystem::path& upload,
+                                                   const process::ImportOptions& options,
+                                                   const std::string& name) {
+  const auto add_one = [&](const process::ImportOptions& how) {
+    auto [volume, is_new] = add(owner, upload, how, name);
+    return UploadedVolume{.member = how.member, .status = is_new ? 201 : 200, .volume = volume};
+  };
+  std::vector<Choice> members;
+  try {
+    return {add_one(options)};
+  } catch (const Error& error) {
+    if (!leaves_members_open(error, options)) throw;
+    members = error.remedy().choices;
+  }
+  std::vector<UploadedVolume> volumes;
+  for (const Choice& member : members) {
+    process::ImportOptions how = options;
+    how.member = member.value;
+    try {
+      volumes.push_back(add_one(how));
+    } catch (const Error& error) {
+      if (describe(error.code()).status >= 500) throw;
+      const Problem problem = to_problem(error, "");
+      volumes.push_back({.member = member.value, .status = problem.status, .problem = problem});
+    }
+  }
+  return volumes;
 }
 
 void VolumeLibrary::erase(const std::string& owner, const std::string& id) {

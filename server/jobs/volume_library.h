@@ -4,6 +4,7 @@
 #include <optional>
 #include <shared_mutex>
 #include <utility>
+#include <vector>
 
 #include "proto/types.h"
 #include "server/jobs/import_runner.h"
@@ -36,6 +37,13 @@ class VolumeLibrary {
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
                               const process::ImportOptions& options = {},
                               const std::string& name = {});
+
+  // The same for an upload that may hold several volumes: each is imported by a process of its own,
+  // one after the other, and answered for. One that the options choose or that is alone is the only
+  // element, with an empty member; its error is thrown.
+  std::vector<UploadedVolume> add_all(const std::string& owner, const std::filesystem::path& upload,
+                                      const process::ImportOptions& options,
+                                      const std::string& name);
 
   // Gives the owner's volume another name, or none. Throws Error kNotFound, kGone.
   Volume rename(const std::string& owner, const std::string& id,

@@ -52,17 +52,11 @@ callbacks::CallbackObserver callback_reporter(Metrics& metrics) {
   };
 }
 
-std::pair<Volume, bool> counting_refusals(App& app, const Request& request,
-                                          const std::function<std::pair<Volume, bool>()>& add) {
-  try {
-    return add();
-  } catch (const Error& error) {
-    app.metrics.count_refused(error.code());
-    LogLine("import_refused")
-        .add("id", request.context.trace.request_id())
-        .add("reason", describe(error.code()).name);
-    throw;
-  }
+void report_import_refused(App& app, const Request& request, const Error& error) {
+  app.metrics.count_refused(error.code());
+  LogLine("import_refused")
+      .add("id", request.context.trace.request_id())
+      .add("reason", describe(error.code()).name);
 }
 
 }  // namespace isomesh::http

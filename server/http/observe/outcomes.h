@@ -19,9 +19,19 @@ struct App;
 // since is neither logged nor counted.
 void report_ended(App& app, const std::string& job);
 
-// Calls `add`, which makes a volume of an upload, and logs and counts the Error that it throws.
-std::pair<Volume, bool> counting_refusals(App& app, const Request& request,
-                                          const std::function<std::pair<Volume, bool>()>& add);
+// Logs and counts an upload, or a part of it, that became no volume.
+void report_import_refused(App& app, const Request& request, const Error& error);
+
+// Calls `add`, which makes volumes of an upload, and reports the Error that it throws.
+template <class Add>
+auto counting_refusals(App& app, const Request& request, const Add& add) {
+  try {
+    return add();
+  } catch (const Error& error) {
+    report_import_refused(app, request, error);
+    throw;
+  }
+}
 
 // An observer that logs and counts attempts to call back. The metrics must outlive it.
 callbacks::CallbackObserver callback_reporter(Metrics& metrics);

@@ -15,11 +15,19 @@ void upload(App& app, const Request& request, Response& response) {
   const process::ImportOptions options = import_options_of(request);
   const Slots::Place place = place_for_upload(app);
   const Upload file(app.services.folder, app.options.upload, app.stopping, request);
-  const auto [volume, is_new] = counting_refusals(app, request, [&] {
-    return app.services.library.add(owner_of(request), file.path(), options, file.name());
+  const std::vector<UploadedVolume> volumes = counting_refusals(app, request, [&] {
+    return app.services.library.add_all(owner_of(request), file.path(), options, file.name());
   });
-  response.set_header("Location", kVolumes + '/' + volume.id);
-  answer_json(response, is_new ? 201 : 200, to_json(volume));
+  for (const UploadedVolume& each : volumes) {
+    if (each.problem) report_import_refused(app, request, to_error(*each.problem));
+  }
+  if (volumes.size() != 1 || !volumes.front().volume) {
+    constexpr int kMultiStatus = 207;
+    return answer_json(response, kMultiStatus, to_json(volumes));
+  }
+  const UploadedVolume& only = volumes.front();
+  response.set_header("Location", kVolumes + '/' + only.volume->id);
+  answer_json(response, only.status, to_json(*only.volume));
 }
 
 // Whether that has the form of what store::cursor_of makes: a time, a space and an id.

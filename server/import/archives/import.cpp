@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -47,8 +48,19 @@ ArchiveLimits limits_of(const SizeLimits& limits) {
   return {.max_bytes = limits.max_sample_bytes + kHeadroomBytes};
 }
 
-std::vector<FoundVolume> volumes_among(const std::vector<ArchiveMember>& members) {
-  std::vector<FoundVolume> volumes;
+Companions companions_of(const ArchiveMember& header, const std::vector<ArchiveMember>& members) {
+  const std::string_view folder = folder_of(header.name);
+  Companions companions{.name = std::string(base_of(header.name)), .files = {}};
+  for (const ArchiveMember& member : members) {
+    if (member.name == header.name || !member.name.starts_with(folder)) continue;
+    const std::filesystem::path below = member.name.substr(folder.size());
+    companions.files.emplace(below.lexically_normal().generic_string(), member.path);
+  }
+  return companions;
+}
+
+std::vector<FoundVolume> files_of_formats(const std::vector<ArchiveMember>& members) {
+  std::vector<FoundVolume> found;
   for (const ArchiveMember& member : members) {
     const Reader* reader = sniff(InputFile(member.path));
     if (reader == nullptr) continue;
@@ -56,70 +68,124 @@ std::vector<FoundVolume> volumes_among(const std::vector<ArchiveMember>& members
       throw_unusable("The archive holds another archive, " + in_quotes(member.name) +
                      "; send that one by itself.");
     }
-    volumes.push_back({member, reader});
+    found.push_back({member, reader});
   }
-  return volumes;
+  return found;
 }
 
-const FoundVolume* first_slice(const std::vector<FoundVolume>& volumes) {
-  const auto found = std::ranges::find_if(volumes, [](const FoundVolume& volume) {
-    return volume.reader->content == Content::kSlices;
-  });
-  return found == volumes.end() ? nullptr : &*found;
-}
-
-// A list for a person, who is told how many follow the first few.
-std::string names_of(const std::vector<FoundVolume>& volumes) {
-  constexpr std::size_t kMost = 10;
-  std::string names;
-  for (std::size_t at = 0; at < std::min(kMost, volumes.size()); ++at) {
-    names += (at > 0 ? ", " : "") + in_quotes(volumes[at].member.name);
+// Files that hold the samples of a header among them. A header that is damaged names none here;
+// when its volume is read it is refused with its reason.
+std::set<std::filesystem::path> data_of(const std::vector<FoundVolume>& found,
+                                        const std::vector<ArchiveMember>& members) {
+  std::set<std::filesystem::path> data;
+  for (const auto& [member, reader] : found) {
+    if (reader->data_names == nullptr) continue;
+    const Companions companions = companions_of(member, members);
+    try {
+      for (const std::string& name : reader->data_names(InputFile(member.path), companions)) {
+        data.insert(companion(name, companions));
+      }
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kUnusableVolume) throw;
+    }
   }
-  if (volumes.size() > kMost) names += " and " + std::to_string(volumes.size() - kMost) + " more";
-  return names;
+  return data;
 }
 
-Companions companions_of(const ArchiveMember& header, const std::vector<ArchiveMember>& members) {
-  Companions companions;
+// What an archive holds: volumes of a file each, with their data files, and one of all slices.
+struct Contents {
+  std::vector<FoundVolume> volumes;
+  std::vector<ArchiveMember> slices;
+  const Reader* slice_reader = nullptr;
+  // Files that are no volume; they are told as ignored beside slices.
+  std::vector<ArchiveMember> others;
+};
+
+Contents contents_of(const std::vector<ArchiveMember>& members) {
+  const std::vector<FoundVolume> found = files_of_formats(members);
+  const std::set<std::filesystem::path> data = data_of(found, members);
+  Contents contents;
+  std::set<std::filesystem::path> taken = data;
+  for (const FoundVolume& volume : found) {
+    if (data.contains(volume.member.path)) continue;
+    taken.insert(volume.member.path);
+    if (volume.reader->content == Content::kSlices) {
+      contents.slice_reader = volume.reader;
+      contents.slices.push_back(volume.member);
+    } else {
+      contents.volumes.push_back(volume);
+    }
+  }
   for (const ArchiveMember& member : members) {
-    if (member.name == header.name || folder_of(member.name) != folder_of(header.name)) continue;
-    companions.emplace(base_of(member.name), member.path);
+    if (!taken.contains(member.path)) contents.others.push_back(member);
   }
-  return companions;
+  return contents;
 }
 
-// All members are read, because the answer names those that are no part of the series: files of
-// other kinds, and volumes that somebody has made of the same slices.
-Volume read_slices(const Reader& reader, const std::vector<ArchiveMember>& members,
-                   const Input& input) {
-  if (input.listener) input.listener(reader.name);
+Volume read_slices(const Contents& contents, const Input& input) {
+  if (input.listener) input.listener(contents.slice_reader->name);
   std::vector<std::filesystem::path> files;
-  files.reserve(members.size());
-  for (const ArchiveMember& member : members) files.push_back(member.path);
-  return import_dicom(files, input.task);
+  for (const auto* members : {&contents.slices, &contents.others}) {
+    for (const ArchiveMember& member : *members) files.push_back(member.path);
+  }
+  Volume volume = import_dicom(files, input.task);
+  volume.format = contents.slice_reader->name;
+  return volume;
 }
 
-Volume read_members(const std::vector<ArchiveMember>& members, const Input& input) {
-  const std::vector<FoundVolume> volumes = volumes_among(members);
-  if (volumes.empty()) {
-    throw Error(ErrorCode::kUnsupportedMedia, "None of the archive's " +
-                                                  std::to_string(members.size()) +
-                                                  " files is a volume of a format that is read.");
-  }
-  if (const FoundVolume* slice = first_slice(volumes)) {
-    return read_slices(*slice->reader, members, input);
-  }
-  if (volumes.size() > 1) {
-    throw_unusable("The archive holds " + std::to_string(volumes.size()) +
-                   " volumes, where one is needed: " + names_of(volumes) + ".");
-  }
-  const auto& [member, reader] = volumes.front();
+Volume read_file(const FoundVolume& found, const std::vector<ArchiveMember>& members,
+                 const Input& input) {
+  const auto& [member, reader] = found;
   Volume volume = read_input(*reader, {.path = member.path,
                                        .companions = companions_of(member, members),
                                        .task = input.task,
                                        .listener = input.listener});
   volume.name = std::string(base_of(member.name));
   return volume;
+}
+
+// Leaves it to the client which of several is to be read.
+[[noreturn]] void offer_members(const Contents& contents, const std::string& asked) {
+  std::vector<Choice> choices;
+  if (!contents.slices.empty()) {
+    choices.push_back({"member", std::string(process::kDicomMember),
+                       std::to_string(contents.slices.size()) + " DICOM files"});
+  }
+  for (const auto& [member, reader] : contents.volumes) {
+    choices.push_back({"member", member.name, std::string(reader->title)});
+  }
+  std::string names;
+  constexpr std::size_t kMost = 10;
+  for (std::size_t at = 0; at < std::min(kMost, choices.size()); ++at) {
+    names += (at > 0 ? ", " : "") + in_quotes(choices[at].value);
+  }
+  if (choices.size() > kMost) names += " and " + std::to_string(choices.size() - kMost) + " more";
+  throw_choice(asked.empty()
+                   ? "The archive holds " + std::to_string(choices.size()) +
+                         " volumes, where one is needed; choose one with member=NAME: " + names +
+                         "."
+                   : "The archive has no volume " + in_quotes(asked) + ", but: " + names + ".",
+               std::move(choices));
+}
+
+Volume read_members(const std::vector<ArchiveMember>& members, const Input& input) {
+  const Contents contents = contents_of(members);
+  const std::string& asked = input.task.options.member;
+  const std::size_t count = contents.volumes.size() + (contents.slices.empty() ? 0 : 1);
+  if (count == 0) {
+    throw Error(ErrorCode::kUnsupportedMedia, "None of the archive's " +
+                                                  std::to_string(members.size()) +
+                                                  " files is a volume of a format that is read.");
+  }
+  if (!contents.slices.empty() &&
+      (asked == process::kDicomMember || (asked.empty() && count == 1))) {
+    return read_slices(contents, input);
+  }
+  if (asked.empty() && count == 1) return read_file(contents.volumes.front(), members, input);
+  const auto found = std::ranges::find_if(
+      contents.volumes, [&](const FoundVolume& volume) { return volume.member.name == asked; });
+  if (found == contents.volumes.end()) offer_members(contents, asked);
+  return read_file(*found, members, input);
 }
 
 }  // namespace
@@ -131,7 +197,8 @@ Volume parse_archive(const Input& input) {
   return read_members(unpack(input.path, folder.path(), limits_of(input.task.limits)), input);
 }
 
-std::uint64_t most_archive_bytes(const InputFile& file, const SizeLimits& limits) {
+std::uint64_t most_archive_bytes(const InputFile& file, const SizeLimits& limits,
+                                 const ImportOptions& /*options*/) {
   return std::min(limits_of(limits).max_bytes + kHeadroomBytes, most_unpacked_bytes(file.size()));
 }
 

@@ -17,6 +17,7 @@ bool is_archive(std::string_view head);
 Volume parse_archive(const Input& input);
 
 // How many bytes a compressed TAR may inflate to.
-std::uint64_t most_archive_bytes(const InputFile& file, const SizeLimits& limits);
+std::uint64_t most_archive_bytes(const InputFile& file, const SizeLimits& limits,
+                                 const ImportOptions& options);
 
 }  // namespace isomesh::import

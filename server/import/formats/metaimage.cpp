@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -155,14 +156,24 @@ void check_samples_are_plain(const Fields& fields) {
     throw_unusable("Each sample has " + in_quotes(channels) +
                    " channels, where plain numbers are needed.");
   }
-  const std::string_view slope = optional(fields, "ElementToIntensityFunctionSlope");
-  const std::string_view offset = optional(fields, "ElementToIntensityFunctionOffset");
-  if ((!slope.empty() && parse_double(slope) != 1) ||
-      (!offset.empty() && parse_double(offset) != 0)) {
-    throw_unusable(
-        "The MetaImage header has a slope or offset for its samples, which programs "
-        "disagree about; store the values themselves.");
-  }
+}
+
+// What the standard calls the function from elements to intensities, which few programs apply.
+std::optional<Rescale> rescale_of(const Fields& fields) {
+  const auto number = [&](std::string_view name, double otherwise) {
+    const std::string_view text = optional(fields, name);
+    if (text.empty()) return otherwise;
+    const auto value = parse_double(text);
+    if (!value || !std::isfinite(*value)) {
+      throw_unusable("The MetaImage header's " + in_quotes(name) + " is no finite number.");
+    }
+    return *value;
+  };
+  const Rescale rescale = {number("ElementToIntensityFunctionSlope", 1),
+                           number("ElementToIntensityFunctionOffset", 0)};
+  if (rescale.slope == 0) throw_unusable("The MetaImage header's slope of its samples is 0.");
+  if (rescale.slope == 1 && rescale.intercept == 0) return std::nullopt;
+  return rescale;
 }
 
 bool is_big_endian(const Fields& fields) {
@@ -259,13 +270,24 @@ Geometry geometry_of(const Fields& fields, std::size_t axes) {
   return geometry;
 }
 
-// Their dims, type and encoding.
-SourceVolume samples_of(const Fields& fields, const std::vector<std::uint64_t>& sizes) {
+// Their dims, type and encoding, and which of several volumes they are.
+SourceVolume samples_of(const Fields& fields, const std::vector<std::uint64_t>& sizes,
+                        const ImportOptions& options) {
   SourceVolume volume;
-  volume.dims = volume_dims(sizes);
+  volume.dims = volume_dims(std::span(sizes).first(std::min<std::size_t>(sizes.size(), 3)));
   volume.encoding = encoding_of(fields);
   volume.layout.type = type_of(fields);
   volume.layout.big_endian = is_big_endian(fields);
+  volume.layout.rescale = rescale_of(fields);
+  if (volume.layout.rescale) {
+    volume.notes.push_back(note_of(NoteCode::kValuesRescaled,
+                                   "The slope and offset of the MetaImage header's samples were "
+                                   "applied; programs that pass over them show other values."));
+  }
+  choose_volume(volumes_beyond(sizes),
+                {.what = "their fourth axis",
+                 .title = [](std::uint64_t index) { return "volume " + std::to_string(index); }},
+                options, volume);
   return volume;
 }
 
@@ -276,7 +298,14 @@ bool is_metaimage(std::string_view head) {
   return end != std::string_view::npos && is_header_line(head.substr(0, end));
 }
 
-SourceVolume parse_metaimage(const InputFile& file, const Companions& companions) {
+std::vector<std::string> metaimage_data_names(const InputFile& file,
+                                              const Companions& /*companions*/) {
+  const Header header = read_header(file.text(0, kMostHeaderBytes));
+  return is_detached(header.fields) ? data_names(file, header) : std::vector<std::string>();
+}
+
+SourceVolume parse_metaimage(const InputFile& file, const Companions& companions,
+                             const ImportOptions& options) {
   const Header header = read_header(file.text(0, kMostHeaderBytes));
   const Fields& fields = header.fields;
   const std::string_view object = optional(fields, "ObjectType");
@@ -285,23 +314,24 @@ SourceVolume parse_metaimage(const InputFile& file, const Companions& companions
   }
   const std::vector<std::uint64_t> sizes = sizes_of(fields);
   check_samples_are_plain(fields);
-  SourceVolume volume = samples_of(fields, sizes);
+  SourceVolume volume = samples_of(fields, sizes, options);
   if (is_detached(fields)) {
     volume.data_files =
-        data_files_of(data_names(file, header), companions, volume, data_skip(fields));
+        data_files_of(data_names(file, header), companions, data_skip(fields), volume);
   } else {
     volume.payload = payload_of(file, header, volume);
   }
   volume.geometry = geometry_of(fields, sizes.size());
-  scale_to_millimetres(volume.geometry, optional(fields, "DistanceUnits"));
+  scale_to_millimetres(volume.geometry, optional(fields, "DistanceUnits"), volume.notes);
   return volume;
 }
 
-std::uint64_t most_metaimage_bytes(const InputFile& file, const SizeLimits& limits) {
+std::uint64_t most_metaimage_bytes(const InputFile& file, const SizeLimits& limits,
+                                   const ImportOptions& options) {
   const std::string head = file.text(0, kMostHeaderBytes);
   const Header header = read_header(inflate_head(std::as_bytes(std::span(head)), kMostHeaderBytes));
   if (is_detached(header.fields)) return kMostHeaderBytes + kHeadroomBytes;
-  const SourceVolume volume = samples_of(header.fields, sizes_of(header.fields));
+  const SourceVolume volume = samples_of(header.fields, sizes_of(header.fields), options);
   check_limits(volume, limits);
   return header.bytes + volume.most_encoded_bytes() + kHeadroomBytes;
 }

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/files.h"
 #include "server/import/source.h"
@@ -15,10 +17,17 @@ bool is_metaimage(std::string_view head);
 // Reads the header. Its space is taken for LPS, as all programs that write MetaImage have it.
 // AnatomicalOrientation and CenterOfRotation, which say the same once more or nothing of the
 // samples' places, are passed over. Throws Error kUnusableVolume.
-SourceVolume parse_metaimage(const InputFile& file, const Companions& companions);
+// A slope and offset of the samples are applied, with a note. The options choose one of several
+// volumes.
+SourceVolume parse_metaimage(const InputFile& file, const Companions& companions,
+                             const ImportOptions& options);
+
+// The data files that a header without samples names.
+std::vector<std::string> metaimage_data_names(const InputFile& file, const Companions& companions);
 
 // How many bytes a compressed file may inflate to: what the header in its beginning describes.
 // Throws as parse_metaimage does, and Error kTooLarge beyond the limits.
-std::uint64_t most_metaimage_bytes(const InputFile& file, const SizeLimits& limits);
+std::uint64_t most_metaimage_bytes(const InputFile& file, const SizeLimits& limits,
+                                   const ImportOptions& options);
 
 }  // namespace isomesh::import

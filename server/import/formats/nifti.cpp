@@ -3,144 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
+#include <cstdio>
 #include <optional>
 #include <vector>
 
 #include "base/text.h"
 #include "server/import/archives/gzip.h"
+#include "server/import/formats/nifti_header.h"
 
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kNifti1Bytes = 348;
-constexpr std::size_t kNifti2Bytes = 540;
-
-// The fields of either version that a volume needs, in this machine's byte order.
-struct Header {
-  bool big_endian = false;
-  bool detached = false;
-  std::array<std::int64_t, 8> dim = {};
-  std::array<double, 8> pixdim = {};
-  int datatype = 0;
-  int bits = 0;
-  double vox_offset = 0;
-  double slope = 0;
-  double intercept = 0;
-  int units = 0;
-  int qform_code = 0;
-  int sform_code = 0;
-  std::array<double, 3> quaternion = {};
-  Vector3 qoffset = {};
-  std::array<double, 12> srow = {};  // row-major, 3 x 4
-};
-
-class Fields {
- public:
-  Fields(std::string_view bytes, bool big_endian) : bytes_(bytes), big_endian_(big_endian) {}
-
-  template <class Stored>
-  Stored at(std::size_t offset) const {
-    std::array<std::byte, sizeof(Stored)> raw;
-    std::memcpy(raw.data(), bytes_.data() + offset, sizeof(Stored));
-    if (big_endian_) std::reverse(raw.begin(), raw.end());
-    Stored value;
-    std::memcpy(&value, raw.data(), sizeof(Stored));
-    return value;
-  }
-
-  template <class Stored, class Value, std::size_t Count>
-  void read(std::size_t offset, std::array<Value, Count>& values) const {
-    for (Value& value : values) {
-      value = at<Stored>(offset);
-      offset += sizeof(Stored);
-    }
-  }
-
- private:
-  std::string_view bytes_;
-  bool big_endian_;
-};
-
-enum class Version { kOne, kTwo };
-
-struct Kind {
-  Version version = Version::kOne;
-  bool big_endian = false;
-  bool detached = false;
-};
-
-std::optional<Kind> kind_of(std::string_view head) {
-  using std::string_view_literals::operator""sv;
-  if (head.size() < kNifti1Bytes) return std::nullopt;
-  for (const bool big_endian : {false, true}) {
-    const auto size = Fields(head, big_endian).at<std::int32_t>(0);
-    if (size == kNifti1Bytes) {
-      const std::string_view magic = head.substr(344, 4);
-      if (magic == "n+1\0"sv || magic == "ni1\0"sv) {
-        return Kind{Version::kOne, big_endian, magic == "ni1\0"sv};
-      }
-    }
-    if (size == kNifti2Bytes) {
-      const std::string_view magic = head.substr(4, 4);
-      if (magic == "n+2\0"sv || magic == "ni2\0"sv) {
-        return Kind{Version::kTwo, big_endian, magic == "ni2\0"sv};
-      }
-    }
-  }
-  return std::nullopt;
-}
-
-Header read_nifti1(const Fields& fields) {
-  Header header;
-  fields.read<std::int16_t>(40, header.dim);
-  header.datatype = fields.at<std::int16_t>(70);
-  header.bits = fields.at<std::int16_t>(72);
-  fields.read<float>(76, header.pixdim);
-  header.vox_offset = fields.at<float>(108);
-  header.slope = fields.at<float>(112);
-  header.intercept = fields.at<float>(116);
-  header.units = fields.at<std::uint8_t>(123);
-  header.qform_code = fields.at<std::int16_t>(252);
-  header.sform_code = fields.at<std::int16_t>(254);
-  fields.read<float>(256, header.quaternion);
-  fields.read<float>(268, header.qoffset);
-  fields.read<float>(280, header.srow);
-  return header;
-}
-
-Header read_nifti2(const Fields& fields) {
-  Header header;
-  header.datatype = fields.at<std::int16_t>(12);
-  header.bits = fields.at<std::int16_t>(14);
-  fields.read<std::int64_t>(16, header.dim);
-  fields.read<double>(104, header.pixdim);
-  header.vox_offset = static_cast<double>(fields.at<std::int64_t>(168));
-  header.slope = fields.at<double>(176);
-  header.intercept = fields.at<double>(184);
-  header.qform_code = fields.at<std::int32_t>(344);
-  header.sform_code = fields.at<std::int32_t>(348);
-  fields.read<double>(352, header.quaternion);
-  fields.read<double>(376, header.qoffset);
-  fields.read<double>(400, header.srow);
-  header.units = fields.at<std::int32_t>(500);
-  return header;
-}
-
-Header read_header(std::string_view head) {
-  const auto kind = kind_of(head);
-  if (!kind) throw_unusable("The NIfTI header is damaged.");
-  if (kind->version == Version::kTwo && head.size() < kNifti2Bytes) {
-    throw_unusable("The file ends within its NIfTI-2 header.");
-  }
-  const Fields fields(head, kind->big_endian);
-  Header header = kind->version == Version::kOne ? read_nifti1(fields) : read_nifti2(fields);
-  header.big_endian = kind->big_endian;
-  header.detached = kind->detached;
-  return header;
-}
-
-std::array<std::uint32_t, 3> dims_of(const Header& header) {
+std::vector<std::uint64_t> sizes_of(const NiftiHeader& header) {
   if (header.dim[0] < 1 || header.dim[0] > 7) {
     throw_unusable("The NIfTI header tells " + std::to_string(header.dim[0]) +
                    " dimensions, where 1 to 7 are possible.");
@@ -153,10 +27,40 @@ std::array<std::uint32_t, 3> dims_of(const Header& header) {
     }
     sizes.push_back(static_cast<std::uint64_t>(header.dim[axis]));
   }
-  return volume_dims(sizes);
+  return sizes;
 }
 
-StoredType type_of(const Header& header) {
+// Of an index along the axes beyond the third, of which the fourth is time and runs fastest.
+std::string title_of(const NiftiHeader& header, std::uint64_t index) {
+  const auto instants = static_cast<std::uint64_t>(std::max<std::int64_t>(header.dim[4], 1));
+  const double step = header.pixdim[4];
+  constexpr int kTimeUnits = 56;
+  struct Row {
+    int code;
+    const char* name;
+  };
+  static constexpr Row kUnits[] = {{8, " s"}, {16, " ms"}, {24, " us"}, {32, " Hz"}, {40, " ppm"}};
+  const auto* unit = std::ranges::find(kUnits, header.units & kTimeUnits, &Row::code);
+  const std::uint64_t instant = index % instants;
+  std::string title = "time " + std::to_string(instant);
+  if (unit != std::end(kUnits) && std::isfinite(step) && step > 0) {
+    title = to_text(step * static_cast<double>(instant)) + unit->name;
+  }
+  if (header.dim[0] < 5) return title;
+  const std::string value = "value " + std::to_string(index / instants);
+  return instants == 1 ? value : title + ", " + value;
+}
+
+Difference difference_of(const NiftiHeader& header) {
+  const bool by_time = header.dim[4] > 1;
+  const bool by_value = header.dim[0] >= 5;
+  return {.what = by_time && by_value ? "time and value"
+                  : by_value          ? "value"
+                                      : "time",
+          .title = [header](std::uint64_t index) { return title_of(header, index); }};
+}
+
+StoredType type_of(const NiftiHeader& header) {
   struct Row {
     int code;
     StoredType type;
@@ -199,7 +103,7 @@ StoredType type_of(const Header& header) {
 }
 
 // The standard writes a slope of 0 where there is none; several programs write NaN.
-std::optional<Rescale> rescale_of(const Header& header) {
+std::optional<Rescale> rescale_of(const NiftiHeader& header) {
   if (header.slope == 0 || std::isnan(header.slope)) return std::nullopt;
   if (!std::isfinite(header.slope) || !std::isfinite(header.intercept)) {
     throw_unusable("The slope " + to_text(header.slope) + " and intercept " +
@@ -209,7 +113,7 @@ std::optional<Rescale> rescale_of(const Header& header) {
   return Rescale{header.slope, header.intercept};
 }
 
-double millimetres_per_unit(const Header& header) {
+double millimetres_per_unit(const NiftiHeader& header) {
   constexpr int kSpatialUnits = 7;
   switch (header.units & kSpatialUnits) {
     case 0:
@@ -225,13 +129,15 @@ double millimetres_per_unit(const Header& header) {
   }
 }
 
+bool is_length(double size) { return std::isfinite(size) && size > 0; }
+
 // Along an axis of a single sample there is no distance, and some programs write 0.
-Vector3 spacing_of(const Header& header, const std::array<std::uint32_t, 3>& dims) {
+Vector3 spacing_of(const NiftiHeader& header, const std::array<std::uint32_t, 3>& dims) {
   Vector3 spacing;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     spacing[axis] = header.pixdim[axis + 1];
     if (dims[axis] == 1 && !(spacing[axis] > 0)) spacing[axis] = 1;
-    if (std::isfinite(spacing[axis]) && spacing[axis] > 0) continue;
+    if (is_length(spacing[axis])) continue;
     throw_unusable("The voxel size along " + axis_name(axis) + " is " + to_text(spacing[axis]) +
                    ", not a positive number.");
   }
@@ -244,7 +150,7 @@ struct Placement {
   std::array<Vector3, 3> steps = {};
 };
 
-Placement sform_of(const Header& header) {
+Placement sform_of(const NiftiHeader& header) {
   Placement placement;
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -255,14 +161,23 @@ Placement sform_of(const Header& header) {
   return placement;
 }
 
-// The quaternion has length 1 and its real part is never negative, so that part is not stored.
-Placement qform_of(const Header& header, const Vector3& spacing) {
-  auto [b, c, d] = header.quaternion;
-  const double squares = b * b + c * c + d * d;
+double squares_of(const NiftiHeader& header) {
+  const auto& [b, c, d] = header.quaternion;
+  return b * b + c * c + d * d;
+}
+
+bool is_rotation(const NiftiHeader& header) {
   constexpr double kRounding = 1e-3;
-  if (!(squares <= 1 + kRounding)) {
+  return squares_of(header) <= 1 + kRounding;
+}
+
+// The quaternion has length 1 and its real part is never negative, so that part is not stored.
+Placement qform_of(const NiftiHeader& header, const Vector3& spacing) {
+  if (!is_rotation(header)) {
     throw_unusable("The quaternion of the NIfTI header's qform is no rotation.");
   }
+  auto [b, c, d] = header.quaternion;
+  const double squares = squares_of(header);
   const double a = std::sqrt(std::max(0.0, 1 - squares));
   const double norm = std::sqrt(std::max(1.0, squares));
   b /= norm;
@@ -281,35 +196,54 @@ Placement qform_of(const Header& header, const Vector3& spacing) {
   return placement;
 }
 
-bool agree(const Placement& one, const Placement& other, const std::array<std::uint32_t, 3>& dims) {
-  constexpr double kVoxels = 0.01;
-  double smallest_step = HUGE_VAL;
-  double apart = 0;
-  for (std::size_t row = 0; row < 3; ++row) {
-    // No corner differs by more than the sum of the differences of the origin and of all steps.
-    double off = std::abs(one.origin[row] - other.origin[row]);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      off += std::abs(one.steps[axis][row] - other.steps[axis][row]) * (dims[axis] - 1.0);
+// The sample (i,j,k).
+Vector3 point_of(const Placement& placement, const std::array<double, 3>& index) {
+  Vector3 point = placement.origin;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t row = 0; row < 3; ++row) {
+      point[row] += placement.steps[axis][row] * index[axis];
     }
-    apart = std::max(apart, off);
   }
-  for (const Vector3& step : other.steps) {
-    smallest_step = std::min(smallest_step, std::hypot(step[0], step[1], step[2]));
-  }
-  return apart <= smallest_step * kVoxels;
+  return point;
 }
 
-void check_sform(const Placement& sform, const Vector3& spacing,
-                 const std::array<std::uint32_t, 3>& dims) {
+// How far apart the two place a sample at most, which is one of the corners.
+double distance_of(const Placement& one, const Placement& other,
+                   const std::array<std::uint32_t, 3>& dims) {
+  double most = 0;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    std::array<double, 3> index;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      index[axis] = (corner >> axis & 1U) != 0 ? dims[axis] - 1.0 : 0;
+    }
+    const Vector3 a = point_of(one, index);
+    const Vector3 b = point_of(other, index);
+    most = std::max(most, std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]));
+  }
+  return most;
+}
+
+double shortest_step(const Placement& placement) {
+  double shortest = HUGE_VAL;
+  for (const Vector3& step : placement.steps) {
+    shortest = std::min(shortest, std::hypot(step[0], step[1], step[2]));
+  }
+  return shortest;
+}
+
+// Compares the steps of the sform that is taken with the voxel sizes.
+void note_other_pixdim(const NiftiHeader& header, const Placement& sform, SourceVolume& volume) {
   constexpr double kTolerance = 0.01;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const Vector3& step = sform.steps[axis];
     const double size = std::hypot(step[0], step[1], step[2]);
-    if (dims[axis] == 1 && std::isfinite(size) && size > 0) continue;
-    if (std::abs(size - spacing[axis]) <= spacing[axis] * kTolerance) continue;
-    throw_unusable("The NIfTI header contradicts itself: along " + axis_name(axis) +
-                   " a voxel is " + to_text(spacing[axis]) + " long by its pixdim and " +
-                   to_text(size) + " by its sform.");
+    const double told = header.pixdim[axis + 1];
+    if (volume.dims[axis] == 1 || std::abs(size - told) <= std::abs(told) * kTolerance) continue;
+    volume.notes.push_back(note_of(NoteCode::kPixdimDiffers,
+                                   "Along " + axis_name(axis) + " a voxel of the NIfTI header is " +
+                                       to_text(told) + " long by its pixdim and " + to_text(size) +
+                                       " by its sform, which was taken."));
+    return;
   }
 }
 
@@ -322,17 +256,65 @@ Placement without_forms(const Vector3& spacing) {
   return placement;
 }
 
-Placement placement_of(const Header& header, const std::array<std::uint32_t, 3>& dims) {
-  constexpr int kScanner = 1;
-  const Vector3 spacing = spacing_of(header, dims);
-  if (header.sform_code <= 0 && header.qform_code <= 0) return without_forms(spacing);
-  if (header.sform_code <= 0) return qform_of(header, spacing);
-  const Placement sform = sform_of(header);
-  if (header.qform_code > 0 && header.sform_code != kScanner) {
-    const Placement qform = qform_of(header, spacing);
-    if (!agree(sform, qform, dims)) return qform;
+// Analyze's standard axes run to the left, to the front and up; its images lie around the middle,
+// as programs that read them have it.
+Placement analyze_placement(const Vector3& spacing, SourceVolume& volume) {
+  volume.notes.push_back(
+      note_of(NoteCode::kSpaceAssumed,
+              "An Analyze header does not tell how its axes lie in the patient; they were taken to "
+              "run to the left, to the front and up, around the point (0,0,0)."));
+  Placement placement;
+  placement.steps[0][0] = -spacing[0];
+  placement.steps[1][1] = spacing[1];
+  placement.steps[2][2] = spacing[2];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    placement.origin[axis] = -placement.steps[axis][axis] * (volume.dims[axis] - 1.0) / 2;
   }
-  check_sform(sform, spacing, dims);
+  return placement;
+}
+
+// Where both forms are there, tells how far apart they are.
+void note_other_form(const NiftiHeader& header, const Placement& taken, const Placement& other,
+                     const std::string& name_of_taken, SourceVolume& volume) {
+  constexpr double kVoxels = 0.01;
+  const double apart = distance_of(taken, other, volume.dims);
+  if (apart <= shortest_step(taken) * kVoxels) return;
+  std::array<char, 32> millimetres = {};
+  std::snprintf(millimetres.data(), millimetres.size(), "%.1f",
+                apart * millimetres_per_unit(header));
+  volume.notes.push_back(note_of(NoteCode::kFormsDiffer,
+                                 std::string("The sform and the qform of the NIfTI header place "
+                                             "samples up to ") +
+                                     millimetres.data() + " mm apart; the " + name_of_taken +
+                                     " was taken."));
+}
+
+Placement placement_of(const NiftiHeader& header, const ImportOptions& options,
+                       SourceVolume& volume) {
+  const bool has_sform = header.sform_code > 0;
+  const bool has_qform = header.qform_code > 0;
+  const auto asked = options.nifti_form;
+  if (asked && !(*asked == NiftiForm::kSform ? has_sform : has_qform)) {
+    throw_unusable("The header has no " + std::string(to_string(*asked)) +
+                   ", which the request asks for.");
+  }
+  const bool takes_sform = asked ? *asked == NiftiForm::kSform : has_sform;
+  const bool has_sizes =
+      std::all_of(header.pixdim.begin() + 1, header.pixdim.begin() + 4, is_length);
+  if (!takes_sform) {
+    const Vector3 spacing = spacing_of(header, volume.dims);
+    if (header.is_analyze) return analyze_placement(spacing, volume);
+    if (!has_qform) return without_forms(spacing);
+    const Placement qform = qform_of(header, spacing);
+    if (has_sform) note_other_form(header, qform, sform_of(header), "qform", volume);
+    return qform;
+  }
+  const Placement sform = sform_of(header);
+  note_other_pixdim(header, sform, volume);
+  if (has_qform && has_sizes && is_rotation(header)) {
+    note_other_form(header, sform, qform_of(header, spacing_of(header, volume.dims)), "sform",
+                    volume);
+  }
   return sform;
 }
 
@@ -340,8 +322,9 @@ Vector3 to_lps(const Vector3& ras, double scale) {
   return {-ras[0] * scale, -ras[1] * scale, ras[2] * scale};
 }
 
-Geometry lps_geometry(const Header& header, const std::array<std::uint32_t, 3>& dims) {
-  const Placement placement = placement_of(header, dims);
+Geometry lps_geometry(const NiftiHeader& header, const ImportOptions& options,
+                      SourceVolume& volume) {
+  const Placement placement = placement_of(header, options, volume);
   const double scale = millimetres_per_unit(header);
   std::array<Vector3, 3> steps;
   std::transform(placement.steps.begin(), placement.steps.end(), steps.begin(),
@@ -349,10 +332,11 @@ Geometry lps_geometry(const Header& header, const std::array<std::uint32_t, 3>& 
   return geometry_of(to_lps(placement.origin, scale), steps);
 }
 
-std::uint64_t payload_offset(const Header& header) {
+std::uint64_t payload_offset(const NiftiHeader& header) {
   // Header extensions are small; a larger offset is damage.
   constexpr double kMost = 64 << 20;
-  if (!(header.vox_offset >= kNifti1Bytes && header.vox_offset <= kMost) ||
+  const double least = header.is_detached ? 0 : static_cast<double>(header.bytes);
+  if (!(header.vox_offset >= least && header.vox_offset <= kMost) ||
       header.vox_offset != std::floor(header.vox_offset)) {
     throw_unusable("The NIfTI header's vox_offset is " + to_text(header.vox_offset) +
                    ", which no place in the file can be.");
@@ -360,34 +344,68 @@ std::uint64_t payload_offset(const Header& header) {
   return static_cast<std::uint64_t>(header.vox_offset);
 }
 
-SourceVolume describe(std::string_view head) {
-  const Header header = read_header(head);
-  if (header.detached) {
-    throw_unusable(
-        "Its samples are in another file (a pair of .hdr and .img); send the volume as one .nii.");
-  }
+// All but where the samples are.
+SourceVolume describe(const NiftiHeader& header, const ImportOptions& options) {
   SourceVolume volume;
-  volume.dims = dims_of(header);
+  const std::vector<std::uint64_t> sizes = sizes_of(header);
+  volume.dims = volume_dims(std::span(sizes).first(std::min<std::size_t>(sizes.size(), 3)));
   volume.layout = {type_of(header), header.big_endian, rescale_of(header)};
+  choose_volume(volumes_beyond(sizes), difference_of(header), options, volume);
   volume.encoding = Encoding::kRaw;
-  volume.payload.offset = payload_offset(header);
-  volume.geometry = lps_geometry(header, volume.dims);
+  volume.geometry = lps_geometry(header, options, volume);
   return volume;
+}
+
+// The file of a pair that holds the samples has the header's name with another suffix.
+std::string image_name(const Companions& companions) {
+  std::string_view own = companions.name;
+  if (lower(own).ends_with(".gz")) own.remove_suffix(3);
+  const std::string stem(own.substr(0, own.rfind('.')));
+  for (const char* suffix : {".img", ".img.gz", ".IMG"}) {
+    if (companions.files.contains(stem + suffix)) return stem + suffix;
+  }
+  throw_unusable(
+      "Its samples are in another file (a pair of .hdr and .img), which did not come with it; send "
+      "both in one ZIP, TAR or folder, or the volume as one .nii.");
 }
 
 }  // namespace
 
-bool is_nifti(std::string_view head) { return kind_of(head).has_value(); }
+bool is_nifti(std::string_view head) { return begins_as_nifti(head); }
 
-SourceVolume parse_nifti(const InputFile& file, const Companions& /*companions*/) {
-  return describe(file.text(0, kNifti2Bytes));
+SourceVolume parse_nifti(const InputFile& file, const Companions& companions,
+                         const ImportOptions& options) {
+  const NiftiHeader header = read_nifti_header(file.text(0, kNiftiHeaderBytes));
+  // A pair's samples are looked for first: without them nothing else that is wrong can be helped.
+  const std::string image = header.is_detached ? image_name(companions) : "";
+  SourceVolume volume = describe(header, options);
+  if (!header.is_detached) {
+    volume.payload.offset = payload_offset(header);
+    return volume;
+  }
+  const InputFile samples(companion(image, companions));
+  const std::string head = samples.text(0, kSniffBytes);
+  if (is_gzip(std::as_bytes(std::span(head)))) volume.encoding = Encoding::kDeflate;
+  volume.data_files = data_files_of({image}, companions, payload_offset(header), volume);
+  return volume;
 }
 
-std::uint64_t most_nifti_bytes(const InputFile& file, const SizeLimits& limits) {
+std::vector<std::string> nifti_data_names(const InputFile& file, const Companions& companions) {
+  const NiftiHeader header = read_nifti_header(file.text(0, kNiftiHeaderBytes));
+  if (!header.is_detached) return {};
+  return {image_name(companions)};
+}
+
+std::uint64_t most_nifti_bytes(const InputFile& file, const SizeLimits& limits,
+                               const ImportOptions& options) {
   const std::string head = file.text(0, kSniffBytes);
-  const SourceVolume volume = describe(inflate_head(std::as_bytes(std::span(head)), kNifti2Bytes));
+  const NiftiHeader header =
+      read_nifti_header(inflate_head(std::as_bytes(std::span(head)), kNiftiHeaderBytes));
+  // A compressed header of a pair holds nothing else.
+  if (header.is_detached) return kHeadroomBytes;
+  const SourceVolume volume = describe(header, options);
   check_limits(volume, limits);
-  return volume.payload.offset + volume.stored_bytes() + kHeadroomBytes;
+  return payload_offset(header) + volume.stored_bytes() + kHeadroomBytes;
 }
 
 }  // namespace isomesh::import

@@ -1,4 +1,4 @@
-// NIfTI-1 and NIfTI-2 headers (https://nifti.nimh.nih.gov/nifti-1, /nifti-2).
+// NIfTI-1, NIfTI-2 and Analyze 7.5 headers (https://nifti.nimh.nih.gov/nifti-1, /nifti-2).
 //
 // ITK 5.2 is no model for all of this: it reads no NIfTI-2, crashes on small 5-D files, does not
 // apply the spatial unit to the origin and the directions, silently takes the qform where the sform
@@ -6,7 +6,9 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/files.h"
 #include "server/import/reader.h"
@@ -16,17 +18,24 @@ namespace isomesh::import {
 
 bool is_nifti(std::string_view head);
 
-// Reads the header. The payload's size stays 0, because the header does not tell it. Throws Error
+// Reads the header, attached to its samples or in a file of its own with an image file (.img)
+// beside it. The payload's size stays 0, because the header does not tell it. Throws Error
 // kUnusableVolume.
 //
-// The geometry is that of the sform where its code is the scanner's (1), where there is no qform,
-// or where both agree; otherwise it is that of the qform. ITK chooses in the same way, but passes
-// over a sheared sform. An sform whose steps are not as long as the voxel sizes in `pixdim` is
-// refused. Without either form the samples begin at (0,0,0) and lie along the LPS axes, as in ITK.
-SourceVolume parse_nifti(const InputFile& file, const Companions& companions);
+// The geometry is that of the sform where there is one, with its shear, and else that of the qform;
+// the options may ask for either. A note tells where both disagree by more than a hundredth of a
+// voxel, another where the sform's steps are not as long as the voxel sizes in `pixdim`. Without
+// either form the samples begin at (0,0,0) and lie along the LPS axes, as in ITK; those of Analyze
+// 7.5 lie as nibabel has them, with a note.
+SourceVolume parse_nifti(const InputFile& file, const Companions& companions,
+                         const ImportOptions& options);
+
+// The file beside a header that holds its samples; none for one with its samples in it.
+std::vector<std::string> nifti_data_names(const InputFile& file, const Companions& companions);
 
 // How many bytes a compressed file may inflate to, as its header tells. Throws Error kTooLarge for
 // volumes beyond the limits.
-std::uint64_t most_nifti_bytes(const InputFile& file, const SizeLimits& limits);
+std::uint64_t most_nifti_bytes(const InputFile& file, const SizeLimits& limits,
+                               const ImportOptions& options);
 
 }  // namespace isomesh::import

@@ -11,6 +11,7 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "server/import/formats/file_pattern.h"
+#include "server/import/formats/nifti.h"
 #include "server/import/formats/nrrd_space.h"
 #include "server/import/reader.h"
 
@@ -39,8 +40,11 @@ void add_field(Fields& fields, std::string_view line) {
   if (colon == std::string_view::npos) {
     throw_unusable("The NRRD header has a line that is no field: " + in_quotes(line) + ".");
   }
-  // "key:=value" is a program's own and no field of the format.
-  if (line.substr(colon).starts_with(":=")) return;
+  // "key:=value" is a program's own, whose names may be those of fields.
+  if (line.substr(colon).starts_with(":=")) {
+    fields.emplace(own_key(line.substr(0, colon)), trimmed(line.substr(colon + 2)));
+    return;
+  }
   const std::string name = field_name(line.substr(0, colon));
   const std::string_view value = trimmed(line.substr(colon + 1));
   if (has_control_characters(value)) {
@@ -135,8 +139,9 @@ Encoding encoding_of(const Fields& fields) {
   if (name == "gzip" || name == "gz") return Encoding::kDeflate;
   if (name == "text" || name == "txt" || name == "ascii") return Encoding::kText;
   if (name == "hex") return Encoding::kHex;
+  if (name == "bzip2" || name == "bz2") return Encoding::kBzip2;
   throw_unusable("The NRRD header's encoding " + in_quotes(name) +
-                 " is not read; raw, gzip, ascii and hex are.");
+                 " is not read; raw, gzip, bzip2, ascii and hex are.");
 }
 
 bool is_big_endian(const Fields& fields, StoredType type, Encoding encoding) {
@@ -177,22 +182,33 @@ std::int64_t skip_field(const Fields& fields, std::string_view name) {
   return *count;
 }
 
-std::uint64_t payload_offset(const InputFile& file, const Header& header,
-                             const SourceVolume& volume) {
-  const std::int64_t lines = skip_field(header.fields, "lineskip");
-  const std::int64_t bytes = skip_field(header.fields, "byteskip");
-  if (lines < 0) throw_unusable("The NRRD header's \"lineskip\" is negative.");
-  if (bytes != 0 && volume.encoding == Encoding::kDeflate) {
-    throw_unusable("Skipping bytes within gzip data is not supported.");
+bool is_stream(const SourceVolume& volume) {
+  return volume.encoding == Encoding::kDeflate || volume.encoding == Encoding::kBzip2;
+}
+
+// The bytes that are to be skipped; empty where the samples end with their file.
+Skip byte_skip(const Fields& fields, const SourceVolume& volume) {
+  const std::int64_t bytes = skip_field(fields, "byteskip");
+  const bool can_end = is_stream(volume) || volume.encoding == Encoding::kRaw;
+  if (bytes < 0 && !can_end) {
+    throw_unusable("The NRRD header says that samples in text end with their file.");
   }
-  if (bytes < 0) {
-    if (volume.encoding != Encoding::kRaw || file.size() < header.bytes + volume.stored_bytes()) {
+  return bytes < 0 ? Skip() : Skip(static_cast<std::uint64_t>(bytes));
+}
+
+std::uint64_t payload_offset(const InputFile& file, const Header& header, SourceVolume& volume) {
+  const std::int64_t lines = skip_field(header.fields, "lineskip");
+  if (lines < 0) throw_unusable("The NRRD header's \"lineskip\" is negative.");
+  const Skip skip = byte_skip(header.fields, volume);
+  if (!skip && volume.encoding == Encoding::kRaw) {
+    if (file.size() < header.bytes + volume.stored_bytes()) {
       throw_unusable("The file is too short for its samples to be at its end.");
     }
     return file.size() - volume.stored_bytes();
   }
-  const std::uint64_t offset = skip_lines(file, header.bytes, static_cast<std::uint64_t>(lines)) +
-                               static_cast<std::uint64_t>(bytes);
+  const std::uint64_t begin = skip_lines(file, header.bytes, static_cast<std::uint64_t>(lines));
+  if (is_stream(volume)) volume.decoded_skip = skip;
+  const std::uint64_t offset = is_stream(volume) ? begin : begin + *skip;
   if (offset > file.size()) throw_unusable("The file ends before its samples begin.");
   return offset;
 }
@@ -209,26 +225,45 @@ std::vector<std::string> data_names(const InputFile& file, const Header& header)
   return {names.begin(), names.end()};
 }
 
+// A NIfTI file that serves as data begins with a header of its own, which some headers forget.
+bool has_own_header(const std::string& name, const Companions& companions) {
+  const std::string head = InputFile(companion(name, companions)).text(0, kSniffBytes);
+  const auto bytes = std::as_bytes(std::span(head));
+  return is_nifti(is_gzip(bytes) ? inflate_head(bytes, kSniffBytes) : head);
+}
+
 std::vector<DataFile> data_files(const InputFile& file, const Header& header,
-                                 const Companions& companions, const SourceVolume& volume) {
-  const std::int64_t bytes = skip_field(header.fields, "byteskip");
+                                 const Companions& companions, SourceVolume& volume) {
   if (skip_field(header.fields, "lineskip") != 0) {
     throw_unusable("Skipping lines of a data file is not supported.");
   }
-  if (bytes != 0 && volume.encoding == Encoding::kDeflate) {
-    throw_unusable("Skipping bytes within gzip data is not supported.");
+  const std::vector<std::string> names = data_names(file, header);
+  Skip skip = byte_skip(header.fields, volume);
+  if (skip == Skip(0) && names.size() == 1 && has_own_header(names.front(), companions)) {
+    skip.reset();
+    volume.notes.push_back(note_of(NoteCode::kTrailingBytes,
+                                   "The data file has a header of its own, which was left out: the "
+                                   "samples are those at its end."));
   }
-  const Skip skip = bytes < 0 ? Skip() : Skip(static_cast<std::uint64_t>(bytes));
-  return data_files_of(data_names(file, header), companions, volume, skip);
+  return data_files_of(names, companions, skip, volume);
 }
 
-// Their dims, type and encoding.
-SourceVolume samples_of(const Fields& fields, const std::vector<std::uint64_t>& sizes) {
+// Their dims, type and encoding, and which of several volumes they are.
+SourceVolume samples_of(const Fields& fields, const NrrdSizes& sizes,
+                        const ImportOptions& options) {
   SourceVolume volume;
-  volume.dims = volume_dims(lattice_sizes(fields, sizes));
+  volume.dims =
+      volume_dims(std::span(sizes.lattice).first(std::min<std::size_t>(sizes.lattice.size(), 3)));
   volume.encoding = encoding_of(fields);
   volume.layout.type = type_of(fields);
   volume.layout.big_endian = is_big_endian(fields, volume.layout.type, volume.encoding);
+  choose_volume(
+      sizes.volumes,
+      {.what = sizes.volume_kind,
+       .title =
+           [&](std::uint64_t index) { return sizes.volume_kind + ' ' + std::to_string(index); }},
+      options, volume);
+  volume.chosen.is_interleaved = sizes.is_interleaved && sizes.volumes > 1;
   return volume;
 }
 
@@ -239,27 +274,35 @@ bool is_nrrd(std::string_view head) {
          (head[8] == '\n' || head[8] == '\r');
 }
 
-SourceVolume parse_nrrd(const InputFile& file, const Companions& companions) {
+std::vector<std::string> nrrd_data_names(const InputFile& file, const Companions& /*companions*/) {
+  const Header header = read_header(file.text(0, kMostHeaderBytes));
+  return header.fields.contains(kDataFile) ? data_names(file, header) : std::vector<std::string>();
+}
+
+SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
+                        const ImportOptions& options) {
   const Header header = read_header(file.text(0, kMostHeaderBytes));
   const Fields& fields = header.fields;
-  const std::vector<std::uint64_t> sizes = sizes_of(fields);
-  SourceVolume volume = samples_of(fields, sizes);
+  const NrrdSizes sizes = nrrd_sizes(fields, sizes_of(fields));
+  SourceVolume volume = samples_of(fields, sizes, options);
   if (fields.contains(kDataFile)) {
     volume.data_files = data_files(file, header, companions, volume);
   } else {
     volume.payload.offset = payload_offset(file, header, volume);
     volume.payload.bytes = file.size() - volume.payload.offset;
   }
-  volume.geometry = nrrd_geometry(fields, sizes);
+  volume.geometry = nrrd_geometry(fields, sizes.all, volume.notes);
   return volume;
 }
 
-std::uint64_t most_nrrd_bytes(const InputFile& file, const SizeLimits& limits) {
+std::uint64_t most_nrrd_bytes(const InputFile& file, const SizeLimits& limits,
+                              const ImportOptions& options) {
   constexpr std::int64_t kMostSkipped = std::int64_t{64} << 20;
   const std::string head = file.text(0, kMostHeaderBytes);
   const Header header = read_header(inflate_head(std::as_bytes(std::span(head)), kMostHeaderBytes));
   if (header.fields.contains(kDataFile)) return kMostHeaderBytes + kHeadroomBytes;
-  const SourceVolume volume = samples_of(header.fields, sizes_of(header.fields));
+  const SourceVolume volume =
+      samples_of(header.fields, nrrd_sizes(header.fields, sizes_of(header.fields)), options);
   check_limits(volume, limits);
   const std::int64_t skipped =
       std::clamp<std::int64_t>(skip_field(header.fields, "byteskip"), 0, kMostSkipped);

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/files.h"
 #include "server/import/source.h"
@@ -12,11 +14,17 @@ namespace isomesh::import {
 bool is_nrrd(std::string_view head);
 
 // Reads the header, attached to its samples or in a file of its own; nrrd_space.h says where the
-// samples lie. Throws Error kUnusableVolume.
-SourceVolume parse_nrrd(const InputFile& file, const Companions& companions);
+// samples lie. The options choose one of several volumes along a list or time. Throws Error
+// kUnusableVolume.
+SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
+                        const ImportOptions& options);
+
+// The data files that a header without samples names.
+std::vector<std::string> nrrd_data_names(const InputFile& file, const Companions& companions);
 
 // How many bytes a compressed file may inflate to: what the header in its beginning describes.
 // Throws as parse_nrrd does, and Error kTooLarge beyond the limits.
-std::uint64_t most_nrrd_bytes(const InputFile& file, const SizeLimits& limits);
+std::uint64_t most_nrrd_bytes(const InputFile& file, const SizeLimits& limits,
+                              const ImportOptions& options);
 
 }  // namespace isomesh::import

@@ -27,7 +27,22 @@ bool is_known(double number) { return !std::isnan(number); }
 }
 
 bool is_lattice_kind(std::string_view kind) {
-  return kind == "domain" || kind == "space" || kind == "time" || kind == "???" || kind == "none";
+  return kind == "domain" || kind == "space" || kind == "???" || kind == "none";
+}
+
+// Kinds of axes along which whole volumes lie. A vector's components are as good as volumes.
+bool is_volume_kind(std::string_view kind) {
+  return kind == "list" || kind == "time" || kind == "vector";
+}
+
+// The name of the kind of each axis, in lower case.
+std::vector<std::string> kinds_of(const NrrdFields& fields, std::size_t axes) {
+  const auto said = words(value_of(fields, "kinds"));
+  std::vector<std::string> kinds;
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    kinds.push_back(axis < said.size() ? lower(said[axis]) : "none");
+  }
+  return kinds;
 }
 
 std::size_t count_of(std::string_view text, std::string_view part) {
@@ -175,8 +190,8 @@ struct Axis {
 // Of the kinds that components have, those that a single one may be.
 bool is_kind_of_one(std::string_view kind) {
   static constexpr std::string_view kKinds[] = {
-      "list",   "point", "vector", "contravariant-vector", "covariant-vector",
-      "normal", "stub",  "scalar"};
+      "list",   "time", "point", "vector", "contravariant-vector", "covariant-vector",
+      "normal", "stub", "scalar"};
   return std::ranges::find(kKinds, kind) != std::end(kKinds);
 }
 
@@ -190,7 +205,7 @@ void set_kind(Axis& axis, std::string_view word) {
     return;
   }
   const std::string kind = lower(word);
-  if (kind == "domain" || kind == "space" || kind == "time") return;
+  if (kind == "domain" || kind == "space") return;
   if (!is_kind_of_one(kind)) throw_not_understood("kinds", word);
   axis.is_component = true;
 }
@@ -272,6 +287,20 @@ std::vector<Axis> lattice_axes(const NrrdFields& fields, std::span<const std::ui
 
 // --- Geometry ------------------------------------------------------------------------------------
 
+bool has_extent(const Axis& axis) { return is_known(axis.min) && is_known(axis.max); }
+
+// Between samples, where min and max are the places of the outer ones or the borders of their
+// cells.
+double spacing_of_extent(const Axis& axis) {
+  const std::uint64_t steps = axis.is_node ? axis.size - 1 : axis.size;
+  const double spacing = (axis.max - axis.min) / static_cast<double>(steps);
+  if (steps == 0) return 1;
+  if (!std::isfinite(spacing) || !(spacing > 0)) {
+    throw_unusable("The NRRD header's axis mins and maxs make no distance between samples.");
+  }
+  return spacing;
+}
+
 void set_step(Geometry& geometry, std::size_t at, const Axis& axis, bool in_space) {
   if (is_known(axis.spacing)) {
     if (in_space) {
@@ -281,12 +310,18 @@ void set_step(Geometry& geometry, std::size_t at, const Axis& axis, bool in_spac
     geometry.spacing[at] = axis.spacing;
     return;
   }
-  if (!axis.has_direction()) return;
+  if (!axis.has_direction()) {
+    if (!in_space && has_extent(axis)) geometry.spacing[at] = spacing_of_extent(axis);
+    return;
+  }
   // As the format's own library computes them: volumes that were read by it before have the same
   // canonical file, to the last bit.
   double squares = 0;
   for (const double part : axis.direction) squares += part * part;
   const double spacing = std::sqrt(squares);
+  if (!std::isfinite(spacing) || spacing == 0) {
+    throw_unusable("The NRRD header's space directions are too long or too short for an axis.");
+  }
   geometry.spacing[at] = spacing;
   for (std::size_t row = 0; row < 3; ++row) {
     const double part = row < axis.direction.size() ? axis.direction[row] : 0;
@@ -310,14 +345,13 @@ void set_space_origin(Geometry& geometry, const NrrdFields& fields, std::size_t 
 // Without a space the first samples lie half a spacing behind the axes' mins, where those are the
 // borders of cells.
 void set_origin_from_mins(Geometry& geometry, std::span<const Axis> axes) {
-  const auto has_extent = [](const Axis& axis) {
+  const auto has_length = [](const Axis& axis) {
     return is_known(axis.max) || is_known(axis.spacing);
   };
-  if (!is_known(axes.front().min) || !std::ranges::all_of(axes, has_extent)) return;
+  if (!is_known(axes.front().min) || !std::ranges::all_of(axes, has_length)) return;
   for (std::size_t at = 0; at < std::min<std::size_t>(axes.size(), 3); ++at) {
     const Axis& axis = axes[at];
-    const auto steps = static_cast<double>(axis.is_node ? axis.size - 1 : axis.size);
-    const double spacing = is_known(axis.spacing) ? axis.spacing : (axis.max - axis.min) / steps;
+    const double spacing = is_known(axis.spacing) ? axis.spacing : spacing_of_extent(axis);
     geometry.origin[at] = axis.min + (axis.is_node ? 0 : spacing / 2);
   }
 }
@@ -356,28 +390,91 @@ std::string_view value_of(const NrrdFields& fields, std::string_view name) {
   return found == fields.end() ? std::string_view{} : std::string_view(found->second);
 }
 
-std::vector<std::uint64_t> lattice_sizes(const NrrdFields& fields,
-                                         std::span<const std::uint64_t> sizes) {
-  const auto kinds = words(value_of(fields, "kinds"));
-  std::vector<std::uint64_t> result;
+std::string own_key(std::string_view key) { return std::string(key) + ":="; }
+
+NrrdSizes nrrd_sizes(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes) {
+  const std::vector<std::string> kinds = kinds_of(fields, sizes.size());
+  NrrdSizes result;
+  result.all = sizes;
   for (std::size_t axis = 0; axis < sizes.size(); ++axis) {
-    const std::string kind = axis < kinds.size() ? lower(kinds[axis]) : "none";
-    if (kind == "time" && axis < 3) {
-      throw_unusable("The NRRD header's axis " + axis_name(axis) + " is time.");
+    const std::string& kind = kinds[axis];
+    const bool is_fourth = result.lattice.size() == 3;
+    if (is_lattice_kind(kind) && !is_fourth) {
+      result.lattice.push_back(sizes[axis]);
+      continue;
     }
-    if (is_lattice_kind(kind)) {
-      result.push_back(sizes[axis]);
-    } else if (sizes[axis] != 1) {
+    if (sizes[axis] == 1) continue;
+    const bool is_at_end = axis == 0 || axis + 1 == sizes.size();
+    if (!is_volume_kind(kind) && !is_lattice_kind(kind)) {
       throw_unusable("Each sample has " + std::to_string(sizes[axis]) +
                      " components (an axis of kind " + in_quotes(kind) +
                      "), where plain numbers are needed.");
     }
+    if (!is_at_end || result.volumes > 1) {
+      throw_unusable("The NRRD header's axis " + axis_name(axis) + " holds several volumes (kind " +
+                     in_quotes(kind) +
+                     "), of which one can be chosen only along the first or the "
+                     "last axis.");
+    }
+    result.volumes = sizes[axis];
+    result.volume_kind = is_volume_kind(kind) ? kind : "the axis " + axis_name(axis);
+    result.is_interleaved = axis == 0;
   }
   return result;
 }
 
-Geometry nrrd_geometry(const NrrdFields& fields, std::span<const std::uint64_t> sizes) {
-  check_space_is_told(fields, sizes.size() - lattice_sizes(fields, sizes).size());
+namespace {
+
+// The numbers of an extent of Slicer's, (first, last) along each axis, if they are as many samples
+// as the sizes tell.
+std::optional<std::array<double, 3>> first_of_extent(const NrrdFields& fields, std::string_view key,
+                                                     const std::vector<std::uint64_t>& sizes) {
+  const std::vector<std::string_view> numbers = words(value_of(fields, own_key(key)));
+  std::array<double, 3> first = {};
+  if (numbers.size() != 6 || sizes.size() < 3) return std::nullopt;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto low = parse_int64(numbers[axis * 2]);
+    const auto high = parse_int64(numbers[axis * 2 + 1]);
+    const bool fits =
+        low && high && *high >= *low &&
+        static_cast<std::uint64_t>(*high) - static_cast<std::uint64_t>(*low) == sizes[axis] - 1;
+    if (!fits) return std::nullopt;
+    first[axis] = static_cast<double>(*low);
+  }
+  return first;
+}
+
+// Turns what old versions of Slicer wrote into LPS.
+void place_as_slicer(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes,
+                     Geometry& geometry, std::vector<Note>& notes) {
+  auto first = first_of_extent(fields, "Segment0_Extent", sizes);
+  if (!first) first = first_of_extent(fields, "Segmentation_Extent", sizes);
+  for (std::size_t row = 0; first && row < 3; ++row) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      geometry.origin[row] +=
+          geometry.direction[row * 3 + axis] * geometry.spacing[axis] * (*first)[axis];
+    }
+  }
+  turn_into_lps(geometry, {"ras", {-1, -1, 1}});
+  notes.push_back(
+      note_of(NoteCode::kSpaceAssumed,
+              std::string("The NRRD header's space has four dimensions and no name; it "
+                          "was taken for RAS, as Slicer does") +
+                  (first ? ", with the samples where the segment's extent begins." : ".")));
+}
+
+bool is_unnamed_4d(const NrrdFields& fields, std::size_t dimension) {
+  return dimension == 4 && !space_of(fields);
+}
+
+}  // namespace
+
+Geometry nrrd_geometry(const NrrdFields& fields, const std::vector<std::uint64_t>& sizes,
+                       std::vector<Note>& notes) {
+  const std::vector<std::string> kinds = kinds_of(fields, sizes.size());
+  const auto apart = static_cast<std::size_t>(
+      std::ranges::count_if(kinds, [](const std::string& kind) { return !is_lattice_kind(kind); }));
+  check_space_is_told(fields, apart);
   const std::size_t dimension = space_dimension(fields);
   const std::vector<Axis> axes = lattice_axes(fields, sizes, dimension);
   Geometry geometry;
@@ -387,7 +484,8 @@ Geometry nrrd_geometry(const NrrdFields& fields, std::span<const std::uint64_t> 
   set_space_origin(geometry, fields, dimension);
   if (dimension == 0 && !axes.empty()) set_origin_from_mins(geometry, axes);
   if (const auto space = space_of(fields)) turn_into_lps(geometry, *space);
-  scale_to_millimetres(geometry, unit_of(fields));
+  if (is_unnamed_4d(fields, dimension)) place_as_slicer(fields, sizes, geometry, notes);
+  scale_to_millimetres(geometry, unit_of(fields), notes);
   return geometry;
 }
 

@@ -407,7 +407,8 @@ bool is_vti(std::string_view head) {
   return trimmed(head).starts_with('<') && head.find("<VTKFile") != std::string_view::npos;
 }
 
-SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/) {
+SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
+                       const ImportOptions& options) {
   const Document document = Parser(file).parse();
   if (document.pieces != 1) {
     throw_unusable("The VTK file has " + std::to_string(document.pieces) +
@@ -424,6 +425,7 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/) 
   check_components(array);
   SourceVolume volume;
   volume.dims = extent.dims;
+  choose_volume(1, {}, options, volume);
   volume.layout.type = type_of(array);
   place_samples(file, document, array, volume);
   volume.geometry = geometry_of(document.image, extent);

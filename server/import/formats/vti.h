@@ -14,6 +14,7 @@ bool is_vti(std::string_view head);
 // Reads the XML up to the samples. They are the scalars of the point data, of one component, in one
 // piece that fills the whole extent. VTK does not say how its space lies in the patient; it is
 // taken for LPS, as programs made with ITK write it. Throws Error kUnusableVolume.
-SourceVolume parse_vti(const InputFile& file, const Companions& companions);
+SourceVolume parse_vti(const InputFile& file, const Companions& companions,
+                       const ImportOptions& options);
 
 }  // namespace isomesh::import

@@ -55,9 +55,9 @@ describe('several files', () => {
           title: 'Unusable volume',
           status: 422,
           detail: 'the upload holds 2 series',
-          errors: [
-            { field: 'series', message: '1.2.840.1 "head", 93 slices' },
-            { field: 'series', message: '1.2.840.2 "chest", 40 slices' },
+          choices: [
+            { parameter: 'series', value: '1.2.840.1', title: 'head, 93 slices' },
+            { parameter: 'series', value: '1.2.840.2', title: 'chest, 40 slices' },
           ],
         }),
       });
@@ -65,7 +65,7 @@ describe('several files', () => {
     await page.goto(daemon.url);
     await drop(page, [{ name: 'study.nrrd', bytes: ballNrrd(16, 5, 3) }]);
     const choice = page.getByLabel('Series to read');
-    await choice.selectOption({ label: '1.2.840.2 "chest", 40 slices' });
+    await choice.selectOption({ label: 'chest, 40 slices (1.2.840.2)' });
     await page.getByRole('button', { name: 'Upload this series' }).click();
     await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
     expect(asked).toEqual(['', '1.2.840.2']);

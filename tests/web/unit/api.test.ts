@@ -1,9 +1,9 @@
 import { describe, expect, it } from 'vitest';
 import { EventParser } from '@/api/events';
 import { merged } from '@/api/follow';
-import { adviceFor, ApiError, asApiError, errorOf, seriesOf } from '@/api/problem';
+import { adviceFor, ApiError, asApiError, choicesOf, errorOf } from '@/api/problem';
 import type { Job } from '@/api/types';
-import { uploadPath } from '@/api/upload';
+import { dispositionOf, uploadedOf, uploadPath } from '@/api/upload';
 
 describe('errorOf', () => {
   it('takes a problem by its words', () => {
@@ -12,11 +12,16 @@ describe('errorOf', () => {
       title: 'Unusable volume',
       status: 422,
       detail: 'slice 41 of 93 is missing',
-      errors: [{ field: 'series', message: '1.2.840.1: head, 93 slices' }],
+      overridable: 'frame-of-reference',
+      choices: [{ parameter: 'series', value: '1.2.840.1', title: 'head, 93 slices' }],
     });
     const error = errorOf(422, body);
     expect(error).toMatchObject({ status: 422, title: 'Unusable volume', detail: 'slice 41 of 93 is missing' });
-    expect(seriesOf(error)).toEqual([{ uid: '1.2.840.1', text: '1.2.840.1: head, 93 slices' }]);
+    expect(error.remedy.overridable).toBe('frame-of-reference');
+    expect([...choicesOf(error)]).toEqual([
+      ['series', [{ parameter: 'series', value: '1.2.840.1', title: 'head, 93 slices' }]],
+    ]);
+    expect(adviceFor(error)).toBe('');
   });
 
   it('says the status of a proxy that answers with a page of its own', () => {
@@ -68,10 +73,23 @@ describe('merged', () => {
 });
 
 describe('uploadPath', () => {
-  it('describes raw samples and the series', () => {
+  it('describes raw samples and what was chosen', () => {
     expect(uploadPath({})).toBe('/v1/volumes');
-    expect(uploadPath({ series: '1.2.3' })).toBe('/v1/volumes?series=1.2.3');
+    expect(uploadPath({ choices: { series: '1.2.3', volume: '4' } })).toBe('/v1/volumes?series=1.2.3&volume=4');
     const raw = { dims: [2, 3, 4] as [number, number, number], type: 'int16' as const, spacing: [1, 1, 0.5] as [number, number, number], byteOrder: 'big' as const };
     expect(decodeURIComponent(uploadPath({ raw }))).toBe('/v1/volumes?dims=2,3,4&type=int16&spacing=1,1,0.5&byte_order=big');
+  });
+});
+
+describe('dispositionOf', () => {
+  it('tells any name in ASCII', () => {
+    expect(dispositionOf("M\u00fcller's ct.nii")).toBe("attachment; filename*=UTF-8''M%C3%BCller%27s%20ct.nii");
+  });
+});
+
+describe('uploadedOf', () => {
+  it('is a list for one volume and for several', () => {
+    expect(uploadedOf(201, '{"id":"a"}')).toEqual([{ member: '', status: 201, volume: { id: 'a' }, problem: null }]);
+    expect(uploadedOf(207, '{"volumes":[{"member":"b"},{"member":"c"}]}')).toHaveLength(2);
   });
 });

@@ -51,6 +51,15 @@ export function getVolume(id: string): Promise<Volume> {
   return json(`/v1/volumes/${encodeURIComponent(id)}`);
 }
 
+// Gives the volume another name, or none.
+export function renameVolume(id: string, name: string | null): Promise<Volume> {
+  return json(`/v1/volumes/${encodeURIComponent(id)}`, {
+    method: 'PATCH',
+    headers: { 'Content-Type': 'application/json' },
+    body: JSON.stringify({ name }),
+  });
+}
+
 export async function eraseVolume(id: string): Promise<void> {
   await send(`/v1/volumes/${encodeURIComponent(id)}`, { method: 'DELETE' });
 }

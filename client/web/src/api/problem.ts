@@ -1,4 +1,7 @@
-import type { FieldFault, Problem } from './types';
+import type { Choice, FieldFault, Problem } from './types';
+
+// Of a refusal: the note that a person may accept, and what there is to choose from.
+export type Remedy = Pick<Problem, 'overridable' | 'choices'>;
 
 // A request that the daemon refused, or (status 0) that never reached it.
 export class ApiError extends Error {
@@ -7,6 +10,8 @@ export class ApiError extends Error {
     readonly title: string,
     readonly detail: string,
     readonly faults: FieldFault[] = [],
+    // What can be added to the request so that it is not refused again.
+    readonly remedy: Remedy = {},
   ) {
     super(detail || title);
     this.name = 'ApiError';
@@ -28,6 +33,7 @@ export function errorOfProblem(problem: Problem): ApiError {
     problem.title,
     problem.detail,
     Array.isArray(problem.errors) ? problem.errors : [],
+    { overridable: problem.overridable, choices: problem.choices },
   );
 }
 
@@ -59,6 +65,7 @@ export function asApiError(error: unknown): ApiError {
 
 // What a person can do about it, in one sentence; empty when the detail says all.
 export function adviceFor(error: ApiError): string {
+  if (error.remedy.overridable !== undefined || choicesOf(error).size > 0) return '';
   switch (error.status) {
     case 0:
       return 'The page tries again by itself.';
@@ -89,12 +96,11 @@ export function mayPass({ status }: ApiError): boolean {
   return ![400, 413, 415, 422].includes(status);
 }
 
-// The series that a refusal offers to choose from.
-export function seriesOf(error: ApiError): { uid: string; text: string }[] {
-  return error.faults
-    .filter(({ field }) => field === 'series')
-    .flatMap(({ message }) => {
-      const uid = /\d+(\.\d+)+/.exec(message)?.[0];
-      return uid === undefined ? [] : [{ uid, text: message }];
-    });
+// The choices by their parameters: one of each can be taken.
+export function choicesOf({ remedy }: ApiError): Map<Choice['parameter'], Choice[]> {
+  const byParameter = new Map<Choice['parameter'], Choice[]>();
+  for (const choice of remedy.choices ?? []) {
+    byParameter.set(choice.parameter, [...(byParameter.get(choice.parameter) ?? []), choice]);
+  }
+  return byParameter;
 }

@@ -29,6 +29,9 @@ export type QualityStages = Schemas['QualityStages'];
 export type Problem = Schemas['Problem'];
 export type FieldFault = NonNullable<Problem['errors']>[number];
 
+export type Choice = NonNullable<Problem['choices']>[number];
+export type UploadedVolume = Schemas['UploadedVolumes']['volumes'][number];
+
 export function isFinal(state: JobState): boolean {
   return state === 'succeeded' || state === 'failed' || state === 'cancelled';
 }

@@ -1,7 +1,7 @@
 // Uploads with their progress, which fetch cannot tell.
 import { connected, headers, unauthorized } from './client';
 import { ApiError, errorOf, unreachable } from './problem';
-import type { SampleType, Volume } from './types';
+import type { SampleType, UploadedVolume, Volume } from './types';
 
 export interface RawDescription {
   dims: [number, number, number];
@@ -12,13 +12,16 @@ export interface RawDescription {
 
 export interface UploadOptions {
   raw?: RawDescription;
-  series?: string;
+  // What chooses and accepts, by its parameter of the query.
+  choices?: Readonly<Record<string, string>>;
+  // What the file is called.
+  name?: string;
   signal: AbortSignal;
   // Bytes that are sent; all of them while the daemon reads the volume.
   onProgress: (sent: number, total: number) => void;
 }
 
-export function uploadPath(options: Pick<UploadOptions, 'raw' | 'series'>): string {
+export function uploadPath(options: Pick<UploadOptions, 'raw' | 'choices'>): string {
   const query = new URLSearchParams();
   if (options.raw) {
     query.set('dims', options.raw.dims.join(','));
@@ -26,22 +29,30 @@ export function uploadPath(options: Pick<UploadOptions, 'raw' | 'series'>): stri
     query.set('spacing', options.raw.spacing.join(','));
     query.set('byte_order', options.raw.byteOrder);
   }
-  if (options.series !== undefined) query.set('series', options.series);
+  for (const [parameter, value] of Object.entries(options.choices ?? {})) query.set(parameter, value);
   const text = query.toString();
   return `/v1/volumes${text === '' ? '' : `?${text}`}`;
 }
 
-export interface Uploaded {
-  volume: Volume;
-  isNew: boolean;
+// The header that tells a file's name, which is in no address because logs hold those.
+export function dispositionOf(name: string): string {
+  return `attachment; filename*=UTF-8''${encodeURIComponent(name).replaceAll("'", '%27')}`;
 }
 
-export function upload(body: Blob, options: UploadOptions): Promise<Uploaded> {
+// What became of each volume of the body; the only one has an empty member.
+export function uploadedOf(status: number, body: string): UploadedVolume[] {
+  const answer: unknown = JSON.parse(body);
+  if (status === 207) return (answer as { volumes: UploadedVolume[] }).volumes;
+  return [{ member: '', status, volume: answer as Volume, problem: null }];
+}
+
+export function upload(body: Blob, options: UploadOptions): Promise<UploadedVolume[]> {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open('POST', uploadPath(options));
     for (const [name, value] of Object.entries(headers())) request.setRequestHeader(name, value);
     request.setRequestHeader('Content-Type', 'application/octet-stream');
+    if (options.name !== undefined) request.setRequestHeader('Content-Disposition', dispositionOf(options.name));
     let sent = 0;
     request.upload.onprogress = (event) => {
       sent = event.loaded;
@@ -50,11 +61,8 @@ export function upload(body: Blob, options: UploadOptions): Promise<Uploaded> {
     request.upload.onload = () => options.onProgress(body.size, body.size);
     request.onload = () => {
       connected.value = true;
-      if (request.status === 200 || request.status === 201) {
-        resolve({
-          volume: JSON.parse(request.responseText) as Volume,
-          isNew: request.status === 201,
-        });
+      if ([200, 201, 207].includes(request.status)) {
+        resolve(uploadedOf(request.status, request.responseText));
         return;
       }
       if (request.status === 401) unauthorized.value = true;

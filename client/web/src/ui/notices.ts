@@ -46,19 +46,17 @@ export function refusal(error: ApiError, ...actions: Child[]): HTMLElement {
   );
 }
 
-// Resolves with true when the person agrees.
-export function ask(title: string, text: string, action: string): Promise<boolean> {
+// Shows a dialog; resolves with whether the person agrees.
+function showDialog(title: string, content: Child, action: HTMLButtonElement, dialog: HTMLDialogElement): Promise<boolean> {
   return new Promise((resolve) => {
-    const dialog = h(
-      'dialog',
-      { class: 'dialog', 'aria-label': title },
+    dialog.append(
       h('h2', {}, title),
-      h('p', {}, text),
+      h('div', {}, content),
       h(
         'div',
         { class: 'actions' },
         button('Cancel', () => dialog.close(), { autofocus: true }),
-        button(action, () => dialog.close('yes'), { class: 'danger' }),
+        action,
       ),
     );
     dialog.addEventListener('close', () => {
@@ -68,4 +66,19 @@ export function ask(title: string, text: string, action: string): Promise<boolea
     document.body.append(dialog);
     dialog.showModal();
   });
+}
+
+// Resolves with true when the person agrees.
+export function ask(title: string, text: string, action: string): Promise<boolean> {
+  const dialog = h('dialog', { class: 'dialog', 'aria-label': title });
+  const agree = button(action, () => dialog.close('yes'), { class: 'danger' });
+  return showDialog(title, h('p', {}, text), agree, dialog);
+}
+
+// Resolves with the text that the person enters, which may be empty, or null.
+export async function askText(title: string, text: string, action: string): Promise<string | null> {
+  const dialog = h('dialog', { class: 'dialog', 'aria-label': title });
+  const input = h('input', { type: 'text', value: text, maxlength: 255, 'aria-label': title });
+  const agree = button(action, () => dialog.close('yes'), { class: 'primary' });
+  return (await showDialog(title, input, agree, dialog)) ? input.value.trim() : null;
 }

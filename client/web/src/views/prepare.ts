@@ -1,5 +1,5 @@
 // A volume and the iso-value to be chosen in it: #/volumes/ID.
-import { estimateOf, getVolume, histogramOf, listJobs, submitJob } from '../api/client';
+import { estimateOf, getVolume, histogramOf, listJobs, renameVolume, submitJob } from '../api/client';
 import { asApiError, type ApiError } from '../api/problem';
 import type { Estimate, JobParameters, Vec3, Volume } from '../api/types';
 import {
@@ -22,7 +22,7 @@ import {
   formatSpacing,
   formatValue,
 } from '../ui/format';
-import { refusal, tellError } from '../ui/notices';
+import { askText, refusal, tellError } from '../ui/notices';
 import { go, hashOf, noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { cssColour, theme } from '../ui/theme';
@@ -74,6 +74,32 @@ function ignoredNote({ ignored }: Volume): HTMLElement | null {
     h('summary', {}, ignored.length === 1 ? '1 file was left out' : `${ignored.length} files were left out`),
     h('ul', {}, ...ignored.map(({ name, reason }) => h('li', {}, h('b', {}, name), `: ${reason}`))),
   );
+}
+
+// What the server decided or corrected when it read the upload.
+function notesOf({ notes }: Volume): HTMLElement | null {
+  if (notes.length === 0) return null;
+  return h(
+    'ul',
+    { class: 'notes', 'aria-label': 'Notes' },
+    ...notes.map(({ code, detail }) => h('li', { 'data-note': code }, detail)),
+  );
+}
+
+// The volume's name, which a person can change.
+function nameHeading(volume: Volume): HTMLElement {
+  const text = h('span', {}, volumeName(volume));
+  const rename = async (): Promise<void> => {
+    const name = await askText('Name of this volume', volume.name ?? '', 'Rename');
+    if (name === null) return;
+    try {
+      volume.name = (await renameVolume(volume.id, name === '' ? null : name)).name;
+      text.textContent = volumeName(volume);
+    } catch (error) {
+      tellError(error);
+    }
+  };
+  return h('h1', {}, text, ' ', button('Rename', () => void rename(), { class: 'quiet' }));
 }
 
 function factsOf(volume: Volume): string {
@@ -214,8 +240,9 @@ class Prepare {
     return h(
       'div',
       { class: 'slice-help' },
-      h('h1', {}, volumeName(volume)),
+      nameHeading(volume),
       h('p', { class: 'facts' }, factsOf(volume)),
+      notesOf(volume),
       ignoredNote(volume),
       sliceHelp(),
       h('div', { class: 'actions' }, reset, this.windowText),

@@ -1,6 +1,6 @@
 // Where volumes are dropped: one file, a folder of slices, or several files.
-import { ApiError, asApiError, mayPass, seriesOf } from '../api/problem';
-import type { Volume } from '../api/types';
+import { ApiError, asApiError, choicesOf, mayPass } from '../api/problem';
+import type { Choice, UploadedVolume } from '../api/types';
 import { upload, type RawDescription } from '../api/upload';
 import { button, field, h, icon } from '../ui/dom';
 import { formatBytes } from '../ui/format';
@@ -15,10 +15,10 @@ const arrow = 'M8 11V2.5M4.5 6 8 2.5 11.5 6M2.5 10.5v3h11v-3';
 // What a person added to an upload that was refused.
 interface Addition {
   raw?: RawDescription;
-  series?: string;
+  choices?: Readonly<Record<string, string>>;
 }
 
-type OnVolume = (volume: Volume, isNew: boolean, name: string) => void;
+type OnVolumes = (uploaded: UploadedVolume[]) => void;
 
 // How far an upload is.
 class Progress {
@@ -51,7 +51,7 @@ export class UploadPanel {
 
   constructor(
     private readonly scope: Scope,
-    private readonly onVolume: OnVolume,
+    private readonly onVolumes: OnVolumes,
   ) {
     this.element = h(
       'section',
@@ -109,18 +109,19 @@ export class UploadPanel {
     const progress = new Progress(gathered.body.size);
     this.showRunning(gathered, progress, controller);
     try {
-      const { volume, isNew } = await upload(gathered.body, {
+      const uploaded = await upload(gathered.body, {
         ...addition,
+        name: gathered.name,
         signal: controller.signal,
         onProgress: (sent) => progress.show(sent),
       });
       if (this.scope.isOver) return;
       this.showIdle();
-      this.onVolume(volume, isNew, gathered.name);
+      this.onVolumes(uploaded);
     } catch (error) {
       if (this.scope.isOver) return;
       if (error instanceof DOMException && error.name === 'AbortError') this.showIdle();
-      else this.showRefused(asApiError(error), gathered);
+      else this.showRefused(asApiError(error), gathered, addition);
     } finally {
       this.running = null;
     }
@@ -152,14 +153,13 @@ export class UploadPanel {
   }
 
   // What the server refused, with all that may help it: another try, a choice, a description.
-  private showRefused(error: ApiError, gathered: Gathered): void {
+  private showRefused(error: ApiError, gathered: Gathered, before: Addition): void {
     this.element.classList.remove('busy');
-    const again = mayPass(error) && button('Try again', () => void this.send(gathered));
-    const series = seriesOf(error);
-    const parts: Node[] = [
-      refusal(series.length > 0 ? withoutSeries(error) : error, again, this.otherButton()),
-    ];
-    if (series.length > 0) parts.push(seriesForm(series, (uid) => void this.send(gathered, { series: uid })));
+    const again = mayPass(error) && button('Try again', () => void this.send(gathered, before));
+    const addTo = (more: Record<string, string>): void =>
+      void this.send(gathered, { ...before, choices: { ...before.choices, ...more } });
+    const parts: Node[] = [refusal(error, again, acceptButton(error, before, addTo), this.otherButton())];
+    for (const [parameter, choices] of choicesOf(error)) parts.push(choiceForm(parameter, choices, addTo));
     if (error.status === 415 && gathered.count === 1) {
       parts.push(rawForm(gathered.body.size, (raw) => void this.send(gathered, { raw })));
     }
@@ -175,28 +175,32 @@ export class UploadPanel {
   }
 }
 
-function withoutSeries(error: ApiError): ApiError {
-  return new ApiError(
-    error.status,
-    error.title,
-    error.detail,
-    error.faults.filter((fault) => fault.field !== 'series'),
-  );
+// Has the upload taken in spite of what it was refused for, beside what was accepted before.
+function acceptButton(
+  { remedy: { overridable } }: ApiError,
+  before: Addition,
+  onAccept: (more: Record<string, string>) => void,
+): HTMLButtonElement | false {
+  if (overridable === undefined) return false;
+  const accept = [before.choices?.['accept'], overridable].filter(Boolean).join(',');
+  return button('Take it in spite of this', () => onAccept({ accept }));
 }
 
-function seriesForm(
-  series: { uid: string; text: string }[],
-  onChoice: (uid: string) => void,
+function choiceForm(
+  parameter: Choice['parameter'],
+  choices: Choice[],
+  onChoice: (more: Record<string, string>) => void,
 ): HTMLElement {
-  const choice = h(
+  const noun = { series: 'series', member: 'file', volume: 'volume' }[parameter];
+  const select = h(
     'select',
     {},
-    ...series.map(({ uid, text }) => h('option', { value: uid }, text)),
+    ...choices.map(({ value, title }) => h('option', { value }, title === '' ? value : `${title} (${value})`)),
   );
   return h(
     'div',
     { class: 'series' },
-    field('Series to read', choice),
-    button('Upload this series', () => onChoice(choice.value), { class: 'primary' }),
+    field(`${noun.charAt(0).toUpperCase()}${noun.slice(1)} to read`, select),
+    button(`Upload this ${noun}`, () => onChoice({ [parameter]: select.value }), { class: 'primary' }),
   );
 }

@@ -1,5 +1,6 @@
 // The first view: upload, the volumes that are there, the last surfaces.
 import { eraseVolume, listJobs, listVolumes, slicePicture } from '../api/client';
+import { errorOfProblem } from '../api/problem';
 import type { Job, Volume } from '../api/types';
 import { inWords } from '../job/parameters';
 import { button, h } from '../ui/dom';
@@ -8,7 +9,7 @@ import { ask, tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { axisIndex, slicePlane } from '../volume/geometry';
-import { nameIn, rememberName, volumeKind, volumeName } from '../volume/names';
+import { nameIn, volumeKind, volumeName } from '../volume/names';
 import { UploadPanel } from './upload_panel';
 
 const shownJobs = 8;
@@ -142,10 +143,19 @@ export async function volumesView(scope: Scope): Promise<HTMLElement> {
     surfaces.replaceChildren(...jobs.map((job) => surfaceRow(job, nameIn(byId, job.volume))));
     if (jobs.length === 0) surfaces.append(h('li', { class: 'empty' }, 'No surfaces yet.'));
   };
-  const panel = new UploadPanel(scope, (volume, isNew, name) => {
-    rememberName(volume.id, name);
-    if (!isNew) tell('This volume was there already.');
-    go(['volumes', volume.id]);
+  const panel = new UploadPanel(scope, (uploaded) => {
+    const [first] = uploaded;
+    if (uploaded.length === 1 && first?.volume) {
+      if (first.status === 200) tell('This volume was there already.');
+      go(['volumes', first.volume.id]);
+      return;
+    }
+    for (const { member, problem } of uploaded) {
+      if (problem) tellError(errorOfProblem({ ...problem, title: `${member}: ${problem.title}` }));
+    }
+    const stored = uploaded.filter(({ volume }) => volume !== null).length;
+    tell(`${stored} of the ${uploaded.length} volumes in the upload were stored.`);
+    void show().catch(tellError);
   });
   await show();
   return h(

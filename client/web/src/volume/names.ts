@@ -1,13 +1,6 @@
-// Volumes have no names on the server; what a file was called is kept as long as the tab, and never
-// leaves it: names of files can name patients.
+// What a person calls a volume.
 import type { Volume } from '../api/types';
 import { formatDims, formatNames } from '../ui/format';
-
-const key = (id: string): string => `isomesh.name.${id}`;
-
-export function rememberName(id: string, name: string): void {
-  sessionStorage.setItem(key(id), name);
-}
 
 // A date of DICOM, 20240501, for people.
 function dateOf(text: string | undefined): string {
@@ -15,12 +8,12 @@ function dateOf(text: string | undefined): string {
   return match ? `${match[1]}-${match[2]}-${match[3]}` : '';
 }
 
-// What a person would call the volume: whose and which study it is, the file, or else what it holds.
+// Whose and which study it is, and what it is called; or else what it holds.
 export function volumeName(volume: Volume): string {
   const { patient_name: patient, series_description: series, study_date: date } = volume.dicom ?? {};
-  const told = [patient?.replaceAll('^', ' ').trim(), series?.trim(), dateOf(date)].filter(Boolean);
-  if (told.length > 0) return told.join(', ');
-  return sessionStorage.getItem(key(volume.id)) ?? volumeKind(volume);
+  const own = (volume.name ?? series)?.trim();
+  const told = [patient?.replaceAll('^', ' ').trim(), own, dateOf(date)].filter(Boolean);
+  return told.length > 0 ? told.join(', ') : volumeKind(volume);
 }
 
 // Of a job's volume, which may be gone.

@@ -1,0 +1,156 @@
+#include "server/import/formats/nifti_header.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <optional>
+
+namespace isomesh::import {
+namespace {
+
+constexpr std::size_t kNifti1Bytes = 348;
+constexpr std::size_t kNifti2Bytes = 540;
+
+class Fields {
+ public:
+  Fields(std::string_view bytes, bool big_endian) : bytes_(bytes), big_endian_(big_endian) {}
+
+  template <class Stored>
+  Stored at(std::size_t offset) const {
+    std::array<std::byte, sizeof(Stored)> raw;
+    std::memcpy(raw.data(), bytes_.data() + offset, sizeof(Stored));
+    if (big_endian_) std::reverse(raw.begin(), raw.end());
+    Stored value;
+    std::memcpy(&value, raw.data(), sizeof(Stored));
+    return value;
+  }
+
+  template <class Stored, class Value, std::size_t Count>
+  void read(std::size_t offset, std::array<Value, Count>& values) const {
+    for (Value& value : values) {
+      value = at<Stored>(offset);
+      offset += sizeof(Stored);
+    }
+  }
+
+ private:
+  std::string_view bytes_;
+  bool big_endian_;
+};
+
+enum class Version { kOne, kTwo };
+
+struct Kind {
+  Version version = Version::kOne;
+  bool big_endian = false;
+  bool detached = false;
+  bool is_analyze = false;
+};
+
+// Analyze has no magic, so that more is asked of its header than of others: its fields "extents"
+// and "regular" as its manual has them, a known datatype with its bits, sizes of one to seven axes.
+bool is_analyze(const Fields& fields) {
+  struct Row {
+    int datatype;
+    int bits;
+  };
+  static constexpr Row kTypes[] = {{2, 8}, {4, 16}, {8, 32}, {16, 32}, {64, 64}, {132, 16}};
+  const auto axes = fields.at<std::int16_t>(40);
+  const auto is_its_type = [&](const Row& row) {
+    return fields.at<std::int16_t>(70) == row.datatype && fields.at<std::int16_t>(72) == row.bits;
+  };
+  return fields.at<char>(38) == 'r' && axes >= 1 && axes <= 7 &&
+         std::ranges::any_of(kTypes, is_its_type);
+}
+
+std::optional<Kind> kind_of(std::string_view head) {
+  using std::string_view_literals::operator""sv;
+  if (head.size() < kNifti1Bytes) return std::nullopt;
+  for (const bool big_endian : {false, true}) {
+    const auto size = Fields(head, big_endian).at<std::int32_t>(0);
+    if (size == kNifti1Bytes) {
+      const std::string_view magic = head.substr(344, 4);
+      if (magic == "n+1\0"sv || magic == "ni1\0"sv) {
+        return Kind{Version::kOne, big_endian, magic == "ni1\0"sv};
+      }
+      if (is_analyze(Fields(head, big_endian))) return Kind{Version::kOne, big_endian, true, true};
+    }
+    if (size == kNifti2Bytes) {
+      const std::string_view magic = head.substr(4, 4);
+      if (magic == "n+2\0"sv || magic == "ni2\0"sv) {
+        return Kind{Version::kTwo, big_endian, magic == "ni2\0"sv};
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+NiftiHeader read_nifti1(const Fields& fields) {
+  NiftiHeader header;
+  fields.read<std::int16_t>(40, header.dim);
+  header.datatype = fields.at<std::int16_t>(70);
+  header.bits = fields.at<std::int16_t>(72);
+  fields.read<float>(76, header.pixdim);
+  header.vox_offset = fields.at<float>(108);
+  header.slope = fields.at<float>(112);
+  header.intercept = fields.at<float>(116);
+  header.units = fields.at<std::uint8_t>(123);
+  header.qform_code = fields.at<std::int16_t>(252);
+  header.sform_code = fields.at<std::int16_t>(254);
+  fields.read<float>(256, header.quaternion);
+  fields.read<float>(268, header.qoffset);
+  fields.read<float>(280, header.srow);
+  return header;
+}
+
+NiftiHeader read_nifti2(const Fields& fields) {
+  NiftiHeader header;
+  header.datatype = fields.at<std::int16_t>(12);
+  header.bits = fields.at<std::int16_t>(14);
+  fields.read<std::int64_t>(16, header.dim);
+  fields.read<double>(104, header.pixdim);
+  header.vox_offset = static_cast<double>(fields.at<std::int64_t>(168));
+  header.slope = fields.at<double>(176);
+  header.intercept = fields.at<double>(184);
+  header.qform_code = fields.at<std::int32_t>(344);
+  header.sform_code = fields.at<std::int32_t>(348);
+  fields.read<double>(352, header.quaternion);
+  fields.read<double>(376, header.qoffset);
+  fields.read<double>(400, header.srow);
+  header.units = fields.at<std::int32_t>(500);
+  return header;
+}
+
+// What Analyze's header has in the place of NIfTI's fields means something else.
+void forget_what_is_no_analyze(NiftiHeader& header) {
+  constexpr int kUint16OfSpm = 132;
+  constexpr int kUint16 = 512;
+  if (header.datatype == kUint16OfSpm) header.datatype = kUint16;
+  header.intercept = 0;
+  header.units = 0;
+  header.qform_code = 0;
+  header.sform_code = 0;
+  for (double& size : header.pixdim) size = std::abs(size);
+}
+
+}  // namespace
+
+bool begins_as_nifti(std::string_view head) { return kind_of(head).has_value(); }
+
+NiftiHeader read_nifti_header(std::string_view head) {
+  const auto kind = kind_of(head);
+  if (!kind) throw_unusable("The NIfTI header is damaged.");
+  if (kind->version == Version::kTwo && head.size() < kNifti2Bytes) {
+    throw_unusable("The file ends within its NIfTI-2 header.");
+  }
+  const Fields fields(head, kind->big_endian);
+  NiftiHeader header = kind->version == Version::kOne ? read_nifti1(fields) : read_nifti2(fields);
+  header.big_endian = kind->big_endian;
+  header.bytes = kind->version == Version::kOne ? kNifti1Bytes : kNifti2Bytes;
+  header.is_detached = kind->detached;
+  header.is_analyze = kind->is_analyze;
+  if (kind->is_analyze) forget_what_is_no_analyze(header);
+  return header;
+}
+
+}  // namespace isomesh::import

@@ -1,0 +1,44 @@
+// The fields of NIfTI-1, NIfTI-2 and Analyze 7.5 headers that a volume needs. Internal to the
+// reader.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "server/import/names.h"
+
+namespace isomesh::import {
+
+// As many leading bytes hold the header of any version.
+inline constexpr std::size_t kNiftiHeaderBytes = 540;
+
+// In this machine's byte order.
+struct NiftiHeader {
+  bool big_endian = false;
+  bool is_analyze = false;   // an Analyze header, which knows no place in space
+  bool is_detached = false;  // the samples are in a file of their own
+  std::int64_t bytes = 0;    // of the header
+  std::array<std::int64_t, 8> dim = {};
+  std::array<double, 8> pixdim = {};
+  int datatype = 0;
+  int bits = 0;
+  double vox_offset = 0;
+  double slope = 0;
+  double intercept = 0;
+  int units = 0;
+  int qform_code = 0;
+  int sform_code = 0;
+  std::array<double, 3> quaternion = {};
+  Vector3 qoffset = {};
+  std::array<double, 12> srow = {};  // row-major, 3 x 4
+};
+
+// Whether a file of one of the three begins so. Analyze's header has no magic: the size of a
+// header, and fields that have few possible values, tell it.
+bool begins_as_nifti(std::string_view head);
+
+// Throws Error kUnusableVolume.
+NiftiHeader read_nifti_header(std::string_view head);
+
+}  // namespace isomesh::import
