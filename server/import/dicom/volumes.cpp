@@ -291,7 +291,7 @@ std::vector<Slices> grouped(const Slices& slices, const IsSame& is_same) {
   return groups;
 }
 
-bool is_mosaic(const Slice& slice) { return slice.image->tiles_per_row > 0; }
+bool is_tile(const Slice& slice) { return slice.image->tiles_per_row > 0; }
 
 // The slices of each mosaic, in the order of their instance numbers.
 std::vector<Slices> mosaics_of(const Slices& slices) {
@@ -351,7 +351,7 @@ std::string described(const Slice& slice) {
 }  // namespace
 
 SeriesVolumes split_volumes(std::vector<Slice> slices) {
-  if (std::ranges::all_of(slices, is_mosaic)) return one_a_mosaic(slices);
+  if (std::ranges::all_of(slices, is_tile)) return one_a_mosaic(slices);
   std::vector<Slices> groups = grouped(slices, same_lattice);
   if (groups.size() == 1) return split_by_phase(std::move(groups.front()));
   SeriesVolumes result;
