@@ -157,7 +157,7 @@ std::vector<double> required_numbers(const DataSet& data, Tag tag, std::size_t c
 
 Vector3 unit_vector(const double* parts) {
   Vector3 vector = {parts[0], parts[1], parts[2]};
-  const double size = length(vector);
+  const double size = std::sqrt(dot(vector, vector));
   if (!(std::abs(size - 1) <= kCosineTolerance)) {
     throw_unusable("The DICOM image's orientation is not made of unit vectors.");
   }

@@ -50,6 +50,7 @@ Tiling tiling_of(double count, bool is_square) {
 
 void cut(const Tiling& tiling, Image& image) {
   const PixelLayout& whole = image.stored;
+  if (whole.bits_allocated < 8) throw_unusable("The DICOM image is a mosaic of single bits.");
   if (whole.columns % tiling.columns != 0 || whole.rows % tiling.rows != 0) {
     throw_unusable(
         "The DICOM image is a mosaic of " + std::to_string(tiling.slices) + " slices, and its " +

@@ -45,7 +45,6 @@ bool is_needed_sequence(Tag tag) {
     case kDiffusionGradientSequence:
     case kCardiacSequence:
     case kMrImageFrameTypeSequence:
-    case kGridFrames:
     case kPlanePositionSequence:
     case kPlaneOrientationSequence:
     case kModalityLutSequence:
@@ -204,7 +203,8 @@ class Parser {
     const auto needed = blocks_.needed(head.tag);
     Head known = head;
     if (needed) known.tag = *needed;
-    Element element = read_content(known, encoding, end(), 0);
+    Element element =
+        read_content(known, encoding, end(), 0, needed ? Meaning::kKnownPrivate : Meaning::kPublic);
     if (needed) return keep(set, std::move(element));
     blocks_.reserve(head.tag, without_padding(element.value));
   }
@@ -219,15 +219,18 @@ class Parser {
     if (!is_private(head.tag)) keep(set, std::move(element));
   }
 
+  // Whose dictionary a tag is looked up in.
+  enum class Meaning { kPublic, kKnownPrivate };
+
   Element read_content(const Head& head, const Encoding& encoding, std::uint64_t limit,
-                       unsigned depth) {
+                       unsigned depth, Meaning meaning = Meaning::kPublic) {
     Element element;
     element.tag = head.tag;
-    const bool is_sequence =
-        head.vr == "SQ" || head.has_undefined_length() || is_needed_sequence(head.tag);
+    const bool is_known = meaning == Meaning::kKnownPrivate;
+    const bool is_sequence = head.vr == "SQ" || head.has_undefined_length() ||
+                             (is_known ? head.tag == kGridFrames : is_needed_sequence(head.tag));
     if (!is_sequence) {
-      element.value = read_value(
-          head, limit, head.tag == kCsaImageHeader ? kLongestPrivateValue : kLongestValue);
+      element.value = read_value(head, limit, is_known ? kLongestPrivateValue : kLongestValue);
       return element;
     }
     // Systems that do not know an element pass it on as UN, with its items in implicit encoding.

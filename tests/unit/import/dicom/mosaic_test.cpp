@@ -79,6 +79,11 @@ TEST(DicomMosaic, IsRefusedWhenItDoesNotSayWhereSlicesLie) {
               HasSubstr("unit vectors"));
   EXPECT_THAT(import_one(siemens_mosaic().erase(kSpacingBetweenSlices)).error,
               HasSubstr("how far apart"));
+  EXPECT_THAT(
+      import_one(
+          siemens_mosaic().number(kBitsAllocated, 1).number(kBitsStored, 1).number(kHighBit, 0))
+          .error,
+      HasSubstr("single bits"));
   CsaFields many = csa_fields({"0", "0", "1"});
   many[1].second = {"17"};
   EXPECT_THAT(import_one(siemens_mosaic(many)).error, HasSubstr("no 5 x 5 tiles"));
@@ -91,8 +96,7 @@ TEST(DicomMosaic, TakesTheThicknessWhereNoDistanceIsTold) {
       import_one(siemens_mosaic().erase(kSpacingBetweenSlices).text(kSliceThickness, "DS", "4"));
   expect_slices(outcome);
   EXPECT_EQ(outcome.volume.geometry.spacing[2], 4);
-  ASSERT_EQ(outcome.volume.notes.size(), 1);
-  EXPECT_EQ(outcome.volume.notes[0].code, "distance-assumed");
+  EXPECT_THAT(note_detail(outcome, NoteCode::kDistanceAssumed), HasSubstr("4 mm"));
 }
 
 // Scanners that have unfolded it leave the word.
@@ -123,8 +127,7 @@ TEST(DicomMosaic, IsAVolumeOfItsSeries) {
   const Outcome second = import_objects(files, {.volume = 1});
   expect_slices(second);
   EXPECT_EQ(second.volume.geometry.origin[2], 30.2);
-  ASSERT_EQ(second.volume.notes.size(), 1);
-  EXPECT_EQ(second.volume.notes[0].code, "volume-chosen");
+  EXPECT_THAT(note_detail(second, NoteCode::kVolumeChosen), HasSubstr("Volume 1 of 3"));
   EXPECT_EQ(second.volume.dicom->instances.size(), 1);
 }
 
@@ -144,6 +147,20 @@ TEST(DicomGrid, IsRefusedWhenPlacesAreMissing) {
   EXPECT_THAT(
       import_one(united_imaging_grid().items(kGridFrames, std::vector<DicomObject>(kTiles))).error,
       HasSubstr("position"));
+}
+
+// The same tags of another maker hold other things.
+TEST(DicomGrid, IsKnownByItsMaker) {
+  const DicomSeries series;
+  NamedFiles files;
+  for (std::uint32_t k = 0; k < series.slices; ++k) {
+    files.emplace_back("F" + std::to_string(k), series.slice(k)
+                                                    .text(0x00650010, "LO", "SOMEBODY ELSE")
+                                                    .text(kGridImages, "DS", "5")
+                                                    .text(kGridFrames, "LO", "no sequence")
+                                                    .file(kImplicit));
+  }
+  EXPECT_EQ(import_objects(files).canonical, import_objects(series.files()).canonical);
 }
 
 TEST(CsaHeaderTest, IsReadOrRefusedWhereverItEnds) {

@@ -302,4 +302,10 @@ Outcome import_objects(const NamedFiles& files, const ImportOptions& options,
   return outcome;
 }
 
+std::string note_detail(const Outcome& outcome, NoteCode code) {
+  const auto& notes = outcome.volume.notes;
+  const auto found = std::ranges::find(notes, describe(code).name, &Note::code);
+  return found == notes.end() ? "" : found->detail;
+}
+
 }  // namespace isomesh::import::test

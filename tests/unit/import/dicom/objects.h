@@ -101,4 +101,7 @@ using NamedFiles = std::vector<std::pair<std::string, std::string>>;
 Outcome import_objects(const NamedFiles& files, const ImportOptions& options = {},
                        const SizeLimits& limits = {});
 
+// The detail of the volume's note of that code; empty when there is none.
+std::string note_detail(const Outcome& outcome, NoteCode code);
+
 }  // namespace isomesh::import::test

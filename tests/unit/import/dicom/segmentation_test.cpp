@@ -72,9 +72,7 @@ TEST(DicomSegmentation, HasEmptyPlanesWhereFramesAreLeftOut) {
   ASSERT_EQ(told.error, "");
   EXPECT_EQ(told.volume.dims[2], 5);
   EXPECT_EQ(told.volume.geometry.spacing[2], 1);
-  ASSERT_EQ(told.volume.notes.size(), 1);
-  EXPECT_EQ(told.volume.notes[0].code, "empty-planes");
-  EXPECT_THAT(told.volume.notes[0].detail, HasSubstr("2 of the 5 planes"));
+  EXPECT_THAT(note_detail(told, NoteCode::kEmptyPlanes), HasSubstr("2 of the 5 planes"));
   EXPECT_EQ(label_at(told, 14, 2), 1);
   for (unsigned place = 0; place < kSegmentSamples; ++place) {
     EXPECT_EQ(label_at(told, place, 1) + label_at(told, place, 3), 0);

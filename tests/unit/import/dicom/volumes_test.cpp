@@ -57,7 +57,7 @@ void expect_all_volumes(const NamedFiles& files) {
     for (std::size_t slice = 0; slice < 6; ++slice) {
       ASSERT_EQ(samples_of<std::int16_t>(outcome)[slice * 20], volume);
     }
-    EXPECT_EQ(outcome.volume.notes.at(0).code, "volume-chosen");
+    EXPECT_NE(note_detail(outcome, NoteCode::kVolumeChosen), "");
     EXPECT_EQ(outcome.volume.dicom->instances.size(), 6);
   }
 }
@@ -205,9 +205,8 @@ std::string in_groups(std::uint32_t slice) { return slice < 3 ? "1.2.1" : "1.2.2
 TEST(DicomFramesOfReference, OfEachSliceAreNoted) {
   const Outcome outcome = import_objects(with_frames_of_reference(one_each));
   ASSERT_EQ(outcome.error, "");
-  ASSERT_EQ(outcome.volume.notes.size(), 1);
-  EXPECT_EQ(outcome.volume.notes[0].code, "frame-of-reference");
-  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("5 frames of reference"));
+  EXPECT_THAT(note_detail(outcome, NoteCode::kFrameOfReference),
+              HasSubstr("5 frames of reference"));
   EXPECT_EQ(outcome.volume.dicom->frame_of_reference_uid, "");
 }
 
@@ -219,8 +218,7 @@ TEST(DicomFramesOfReference, ThatFormGroupsMayBeAccepted) {
   EXPECT_THAT(refused.error, HasSubstr("2 frames of reference"));
   const Outcome accepted = import_objects(files, {.accept = {"frame-of-reference"}});
   ASSERT_EQ(accepted.error, "");
-  EXPECT_EQ(accepted.volume.notes.at(0).code, "frame-of-reference");
-  EXPECT_THAT(accepted.volume.notes.at(0).detail, HasSubstr("was accepted"));
+  EXPECT_THAT(note_detail(accepted, NoteCode::kFrameOfReference), HasSubstr("was accepted"));
 }
 
 // What is wrong with the lattice is never overlooked, and nothing else is offered then.
@@ -232,7 +230,7 @@ TEST(DicomFramesOfReference, DoNotHideWhatIsMissing) {
     EXPECT_THAT(outcome.error, HasSubstr("slice 5 of 6 is missing"));
     EXPECT_EQ(outcome.remedy.overridable, "");
   }
-  EXPECT_EQ(import_objects(DicomSeries{}.files()).volume.notes.size(), 0);
+  EXPECT_EQ(note_detail(import_objects(DicomSeries{}.files()), NoteCode::kFrameOfReference), "");
 }
 
 // --- What lies beside a series -------------------------------------------------------------------
@@ -247,9 +245,8 @@ TEST(DicomUpload, TakesAFileOnceThatCameTwice) {
   EXPECT_THAT(outcome.volume.ignored,
               ElementsAre(IgnoredObject{"copy", "it is the same as \"IM9\""},
                           IgnoredObject{"another", "it is the same as \"IM10\""}));
-  ASSERT_EQ(outcome.volume.notes.size(), 1);
-  EXPECT_EQ(outcome.volume.notes[0].code, "duplicate-file");
-  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("2 files came more than once"));
+  EXPECT_THAT(note_detail(outcome, NoteCode::kDuplicateFile),
+              HasSubstr("2 files came more than once"));
   // The same name for another content is no copy.
   files.back().second = DicomSeries{}.slice(2).number(kRows, 4).text(kStudyId, "SH", "x").file();
   EXPECT_THAT(import_objects(files).error, HasSubstr("more than once"));
