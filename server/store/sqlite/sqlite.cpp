@@ -1,6 +1,7 @@
 #include "server/store/sqlite/sqlite.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <iterator>
 #include <utility>
 
@@ -17,6 +18,11 @@ Error error_of(sqlite3* handle, int code) {
   // Most of what SQLite calls an I/O error is a write that found no room, too.
   if (primary == SQLITE_FULL || code == SQLITE_IOERR_WRITE || code == SQLITE_IOERR_SHMSIZE) {
     return {ErrorCode::kOutOfSpace, "the data folder has no space left"};
+  }
+  const int system = handle == nullptr ? 0 : sqlite3_system_errno(handle);
+  const bool is_short = primary == SQLITE_CANTOPEN && (system == EMFILE || system == ENFILE);
+  if (primary == SQLITE_NOMEM || code == SQLITE_IOERR_NOMEM || is_short) {
+    return {ErrorCode::kUnavailable, "the service has not enough descriptors or memory"};
   }
   const std::string reason = handle == nullptr ? sqlite3_errstr(code) : sqlite3_errmsg(handle);
   return {ErrorCode::kInternal, "the database: " + reason};
