@@ -22,6 +22,10 @@ void throw_system_error(std::string_view call, int error_number) {
   if (error_number == ENOSPC || error_number == EDQUOT || error_number == EFBIG) {
     throw Error(ErrorCode::kOutOfSpace, "there is no space left on the disk");
   }
+  if (error_number == EMFILE || error_number == ENFILE || error_number == ENOMEM ||
+      error_number == ENOBUFS || error_number == EAGAIN) {
+    throw Error(ErrorCode::kUnavailable, "the service has not enough descriptors or memory");
+  }
   throw Error(ErrorCode::kInternal,
               std::string(call) + ": " + std::generic_category().message(error_number));
 }

@@ -99,9 +99,9 @@ Error invalid_parameter(const std::string& field, const std::string& message);
 // kInvalidParameter with several; the detail names them all.
 Error invalid_parameters(std::vector<FieldError> fields);
 
-// Throws what a failed system call means: kOutOfSpace for a full disk or quota, otherwise kInternal
-// with the call's name and `error_number`'s text. Never names a path, because the text is sent to
-// clients.
+// Throws what a failed system call means: kOutOfSpace for a full disk or quota, kUnavailable where
+// descriptors, memory or processes are used up, which may pass, otherwise kInternal with the call's
+// name and `error_number`'s text. Never names a path, because the text is sent to clients.
 [[noreturn]] void throw_system_error(std::string_view call, int error_number);
 
 // The same for a call that names a file: kNotFound where it is not there.

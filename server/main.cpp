@@ -32,6 +32,7 @@
 #include "server/jobs/workers.h"
 #include "server/mesh/parallel.h"
 #include "server/net/address.h"
+#include "server/net/descriptors.h"
 #include "server/net/tls.h"
 #include "server/options.h"
 #include "server/store/files/blob_store.h"
@@ -202,6 +203,7 @@ int run(const Options& options, const sigset_t& signals) {
   jobs::Estimator estimator(volumes, blobs, jobs, limits);
   http::ServerOptions server_options = options.http;
   server_options.tls = files.tls.get();
+  server_options.connections = net::connections_within(net::raise_descriptor_limit());
   const http::Services services = {folder,     blobs,     volumes,           jobs,    library,
                                    histograms, estimator, retention,         metrics, outbox,
                                    callbacks,  targets,   files.tokens.get()};

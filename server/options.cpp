@@ -132,7 +132,7 @@ void add_options(CLI::App& cli, Options& options) {
       ->transform(CLI::AsSizeValue(false))
       ->capture_default_str();
   cli.add_option("--upload-places", options.http.upload_places,
-                 "Uploads at the same time; more get 503")
+                 "Uploads at the same time; one owner or address has a share of them")
       ->envname("ISOMESH_UPLOAD_PLACES")
       ->check(CLI::Range(1, 24))
       ->capture_default_str();

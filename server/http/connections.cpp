@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "server/http/library.h"
+#include "server/net/address.h"
 
 namespace isomesh::http {
 namespace {
@@ -24,15 +25,20 @@ Request request_of(net::Connection& connection) {
 struct Connections::Exchange {
   Exchange(net::Connection connection, const net::BodyLimits& limits,
            const std::atomic<bool>& stopping)
-      : body(connection, limits, stopping), request(request_of(connection)) {}
+      : party(net::party_of(connection.address)),
+        body(connection, limits, stopping),
+        request(request_of(connection)) {}
 
+  const std::string party;
   net::IncomingBody body;
   Request request;
   Response response;
 };
 
 Connections::Connections(ConnectionOptions options, ConnectionHandlers handlers)
-    : options_(std::move(options)), handlers_(std::move(handlers)) {}
+    : options_(std::move(options)),
+      handlers_(std::move(handlers)),
+      places_(options_.connections, "connections") {}
 
 Connections::~Connections() { close(std::chrono::milliseconds(0)); }
 
@@ -41,7 +47,7 @@ void Connections::open(int listening) {
   tasks_.emplace(options_.threads, options_.backlog);
   parked_.emplace(handlers_.has_ended);
   acceptor_.emplace(
-      listening, options_.acceptor, options_.stream_of,
+      listening, options_.acceptor, places_, options_.stream_of,
       [this](net::Connection connection) {
         enqueue(std::make_shared<Exchange>(std::move(connection), options_.body, stopping_),
                 [this](Exchange& exchange) {
@@ -67,11 +73,15 @@ void Connections::close(std::chrono::milliseconds patience) {
 void Connections::refuse(std::unique_ptr<net::ByteStream> stream, const std::string& address,
                          const Error& error) {
   if (handlers_.on_refused) handlers_.on_refused(address, error);
-  sender_->send({std::move(stream), refusal(error), nullptr}, false);
+  sender_->send(
+      {.stream = std::move(stream), .bytes = refusal(error), .source = nullptr, .is_refusal = true},
+      false);
 }
 
 void Connections::enqueue(const std::shared_ptr<Exchange>& exchange, const Answer& answer) {
-  if (tasks_->try_enqueue([this, exchange, answer] { serve(exchange, answer); })) return;
+  if (tasks_->try_enqueue(exchange->party, [this, exchange, answer] { serve(exchange, answer); })) {
+    return;
+  }
   refuse(exchange->body.take_stream(), exchange->request.remote_address,
          {ErrorCode::kUnavailable, "too many requests are under way"});
 }
@@ -87,21 +97,42 @@ void Connections::serve(const std::shared_ptr<Exchange>& exchange, const Answer&
                           {.received = exchange->body.received(), .sent = written.body_bytes});
   }
   auto source = exchange->response.stream ? std::move(exchange->response.stream->source) : nullptr;
-  sender_->send({exchange->body.take_stream(), std::move(written.bytes), std::move(source)},
-                exchange->body.is_whole());
+  const bool is_whole = exchange->body.is_whole();
+  sender_->send({.stream = exchange->body.take_stream(),
+                 .bytes = std::move(written.bytes),
+                 .source = std::move(source),
+                 .party = exchange->party},
+                is_whole);
 }
 
-// The library sees the request once more when its handler goes on, to write the response.
 void Connections::park(const std::shared_ptr<Exchange>& exchange,
                        const Continuation& continuation) {
-  parked_->park({.job = continuation.job,
-                 .until = continuation.until,
-                 .resume = [this, exchange, resume = continuation.resume] {
-                   enqueue(exchange, [resume](Exchange& parked) {
-                     resume(parked.request, parked.response);
-                     return std::optional<Continuation>();
-                   });
-                 }});
+  net::ParkedRequest parked = {
+      .job = continuation.job,
+      .until = continuation.until,
+      .resume = [this, exchange, resume = continuation.resume] { go_on(exchange, resume); },
+      .descriptor = exchange->body.descriptor()};
+  if (continuation.abandoned) {
+    parked.abandoned = [this, exchange, abandoned = continuation.abandoned] {
+      tasks_->enqueue_rest(exchange->party,
+                           [exchange, abandoned] { abandoned(exchange->request); });
+    };
+  }
+  parked_->park(std::move(parked));
+}
+
+// The library sees the request once more, to write the response. A request that was accepted has
+// its turn however many wait, unless the service ends.
+void Connections::go_on(const std::shared_ptr<Exchange>& exchange, const Resume& resume) {
+  const bool has_turn = tasks_->enqueue_rest(exchange->party, [this, exchange, resume] {
+    serve(exchange, [&resume](Exchange& waited) {
+      resume(waited.request, waited.response);
+      return std::optional<Continuation>();
+    });
+  });
+  if (has_turn) return;
+  refuse(exchange->body.take_stream(), exchange->request.remote_address,
+         {ErrorCode::kUnavailable, "the service is shutting down"});
 }
 
 }  // namespace isomesh::http

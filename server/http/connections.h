@@ -14,6 +14,7 @@
 #include "server/http/request.h"
 #include "server/http/response.h"
 #include "server/net/acceptor.h"
+#include "server/net/fair_places.h"
 #include "server/net/incoming_body.h"
 #include "server/net/parked.h"
 #include "server/net/sender.h"
@@ -22,8 +23,11 @@
 namespace isomesh::http {
 
 struct ConnectionOptions {
+  // Connections that are open, from their acceptance to the end of their response. An address has
+  // its share of them (net::FairPlaces), as of the next two.
+  std::size_t connections = 2048;
   std::size_t threads = 32;   // requests that are worked on at once
-  std::size_t backlog = 256;  // requests that wait for a thread
+  std::size_t backlog = 512;  // requests that wait for a thread
   net::AcceptorLimits acceptor;
   net::BodyLimits body;
   net::SenderLimits sender;
@@ -64,7 +68,9 @@ class Connections {
   // Sources that had nothing to send are asked again.
   void wake_sources();
 
-  // Connections whose request has not come yet, and responses on their way.
+  // Connections that are open; of those, whose request has not come yet, and responses on their
+  // way.
+  std::size_t open_connections() const { return places_.taken(); }
   std::size_t pending() const { return acceptor_->pending(); }
   std::size_t sending() const { return sender_->sending(); }
 
@@ -75,17 +81,20 @@ class Connections {
  private:
   struct Exchange;
   using Answer = std::function<std::optional<Continuation>(Exchange& exchange)>;
+  using Resume = decltype(Continuation::resume);
 
   void refuse(std::unique_ptr<net::ByteStream> stream, const std::string& address,
               const Error& error);
   void enqueue(const std::shared_ptr<Exchange>& exchange, const Answer& answer);
   void serve(const std::shared_ptr<Exchange>& exchange, const Answer& answer);
   void park(const std::shared_ptr<Exchange>& exchange, const Continuation& continuation);
+  void go_on(const std::shared_ptr<Exchange>& exchange, const Resume& resume);
 
   const ConnectionOptions options_;
   const ConnectionHandlers handlers_;
   std::atomic<bool> stopping_ = false;
   // Each uses those before it, so they end from the last to the first.
+  net::FairPlaces places_;
   std::optional<net::Sender> sender_;
   std::optional<net::Parked> parked_;
   std::optional<net::BoundedTaskQueue> tasks_;

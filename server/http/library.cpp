@@ -100,6 +100,7 @@ class LibraryBodyReader : public BodyReader {
 
   bool is_whole() const override { return body_.is_whole(); }
   bool was_too_slow() const override { return body_.was_too_slow(); }
+  bool was_malformed() const override { return body_.was_malformed(); }
 
  private:
   static httplib::ContentReceiver receiver_of(const TakePiece& take) {
@@ -185,6 +186,7 @@ class LibraryServer : public httplib::Server {
   void write_into(httplib::Response& out) {
     out.status = response_.status;
     out.set_header("X-Content-Type-Options", "nosniff");
+    out.set_header("Cross-Origin-Resource-Policy", "same-origin");
     for (const auto& [name, value] : response_.headers) out.set_header(name, value);
     if (response_.stream) {
       announce(*response_.stream, out);

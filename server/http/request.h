@@ -47,8 +47,9 @@ class BodyReader {
   // Whether the whole body is here already, so that reading it does not wait. False for a chunked
   // one, whose end is not known before.
   virtual bool is_whole() const = 0;
-  // Whether reading has ended because the body came too slowly.
+  // Whether reading has ended because the body came too slowly, or its chunks are none.
   virtual bool was_too_slow() const = 0;
+  virtual bool was_malformed() const = 0;
 };
 
 using Parameters = std::vector<std::pair<std::string, std::string>>;

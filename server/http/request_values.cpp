@@ -59,9 +59,13 @@ std::pair<std::string_view, std::string_view> digest_member(std::string_view mem
   return {name, value.substr(1, value.size() - 2)};
 }
 
-bool names_etag(std::string_view header, std::string_view etag) {
+// Weak tags are for caches: what they name has the same meaning, not the same bytes (RFC 9110,
+// 8.8.3.2).
+enum class Comparison { kStrong, kWeak };
+
+bool names_etag(std::string_view header, std::string_view etag, Comparison comparison) {
   for (std::string_view tag : split(header, ',')) {
-    if (tag.starts_with("W/")) tag.remove_prefix(2);
+    if (comparison == Comparison::kWeak && tag.starts_with("W/")) tag.remove_prefix(2);
     if (tag == "*" || tag == etag) return true;
   }
   return false;
@@ -202,12 +206,12 @@ bool accepts_gzip(const Request& request) {
 }
 
 bool matches_etag(const Request& request, std::string_view etag) {
-  return names_etag(request.header("If-None-Match"), etag);
+  return names_etag(request.header("If-None-Match"), etag, Comparison::kWeak);
 }
 
 void check_if_match(const Request& request, std::string_view etag) {
   if (!request.has_header("If-Match")) return;
-  if (names_etag(request.header("If-Match"), etag)) return;
+  if (names_etag(request.header("If-Match"), etag, Comparison::kStrong)) return;
   throw Error(ErrorCode::kPreconditionFailed, "what If-Match names is not what is there");
 }
 

@@ -49,8 +49,9 @@ std::string refusal(const Error& error) {
   std::string bytes =
       "HTTP/1.1 " + std::to_string(problem.status) + ' ' + problem.title +
       "\r\nCache-Control: no-store\r\nConnection: close\r\nContent-Type: " + kProblemType +
-      "\r\nX-Content-Type-Options: nosniff\r\nContent-Length: " + std::to_string(body.size()) +
-      "\r\n";
+      "\r\nX-Content-Type-Options: nosniff\r\nCross-Origin-Resource-Policy: same-origin"
+      "\r\nContent-Length: " +
+      std::to_string(body.size()) + "\r\n";
   if (may_come_again(problem)) {
     bytes.append("Retry-After: ").append(kRetryAfterSeconds).append("\r\n");
   }

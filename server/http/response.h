@@ -51,6 +51,9 @@ struct Continuation {
   std::string job;
   std::chrono::steady_clock::time_point until;
   std::function<void(const Request& request, Response& response)> resume;
+  // Called once, before `resume`, when the client has gone meanwhile. Without it `resume` is, since
+  // there is nobody to wait for.
+  std::function<void(const Request& request)> abandoned = {};
 };
 
 // Answers, or leaves that to a continuation. May throw: Error becomes the problem that it names,

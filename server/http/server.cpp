@@ -95,6 +95,15 @@ std::optional<Continuation> answer(App& app, Request& request, Response& respons
   auto continuation =
       guarded(request, response, [&] { return checked_answer(app, request, response); });
   if (!continuation) return std::nullopt;
+  if (continuation->abandoned) {
+    continuation->abandoned = [run = std::move(continuation->abandoned)](const Request& asked) {
+      Response nobodys;
+      guarded(asked, nobodys, [&] {
+        run(asked);
+        return std::optional<Continuation>();
+      });
+    };
+  }
   continuation->resume = [resume = std::move(continuation->resume)](const Request& asked,
                                                                     Response& out) {
     guarded(asked, out, [&] {
@@ -128,7 +137,8 @@ Server::~Server() = default;
 
 std::string Server::bind(const net::Address& address) {
   OriginRules& rules = state_->app.rules;
-  rules.check_host = address.is_loopback() && !address.is_unix() && state_->app.tokens == nullptr;
+  const bool is_local = address.is_loopback() && !address.is_unix();
+  rules.check_host = state_->app.tokens == nullptr && (is_local || !rules.hosts.empty());
   rules.hosts.push_back(address.host);
   for (std::string& host : rules.hosts) host = host_of(host);
   const std::string authority = state_->listener.emplace(address).authority();

@@ -24,12 +24,14 @@
 namespace isomesh::http {
 
 struct ServerOptions {
-  std::size_t threads = 32;       // requests that are worked on at once
-  std::size_t backlog = 256;      // requests that wait for a thread
-  std::size_t upload_places = 8;  // of the threads, how many may hold uploads
+  // Of each of these, and of event_streams, one owner or address has a share (net::FairPlaces).
+  std::size_t connections = 2048;
+  std::size_t threads = 32;        // requests that are worked on at once
+  std::size_t backlog = 512;       // requests that wait for a thread
+  std::size_t upload_places = 16;  // of the threads, how many may hold uploads
   // How long a connection may take to send its request, up to a small body.
   std::chrono::milliseconds request_time{10'000};
-  std::size_t event_streams = 256;
+  std::size_t event_streams = 512;
   UploadLimits upload;
   std::vector<std::string> cors_origins;  // pages of which origins may use the service, `*` for all
   std::vector<std::string> hosts;         // names of this service beside loopback's, without ports

@@ -38,6 +38,9 @@ Error incomplete(const BodyReader& body) {
   if (body.was_too_slow()) {
     return {ErrorCode::kRequestTimeout, "the body came too slowly"};
   }
+  if (body.was_malformed()) {
+    return invalid_parameter("Transfer-Encoding", "the body is no sequence of chunks");
+  }
   return {ErrorCode::kInvalidParameter, "the body ended before its length"};
 }
 

@@ -102,12 +102,13 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   estimate.iso = parameters.iso.value_or(volume.suggested_iso);
   estimate.scheme = parameters.scheme;
   const SurfaceSize surface =
-      count(volume, {.iso = estimate.iso, .scheme = parameters.scheme, .close = parameters.close});
+      count(viewer, volume,
+            {.iso = estimate.iso, .scheme = parameters.scheme, .close = parameters.close});
   estimate.triangles = surface.triangles;
   estimate.vertices = surface.vertices;
   estimate.memory_bytes = estimate_memory(surface, parameters);
   estimate.fits = estimate.memory_bytes <= limits_.memory_bytes;
-  const CostModel costs = model();
+  const CostModel costs = model(viewer);
   estimate.milliseconds = costs.milliseconds(surface, volume.sample_count(), parameters);
   for (const MeshFormat format : parameters.formats) {
     estimate.bytes[format] = costs.file_bytes(format, surface, parameters);
@@ -117,25 +118,27 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   return estimate;
 }
 
-SurfaceSize Estimator::count(const Volume& volume, const mesh::ExtractOptions& options) {
-  const auto size = counts_.get({volume.id, options.iso, options.scheme, options.close}, [&] {
-    const store::LocalBlob file = stored_samples(blobs_, volume.id, stop_.get_token());
-    const volume::CanonicalVolume canonical(file.path);
-    return with_sample(volume.type, [&](auto sample) {
-      return count_as<decltype(sample)>(canonical, options, stop_.get_token());
-    });
-  });
+SurfaceSize Estimator::count(const store::Viewer& viewer, const Volume& volume,
+                             const mesh::ExtractOptions& options) {
+  const auto size =
+      counts_.get({viewer, volume.id, options.iso, options.scheme, options.close}, [&] {
+        const store::LocalBlob file = stored_samples(blobs_, volume.id, stop_.get_token());
+        const volume::CanonicalVolume canonical(file.path);
+        return with_sample(volume.type, [&](auto sample) {
+          return count_as<decltype(sample)>(canonical, options, stop_.get_token());
+        });
+      });
   return *size;
 }
 
-CostModel Estimator::model() const {
+CostModel Estimator::model(const store::Viewer& viewer) const {
   CostModel costs;
   std::map<std::string, std::uint64_t> samples;
-  for (const Job& job : jobs_.list(std::nullopt, JobState::kSucceeded, "", kJobsLookedAt)) {
+  for (const Job& job : jobs_.list(viewer, JobState::kSucceeded, "", kJobsLookedAt)) {
     const std::string& id = job.parameters.volume;
-    if (!volumes_.contains(std::nullopt, id)) continue;
+    if (!volumes_.contains(viewer, id)) continue;
     const auto [known, is_new] = samples.try_emplace(id);
-    if (is_new) known->second = volumes_.get(std::nullopt, id).sample_count();
+    if (is_new) known->second = volumes_.get(viewer, id).sample_count();
     costs.learn(job, known->second);
   }
   return costs;

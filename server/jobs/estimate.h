@@ -63,23 +63,24 @@ class Estimator {
       : volumes_(volumes), blobs_(blobs), jobs_(jobs), limits_(limits) {}
 
   // Triangles and vertices are exact, before the filter of components; the rest follows from them
-  // and from the jobs that this daemon has finished. Throws Error kNotFound without the volume,
-  // kUnusableVolume when the stored samples are damaged, kUnavailable when too many wait for an
-  // estimate already or after stop().
+  // and from the jobs of the viewer's that are finished: those of others would tell of them. Throws
+  // Error kNotFound without the volume, kUnusableVolume when the stored samples are damaged,
+  // kUnavailable when too many wait for an estimate already or after stop().
   Estimate estimate(const store::Viewer& viewer, const JobParameters& parameters);
 
   // Ends the counting that is under way, for good.
   void stop() { stop_.request_stop(); }
 
  private:
-  // Volume, iso-value, scheme, whether it is closed.
-  using Surface = std::tuple<std::string, double, Scheme, bool>;
+  // Viewer (see Histograms), volume, iso-value, scheme, whether it is closed.
+  using Surface = std::tuple<store::Viewer, std::string, double, Scheme, bool>;
 
   static constexpr std::size_t kSurfaces = 1024;
-  static constexpr std::size_t kMostWaiting = 6;
+  static constexpr std::size_t kMostWaiting = 12;
 
-  SurfaceSize count(const Volume& volume, const mesh::ExtractOptions& options);
-  CostModel model() const;
+  SurfaceSize count(const store::Viewer& viewer, const Volume& volume,
+                    const mesh::ExtractOptions& options);
+  CostModel model(const store::Viewer& viewer) const;
 
   const store::VolumeStore& volumes_;
   const store::BlobStore& blobs_;

@@ -34,8 +34,8 @@ volume::ValueCounts count_values(const volume::CanonicalVolume& canonical, const
 
 }  // namespace
 
-Histogram Histograms::of(const Volume& volume, std::size_t bins) {
-  const auto values = counts_.get(volume.id, [&] {
+Histogram Histograms::of(const store::Viewer& viewer, const Volume& volume, std::size_t bins) {
+  const auto values = counts_.get({viewer, volume.id}, [&] {
     const store::LocalBlob file = stored_samples(blobs_, volume.id);
     return count_values(volume::CanonicalVolume(file.path), volume);
   });

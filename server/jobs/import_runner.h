@@ -29,9 +29,9 @@ class ImportRunner {
   explicit ImportRunner(const RunnerOptions& options);
 
   // Imports as import_volume does, in a process that does nothing else, before or after, and has
-  // ended when this returns or throws; only files in the scratch folder may remain of it. Throws what import_volume throws, and Error
-  // kUnusableVolume when the process crashes or exceeds its bounds, kUnavailable once stopped. The
-  // volume has been compared with the canonical file.
+  // ended when this returns or throws; only files in the scratch folder may remain of it. Throws
+  // what import_volume throws, and Error kUnusableVolume when the process crashes or exceeds its
+  // bounds, kUnavailable once stopped. The volume has been compared with the canonical file.
   Volume run(const process::ImportTask& task);
 
   // Ends the imports that run or wait, and refuses further ones.

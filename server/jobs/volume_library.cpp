@@ -27,7 +27,8 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
                                .limits = limits_});
   const store::Blob blob = store::digest_of(canonical);
   const std::shared_lock lock(mutex_);
-  if (!volumes_.names(blob.key)) retention_.make_room(blob.bytes);
+  // Also for what another owner has: whether there was room for it would tell.
+  if (!volumes_.contains(owner, blob.key)) retention_.make_room(blob.bytes);
   blobs_.adopt(canonical, blob);
   volume.id = blob.key;
   volume.created = timestamp();
@@ -67,9 +68,9 @@ std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
   return volumes;
 }
 
-void VolumeLibrary::erase(const std::string& owner, const std::string& id) {
+void VolumeLibrary::erase(const store::Viewer& viewer, const std::string& id) {
   const std::scoped_lock lock(mutex_);
-  volumes_.erase(owner, id);
+  volumes_.erase(viewer, id);
   if (!volumes_.names(id)) blobs_.erase(id);
 }
 

@@ -54,9 +54,9 @@ class VolumeLibrary {
   // Ends the imports that run or wait, and refuses further ones.
   void stop_imports() { runner_.stop(); }
 
-  // The samples go with the last owner's record. Throws Error kNotFound, kGone, and kNotReady while
-  // a job needs the volume.
-  void erase(const std::string& owner, const std::string& id);
+  // The records that the viewer sees; the samples go with the last. Throws Error kNotFound, kGone,
+  // and kNotReady while a job needs the volume.
+  void erase(const store::Viewer& viewer, const std::string& id);
 
  private:
   const store::DataFolder& folder_;

@@ -26,11 +26,13 @@ constexpr milliseconds kLongestIdle{1000};
 // most. It doubles each time.
 constexpr milliseconds kFullDiskDelay{5000};
 constexpr milliseconds kLongestFullDiskDelay{60'000};
+// The same of one that found no descriptor or memory.
+constexpr milliseconds kExhaustedDelay{5000};
 // How long until a job's end that found the disk full is told the queue again.
 constexpr milliseconds kFullDiskRetry{500};
 
 // Why a run was asked to stop.
-enum class Reason { kNone, kCancelled, kLost, kTooLong, kFullDisk, kEnding };
+enum class Reason { kNone, kCancelled, kLost, kTooLong, kFullDisk, kExhausted, kEnding };
 
 std::string worker_name(std::size_t thread) {
   std::array<char, 256> host = {};
@@ -166,6 +168,7 @@ void Workers::run(const store::Lease& lease, Workspace& workspace) {
     outcome.timing = result.timing;
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kOutOfSpace) run->stop(Reason::kFullDisk);
+    if (error.code() == ErrorCode::kUnavailable) run->stop(Reason::kExhausted);
     if (error.code() != ErrorCode::kCancelled) {
       outcome.error = to_problem(error, path);
       outcome.may_retry = error.code() == ErrorCode::kInternal;
@@ -209,6 +212,9 @@ void Workers::conclude(const Run& run, store::Outcome outcome) {
       const milliseconds delay = full_disk_delay(lease.id);
       spdlog::warn("job {} waits for room on the disk, {} s", lease.id, delay.count() / 1000);
       return jobs_.put_back(lease, delay, WaitingFor::kDisk);
+    }
+    if (!outcome.mesh && run.reason() == Reason::kExhausted) {
+      return jobs_.put_back(lease, kExhaustedDelay);
     }
     return jobs_.finish(lease, outcome);
   };

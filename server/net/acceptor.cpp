@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <map>
 #include <utility>
 
 #include <arpa/inet.h>
@@ -12,6 +13,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "server/net/address.h"
+
 namespace isomesh::net {
 namespace {
 
@@ -19,6 +22,9 @@ constexpr int kMostEvents = 128;
 constexpr int kTickMilliseconds = 250;  // how often deadlines are looked at
 constexpr int kMostAcceptedAtOnce = 64;
 constexpr std::size_t kBlock = 16 * 1024;
+// What epoll calls the two that are no connections; those have higher numbers.
+constexpr std::uint64_t kListening = 0;
+constexpr std::uint64_t kWakeup = 1;
 
 std::string address_of(const sockaddr_storage& peer) {
   std::array<char, INET6_ADDRSTRLEN> text = {};
@@ -35,26 +41,44 @@ std::string address_of(const sockaddr_storage& peer) {
   return text.data();
 }
 
-void add(int epoll, int descriptor, const void* who) {
+void add(int epoll, int descriptor, std::uint64_t who) {
   epoll_event event = {};
   event.events = EPOLLIN;
-  event.data.ptr = const_cast<void*>(who);
+  event.data.u64 = who;
   ::epoll_ctl(epoll, EPOLL_CTL_ADD, descriptor, &event);
 }
 
+// A stream with its place among the connections, which is free when the descriptor is.
+class PlacedStream : public ByteStream {
+ public:
+  PlacedStream(FairPlaces::Place place, std::unique_ptr<ByteStream> stream)
+      : place_(std::move(place)), stream_(std::move(stream)) {}
+
+  int descriptor() const override { return stream_->descriptor(); }
+  Transfer read(std::span<char> target) override { return stream_->read(target); }
+  Transfer write(std::string_view bytes) override { return stream_->write(bytes); }
+  void finish_writing() override { stream_->finish_writing(); }
+
+ private:
+  const FairPlaces::Place place_;
+  const std::unique_ptr<ByteStream> stream_;
+};
+
 }  // namespace
 
-Acceptor::Acceptor(int listening, const AcceptorLimits& limits, StreamOf stream_of,
-                   OnRequest on_request, OnRefused on_refused)
+Acceptor::Acceptor(int listening, const AcceptorLimits& limits, FairPlaces& places,
+                   StreamOf stream_of, OnRequest on_request, OnRefused on_refused)
     : listening_(listening),
       limits_(limits),
+      places_(places),
       stream_of_(std::move(stream_of)),
       on_request_(std::move(on_request)),
       on_refused_(std::move(on_refused)),
       epoll_(new_epoll()) {
   ::fcntl(listening_, F_SETFL, ::fcntl(listening_, F_GETFL) | O_NONBLOCK);
-  add(epoll_, listening_, this);
-  add(epoll_, wakeup_.descriptor(), &wakeup_);
+  add(epoll_, listening_, kListening);
+  add(epoll_, wakeup_.descriptor(), kWakeup);
+  last_id_ = kWakeup;
   thread_ = std::jthread([this] { work(); });
 }
 
@@ -76,13 +100,10 @@ void Acceptor::work() {
     const int count = ::epoll_wait(epoll_, events.data(), kMostEvents, kTickMilliseconds);
     bool has_new = false;
     for (int i = 0; i < count; ++i) {
-      const void* who = events.at(static_cast<std::size_t>(i)).data.ptr;
-      has_new = has_new || who == this;
-      // A pending connection is known by its address in memory. New ones are added after this
-      // batch of events, so that none can have the address of one that was closed within it.
-      const auto pending =
-          std::ranges::find_if(pending_, [&](const Pending& each) { return &each == who; });
-      if (pending != pending_.end()) read_some(pending);
+      const std::uint64_t who = events.at(static_cast<std::size_t>(i)).data.u64;
+      has_new = has_new || who == kListening;
+      const auto pending = by_id_.find(who);  // it may have been closed within this batch
+      if (pending != by_id_.end()) read_some(pending->second);
     }
     if (has_new) accept_some();
     if (Clock::now() - last_tick >= std::chrono::milliseconds(kTickMilliseconds)) {
@@ -90,6 +111,7 @@ void Acceptor::work() {
       close_overdue();
     }
   }
+  by_id_.clear();
   pending_.clear();
   count_ = 0;
 }
@@ -118,18 +140,51 @@ void Acceptor::accept_some() {
 }
 
 void Acceptor::begin(int socket, std::string address) {
-  if (pending_.size() >= limits_.most_pending) close(pending_.begin());
-  Pending& pending = pending_.emplace_back();
-  ++count_;
-  pending.deadline = Clock::now() + limits_.head_time;
-  pending.connection.address = std::move(address);
+  std::string party = party_of(address);
+  auto place = place_for(party);
   try {
-    pending.connection.stream = stream_of_(socket);
+    std::unique_ptr<ByteStream> stream = stream_of_(socket);
+    if (!place) {
+      return on_refused_(std::move(stream), address,
+                         {ErrorCode::kUnavailable, "too many connections are open"});
+    }
+    Pending& pending = pending_.emplace_back();
+    pending.connection.stream =
+        std::make_unique<PlacedStream>(std::move(*place), std::move(stream));
+    pending.connection.address = std::move(address);
+    pending.party = std::move(party);
+    pending.deadline = Clock::now() + limits_.head_time;
+    pending.id = ++last_id_;
   } catch (const std::exception& error) {
     spdlog::warn("a connection could not be begun: {}", error.what());
-    return close(std::prev(pending_.end()));
+    return;
   }
-  read_some(std::prev(pending_.end()));
+  const auto pending = std::prev(pending_.end());
+  by_id_.emplace(pending->id, pending);
+  ++count_;
+  read_some(pending);
+}
+
+// Requests that have not come yet make room, of the same party where it has its share. Nothing when
+// all the places are held by others.
+std::optional<FairPlaces::Place> Acceptor::place_for(const std::string& party) {
+  while (true) {
+    try {
+      return places_.take(party);
+    } catch (const Error& error) {
+      const bool has_share = error.code() == ErrorCode::kTooManyRequests;
+      if (!close_oldest_of(has_share ? party : "")) return std::nullopt;
+    }
+  }
+}
+
+// Of that party, or of all for "". False when there is none.
+bool Acceptor::close_oldest_of(const std::string& party) {
+  const auto oldest = std::ranges::find_if(
+      pending_, [&](const Pending& pending) { return party.empty() || pending.party == party; });
+  if (oldest == pending_.end()) return false;
+  close(oldest);
+  return true;
 }
 
 void Acceptor::read_some(PendingList::iterator pending) {
@@ -151,7 +206,7 @@ void Acceptor::read_some(PendingList::iterator pending) {
       if (is_complete(*pending)) return hand_on(pending);
       if (bytes_ > limits_.most_bytes) {
         watch(pending, Transfer::State::kWantsRead);  // what is left to read is read later
-        return close_oldest();
+        return close_greediest();
       }
     }
   } catch (const Error& error) {
@@ -182,7 +237,7 @@ bool Acceptor::is_complete(Pending& pending) {
 void Acceptor::watch(PendingList::iterator pending, Transfer::State wanted) {
   epoll_event event = {};
   event.events = wanted == Transfer::State::kWantsWrite ? EPOLLOUT : EPOLLIN;
-  event.data.ptr = &*pending;
+  event.data.u64 = pending->id;
   const int operation = std::exchange(pending->is_watched, true) ? EPOLL_CTL_MOD : EPOLL_CTL_ADD;
   const int descriptor = pending->connection.stream->descriptor();
   if (::epoll_ctl(epoll_, operation, descriptor, &event) != 0) close(pending);
@@ -200,8 +255,16 @@ void Acceptor::close_overdue() {
   }
 }
 
-void Acceptor::close_oldest() {
-  while (bytes_ > limits_.most_bytes && !pending_.empty()) close(pending_.begin());
+// Whoever holds the most of what has come and waits loses the oldest of it.
+void Acceptor::close_greediest() {
+  while (bytes_ > limits_.most_bytes) {
+    std::map<std::string_view, std::size_t> held;
+    for (const Pending& pending : pending_) held[pending.party] += pending.received.size();
+    const auto most = std::ranges::max_element(held, {}, &decltype(held)::value_type::second);
+    close(std::ranges::find_if(pending_, [&](const Pending& pending) {
+      return pending.party == most->first && !pending.received.empty();
+    }));
+  }
 }
 
 void Acceptor::hand_on(PendingList::iterator pending) {
@@ -211,6 +274,7 @@ void Acceptor::hand_on(PendingList::iterator pending) {
     ::epoll_ctl(epoll_, EPOLL_CTL_DEL, connection.stream->descriptor(), nullptr);
   }
   bytes_ -= connection.body.size();
+  by_id_.erase(pending->id);
   pending_.erase(pending);
   --count_;
   on_request_(std::move(connection));
@@ -226,6 +290,7 @@ void Acceptor::refuse(PendingList::iterator pending, const Error& error) {
 // Closing a stream takes it out of epoll.
 void Acceptor::close(PendingList::iterator pending) {
   bytes_ -= pending->received.size();
+  by_id_.erase(pending->id);
   pending_.erase(pending);
   --count_;
 }

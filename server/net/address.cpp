@@ -1,10 +1,13 @@
 #include "server/net/address.h"
 
 #include <algorithm>
+#include <array>
+#include <span>
 #include <string_view>
 
 #include <arpa/inet.h>
 
+#include "base/hex.h"
 #include "base/text.h"
 #include "proto/error.h"
 
@@ -15,6 +18,19 @@ bool Address::is_loopback() const {
   in_addr v4 = {};
   constexpr std::uint32_t kLoopbackNetwork = 127;
   return ::inet_pton(AF_INET, host.c_str(), &v4) == 1 && ntohl(v4.s_addr) >> 24 == kLoopbackNetwork;
+}
+
+std::string party_of(const std::string& address) {
+  in6_addr v6 = {};
+  if (::inet_pton(AF_INET6, address.c_str(), &v6) != 1) return address;
+  constexpr std::size_t kNetworkBytes = 8;
+  constexpr std::size_t kV4Offset = 12;
+  const std::span<const std::uint8_t> bytes(v6.s6_addr);
+  std::array<char, INET_ADDRSTRLEN> v4 = {};
+  if (IN6_IS_ADDR_V4MAPPED(&v6)) {
+    return ::inet_ntop(AF_INET, &bytes[kV4Offset], v4.data(), v4.size());
+  }
+  return to_hex(bytes.first(kNetworkBytes));
 }
 
 Address parse_address(const std::string& text) {

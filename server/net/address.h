@@ -18,6 +18,10 @@ struct Address {
   bool is_loopback() const;
 };
 
+// Who shares limits (FairPlaces): whoever has one IPv4 address, or one network of 64 bits of IPv6,
+// which is the least that is given out. `address` is a number; "" for "".
+std::string party_of(const std::string& address);
+
 // Throws Error kInvalidParameter that says what is wrong.
 Address parse_address(const std::string& text);
 

@@ -32,6 +32,7 @@ std::optional<std::size_t> IncomingBody::read(std::span<char> target) {
   if (begin_read_ < begin_.size()) {
     const std::size_t count = begin_.copy(target.data(), target.size(), begin_read_);
     begin_read_ += count;
+    if (!is_well_formed({target.data(), count})) return std::nullopt;
     return count;
   }
   if (std::exchange(waits_for_invitation_, false)) invite();
@@ -46,12 +47,18 @@ std::optional<std::size_t> IncomingBody::read(std::span<char> target) {
         since_deadline_ = 0;
         deadline_ = Clock::now() + limits_.patience;
       }
+      if (!is_well_formed({target.data(), transfer.bytes})) return std::nullopt;
       return transfer.bytes;
     }
     was_too_slow_ = Clock::now() >= *deadline_;
     if (stopping_ || was_too_slow_) return std::nullopt;
     wait_for(*stream_, transfer.state, kStopMilliseconds);
   }
+}
+
+bool IncomingBody::is_well_formed(std::string_view bytes) {
+  if (framing_.chunked && !chunks_.scan(bytes)) was_malformed_ = true;
+  return !was_malformed_;
 }
 
 // These few bytes are the first of the connection's other direction, so its buffer has room for

@@ -1,31 +1,57 @@
 #include "server/net/parked.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
+#include <vector>
+
+#include <sys/epoll.h>
+#include <unistd.h>
 
 namespace isomesh::net {
+namespace {
 
-Parked::Parked(HasEnded has_ended)
-    : has_ended_(std::move(has_ended)),
-      clock_([this](const std::stop_token& stop) { resume_overdue(stop); }) {}
+constexpr int kMostEvents = 64;
+constexpr std::uint64_t kWakeup = 0;  // what epoll calls it; requests have higher numbers
+
+bool watch(int epoll, int descriptor, unsigned events, std::uint64_t who) {
+  epoll_event event = {};
+  event.events = events;
+  event.data.u64 = who;
+  return ::epoll_ctl(epoll, EPOLL_CTL_ADD, descriptor, &event) == 0;
+}
+
+}  // namespace
+
+Parked::Parked(HasEnded has_ended) : has_ended_(std::move(has_ended)), epoll_(new_epoll()) {
+  watch(epoll_, wakeup_.descriptor(), EPOLLIN, kWakeup);
+  thread_ = std::jthread([this] { work(); });
+}
 
 Parked::~Parked() {
   close();
-  clock_.request_stop();
+  stopping_ = true;
+  wakeup_.ring();
+  thread_.join();
+  ::close(epoll_);
 }
 
 void Parked::park(ParkedRequest request) {
   const std::string job = request.job;
   {
     Lock lock(mutex_);
-    if (closed_ || requests_.size() >= kMostRequests) {
+    if (closed_) {
       lock.unlock();
       return request.resume();
     }
-    requests_.push_back(std::move(request));
-    ++count_;
-    changed_.notify_all();
+    const std::uint64_t id = ++last_id_;
+    // One that cannot be watched waits without that.
+    const bool is_watched =
+        request.descriptor >= 0 && watch(epoll_, request.descriptor, EPOLLRDHUP, id);
+    if (!is_watched) request.descriptor = -1;
+    requests_.emplace(id, std::move(request));
   }
+  wakeup_.ring();
   // The job may have ended after its handler looked and before the request was here to be told.
   if (has_ended_(job)) job_ended(job);
 }
@@ -47,32 +73,62 @@ void Parked::resume_if(const Predicate& is_over) {
   std::vector<ParkedRequest> over;
   {
     const Lock lock(mutex_);
-    const auto first =
-        std::stable_partition(requests_.begin(), requests_.end(),
-                              [&](const ParkedRequest& request) { return !is_over(request); });
-    over.assign(std::make_move_iterator(first), std::make_move_iterator(requests_.end()));
-    requests_.erase(first, requests_.end());
+    for (auto named = requests_.begin(); named != requests_.end();) {
+      const auto each = named++;
+      if (!is_over(std::as_const(each->second))) continue;
+      unwatch(each->second);
+      over.push_back(std::move(each->second));
+      requests_.erase(each);
+    }
   }
   for (const ParkedRequest& request : over) request.resume();
 }
 
-void Parked::resume_overdue(const std::stop_token& stop) {
-  while (!stop.stop_requested()) {
-    {
-      Lock lock(mutex_);
-      Clock::time_point next = Clock::time_point::max();
-      for (const ParkedRequest& request : requests_) next = std::min(next, request.until);
-      if (next == Clock::time_point::max()) {
-        changed_.wait(lock, stop, [this]() ISOMESH_REQUIRES(mutex_) { return !requests_.empty(); });
-        continue;
-      }
-      const std::uint64_t count = count_;
-      changed_.wait_until(lock, stop, next,
-                          [this, count]() ISOMESH_REQUIRES(mutex_) { return count_ != count; });
+// Before anybody else uses the descriptor, or closes it.
+void Parked::unwatch(ParkedRequest& request) {
+  const int descriptor = std::exchange(request.descriptor, -1);
+  if (descriptor >= 0) ::epoll_ctl(epoll_, EPOLL_CTL_DEL, descriptor, nullptr);
+}
+
+void Parked::work() {
+  std::array<epoll_event, kMostEvents> events = {};
+  while (!stopping_) {
+    const int count = ::epoll_wait(epoll_, events.data(), kMostEvents, milliseconds_to_next());
+    for (int i = 0; i < count; ++i) {
+      const std::uint64_t who = events.at(static_cast<std::size_t>(i)).data.u64;
+      who == kWakeup ? wakeup_.clear() : notice_end(who);
     }
     const auto now = Clock::now();
     resume_if([&](const ParkedRequest& request) { return now >= request.until; });
   }
+}
+
+// -1, which is for ever, while nobody waits.
+int Parked::milliseconds_to_next() {
+  const Lock lock(mutex_);
+  if (requests_.empty()) return -1;
+  Clock::time_point next = Clock::time_point::max();
+  for (const auto& [id, request] : requests_) next = std::min(next, request.until);
+  constexpr std::chrono::milliseconds kLongest{60'000};
+  const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next - Clock::now());
+  return static_cast<int>(std::clamp<std::chrono::milliseconds>(wait, {}, kLongest).count());
+}
+
+void Parked::notice_end(std::uint64_t id) {
+  std::function<void()> abandoned;
+  ParkedRequest over;
+  {
+    const Lock lock(mutex_);
+    const auto found = requests_.find(id);
+    if (found == requests_.end()) return;  // it has just been resumed
+    unwatch(found->second);
+    abandoned = std::exchange(found->second.abandoned, nullptr);
+    if (!abandoned) {
+      over = std::move(found->second);
+      requests_.erase(found);
+    }
+  }
+  abandoned ? abandoned() : over.resume();
 }
 
 }  // namespace isomesh::net

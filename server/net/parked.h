@@ -1,22 +1,28 @@
 // Requests that wait for the end of a job without holding a thread.
 #pragma once
 
+#include <atomic>
 #include <chrono>
-#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <thread>
-#include <vector>
 
 #include "base/mutex.h"
+#include "server/net/wakeup.h"
 
 namespace isomesh::net {
 
 struct ParkedRequest {
   std::string job;                              // whose end it waits for
   std::chrono::steady_clock::time_point until;  // when it goes on whether the job has ended or not
-  std::function<void()> resume;                 // called once; must not block
+  std::function<void()> resume = {};            // called once; must not block
+  // The connection that it came by, open until it is resumed; -1: it is not watched.
+  int descriptor = -1;
+  // Called at most once, before resume, when the other side has ended the connection, or its half
+  // of it; must not block. Without it the request is resumed then.
+  std::function<void()> abandoned = {};
 };
 
 // Thread safe.
@@ -25,15 +31,13 @@ class Parked {
   // Whether a job has ended, or does not exist.
   using HasEnded = std::function<bool(const std::string& job)>;
 
-  static constexpr std::size_t kMostRequests = 1024;
-
   explicit Parked(HasEnded has_ended);
   // As close().
   ~Parked();
   Parked(const Parked&) = delete;
   Parked& operator=(const Parked&) = delete;
 
-  // When kMostRequests wait already, or after close(), the request is resumed at once.
+  // After close() the request is resumed at once. How many wait is bounded by the connections.
   void park(ParkedRequest request) ISOMESH_EXCLUDES(mutex_);
 
   // Resumes all that wait for that job.
@@ -45,17 +49,22 @@ class Parked {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void resume_overdue(const std::stop_token& stop) ISOMESH_EXCLUDES(mutex_);
+  void work() ISOMESH_EXCLUDES(mutex_);
+  int milliseconds_to_next() ISOMESH_EXCLUDES(mutex_);
+  void notice_end(std::uint64_t id) ISOMESH_EXCLUDES(mutex_);
+  void unwatch(ParkedRequest& request) ISOMESH_REQUIRES(mutex_);
   template <class Predicate>
   void resume_if(const Predicate& is_over) ISOMESH_EXCLUDES(mutex_);
 
   const HasEnded has_ended_;
+  const int epoll_;
+  Wakeup wakeup_;
+  std::atomic<bool> stopping_ = false;
   Mutex mutex_;
-  Condition changed_;
-  std::vector<ParkedRequest> requests_ ISOMESH_GUARDED_BY(mutex_);
-  std::uint64_t count_ ISOMESH_GUARDED_BY(mutex_) = 0;  // of all that ever came
+  std::map<std::uint64_t, ParkedRequest> requests_ ISOMESH_GUARDED_BY(mutex_);  // by epoll's name
+  std::uint64_t last_id_ ISOMESH_GUARDED_BY(mutex_) = 0;
   bool closed_ ISOMESH_GUARDED_BY(mutex_) = false;
-  std::jthread clock_;  // declared last, so that it ends before what it uses
+  std::jthread thread_;  // declared last, so that it ends before what it uses
 };
 
 }  // namespace isomesh::net

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <exception>
+#include <limits>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -16,6 +17,7 @@ constexpr int kMostEvents = 128;
 constexpr int kTickMilliseconds = 1000;  // how often sources and deadlines are looked at
 constexpr std::size_t kBytesPerTurn = std::size_t{1} << 20;  // then it is the next one's turn
 constexpr std::size_t kMostIgnored = std::size_t{64} << 20;
+constexpr std::uint64_t kWakeup = 0;  // what epoll calls it; responses have higher numbers
 
 // An exception of one source must not end the thread that serves all.
 Source::More next_of(Source& source, std::string& bytes) {
@@ -46,10 +48,15 @@ bool is_sent(Response& response, bool request_is_whole) {
 
 }  // namespace
 
-Sender::Sender(const SenderLimits& limits) : limits_(limits), epoll_(new_epoll()) {
+// Each response has at most one piece that is computed at a time, so the queue needs no bound of
+// its own.
+Sender::Sender(const SenderLimits& limits)
+    : limits_(limits),
+      epoll_(new_epoll()),
+      computing_(limits.computing_threads, std::numeric_limits<std::size_t>::max()) {
   epoll_event event = {};
   event.events = EPOLLIN;
-  event.data.ptr = nullptr;
+  event.data.u64 = kWakeup;
   ::epoll_ctl(epoll_, EPOLL_CTL_ADD, wakeup_.descriptor(), &event);
   thread_ = std::jthread([this] { work(); });
 }
@@ -98,51 +105,71 @@ void Sender::work() {
       ask_sources();
       close_overdue();
     }
-    if (ending_ && (sending_.empty() || now >= end)) break;
+    if (ending_ && (by_id_.empty() || now >= end)) break;
     const int patience = ending_ ? kTickMilliseconds / 20 : kTickMilliseconds;
     const int count = ::epoll_wait(epoll_, events.data(), kMostEvents, patience);
     for (int i = 0; i < count; ++i) serve_event(events.at(static_cast<std::size_t>(i)));
   }
+  by_id_.clear();
   sending_.clear();
+  parting_.clear();
   count_ = 0;
 }
 
-// What is sent is known to epoll by its address in memory. New responses are added between two
-// batches of events, so that none can have the address of one that was closed within a batch.
 void Sender::serve_event(const epoll_event& event) {
-  if (event.data.ptr == nullptr) return wakeup_.clear();
-  const auto sending =
-      std::ranges::find_if(sending_, [&](const Sending& each) { return &each == event.data.ptr; });
-  if (sending != sending_.end()) go_on(sending, event.events);
+  if (event.data.u64 == kWakeup) return wakeup_.clear();
+  const auto sending = by_id_.find(event.data.u64);  // closed within this batch of events, perhaps
+  if (sending != by_id_.end()) go_on(sending->second, event.events);
 }
 
 // Returns when to end.
 Sender::Clock::time_point Sender::take_arrived() {
   std::vector<Response> arrived;
+  std::vector<Computed> computed;
   bool woken = false;
   Clock::time_point end;
   {
     const Lock lock(mutex_);
     arrived.swap(arrived_);
+    computed.swap(computed_);
     woken = std::exchange(woken_, false);
     end = end_;
   }
   ending_ = end != Clock::time_point::max();
-  for (Response& response : arrived) {
-    if (sending_.size() >= limits_.most_responses) close(sending_.begin());
-    Sending& sending = sending_.emplace_back();
-    sending.response = std::move(response);
-    sending.deadline = Clock::now() + limits_.patience;
-    go_on(std::prev(sending_.end()), 0);
-  }
+  for (Response& response : arrived) begin(std::move(response));
+  for (Computed& each : computed) take_computed(std::move(each));
   if (woken) ask_sources();
   return end;
+}
+
+void Sender::begin(Response response) {
+  const auto sending = sending_.emplace(sending_.end());
+  sending->id = ++last_id_;
+  sending->response = std::move(response);
+  sending->deadline = Clock::now() + limits_.patience;
+  by_id_.emplace(sending->id, sending);
+  if (sending->response.is_refusal) part(*sending);
+  go_on(sending, 0);
+}
+
+// The receiver may be gone, and then the source goes with what it has made.
+void Sender::take_computed(Computed computed) {
+  const auto found = by_id_.find(computed.id);
+  if (found == by_id_.end()) return;
+  const auto sending = found->second;
+  sending->is_computed = false;
+  sending->response.source = std::move(computed.source);
+  sending->response.bytes = std::move(computed.bytes);
+  sending->deadline = Clock::now() + limits_.patience;
+  if (!go_on_with(*sending, computed.more)) return close(sending);
+  go_on(sending, 0);
 }
 
 void Sender::go_on(SendingList::iterator sending, unsigned events) {
   const bool is_broken = (events & (EPOLLERR | EPOLLHUP)) != 0;
   const bool reader_is_gone = (events & EPOLLRDHUP) != 0;  // only watched for where it matters
   if (is_broken || reader_is_gone) return close(sending);
+  if (sending->is_computed) return;
   const bool goes_on =
       sending->phase == Phase::kSending ? send_some(*sending) : ignore_input(*sending);
   if (!goes_on || !watch(*sending)) close(sending);
@@ -156,10 +183,8 @@ bool Sender::send_some(Sending& sending) {
     if (sending.sent == bytes.size()) {
       if (!refill(sending)) return false;
       if (sending.phase == Phase::kLingering) return ignore_input(sending);
-      if (sending.waits_for_source) {
-        sending.events = sending.response.source->ends_with_reader() ? EPOLLRDHUP : 0U;
-        return true;
-      }
+      if (sending.waits_for_source || sending.is_computed) return true;
+      if (bytes.empty()) continue;
     }
     const Transfer transfer =
         sending.response.stream->write(std::string_view(bytes).substr(sending.sent));
@@ -187,21 +212,58 @@ bool Sender::refill(Sending& sending) {
   response.bytes.clear();
   sending.sent = 0;
   sending.waits_for_source = false;
-  switch (response.source ? next_of(*response.source, response.bytes) : Source::More::kEnd) {
+  if (!response.source) return go_on_with(sending, Source::More::kEnd);
+  sending.events = response.source->ends_with_reader() ? EPOLLRDHUP : 0U;
+  if (response.source->computes()) return have_computed(sending);
+  return go_on_with(sending, next_of(*response.source, response.bytes));
+}
+
+// What the source has said, which may have made bytes. False as above.
+bool Sender::go_on_with(Sending& sending, Source::More more) {
+  switch (more) {
     case Source::More::kBytes:
       return true;
     case Source::More::kLater:
       sending.waits_for_source = true;
       return !ending_;
     case Source::More::kEnd:
-      response.stream->finish_writing();
+      sending.response.stream->finish_writing();
       sending.phase = Phase::kLingering;
       sending.deadline = Clock::now() + limits_.linger;
+      part(sending);
       return true;
     case Source::More::kBroken:
       break;
   }
   return false;
+}
+
+bool Sender::have_computed(Sending& sending) {
+  sending.is_computed = true;
+  Response& response = sending.response;
+  // Tasks are copied, sources are not.
+  const auto source = std::make_shared<std::unique_ptr<Source>>(std::move(response.source));
+  const auto bytes = std::make_shared<std::string>(std::move(response.bytes));
+  return computing_.try_enqueue(response.party, [this, id = sending.id, source, bytes] {
+    compute(id, std::move(*source), std::move(*bytes));
+  });
+}
+
+void Sender::compute(std::uint64_t id, std::unique_ptr<Source> source, std::string bytes) {
+  const Source::More more = next_of(*source, bytes);
+  {
+    const Lock lock(mutex_);
+    computed_.push_back({id, std::move(source), more, std::move(bytes)});
+  }
+  wakeup_.ring();
+}
+
+// Those who have their response, or were refused, make room for others.
+void Sender::part(Sending& sending) {
+  if (sending.is_parting) return;
+  sending.is_parting = true;
+  if (parting_.size() >= limits_.most_parting) close(parting_.begin());
+  parting_.splice(parting_.end(), sending_, by_id_.at(sending.id));
 }
 
 // Takes and forgets what the other side still sends. False when it has ended, or has sent enough.
@@ -229,17 +291,20 @@ void Sender::ask_sources() {
 
 void Sender::close_overdue() {
   const auto now = Clock::now();
-  for (auto sending = sending_.begin(); sending != sending_.end();) {
-    const auto next = std::next(sending);
-    if (!sending->waits_for_source && now >= sending->deadline) close(sending);
-    sending = next;
+  for (SendingList* const list : {&sending_, &parting_}) {
+    for (auto sending = list->begin(); sending != list->end();) {
+      const auto next = std::next(sending);
+      const bool is_waited_for = sending->waits_for_source || sending->is_computed;
+      if (!is_waited_for && now >= sending->deadline) close(sending);
+      sending = next;
+    }
   }
 }
 
 bool Sender::watch(Sending& sending) {
   epoll_event event = {};
   event.events = sending.events;
-  event.data.ptr = &sending;
+  event.data.u64 = sending.id;
   const int descriptor = sending.response.stream->descriptor();
   const int operation = std::exchange(sending.is_watched, true) ? EPOLL_CTL_MOD : EPOLL_CTL_ADD;
   return ::epoll_ctl(epoll_, operation, descriptor, &event) == 0;
@@ -247,7 +312,8 @@ bool Sender::watch(Sending& sending) {
 
 // Closing the descriptor takes it out of epoll.
 void Sender::close(SendingList::iterator sending) {
-  sending_.erase(sending);
+  by_id_.erase(sending->id);
+  (sending->is_parting ? parting_ : sending_).erase(sending);
   --count_;
 }
 

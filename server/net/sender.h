@@ -4,15 +4,18 @@
 #include <atomic>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <list>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <thread>
+#include <unordered_map>
 #include <vector>
 
 #include "base/mutex.h"
 #include "server/net/byte_stream.h"
+#include "server/net/task_queue.h"
 #include "server/net/wakeup.h"
 
 struct epoll_event;
@@ -23,7 +26,7 @@ namespace isomesh::net {
 class Source {
  public:
   enum class More {
-    kBytes,   // some were appended
+    kBytes,   // some were appended, or it is to be asked again at once, to compute them
     kLater,   // none at the moment; ask again after Sender::wake or a second
     kEnd,     // the response is complete
     kBroken,  // it cannot be completed; the connection is cut, so that the receiver knows
@@ -31,9 +34,13 @@ class Source {
 
   virtual ~Source() = default;
 
-  // Appends some tens of kilobytes. Must not block for long: all receivers wait. What it throws is
-  // logged, and taken as kBroken.
+  // Appends some tens of kilobytes. Must not block for long: all receivers wait, or those of other
+  // sources that compute. What it throws is logged, and taken as kBroken.
   virtual More next(std::string& bytes) = 0;
+
+  // Whether next() does more than to copy what is there. Then it is called by threads of their own,
+  // so that those who receive what is there already do not wait for it.
+  virtual bool computes() const { return false; }
 
   // Whether a client that ends its own sending counts as gone. One that waits for events is gone;
   // one that downloads a file may have sent all that it had to send.
@@ -45,10 +52,15 @@ struct Response {
   std::unique_ptr<ByteStream> stream;
   std::string bytes;               // what is sent first
   std::unique_ptr<Source> source;  // what follows; may be empty
+  std::string party = {};          // whom it is for, among those that share the computing threads
+  bool is_refusal = false;         // little is lost when the connection is let go of
 };
 
 struct SenderLimits {
-  std::size_t most_responses = 1024;  // with one more the oldest is cut off
+  // Refusals, and connections whose response is written and that linger; with one more the oldest
+  // is closed. Responses on their way are not counted: who holds a place keeps it.
+  std::size_t most_parting = 128;
+  std::size_t computing_threads = 4;
   // Within each such time a receiver must take kLeastBytes or all that there is.
   std::chrono::milliseconds patience{30'000};
   // How long the other side may go on sending after the response. Closing a connection with bytes
@@ -87,10 +99,13 @@ class Sender {
   enum class Phase { kSending, kLingering };
 
   struct Sending {
+    std::uint64_t id = 0;  // to epoll and to the computing threads
     Response response;
     std::size_t sent = 0;  // of response.bytes
     Phase phase = Phase::kSending;
     bool waits_for_source = false;
+    bool is_computed = false;        // its source is with a computing thread
+    bool is_parting = false;         // in the list of those
     bool is_watched = false;         // by epoll
     std::size_t since_deadline = 0;  // bytes that were taken since the deadline was set
     std::size_t ignored = 0;         // bytes that came after the response
@@ -98,15 +113,29 @@ class Sender {
     unsigned events = 0;  // what epoll watches for
   };
   using SendingList = std::list<Sending>;
+  // What a computing thread has made, with the source that it gives back.
+  struct Computed {
+    std::uint64_t id = 0;
+    std::unique_ptr<Source> source;
+    Source::More more = Source::More::kBroken;
+    std::string bytes;
+  };
 
   void work();
   Clock::time_point take_arrived() ISOMESH_EXCLUDES(mutex_);
+  void begin(Response response);
+  void take_computed(Computed computed);
+  void compute(std::uint64_t id, std::unique_ptr<Source> source, std::string bytes)
+      ISOMESH_EXCLUDES(mutex_);
   void serve_event(const epoll_event& event);
   void go_on(SendingList::iterator sending, unsigned events);
   void ask_sources();
   void close_overdue();
   bool send_some(Sending& sending);
   bool refill(Sending& sending);
+  bool go_on_with(Sending& sending, Source::More more);
+  bool have_computed(Sending& sending);
+  void part(Sending& sending);
   bool ignore_input(Sending& sending);
   bool watch(Sending& sending);
   void close(SendingList::iterator sending);
@@ -117,11 +146,16 @@ class Sender {
   std::atomic<std::size_t> count_ = 0;
   Mutex mutex_;
   std::vector<Response> arrived_ ISOMESH_GUARDED_BY(mutex_);
+  std::vector<Computed> computed_ ISOMESH_GUARDED_BY(mutex_);
   bool woken_ ISOMESH_GUARDED_BY(mutex_) = false;
   Clock::time_point end_ ISOMESH_GUARDED_BY(mutex_) = Clock::time_point::max();
-  // Only the sender's thread touches the next two.
-  SendingList sending_;  // oldest first
+  // Only the sender's thread touches the next five.
+  SendingList sending_;  // oldest first, as the next
+  SendingList parting_;
+  std::unordered_map<std::uint64_t, SendingList::iterator> by_id_;
+  std::uint64_t last_id_ = 0;
   bool ending_ = false;
+  BoundedTaskQueue computing_;
   std::jthread thread_;  // declared last, so that it ends before what it uses
 };
 

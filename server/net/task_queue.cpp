@@ -1,11 +1,14 @@
 #include "server/net/task_queue.h"
 
+#include <algorithm>
 #include <utility>
+
+#include "base/share.h"
 
 namespace isomesh::net {
 
 BoundedTaskQueue::BoundedTaskQueue(std::size_t threads, std::size_t capacity)
-    : capacity_(capacity) {
+    : capacity_(capacity), idle_(threads) {
   for (std::size_t i = 0; i < threads; ++i) {
     threads_.emplace_back([this] { work(); });
   }
@@ -13,11 +16,23 @@ BoundedTaskQueue::BoundedTaskQueue(std::size_t threads, std::size_t capacity)
 
 BoundedTaskQueue::~BoundedTaskQueue() { shutdown(); }
 
-bool BoundedTaskQueue::try_enqueue(std::function<void()>&& task) {
+bool BoundedTaskQueue::try_enqueue(const std::string& party, Task&& task) {
   {
     const Lock lock(mutex_);
-    if (closed_ || queue_.size() >= capacity_) return false;
-    queue_.push_back(std::move(task));
+    if (closed_ || waiting_ >= capacity_) return false;
+    const auto line = line_of(party);
+    if (!has_share(party, line->tasks.size(), capacity_ - waiting_)) return false;
+    add(line, std::move(task));
+  }
+  changed_.notify_one();
+  return true;
+}
+
+bool BoundedTaskQueue::enqueue_rest(const std::string& party, Task&& task) {
+  {
+    const Lock lock(mutex_);
+    if (closed_) return false;
+    add(line_of(party), std::move(task));
   }
   changed_.notify_one();
   return true;
@@ -33,17 +48,49 @@ void BoundedTaskQueue::shutdown() {
 }
 
 void BoundedTaskQueue::work() {
+  Lock lock(mutex_);
   while (true) {
-    std::function<void()> task;
-    {
-      Lock lock(mutex_);
-      changed_.wait(lock, [this]() ISOMESH_REQUIRES(mutex_) { return !queue_.empty() || closed_; });
-      if (queue_.empty()) return;
-      task = std::move(queue_.front());
-      queue_.pop_front();
-    }
+    auto line = lines_.end();
+    changed_.wait(lock, [&]() ISOMESH_REQUIRES(mutex_) {
+      line = next();
+      return line != lines_.end() || (closed_ && waiting_ == 0);
+    });
+    if (line == lines_.end()) return;
+    Task task = std::move(line->tasks.front());
+    line->tasks.pop_front();
+    --waiting_;
+    --idle_;
+    ++line->running;
+    lines_.splice(lines_.end(), lines_, line);
+    if (waiting_ > 0) changed_.notify_one();  // several may have got their share at once
+    lock.unlock();
     task();
+    task = nullptr;  // what it holds goes outside of the lock
+    lock.lock();
+    --line->running;
+    ++idle_;
+    if (line->tasks.empty() && line->running == 0) lines_.erase(line);
+    if (closed_) changed_.notify_all();
   }
+}
+
+BoundedTaskQueue::Lines::iterator BoundedTaskQueue::line_of(const std::string& party) {
+  const auto line = std::ranges::find(lines_, party, &Line::party);
+  return line != lines_.end()
+             ? line
+             : lines_.insert(lines_.end(), Line{.party = party, .tasks = {}, .running = 0});
+}
+
+void BoundedTaskQueue::add(Lines::iterator line, Task&& task) {
+  line->tasks.push_back(std::move(task));
+  ++waiting_;
+}
+
+// Whose turn it is; the end when nobody with a share of the threads has a task.
+BoundedTaskQueue::Lines::iterator BoundedTaskQueue::next() {
+  return std::ranges::find_if(lines_, [this](const Line& line) ISOMESH_REQUIRES(mutex_) {
+    return !line.tasks.empty() && has_share(line.party, line.running, idle_);
+  });
 }
 
 }  // namespace isomesh::net

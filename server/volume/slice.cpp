@@ -142,9 +142,14 @@ SlicePng::SlicePng(std::shared_ptr<const CanonicalVolume> volume, const SliceCho
 
 SlicePng::~SlicePng() = default;
 
-std::string_view SlicePng::next() {
+std::optional<std::string_view> SlicePng::next() {
   bytes_.erase(0, taken_);
-  while (next_row_ <= height_ && bytes_.size() < kBlockBytes) write_row();
+  if (next_row_ > height_ && bytes_.empty()) return std::nullopt;
+  std::size_t samples = 0;
+  while (next_row_ <= height_ && bytes_.size() < kBlockBytes && samples < kSamplesPerPiece) {
+    write_row();
+    samples += width_;
+  }
   taken_ = bytes_.size();
   return bytes_;
 }

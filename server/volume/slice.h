@@ -41,8 +41,12 @@ class SlicePng {
   SlicePng(const SlicePng&) = delete;
   SlicePng& operator=(const SlicePng&) = delete;
 
-  // The next bytes of the file; empty at its end. Throws Error kInternal.
-  std::string_view next();
+  // The samples that one call of next() looks at, but for the last row.
+  static constexpr std::size_t kSamplesPerPiece = std::size_t{1} << 20;
+
+  // The next bytes of the file; nothing at its end. A piece may be empty: what is of one grey
+  // makes few bytes of many samples. Throws Error kInternal.
+  std::optional<std::string_view> next();
 
  private:
   struct Writer;

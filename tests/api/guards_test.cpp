@@ -137,6 +137,26 @@ TEST_F(GuardsTest, WhatIsNoHttpIsRefused) {
   }
 }
 
+TEST_F(GuardsTest, PagesOfOtherOriginsDoNotGetWhatIsHere) {
+  for (const std::string path : {"/livez", "/v1/jobs", "/", "/nothing"}) {
+    EXPECT_EQ(daemon_.get(path).header("cross-origin-resource-policy"), "same-origin") << path;
+  }
+  EXPECT_EQ(answer_to("nonsense\r\n\r\n").header("cross-origin-resource-policy"), "same-origin");
+}
+
+TEST(AllowHost, HoldsWithTheOpenNetworkToo) {
+  const TemporaryFolder folder;
+  const Daemon daemon(folder / "data", "0.0.0.0:0",
+                      {"--open-network", "--allow-host", "iso.example"});
+  const auto status_for = [&](const std::string& host) {
+    return test::answer_to(daemon.url(), "GET /livez HTTP/1.1\r\nHost: " + host + "\r\n\r\n")
+        .status;
+  };
+  EXPECT_EQ(status_for("iso.example"), 200);
+  EXPECT_EQ(status_for("localhost"), 200);
+  EXPECT_EQ(status_for("evil.example"), 403);
+}
+
 TEST_F(GuardsTest, ASpoofedAddressDoesNoHarm) {
   EXPECT_EQ(daemon_.get("/livez", {{"REMOTE_ADDR", "1.2.3.4"}, {"REMOTE_PORT", "x"}}).status, 200);
 }
@@ -237,9 +257,9 @@ TEST(UploadPlaces, AreBounded) {
     // The one before may have come while the upload below had the second place.
     begin_slow_upload();
     refused = daemon.send("POST", target, sphere.bytes);
-    return refused.status == 503;
+    return refused.status == 429;
   }));
-  EXPECT_TRUE(is_problem(refused, ErrorCode::kUnavailable));
+  EXPECT_TRUE(is_problem(refused, ErrorCode::kTooManyRequests));
   EXPECT_FALSE(refused.header("retry-after").empty());
   slow.clear();
   EXPECT_TRUE(eventually([&] { return daemon.send("POST", target, sphere.bytes).status < 300; }));

@@ -19,8 +19,17 @@ namespace isomesh::test {
 namespace {
 
 template <class Address>
-int connected(int family, const Address& address) {
+int connected(int family, const Address& address, const std::string& from) {
   const int socket = ::socket(family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (!from.empty()) {
+    sockaddr_in own = {};
+    own.sin_family = AF_INET;
+    ::inet_pton(AF_INET, from.c_str(), &own.sin_addr);
+    if (::bind(socket, reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0) {
+      ::close(socket);
+      throw std::runtime_error(from + " is no address of this machine");
+    }
+  }
   const timeval longest = {std::chrono::seconds(kLongest).count(), 0};
   ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &longest, sizeof longest);
   ::setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &longest, sizeof longest);
@@ -31,19 +40,19 @@ int connected(int family, const Address& address) {
   return socket;
 }
 
-int connected_to(const std::string& url) {
+int connected_to(const std::string& url, const std::string& from) {
   if (url.starts_with("unix:")) {
     sockaddr_un address = {};
     address.sun_family = AF_UNIX;
     url.copy(address.sun_path, sizeof address.sun_path - 1, 5);
-    return connected(AF_UNIX, address);
+    return connected(AF_UNIX, address, "");
   }
   sockaddr_in address = {};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   const auto port = static_cast<std::uint16_t>(std::stoi(url.substr(url.rfind(':') + 1)));
   address.sin_port = htons(port);
-  return connected(AF_INET, address);
+  return connected(AF_INET, address, from);
 }
 
 Answer parse(const std::string& text) {
@@ -72,7 +81,8 @@ std::string Answer::header(const std::string& name) const {
   return found == headers.end() ? "" : found->second;
 }
 
-Connection::Connection(const std::string& url) : socket_(connected_to(url)) {}
+Connection::Connection(const std::string& url, const std::string& from)
+    : socket_(connected_to(url, from)) {}
 
 Connection::~Connection() { ::close(socket_); }
 
@@ -118,8 +128,8 @@ std::string request(const std::string& method, const std::string& target, const 
   return text + "\r\n" + body;
 }
 
-Answer answer_to(const std::string& url, std::string_view bytes) {
-  const Connection connection(url);
+Answer answer_to(const std::string& url, std::string_view bytes, const std::string& from) {
+  const Connection connection(url, from);
   connection.send(bytes);
   return connection.receive();
 }

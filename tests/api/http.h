@@ -24,7 +24,8 @@ struct Answer {
 // when the server is silent for longer than kLongest.
 class Connection {
  public:
-  explicit Connection(const std::string& url);
+  // `from` is the address that it comes from, such as 127.0.0.2; "": whichever the system takes.
+  explicit Connection(const std::string& url, const std::string& from = {});
   ~Connection();
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
@@ -47,8 +48,8 @@ class Connection {
 std::string request(const std::string& method, const std::string& target,
                     const std::string& body = {}, const Headers& headers = {});
 
-// Sends the bytes over a new connection and returns the answer.
-Answer answer_to(const std::string& url, std::string_view bytes);
+// Sends the bytes over a new connection, from that address, and returns the answer.
+Answer answer_to(const std::string& url, std::string_view bytes, const std::string& from = {});
 
 // The body as one chunk after the other, for Transfer-Encoding: chunked.
 std::string chunked(std::string_view body, std::size_t chunk_bytes);

@@ -77,6 +77,17 @@ TEST_F(TokensTest, ARoleReachesAsFarAsItSays) {
   }
 }
 
+TEST_F(TokensTest, AnAdministratorErasesWhatItSees) {
+  const RawUpload sphere = sphere_upload();
+  const std::string target = "/v1/volumes?" + sphere.query;
+  const Answer uploaded = daemon_.send("POST", target, sphere.bytes, bearer(ct_));
+  ASSERT_EQ(uploaded.status, 201) << uploaded.body;
+  const std::string volume = "/v1/volumes/" + volume_from_json(uploaded.body).id;
+  EXPECT_EQ(daemon_.send("DELETE", volume, "", bearer(boss_)).status, 204);
+  EXPECT_EQ(daemon_.get(volume, bearer(boss_)).status, 404);
+  EXPECT_EQ(daemon_.get(volume, bearer(ct_)).status, 404);
+}
+
 // Of what is another's, not even that it is there is told.
 TEST_F(TokensTest, ATokenSeesItsOwnAloneAndAnAdministratorAll) {
   Client ct({.server = daemon_.url(), .token = ct_});

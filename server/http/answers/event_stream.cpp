@@ -30,12 +30,21 @@ class EventSource : public net::Source {
     std::ranges::reverse(stream_.past);
   }
 
+  // The job that is over has to be read and written as JSON.
+  bool computes() const override { return end_.has_value(); }
+
   More next(std::string& bytes) override {
     if (is_over_) return More::kEnd;
+    if (end_) {
+      tell(*std::exchange(end_, std::nullopt), bytes);
+      return More::kBytes;
+    }
     if (!std::exchange(has_begun_, true)) bytes += kRetry;
-    while (!is_over_) {
-      const auto event = next_event();
-      if (!event) break;
+    while (auto event = next_event()) {
+      if (event->kind == store::EventKind::kDone) {
+        end_ = std::move(event);
+        return More::kBytes;
+      }
       tell(*event, bytes);
     }
     const auto now = std::chrono::steady_clock::now();
@@ -71,6 +80,7 @@ class EventSource : public net::Source {
 
   EventStream stream_;  // the past in reverse
   bool has_begun_ = false;
+  std::optional<store::Event> end_;  // the last event, which is to be told next
   bool is_over_ = false;
   std::chrono::steady_clock::time_point last_told_ = std::chrono::steady_clock::now();
 };

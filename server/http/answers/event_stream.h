@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "base/mutex.h"
-#include "server/http/guards/slots.h"
+#include "server/net/fair_places.h"
 #include "server/net/sender.h"
 #include "server/store/job_store.h"
 
@@ -50,7 +50,7 @@ struct EventStream {
   std::vector<store::Event> past;       // what the listener has missed
   std::uint64_t last = 0;               // the last event that the listener has seen
   std::function<std::string()> result;  // the job that is over, as JSON
-  Slots::Place place;                   // among the streams
+  net::FairPlaces::Place place;         // among the streams
 };
 
 // Ends with the event of the job's end. Sends at least a comment every 15 seconds, so that a client

@@ -57,16 +57,18 @@ class SliceSource : public net::Source {
   SliceSource(std::unique_ptr<volume::SlicePng> picture, bool in_chunks)
       : picture_(std::move(picture)), in_chunks_(in_chunks) {}
 
+  bool computes() const override { return true; }
+
   More next(std::string& bytes) override {
     if (is_over_) return More::kEnd;
-    const std::string_view piece = picture_->next();
-    is_over_ = piece.empty();
-    if (in_chunks_) {
-      append_chunk(piece, bytes);  // an empty one is the last
-    } else {
-      bytes.append(piece);
+    const auto piece = picture_->next();
+    is_over_ = !piece;
+    if (!in_chunks_) {
+      bytes.append(piece.value_or(""));
+    } else if (is_over_ || !piece->empty()) {
+      append_chunk(piece.value_or(""), bytes);  // an empty one is the last
     }
-    return bytes.empty() ? More::kEnd : More::kBytes;
+    return More::kBytes;
   }
 
  private:

@@ -5,6 +5,7 @@
 
 #include "base/log.h"
 #include "proto/error.h"
+#include "server/net/address.h"
 
 namespace isomesh::http {
 namespace {
@@ -40,6 +41,11 @@ const std::string& owner_of(const Request& request) { return request.context.cal
 store::Viewer viewer_of(const Request& request) {
   const Caller& caller = request.context.caller;
   return caller.role == Role::kAdmin ? store::Viewer() : store::Viewer(caller.name);
+}
+
+std::string party_of(const Request& request) {
+  const std::string& owner = owner_of(request);
+  return owner.empty() ? net::party_of(request.remote_address) : "owner " + owner;
 }
 
 void begin_request(const Tokens* tokens, Request& request, Response& response) {

@@ -19,6 +19,10 @@ const std::string& owner_of(const Request& request);
 // Whose things this request may see: its owner's, or everybody's for an administrator.
 store::Viewer viewer_of(const Request& request);
 
+// Who shares limits (net::FairPlaces) with this request: its owner, or its address where there are
+// no tokens; "" for what comes through a Unix socket without them.
+std::string party_of(const Request& request);
+
 // Gives the request its trace, which X-Request-Id tells the client, and finds out who sends it.
 // `tokens` is null where none are configured. To be called before the route is looked for. Throws
 // Error kUnauthorized, and kForbidden when the caller's role does not allow the route.

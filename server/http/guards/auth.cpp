@@ -6,6 +6,7 @@
 
 #include <openssl/crypto.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "base/files.h"
 #include "base/hex.h"
@@ -54,12 +55,17 @@ Error at_fault(const std::string& what) { return invalid_parameter("tokens", wha
 void check_only_owner_writes(const std::filesystem::path& file) {
   struct stat status = {};
   if (::stat(file.c_str(), &status) != 0) throw at_fault("the file cannot be read");
+  if (!may_own_tokens(status.st_uid, ::geteuid())) {
+    throw at_fault("the file belongs to another user: chown it to root or to the service's user");
+  }
   if ((status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
     throw at_fault("others may write to the file: chmod go-w it");
   }
 }
 
 }  // namespace
+
+bool may_own_tokens(uid_t owner, uid_t service) { return owner == 0 || owner == service; }
 
 std::string_view to_string(Role role) {
   switch (role) {

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include <sys/types.h>
+
 #include "base/mutex.h"
 #include "proto/error.h"
 
@@ -65,6 +67,10 @@ class Tokens {
   mutable Mutex mutex_;
   std::shared_ptr<const Entries> entries_ ISOMESH_GUARDED_BY(mutex_);
 };
+
+// Whether a file of tokens may belong to that user: to root, or to whom the service runs as. The
+// owner of a file can write to it, and makes an administrator of whomever it likes.
+bool may_own_tokens(uid_t owner, uid_t service);
 
 // The token of an Authorization header; empty when there is none of the scheme Bearer.
 std::optional<std::string> bearer_of(std::string_view authorization);

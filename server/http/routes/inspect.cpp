@@ -34,8 +34,10 @@ void histogram(App& app, const Request& request, Response& response) {
   const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
   const std::uint64_t bins = whole_number_of(request, "bins", {1, kMostBins}, kUsualBins);
   if (is_known(request, response, '"' + volume.id + ".bins" + std::to_string(bins) + '"')) return;
+  const auto place = app.inspections.take(party_of(request));
   response.status = 200;
-  response.set_body(to_json(app.services.histograms.of(volume, bins)), "application/json");
+  response.set_body(to_json(app.services.histograms.of(viewer_of(request), volume, bins)),
+                    "application/json");
 }
 
 volume::SliceChoice slice_choice(const Request& request, const Volume& volume) {
@@ -73,6 +75,7 @@ void slice(App& app, const Request& request, Response& response) {
 
 void estimate(App& app, const Request& request, Response& response) {
   const JobParameters parameters = parse_job_parameters(request.query, VolumeIn::kQuery);
+  const auto place = app.inspections.take(party_of(request));
   answer_json(response, 200,
               to_json(app.services.estimator.estimate(viewer_of(request), parameters)));
 }

@@ -98,8 +98,7 @@ void events(App& app, const Request& request, Response& response) {
   check_known(request, {});
   const std::string id = request.path_parameter("id");
   const std::uint64_t last = last_event_id(request).value_or(0);
-  auto place = app.streams.try_take();
-  if (!place) throw Error(ErrorCode::kUnavailable, "too many streams of events are open");
+  auto place = app.streams.take(party_of(request));
   // The mailbox is there before the past is read, so that no event is missed. One that happens in
   // between is in both, and the source sends it once.
   auto mailbox = app.events.listen_to(id);
@@ -122,7 +121,7 @@ void events(App& app, const Request& request, Response& response) {
                               .last = last,
                               .result = [&jobs = app.services.jobs, who = viewer_of(request),
                                          id] { return to_json(jobs.get(who, id)); },
-                              .place = std::move(*place)}),
+                              .place = std::move(place)}),
       .media_type = "text/event-stream",
       .framing = Framing::kUntilConnectionEnds};
 }

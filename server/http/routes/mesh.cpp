@@ -65,7 +65,7 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
   }
   const process::ImportOptions options = import_options_of(request);
   const std::string key = idempotency_key_of(request);
-  const Slots::Place place = place_for_upload(app);
+  const auto place = place_for_upload(app, request);
   const Upload file(app.services.folder, app.options.upload, app.stopping, request);
   const auto add = [&] {
     return app.services.library.add(owner_of(request), file.path(), options, file.name());
@@ -87,7 +87,14 @@ std::optional<Continuation> mesh_in_one(App& app, const Request& request, Respon
     answer_mesh(app, asked, out, job, job.parameters.formats.front());
   };
   const Job job = submit_with_volume(app, request, response);
-  return answer_at_end(app, request, response, job, kLongestJob, answer);
+  auto continuation = answer_at_end(app, request, response, job, kLongestJob, answer);
+  // Nobody else knows of the job, unless the client has a key by which it can come back for it.
+  if (continuation && idempotency_key_of(request).empty()) {
+    continuation->abandoned = [&app, id = job.id](const Request& asked) {
+      app.services.jobs.cancel(viewer_of(asked), id);
+    };
+  }
+  return continuation;
 }
 
 // Has a damaged file made again, and says what becomes of that.

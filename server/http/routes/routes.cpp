@@ -16,6 +16,7 @@ namespace {
 
 ConnectionOptions connection_options(const ServerOptions& options) {
   ConnectionOptions connections;
+  connections.connections = options.connections;
   connections.threads = options.threads;
   connections.backlog = options.backlog;
   connections.acceptor.head_time = options.request_time;
@@ -55,8 +56,8 @@ void check_is_json(const Request& request) {
 App::App(const Services& the_services, const ServerOptions& the_options)
     : services(the_services),
       options(the_options),
-      uploads(the_options.upload_places),
-      streams(the_options.event_streams),
+      uploads(the_options.upload_places, "uploads"),
+      streams(the_options.event_streams, "streams of events"),
       rules{.cors_origins = the_options.cors_origins,
             .check_host = false,
             .hosts = the_options.hosts},
@@ -131,27 +132,22 @@ void answer_tagged_json(const Request& request, Response& response, const std::s
   response.set_body(json, "application/json");
 }
 
-Slots::Place place_for_upload(App& app) {
+net::FairPlaces::Place place_for_upload(App& app, const Request& request) {
   if (app.draining) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
-  auto place = app.uploads.try_take();
-  if (!place) throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
-  return std::move(*place);
+  return app.uploads.take(party_of(request));
 }
 
 std::string json_body(App& app, const Request& request) {
   constexpr std::size_t kMostBodyBytes = 64 * 1024;
   check_is_json(request);
-  const bool may_be_slow = !request.body->is_whole();
-  const auto place = may_be_slow ? app.uploads.try_take() : std::nullopt;
-  if (may_be_slow && !place) {
-    throw Error(ErrorCode::kUnavailable, "too many uploads are under way");
-  }
+  const auto place =
+      request.body->is_whole() ? net::FairPlaces::Place() : app.uploads.take(party_of(request));
   return read_text(request, kMostBodyBytes);
 }
 
 Job submitted(App& app, const store::JobSpec& spec, Response& response) {
   const store::Submission submission = app.services.jobs.submit(spec);
-  if (submission.kind == store::Submission::Kind::kBusy) {
+  if (submission.retry_after.count() > 0) {
     response.set_header("Retry-After", std::to_string(submission.retry_after.count()));
   }
   return store::job_of(submission);

@@ -13,11 +13,11 @@
 #include "server/http/connections.h"
 #include "server/http/guards/access.h"
 #include "server/http/guards/origin.h"
-#include "server/http/guards/slots.h"
 #include "server/http/request_values.h"
 #include "server/http/response.h"
 #include "server/http/router.h"
 #include "server/http/server.h"
+#include "server/net/fair_places.h"
 
 namespace isomesh::http {
 
@@ -29,8 +29,9 @@ struct App {
   ServerOptions options;
   const Tokens* tokens = services.tokens;  // null: everybody may do everything
   Metrics& metrics = services.metrics;
-  Slots uploads;
-  Slots streams;  // of events
+  net::FairPlaces uploads;
+  net::FairPlaces streams;  // of events
+  net::FairPlaces inspections{jobs::Histograms::kMostWaiting, "histograms and estimates"};
   Broadcaster events;
   OriginRules rules;  // constant once the server is bound
   const std::uint64_t began_us =
@@ -78,8 +79,9 @@ void answer_tagged_json(const Request& request, Response& response, const std::s
 inline constexpr WholeNumbers kListLengths = {1, 1000};
 inline constexpr std::uint64_t kUsualListLength = 100;
 
-// Throws Error kUnavailable when all places are taken, or nothing is accepted any more.
-Slots::Place place_for_upload(App& app);
+// Throws Error kUnavailable when all places are taken, or nothing is accepted any more, and
+// kTooManyRequests when whoever sends the request has its share of them.
+net::FairPlaces::Place place_for_upload(App& app, const Request& request);
 
 // The request's small body, which is JSON. One that is not here yet may come slowly, so reading it
 // takes one of the places of uploads. Throws as place_for_upload and read_text do.

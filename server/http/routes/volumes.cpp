@@ -13,7 +13,7 @@ constexpr const char* kVolumeCursor = "volumes";
 void upload(App& app, const Request& request, Response& response) {
   check_known(request, import_parameters());
   const process::ImportOptions options = import_options_of(request);
-  const Slots::Place place = place_for_upload(app);
+  const auto place = place_for_upload(app, request);
   const Upload file(app.services.folder, app.options.upload, app.stopping, request);
   const std::vector<UploadedVolume> volumes = counting_refusals(app, request, [&] {
     return app.services.library.add_all(owner_of(request), file.path(), options, file.name());
@@ -77,7 +77,7 @@ void erase(App& app, const Request& request, Response& response) {
   if (request.has_header("If-Match")) {
     check_if_match(request, etag_of(to_json(app.services.volumes.get(viewer_of(request), id))));
   }
-  app.services.library.erase(owner_of(request), id);
+  app.services.library.erase(viewer_of(request), id);
   response.status = 204;
 }
 

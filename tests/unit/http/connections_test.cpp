@@ -1,189 +1,15 @@
-// The connection layer with handlers of the test's own: who is slow, silent or gone costs the
-// others nothing.
-#include "server/http/connections.h"
-
+// Who is slow, silent or gone costs the others nothing.
 #include <chrono>
-#include <deque>
-#include <future>
 #include <string>
-#include <thread>
+#include <string_view>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/http/router.h"
-#include "server/net/listener.h"
-#include "tests/api/http.h"
-#include "tests/support/process.h"
+#include "tests/unit/http/connections_fixture.h"
 
-namespace isomesh::http {
+namespace isomesh::http::test {
 namespace {
-
-using namespace std::chrono_literals;
-using Clock = std::chrono::steady_clock;
-using test::Answer;
-using test::answer_to;
-using test::Connection;
-using test::request;
-
-// What the daemon promises while others are slow. Sanitizers and busy machines get more.
-constexpr auto kPrompt = 50ms;
-constexpr auto kPromptEnough = kPrompt * 20;
-
-// Endless words, at once or when the test says so.
-class Words : public net::Source {
- public:
-  explicit Words(std::atomic<int>& said) : said_(said) {}
-
-  More next(std::string& bytes) override {
-    if (heard_ >= said_) return More::kLater;
-    ++heard_;
-    bytes += "word\n";
-    return More::kBytes;
-  }
-  bool ends_with_reader() const override { return true; }
-
- private:
-  std::atomic<int>& said_;
-  int heard_ = 0;
-};
-
-// Many bytes, counted.
-class Flood : public net::Source {
- public:
-  explicit Flood(std::atomic<std::size_t>& made) : made_(made) {}
-
-  More next(std::string& bytes) override {
-    bytes.assign(64 * 1024, 'x');
-    made_ += bytes.size();
-    return More::kBytes;
-  }
-
- private:
-  std::atomic<std::size_t>& made_;
-};
-
-class ConnectionsTest : public testing::Test {
- protected:
-  ~ConnectionsTest() override {
-    if (connections_) connections_->close(1s);
-  }
-
-  // Few threads, so that whoever holds one is noticed.
-  static ConnectionOptions options() {
-    ConnectionOptions options;
-    options.threads = 4;
-    return options;
-  }
-
-  void open(const ConnectionOptions& options) {
-    add_routes();
-    connections_.emplace(
-        options, ConnectionHandlers{
-                     .answer = [this](Request& request,
-                                      Response& response) { return answer(request, response); },
-                     .has_ended = [this](const auto&) { return ended_.load(); },
-                     .on_answered = {},
-                     .on_refused = {}});
-    connections_->open(listener_.descriptor());
-  }
-
-  std::optional<Continuation> answer(const Request& request, Response& response) const {
-    const auto [route, parameters] = router_.find(request.path);
-    if (route != nullptr) {
-      const auto handler = route->handlers().find(request.method);
-      if (handler != route->handlers().end()) return handler->second(request, response);
-    }
-    response.status = 404;
-    return std::nullopt;
-  }
-
-  template <class Run>
-  void add(const std::string& method, const std::string& path, const Run& run) {
-    router_.add(method, path, handler_of(run));
-  }
-
-  void add_routes() {
-    for (const char* method : {"GET", "HEAD"}) {
-      add(method, "/status",
-          [](const Request&, Response& response) { response.set_body("ok", "text/plain"); });
-    }
-    add("GET", "/words", [this](const Request&, Response& response) {
-      response.stream = {std::make_unique<Words>(said_), "text/plain",
-                         Framing::kUntilConnectionEnds, 0};
-    });
-    add("GET", "/flood", [this](const Request&, Response& response) {
-      response.stream = {std::make_unique<Flood>(made_), "text/plain", Framing::kLength,
-                         std::uint64_t{1} << 40};
-    });
-    add("GET", "/wait", [this](const Request&, Response&) -> std::optional<Continuation> {
-      ++runs_;
-      return Continuation{"job", Clock::now() + wait_, [this](const Request&, Response& response) {
-                            ++resumed_;
-                            response.set_body("waited", "text/plain");
-                          }};
-    });
-    add("GET", "/block",
-        [this, gate = go_.get_future().share()](const Request&, Response& response) {
-          busy_ = true;
-          gate.wait();
-          response.set_body("done", "text/plain");
-        });
-    add("GET", "/echo", [](const Request& request, Response& response) {
-      response.set_body(std::string(request.header("X-Echo")), "text/plain");
-    });
-    add("GET", "/query", [](const Request& request, Response& response) {
-      std::string text;
-      for (const auto& [name, value] : request.query) text += '<' + name + '=' + value + '>';
-      response.set_body(text, "text/plain");
-    });
-    add("POST", "/body", [](const Request& request, Response& response) {
-      std::size_t size = 0;
-      const bool whole = request.body->read([&](std::string_view piece) {
-        size += piece.size();
-        return true;
-      });
-      const bool slow = request.body->was_too_slow();
-      response.set_body((whole  ? "whole "
-                         : slow ? "slow "
-                                : "cut ") +
-                            std::to_string(size),
-                        "text/plain");
-    });
-  }
-
-  Answer get(const std::string& path) { return answer_to(url_, request("GET", path)); }
-
-  // Connections that have sent that much and nothing more.
-  void hang_on(int count, const std::string& bytes) {
-    for (int n = 0; n < count; ++n) clients_.emplace_back(url_).send(bytes);
-  }
-
-  // How long a status takes, at best: the machine has other things to do.
-  Clock::duration time_of_status() {
-    Clock::duration best = Clock::duration::max();
-    for (int n = 0; n < 5; ++n) {
-      const auto began = Clock::now();
-      EXPECT_EQ(get("/status").body, "ok");
-      best = std::min(best, Clock::now() - began);
-    }
-    return best;
-  }
-
-  net::Listener listener_{net::parse_address("127.0.0.1:0")};
-  const std::string url_ = "http://" + listener_.authority();
-  Router router_;
-  std::atomic<int> said_ = 0;
-  std::atomic<std::size_t> made_ = 0;
-  std::atomic<int> runs_ = 0;
-  std::atomic<int> resumed_ = 0;
-  std::atomic<bool> ended_ = false;
-  std::atomic<bool> busy_ = false;
-  std::promise<void> go_;
-  std::chrono::milliseconds wait_ = 60s;
-  std::deque<Connection> clients_;
-  std::optional<Connections> connections_;
-};
 
 TEST_F(ConnectionsTest, AnswersARequest) {
   open(options());
@@ -210,7 +36,7 @@ TEST_F(ConnectionsTest, SilentSlowAndListeningClientsCostTheOthersNothing) {
 TEST_F(ConnectionsTest, ReadersThatDoNotReadHoldNoThread) {
   open(options());
   hang_on(16, request("GET", "/flood"));
-  ASSERT_TRUE(test::eventually([&] { return made_ > 16U * 64 * 1024; }));
+  ASSERT_TRUE(eventually([&] { return made_ > 16U * 64 * 1024; }));
   EXPECT_LT(time_of_status(), kPromptEnough);
 }
 
@@ -230,7 +56,7 @@ TEST_F(ConnectionsTest, WhoeverIsSilentForTooLongIsClosed) {
 
 TEST_F(ConnectionsTest, TheOldestSilentOneMakesRoom) {
   ConnectionOptions few = options();
-  few.acceptor.most_pending = 8;
+  few.connections = 16;  // of which one address has half
   open(few);
   const Connection oldest(url_);
   hang_on(8, "GET /sta");
@@ -269,9 +95,21 @@ TEST_F(ConnectionsTest, ABodyComesInWhateverPieces) {
   }
   EXPECT_EQ(answer_to(url_, request("POST", "/body", "small")).body, "whole 5");
   EXPECT_EQ(answer_to(url_, "POST /body HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n" +
-                                test::chunked(std::string(5000, 'y'), 700))
+                                chunked(std::string(5000, 'y'), 700))
                 .body,
             "whole 5000");
+}
+
+// The HTTP library would collect it, for as long as it comes.
+TEST_F(ConnectionsTest, ALineOfAChunkThatDoesNotEndIsRefused) {
+  open(options());
+  const std::string head = "POST /body HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n";
+  for (const std::string& line : {std::string(10'000, '0'), "5;" + std::string(10'000, 'x'),
+                                  "5\r\nhello" + std::string(10'000, ' ')}) {
+    const Connection endless(url_);
+    endless.send(head + line);
+    EXPECT_THAT(endless.receive().body, testing::StartsWith("malformed")) << line.substr(0, 10);
+  }
 }
 
 TEST_F(ConnectionsTest, ABodyIsInvitedOnceItIsWanted) {
@@ -301,7 +139,7 @@ TEST_F(ConnectionsTest, WhoStillSendsGetsTheAnswer) {
 TEST_F(ConnectionsTest, WaitersAreAnsweredByTheEndOfTheirJob) {
   open(options());
   hang_on(40, request("GET", "/wait"));
-  ASSERT_TRUE(test::eventually([&] { return runs_ == 40; }));
+  ASSERT_TRUE(eventually([&] { return runs_ == 40; }));
   connections_->job_ended("another job");
   EXPECT_LT(time_of_status(), kPromptEnough);
   EXPECT_EQ(resumed_, 0);
@@ -341,9 +179,9 @@ TEST_F(ConnectionsTest, AStreamGoesOnWhenSomethingHappens) {
 TEST_F(ConnectionsTest, AReaderThatIsGoneIsNoticed) {
   open(options());
   hang_on(3, request("GET", "/words"));
-  ASSERT_TRUE(test::eventually([&] { return connections_->sending() == 3; }));
+  ASSERT_TRUE(eventually([&] { return connections_->sending() == 3; }));
   clients_.clear();
-  EXPECT_TRUE(test::eventually([&] { return connections_->sending() == 0; }));
+  EXPECT_TRUE(eventually([&] { return connections_->sending() == 0; }));
 }
 
 TEST_F(ConnectionsTest, AReaderThatTakesNothingIsGivenUp) {
@@ -351,8 +189,8 @@ TEST_F(ConnectionsTest, AReaderThatTakesNothingIsGivenUp) {
   quick.sender.patience = 100ms;
   open(quick);
   hang_on(1, request("GET", "/flood"));
-  ASSERT_TRUE(test::eventually([&] { return connections_->sending() == 1; }));
-  EXPECT_TRUE(test::eventually([&] { return connections_->sending() == 0; }));
+  ASSERT_TRUE(eventually([&] { return connections_->sending() == 1; }));
+  EXPECT_TRUE(eventually([&] { return connections_->sending() == 0; }));
 }
 
 TEST_F(ConnectionsTest, AFullQueueSaysSo) {
@@ -361,9 +199,9 @@ TEST_F(ConnectionsTest, AFullQueueSaysSo) {
   narrow.backlog = 1;
   open(narrow);
   hang_on(1, request("GET", "/block"));
-  ASSERT_TRUE(test::eventually([&] { return busy_.load(); }));
+  ASSERT_TRUE(eventually([&] { return busy_.load(); }));
   hang_on(1, request("GET", "/status"));  // the one that waits
-  ASSERT_TRUE(test::eventually([&] { return connections_->pending() == 0; }));
+  ASSERT_TRUE(eventually([&] { return connections_->pending() == 0; }));
   const Answer refused = get("/status");
   EXPECT_EQ(refused.status, 503);
   EXPECT_EQ(refused.header("retry-after"), "1");
@@ -394,11 +232,11 @@ TEST_F(ConnectionsTest, TheEndCutsBodiesAndAnswersWaiters) {
   open(options());
   const Connection waiting(url_);
   waiting.send(request("GET", "/wait"));
-  ASSERT_TRUE(test::eventually([&] { return runs_ == 1; }));
+  ASSERT_TRUE(eventually([&] { return runs_ == 1; }));
   const Connection sending(url_);
   sending.send("POST /body HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\nabc");
   hang_on(3, request("GET", "/words"));
-  ASSERT_TRUE(test::eventually([&] { return connections_->sending() == 3; }));
+  ASSERT_TRUE(eventually([&] { return connections_->sending() == 3; }));
   const auto began = Clock::now();
   connections_->close(10s);
   EXPECT_LT(Clock::now() - began, 5s);
@@ -407,4 +245,4 @@ TEST_F(ConnectionsTest, TheEndCutsBodiesAndAnswersWaiters) {
 }
 
 }  // namespace
-}  // namespace isomesh::http
+}  // namespace isomesh::http::test

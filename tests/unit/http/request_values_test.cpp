@@ -252,8 +252,12 @@ TEST(IfMatch, RefusesWhatIsNotThere) {
   check_if_match(Request(), "\"a\"");
   check_if_match(with_header("If-Match", "*"), "\"a\"");
   check_if_match(with_header("If-Match", "\"b\", \"a\""), "\"a\"");
-  EXPECT_EQ(code_thrown_by([] { check_if_match(with_header("If-Match", "\"b\""), "\"a\""); }),
-            ErrorCode::kPreconditionFailed);
+  // A weak tag is not compared strongly (RFC 9110, 13.1.1).
+  for (const std::string other : {"\"b\"", "W/\"a\"", "W/\"a\", \"b\""}) {
+    EXPECT_EQ(code_thrown_by([&] { check_if_match(with_header("If-Match", other), "\"a\""); }),
+              ErrorCode::kPreconditionFailed)
+        << other;
+  }
 }
 
 TEST(Cursor, StandsForTheRestOfItsList) {

@@ -93,6 +93,22 @@ TEST_F(EstimateTest, RefusesWhatIsNotThereOrHasStopped) {
   EXPECT_TRUE(test::code_thrown_by([&] { estimator_.estimate("", parameters_of(volume, 0)); }));
 }
 
+TEST_F(EstimateTest, JobsOfOthersShiftNothing) {
+  const Volume volume = add_sphere();
+  volumes_.add("other", volume);
+  const JobParameters parameters = parameters_of(volume, 0);
+  const Estimate before = estimator_.estimate("", parameters);
+  jobs_.submit({"other", parameters, "", ""});
+  const auto lease = jobs_.claim("worker", std::chrono::minutes(1));
+  ASSERT_TRUE(lease);
+  store::Outcome outcome;
+  outcome.mesh.emplace().triangles = before.triangles;
+  outcome.timing.encode = 1e7;
+  ASSERT_TRUE(jobs_.finish(*lease, outcome));
+  EXPECT_EQ(estimator_.estimate("", parameters).milliseconds, before.milliseconds);
+  EXPECT_GT(estimator_.estimate("other", parameters).milliseconds, before.milliseconds);
+}
+
 TEST(CostModel, FollowsTheJobsThatItHasSeen) {
   const SurfaceSize surface = {1'000'000, 500'000};
   JobParameters parameters;
@@ -133,11 +149,22 @@ using HistogramsTest = test::JobsFixture;
 TEST_F(HistogramsTest, CountAllSamples) {
   const Volume volume = add_much();
   Histograms histograms(blobs_);
-  const Histogram two = histograms.of(volume, 2);
+  const Histogram two = histograms.of("", volume, 2);
   EXPECT_EQ(two.volume, volume.id);
   EXPECT_EQ(two.range, volume.range);
   EXPECT_EQ(two.counts.at(0) + two.counts.at(1), volume.sample_count());
-  EXPECT_EQ(histograms.of(volume, 101).counts.at(100), two.counts[1]);
+  EXPECT_EQ(histograms.of("", volume, 101).counts.at(100), two.counts[1]);
+}
+
+// An answer that comes at once would tell that somebody else has the volume, too.
+TEST_F(HistogramsTest, AreCountedForEachViewer) {
+  const Volume volume = add_sphere();
+  Histograms histograms(blobs_);
+  histograms.of("one", volume, 2);
+  blobs_.erase(volume.id);
+  EXPECT_NO_THROW(histograms.of("one", volume, 3));
+  EXPECT_TRUE(test::code_thrown_by([&] { histograms.of("other", volume, 2); }));
+  EXPECT_TRUE(test::code_thrown_by([&] { histograms.of(std::nullopt, volume, 2); }));
 }
 
 }  // namespace

@@ -109,6 +109,27 @@ TEST_F(VolumeLibraryTest, SamplesStayUntilTheirLastOwnerGoes) {
   EXPECT_EQ(blob_count(), 0U);
 }
 
+// The answer would tell that another owner has the same samples.
+TEST_F(VolumeLibraryTest, WhatAnotherHasNeedsAsMuchRoomAsWhatIsNew) {
+  const Volume theirs = add_bytes(bytes_).first;
+  jobs_.submit({"", parameters_of(theirs, 100), "", ""});  // so that it does not expire
+  store::Retention full(jobs_, volumes_, blobs_, data_.scratch(),
+                        {.max_bytes = volumes_.named_bytes()});
+  VolumeLibrary library(data_, blobs_, volumes_, full, {},
+                        {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
+  const RawDescription raw{
+      .dims = kDims, .type = SampleType::kUint8, .geometry = {}, .big_endian = false};
+  const auto add_as = [&](const std::string& owner, const std::string& bytes) {
+    test::write_file(folder_ / "upload", bytes);
+    return code_thrown_by(
+        [&] { library.add(owner, folder_ / "upload", {.raw = raw, .series = {}}); });
+  };
+  const std::string others(bytes_.rbegin(), bytes_.rend());
+  EXPECT_EQ(add_as("other", others), ErrorCode::kOutOfSpace);
+  EXPECT_EQ(add_as("other", bytes_), ErrorCode::kOutOfSpace);
+  EXPECT_EQ(add_as("", bytes_), std::nullopt);
+}
+
 TEST_F(VolumeLibraryTest, ErasingAnUnknownOneIsNotFound) {
   EXPECT_EQ(code_thrown_by([&] { library_.erase("", "x"); }), ErrorCode::kNotFound);
 }

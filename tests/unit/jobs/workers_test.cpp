@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "server/mesh/parallel.h"
 #include "tests/support/jobs.h"
@@ -93,6 +94,25 @@ TEST_F(WorkersTest, AFailureOfOursTellsNothingAndIsTriedThreeTimes) {
   const auto events = jobs_.events("", job.id, 0, milliseconds(0));
   EXPECT_EQ(std::ranges::count(events, Stage::kLoad, &store::Event::stage), 3 + 1);
   EXPECT_EQ(job.error->detail.find(folder_.path()), std::string::npos);
+}
+
+// The service is at fault, and not for long.
+TEST_F(WorkersTest, AJobThatFindsNoDescriptorIsPutBackUncharged) {
+  const std::string id = submit(parameters_of(add_sphere(), 0));
+  rlimit before = {};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  const rlimit none = {3, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  const Workers workers(threads(1), jobs_, volumes_, blobs_);
+  const bool is_put_back = eventually([&] {
+    const auto events = jobs_.events("", id, 0, milliseconds(0));
+    return events.size() >= 3 && jobs_.get("", id).state != JobState::kRunning;
+  });
+  ::setrlimit(RLIMIT_NOFILE, &before);
+  EXPECT_TRUE(is_put_back);
+  const store::JobAccount account = jobs_.account(id);
+  EXPECT_EQ(account.job.state, JobState::kQueued);
+  EXPECT_EQ(account.attempts, 0);
 }
 
 TEST_F(WorkersTest, GoOnAfterAFailure) {

@@ -65,5 +65,14 @@ TEST(Address, ANameThatLooksLikeLoopbackIsNot) {
   EXPECT_FALSE(parse_address("127.example.org:1").is_loopback());
 }
 
+// A host has as many addresses of IPv6 as it likes, within its network.
+TEST(Address, WhoSharesLimits) {
+  EXPECT_EQ(party_of("192.0.2.1"), "192.0.2.1");
+  EXPECT_EQ(party_of("::ffff:192.0.2.1"), "192.0.2.1");
+  EXPECT_EQ(party_of("2001:db8:1:2::1"), party_of("2001:db8:1:2:ffff::7"));
+  EXPECT_NE(party_of("2001:db8:1:2::1"), party_of("2001:db8:1:3::1"));
+  EXPECT_EQ(party_of(""), "");
+}
+
 }  // namespace
 }  // namespace isomesh::net

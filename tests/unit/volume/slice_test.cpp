@@ -48,8 +48,8 @@ class SliceTest : public testing::Test {
                              const SliceChoice& choice) {
     SlicePng png(volume, choice);
     std::string bytes;
-    for (std::string_view more = png.next(); !more.empty(); more = png.next()) bytes += more;
-    EXPECT_TRUE(png.next().empty());
+    for (auto more = png.next(); more; more = png.next()) bytes += *more;
+    EXPECT_FALSE(png.next());
     return isomesh::test::read_png(bytes);
   }
 
@@ -114,15 +114,28 @@ TEST_F(SliceTest, ComesInPiecesThatAreBounded) {
   SlicePng png(volume_of(header, noise), {Axis::kZ, 0, {0, 65535}});
   std::size_t pieces = 0;
   std::string bytes;
-  for (std::string_view more = png.next(); !more.empty(); more = png.next()) {
-    EXPECT_LT(more.size(), 200'000U);
-    bytes += more;
+  for (auto more = png.next(); more; more = png.next()) {
+    EXPECT_LT(more->size(), 200'000U);
+    bytes += *more;
     ++pieces;
   }
   EXPECT_GT(pieces, 3U);
   const GreyPicture whole = isomesh::test::read_png(bytes);
   EXPECT_EQ(whole.width, 3000U);
   EXPECT_EQ(whole.height, 400U);
+}
+
+// One piece of a blank picture's file would be made of hundreds of millions of samples.
+TEST_F(SliceTest, APieceIsOfSoManySamplesHoweverFewBytesTheyMake) {
+  CanonicalHeader header;
+  header.dims = {4000, 2000, 1};
+  header.type = SampleType::kUint8;
+  SlicePng png(volume_of(header, std::vector<std::uint8_t>(8'000'000)), {Axis::kZ, 0, {0, 1}});
+  std::size_t pieces = 0;
+  std::string bytes;
+  for (auto more = png.next(); more; more = png.next(), ++pieces) bytes += *more;
+  EXPECT_GE(pieces, 8'000'000 / SlicePng::kSamplesPerPiece);
+  EXPECT_EQ(isomesh::test::read_png(bytes).height, 2000U);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
@@ -80,6 +81,18 @@ TEST_F(TokensTest, AWrongFileIsRefusedByItsLineAndNotItsText) {
   }
   EXPECT_TRUE(test::thrown_by([&] { Tokens(file("# nobody\n")); }));
   EXPECT_TRUE(test::thrown_by([&] { Tokens(folder_ / "absent"); }));
+}
+
+TEST_F(TokensTest, AFileOfAnotherUserIsRefused) {
+  EXPECT_TRUE(may_own_tokens(0, 1000));
+  EXPECT_TRUE(may_own_tokens(1000, 1000));
+  EXPECT_FALSE(may_own_tokens(1001, 1000));
+  EXPECT_FALSE(may_own_tokens(1000, 0));
+  const std::filesystem::path path = file(token_line("ct", Role::kUser, ct_));
+  constexpr uid_t kSomebody = 4711;
+  const bool is_given_away = ::chown(path.c_str(), kSomebody, static_cast<gid_t>(-1)) == 0;
+  EXPECT_EQ(is_given_away, ::geteuid() == 0);  // only root can
+  EXPECT_EQ(test::thrown_by([&] { Tokens{path}; }).has_value(), is_given_away);
 }
 
 TEST_F(TokensTest, AFileThatOthersMayWriteToIsRefused) {

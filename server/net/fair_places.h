@@ -1,0 +1,59 @@
+// Places that several parties share, so that none of them can take all.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "base/mutex.h"
+
+namespace isomesh::net {
+
+// A number of places, of which a party may take one while it has a share (has_share). Whoever holds
+// a place keeps it.
+//
+// A party is whatever its name says: an address, an owner; "" is all who come through a proxy.
+// Thread safe; must outlive its places.
+class FairPlaces {
+ public:
+  using Counts = std::map<std::string, std::size_t>;
+
+  // A place, given back when it goes. Thread safe after it was made: it is only given back.
+  class Place {
+   public:
+    Place() = default;  // none
+    Place(Place&& other) noexcept;
+    Place& operator=(Place&& other) noexcept;
+    Place(const Place&) = delete;
+    Place& operator=(const Place&) = delete;
+    ~Place();
+
+   private:
+    friend FairPlaces;
+    Place(FairPlaces* places, Counts::iterator party) : places_(places), party_(party) {}
+
+    FairPlaces* places_ = nullptr;
+    Counts::iterator party_;
+  };
+
+  // `what` says in refusals what there are places for: "uploads".
+  FairPlaces(std::size_t count, std::string_view what) : count_(count), what_(what) {}
+
+  // Throws Error kTooManyRequests when the party has its share, and kUnavailable when no place is
+  // free.
+  Place take(const std::string& party) ISOMESH_EXCLUDES(mutex_);
+
+  std::size_t taken() const ISOMESH_EXCLUDES(mutex_);
+
+ private:
+  void give_back(Counts::iterator party) ISOMESH_EXCLUDES(mutex_);
+
+  const std::size_t count_;
+  const std::string what_;
+  mutable Mutex mutex_;
+  std::size_t taken_ ISOMESH_GUARDED_BY(mutex_) = 0;
+  Counts parties_ ISOMESH_GUARDED_BY(mutex_);  // that hold places
+};
+
+}  // namespace isomesh::net
