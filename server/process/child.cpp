@@ -20,8 +20,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr milliseconds kLook{100};  // between two looks at the stop token
-
 void require_spawn(int error, std::string_view call) {
   if (error != 0) throw_system_error(call, error);
 }

@@ -19,6 +19,9 @@ namespace isomesh::process {
 // which lead nowhere.
 inline constexpr int kChildDescriptor = 3;
 
+// How often those who wait for a child look whether they are to stop.
+inline constexpr std::chrono::milliseconds kLook{100};
+
 // Two ends of a socket, which are closed when a program is started.
 struct SocketPair {
   Descriptor ours;

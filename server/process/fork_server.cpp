@@ -24,7 +24,6 @@ using Clock = std::chrono::steady_clock;
 
 // Getting ready takes some hundredths of a second, on a busy machine some tenths.
 constexpr std::chrono::seconds kLongestAnswer{20};
-constexpr std::chrono::milliseconds kLook{100};
 
 // A message of one byte with room for one descriptor.
 struct DescriptorMessage {
