@@ -51,9 +51,7 @@ using namespace isomesh;
 
 // Three quarters of the machine's memory, divided by the number of jobs that run at the same time.
 std::uint64_t default_job_memory(std::size_t workers) {
-  const auto pages = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES));
-  const auto page_bytes = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-  return pages * page_bytes / 4 * 3 / workers;
+  return jobs::usable_memory() / 4 * 3 / workers;
 }
 
 std::filesystem::path beside_this_program(const std::string& name) {
