@@ -165,8 +165,10 @@ void add_options(CLI::App& cli, Options& options) {
       ->envname("ISOMESH_IMPORT_SECONDS")
       ->check(CLI::Range(1, 86400))
       ->capture_default_str();
-  cli.add_option("--job-memory", options.job_memory,
-                 "Bytes of memory one job may take; 0: its share of three quarters of the machine")
+  cli.add_option(
+         "--job-memory", options.job_memory,
+         "Bytes of memory one job may take; 0: its share of three quarters of what the machine, "
+         "or its control group, has")
       ->envname("ISOMESH_JOB_MEMORY")
       ->transform(CLI::AsSizeValue(false));
   cli.add_option("--drain-seconds", options.drain_seconds,
