@@ -1,6 +1,6 @@
-// isomesh-import: a program that reads uploads for the daemon, each in a copy of itself that is made
-// ahead. A copy gives up what no import needs, reads its order from kChildDescriptor, gives up what
-// the order does not need, and writes its answer to the same descriptor.
+// isomesh-import: a program that reads uploads for the daemon, each in a copy of itself that is
+// made ahead. A copy gives up what no import needs, reads its order from kChildDescriptor, gives up
+// what the order does not need, and writes its answer to the same descriptor.
 #include <array>
 #include <cstdlib>
 #include <new>

@@ -1,8 +1,8 @@
 #include "tests/support/process.h"
 
-#include <fstream>
 #include <csignal>
 #include <cstring>
+#include <fstream>
 #include <stdexcept>
 #include <string_view>
 #include <thread>

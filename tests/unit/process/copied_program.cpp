@@ -37,10 +37,10 @@ void answer() {
   if (question == "hang") {
     for (;;) ::pause();
   }
-  const std::string text =
-      question == "where" ? std::to_string(reinterpret_cast<std::uintptr_t>(&piece))
-                          : "questions " + std::to_string(questions) + ", descriptors " +
-                                std::to_string(open_descriptors());
+  const std::string text = question == "where"
+                               ? std::to_string(reinterpret_cast<std::uintptr_t>(&piece))
+                               : "questions " + std::to_string(questions) + ", descriptors " +
+                                     std::to_string(open_descriptors());
   if (::write(kChildDescriptor, text.data(), text.size()) < 0) ::_exit(1);
 }
 

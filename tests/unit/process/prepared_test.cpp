@@ -1,4 +1,5 @@
-// Processes that are kept prepared: what a copy is, what becomes of those that die, and who ends them.
+// Processes that are kept prepared: what a copy is, what becomes of those that die, and who ends
+// them.
 #include "server/process/prepared.h"
 
 #include <algorithm>
