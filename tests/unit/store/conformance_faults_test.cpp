@@ -9,6 +9,7 @@
 #include "tests/support/errors.h"
 #include "tests/support/process.h"
 #include "tests/unit/store/engine.h"
+#include "tests/unit/store/wall_clock.h"
 
 namespace isomesh::store {
 namespace {
@@ -307,6 +308,30 @@ TEST_P(FaultConformance, ReadersOfEventsAreWoken) {
   ASSERT_EQ(seen.size(), 1U);
   EXPECT_EQ(seen[0].state, JobState::kRunning);
   EXPECT_THAT(jobs().events("", id, seen[0].id, milliseconds(5)), IsEmpty());
+}
+
+TEST_P(FaultConformance, AClockThatIsSetEndsNoLease) {
+  const std::string id = submit().id;
+  const Lease lease = claimed();
+  for (const int days : {40, -40}) {
+    const test::ClockSetAhead set(std::chrono::days(1) * days);
+    EXPECT_EQ(jobs().reap(), 0U) << days;
+    EXPECT_EQ(jobs().renew(lease, {}, kLongLease), Standing::kOk) << days;
+  }
+  const test::ClockSetAhead set(std::chrono::days(40));
+  EXPECT_TRUE(jobs().finish(lease, some_mesh()));
+  EXPECT_EQ(jobs().account(id).attempts, 1);
+}
+
+TEST_P(FaultConformance, AClockThatIsSetBackHoldsNoJobUp) {
+  submit();
+  {
+    const test::ClockSetAhead set(std::chrono::days(40));
+    jobs().put_back(claimed(), milliseconds(5000));
+    EXPECT_FALSE(can_claim());
+  }
+  EXPECT_TRUE(can_claim());
+  EXPECT_TRUE(jobs().claim("worker", kLongLease));
 }
 
 }  // namespace
