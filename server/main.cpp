@@ -159,6 +159,17 @@ void reload(const Options& options, const Files& files, callbacks::Callbacks& ca
   reload_one([&] { callbacks.set_secrets(callback_secrets(options)); });
 }
 
+// Tells what would be used. Throws what a start would that finds a mistake in it; touches neither
+// the data folder nor the address.
+int tell_configuration(const Options& options, const CLI::App& cli) {
+  const net::Address address = net::parse_address(options.listen);
+  check_reach(options, address, open_files(options, address));
+  const callbacks::CallbackTargets targets(options.callback_targets);
+  callback_secrets(options);
+  std::cout << as_config(cli);
+  return 0;
+}
+
 int run(const Options& options, const sigset_t& signals) {
   const net::Address address = net::parse_address(options.listen);
   const Files files = open_files(options, address);
@@ -233,6 +244,7 @@ int run(const Options& options, const sigset_t& signals) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  constexpr int kWrongUsage = 2;
   try {
     const sigset_t signals = block_signals();
     jobs::keep_freed_memory();
@@ -244,8 +256,10 @@ int main(int argc, char** argv) {
     CLI::App& token_command = add_token_command(cli, token);
     try {
       cli.parse(argc, argv);
+    } catch (const CLI::ConfigError& error) {
+      std::cerr << describe_config_error(error.what()) << '\n';
+      return kWrongUsage;
     } catch (const CLI::ParseError& error) {
-      constexpr int kWrongUsage = 2;
       return cli.exit(error) == 0 ? 0 : kWrongUsage;  // 0 for --help and --version
     }
     if (token_command.parsed()) {
@@ -253,6 +267,7 @@ int main(int argc, char** argv) {
       return 0;
     }
     start_log(options.log_format, options.log_level);
+    if (options.check_only) return tell_configuration(options, cli);
     return run(options, signals);
   } catch (const std::exception& error) {
     spdlog::critical("{}", error.what());

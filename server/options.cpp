@@ -1,29 +1,65 @@
 #include "server/options.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <map>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 
 namespace isomesh {
 namespace {
 
+// As TOML has it: numbers and truth values bare.
+std::string quoted(const std::string& value) {
+  const bool is_number = !value.empty() &&
+                         value.find_first_not_of("0123456789.") == std::string::npos &&
+                         std::ranges::count(value, '.') <= 1;
+  if (is_number || value == "true" || value == "false") return value;
+  std::string text = "\"";
+  for (const char c : value) {
+    if (c == '"' || c == '\\') text += '\\';
+    text += c;
+  }
+  return text + '"';
+}
+
+const std::map<std::string, LogLevel> kLogLevels = {{"debug", LogLevel::kDebug},
+                                                    {"info", LogLevel::kInfo},
+                                                    {"warn", LogLevel::kWarn},
+                                                    {"error", LogLevel::kError},
+                                                    {"off", LogLevel::kOff}};
+const std::map<std::string, LogFormat> kLogFormats = {{"text", LogFormat::kText},
+                                                      {"json", LogFormat::kJson}};
+
+// The library keeps an enumerator's number in place of its name.
+template <class Enum>
+std::string name_in(const std::map<std::string, Enum>& names, const std::string& number) {
+  for (const auto& [name, value] : names) {
+    if (std::to_string(static_cast<int>(value)) == number) return name;
+  }
+  return number;
+}
+
+std::string value_of(const CLI::Option& option) {
+  const bool is_flag = option.get_expected_max() == 0;
+  if (option.count() == 0) return is_flag ? "false" : option.get_default_str();
+  const std::string value = CLI::detail::join(option.reduced_results(), ",");
+  const std::string& name = option.get_lnames().front();
+  if (name == "log-level") return name_in(kLogLevels, value);
+  if (name == "log-format") return name_in(kLogFormats, value);
+  return value;
+}
+
 void add_log_options(CLI::App& cli, Options& options) {
-  const std::map<std::string, LogLevel> levels = {{"debug", LogLevel::kDebug},
-                                                  {"info", LogLevel::kInfo},
-                                                  {"warn", LogLevel::kWarn},
-                                                  {"error", LogLevel::kError},
-                                                  {"off", LogLevel::kOff}};
-  const std::map<std::string, LogFormat> formats = {{"text", LogFormat::kText},
-                                                    {"json", LogFormat::kJson}};
   cli.add_option("--log-level", options.log_level, "debug, info, warn, error or off")
       ->envname("ISOMESH_LOG_LEVEL")
-      ->transform(CLI::CheckedTransformer(levels).description(""))
+      ->transform(CLI::CheckedTransformer(kLogLevels).description(""))
       ->default_str("info");
   cli.add_option("--log-format", options.log_format,
                  "The form of the log's lines on standard error: text or json")
       ->envname("ISOMESH_LOG_FORMAT")
-      ->transform(CLI::CheckedTransformer(formats).description(""))
+      ->transform(CLI::CheckedTransformer(kLogFormats).description(""))
       ->default_str("text");
 }
 
@@ -63,6 +99,15 @@ void add_callback_options(CLI::App& cli, Options& options) {
       ->capture_default_str();
 }
 
+void add_check(CLI::App& cli, Options& options) {
+  constexpr const char* kMeaning = "Tell which options would be used, and end; as `isomeshd check`";
+  cli.add_flag("--check-config", options.check_only, kMeaning)->configurable(false);
+  cli.add_subcommand("check", "Tell which options would be used, and end")
+      ->fallthrough()
+      ->configurable(false)
+      ->callback([&options] { options.check_only = true; });
+}
+
 // Of one start only, so neither in a file nor in the environment.
 void add_operators_word(CLI::App& cli, Options& options) {
   cli.add_flag("--adopt", options.word.adopt,
@@ -84,6 +129,7 @@ void add_options(CLI::App& cli, Options& options) {
   cli.set_config("--config", config == nullptr ? "" : config,
                  "Read options from this file (TOML or INI); also ISOMESH_CONFIG",
                  config != nullptr);
+  cli.allow_config_extras(CLI::config_extras_mode::error);
   cli.add_option("--listen", options.listen, "HOST:PORT, HOST:0 for a free port, or unix:PATH")
       ->envname("ISOMESH_LISTEN")
       ->capture_default_str();
@@ -182,6 +228,26 @@ void add_options(CLI::App& cli, Options& options) {
   add_security_options(cli, options);
   add_callback_options(cli, options);
   add_operators_word(cli, options);
+  add_check(cli, options);
+}
+
+std::string as_config(const CLI::App& cli) {
+  std::string text;
+  for (const CLI::Option* option : cli.get_options()) {
+    const bool is_set = option->count() > 0;
+    if (!option->get_configurable() || option->get_lnames().empty()) continue;
+    const std::string value = value_of(*option);
+    text += (is_set ? "" : "# ") + option->get_lnames().front();
+    text += (value.empty() ? "" : " = " + quoted(value)) + '\n';
+  }
+  return text;
+}
+
+std::string describe_config_error(const std::string& library_text) {
+  constexpr std::string_view kUnknown = "INI was not able to parse ";
+  if (!library_text.starts_with(kUnknown)) return "the file of --config: " + library_text;
+  return "the file of --config: there is no option \"" + library_text.substr(kUnknown.size()) +
+         "\"; `isomeshd --help` names them all";
 }
 
 }  // namespace isomesh

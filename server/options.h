@@ -22,6 +22,7 @@ class App;
 namespace isomesh {
 
 struct Options {
+  bool check_only = false;  // tell what would be used, and end
   std::string listen = "127.0.0.1:8080";
   std::filesystem::path data = "isomesh-data";
   std::size_t workers = 2;
@@ -51,8 +52,15 @@ struct Options {
   std::uint64_t job_memory = 0;  // 0: see default_job_memory
 };
 
-// Every option also as ISOMESH_... in the environment and by its name in the file of --config.
-// `options` is filled in when `cli` parses.
+// Every option also as ISOMESH_... in the environment and by its name in the file of --config,
+// which may hold nothing else. `options` is filled in when `cli` parses.
 void add_options(CLI::App& cli, Options& options);
+
+// What `cli` has parsed as the lines of a file of --config that says all of it; those that nobody
+// has set are comments.
+std::string as_config(const CLI::App& cli);
+
+// What a person is told of a mistake in the file of --config.
+std::string describe_config_error(const std::string& library_text);
 
 }  // namespace isomesh

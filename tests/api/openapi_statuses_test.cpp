@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/json.h"
 #include "tests/api/openapi.h"
 #include "tests/support/nifti.h"
 

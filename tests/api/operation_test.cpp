@@ -68,6 +68,59 @@ TEST(Start, OptionsComeFromTheEnvironmentAndFromAFileToo) {
   EXPECT_THAT(answer.body, HasSubstr("1234"));
 }
 
+// A daemon that ignored it would listen without tokens.
+TEST(Configuration, AnUnknownKeyIsRefusedByName) {
+  const TemporaryFolder folder;
+  for (const std::string text : {"tokns = \"/etc/isomesh/tokens\"\n", "[server]\ntokns = 1\n"}) {
+    write_file(folder / "config.toml", text);
+    for (const std::vector<std::string>& words :
+         std::vector<std::vector<std::string>>{{}, {"check"}, {"--check-config"}}) {
+      std::vector<std::string> command = {ISOMESHD};
+      command.insert(command.end(), words.begin(), words.end());
+      command.insert(command.end(), {"--data", folder / "data", "--listen", "127.0.0.1:0",
+                                     "--config", folder / "config.toml"});
+      const Finished refused = run(command);
+      EXPECT_EQ(refused.status, 2) << text;
+      EXPECT_THAT(refused.errors, testing::AnyOf(HasSubstr("\"tokns\""), HasSubstr("\"server.")));
+      EXPECT_EQ(refused.output, "");
+    }
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "data"));
+}
+
+TEST(Configuration, IsToldWithoutAStart) {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  const std::string file = folder / "config.toml";
+  write_file(file, "max-queue = 7\nlog-level = \"warn\"\nopen-network = true\n");
+  const Finished told =
+      run({ISOMESHD, "check", "--config", file, "--data", data}, {"ISOMESH_WORKERS=3"});
+  EXPECT_EQ(told.status, 0) << told.errors;
+  for (const std::string line : {"max-queue = 7\n", "workers = 3\n", "open-network = true\n",
+                                 "log-level = \"warn\"\n", "# keep-days = 30\n"}) {
+    EXPECT_THAT('\n' + told.output, HasSubstr('\n' + line));
+  }
+  EXPECT_THAT(told.output, HasSubstr("data = \"" + data + "\"\n"));
+  EXPECT_EQ(
+      run({ISOMESHD, "--check-config", "--config", file, "--data", data}, {"ISOMESH_WORKERS=3"})
+          .output,
+      told.output);
+  EXPECT_FALSE(std::filesystem::exists(data));
+  // What it tells is such a file.
+  write_file(folder / "told.toml", told.output);
+  const Finished again = run({ISOMESHD, "check", "--config", folder / "told.toml"});
+  EXPECT_EQ(again.output, told.output) << again.errors;
+}
+
+TEST(Configuration, WhatAStartWouldRefuseIsToldToo) {
+  const TemporaryFolder folder;
+  const Finished open = run({ISOMESHD, "check", "--listen", "0.0.0.0:0"});
+  EXPECT_EQ(open.status, 1);
+  EXPECT_THAT(open.errors, HasSubstr("--open-network"));
+  const Finished tokens = run({ISOMESHD, "check", "--tokens", folder / "absent"});
+  EXPECT_EQ(tokens.status, 1);
+}
+
 // Without tokens only this machine may ask.
 TEST(Start, TheOpenNetworkIsRefusedUnlessAskedFor) {
   const TemporaryFolder folder;

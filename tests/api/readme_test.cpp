@@ -32,10 +32,12 @@ std::string table_of(const std::string& help) {
     if (begin == std::string::npos || !line.substr(begin).starts_with("--")) continue;
     const std::string name = line.substr(begin, line.find_first_of(" \n", begin) - begin);
     if (name == "--version" || name == "--config") continue;
-    std::string meaning;
-    std::getline(lines, meaning);
+    // Beside a short name, or on the next line.
+    const std::size_t beside = line.find("  ", begin);
+    std::string meaning = beside == std::string::npos ? "" : line.substr(beside);
+    if (meaning.empty()) std::getline(lines, meaning);
     meaning.erase(0, meaning.find_first_not_of(' '));
-    table += "| `" + name + "` | " + default_of(line) + " | " + meaning + " |\n";
+    table += "| `" + name + "` | " + default_of(line.substr(0, beside)) + " | " + meaning + " |\n";
   }
   return table;
 }
