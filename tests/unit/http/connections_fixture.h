@@ -19,7 +19,7 @@
 #include "tests/api/http.h"
 #include "tests/support/process.h"
 
-namespace isomesh::http::test {
+namespace isomesh::http::fixture {
 
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
@@ -233,4 +233,4 @@ class ConnectionsTest : public testing::Test {
   std::optional<Connections> connections_;
 };
 
-}  // namespace isomesh::http::test
+}  // namespace isomesh::http::fixture

@@ -8,7 +8,7 @@
 
 #include "tests/unit/http/connections_fixture.h"
 
-namespace isomesh::http::test {
+namespace isomesh::http::fixture {
 namespace {
 
 TEST_F(ConnectionsTest, AnswersARequest) {
@@ -245,4 +245,4 @@ TEST_F(ConnectionsTest, TheEndCutsBodiesAndAnswersWaiters) {
 }
 
 }  // namespace
-}  // namespace isomesh::http::test
+}  // namespace isomesh::http::fixture

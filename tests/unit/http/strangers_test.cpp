@@ -8,7 +8,7 @@
 
 #include "tests/unit/http/connections_fixture.h"
 
-namespace isomesh::http::test {
+namespace isomesh::http::fixture {
 namespace {
 
 using StrangersTest = ConnectionsTest;
@@ -151,4 +151,4 @@ TEST_F(StrangersTest, AnAbandonedWaitEnds) {
 }
 
 }  // namespace
-}  // namespace isomesh::http::test
+}  // namespace isomesh::http::fixture
