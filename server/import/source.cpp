@@ -29,6 +29,7 @@ std::uint64_t SourceVolume::most_encoded_bytes() const {
       return stored_bytes() * kHexPerByte;
     case Encoding::kRaw:
     case Encoding::kDeflate:
+    case Encoding::kBzip2:
     case Encoding::kVtk:
       break;
   }
