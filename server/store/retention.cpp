@@ -28,8 +28,8 @@ Retention::Gone Retention::enforce() {
     expire_old(now, gone);
     if (options_.max_bytes > 0) shrink_to(options_.max_bytes, gone);
     gone.blobs += erase_garbage();
-    sweep_blobs(gone);
   }
+  sweep_blobs(gone);
   gone.blobs += blobs_.empty_quarantine(now - options_.quarantine);
   forget(now);
   sweep_scratch(now);
@@ -121,13 +121,18 @@ std::size_t Retention::erase_garbage() {
   return before - garbage_.size();
 }
 
+// Without the lock: it looks at every file, and those who make room need not wait for that.
 void Retention::sweep_blobs(Gone& gone) {
   const Steady now = Steady::clock::now();
-  if (now < next_sweep_) return;
+  {
+    const Lock lock(mutex_);
+    if (now < next_sweep_) return;
+  }
   const Swept swept = blobs_.sweep(unsettled_since(),
                                    [this](const std::string& key) { return volumes_.names(key); });
   gone.quarantined = swept.quarantined;
   gone.left = swept.left;
+  const Lock lock(mutex_);
   if (swept.left > 0) next_sweep_ = now + options_.sweep_pause;
 }
 

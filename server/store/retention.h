@@ -74,7 +74,7 @@ class Retention {
       ISOMESH_REQUIRES(mutex_);
   Steady unsettled_since() const;
   std::size_t erase_garbage() ISOMESH_REQUIRES(mutex_);
-  void sweep_blobs(Gone& gone) ISOMESH_REQUIRES(mutex_);
+  void sweep_blobs(Gone& gone);
   void sweep_scratch(Time now) const;
   void forget(Time now);
 

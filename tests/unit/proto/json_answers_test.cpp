@@ -86,7 +86,7 @@ TEST(AnswerJson, SpellsAJobAsTheContractDoes) {
   EXPECT_THAT(members_of(job),
               testing::UnorderedElementsAre("id", "state", "stage", "progress", "parameters",
                                             "volume", "priority", "created", "started", "finished",
-                                            "timing", "mesh", "error", "reused"));
+                                            "timing", "mesh", "error", "reused", "waiting_for"));
   EXPECT_EQ(job["state"], "succeeded");
   EXPECT_EQ(job["stage"], "done");
   EXPECT_EQ(job["volume"], "0123abcd");
@@ -341,6 +341,14 @@ TEST(AnswerJson, NestingWithoutEndIsReadWithoutRecursion) {
   EXPECT_EQ(problem_from_json(deep), Problem{});
 }
 
+TEST(AnswerJson, SpellsWhatAJobWaitsFor) {
+  Job job;
+  EXPECT_TRUE(json::parse(to_json(job))["waiting_for"].is_null());
+  job.waiting_for = WaitingFor::kDisk;
+  EXPECT_EQ(json::parse(to_json(job))["waiting_for"], "disk");
+  EXPECT_EQ(job_from_json(to_json(job)), job);
+}
+
 TEST(Records, AreReadBackWhole) {
   const Job job = succeeded_job();
   EXPECT_EQ(job_from_record(to_json(job)), job);
@@ -351,6 +359,7 @@ TEST(Records, OfAnOlderVersionHaveDefaultsForWhatItDidNotKnow) {
   const Job job = succeeded_job();
   json record = json::parse(to_json(job));
   record.erase("reused");
+  record.erase("waiting_for");
   record["parameters"].erase("close");
   record["parameters"]["draco"].erase("speed");
   record["mesh"].erase("components");
