@@ -128,7 +128,7 @@ class Kill : public FaultTest {
   }
 
   void check_blobs() {
-    for (const std::string& file : files_below(folder_ / "data/blobs")) {
+    for (const std::string& file : blobs_below(folder_ / "data")) {
       const std::string name = std::filesystem::path(file).filename();
       EXPECT_EQ(sha256_of(read_file(folder_ / ("data/blobs/" + file))), name);
     }

@@ -139,12 +139,12 @@ TEST_F(Leases, KilledBetweenResultAndFinishItRunsAgainToTheSameBytes) {
       EXPECT_TRUE(eventually([&] { return blob_count() == blobs + 1; }));
       kill();
     }
-    const std::vector<std::string> stored = files_below(folder_ / "data/blobs");
+    const std::vector<std::string> stored = blobs_below(folder_ / "data");
     start();
     const Job after = ended(before.id);
     EXPECT_NE(after.started, before.started);
     EXPECT_EQ(after.state, JobState::kSucceeded);
-    EXPECT_EQ(files_below(folder_ / "data/blobs"), stored);
+    EXPECT_EQ(blobs_below(folder_ / "data"), stored);
     return true;
   }));
 }
