@@ -125,12 +125,15 @@ void choose_volume(std::uint64_t count, const Difference& difference, const Impo
                                        ", which differ in " + difference.what + ", was taken."));
     return;
   }
+  if (count == 1) {
+    throw_unusable("The file holds one volume, 0, and no volume " + std::to_string(*chosen) + ".");
+  }
   constexpr std::uint64_t kMost = 1000;
   std::vector<Choice> choices;
   for (std::uint64_t index = 0; index < std::min(count, kMost); ++index) {
     choices.push_back({"volume", std::to_string(index), difference.title(index)});
   }
-  const std::string there = std::to_string(count) + (count == 1 ? " volume" : " volumes");
+  const std::string there = std::to_string(count) + " volumes";
   const std::string range = "volume=0 to " + std::to_string(count - 1);
   throw_choice(chosen ? "The file holds " + there + " and has no volume " +
                             std::to_string(*chosen) + "; choose one with " + range + "."

@@ -140,12 +140,14 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   job.parameters.components = {1, 1};
   job.parameters.callback = Callback{"https://receiver.example/"};
   job.error = to_problem(invalid_parameter("iso", "is wrong"), "/v1/jobs/x");
+  job.error->remedy = {.overridable = "frame-of-reference", .choices = {{"volume", "0", "0 s"}}};
   Estimate estimate;
   estimate.bytes[MeshFormat::kDrc] = 1;
   Volume volume = daemon_.client().volume(job_.parameters.volume);
   volume.modality = "CT";
   volume.presets = {{"bone", 250}};
   volume.ignored.emplace_back();
+  volume.notes = {note_of(NoteCode::kFormsDiffer, "by 3 mm")};
   volume.dicom.emplace();
   const std::vector<std::pair<std::string, std::string>> complete = {
       {"Job", to_json(job)},
@@ -154,6 +156,7 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
       {"JobEvent", to_json(JobEvent{})},
       {"Volume", to_json(volume)},
       {"VolumeList", to_json(std::vector{volume})},
+      {"UploadedVolumes", to_json(std::vector{UploadedVolume{"ct.nrrd", 201, volume, job.error}})},
       {"Histogram", to_json(Histogram{"", {0, 1}, {1}})},
       {"Estimate", to_json(estimate)},
       {"Problem", to_json(*job.error)}};

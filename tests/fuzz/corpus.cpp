@@ -19,10 +19,11 @@ using namespace import::test;
 const std::string kSamples(kSmallSamples);
 
 std::vector<std::string> nifti_files() {
-  return {nifti({}, kSamples), nifti({.version = 2, .big_endian = true}, kSamples),
-          gzip(nifti({.qform_code = 1, .sform_code = 0}, kSamples)),
-          nifti({.dim = {3, 2, 3, 2, 1, 1, 1, 1}, .datatype = 512, .bitpix = 16, .slope = 2},
-                kSamples)};
+  return {
+      nifti({}, kSamples), nifti({.version = 2, .big_endian = true}, kSamples),
+      gzip(nifti({.qform_code = 1, .sform_code = 0}, kSamples)),
+      nifti({.dim = {3, 2, 3, 2, 1, 1, 1, 1}, .datatype = 512, .bitpix = 16, .slope = 2}, kSamples),
+      nifti({.dim = {4, 2, 3, 2, 2, 1, 1, 1}}, kSamples)};
 }
 
 std::vector<std::string> nrrd_files() {
@@ -31,8 +32,15 @@ std::vector<std::string> nrrd_files() {
   };
   std::string digits;
   for (int at = 0; at < 24; ++at) digits += std::to_string(at) + " ";
-  return {nrrd(small_nrrd(), kSamples), encoded("gzip", gzip(kSamples)), encoded("ascii", digits),
-          encoded("hex", std::string(48, 'a')), gzip(nrrd(small_nrrd(), kSamples))};
+  return {nrrd(small_nrrd(), kSamples),
+          encoded("gzip", gzip(kSamples)),
+          encoded("ascii", digits),
+          encoded("hex", std::string(48, 'a')),
+          encoded("bzip2", bzip2(kSamples)),
+          nrrd(with(with(small_nrrd(), "kinds", "list domain domain"), "space directions",
+                    "none (1,0,0) (0,1,0)"),
+               kSamples),
+          gzip(nrrd(small_nrrd(), kSamples))};
 }
 
 std::vector<std::string> metaimage_files() {
@@ -63,6 +71,7 @@ std::vector<std::string> archive_files() {
           tar({{"1", kSamples.substr(0, 12)},
                {"2", kSamples.substr(12)},
                {"a.mhd", metaimage(with(small_metaimage(), "ElementDataFile", "%01d 1 2 1"), "")}}),
+          zip({{"a.hdr", nifti({.magic = "ni1", .vox_offset = 0}, "")}, {"a.img", kSamples}}),
           zip({{"a.nii.gz", gzip(nifti({}, kSamples))}, {"README", "text"}})};
 }
 

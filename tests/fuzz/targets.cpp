@@ -89,7 +89,9 @@ void import_bytes(Bytes bytes, const process::ImportOptions& options) {
 void import_only(std::string_view format, Bytes bytes) {
   const auto head = bytes.first(std::min(bytes.size(), import::kSniffBytes));
   const import::Reader* reader = import::sniff(head);
-  if (reader != nullptr && reader->name == format) import_bytes(bytes, {});
+  if (reader == nullptr || reader->name != format) return;
+  import_bytes(bytes, {});
+  import_bytes(bytes, {.volume = 1});
 }
 
 void import_anything(Bytes bytes) { import_bytes(bytes, {}); }

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include <bzlib.h>
 #include <zlib.h>
 
 namespace isomesh::test {
@@ -30,5 +31,19 @@ std::string deflated(std::string_view bytes, int window_bits) {
 std::string gzip(std::string_view bytes) { return deflated(bytes, MAX_WBITS + 16); }
 std::string zlib(std::string_view bytes) { return deflated(bytes, MAX_WBITS); }
 std::string raw_deflate(std::string_view bytes) { return deflated(bytes, -MAX_WBITS); }
+
+std::string bzip2(std::string_view bytes) {
+  constexpr std::size_t kMostOverhead = 600;  // beside a hundredth of the bytes
+  std::string source(bytes);
+  std::string packed(source.size() + source.size() / 100 + kMostOverhead, '\0');
+  auto size = static_cast<unsigned>(packed.size());
+  constexpr int kBlocks = 9;
+  if (BZ2_bzBuffToBuffCompress(packed.data(), &size, source.data(),
+                               static_cast<unsigned>(source.size()), kBlocks, 0, 0) != BZ_OK) {
+    throw std::runtime_error("bzip2 failed");
+  }
+  packed.resize(size);
+  return packed;
+}
 
 }  // namespace isomesh::test

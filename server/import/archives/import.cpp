@@ -160,12 +160,12 @@ Volume read_file(const FoundVolume& found, const std::vector<ArchiveMember>& mem
     names += (at > 0 ? ", " : "") + in_quotes(choices[at].value);
   }
   if (choices.size() > kMost) names += " and " + std::to_string(choices.size() - kMost) + " more";
-  throw_choice(asked.empty()
-                   ? "The archive holds " + std::to_string(choices.size()) +
-                         " volumes, where one is needed; choose one with member=NAME: " + names +
-                         "."
-                   : "The archive has no volume " + in_quotes(asked) + ", but: " + names + ".",
-               std::move(choices));
+  const std::string reason =
+      asked.empty()
+          ? "The archive holds " + std::to_string(choices.size()) +
+                " volumes, where one is needed; choose one with member=NAME: " + names + "."
+          : "The archive has no volume " + in_quotes(asked) + ", but: " + names + ".";
+  throw_choice(reason, std::move(choices));
 }
 
 Volume read_members(const std::vector<ArchiveMember>& members, const Input& input) {

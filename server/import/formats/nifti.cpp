@@ -238,7 +238,8 @@ void note_other_pixdim(const NiftiHeader& header, const Placement& sform, Source
     const Vector3& step = sform.steps[axis];
     const double size = std::hypot(step[0], step[1], step[2]);
     const double told = header.pixdim[axis + 1];
-    if (volume.dims[axis] == 1 || std::abs(size - told) <= std::abs(told) * kTolerance) continue;
+    const bool agrees = is_length(told) && std::abs(size - told) <= told * kTolerance;
+    if (volume.dims[axis] == 1 || agrees) continue;
     volume.notes.push_back(note_of(NoteCode::kPixdimDiffers,
                                    "Along " + axis_name(axis) + " a voxel of the NIfTI header is " +
                                        to_text(told) + " long by its pixdim and " + to_text(size) +

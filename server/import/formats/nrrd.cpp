@@ -259,7 +259,7 @@ SourceVolume samples_of(const Fields& fields, const NrrdSizes& sizes,
   volume.layout.big_endian = is_big_endian(fields, volume.layout.type, volume.encoding);
   choose_volume(
       sizes.volumes,
-      {.what = sizes.volume_kind,
+      {.what = sizes.volume_kind == "time" ? "time" : "their " + sizes.volume_kind,
        .title =
            [&](std::uint64_t index) { return sizes.volume_kind + ' ' + std::to_string(index); }},
       options, volume);

@@ -8,23 +8,12 @@
 #include <optional>
 
 #include "base/text.h"
+#include "server/import/formats/nrrd_numbers.h"
 #include "server/import/names.h"
 #include "server/import/units.h"
 
 namespace isomesh::import {
 namespace {
-
-// What is not told, which the format calls "nan" or "none".
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
-constexpr std::string_view kSpaces = " \t";
-
-bool is_known(double number) { return !std::isnan(number); }
-
-[[noreturn]] void throw_not_understood(std::string_view name, std::string_view value) {
-  throw_unusable("The NRRD header's " + in_quotes(name) + " cannot be read: " + in_quotes(value) +
-                 ".");
-}
 
 bool is_lattice_kind(std::string_view kind) {
   return kind == "domain" || kind == "space" || kind == "???" || kind == "none";
@@ -92,84 +81,6 @@ std::optional<Space> space_of(const NrrdFields& fields) {
   }
   throw_unusable("The NRRD header's space " + in_quotes(name) +
                  " is unknown or has more than three dimensions.");
-}
-
-// --- Numbers and vectors -------------------------------------------------------------------------
-
-// A number as the format's own library reads it: whatever holds "nan" is unknown, and what stands
-// behind a number is passed over. Empty when there is none.
-std::optional<double> number_of(std::string_view word) {
-  const std::string text = lower(word);
-  if (text.find("nan") != std::string::npos) return kUnknown;
-  if (text.find("inf") != std::string::npos) return std::numeric_limits<double>::infinity();
-  char* end = nullptr;
-  const double number = std::strtod(text.c_str(), &end);
-  if (end == text.c_str()) return std::nullopt;
-  return number;
-}
-
-// One finite or unknown number for each of `axes` axes; all are unknown without the field.
-std::vector<double> axis_numbers(const NrrdFields& fields, std::string_view name,
-                                 std::size_t axes) {
-  const std::string_view value = value_of(fields, name);
-  if (value.empty()) return std::vector<double>(axes, kUnknown);
-  const auto said = words(value);
-  std::vector<double> numbers;
-  for (std::size_t axis = 0; axis < std::min(axes, said.size()); ++axis) {
-    const auto number = number_of(said[axis]);
-    if (!number || std::isinf(*number)) throw_not_understood(name, value);
-    numbers.push_back(*number);
-  }
-  const bool has_more = said.size() > axes && number_of(said[axes]);
-  if (numbers.size() < axes || has_more) throw_not_understood(name, value);
-  return numbers;
-}
-
-// One word for each axis; none without the field.
-std::vector<std::string_view> axis_words(const NrrdFields& fields, std::string_view name,
-                                         std::size_t axes) {
-  const std::string_view value = value_of(fields, name);
-  const auto said = words(value);
-  if (!said.empty() && said.size() != axes) throw_not_understood(name, value);
-  return said;
-}
-
-void skip_spaces(std::string_view& rest) {
-  rest.remove_prefix(std::min(rest.find_first_not_of(kSpaces), rest.size()));
-}
-
-// The numbers of a vector, all of them known or none.
-std::optional<std::vector<double>> parse_vector(std::string_view inside, std::size_t size) {
-  std::vector<double> numbers;
-  std::size_t known = 0;
-  for (std::size_t next = 0; next <= inside.size();) {
-    const std::size_t end = std::min(inside.find(',', next), inside.size());
-    const std::string_view part = inside.substr(next, end - next);
-    next = end + 1;
-    if (part.empty()) continue;
-    const auto number = number_of(part);
-    if (!number || std::isinf(*number)) return std::nullopt;
-    numbers.push_back(*number);
-    if (is_known(*number)) ++known;
-  }
-  if (numbers.size() != size || (known != 0 && known != size)) return std::nullopt;
-  return numbers;
-}
-
-// Takes "(x,y,z)", or "none", off the front of `rest`. Empty when there is neither.
-std::optional<std::vector<double>> take_vector(std::string_view& rest, std::size_t size) {
-  constexpr std::string_view kNone = "none";
-  skip_spaces(rest);
-  if (rest.starts_with(kNone)) {
-    rest.remove_prefix(kNone.size());
-    if (!rest.empty() && kSpaces.find(rest.front()) == std::string_view::npos) return std::nullopt;
-    return std::vector<double>(size, kUnknown);
-  }
-  const std::size_t end = rest.find(')');
-  if (!rest.starts_with('(') || end == std::string_view::npos) return std::nullopt;
-  const std::string_view inside = rest.substr(1, end - 1);
-  rest.remove_prefix(end + 1);
-  return parse_vector(inside, size);
 }
 
 // --- Axes ----------------------------------------------------------------------------------------
@@ -417,7 +328,7 @@ NrrdSizes nrrd_sizes(const NrrdFields& fields, const std::vector<std::uint64_t>&
                      "last axis.");
     }
     result.volumes = sizes[axis];
-    result.volume_kind = is_volume_kind(kind) ? kind : "the axis " + axis_name(axis);
+    result.volume_kind = is_volume_kind(kind) ? kind : "axis " + axis_name(axis);
     result.is_interleaved = axis == 0;
   }
   return result;

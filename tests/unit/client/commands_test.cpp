@@ -59,7 +59,7 @@ class Commands : public testing::Test {
     test::write_file(folder_ / "head.nii", "volume");
     options_.server = server_.start();
     options_.command = Command::kMesh;
-    options_.file = folder_ / "head.nii";
+    options_.files = {folder_ / "head.nii"};
     options_.outputs = {{.path = folder_ / "head.drc", .format = MeshFormat::kDrc}};
   }
 

@@ -76,9 +76,9 @@ TEST_F(OptionsTest, ReadsEverythingThatAMeshCanBeAskedFor) {
                                  stl_.c_str(),
                                  "--digest"});
   EXPECT_EQ(options.command, Command::kMesh);
-  EXPECT_EQ(options.file, file_);
-  EXPECT_TRUE(options.digest);
-  EXPECT_FALSE(options.raw);
+  EXPECT_THAT(options.files, ElementsAre(file_));
+  EXPECT_TRUE(options.upload.digest);
+  EXPECT_FALSE(options.upload.raw);
   JobParameters expected;
   expected.iso = -600.5;
   expected.scheme = Scheme::kFive;
@@ -103,13 +103,13 @@ TEST_F(OptionsTest, ReadsRawSamples) {
   const Options options = parse({"upload", file_.c_str(), "--dims", "512,512,300", "--type",
                                  "int16", "--spacing", "0.7,0.7,1", "--origin", "-90,0,1.5",
                                  "--direction", "1,0,0,0,1,0,0,0,-1", "--byte-order", "big"});
-  ASSERT_TRUE(options.raw);
-  EXPECT_THAT(options.raw->dims, ElementsAre(512, 512, 300));
-  EXPECT_EQ(options.raw->type, SampleType::kInt16);
-  EXPECT_THAT(options.raw->geometry.spacing, ElementsAre(0.7, 0.7, 1));
-  EXPECT_THAT(options.raw->geometry.origin, ElementsAre(-90, 0, 1.5));
-  EXPECT_EQ(options.raw->geometry.direction.back(), -1);
-  EXPECT_TRUE(options.raw->big_endian);
+  ASSERT_TRUE(options.upload.raw);
+  EXPECT_THAT(options.upload.raw->dims, ElementsAre(512, 512, 300));
+  EXPECT_EQ(options.upload.raw->type, SampleType::kInt16);
+  EXPECT_THAT(options.upload.raw->geometry.spacing, ElementsAre(0.7, 0.7, 1));
+  EXPECT_THAT(options.upload.raw->geometry.origin, ElementsAre(-90, 0, 1.5));
+  EXPECT_EQ(options.upload.raw->geometry.direction.back(), -1);
+  EXPECT_TRUE(options.upload.raw->big_endian);
 }
 
 TEST_F(OptionsTest, LeavesRangesToTheServer) {

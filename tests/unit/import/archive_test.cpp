@@ -145,14 +145,16 @@ TEST(Archive, PatternsOfOtherThingsAreRefused) {
 }
 
 TEST(Archive, DataThatIsNotWhatTheHeaderTellsIsRefused) {
-  expect_refused({{"head.mhd", mhd()}, {"head.raw", kSamples + "x"}}, HasSubstr("25 bytes"));
+  expect_refused({{"head.mhd", mhd()}, {"head.raw", kSamples + std::string(5000, 'x')}},
+                 HasSubstr("5024 bytes"));
   expect_refused({{"head.nhdr", nhdr()}, {"head.raw", kSamples.substr(1)}}, HasSubstr("23 bytes"));
   expect_refused({{"head.mhd", mhd()}, {"other.raw", kSamples}}, HasSubstr("did not come with it"));
   expect_refused({{"head.mhd", mhd("")}, {"head.raw", kSamples}}, HasSubstr(""));
 }
 
-TEST(Archive, HeadersNameOnlyFilesBesideThem) {
-  for (const std::string name : {"../head.raw", "/etc/passwd", "a/head.raw", ".."}) {
+TEST(Archive, HeadersNameOnlyFilesOfTheirFolder) {
+  for (const std::string name :
+       {"../head.raw", "/etc/passwd", "a/head.raw", "b/../../head.raw", "..", "a\\head.raw"}) {
     expect_refused({{"a/head.mhd", mhd(name)}, {"head.raw", kSamples}, {"a/head.raw", kSamples}},
                    HasSubstr("in another file"));
     expect_refused({{"a/head.nhdr", nhdr(name)}, {"head.raw", kSamples}},
@@ -186,6 +188,28 @@ TEST(Archive, LinksDevicesAndHiddenFilesArePassedOver) {
   const Outcome tarred = import_bytes(
       tar({volume, {"again.nii", "head.nii", Kind::kHardLink}, {"null", "", Kind::kDevice}}));
   EXPECT_EQ(tarred.error, "");
+}
+
+TEST(Archive, DataMayLieInAFolderBelowItsHeader) {
+  expect_read({{"v/h.mhd", mhd("sub/h.raw")}, {"v/sub/h.raw", kSamples}}, "metaimage");
+  expect_read({{"./h.nhdr", nhdr("./sub/./h.raw")}, {"./sub/h.raw", kSamples}}, "nrrd");
+}
+
+TEST(Archive, OneOfSeveralVolumesIsChosenByItsName) {
+  const std::string other(kSamples.rbegin(), kSamples.rend());
+  const std::string file = zip({{"a.nii", nifti({}, kSamples)},
+                                {"b/h.mhd", mhd("h.raw")},
+                                {"b/h.raw", other},
+                                {"readme", "text"}});
+  const Outcome open = import_bytes(file);
+  EXPECT_THAT(open.remedy.choices, testing::ElementsAre(Choice{"member", "a.nii", "NIfTI"},
+                                                        Choice{"member", "b/h.mhd", "MetaImage"}));
+  const Outcome chosen = import_bytes(file, {}, {.member = "b/h.mhd"});
+  EXPECT_EQ(chosen.sample_bytes(), other);
+  EXPECT_EQ(chosen.volume.name, "h.mhd");
+  EXPECT_EQ(import_bytes(file, {}, {.member = "b/h.raw"}).remedy.choices.size(), 2);
+  EXPECT_THAT(import_bytes(nifti({}, kSamples), {}, {.member = "a.nii"}).error,
+              HasSubstr("member"));
 }
 
 TEST(Archive, SeveralVolumesAreNamed) {

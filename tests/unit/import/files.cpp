@@ -21,6 +21,7 @@ Outcome outcome_of(const Folder& folder, const Import& import) {
   } catch (const Error& error) {
     outcome.code = error.code();
     outcome.error = error.what();
+    outcome.remedy = error.remedy();
   }
   return outcome;
 }
@@ -58,7 +59,8 @@ std::size_t Folder::entries() const {
   return static_cast<std::size_t>(std::distance(begin(all), end(all)));
 }
 
-Outcome import_bytes(std::string_view bytes, const SizeLimits& limits) {
+Outcome import_bytes(std::string_view bytes, const SizeLimits& limits,
+                     const ImportOptions& options) {
   const Folder folder;
   const Folder scratch;
   const auto source = folder.write("upload", bytes);
@@ -66,11 +68,17 @@ Outcome import_bytes(std::string_view bytes, const SizeLimits& limits) {
     return import_volume({.source = source,
                           .scratch = scratch.path(""),
                           .target = target,
-                          .options = {},
+                          .options = options,
                           .limits = limits});
   });
   if (scratch.entries() != 0) throw std::logic_error("an import left files behind");
   return outcome;
+}
+
+std::vector<std::string> codes_of(const Outcome& outcome) {
+  std::vector<std::string> codes;
+  for (const Note& note : outcome.volume.notes) codes.push_back(note.code);
+  return codes;
 }
 
 Outcome import_raw_bytes(std::string_view bytes, const RawDescription& description,

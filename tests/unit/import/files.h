@@ -48,7 +48,10 @@ struct Outcome {
   std::string_view sample_bytes() const { return std::string_view(canonical).substr(kHeaderBytes); }
 };
 
-Outcome import_bytes(std::string_view bytes, const SizeLimits& limits = {});
+Outcome import_bytes(std::string_view bytes, const SizeLimits& limits = {},
+                     const ImportOptions& options = {});
+// The codes of the volume's notes, in their order.
+std::vector<std::string> codes_of(const Outcome& outcome);
 Outcome import_raw_bytes(std::string_view bytes, const RawDescription& description,
                          const SizeLimits& limits = {});
 

@@ -110,15 +110,28 @@ TEST(Nifti, LiesAlongLpsWithoutForms) {
   EXPECT_EQ(geometry, (Geometry{.spacing = {2, 3, 4}}));
 }
 
-TEST(Nifti, TakesTheScannersSformBeforeTheQform) {
-  NiftiFields fields{.qform_code = 1, .sform_code = 1, .qoffset = {5, 5, 5}};
-  EXPECT_EQ(import_nifti(fields).volume.geometry.origin, (Vector3{0, 0, 0}));
-  // Any other sform that disagrees is a template's space.
-  fields.sform_code = 4;
-  EXPECT_EQ(import_nifti(fields).volume.geometry.origin, (Vector3{-5, -5, 5}));
-  // Where both agree the sform is more exact.
-  fields.qoffset = {0.001, 0, 0};
-  EXPECT_EQ(import_nifti(fields).volume.geometry.origin, (Vector3{0, 0, 0}));
+TEST(Nifti, TakesTheSformWhateverItsCodeAndTellsHowFarTheQformIs) {
+  for (const int code : {1, 2, 4}) {
+    NiftiFields fields{.qform_code = 1, .sform_code = code, .qoffset = {3, 4, 12}};
+    const Outcome outcome = import_nifti(fields);
+    EXPECT_EQ(outcome.volume.geometry.origin, (Vector3{0, 0, 0}));
+    ASSERT_EQ(codes_of(outcome), std::vector<std::string>{"forms-differ"});
+    EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("13.0 mm apart; the sform"));
+    fields.qoffset = {0.001, 0, 0};
+    EXPECT_EQ(codes_of(import_nifti(fields)), std::vector<std::string>{});
+  }
+}
+
+TEST(Nifti, TakesTheFormThatIsAskedFor) {
+  const NiftiFields fields{.qform_code = 1, .sform_code = 2, .qoffset = {3, 4, 12}};
+  const std::string file = nifti(fields, kSmallSamples);
+  const Outcome qform = import_bytes(file, {}, {.nifti_form = NiftiForm::kQform});
+  EXPECT_EQ(qform.volume.geometry.origin, (Vector3{-3, -4, 12}));
+  EXPECT_THAT(qform.volume.notes.at(0).detail, HasSubstr("the qform was taken"));
+  const Outcome sform = import_bytes(file, {}, {.nifti_form = NiftiForm::kSform});
+  EXPECT_EQ(sform.volume.geometry.origin, (Vector3{0, 0, 0}));
+  EXPECT_THAT(import_bytes(nifti({}, kSmallSamples), {}, {.nifti_form = NiftiForm::kQform}).error,
+              HasSubstr("no qform"));
 }
 
 TEST(Nifti, ReadsAShearedSformAsItIs) {
@@ -137,10 +150,11 @@ TEST(Nifti, ReadsAnSformFarFromTheOrigin) {
   EXPECT_EQ(outcome.volume.geometry.origin[2], -1755.25);
 }
 
-TEST(Nifti, RefusesAnSformThatContradictsPixdim) {
+TEST(Nifti, NotesAnSformThatContradictsPixdim) {
   const Outcome outcome = import_nifti({.pixdim = {1, 1, 1, 2, 0, 0, 0, 0}});
-  EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-  EXPECT_THAT(outcome.error, HasSubstr("along k"));
+  ASSERT_EQ(codes_of(outcome), std::vector<std::string>{"pixdim-differs"});
+  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("Along k"));
+  EXPECT_EQ(outcome.volume.geometry.spacing, (Vector3{1, 1, 1}));
 }
 
 TEST(Nifti, HonoursItsSpatialUnit) {
@@ -185,11 +199,28 @@ TEST(Nifti, TakesNoSlopeForNone) {
   EXPECT_THAT(import_nifti({.slope = 1, .intercept = nan}).error, HasSubstr("intercept nan"));
 }
 
-TEST(Nifti, RefusesMoreThanThreeDimensions) {
-  EXPECT_THAT(import_bytes(nifti({.dim = {4, 4, 3, 1, 2, 1, 1, 1}}, kSmallSamples)).error,
-              HasSubstr("time series of 2 volumes"));
-  EXPECT_THAT(import_bytes(nifti({.dim = {5, 1, 2, 3, 1, 3, 1, 1}}, kSmallSamples)).error,
-              HasSubstr("3 values along its axis 5"));
+TEST(Nifti, OffersTheVolumesOfASeries) {
+  const std::string file =
+      nifti({.dim = {4, 2, 3, 2, 2, 1, 1, 1}, .pixdim = {1, 1, 1, 1, 2.5, 0, 0, 0}, .units = 10},
+            kSmallSamples);
+  for (const std::string& bytes : {file, gzip(file)}) {
+    const Outcome open = import_bytes(bytes);
+    EXPECT_THAT(open.error, HasSubstr("2 volumes that differ in time"));
+    EXPECT_THAT(open.remedy.choices,
+                testing::ElementsAre(Choice{"volume", "0", "0 s"}, Choice{"volume", "1", "2.5 s"}));
+    const Outcome second = import_bytes(bytes, {}, {.volume = 1});
+    EXPECT_EQ(second.sample_bytes(), kSmallSamples.substr(12));
+    EXPECT_EQ(codes_of(second), std::vector<std::string>{"volume-chosen"});
+    EXPECT_EQ(import_bytes(bytes, {}, {.volume = 0}).sample_bytes(), kSmallSamples.substr(0, 12));
+    EXPECT_EQ(import_bytes(bytes, {}, {.volume = 2}).remedy.choices.size(), 2);
+  }
+  EXPECT_THAT(import_bytes(nifti({.dim = {5, 2, 2, 2, 1, 3, 1, 1}}, kSmallSamples)).error,
+              HasSubstr("3 volumes that differ in value"));
+  EXPECT_THAT(import_bytes(nifti({}, kSmallSamples), {}, {.volume = 1}).error,
+              HasSubstr("one volume"));
+}
+
+TEST(Nifti, PassesOverDimensionsOfOne) {
   EXPECT_TRUE(import_nifti({.dim = {7, 4, 3, 2, 1, 1, 1, 1}}).imported());
   // What lies beyond the dimensions that are told says nothing.
   EXPECT_TRUE(import_nifti({.dim = {3, 4, 3, 2, 0, -5, 9, 0}}).imported());
@@ -221,11 +252,12 @@ TEST(Nifti, RefusesSpacingsThatCannotBe) {
   for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), 0.0, -1.0}) {
     NiftiFields fields;
     fields.pixdim[2] = bad;
-    for (fields.sform_code = 0; fields.sform_code <= 1; ++fields.sform_code) {
-      const Outcome outcome = import_nifti(fields);
-      EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-      EXPECT_THAT(outcome.error, HasSubstr("voxel size along j"));
-    }
+    // The sform needs no voxel sizes.
+    EXPECT_EQ(codes_of(import_nifti(fields)), std::vector<std::string>{"pixdim-differs"});
+    fields.sform_code = 0;
+    const Outcome outcome = import_nifti(fields);
+    EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
+    EXPECT_THAT(outcome.error, HasSubstr("voxel size along j"));
   }
 }
 

@@ -74,15 +74,16 @@ TEST(Raw, IsRefusedBeyondTheLimits) {
       import_raw_bytes(kSmallSamples, small_description(), {.max_sample_bytes = 24}).imported());
 }
 
-TEST(Raw, IsRefusedWithTheCountOfSamplesThatAreNotFinite) {
+TEST(Raw, NotesTheCountOfSamplesThatAreNotFinite) {
   RawDescription description = small_description();
   description.type = SampleType::kFloat32;
   std::vector<float> samples(24, 1.0F);
   samples[3] = std::numeric_limits<float>::infinity();
   samples[7] = std::nanf("");
   const Outcome outcome = import_raw_bytes(bytes_of(samples), description);
-  EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-  EXPECT_THAT(outcome.error, HasSubstr("2 of its 24 samples"));
+  ASSERT_EQ(codes_of(outcome), std::vector<std::string>{"non-finite-samples"});
+  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("2 of its 24 samples"));
+  EXPECT_EQ(outcome.volume.range, (std::array<double, 2>{1, 1}));
 }
 
 TEST(Raw, KeepsItsGeometry) {

@@ -47,6 +47,7 @@ std::vector<Number> some_samples(std::size_t count) {
   return result;
 }
 
+using isomesh::test::bzip2;
 using isomesh::test::gzip;
 using isomesh::test::zlib;
 

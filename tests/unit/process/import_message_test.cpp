@@ -12,6 +12,10 @@ TEST(ImportMessage, AnOrderComesAsItWent) {
   order.task = {
       .source = "/a/\"b\"\n", .scratch = "/s", .target = "/s/t", .options = {}, .limits = {7}};
   order.task.options.series = "1.2.3";
+  order.task.options.member = "a/b.nrrd";
+  order.task.options.volume = 3;
+  order.task.options.accept = {"frame-of-reference"};
+  order.task.options.nifti_form = NiftiForm::kQform;
   order.bounds = {.memory_bytes = 8, .time = seconds(9)};
   order.task.options.raw = RawDescription{.dims = {1, 2, 4294967295},
                                           .type = SampleType::kFloat64,
@@ -25,6 +29,10 @@ TEST(ImportMessage, AnOrderComesAsItWent) {
   EXPECT_EQ(read.task.target, order.task.target);
   EXPECT_EQ(read.task.limits.max_sample_bytes, 7U);
   EXPECT_EQ(read.task.options.series, "1.2.3");
+  EXPECT_EQ(read.task.options.member, "a/b.nrrd");
+  EXPECT_EQ(read.task.options.volume, 3U);
+  EXPECT_TRUE(read.task.options.accepts(NoteCode::kFrameOfReference));
+  EXPECT_EQ(read.task.options.nifti_form, NiftiForm::kQform);
   EXPECT_EQ(read.bounds.memory_bytes, 8U);
   EXPECT_EQ(read.bounds.time, seconds(9));
   ASSERT_TRUE(read.task.options.raw);
@@ -35,7 +43,10 @@ TEST(ImportMessage, AnOrderComesAsItWent) {
 }
 
 TEST(ImportMessage, AReportHasWhatWasSaid) {
-  const Error refusal(ErrorCode::kUnusableVolume, "two \"series\"", {{"series", "1.2"}});
+  const Remedy remedy = {.overridable = "frame-of-reference",
+                         .choices = {{"series", "1.2", "head"}, {"series", "1.3", "scout"}}};
+  const Error refusal =
+      Error(ErrorCode::kUnusableVolume, "two \"series\"", {{"series", "1.2"}}).with_remedy(remedy);
   const ImportReport report = report_from(reading_message("archive") + reading_message("dicom") +
                                           error_message(refusal) + "{\"read");
   EXPECT_EQ(report.reading, "dicom");
@@ -44,6 +55,7 @@ TEST(ImportMessage, AReportHasWhatWasSaid) {
   EXPECT_EQ(report.error->code(), ErrorCode::kUnusableVolume);
   EXPECT_STREQ(report.error->what(), "two \"series\"");
   EXPECT_EQ(report.error->fields(), refusal.fields());
+  EXPECT_EQ(report.error->remedy(), remedy);
 }
 
 }  // namespace

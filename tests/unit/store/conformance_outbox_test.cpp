@@ -106,5 +106,14 @@ TEST(ResultKey, KnowsVolumeParametersAndVersionAlone) {
   EXPECT_NE(key("1"), first);
 }
 
+// Those that a mesh carries, and no others.
+TEST(ResultKey, KnowsTheNotesInMeshes) {
+  const auto key = [](const std::vector<Note>& notes) { return result_key("abc", notes, {}, "1"); };
+  const Note in_mesh = note_of(NoteCode::kFormsDiffer, "by 3 mm");
+  EXPECT_NE(key({in_mesh}), key({}));
+  EXPECT_NE(key({in_mesh}), key({note_of(NoteCode::kFormsDiffer, "by 4 mm")}));
+  EXPECT_EQ(key({note_of(NoteCode::kTrailingBytes, "3 bytes")}), key({}));
+}
+
 }  // namespace
 }  // namespace isomesh::store

@@ -65,6 +65,21 @@ TEST_P(VolumeConformance, KeepsTheFirstOfTwoWithOneId) {
   EXPECT_EQ(volumes().get("", "aa"), first);
 }
 
+TEST_P(VolumeConformance, ANameIsItsOwnersAlone) {
+  Volume volume = volume_of("aa");
+  volume.name = "ct.nrrd";
+  volume.notes = {note_of(NoteCode::kFormsDiffer, "by 3 mm")};
+  volumes().add("", volume);
+  volumes().add("other", volume);
+  volume.name = "head";
+  EXPECT_EQ(volumes().rename("", "aa", "head"), volume);
+  restart();
+  EXPECT_EQ(volumes().get("", "aa"), volume);
+  EXPECT_EQ(volumes().get("other", "aa").name, "ct.nrrd");
+  EXPECT_EQ(volumes().rename("", "aa", std::nullopt).name, std::nullopt);
+  EXPECT_EQ(code_thrown_by([&] { volumes().rename("nobody", "aa", "x"); }), ErrorCode::kNotFound);
+}
+
 TEST_P(VolumeConformance, OwnersHaveRecordsOfTheirOwn) {
   const Volume mine = volume_of("aa");
   const Volume theirs = volume_of("aa", "2025-01-01T00:00:00.000Z");

@@ -1,0 +1,286 @@
+// What a volume says about how it was read, and what a refusal offers, from the file to the mesh.
+#include <functional>
+#include <map>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/json.h"
+#include "tests/api/daemon.h"
+#include "tests/support/deflate.h"
+
+namespace isomesh::test {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::Field;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+const std::string kSamples = "abcdefghijklmnopqrstuvwx";  // 4 x 3 x 2
+
+// --- Files that show a note each -----------------------------------------------------------------
+
+std::string nrrd(const std::string& fields, const std::string& samples = kSamples) {
+  return "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 3 2\nencoding: raw\n" + fields + '\n' +
+         samples;
+}
+
+std::string metaimage(const std::string& fields, const std::string& samples = kSamples) {
+  return "ObjectType = Image\nNDims = 3\nDimSize = 4 3 2\nElementType = MET_UCHAR\n" + fields +
+         "ElementDataFile = LOCAL\n" + samples;
+}
+
+template <class Number>
+void put(std::string& bytes, std::size_t at, Number number) {
+  bytes.replace(at, sizeof(Number), reinterpret_cast<const char*>(&number), sizeof(Number));
+}
+
+struct NiftiFields {
+  std::int16_t axes = 3;
+  std::int16_t datatype = 2;
+  std::int16_t bits = 8;
+  float pixdim = 1;
+  float qoffset = 0;  // of a qform, unless it is 0
+  std::string samples = kSamples;
+};
+
+std::string nifti(const NiftiFields& fields) {
+  std::string file(352, '\0');
+  put<std::int32_t>(file, 0, 348);
+  const std::int16_t dim[] = {fields.axes, 4, 3,
+                              static_cast<std::int16_t>(fields.axes == 4 ? 1 : 2), 2};
+  for (std::size_t at = 0; at < std::size(dim); ++at) put(file, 40 + 2 * at, dim[at]);
+  put(file, 70, fields.datatype);
+  put(file, 72, fields.bits);
+  for (std::size_t at = 0; at < 5; ++at) put<float>(file, 76 + 4 * at, at == 0 ? 1 : fields.pixdim);
+  put<float>(file, 108, 352);
+  put<std::int16_t>(file, 252, fields.qoffset == 0 ? 0 : 1);
+  put<std::int16_t>(file, 254, 2);
+  put(file, 268, fields.qoffset);
+  for (const std::size_t at : {280, 300, 320}) put<float>(file, at, 1);
+  file.replace(344, 3, "n+1");
+  return file + fields.samples;
+}
+
+std::string not_finite() {
+  std::string samples;
+  for (int at = 0; at < 24; ++at) {
+    std::string one(4, '\0');
+    put<float>(one, 0, at == 5 ? std::nanf("") : static_cast<float>(at));
+    samples += one;
+  }
+  return samples;
+}
+
+// Elements of explicit little-endian DICOM.
+std::string element(std::uint16_t group, std::uint16_t number, const std::string& kind,
+                    std::string value) {
+  if (value.size() % 2 != 0) value += kind == "UI" ? '\0' : ' ';
+  std::string head(8, '\0');
+  put(head, 0, group);
+  put(head, 2, number);
+  head.replace(4, 2, kind);
+  const bool is_long = kind == "OW";
+  if (is_long) head.resize(12);
+  if (is_long) put(head, 8, static_cast<std::uint32_t>(value.size()));
+  if (!is_long) put(head, 6, static_cast<std::uint16_t>(value.size()));
+  return head + value;
+}
+
+std::string number(std::uint16_t group, std::uint16_t tag, std::uint16_t value) {
+  std::string bytes(2, '\0');
+  put(bytes, 0, value);
+  return element(group, tag, "US", bytes);
+}
+
+// One slice of a CT of 4 x 4 samples.
+std::string slice(int index, const std::string& frame_of_reference) {
+  const std::string uid = "1.2.826.0.1.3680043.9.1." + std::to_string(index);
+  const std::string meta = element(2, 2, "UI", "1.2.840.10008.5.1.4.1.1.2") +
+                           element(2, 3, "UI", uid) + element(2, 0x10, "UI", "1.2.840.10008.1.2.1");
+  std::string length(4, '\0');
+  put(length, 0, static_cast<std::uint32_t>(meta.size()));
+  return std::string(128, '\0') + "DICM" + element(2, 0, "UL", length) + meta +
+         element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") + element(8, 0x18, "UI", uid) +
+         element(8, 0x60, "CS", "CT") + element(0x20, 0xd, "UI", "1.2.3") +
+         element(0x20, 0xe, "UI", "1.2.3.4") +
+         element(0x20, 0x32, "DS", "0\\0\\" + std::to_string(index)) +
+         element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") +
+         element(0x20, 0x52, "UI", frame_of_reference) + number(0x28, 2, 1) +
+         element(0x28, 4, "CS", "MONOCHROME2") + number(0x28, 0x10, 4) + number(0x28, 0x11, 4) +
+         element(0x28, 0x30, "DS", "1\\1") + number(0x28, 0x100, 16) + number(0x28, 0x101, 16) +
+         number(0x28, 0x102, 15) + number(0x28, 0x103, 0) +
+         element(0x7fe0, 0x10, "OW",
+                 std::string(16, static_cast<char>(index)) + std::string(16, 'a'));
+}
+
+using Files = std::map<std::string, std::string>;
+
+struct Shown {
+  Files files;
+  std::vector<std::string> options = {};
+};
+
+// By the note's name, so that whoever adds a note adds how it is shown.
+const std::map<std::string, Shown>& shown() {
+  static const std::map<std::string, Shown> all = {
+      {"forms-differ", {{{"a.nii", nifti({.qoffset = 3})}}}},
+      {"pixdim-differs", {{{"a.nii", nifti({.pixdim = 2})}}}},
+      {"volume-chosen", {{{"a.nii", nifti({.axes = 4})}}, {"--volume", "1"}}},
+      {"space-assumed",
+       {{{"a.nrrd",
+          "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 4 3 2 1\nencoding: raw\nspace "
+          "dimension: 4\nspace directions: (1,0,0,0) (0,1,0,0) (0,0,1,0) (0,0,0,1)\n\n" +
+              kSamples}}}},
+      {"unit-unknown",
+       {{{"a.nrrd",
+          nrrd("space: LPS\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace units: \"pixel\" "
+               "\"pixel\" \"pixel\"\n")}}}},
+      {"non-finite-samples",
+       {{{"a.nii", nifti({.datatype = 16, .bits = 32, .samples = not_finite()})}}}},
+      {"trailing-bytes", {{{"a.nrrd", nrrd("", kSamples + "more")}}}},
+      {"values-rescaled", {{{"a.mha", metaimage("ElementToIntensityFunctionSlope = 2\n")}}}},
+      {"duplicate-file",
+       {{{"1", slice(1, "1.9")}, {"2", slice(2, "1.9")}, {"again", slice(2, "1.9")}}}},
+      {"looks-like-labels",
+       {{{"a.nrrd",
+          nrrd("", std::string(8, '\0') + std::string(8, '\1') + std::string(8, '\5'))}}}},
+      {"frame-of-reference",
+       {{{"1", slice(1, "1.9.1")}, {"2", slice(2, "1.9.2")}, {"3", slice(3, "1.9.3")}}}},
+  };
+  return all;
+}
+
+class NotesTest : public testing::Test {
+ protected:
+  // Uploads the files with the command, as a folder where there are several.
+  Finished upload_files(const Shown& what, const std::string& folder) {
+    std::filesystem::create_directories(folder_ / folder);
+    for (const auto& [name, bytes] : what.files) write_file(folder_ / folder / name, bytes);
+    const auto path = folder_ / folder;
+    std::vector<std::string> arguments = {
+        "--json", "upload", what.files.size() == 1 ? path / what.files.begin()->first : path};
+    arguments.insert(arguments.end(), what.options.begin(), what.options.end());
+    return daemon_.command(arguments);
+  }
+
+  const Daemon daemon_;
+  const TemporaryFolder folder_;
+};
+
+TEST_F(NotesTest, EveryCodeIsShownByAFileAndCarriedToTheEnd) {
+  for (const NoteDescription& note : note_descriptions()) {
+    const std::string code(note.name);
+    SCOPED_TRACE(code);
+    const auto found = shown().find(code);
+    ASSERT_NE(found, shown().end()) << "no file shows this note: add one to shown()";
+    const Finished uploaded = upload_files(found->second, code);
+    ASSERT_EQ(uploaded.status, 0) << uploaded.errors;
+    EXPECT_THAT(uploaded.errors, HasSubstr('(' + code + ')'));
+    const Volume volume = volume_from_json(uploaded.output);
+    EXPECT_THAT(volume.notes, Contains(Field(&Note::code, code)));
+    EXPECT_EQ(daemon_.client().volume(volume.id).notes, volume.notes);
+    EXPECT_THAT(daemon_.command({"info", volume.id}).output, HasSubstr('(' + code + ')'));
+    const auto mesh = folder_ / (code + ".glb");
+    const Finished meshed =
+        daemon_.command({"submit", volume.id, "--iso", "otsu", "--format", "glb"});
+    ASSERT_EQ(meshed.status, 0) << meshed.errors;
+    const std::string job = meshed.output.substr(0, meshed.output.find('\n'));
+    ASSERT_EQ(daemon_.client().wait(job).state, JobState::kSucceeded);
+    daemon_.client().fetch(job, MeshFormat::kGlb, mesh);
+    const std::string in_mesh = "{\"code\":\"" + code + "\"";
+    if (note.is_in_mesh) {
+      EXPECT_THAT(read_file(mesh), HasSubstr(in_mesh));
+    } else {
+      EXPECT_THAT(read_file(mesh), Not(HasSubstr(in_mesh)));
+    }
+  }
+}
+
+TEST_F(NotesTest, ARefusalOffersTheVolumesOfAFile) {
+  const std::string file = nifti({.axes = 4});
+  const Answer open = daemon_.send("POST", "/v1/volumes", file);
+  EXPECT_EQ(open.status, 422);
+  EXPECT_THAT(problem_from_json(open.body).remedy.choices,
+              ElementsAre(Choice{"volume", "0", "time 0"}, Choice{"volume", "1", "time 1"}));
+  EXPECT_EQ(daemon_.send("POST", "/v1/volumes?volume=1", file).status, 201);
+  EXPECT_EQ(daemon_.send("POST", "/v1/mesh?volume=1&iso=110&format=stl", file).status, 200);
+  EXPECT_EQ(daemon_.send("POST", "/v1/mesh?iso=110&format=stl", file).status, 422);
+  write_file(folder_ / "a.nii", file);
+  const Finished said = daemon_.command({"upload", folder_ / "a.nii"});
+  EXPECT_EQ(said.status, 1);
+  EXPECT_THAT(said.errors, HasSubstr("--volume 1"));
+}
+
+TEST_F(NotesTest, EveryVolumeOfAFolderIsAnsweredFor) {
+  const Shown several = {{{"a.nrrd", nrrd("")},
+                          {"b.nii.gz", gzip(nifti({.qoffset = 3}))},
+                          {"broken.nrrd", nrrd("", "few")},
+                          {"readme", "text"}}};
+  const Finished uploaded = upload_files(several, "several");
+  EXPECT_EQ(uploaded.status, 1);
+  EXPECT_THAT(uploaded.errors, HasSubstr("broken.nrrd: The file is truncated"));
+  const std::vector<UploadedVolume> volumes = uploaded_volumes_from_json(uploaded.output);
+  ASSERT_EQ(volumes.size(), 3U);
+  EXPECT_EQ(volumes[0].volume->name, "a.nrrd");
+  EXPECT_EQ(volumes[1].status, 201);
+  EXPECT_THAT(volumes[1].volume->notes, Contains(Field(&Note::code, "forms-differ")));
+  EXPECT_EQ(volumes[2].status, 422);
+  EXPECT_EQ(daemon_.client().volumes().size(), 2U);
+  const Finished meshed =
+      daemon_.command({"mesh", folder_ / "several", "--iso", "110", "-o", folder_ / "a.stl"});
+  EXPECT_EQ(meshed.status, 1);
+  EXPECT_THAT(meshed.errors, HasSubstr("--member a.nrrd"));
+  EXPECT_EQ(daemon_
+                .command({"mesh", folder_ / "several", "--member", "a.nrrd", "--iso", "110", "-o",
+                          folder_ / "a.stl"})
+                .status,
+            0);
+}
+
+TEST_F(NotesTest, AVolumeKeepsItsFilesNameUntilItIsRenamed) {
+  write_file(folder_ / "M\xC3\xBCller ct.nrrd", nrrd(""));
+  const Finished uploaded = daemon_.command({"upload", folder_ / "M\xC3\xBCller ct.nrrd"});
+  const std::string id = uploaded.output.substr(0, 64);
+  EXPECT_EQ(daemon_.client().volume(id).name, "M\xC3\xBCller ct.nrrd");
+  EXPECT_EQ(daemon_.client().rename_volume(id, "head").name, "head");
+  EXPECT_EQ(daemon_.command({"rename", id, "skull"}).status, 0);
+  EXPECT_EQ(daemon_.client().volume(id).name, "skull");
+  EXPECT_EQ(daemon_.client().rename_volume(id, std::nullopt).name, std::nullopt);
+  const Headers json = {{"Content-Type", "application/json"}};
+  for (const std::string body : {"", "[]", "{}", "{\"name\":5}", "{\"name\":\"\"}",
+                                 "{\"name\":\"a\\nb\"}", "{\"name\":\"a\",\"id\":\"b\"}"}) {
+    EXPECT_EQ(daemon_.send("PATCH", "/v1/volumes/" + id, body, json).status, 400) << body;
+  }
+  EXPECT_EQ(
+      daemon_.send("PATCH", "/v1/volumes/" + std::string(64, '0'), "{\"name\":null}", json).status,
+      404);
+  EXPECT_THAT(daemon_.errors(), Not(HasSubstr("ller")));
+  EXPECT_THAT(daemon_.errors(), Not(HasSubstr("skull")));
+}
+
+TEST_F(NotesTest, AFormTellsItsFilesName) {
+  const std::string body =
+      "--x\r\nContent-Disposition: form-data; name=\"file\"; "
+      "filename=\"ct.nrrd\"\r\n\r\n" +
+      nrrd("") + "\r\n--x--\r\n";
+  const Answer answer = daemon_.send("POST", "/v1/volumes", body,
+                                     {{"Content-Type", "multipart/form-data; boundary=x"}});
+  ASSERT_EQ(answer.status, 201) << answer.body;
+  EXPECT_EQ(volume_from_json(answer.body).name, "ct.nrrd");
+}
+
+// The same samples and geometry are one volume: it says what its first upload showed.
+TEST_F(NotesTest, AreThoseOfTheUploadThatCameFirst) {
+  const Answer first = daemon_.send("POST", "/v1/volumes", nrrd(""));
+  const Answer again = daemon_.send("POST", "/v1/volumes", nrrd("", kSamples + "more"));
+  EXPECT_EQ(again.status, 200);
+  EXPECT_EQ(volume_from_json(again.body), volume_from_json(first.body));
+  EXPECT_THAT(volume_from_json(again.body).notes, IsEmpty());
+}
+
+}  // namespace
+}  // namespace isomesh::test

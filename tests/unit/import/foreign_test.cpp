@@ -1,0 +1,211 @@
+// What programs of others write beside or against the formats' descriptions, and how it is read.
+
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/import/archives.h"
+#include "tests/unit/import/files.h"
+#include "tests/unit/import/writers.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Vector = std::array<double, 3>;
+
+const std::string kSamples(kSmallSamples);
+
+Lines without_space(Lines lines) {
+  for (const char* name : {"space", "space directions", "space origin"}) {
+    lines = with(lines, name, "");
+  }
+  return lines;
+}
+
+TEST(ForeignNrrd, ReadsBzip2AndItsDamage) {
+  const Lines lines = with(small_nrrd(), "encoding", "bzip2");
+  const std::string packed = bzip2(kSamples);
+  EXPECT_EQ(import_bytes(nrrd(lines, packed)).sample_bytes(), kSamples);
+  for (std::size_t size = 0; size < packed.size(); ++size) {
+    EXPECT_FALSE(import_bytes(nrrd(lines, packed.substr(0, size))).imported()) << size;
+  }
+  EXPECT_FALSE(import_bytes(nrrd(lines, bzip2(kSamples + "x"))).imported());
+  EXPECT_FALSE(import_bytes(nrrd(lines, packed + "x")).imported());
+}
+
+TEST(ForeignNrrd, SpacingFollowsFromMinsAndMaxs) {
+  Lines lines = without_space(small_nrrd());
+  lines.emplace_back("axis mins", "0 10 20");
+  lines.emplace_back("axis maxs", "8 19 30");
+  const Geometry cells = import_bytes(nrrd(lines, kSamples)).volume.geometry;
+  EXPECT_EQ(cells.spacing, (Vector{2, 3, 5}));
+  EXPECT_EQ(cells.origin, (Vector{1, 11.5, 22.5}));
+  lines.emplace_back("centers", "node node node");
+  EXPECT_EQ(import_bytes(nrrd(lines, kSamples)).volume.geometry.spacing,
+            (Vector{8.0 / 3, 4.5, 10}));
+  EXPECT_FALSE(import_bytes(nrrd(with(lines, "axis maxs", "0 19 30"), kSamples)).imported());
+}
+
+TEST(ForeignNrrd, RefusesDirectionsBeyondMeasure) {
+  for (const std::string step : {"1e155", "1e100", "1e-170"}) {
+    const std::string directions = "(" + step + ",0,0) (0," + step + ",0) (0,0," + step + ")";
+    EXPECT_FALSE(
+        import_bytes(nrrd(with(small_nrrd(), "space directions", directions), kSamples)).imported())
+        << step;
+  }
+}
+
+TEST(ForeignNrrd, AnUnnamedSpaceOfFourDimensionsIsThatOfSlicer) {
+  Lines lines = without_space(small_nrrd());
+  lines = with(with(lines, "dimension", "4"), "sizes", "4 3 2 1");
+  lines.emplace_back("space dimension", "4");
+  lines.emplace_back("space directions", "(-2,0,0,0) (0,-2,0,0) (0,0,3,0) (0,0,0,1)");
+  lines.emplace_back("space origin", "(10,20,30,0)");
+  const std::string file = nrrd(lines, kSamples);
+  const Outcome bare = import_bytes(file);
+  ASSERT_EQ(bare.error, "");
+  EXPECT_THAT(codes_of(bare), ElementsAre("space-assumed"));
+  EXPECT_EQ(bare.volume.geometry.origin, (Vector{-10, -20, 30}));
+  EXPECT_EQ(bare.volume.geometry.direction, (std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}));
+  std::string extended = file;
+  extended.insert(extended.find("\n\n") + 1, "Segment0_Extent:=5 8 1 3 2 3\n");
+  EXPECT_EQ(import_bytes(extended).volume.geometry.origin, (Vector{0, -18, 36}));
+}
+
+TEST(ForeignNrrd, AUnitThatCountsSamplesIsNoLength) {
+  Lines lines = small_nrrd();
+  lines.emplace_back("space units", "\"pixel\" \"pixel\" \"pixel\"");
+  const Outcome outcome = import_bytes(nrrd(lines, kSamples));
+  EXPECT_THAT(codes_of(outcome), ElementsAre("unit-unknown"));
+  lines.back().second = "\"furlong\" \"furlong\" \"furlong\"";
+  EXPECT_THAT(import_bytes(nrrd(lines, kSamples)).error, HasSubstr("furlong"));
+}
+
+// Sample by sample, as diffusion series are stored, and one behind the other.
+TEST(ForeignNrrd, VolumesAreChosenAlongTheFirstAndTheLastAxis) {
+  Lines lines = with(with(small_nrrd(), "dimension", "4"), "sizes", "3 2 2 2");
+  lines = with(with(lines, "kinds", "list domain domain domain"), "space directions",
+               "none (1,0,0) (0,1,0) (0,0,1)");
+  EXPECT_THAT(import_bytes(nrrd(lines, kSamples)).error, HasSubstr("3 volumes"));
+  std::string every_third;
+  for (std::size_t at = 1; at < kSamples.size(); at += 3) every_third += kSamples[at];
+  for (const bool packed : {false, true}) {
+    const Lines encoded = with(lines, "encoding", packed ? "gzip" : "raw");
+    const std::string file = nrrd(encoded, packed ? gzip(kSamples) : kSamples);
+    EXPECT_EQ(import_bytes(file, {}, {.volume = 1}).sample_bytes(), every_third);
+  }
+  lines = with(with(lines, "sizes", "2 2 2 3"), "kinds", "domain domain domain list");
+  lines = with(lines, "space directions", "(1,0,0) (0,1,0) (0,0,1) none");
+  EXPECT_EQ(import_bytes(nrrd(lines, kSamples), {}, {.volume = 1}).sample_bytes(),
+            kSamples.substr(8, 8));
+}
+
+TEST(ForeignNrrd, ANiftiFileServesAsDataWithOrWithoutItsHeaderSkipped) {
+  Lines lines = with(small_nrrd(), "encoding", "gzip");
+  lines.emplace_back("data file", "h.nii.gz");
+  const std::string data = gzip(nifti({}, kSamples));
+  for (const char* skip : {"", "-1", "352"}) {
+    const std::string header = nrrd(with(lines, "byte skip", skip), "");
+    const Outcome outcome = import_bytes(zip({{"h.nhdr", header}, {"h.nii.gz", data}}));
+    EXPECT_EQ(outcome.error, "") << skip;
+    EXPECT_EQ(outcome.volume.format, "nrrd");
+    EXPECT_EQ(outcome.sample_bytes(), kSamples);
+    EXPECT_EQ(codes_of(outcome).size(), *skip == '\0' ? 1 : 0) << skip;
+  }
+}
+
+TEST(ForeignMetaImage, RawDataMayBeALittleLonger) {
+  const std::string header = metaimage(with(small_metaimage(), "ElementDataFile", "h.raw"), "");
+  const Outcome outcome =
+      import_bytes(zip({{"h.mhd", header}, {"h.raw", kSamples + "12 bytes more"}}));
+  EXPECT_EQ(outcome.sample_bytes(), kSamples);
+  EXPECT_THAT(codes_of(outcome), ElementsAre("trailing-bytes"));
+}
+
+TEST(ForeignMetaImage, SlopeAndOffsetAreApplied) {
+  Lines lines = with(small_metaimage(), "ElementToIntensityFunctionSlope", "2");
+  lines = with(lines, "ElementToIntensityFunctionOffset", "-5");
+  const Outcome outcome = import_bytes(metaimage(lines, kSamples));
+  EXPECT_EQ(outcome.volume.type, SampleType::kFloat32);
+  EXPECT_EQ(samples_of<float>(outcome)[0], 'a' * 2.0F - 5);
+  EXPECT_THAT(codes_of(outcome), ElementsAre("values-rescaled"));
+}
+
+TEST(ForeignMetaImage, OneOfSeveralVolumesIsChosen) {
+  Lines lines = with(with(small_metaimage(), "NDims", "4"), "DimSize", "4 3 1 2");
+  for (const char* name : {"TransformMatrix", "Offset", "ElementSpacing"})
+    lines = with(lines, name, "");
+  const std::string file = metaimage(lines, kSamples);
+  EXPECT_EQ(import_bytes(file).remedy.choices.size(), 2);
+  EXPECT_EQ(import_bytes(file, {}, {.volume = 1}).sample_bytes(), kSamples.substr(12));
+}
+
+TEST(ForeignPairs, AreReadWithTheirImage) {
+  using std::string_literals::operator""s;
+  const std::string header = nifti({.magic = "ni1\0"s, .vox_offset = 0}, "").substr(0, 348);
+  for (const std::string& image : {kSamples, gzip(kSamples)}) {
+    const std::string name = image == kSamples ? "v/a.img" : "v/a.img.gz";
+    const Outcome outcome = import_bytes(zip({{"v/a.hdr", header}, {name, image}}));
+    EXPECT_EQ(outcome.error, "");
+    EXPECT_EQ(outcome.sample_bytes(), kSamples);
+    EXPECT_THAT(codes_of(outcome), IsEmpty());
+  }
+  EXPECT_THAT(import_bytes(header).error, HasSubstr("a pair of .hdr and .img"));
+  EXPECT_THAT(import_bytes(zip({{"a.hdr", header}, {"b.img", kSamples}})).error,
+              HasSubstr("a pair of .hdr and .img"));
+}
+
+TEST(ForeignPairs, AnalyzeLiesAroundTheMiddleWithANote) {
+  std::string header = nifti({.magic = std::string(4, '\0'),
+                              .pixdim = {0, 2, 2, 3, 0, 0, 0, 0},
+                              .vox_offset = 0,
+                              .sform_code = 0},
+                             "")
+                           .substr(0, 348);
+  header[38] = 'r';
+  const Outcome outcome = import_bytes(zip({{"a.hdr", header}, {"a.img", kSamples}}));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.format, "nifti");
+  EXPECT_EQ(outcome.sample_bytes(), kSamples);
+  EXPECT_THAT(codes_of(outcome), ElementsAre("space-assumed"));
+  EXPECT_EQ(outcome.volume.geometry.spacing, (Vector{2, 2, 3}));
+  EXPECT_EQ(outcome.volume.geometry.origin, (Vector{-3, 2, -1.5}));
+}
+
+TEST(ForeignSamples, ThatAreNoNumbersAreOutside) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  std::vector<float> samples = some_samples<float>(24);
+  samples[0] = -1e12F;
+  samples[3] = kNan;
+  samples[7] = kInfinity;
+  samples[9] = -kInfinity;
+  const auto file = [](const std::vector<float>& values) {
+    return nifti({.datatype = 16, .bitpix = 32}, bytes_of(values));
+  };
+  const Outcome outcome = import_bytes(file(samples));
+  ASSERT_THAT(codes_of(outcome), ElementsAre("non-finite-samples"));
+  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("3 of its 24"));
+  EXPECT_EQ(outcome.volume.range[0], -1e12F);
+  for (const std::size_t at : {3, 7, 9}) EXPECT_EQ(samples_of<float>(outcome)[at], -1e12F);
+  EXPECT_EQ(samples_of<float>(outcome)[4], samples[4]);
+  EXPECT_THAT(import_bytes(file(std::vector<float>(24, kNan))).error, HasSubstr("24 of its 24"));
+}
+
+TEST(ForeignSamples, OfFewWholeValuesInRegionsLookLikeLabels) {
+  std::string labels;
+  for (const char value : {0, 1, 2, 5}) labels += std::string(6, value);
+  EXPECT_THAT(codes_of(import_bytes(nifti({.dim = {3, 6, 4, 1, 1, 1, 1, 1}}, labels))),
+              ElementsAre("looks-like-labels"));
+  const std::string mask = std::string(12, '\0') + std::string(12, '\1');
+  EXPECT_THAT(codes_of(import_bytes(nifti({}, mask))), IsEmpty());
+  EXPECT_THAT(codes_of(import_bytes(nifti({}, kSamples))), IsEmpty());
+}
+
+}  // namespace
+}  // namespace isomesh::import::test
