@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "base/text.h"
 #include "server/import/dicom/private_elements.h"
@@ -58,11 +59,20 @@ constexpr std::array kPhaseRows = {
 // Texts come from a file and go into messages.
 constexpr std::size_t kLongestPhase = 64;
 
+// Cut before a letter, which may have several bytes.
+std::string shortened(std::string text) {
+  if (text.size() <= kLongestPhase) return text;
+  std::size_t end = kLongestPhase;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
+  text.resize(end);
+  return text;
+}
+
 std::string value_of(const DataSet& data, const PhaseRow& row) {
   std::string value;
   switch (row.kind) {
     case Kind::kText:
-      value = printable(data.text(row.tag));
+      value = utf8(data, row.tag);
       break;
     case Kind::kReal:
       for (const double number : data.binary_reals(row.tag)) {
@@ -73,8 +83,7 @@ std::string value_of(const DataSet& data, const PhaseRow& row) {
       if (const auto number = data.unsigned_number(row.tag)) value = std::to_string(*number);
       break;
   }
-  if (value.size() > kLongestPhase) value.resize(kLongestPhase);
-  return value;
+  return shortened(std::move(value));
 }
 
 constexpr auto kPhaseNames = [] {

@@ -100,7 +100,7 @@ std::optional<std::vector<std::uint32_t>> volumes_by(std::span<const Criterion* 
   }
   std::vector<std::uint64_t> distinct = keys;
   std::ranges::sort(distinct);
-  distinct.erase(std::ranges::unique(distinct).begin(), distinct.end());
+  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
   if (distinct.size() != positions.most_at_one) return std::nullopt;
   std::vector<bool> taken(distinct.size() * positions.count);
   std::vector<std::uint32_t> counts(distinct.size());

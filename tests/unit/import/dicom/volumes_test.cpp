@@ -99,6 +99,17 @@ TEST(DicomVolumes, AreToldApartByTheAttributeThatDoes) {
   }
 }
 
+// Titles go into answers, which are UTF-8.
+TEST(DicomVolumes, HaveTitlesThatCanBeRead) {
+  const Outcome outcome =
+      import_objects(several([](DicomObject& object, std::uint32_t volume, std::uint32_t) {
+        object.text(kImageType, "CS", std::string(70, '\xE4') + "ABC"[volume]);
+        object.text(kEchoNumbers, "IS", std::string(volume + 1, '\xE4'));
+      }));
+  ASSERT_EQ(outcome.remedy.choices.size(), 3);
+  EXPECT_EQ(outcome.remedy.choices[1].title, "EchoNumbers \xEF\xBF\xBD\xEF\xBF\xBD, 6 slices");
+}
+
 TEST(DicomVolumes, AreToldApartByTwoAttributes) {
   const DicomSeries series;
   NamedFiles files;
