@@ -168,7 +168,7 @@ class Transfer {
     if (request_.source) {
       set(CURLOPT_POST, 1L);
       set(CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(request_.source_bytes));
-    } else if (request_.method == "POST") {
+    } else if (request_.method == "POST" || request_.method == "PATCH") {
       set(CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(request_.body.size()));
       set(CURLOPT_POSTFIELDS, request_.body.data());
     }

@@ -83,7 +83,7 @@ std::string element(std::uint16_t group, std::uint16_t number, const std::string
   put(head, 0, group);
   put(head, 2, number);
   head.replace(4, 2, kind);
-  const bool is_long = kind == "OW";
+  const bool is_long = kind == "OW" || kind == "OB" || kind == "SQ";
   if (is_long) head.resize(12);
   if (is_long) put(head, 8, static_cast<std::uint32_t>(value.size()));
   if (!is_long) put(head, 6, static_cast<std::uint16_t>(value.size()));
@@ -117,6 +117,81 @@ std::string slice(int index, const std::string& frame_of_reference) {
                  std::string(16, static_cast<char>(index)) + std::string(16, 'a'));
 }
 
+std::string little(std::uint32_t value) {
+  std::string bytes(4, '\0');
+  put(bytes, 0, value);
+  return bytes;
+}
+
+std::string sequence(std::uint16_t group, std::uint16_t tag,
+                     const std::vector<std::string>& items) {
+  std::string value;
+  for (const std::string& item : items) {
+    value +=
+        std::string("\xFE\xFF\x00\xE0", 4) + little(static_cast<std::uint32_t>(item.size())) + item;
+  }
+  return element(group, tag, "SQ", value);
+}
+
+std::string dicom(const std::string& data_set) {
+  const std::string meta = element(2, 0x10, "UI", "1.2.840.10008.1.2.1");
+  return std::string(128, '\0') + "DICM" +
+         element(2, 0, "UL", little(static_cast<std::uint32_t>(meta.size()))) + meta + data_set;
+}
+
+// 8 x 8 samples of 8 bits.
+std::string square_image() {
+  return number(0x28, 2, 1) + element(0x28, 4, "CS", "MONOCHROME2") + number(0x28, 0x10, 8) +
+         number(0x28, 0x11, 8) + element(0x28, 0x30, "DS", "1\\1") + number(0x28, 0x100, 8) +
+         number(0x28, 0x101, 8) + number(0x28, 0x102, 7) + number(0x28, 0x103, 0);
+}
+
+std::string halves(std::size_t samples) {
+  return std::string(samples / 2, '\0') + std::string(samples / 2, '\1');
+}
+
+// A label map with a frame at 0, 1 and 3 mm.
+std::string sparse_segmentation() {
+  std::vector<std::string> frames;
+  for (const char* z : {"0", "1", "3"}) {
+    frames.push_back(
+        sequence(0x20, 0x9113, {element(0x20, 0x32, "DS", "0\\0\\" + std::string(z))}));
+  }
+  const std::string shared =
+      sequence(0x20, 0x9116, {element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0")}) +
+      sequence(0x28, 0x9110, {element(0x28, 0x30, "DS", "1\\1")});
+  return dicom(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.66.7") +
+               element(8, 0x60, "CS", "SEG") + element(0x20, 0xe, "UI", "1.2.3.4") +
+               element(0x28, 8, "IS", "3") + square_image() + element(0x62, 1, "CS", "LABELMAP") +
+               sequence(0x5200, 0x9229, {shared}) + sequence(0x5200, 0x9230, frames) +
+               element(0x7fe0, 0x10, "OW", halves(3 * 64)));
+}
+
+std::string csa_field(std::string name, const std::vector<std::string>& values) {
+  name.resize(64, '\0');
+  std::string field = name + little(0) + "FD" + std::string(2, '\0') + little(4) +
+                      little(static_cast<std::uint32_t>(values.size())) + little(0);
+  for (std::string value : values) {
+    value.resize(4, ' ');
+    field += little(4) + little(4) + little(77) + little(4) + value;
+  }
+  return field;
+}
+
+// Four slices in two by two tiles, with a thickness and no distance.
+std::string mosaic() {
+  const std::string header = "SV10\4\3\2\1" + little(2) + little(77) +
+                             csa_field("NumberOfImagesInMosaic", {"4"}) +
+                             csa_field("SliceNormalVector", {"0", "0", "1"});
+  return dicom(element(8, 8, "CS", "ORIGINAL\\PRIMARY\\M\\MOSAIC") +
+               element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.4") + element(8, 0x60, "CS", "MR") +
+               element(0x18, 0x50, "DS", "3") + element(0x20, 0xe, "UI", "1.2.3.4") +
+               element(0x20, 0x32, "DS", "0\\0\\0") +
+               element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + square_image() +
+               element(0x29, 0x10, "LO", "SIEMENS CSA HEADER") +
+               element(0x29, 0x1010, "OB", header) + element(0x7fe0, 0x10, "OW", halves(64)));
+}
+
 using Files = std::map<std::string, std::string>;
 
 struct Shown {
@@ -148,6 +223,8 @@ const std::map<std::string, Shown>& shown() {
       {"looks-like-labels",
        {{{"a.nrrd",
           nrrd("", std::string(8, '\0') + std::string(8, '\1') + std::string(8, '\5'))}}}},
+      {"empty-planes", {{{"a.dcm", sparse_segmentation()}}}},
+      {"distance-assumed", {{{"a.dcm", mosaic()}}}},
       {"frame-of-reference",
        {{{"1", slice(1, "1.9.1")}, {"2", slice(2, "1.9.2")}, {"3", slice(3, "1.9.3")}}}},
   };

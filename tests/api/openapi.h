@@ -30,6 +30,7 @@ class OpenApiTest : public testing::Test {
     if (path_item["get"]) methods.insert({"GET", "HEAD"});
     if (path_item["post"]) methods.insert("POST");
     if (path_item["delete"]) methods.insert("DELETE");
+    if (path_item["patch"]) methods.insert("PATCH");
     return methods;
   }
 

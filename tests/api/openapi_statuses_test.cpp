@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "client/isomesh/package.h"
 #include "proto/json.h"
 #include "tests/api/openapi.h"
 #include "tests/support/nifti.h"
@@ -44,6 +45,20 @@ class Statuses {
   std::map<std::string, std::set<int>> seen_;
 };
 
+// An archive of two.
+std::string two_volumes() {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.nrrd", "b.nrrd"}) {
+    write_file(folder / name,
+               "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\n" +
+                   std::string(7, 'a') + name[0]);
+  }
+  const UploadBody body(folder.path());
+  std::string bytes(body.size(), '\0');
+  body.read(0, bytes);
+  return bytes;
+}
+
 void probe_volumes(Statuses& statuses, const Job& running, const std::string& id) {
   const RawUpload sphere = sphere_upload();
   const std::string post = "POST /v1/volumes";
@@ -56,6 +71,7 @@ void probe_volumes(Statuses& statuses, const Job& running, const std::string& id
   statuses.see(post,
                "POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\n"
                "Content-Length: 99999999999999\r\n\r\n");
+  statuses.probe(post, "/v1/volumes", two_volumes());
   statuses.probe("GET /v1/volumes", "/v1/volumes");
   statuses.probe("GET /v1/volumes", "/v1/volumes?cursor=x");
   for (const std::string part : {"", "/histogram", "/slice.png"}) {
@@ -66,6 +82,15 @@ void probe_volumes(Statuses& statuses, const Job& running, const std::string& id
     statuses.probe(get, "/v1/volumes/" + id + part, {}, {{"If-None-Match", "*"}});
     statuses.probe(get, "/v1/volumes/" + id + part, {}, {{"If-Match", "\"x\""}});
   }
+  const std::string rename = "PATCH /v1/volumes/{id}";
+  const std::string name = R"({"name": "head"})";
+  statuses.probe(rename, "/v1/volumes/" + id, name);
+  statuses.probe(rename, "/v1/volumes/" + id, "{}");
+  statuses.probe(rename, "/v1/volumes/0123", name);
+  statuses.probe(rename, "/v1/volumes/" + id, name, {{"If-Match", "\"x\""}});
+  statuses.probe(rename, "/v1/volumes/" + id, name, {{"Content-Type", "text/plain"}});
+  statuses.probe(rename, "/v1/volumes/" + id, std::string(70'000, ' '));
+  statuses.see(rename, "PATCH /v1/volumes/" + id + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
   const std::string erase = "DELETE /v1/volumes/{id}";
   statuses.probe(erase, "/v1/volumes/" + running.parameters.volume);
   statuses.probe(erase, "/v1/volumes/" + id + "?x=1");
