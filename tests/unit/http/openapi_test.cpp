@@ -44,6 +44,7 @@ class OpenApi : public testing::Test {
     if (path_item["get"]) methods.merge(Methods{"GET", "HEAD"});
     if (path_item["post"]) methods.insert("POST");
     if (path_item["delete"]) methods.insert("DELETE");
+    if (path_item["patch"]) methods.insert("PATCH");
     return methods;
   }
 

@@ -38,9 +38,10 @@ TEST(AnswerJson, SpellsAVolumeAsTheContractDoes) {
   const auto written = nlohmann::ordered_json::parse(to_json(some_volume()));
   std::vector<std::string> names;
   for (const auto& [name, value] : written.items()) names.push_back(name);
-  EXPECT_THAT(names,
-              ElementsAre("id", "format", "dims", "type", "spacing", "origin", "direction", "range",
-                          "suggested_iso", "bytes", "created", "modality", "presets", "ignored"));
+  EXPECT_THAT(names, ElementsAre("id", "name", "format", "dims", "type", "spacing", "origin",
+                                 "direction", "range", "suggested_iso", "bytes", "created",
+                                 "modality", "presets", "ignored", "notes"));
+  EXPECT_TRUE(written["name"].is_null());
   EXPECT_TRUE(written["modality"].is_null());
   EXPECT_EQ(written["dims"], json({181, 217, 4294967295}));
   EXPECT_EQ(written["type"], "float32");
@@ -56,6 +57,9 @@ TEST(AnswerJson, SpellsWhatDicomTellsOfAVolume) {
                                                 {"name": "bone", "iso": 250}])"));
   EXPECT_EQ(written["ignored"], json::parse(R"([{"name": "DICOMDIR",
                                       "reason": "it is a directory of DICOM files"}])"));
+  EXPECT_EQ(written["name"], "M\xc3\xbcller CT");
+  EXPECT_EQ(written["notes"], json::parse(R"([{"code": "frame-of-reference",
+                                    "detail": "Every slice has another one."}])"));
   EXPECT_EQ(written["dicom"]["patient_name"], "M\xc3\xbcller^Eva");
   EXPECT_EQ(written["dicom"]["instances"][1]["sop_instance_uid"], "1.2.3.4.2");
 }
@@ -137,13 +141,17 @@ TEST(AnswerJson, SpellsAProblemAsRfc9457Does) {
       "type": "urn:isomesh:problem:invalid-parameter", "title": "Invalid parameter", "status": 400,
       "detail": "iso: is required", "instance": "/v1/jobs",
       "errors": [{"field": "iso", "message": "is required"},
-                 {"field": "volume", "message": "is required"}]})"));
+                 {"field": "volume", "message": "is required"}],
+      "overridable": "frame-of-reference",
+      "choices": [{"parameter": "volume", "value": "0", "title": "0 s"},
+                  {"parameter": "volume", "value": "1", "title": "2 s"}]})"));
 }
 
 TEST(AnswerJson, LeavesOutWhatAProblemDoesNotHave) {
   Problem bare = some_problem();
   bare.instance.clear();
   bare.errors.clear();
+  bare.remedy = {};
   EXPECT_THAT(members_of(json::parse(to_json(bare))),
               testing::UnorderedElementsAre("type", "title", "status", "detail"));
 }
