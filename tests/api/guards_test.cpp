@@ -87,7 +87,7 @@ TEST_F(GuardsTest, OtherMethodsAreNotAllowed) {
        {Wrong{"DELETE", "/v1/jobs", "GET, HEAD, POST"},
         Wrong{"PUT", "/v1/volumes", "GET, HEAD, POST"},
         Wrong{"POST", "/v1/jobs/0123", "DELETE, GET, HEAD"},
-        Wrong{"PATCH", "/v1/volumes/0123", "DELETE, GET, HEAD"},
+        Wrong{"PUT", "/v1/volumes/0123", "DELETE, GET, HEAD, PATCH"},
         Wrong{"DELETE", "/v1/jobs/0123/mesh.drc", "GET, HEAD"}, Wrong{"GET", "/v1/mesh", "POST"},
         Wrong{"HEAD", "/v1/mesh", "POST"}, Wrong{"OPTIONS", "/v1/jobs", "GET, HEAD, POST"},
         Wrong{"POST", "/livez", "GET, HEAD"}, Wrong{"TRACE", "/livez", "GET, HEAD"},
