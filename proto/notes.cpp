@@ -6,7 +6,7 @@
 namespace isomesh {
 namespace {
 
-constexpr NoteDescription kDescriptions[] = {
+constexpr NoteDescription kNoteDescriptions[] = {
     {.code = NoteCode::kFormsDiffer,
      .name = "forms-differ",
      .meaning = "A NIfTI header's sform and qform place the samples differently; the detail says "
@@ -70,20 +70,20 @@ constexpr NoteDescription kDescriptions[] = {
 
 }  // namespace
 
-std::span<const NoteDescription> note_descriptions() { return kDescriptions; }
+std::span<const NoteDescription> note_descriptions() { return kNoteDescriptions; }
 
 const NoteDescription& describe(NoteCode code) {
-  return *std::ranges::find(kDescriptions, code, &NoteDescription::code);
+  return *std::ranges::find(kNoteDescriptions, code, &NoteDescription::code);
 }
 
 const NoteDescription* find_note(std::string_view name) {
-  const auto* found = std::ranges::find(kDescriptions, name, &NoteDescription::name);
-  return found == std::end(kDescriptions) ? nullptr : found;
+  const auto* found = std::ranges::find(kNoteDescriptions, name, &NoteDescription::name);
+  return found == std::end(kNoteDescriptions) ? nullptr : found;
 }
 
 std::string acceptable_notes() {
   std::string names;
-  for (const NoteDescription& row : kDescriptions) {
+  for (const NoteDescription& row : kNoteDescriptions) {
     if (row.is_acceptable) names += (names.empty() ? "" : ", ") + std::string(row.name);
   }
   return names;

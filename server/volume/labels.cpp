@@ -9,7 +9,7 @@
 namespace isomesh::volume {
 namespace {
 
-constexpr std::size_t kMostValues = 1024;
+constexpr std::size_t kMostLabels = 1024;
 constexpr std::size_t kFewestValues = 3;
 // Of the pairs of neighbours. Regions of five samples along x have a fifth of them at their
 // borders; images of eight bits have hardly any pair of the same values.
@@ -46,7 +46,7 @@ std::optional<std::size_t> count_labels(std::span<const Sample> samples, std::si
       same += line[at] == line[at - 1] ? 1 : 0;
       values.add(line[at]);
     }
-    if (values.count() > kMostValues) return std::nullopt;
+    if (values.count() > kMostLabels) return std::nullopt;
   }
   const bool is_flat = static_cast<double>(same) >= kFlat * static_cast<double>(pairs);
   if (values.count() < kFewestValues || !is_flat) return std::nullopt;

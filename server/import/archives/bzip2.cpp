@@ -11,7 +11,7 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
+constexpr std::size_t kBufferBytes = std::size_t{1} << 18;
 
 class Stream {
  public:
@@ -54,8 +54,8 @@ bool is_padding(std::span<const std::byte> bytes) {
 
 std::uint64_t unzip2_range(const InputFile& file, const CompressedRange& range, std::uint64_t limit,
                            const ByteSink& sink) {
-  std::vector<std::byte> piece(kPieceBytes);
-  std::vector<std::byte> output(kPieceBytes);
+  std::vector<std::byte> piece(kBufferBytes);
+  std::vector<std::byte> output(kBufferBytes);
   std::span<std::byte> input;
   std::uint64_t next = range.offset;
   const std::uint64_t end = range.offset + range.bytes;

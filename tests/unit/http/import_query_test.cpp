@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/errors.h"
+#include "tests/unit/http/requests.h"
 
 namespace isomesh::http {
 namespace {
@@ -15,15 +16,10 @@ namespace {
 using test::code_thrown_by;
 using test::fields_of;
 using test::thrown_by;
+using test::with_query;
 using testing::ElementsAre;
 using testing::UnorderedElementsAre;
 using Pairs = std::vector<std::pair<std::string, std::string>>;
-
-Request with_query(const Pairs& parameters) {
-  Request request;
-  request.query = parameters;
-  return request;
-}
 
 TEST(RawDescription, IsNoneWithoutDims) { EXPECT_FALSE(raw_description_of(Request())); }
 

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/errors.h"
+#include "tests/unit/http/requests.h"
 
 namespace isomesh::http {
 namespace {
@@ -17,19 +18,13 @@ using std::chrono::milliseconds;
 using test::code_thrown_by;
 using test::fields_of;
 using test::thrown_by;
+using test::with_query;
 using testing::ElementsAre;
 using testing::UnorderedElementsAre;
-using Pairs = std::vector<std::pair<std::string, std::string>>;
 
 Request with_header(const std::string& name, const std::string& value) {
   Request request;
   request.headers.emplace_back(name, value);
-  return request;
-}
-
-Request with_query(const Pairs& parameters) {
-  Request request;
-  request.query = parameters;
   return request;
 }
 

@@ -313,10 +313,10 @@ TEST_P(FaultConformance, ReadersOfEventsAreWoken) {
 TEST_P(FaultConformance, AClockThatIsSetEndsNoLease) {
   const std::string id = submit().id;
   const Lease lease = claimed();
-  for (const int days : {40, -40}) {
-    const test::ClockSetAhead set(std::chrono::days(1) * days);
-    EXPECT_EQ(jobs().reap(), 0U) << days;
-    EXPECT_EQ(jobs().renew(lease, {}, kLongLease), Standing::kOk) << days;
+  for (const int ahead : {40, -40}) {
+    const test::ClockSetAhead set(std::chrono::days(1) * ahead);
+    EXPECT_EQ(jobs().reap(), 0U) << ahead;
+    EXPECT_EQ(jobs().renew(lease, {}, kLongLease), Standing::kOk) << ahead;
   }
   const test::ClockSetAhead set(std::chrono::days(40));
   EXPECT_TRUE(jobs().finish(lease, some_mesh()));
