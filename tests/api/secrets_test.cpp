@@ -19,7 +19,7 @@ using nlohmann::json;
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kSecret = "c9a1f0e2-not-for-others";
+const std::string kKeyInUrl = "c9a1f0e2-not-for-others";
 
 class CallbackSecret : public testing::Test {
  protected:
@@ -29,7 +29,7 @@ class CallbackSecret : public testing::Test {
   }
 
   std::string callback() const {
-    return R"("callback": {"url": ")" + receiver_.url() + "/hooks/iso?key=" + kSecret + "\"}";
+    return R"("callback": {"url": ")" + receiver_.url() + "/hooks/iso?key=" + kKeyInUrl + "\"}";
   }
 
   void expect_clean_meshes(const Job& job) const {
@@ -38,7 +38,7 @@ class CallbackSecret : public testing::Test {
     for (const auto& [format, file] : job.mesh->files) {
       const std::string bytes = daemon_.get(file.href).body;
       EXPECT_EQ(bytes.size(), file.bytes);
-      for (const std::string& word : {kSecret, receiver_.url(), std::string("callback")}) {
+      for (const std::string& word : {kKeyInUrl, receiver_.url(), std::string("callback")}) {
         EXPECT_EQ(bytes.find(word), std::string::npos) << to_string(format) << " holds " << word;
       }
     }
@@ -72,17 +72,17 @@ TEST_F(CallbackSecret, StandsInNoLineOfTheLog) {
   const Job job = finished_job(daemon_, callback());
   ASSERT_TRUE(receiver_.gets(2));
   // Refused: an address that nobody has listed, and a request that has no callbacks.
-  const std::string elsewhere = "http://elsewhere.example/?key=" + kSecret;
-  for (const std::string& url : {elsewhere, "nonsense " + kSecret}) {
+  const std::string elsewhere = "http://elsewhere.example/?key=" + kKeyInUrl;
+  for (const std::string& url : {elsewhere, "nonsense " + kKeyInUrl}) {
     const json body = {
         {"volume", job.parameters.volume}, {"iso", 100}, {"callback", {{"url", url}}}};
     EXPECT_EQ(daemon_.send("POST", "/v1/jobs", body.dump()).status, 400);
   }
-  EXPECT_EQ(daemon_.send("POST", "/v1/mesh?iso=1&callback=" + kSecret, "x").status, 400);
-  EXPECT_EQ(daemon_.get("/v1/estimate?iso=1&callback=" + kSecret).status, 400);
+  EXPECT_EQ(daemon_.send("POST", "/v1/mesh?iso=1&callback=" + kKeyInUrl, "x").status, 400);
+  EXPECT_EQ(daemon_.get("/v1/estimate?iso=1&callback=" + kKeyInUrl).status, 400);
   EXPECT_EQ(daemon_.stop(), 0);
   EXPECT_THAT(daemon_.errors(), HasSubstr("callback"));
-  EXPECT_THAT(daemon_.errors(), Not(HasSubstr(kSecret)));
+  EXPECT_THAT(daemon_.errors(), Not(HasSubstr(kKeyInUrl)));
 }
 
 }  // namespace
