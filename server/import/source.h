@@ -30,9 +30,12 @@ enum class Encoding {
 
 // How VTK encodes an array: a header of counts comes first, then its bytes, which may be compressed
 // by zlib in blocks; all of it may be in base64.
+// By which of VTK's compressors.
+enum class VtkCompression { kNone, kZlib, kLz4, kXz };
+
 struct VtkEncoding {
   bool base64 = false;
-  bool compressed = false;
+  VtkCompression compression = VtkCompression::kNone;
   bool wide_header = false;  // counts of 8 bytes instead of 4
   bool big_endian = false;
 };

@@ -322,12 +322,13 @@ bool has_wide_header(const Document& document) {
   throw_unusable("The VTK file's header_type " + in_quotes(type) + " is unknown.");
 }
 
-bool is_compressed(const Document& document) {
+VtkCompression compression_of(const Document& document) {
   const std::string_view compressor = value_of(document.file, "compressor");
-  if (compressor.empty()) return false;
-  if (compressor == "vtkZLibDataCompressor") return true;
-  throw_unusable("The VTK file's compressor " + in_quotes(compressor) +
-                 " is not read; vtkZLibDataCompressor is.");
+  if (compressor.empty()) return VtkCompression::kNone;
+  if (compressor == "vtkZLibDataCompressor") return VtkCompression::kZlib;
+  if (compressor == "vtkLZ4DataCompressor") return VtkCompression::kLz4;
+  if (compressor == "vtkLZMADataCompressor") return VtkCompression::kXz;
+  throw_unusable("The VTK file's compressor " + in_quotes(compressor) + " is unknown.");
 }
 
 // Throws where an entity or a comment stands among the samples, because the decoder would read it
@@ -387,7 +388,7 @@ void place_samples(const InputFile& file, const Document& document, const Array&
   volume.encoding = Encoding::kVtk;
   volume.layout.big_endian = is_big_endian(document);
   volume.vtk = {.base64 = true,
-                .compressed = is_compressed(document),
+                .compression = compression_of(document),
                 .wide_header = has_wide_header(document),
                 .big_endian = volume.layout.big_endian};
   if (format == "binary") return check_text(file, array.text);

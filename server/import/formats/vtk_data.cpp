@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "server/import/formats/vtk_blocks.h"
+
 namespace isomesh::import {
 namespace {
 
@@ -151,7 +153,7 @@ Blocks blocks_of(std::span<const std::byte> counts, const VtkEncoding& encoding)
   const std::size_t all = counts.size() / count_bytes(encoding);
   for (std::size_t at = kCountsAheadOfSizes; at < all; ++at) {
     blocks.stored.push_back(count_at(counts, at, encoding));
-    // Bytes that zlib cannot compress grow by little. The bound also keeps the sum from
+    // Bytes that cannot be compressed grow by little. The bound also keeps the sum from
     // overflowing.
     if (blocks.stored.back() > blocks.bytes + blocks.bytes / 2 + kPieceBytes) {
       throw_unusable("A compressed block of the VTK array is larger than it can be.");
@@ -198,15 +200,27 @@ class Source {
   std::optional<Base64> base64_;
 };
 
-void inflate_blocks(const InputFile& file, std::uint64_t offset, const Blocks& blocks,
-                    ScratchFile& target) {
+std::vector<std::byte> read_block(const InputFile& file, std::uint64_t offset,
+                                  std::uint64_t bytes) {
+  if (bytes > 2 * kLargestVtkBlock) {
+    throw_unusable("A compressed block of the VTK array is larger than it can be.");
+  }
+  std::vector<std::byte> block(bytes);
+  if (file.read(offset, block) != block.size()) throw_short();
+  return block;
+}
+
+void expand_blocks(const InputFile& file, std::uint64_t offset, const Blocks& blocks,
+                   VtkCompression compression, ScratchFile& target) {
   const auto sink = [&](std::span<const std::byte> piece) { target.write(piece); };
   for (std::size_t at = 0; at < blocks.stored.size(); ++at) {
     const bool is_last = at + 1 == blocks.stored.size();
     const std::uint64_t bytes = is_last ? blocks.last_bytes : blocks.bytes;
     const std::uint64_t stored = blocks.stored[at];
     if (stored > file.size() - std::min(offset, file.size())) throw_short();
-    if (inflate_range(file, {offset, stored}, bytes, sink) != bytes) {
+    if (compression != VtkCompression::kZlib) {
+      target.write(expanded_block(compression, read_block(file, offset, stored), bytes));
+    } else if (inflate_range(file, {offset, stored}, bytes, sink) != bytes) {
       throw_unusable("A compressed block of the VTK array has a wrong size.");
     }
     offset += stored;
@@ -223,11 +237,13 @@ void decode_blocks(Source& source, std::uint64_t expected, const VtkEncoding& en
   source.end_part();
   counts.insert(counts.end(), sizes.begin(), sizes.end());
   const Blocks blocks = blocks_of(counts, encoding);
-  if (!encoding.base64) return inflate_blocks(source.file(), source.next(), blocks, target);
+  if (!encoding.base64) {
+    return expand_blocks(source.file(), source.next(), blocks, encoding.compression, target);
+  }
   ScratchFile stored(scratch, ".blocks");
   source.copy(std::accumulate(blocks.stored.begin(), blocks.stored.end(), std::uint64_t{0}),
               stored);
-  inflate_blocks(InputFile(stored.path()), 0, blocks, target);
+  expand_blocks(InputFile(stored.path()), 0, blocks, encoding.compression, target);
 }
 
 }  // namespace
@@ -236,7 +252,8 @@ void decode_vtk(const InputFile& file, const CompressedRange& range, std::uint64
                 const VtkEncoding& encoding, const std::filesystem::path& scratch,
                 ScratchFile& target) {
   Source source(file, range, encoding.base64);
-  if (encoding.compressed) return decode_blocks(source, bytes, encoding, scratch, target);
+  if (encoding.compression != VtkCompression::kNone)
+    return decode_blocks(source, bytes, encoding, scratch, target);
   std::vector<std::byte> header(count_bytes(encoding));
   source.read(header);
   const std::uint64_t found = count_at(header, 0, encoding);

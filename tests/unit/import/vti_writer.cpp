@@ -1,7 +1,11 @@
 #include "tests/unit/import/vti_writer.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <vector>
+
+#include <lz4.h>
+#include <lzma.h>
 
 #include "tests/unit/import/writers.h"
 
@@ -30,6 +34,32 @@ std::string counts(const VtiFields& f, const std::vector<std::uint64_t>& values)
   return bytes_of(std::vector<std::uint32_t>(values.begin(), values.end()), f.big_endian);
 }
 
+std::string lz4(std::string_view bytes) {
+  std::string block(static_cast<std::size_t>(::LZ4_compressBound(static_cast<int>(bytes.size()))),
+                    '\0');
+  const int size = ::LZ4_compress_default(
+      bytes.data(), block.data(), static_cast<int>(bytes.size()), static_cast<int>(block.size()));
+  block.resize(static_cast<std::size_t>(size));
+  return block;
+}
+
+std::string xz(std::string_view bytes) {
+  std::string block(::lzma_stream_buffer_bound(bytes.size()), '\0');
+  std::size_t size = 0;
+  const auto result = ::lzma_easy_buffer_encode(
+      5, LZMA_CHECK_CRC32, nullptr, reinterpret_cast<const std::uint8_t*>(bytes.data()),
+      bytes.size(), reinterpret_cast<std::uint8_t*>(block.data()), &size, block.size());
+  if (result != LZMA_OK) throw std::runtime_error("lzma_easy_buffer_encode failed");
+  block.resize(size);
+  return block;
+}
+
+std::string compressed(const VtiFields& f, std::string_view bytes) {
+  if (f.compressor == "vtkLZ4DataCompressor") return lz4(bytes);
+  if (f.compressor == "vtkLZMADataCompressor") return xz(bytes);
+  return zlib(bytes);
+}
+
 // What stands ahead of an array's bytes, and they.
 struct Encoded {
   std::string header;
@@ -41,7 +71,7 @@ Encoded encode(const VtiFields& f, std::string_view samples) {
   std::vector<std::uint64_t> sizes;
   std::string blocks;
   for (std::size_t at = 0; at < samples.size(); at += f.block_bytes) {
-    const std::string block = zlib(samples.substr(at, f.block_bytes));
+    const std::string block = compressed(f, samples.substr(at, f.block_bytes));
     sizes.push_back(block.size());
     blocks += block;
   }

@@ -1,15 +1,20 @@
 // A program that serves copies, which answer one question each.
 #include <array>
+#include <cstdint>
+#include <span>
 #include <string>
 
 #include <dirent.h>
+#include <sys/auxv.h>
 #include <unistd.h>
 
+#include "base/hex.h"
 #include "server/process/fork_server.h"
 
 namespace {
 
 using namespace isomesh::process;
+using isomesh::to_hex;
 
 int questions = 0;
 
@@ -22,6 +27,12 @@ int open_descriptors() {
   }
   ::closedir(folder);
   return count;
+}
+
+// What the kernel has given the program when it was started, and copies of it have too.
+std::string random_of_this_program() {
+  constexpr std::size_t kBytes = 16;
+  return to_hex(std::span(reinterpret_cast<const std::uint8_t*>(::getauxval(AT_RANDOM)), kBytes));
 }
 
 void answer() {
@@ -37,8 +48,8 @@ void answer() {
   if (question == "hang") {
     for (;;) ::pause();
   }
-  const std::string text = question == "where"
-                               ? std::to_string(reinterpret_cast<std::uintptr_t>(&piece))
+  const std::string text = question == "which"
+                               ? random_of_this_program()
                                : "questions " + std::to_string(questions) + ", descriptors " +
                                      std::to_string(open_descriptors());
   if (::write(kChildDescriptor, text.data(), text.size()) < 0) ::_exit(1);

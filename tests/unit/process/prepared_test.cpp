@@ -67,10 +67,10 @@ TEST(PreparedProcesses, OnesThatDieAreReplaced) {
 
 TEST(PreparedProcesses, AreOfANewProgramAfterRenewal) {
   PreparedProcesses prepared(COPIED_PROGRAM, 1);
-  const std::string first = answer_of(prepared.take(), "where");
-  EXPECT_EQ(answer_of(prepared.take(), "where"), first);
+  const std::string first = answer_of(prepared.take(), "which");
+  EXPECT_EQ(answer_of(prepared.take(), "which"), first);
   prepared.renew();
-  EXPECT_NE(answer_of(prepared.take(), "where"), first);
+  EXPECT_NE(answer_of(prepared.take(), "which"), first);
 }
 
 TEST(PreparedProcesses, AProgramThatIsNotThereIsAnErrorEachTime) {
