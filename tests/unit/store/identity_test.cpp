@@ -24,7 +24,8 @@ class IdentityTest : public testing::Test {
     Database database(data);
     Identity identity(database, data, word, {});
     if (!bytes.empty()) {
-      const auto writer = FileBlobStore(data).begin();
+      const FileBlobStore blobs(data);
+      const auto writer = blobs.begin();
       writer->write(test::as_span(bytes));
       Volume volume;
       volume.id = writer->commit().key;
