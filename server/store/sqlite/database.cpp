@@ -156,6 +156,9 @@ Database::Database(const DataFolder& folder)
     : folder_(folder), writer_(folder.records(), migrated(folder.records())) {
   for (auto& reader : readers_) {
     reader = std::make_unique<Connection>(folder.records(), Connection::Mode::kRead);
+    // SQLite opens its files when they are read first, and then there may be no descriptor left.
+    const Reading reading(*reader);
+    reading->query("SELECT count(*) FROM sqlite_schema").next();
   }
   writer_.limit_log(log_bytes(folder.reserve().capacity()));
 }
