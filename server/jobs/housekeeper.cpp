@@ -20,7 +20,7 @@ void enforce(store::Retention& retention) {
     }
     if (left > 0) {
       spdlog::error(
-          "{} more files that no record names stay where they are for now: is this the "
+          "{} more files that no record names stay where they are: is this the "
           "database that belongs to them?",
           left);
     }

@@ -16,8 +16,7 @@ namespace isomesh::store {
 
 // The records of a data folder: one SQLite file (WAL, synchronous=FULL), with a connection that
 // writes and some that read side by side, so that readers wait neither for the disk nor for whoever
-// reads much. Thread safe; `folder` must
-// outlive it.
+// reads much. Thread safe; `folder` must outlive it.
 class Database {
  public:
   // Creates what is missing and brings the tables of an older version up to date. Throws Error
