@@ -7,7 +7,6 @@
 #include "base/sha256.h"
 #include "server/http/import_query.h"
 #include "server/http/request_values.h"
-#include "server/store/files/files.h"
 
 namespace isomesh::http {
 namespace {
@@ -59,7 +58,7 @@ void check_room(const store::DataFolder& folder, const Request& request) {
 // through, so that it is kept and ends the reading.
 class Receiver {
  public:
-  Receiver(store::File& file, store::Reserve& reserve, const UploadLimits& limits,
+  Receiver(ScratchFile& file, store::Reserve& reserve, const UploadLimits& limits,
            const std::atomic<bool>& stopping, bool is_digested)
       : file_(file),
         reserve_(reserve),
@@ -124,7 +123,7 @@ class Receiver {
     held_.clear();
   }
 
-  store::File& file_;
+  ScratchFile& file_;
   store::Reserve& reserve_;
   const UploadLimits& limits_;
   const std::atomic<bool>& stopping_;
@@ -143,7 +142,7 @@ class Receiver {
 
 Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
                const std::atomic<bool>& stopping, const Request& request)
-    : scratch_(folder.scratch()), path_(scratch_.path() / "upload") {
+    : file_(folder.scratch(), ".upload") {
   refuse_encoded(request);
   check_length(request, limits.max_bytes);
   check_room(folder, request);
@@ -152,8 +151,7 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
   if (is_form && expected) {
     throw invalid_parameter("Content-Digest", "is not supported with a form: send the bare file");
   }
-  store::File file = store::File::create(path_);
-  Receiver receiver(file, folder.reserve(), limits, stopping, expected.has_value());
+  Receiver receiver(file_, folder.reserve(), limits, stopping, expected.has_value());
   const auto take = [&](std::string_view piece) { return receiver.take(piece); };
   const bool complete = is_form ? request.body->read_form(
                                       [&](const std::string& name, const std::string& file_name) {

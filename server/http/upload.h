@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 
+#include "base/files.h"
 #include "server/http/request.h"
 #include "server/store/files/data_folder.h"
 
@@ -27,14 +28,13 @@ class Upload {
   Upload(const store::DataFolder& folder, const UploadLimits& limits,
          const std::atomic<bool>& stopping, const Request& request);
 
-  const std::filesystem::path& path() const { return path_; }
+  const std::filesystem::path& path() const { return file_.path(); }
   // What the client calls the file, without folders: the name in the form, or in the header
   // Content-Disposition. May be empty, and may name a patient.
   const std::string& name() const { return name_; }
 
  private:
-  store::ScratchFolder scratch_;
-  std::filesystem::path path_;
+  ScratchFile file_;
   std::string name_;
 };
 

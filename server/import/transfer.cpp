@@ -78,8 +78,8 @@ Volume finish(CanonicalWriter& writer, Volume volume) {
     volume.notes.push_back(note_of(
         NoteCode::kLooksLikeLabels,
         "The samples are " + std::to_string(*values) +
-            " whole values in flat regions, as labels are: the parameter labels makes a surface of "
-            "each, where an iso-value makes one of all above it."));
+            " whole values in flat regions, as labels are: an iso-value makes one surface of all "
+            "above it."));
   }
   volume.range = statistics.range;
   volume.suggested_iso = statistics.otsu;

@@ -1,8 +1,9 @@
 #include "server/volume/labels.h"
 
-#include <limits>
+#include <algorithm>
 #include <type_traits>
 #include <unordered_set>
+#include <vector>
 
 #include "proto/samples.h"
 
@@ -11,18 +12,21 @@ namespace {
 
 constexpr std::size_t kMostLabels = 1024;
 constexpr std::size_t kFewestValues = 3;
+constexpr std::size_t kPieceSamples = std::size_t{1} << 20;  // between counts of the values
 // Of the pairs of neighbours. Regions of five samples along x have a fifth of them at their
 // borders; images of eight bits have hardly any pair of the same values.
 constexpr double kFlat = 0.6;
 
-// The distinct values of a walk through samples, most of which are the same as the one before.
+// The distinct values of samples.
 template <class Sample>
 class Values {
  public:
-  void add(Sample value) {
-    if (value == last_ && !seen_.empty()) return;
-    last_ = value;
-    seen_.insert(value);
+  void add(std::span<const Sample> samples) {
+    for (const Sample value : samples) {
+      if (value == last_ && !seen_.empty()) continue;  // as most are
+      last_ = value;
+      seen_.insert(value);
+    }
   }
   std::size_t count() const { return seen_.size(); }
 
@@ -31,25 +35,64 @@ class Values {
   std::unordered_set<Sample> seen_;
 };
 
+// A mark for each value that there can be.
+template <class Sample>
+requires(sizeof(Sample) <= 2) class Values<Sample> {
+ public:
+  void add(std::span<const Sample> samples) {
+    for (const Sample value : samples) seen_[static_cast<std::make_unsigned_t<Sample>>(value)] = 1;
+  }
+  std::size_t count() const {
+    return static_cast<std::size_t>(std::ranges::count(seen_, std::uint8_t{1}));
+  }
+
+ private:
+  std::vector<std::uint8_t> seen_ = std::vector<std::uint8_t>(std::size_t{1} << 8 * sizeof(Sample));
+};
+
+struct Neighbours {
+  std::size_t pairs = 0;  // those that are not both background
+  std::size_t same = 0;   // of these
+};
+
+template <class Sample>
+Neighbours neighbours_in(std::span<const Sample> line, Sample background) {
+  // As many as can be counted in a byte, which lets the compiler compare many at once.
+  constexpr std::size_t kBlock = 255;
+  Neighbours found;
+  for (std::size_t begin = 1; begin < line.size(); begin += kBlock) {
+    const std::size_t end = std::min(begin + kBlock, line.size());
+    std::uint8_t pairs = 0;
+    std::uint8_t same = 0;
+    for (std::size_t at = begin; at < end; ++at) {
+      const std::uint8_t is_same = line[at] == line[at - 1];
+      const std::uint8_t is_background = is_same & std::uint8_t{line[at] == background};
+      pairs += 1 - is_background;
+      same += is_same - is_background;
+    }
+    found.pairs += pairs;
+    found.same += same;
+  }
+  return found;
+}
+
 template <class Sample>
 std::optional<std::size_t> count_labels(std::span<const Sample> samples, std::size_t row) {
-  Values<Sample> values;
-  const Sample background = samples.front();
-  std::size_t pairs = 0;
-  std::size_t same = 0;
+  Neighbours found;
   for (std::size_t begin = 0; begin < samples.size(); begin += row) {
-    const std::span<const Sample> line = samples.subspan(begin, row);
-    values.add(line[0]);
-    for (std::size_t at = 1; at < row; ++at) {
-      if (line[at] == background && line[at - 1] == background) continue;
-      ++pairs;
-      same += line[at] == line[at - 1] ? 1 : 0;
-      values.add(line[at]);
-    }
+    const Neighbours in_row = neighbours_in(samples.subspan(begin, row), samples.front());
+    found.pairs += in_row.pairs;
+    found.same += in_row.same;
+  }
+  if (static_cast<double>(found.same) < kFlat * static_cast<double>(found.pairs)) {
+    return std::nullopt;
+  }
+  Values<Sample> values;
+  for (std::size_t begin = 0; begin < samples.size(); begin += kPieceSamples) {
+    values.add(samples.subspan(begin, std::min(kPieceSamples, samples.size() - begin)));
     if (values.count() > kMostLabels) return std::nullopt;
   }
-  const bool is_flat = static_cast<double>(same) >= kFlat * static_cast<double>(pairs);
-  if (values.count() < kFewestValues || !is_flat) return std::nullopt;
+  if (values.count() < kFewestValues) return std::nullopt;
   return values.count();
 }
 

@@ -14,8 +14,7 @@ namespace isomesh::volume {
 // How many values the samples of a volume have that looks like a label map: integers of at least
 // three values, few of them, and mostly the same as the next sample along x wherever one of both is
 // not background (the first sample's value). Empty for anything else; a mask of two values needs no
-// labels. `samples` as for measure(); reads until it is clear that there are too many values.
-// Thread safe.
+// labels. `samples` as for measure(). Thread safe.
 std::optional<std::size_t> label_count(std::span<const std::byte> samples, SampleType type,
                                        const std::array<std::uint32_t, 3>& dims);
 

@@ -1,0 +1,104 @@
+#include "server/volume/labels.h"
+
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <set>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace isomesh::volume::test {
+namespace {
+
+using Dims = std::array<std::uint32_t, 3>;
+
+template <class Sample>
+constexpr SampleType kTypeOf = SampleType::kUint8;
+template <>
+constexpr SampleType kTypeOf<std::int8_t> = SampleType::kInt8;
+template <>
+constexpr SampleType kTypeOf<std::uint16_t> = SampleType::kUint16;
+template <>
+constexpr SampleType kTypeOf<std::int16_t> = SampleType::kInt16;
+template <>
+constexpr SampleType kTypeOf<std::int32_t> = SampleType::kInt32;
+template <>
+constexpr SampleType kTypeOf<float> = SampleType::kFloat32;
+
+template <class Sample>
+std::optional<std::size_t> labels_of(const std::vector<Sample>& samples, const Dims& dims) {
+  return label_count(std::as_bytes(std::span(samples)), kTypeOf<Sample>, dims);
+}
+
+// By the definition, pair by pair.
+template <class Sample>
+std::optional<std::size_t> reference(const std::vector<Sample>& samples, const Dims& dims) {
+  std::size_t pairs = 0;
+  std::size_t same = 0;
+  for (std::size_t at = 0; at < samples.size(); ++at) {
+    if (at % dims[0] == 0) continue;
+    if (samples[at] == samples[0] && samples[at - 1] == samples[0]) continue;
+    ++pairs;
+    if (samples[at] == samples[at - 1]) ++same;
+  }
+  const std::size_t values = std::set(samples.begin(), samples.end()).size();
+  if (values < 3 || values > 1024 || 10 * same < 6 * pairs) return std::nullopt;
+  return values;
+}
+
+// Runs of one value that are about so long; the rows are longer than what is counted at once.
+template <class Sample>
+std::vector<Sample> runs(const Dims& dims, int values, double length, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_int_distribution<int> value(0, values - 1);
+  std::bernoulli_distribution ends(1 / length);
+  std::vector<Sample> samples(std::size_t{dims[0]} * dims[1] * dims[2]);
+  // Over all of the type's range, its ends among them.
+  const auto low = static_cast<double>(std::numeric_limits<Sample>::lowest());
+  const auto high = static_cast<double>(std::numeric_limits<Sample>::max());
+  auto now = Sample{0};
+  for (Sample& sample : samples) {
+    if (ends(random)) now = static_cast<Sample>(low + (high - low) * value(random) / (values - 1));
+    sample = now;
+  }
+  return samples;
+}
+
+template <class Sample>
+class LabelCount : public testing::Test {};
+using Integers =
+    testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, std::int32_t>;
+TYPED_TEST_SUITE(LabelCount, Integers);
+
+TYPED_TEST(LabelCount, IsThatOfTheDefinition) {
+  const Dims dims = {601, 7, 3};
+  std::set<bool> answers;
+  for (const int values : {2, 3, 40, 200}) {
+    for (const double length : {1.5, 2.2, 2.6, 8.0, 40.0}) {
+      for (unsigned seed = 0; seed < 3; ++seed) {
+        const auto samples = runs<TypeParam>(dims, values, length, seed);
+        const auto expected = reference(samples, dims);
+        EXPECT_EQ(labels_of(samples, dims), expected) << values << ' ' << length << ' ' << seed;
+        answers.insert(expected.has_value());
+      }
+    }
+  }
+  EXPECT_EQ(answers.size(), 2U) << "both answers have to come";
+}
+
+TEST(Labels, FlatImagesOfTooManyValuesAreNone) {
+  std::vector<std::int16_t> samples;
+  for (int value = 0; value < 1024; ++value) samples.insert(samples.end(), 8, std::int16_t(value));
+  EXPECT_EQ(labels_of(samples, {8, 1024, 1}), 1024U);
+  samples.insert(samples.end(), 8, std::int16_t{-1});
+  EXPECT_EQ(labels_of(samples, {8, 1025, 1}), std::nullopt);
+}
+
+TEST(Labels, RealNumbersAreNoLabels) {
+  const std::vector<float> samples = {0, 0, 0, 1, 1, 1, 2, 2, 2};
+  EXPECT_EQ(labels_of(samples, {9, 1, 1}), std::nullopt);
+}
+
+}  // namespace
+}  // namespace isomesh::volume::test
