@@ -48,8 +48,8 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .meaning = "A file came more than once and was taken once."},
     {.code = NoteCode::kLooksLikeLabels,
      .name = "looks-like-labels",
-     .meaning = "The samples are few whole values in flat regions, such as a segmentation has: the "
-                "parameter labels makes a surface of each, an iso-value one of all above it."},
+     .meaning = "The samples are few whole values in flat regions, such as a segmentation has; an "
+                "iso-value makes one surface of all that lie above it."},
     {.code = NoteCode::kFrameOfReference,
      .name = "frame-of-reference",
      .meaning = "The DICOM slices do not share one frame of reference; that they lie in one space "
