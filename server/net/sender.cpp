@@ -17,6 +17,8 @@ constexpr int kMostEvents = 128;
 constexpr int kTickMilliseconds = 1000;  // how often sources and deadlines are looked at
 constexpr std::size_t kBytesPerTurn = std::size_t{1} << 20;  // then it is the next one's turn
 constexpr std::size_t kMostIgnored = std::size_t{64} << 20;
+// Of the computing threads: whoever asks for what is there already goes before.
+constexpr int kNiceness = 10;
 constexpr std::uint64_t kWakeup = 0;  // what epoll calls it; responses have higher numbers
 
 // An exception of one source must not end the thread that serves all.
@@ -53,7 +55,7 @@ bool is_sent(Response& response, bool request_is_whole) {
 Sender::Sender(const SenderLimits& limits)
     : limits_(limits),
       epoll_(new_epoll()),
-      computing_(limits.computing_threads, std::numeric_limits<std::size_t>::max()) {
+      computing_(limits.computing_threads, std::numeric_limits<std::size_t>::max(), kNiceness) {
   epoll_event event = {};
   event.events = EPOLLIN;
   event.data.u64 = kWakeup;

@@ -1,16 +1,23 @@
 #include "server/net/task_queue.h"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
+
+#include <unistd.h>
 
 #include "base/share.h"
 
 namespace isomesh::net {
 
-BoundedTaskQueue::BoundedTaskQueue(std::size_t threads, std::size_t capacity)
+BoundedTaskQueue::BoundedTaskQueue(std::size_t threads, std::size_t capacity, int niceness)
     : capacity_(capacity), idle_(threads) {
   for (std::size_t i = 0; i < threads; ++i) {
-    threads_.emplace_back([this] { work(); });
+    threads_.emplace_back([this, niceness] {
+      // On Linux of this thread alone. It is refused to nobody, and what it returns is no error.
+      std::ignore = ::nice(niceness);
+      work();
+    });
   }
 }
 

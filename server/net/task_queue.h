@@ -19,7 +19,9 @@ class BoundedTaskQueue {
  public:
   using Task = std::function<void()>;
 
-  BoundedTaskQueue(std::size_t threads, std::size_t capacity);
+  // By `niceness` the threads are nicer than the process: of a busy machine they get less than
+  // others.
+  BoundedTaskQueue(std::size_t threads, std::size_t capacity, int niceness = 0);
   ~BoundedTaskQueue();
   BoundedTaskQueue(const BoundedTaskQueue&) = delete;
   BoundedTaskQueue& operator=(const BoundedTaskQueue&) = delete;

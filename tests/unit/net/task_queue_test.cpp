@@ -1,10 +1,12 @@
 #include "server/net/task_queue.h"
 
+#include <algorithm>
 #include <atomic>
 #include <future>
 #include <string>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "tests/support/process.h"
 
@@ -107,6 +109,22 @@ TEST(BoundedTaskQueue, WhoeverHoldsThreadsLeavesSomeForOthers) {
   go.set_value();
   queue.shutdown();
   EXPECT_EQ(held, 10);
+}
+
+TEST(BoundedTaskQueue, ItsThreadsAreAsNiceAsTheyAreToBe) {
+  const auto niceness = [] { return ::getpriority(PRIO_PROCESS, 0); };
+  const int mine = niceness();
+  int nice = 0;
+  int usual = 0;
+  {
+    BoundedTaskQueue background(1, 1, 1);
+    BoundedTaskQueue queue(1, 1);
+    background.try_enqueue("", [&] { nice = niceness(); });
+    queue.try_enqueue("", [&] { usual = niceness(); });
+  }
+  EXPECT_EQ(nice, std::min(mine + 1, 19));
+  EXPECT_EQ(usual, mine);
+  EXPECT_EQ(niceness(), mine);
 }
 
 TEST(BoundedTaskQueue, EndsTwiceWithoutHarm) {
