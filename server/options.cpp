@@ -153,8 +153,10 @@ void add_options(CLI::App& cli, Options& options) {
       ->envname("ISOMESH_KEEP_DAYS")
       ->check(CLI::Range(0.0, 100000.0))
       ->capture_default_str();
-  cli.add_option("--max-disk", options.max_disk,
-                 "Bytes of all volumes and meshes; the oldest go first; 0: what the disk holds")
+  cli.add_option(
+         "--max-disk", options.max_disk,
+         "Bytes of all volumes and meshes; the oldest of whoever has most go first; 0: what the "
+         "disk holds")
       ->envname("ISOMESH_MAX_DISK")
       ->transform(CLI::AsSizeValue(false))
       ->capture_default_str();

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +24,15 @@ struct Expirable {
   // When the job ended; when the volume was added or the last job on it ended, whichever is later.
   Time last_used;
 };
+
+// Which of those to list.
+struct ExpiryFilter {
+  Time before;                            // last used earlier
+  std::optional<std::string> owner = {};  // of this one alone
+};
+
+// Bytes of the blobs that each owner's records name, each counted once for an owner.
+using OwnedBytes = std::map<std::string, std::uint64_t>;
 
 // What a call of expire() removed.
 struct Expired {

@@ -212,8 +212,9 @@ class JobStore {
   // The same, and everybody who waits gets what there is.
   virtual void close() = 0;
 
-  // Jobs that ended before that time, the oldest first, at most `limit`.
-  virtual std::vector<Expirable> ended(Time before, Ended which, std::size_t limit) const = 0;
+  // Jobs that ended, as the filter says, the oldest first, at most `limit`.
+  virtual std::vector<Expirable> ended(const ExpiryFilter& filter, Ended which,
+                                       std::size_t limit) const = 0;
 
   // Removes ended jobs with their events, in their order, until that frees `enough` bytes: until no
   // record names blobs of so many bytes any more. One that is gone already is passed over. The
@@ -222,6 +223,7 @@ class JobStore {
 
   // Of the blobs that meshes name, each counted once.
   virtual std::uint64_t named_bytes() const = 0;
+  virtual OwnedBytes owned_bytes() const = 0;
 
   // When the run began that lasts longest; empty when nothing runs. Blobs that were stored since
   // then may be about to be named.

@@ -1,6 +1,7 @@
 #include "server/store/retention.h"
 
 #include <algorithm>
+#include <functional>
 #include <iterator>
 #include <span>
 #include <system_error>
@@ -51,7 +52,7 @@ std::uint64_t Retention::named_bytes() const {
 void Retention::expire_old(Time now, Gone& gone) {
   const Time cutoff = now - options_.keep;
   while (true) {
-    const std::vector<Expirable> items = oldest(cutoff, Ended::kAll);
+    const std::vector<Expirable> items = oldest({cutoff}, Ended::kAll);
     expire(items, kAllBytes, gone);
     if (items.size() < kMostAtOnce) return;
   }
@@ -68,10 +69,9 @@ bool Retention::shrink_to(std::uint64_t max_bytes, Gone& gone) {
     // What has expired and cannot go yet will: no more is to expire for that.
     const std::uint64_t going = garbage_bytes();
     if (used <= max_bytes + going) return false;
-    // Jobs without a mesh take no room, and go by their age alone.
-    const std::vector<Expirable> items = oldest(Time::max(), Ended::kWithMesh);
-    if (items.empty()) return false;
-    expire(items, used - max_bytes - going, gone);
+    const Superfluous superfluous = this->superfluous();
+    if (superfluous.items.empty()) return false;
+    expire(superfluous.items, std::min(used - max_bytes - going, superfluous.enough), gone);
   }
 }
 
@@ -81,9 +81,26 @@ std::uint64_t Retention::garbage_bytes() const {
   return bytes;
 }
 
-std::vector<Expirable> Retention::oldest(Time before, Ended which) const {
-  const std::vector<Expirable> jobs = jobs_.ended(before, which, kMostAtOnce);
-  const std::vector<Expirable> volumes = volumes_.unused(before, kMostAtOnce);
+// The oldest of whoever has most, so that the many uploads of one owner cost nobody else theirs
+// (longest queue drop: Suter, Lakshman, Stiliadis and Choudhury, 1998).
+Retention::Superfluous Retention::superfluous() const {
+  OwnedBytes owned = volumes_.owned_bytes();
+  for (const auto& [owner, bytes] : jobs_.owned_bytes()) owned[owner] += bytes;
+  std::vector<std::pair<std::uint64_t, std::string>> most;
+  for (const auto& [owner, bytes] : owned) most.emplace_back(bytes, owner);
+  std::ranges::sort(most, std::greater());
+  for (std::size_t n = 0; n < most.size(); ++n) {
+    const std::uint64_t next = n + 1 < most.size() ? most[n + 1].first : 0;
+    // Jobs without a mesh take no room, and go by their age alone.
+    std::vector<Expirable> items = oldest({Time::max(), most[n].second}, Ended::kWithMesh);
+    if (!items.empty()) return {std::move(items), std::max<std::uint64_t>(1, most[n].first - next)};
+  }
+  return {};
+}
+
+std::vector<Expirable> Retention::oldest(const ExpiryFilter& filter, Ended which) const {
+  const std::vector<Expirable> jobs = jobs_.ended(filter, which, kMostAtOnce);
+  const std::vector<Expirable> volumes = volumes_.unused(filter, kMostAtOnce);
   std::vector<Expirable> items;
   std::ranges::merge(jobs, volumes, std::back_inserter(items), {}, &Expirable::last_used,
                      &Expirable::last_used);

@@ -69,7 +69,12 @@ class Retention {
   // False when what queued and running jobs need is more than that.
   bool shrink_to(std::uint64_t max_bytes, Gone& gone) ISOMESH_REQUIRES(mutex_);
   std::uint64_t garbage_bytes() const ISOMESH_REQUIRES(mutex_);
-  std::vector<Expirable> oldest(Time before, Ended which) const;
+  std::vector<Expirable> oldest(const ExpiryFilter& filter, Ended which) const;
+  struct Superfluous {
+    std::vector<Expirable> items;
+    std::uint64_t enough = 0;  // bytes of them; after these it may be another owner's turn
+  };
+  Superfluous superfluous() const;
   void expire(std::span<const Expirable> items, std::uint64_t enough, Gone& gone)
       ISOMESH_REQUIRES(mutex_);
   Steady unsettled_since() const;

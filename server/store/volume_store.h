@@ -47,15 +47,16 @@ class VolumeStore {
   // Whether any record, of a volume or of a mesh, names the blob.
   virtual bool names(const std::string& blob) const = 0;
 
-  // Volumes that were last used before that time and that no queued or running job of their owner
-  // needs, the oldest first, at most `limit`.
-  virtual std::vector<Expirable> unused(Time before, std::size_t limit) const = 0;
+  // Volumes, as the filter says, that no queued or running job of their owner needs, the oldest
+  // first, at most `limit`.
+  virtual std::vector<Expirable> unused(const ExpiryFilter& filter, std::size_t limit) const = 0;
 
   // As JobStore::expire. A volume that was used since unused() named it is passed over.
   virtual Expired expire(std::span<const Expirable> volumes, std::uint64_t enough) = 0;
 
   // Of the blobs that volumes name, each counted once.
   virtual std::uint64_t named_bytes() const = 0;
+  virtual OwnedBytes owned_bytes() const = 0;
 };
 
 // What list() continues after.

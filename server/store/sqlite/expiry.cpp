@@ -12,6 +12,12 @@ std::vector<Blob> read_blobs(Query&& query) {
   return blobs;
 }
 
+OwnedBytes read_owned_bytes(Query&& query) {
+  OwnedBytes bytes;
+  while (query.next()) bytes[query.text(0)] = static_cast<std::uint64_t>(query.integer(1));
+  return bytes;
+}
+
 bool is_named(Connection& connection, const std::string& blob) {
   Query query = connection.query(
       "SELECT EXISTS(SELECT 1 FROM volumes WHERE id = ?1) OR EXISTS(SELECT 1 FROM meshes WHERE "

@@ -13,6 +13,9 @@ namespace isomesh::store {
 // The rows of a query for keys and bytes.
 std::vector<Blob> read_blobs(Query&& query);
 
+// Of rows that are an owner and a sum of bytes.
+OwnedBytes read_owned_bytes(Query&& query);
+
 // Whether any record, of a volume or of a mesh, names the blob.
 bool is_named(Connection& connection, const std::string& blob);
 

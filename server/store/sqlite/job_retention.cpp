@@ -6,12 +6,13 @@
 
 namespace isomesh::store {
 
-std::vector<Expirable> SqliteJobStore::ended(Time before, Ended which, std::size_t limit) const {
+std::vector<Expirable> SqliteJobStore::ended(const ExpiryFilter& filter, Ended which,
+                                             std::size_t limit) const {
   const Reading reading(database_.reader());
   Query query = reading->query(
       "SELECT owner, id, finished FROM jobs WHERE finished < ?1 AND (?2 = 0 OR EXISTS (SELECT 1 "
-      "FROM meshes WHERE job = jobs.id)) ORDER BY finished LIMIT ?3",
-      to_us(before), which == Ended::kWithMesh, limit);
+      "FROM meshes WHERE job = jobs.id)) AND (?4 IS NULL OR owner = ?4) ORDER BY finished LIMIT ?3",
+      to_us(filter.before), which == Ended::kWithMesh, limit, filter.owner);
   std::vector<Expirable> jobs;
   while (query.next()) {
     jobs.push_back({RecordKind::kJob, query.text(0), query.text(1), from_us(query.integer(2))});
@@ -46,6 +47,13 @@ std::uint64_t SqliteJobStore::named_bytes() const {
       "SELECT coalesce(sum(bytes), 0) FROM (SELECT max(bytes) AS bytes FROM meshes GROUP BY blob)");
   query.next();
   return static_cast<std::uint64_t>(query.integer(0));
+}
+
+OwnedBytes SqliteJobStore::owned_bytes() const {
+  const Reading reading(database_.reader());
+  return read_owned_bytes(reading->query(
+      "SELECT owner, sum(bytes) FROM (SELECT owner, max(bytes) AS bytes FROM meshes JOIN jobs ON "
+      "job = id GROUP BY owner, blob) GROUP BY owner"));
 }
 
 std::optional<Steady> SqliteJobStore::oldest_run() const {

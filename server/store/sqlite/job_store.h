@@ -44,9 +44,11 @@ class SqliteJobStore : public JobStore {
   bool is_full() const override;
   void refuse_new() override;
   void close() override;
-  std::vector<Expirable> ended(Time before, Ended which, std::size_t limit) const override;
+  std::vector<Expirable> ended(const ExpiryFilter& filter, Ended which,
+                               std::size_t limit) const override;
   Expired expire(std::span<const Expirable> jobs, std::uint64_t enough) override;
   std::uint64_t named_bytes() const override;
+  OwnedBytes owned_bytes() const override;
   std::optional<Steady> oldest_run() const override;
   void forget_expired(Time before) override;
   void forget_events(Time before) override;

@@ -117,12 +117,14 @@ bool SqliteVolumeStore::names(const std::string& blob) const {
   return is_named(reading.connection(), blob);
 }
 
-std::vector<Expirable> SqliteVolumeStore::unused(Time before, std::size_t limit) const {
+std::vector<Expirable> SqliteVolumeStore::unused(const ExpiryFilter& filter,
+                                                 std::size_t limit) const {
   const Reading reading(database_.reader());
   Query query = reading->query(
-      "SELECT owner, id, used FROM volumes v WHERE used < ? AND NOT EXISTS (SELECT 1 FROM jobs j "
-      "WHERE j.volume = v.id AND j.owner = v.owner AND j.state < 2) ORDER BY used LIMIT ?",
-      to_us(before), limit);
+      "SELECT owner, id, used FROM volumes v WHERE used < ?1 AND NOT EXISTS (SELECT 1 FROM jobs j "
+      "WHERE j.volume = v.id AND j.owner = v.owner AND j.state < 2) AND (?3 IS NULL OR owner = ?3) "
+      "ORDER BY used LIMIT ?2",
+      to_us(filter.before), limit, filter.owner);
   std::vector<Expirable> volumes;
   while (query.next()) {
     volumes.push_back(
@@ -159,6 +161,11 @@ std::uint64_t SqliteVolumeStore::named_bytes() const {
       "SELECT coalesce(sum(bytes), 0) FROM (SELECT max(bytes) AS bytes FROM volumes GROUP BY id)");
   query.next();
   return static_cast<std::uint64_t>(query.integer(0));
+}
+
+OwnedBytes SqliteVolumeStore::owned_bytes() const {
+  const Reading reading(database_.reader());
+  return read_owned_bytes(reading->query("SELECT owner, sum(bytes) FROM volumes GROUP BY owner"));
 }
 
 std::string cursor_of(const Volume& volume) { return volume.created + ' ' + volume.id; }

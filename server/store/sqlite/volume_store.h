@@ -24,9 +24,10 @@ class SqliteVolumeStore : public VolumeStore {
                            std::size_t limit) const override;
   void erase(const Viewer& viewer, const std::string& id) override;
   bool names(const std::string& blob) const override;
-  std::vector<Expirable> unused(Time before, std::size_t limit) const override;
+  std::vector<Expirable> unused(const ExpiryFilter& filter, std::size_t limit) const override;
   Expired expire(std::span<const Expirable> volumes, std::uint64_t enough) override;
   std::uint64_t named_bytes() const override;
+  OwnedBytes owned_bytes() const override;
 
  private:
   std::vector<std::string> records(const Viewer& viewer, const std::string& after,

@@ -250,7 +250,49 @@ TEST_P(RetentionConformance, RoomThatSeveralMakeIsMadeOnce) {
   EXPECT_EQ(retention.named_bytes(), 450U);
 }
 
+TEST_P(RetentionConformance, WhoeverHasMostMakesTheRoom) {
+  const std::string others = add_volume('o', 100, "other");  // the oldest
+  const std::string first = add_volume('1', 100);
+  const std::string second = add_volume('2', 90);
+  const std::string third = add_volume('3', 80);
+  retention(300).make_room(50);  // of 370 that are there, 120 have to go
+  EXPECT_TRUE(volumes().contains("other", others));
+  EXPECT_FALSE(volumes().contains("", first));
+  EXPECT_FALSE(volumes().contains("", second));
+  EXPECT_TRUE(volumes().contains("", third));
+  // Now the other one has most, and then nobody has anything.
+  retention(300).make_room(150);
+  EXPECT_FALSE(volumes().contains("other", others));
+  EXPECT_TRUE(volumes().contains("", third));
+  retention(300).make_room(300);
+  EXPECT_FALSE(volumes().contains("", third));
+}
+
+TEST_P(RetentionConformance, WhatARunningJobNeedsMakesNoRoom) {
+  const std::string needed = add_volume('n', 200);
+  submit(needed, 1);
+  const std::string others = add_volume('o', 50, "other");
+  retention(250).make_room(40);
+  EXPECT_TRUE(volumes().contains("", needed));
+  EXPECT_FALSE(volumes().contains("other", others));
+  EXPECT_EQ(code_thrown_by([&] { retention(250).make_room(60); }), ErrorCode::kOutOfSpace);
+}
+
 // --- What retention asks of the stores
+
+TEST_P(RetentionConformance, BytesAreToldForEachOwner) {
+  const std::string volume = add_volume('v', 100);
+  add_volume('v', 100, "other");
+  add_volume('w', 10, "other");
+  finish(volume, std::string(50, 'm'));
+  finish(volume, std::string(50, 'm'));
+  EXPECT_EQ(volumes().owned_bytes(), (OwnedBytes{{"", 100}, {"other", 110}}));
+  EXPECT_EQ(jobs().owned_bytes(), (OwnedBytes{{"", 50}}));
+  EXPECT_THAT(ids_of(volumes().unused({soon(), "other"}, 9)), SizeIs(2));
+  EXPECT_THAT(ids_of(volumes().unused({soon(), ""}, 9)), ElementsAre(volume));
+  EXPECT_THAT(ids_of(jobs().ended({soon(), "other"}, Ended::kAll, 9)), IsEmpty());
+  EXPECT_THAT(ids_of(jobs().ended({soon(), ""}, Ended::kAll, 9)), SizeIs(2));
+}
 
 TEST_P(RetentionConformance, EndedJobsAreListedTheOldestFirst) {
   const std::string volume = add_volume('v', 100);
@@ -259,11 +301,11 @@ TEST_P(RetentionConformance, EndedJobsAreListedTheOldestFirst) {
   jobs().cancel("", bare);
   const std::string third = finish(volume, "3");
   submit(volume, 1001);
-  EXPECT_THAT(ids_of(jobs().ended(soon(), Ended::kAll, 9)), ElementsAre(first, bare, third));
-  EXPECT_THAT(ids_of(jobs().ended(soon(), Ended::kAll, 2)), ElementsAre(first, bare));
-  EXPECT_THAT(ids_of(jobs().ended(soon(), Ended::kWithMesh, 9)), ElementsAre(first, third));
-  const Time end_of_second = jobs().ended(soon(), Ended::kAll, 9).at(1).last_used;
-  EXPECT_THAT(ids_of(jobs().ended(end_of_second, Ended::kAll, 9)), ElementsAre(first));
+  EXPECT_THAT(ids_of(jobs().ended({soon()}, Ended::kAll, 9)), ElementsAre(first, bare, third));
+  EXPECT_THAT(ids_of(jobs().ended({soon()}, Ended::kAll, 2)), ElementsAre(first, bare));
+  EXPECT_THAT(ids_of(jobs().ended({soon()}, Ended::kWithMesh, 9)), ElementsAre(first, third));
+  const Time end_of_second = jobs().ended({soon()}, Ended::kAll, 9).at(1).last_used;
+  EXPECT_THAT(ids_of(jobs().ended({end_of_second}, Ended::kAll, 9)), ElementsAre(first));
 }
 
 TEST_P(RetentionConformance, JobsExpireUntilEnoughIsFreed) {
@@ -272,7 +314,7 @@ TEST_P(RetentionConformance, JobsExpireUntilEnoughIsFreed) {
   const std::string again = finish(volume, std::string(50, 'm'));
   const std::string third = finish(volume, std::string(50, 'n'));
   EXPECT_EQ(jobs().named_bytes(), 100U);
-  const auto items = jobs().ended(soon(), Ended::kAll, 9);
+  const auto items = jobs().ended({soon()}, Ended::kAll, 9);
   const Expired expired = jobs().expire(items, 1);
   EXPECT_EQ(expired.records, 2U);
   EXPECT_EQ(expired.bytes, 50U);
@@ -287,11 +329,11 @@ TEST_P(RetentionConformance, AVolumeThatIsUsedAgainDoesNotExpire) {
   const std::string used = add_volume('u', 100);
   const std::string needed = add_volume('n', 10);
   const std::string idle = add_volume('i', 1);
-  const auto items = volumes().unused(soon(), 9);
+  const auto items = volumes().unused({soon()}, 9);
   EXPECT_THAT(ids_of(items), ElementsAre(used, needed, idle));
   add_volume('u', 100);
   submit(needed, 1);
-  EXPECT_THAT(ids_of(volumes().unused(soon(), 9)), ElementsAre(idle, used));
+  EXPECT_THAT(ids_of(volumes().unused({soon()}, 9)), ElementsAre(idle, used));
   EXPECT_EQ(volumes().named_bytes(), 111U);
   const Expired expired = volumes().expire(items, kAllBytes);
   EXPECT_EQ(expired.records, 1U);
@@ -305,10 +347,10 @@ TEST_P(RetentionConformance, TheSamplesOfTwoOwnersAreFreedWithTheLast) {
   add_volume('v', 100);
   add_volume('v', 100, "other");
   EXPECT_EQ(volumes().named_bytes(), 100U);
-  const Expired expired = volumes().expire(volumes().unused(soon(), 1), kAllBytes);
+  const Expired expired = volumes().expire(volumes().unused({soon()}, 1), kAllBytes);
   EXPECT_EQ(expired.records, 1U);
   EXPECT_EQ(expired.bytes, 0U);
-  EXPECT_EQ(volumes().expire(volumes().unused(soon(), 9), kAllBytes).bytes, 100U);
+  EXPECT_EQ(volumes().expire(volumes().unused({soon()}, 9), kAllBytes).bytes, 100U);
 }
 
 TEST_P(RetentionConformance, TheOldestRunIsTheFirstThatWasClaimed) {
