@@ -212,24 +212,24 @@ bool ended_while_draining(const Daemon& daemon, const std::string& job) {
          log.find(job) > draining;
 }
 
-// Calls attempt(passes) with ever longer jobs until it is true. How long a job takes on a busy
+// Calls attempt(volume) with ever larger volumes until it is true. How long a job takes on a busy
 // machine is not known, and one that ends before the draining begins, or does not end while its
 // client waits, shows nothing.
-bool with_a_job_that_is_long_enough(const std::function<bool(int passes)>& attempt) {
-  for (int passes = 25; passes <= 1000; passes *= 2) {
-    if (attempt(passes)) return true;
+bool with_a_job_that_is_long_enough(const std::function<bool(const RawUpload& volume)>& attempt) {
+  for (std::uint32_t size = 12; size <= 150; size += size / 2) {
+    if (attempt(raw_upload(noise<std::uint8_t>({0, 100}, {size, size, size}, 11)))) return true;
   }
   return false;
 }
 
 TEST(Drain, LetsARunningJobFinish) {
-  EXPECT_TRUE(with_a_job_that_is_long_enough([](int passes) {
+  EXPECT_TRUE(with_a_job_that_is_long_enough([](const RawUpload& volume) {
     Daemon daemon(std::vector<std::string>{"--drain-seconds", "100"});
-    const Job job = submit(daemon, upload(daemon, long_upload()), 50,
-                           R"("draco": {"speed": 10}, "passes": )" + std::to_string(passes));
+    const Job job =
+        submit(daemon, upload(daemon, volume), 50, R"("draco": {"speed": 10}, "passes": 200)");
     EXPECT_TRUE(eventually([&] { return daemon.client().job(job.id).state != JobState::kQueued; }));
     const Connection waiter(daemon.url());
-    waiter.send(request("GET", "/v1/jobs/" + job.id + "?wait=60"));
+    waiter.send(request("GET", "/v1/jobs/" + job.id + "?wait=30"));
     daemon.terminate();
     const Answer answer = waiter.receive();
     EXPECT_EQ(daemon.wait(), 0);
@@ -268,13 +268,11 @@ TEST(Drain, IsNotReadyAndAcceptsNothing) {
 }
 
 TEST(Drain, FinishesTheMeshOfOneRequest) {
-  const RawUpload raw = long_upload();
-  EXPECT_TRUE(with_a_job_that_is_long_enough([&](int passes) {
+  EXPECT_TRUE(with_a_job_that_is_long_enough([](const RawUpload& volume) {
     Daemon daemon(std::vector<std::string>{"--drain-seconds", "100"});
     const Connection client(daemon.url());
-    client.send(request(
-        "POST", "/v1/mesh?iso=50&speed=10&passes=" + std::to_string(passes) + "&" + raw.query,
-        raw.bytes));
+    client.send(
+        request("POST", "/v1/mesh?iso=50&speed=10&passes=200&" + volume.query, volume.bytes));
     std::string job;
     EXPECT_TRUE(eventually([&] {
       const auto jobs = daemon.client().jobs().jobs;
