@@ -93,13 +93,17 @@ Child& Child::operator=(Child&& other) noexcept {
   return *this;
 }
 
-void Child::tell(std::string_view message) const {
+void Child::say(std::string_view message) const {
   while (!message.empty()) {
     const ssize_t count = ::send(socket_.number(), message.data(), message.size(), MSG_NOSIGNAL);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) return;
     message.remove_prefix(static_cast<std::size_t>(count));
   }
+}
+
+void Child::tell(std::string_view message) const {
+  say(message);
   ::shutdown(socket_.number(), SHUT_WR);
 }
 

@@ -53,8 +53,11 @@ class Child {
   pid_t pid() const { return pid_; }
   const Descriptor& socket() const { return socket_; }
 
-  // Sends all of that and closes this direction. A child that has ended is no error here: it is
-  // noticed when it is listened to.
+  // Sends all of that. A child that has ended is no error here: it is noticed when it is listened
+  // to.
+  void say(std::string_view message) const;
+
+  // The same, and closes this direction.
   void tell(std::string_view message) const;
 
   // Everything that it says until it closes its end, at most `most_bytes` (about).

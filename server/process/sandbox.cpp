@@ -5,11 +5,13 @@
 #include <cerrno>
 #include <csignal>
 #include <cstddef>
+#include <fstream>
 #include <initializer_list>
 #include <limits>
 
 #include <fcntl.h>
 #include <linux/landlock.h>
+#include <linux/sched.h>
 #include <seccomp.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -95,7 +97,8 @@ void allow(const Descriptor& ruleset, const std::filesystem::path& path, std::ui
       "landlock_add_rule");
 }
 
-void restrict_files(const Confinement& confinement) {
+// Leaves `readable`, a file or a folder, and all of the folder `writable`.
+void restrict_files(const std::filesystem::path& readable, const std::filesystem::path& writable) {
   const long version = landlock_version();
   if (version < 1) return;
   landlock_ruleset_attr attributes = {};
@@ -108,8 +111,8 @@ void restrict_files(const Confinement& confinement) {
                                   LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_MAKE_REG |
                                   LANDLOCK_ACCESS_FS_MAKE_DIR | LANDLOCK_ACCESS_FS_REMOVE_FILE |
                                   LANDLOCK_ACCESS_FS_REMOVE_DIR | kTruncate;
-  allow(ruleset, confinement.readable, kRead);
-  allow(ruleset, confinement.writable, kWork & attributes.handled_access_fs);
+  allow(ruleset, readable, kRead);
+  allow(ruleset, writable, kWork & attributes.handled_access_fs);
   require(::syscall(SYS_landlock_restrict_self, ruleset.number(), 0) == 0,
           "landlock_restrict_self");
 }
@@ -164,9 +167,10 @@ class Filter {
   void allow(int call, const scmp_arg_cmp& condition) {
     check(::seccomp_rule_add_array(context_, SCMP_ACT_ALLOW, call, 1, &condition));
   }
-  void forbid(int call) {
-    check(::seccomp_rule_add_array(context_, SCMP_ACT_ERRNO(EPERM), call, 0, nullptr));
+  void fail(int call, int error) {
+    check(::seccomp_rule_add_array(context_, SCMP_ACT_ERRNO(error), call, 0, nullptr));
   }
+  void forbid(int call) { fail(call, EPERM); }
   void load() { check(::seccomp_load(context_)); }
 
  private:
@@ -181,8 +185,18 @@ scmp_arg_cmp argument_is(unsigned index, std::uint64_t value) {
   return {index, SCMP_CMP_EQ, value, 0};
 }
 
-void filter_calls() {
+enum class Threads { kOne, kMany };
+
+void filter_calls(Threads threads) {
   Filter filter(SCMP_ACT_ERRNO(EPERM));
+  if (threads == Threads::kMany) {
+    // A thread, never a process; its newer form cannot be looked into, and the C library goes back
+    // to this one where the kernel seems not to have it.
+    filter.allow(SCMP_SYS(clone), {0, SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD});
+    filter.fail(SCMP_SYS(clone3), ENOSYS);
+    filter.allow(SCMP_SYS(sched_setaffinity));
+    filter.allow(SCMP_SYS(prctl), argument_is(0, PR_SET_NAME));
+  }
   for (const int call : kAllowedCalls) filter.allow(call);
   // Memory must never be mapped as executable.
   const scmp_arg_cmp not_executable = {2, SCMP_CMP_MASKED_EQ, PROT_EXEC, 0};
@@ -218,19 +232,42 @@ void become_first_victim() {
 
 bool has_landlock() { return landlock_version() >= 1; }
 
-void confine_ahead() {
+namespace {
+
+void confine_process(Threads threads) {
   constexpr std::uint64_t kMostOpenFiles = 64;
   become_first_victim();
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_NOFILE, kMostOpenFiles);
   require(::prctl(PR_SET_DUMPABLE, 0) == 0, "prctl");
   require(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0, "prctl");
-  filter_calls();
+  filter_calls(threads);
+}
+
+}  // namespace
+
+void confine_ahead() { confine_process(Threads::kOne); }
+
+void confine_job(const std::filesystem::path& readable, const std::filesystem::path& writable) {
+  confine_process(Threads::kMany);
+  restrict_files(readable, writable);
+}
+
+void limit_memory(std::uint64_t more_bytes) {
+  if constexpr (!kLimitMemory) return;
+  std::uint64_t present = 0;  // in pages; the sixth number is of data and stack
+  std::ifstream file("/proc/self/statm");
+  for (int number = 0; number < 6; ++number) file >> present;
+  present *= static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  rlimit bounds = {};
+  require(::getrlimit(RLIMIT_DATA, &bounds) == 0, "getrlimit");
+  bounds.rlim_cur = std::min<rlim_t>(bounds.rlim_max, sum({present, more_bytes}));
+  require(::setrlimit(RLIMIT_DATA, &bounds) == 0, "setrlimit");
 }
 
 void confine_to(const Confinement& confinement) {
   limit_resources(confinement);
-  restrict_files(confinement);
+  restrict_files(confinement.readable, confinement.writable);
   forbid_confining();
 }
 
