@@ -26,6 +26,9 @@ class JobProcess {
   // next one gets a new process.
   Job run(const JobOrder& order, const std::stop_token& stop, const Report& report);
 
+  // Of the process; none before the first job and after one that ended it.
+  std::optional<pid_t> pid() const { return child_ ? std::optional(child_->pid()) : std::nullopt; }
+
  private:
   // The next whole line; empty when the process has ended.
   std::optional<std::string> next_line(const std::stop_token& stop);
