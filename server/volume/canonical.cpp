@@ -13,9 +13,9 @@
 
 #include "base/descriptor.h"
 #include "base/error.h"
-#include "base/files.h"
 #include "proto/error.h"
 #include "server/volume/geometry.h"
+#include "server/volume/unusable.h"
 
 namespace isomesh::volume {
 namespace {
@@ -104,16 +104,24 @@ std::span<std::byte> CanonicalWriter::samples() {
   return {data_ + kHeaderBytes, size_ - kHeaderBytes};
 }
 
-CanonicalVolume::CanonicalVolume(const std::filesystem::path& path) {
-  const InputFile input(path);
-  header_ = from_text(input.text(0, kHeaderBytes));
+CanonicalFile::CanonicalFile(const std::filesystem::path& path) : file_(path) {
+  header_ = from_text(file_.text(0, kHeaderBytes));
   const auto size = file_bytes(header_);
-  if (!size || *size != input.size()) throw_not_canonical("its size is not what its header tells");
+  if (!size || *size != file_.size()) throw_not_canonical("its size is not what its header tells");
   if (find_fault(header_.dims, header_.geometry)) throw_not_canonical("its geometry is unusable");
-  void* data = ::mmap(nullptr, *size, PROT_READ, MAP_SHARED, input.descriptor(), 0);
+}
+
+void CanonicalFile::read(std::uint64_t offset, std::span<std::byte> target) const {
+  if (file_.read(kHeaderBytes + offset, target) != target.size()) throw_damaged();
+}
+
+CanonicalVolume::CanonicalVolume(const std::filesystem::path& path) {
+  const CanonicalFile canonical(path);
+  header_ = canonical.header();
+  size_ = canonical.file_.size();
+  void* data = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, canonical.file_.descriptor(), 0);
   if (data == MAP_FAILED) throw_system_error("mmap", errno);
   data_ = static_cast<const std::byte*>(data);
-  size_ = *size;
 }
 
 CanonicalVolume::~CanonicalVolume() {

@@ -14,6 +14,7 @@
 #include <span>
 #include <string>
 
+#include "base/files.h"
 #include "proto/types.h"
 
 namespace isomesh::volume {
@@ -48,11 +49,33 @@ class CanonicalWriter {
   int file_ = -1;
 };
 
-// A canonical file, mapped for reading. Immutable, so safe to read from several threads.
-class CanonicalVolume {
+// A canonical file whose samples are copied out of it, so that one which is cut meanwhile is an
+// error and no signal: for those who serve others besides. Safe to read from several threads.
+class CanonicalFile {
  public:
   // Throws Error kInternal when the file is not a canonical volume of exactly the size that its
   // header tells.
+  explicit CanonicalFile(const std::filesystem::path& path);
+
+  const CanonicalHeader& header() const { return header_; }
+
+  // Fills `target` with what is `offset` bytes behind the beginning of the samples, all of which is
+  // to lie within them. Throws Error kUnusableVolume when the file has become shorter, kInternal
+  // when the disk fails.
+  void read(std::uint64_t offset, std::span<std::byte> target) const;
+
+ private:
+  friend class CanonicalVolume;
+
+  InputFile file_;
+  CanonicalHeader header_;
+};
+
+// A canonical file, mapped for reading. Immutable, so safe to read from several threads. A file
+// that is cut meanwhile ends the process with SIGBUS: for processes that do nothing else.
+class CanonicalVolume {
+ public:
+  // Throws as CanonicalFile does.
   explicit CanonicalVolume(const std::filesystem::path& path);
   ~CanonicalVolume();
   CanonicalVolume(CanonicalVolume&&) noexcept;

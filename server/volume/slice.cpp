@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <csetjmp>
+#include <cstring>
 
 #include <png.h>
 
@@ -13,6 +14,9 @@ namespace isomesh::volume {
 namespace {
 
 constexpr std::size_t kBlockBytes = 64 * 1024;
+// Samples that lie closer together than this are read with what is between them.
+constexpr std::size_t kCloseBytes = 4096;
+constexpr std::size_t kReadBytes = std::size_t{1} << 20;
 constexpr int kCompression = 3;  // higher levels take much longer for a tenth fewer bytes
 
 // Which of the volume's axes run along a picture's columns and rows.
@@ -127,7 +131,7 @@ std::string_view to_string(Axis axis) {
   return axis == Axis::kX ? "x" : axis == Axis::kY ? "y" : "z";
 }
 
-SlicePng::SlicePng(std::shared_ptr<const CanonicalVolume> volume, const SliceChoice& choice)
+SlicePng::SlicePng(std::shared_ptr<const CanonicalFile> volume, const SliceChoice& choice)
     : volume_(std::move(volume)), choice_(choice) {
   const CanonicalHeader& header = volume_->header();
   const Plane plane = plane_of(choice.axis);
@@ -173,13 +177,23 @@ void SlicePng::read_row(std::uint32_t row) {
   const std::uint64_t first =
       choice_.index * stride[plane.fixed] + std::uint64_t{row} * stride[plane.row];
   const std::uint64_t step = stride[plane.column];
-  with_sample(header.type, [&](auto sample) {
-    using Sample = decltype(sample);
-    const auto* at = reinterpret_cast<const Sample*>(volume_->samples().data()) + first;
-    for (std::uint32_t column = 0; column < width_; ++column) {
-      row_[column] = grey(static_cast<double>(at[column * step]), choice_.window);
+  with_sample(header.type, [&](auto sample) { read_row_as<decltype(sample)>(first, step); });
+}
+
+template <class Sample>
+void SlicePng::read_row_as(std::uint64_t first, std::uint64_t step) {
+  const std::uint64_t step_bytes = step * sizeof(Sample);
+  const std::uint64_t together = step_bytes > kCloseBytes ? 1 : kReadBytes / step_bytes;
+  for (std::uint64_t begin = 0; begin < width_; begin += together) {
+    const std::uint64_t count = std::min<std::uint64_t>(together, width_ - begin);
+    block_.resize((count - 1) * step_bytes + sizeof(Sample));
+    volume_->read((first + begin * step) * sizeof(Sample), block_);
+    for (std::uint64_t n = 0; n < count; ++n) {
+      Sample sample;
+      std::memcpy(&sample, &block_[n * step_bytes], sizeof(Sample));
+      row_[begin + n] = grey(static_cast<double>(sample), choice_.window);
     }
-  });
+  }
 }
 
 }  // namespace isomesh::volume

@@ -36,7 +36,7 @@ struct SliceChoice {
 class SlicePng {
  public:
   // Throws Error kInternal.
-  SlicePng(std::shared_ptr<const CanonicalVolume> volume, const SliceChoice& choice);
+  SlicePng(std::shared_ptr<const CanonicalFile> volume, const SliceChoice& choice);
   ~SlicePng();
   SlicePng(const SlicePng&) = delete;
   SlicePng& operator=(const SlicePng&) = delete;
@@ -45,7 +45,8 @@ class SlicePng {
   static constexpr std::size_t kSamplesPerPiece = std::size_t{1} << 20;
 
   // The next bytes of the file; nothing at its end. A piece may be empty: what is of one grey
-  // makes few bytes of many samples. Throws Error kInternal.
+  // makes few bytes of many samples. Throws Error kInternal, and kUnusableVolume when the file has
+  // become shorter.
   std::optional<std::string_view> next();
 
  private:
@@ -53,14 +54,17 @@ class SlicePng {
 
   void write_row();
   void read_row(std::uint32_t row);
+  template <class Sample>
+  void read_row_as(std::uint64_t first, std::uint64_t step);
 
-  std::shared_ptr<const CanonicalVolume> volume_;
+  std::shared_ptr<const CanonicalFile> volume_;
   SliceChoice choice_;
   std::uint32_t width_ = 0;
   std::uint32_t height_ = 0;
   std::uint32_t next_row_ = 0;
   std::vector<std::uint8_t> row_;
-  std::string bytes_;  // encoded; next() has returned the first taken_ of them
+  std::vector<std::byte> block_;  // of the file
+  std::string bytes_;             // encoded; next() has returned the first taken_ of them
   std::size_t taken_ = 0;
   std::unique_ptr<Writer> writer_;
 };

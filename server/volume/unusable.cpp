@@ -7,6 +7,8 @@ namespace isomesh::volume {
 
 void throw_unusable(const std::string& reason) { throw Error(ErrorCode::kUnusableVolume, reason); }
 
+void throw_damaged() { throw_unusable("the stored volume is damaged: upload it again"); }
+
 void throw_overridable(NoteCode code, const std::string& reason) {
   throw Error(ErrorCode::kUnusableVolume, reason)
       .with_remedy({.overridable = std::string(describe(code).name)});

@@ -11,6 +11,9 @@ namespace isomesh::volume {
 
 [[noreturn]] void throw_unusable(const std::string& reason);
 
+// Of a stored volume whose bytes are not those any more that were stored.
+[[noreturn]] void throw_damaged();
+
 // Throws a refusal that a person may overrule with `accept=` and the name of `code`, which is an
 // acceptable one. Not to be called where the import's options accept it.
 [[noreturn]] void throw_overridable(NoteCode code, const std::string& reason);

@@ -62,7 +62,7 @@ void slice(App& app, const Request& request, Response& response) {
                            std::to_string(choice.index) + '.' + to_text(choice.window[0]) + '.' +
                            to_text(choice.window[1]) + '"';
   if (is_known(request, response, etag)) return;
-  const auto canonical = std::make_shared<const volume::CanonicalVolume>(
+  const auto canonical = std::make_shared<const volume::CanonicalFile>(
       jobs::stored_samples(app.services.blobs, volume.id).path);
   auto picture = std::make_unique<volume::SlicePng>(canonical, choice);
   const bool in_chunks = request.version != "HTTP/1.0";

@@ -1,12 +1,15 @@
 #include "server/volume/canonical.h"
 
+#include <array>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <numbers>
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 
+#include "tests/support/errors.h"
 #include "tests/support/files.h"
 
 namespace isomesh::volume::test {
@@ -91,6 +94,27 @@ TEST(Canonical, RefusesEverythingElse) {
   replaced("\"spacing\":[0.1", "\"spacing\":[null");
   replaced("12.5", "1e300");
   EXPECT_THROW(CanonicalVolume volume(folder / "absent"), Error);
+}
+
+TEST(Canonical, IsCopiedOutOfItsFile) {
+  const TemporaryFolder folder;
+  written(folder, small_header());
+  const CanonicalFile file(folder / "volume");
+  EXPECT_EQ(file.header().geometry, small_header().geometry);
+  std::array<std::byte, 4> some = {};
+  file.read(20, some);
+  EXPECT_EQ(some, (std::array{std::byte{20}, std::byte{21}, std::byte{22}, std::byte{23}}));
+}
+
+// Of a mapped one it would be a signal.
+TEST(Canonical, AFileThatIsCutMeanwhileIsDamaged) {
+  const TemporaryFolder folder;
+  written(folder, small_header());
+  const CanonicalFile file(folder / "volume");
+  std::filesystem::resize_file(folder / "volume", kHeaderBytes + 22);
+  std::array<std::byte, 4> some = {};
+  EXPECT_EQ(isomesh::test::code_thrown_by([&] { file.read(20, some); }),
+            ErrorCode::kUnusableVolume);
 }
 
 TEST(Canonical, MovesWithItsMapping) {

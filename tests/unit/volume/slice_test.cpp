@@ -1,6 +1,7 @@
 #include "server/volume/slice.h"
 
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/png.h"
 
@@ -21,15 +23,15 @@ using testing::ElementsAre;
 class SliceTest : public testing::Test {
  protected:
   template <class Sample>
-  std::shared_ptr<const CanonicalVolume> volume_of(const CanonicalHeader& header,
-                                                   const std::vector<Sample>& samples) {
+  std::shared_ptr<const CanonicalFile> volume_of(const CanonicalHeader& header,
+                                                 const std::vector<Sample>& samples) {
     CanonicalWriter writer(folder_ / "volume", header);
     std::memcpy(writer.samples().data(), samples.data(), writer.samples().size());
-    return std::make_shared<const CanonicalVolume>(folder_ / "volume");
+    return std::make_shared<const CanonicalFile>(folder_ / "volume");
   }
 
   // The sample (i,j,k) is 100 k + 10 j + i.
-  std::shared_ptr<const CanonicalVolume> numbered() {
+  std::shared_ptr<const CanonicalFile> numbered() {
     CanonicalHeader header;
     header.dims = {4, 3, 2};
     header.type = SampleType::kUint8;
@@ -44,7 +46,7 @@ class SliceTest : public testing::Test {
     return volume_of(header, samples);
   }
 
-  static GreyPicture picture(const std::shared_ptr<const CanonicalVolume>& volume,
+  static GreyPicture picture(const std::shared_ptr<const CanonicalFile>& volume,
                              const SliceChoice& choice) {
     SlicePng png(volume, choice);
     std::string bytes;
@@ -55,6 +57,47 @@ class SliceTest : public testing::Test {
 
   const TemporaryFolder folder_;
 };
+
+// A signal would end everybody else's requests too.
+TEST_F(SliceTest, AFileThatIsCutMeanwhileIsAnError) {
+  CanonicalHeader header;
+  header.dims = {300, 200, 3};
+  header.type = SampleType::kUint8;
+  for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+    SlicePng png(volume_of(header, std::vector<std::uint8_t>(300 * 200 * 3, 7)), {axis, 1, {0, 9}});
+    std::filesystem::resize_file(folder_ / "volume", kHeaderBytes + 300);
+    const auto error = isomesh::test::thrown_by([&] {
+      while (png.next()) continue;
+    });
+    ASSERT_TRUE(error);
+    EXPECT_EQ(error->code(), ErrorCode::kUnusableVolume);
+  }
+}
+
+// Rows along x, y and z, of samples that lie close together and far apart.
+TEST_F(SliceTest, ReadsRowsOfAnyStride) {
+  CanonicalHeader header;
+  header.dims = {2500, 3, 5};
+  header.type = SampleType::kUint16;
+  std::vector<std::uint16_t> samples(2500 * 3 * 5);
+  for (std::size_t n = 0; n < samples.size(); ++n) {
+    samples[n] = static_cast<std::uint16_t>(n % 251);
+  }
+  const auto volume = volume_of(header, samples);
+  const auto at = [&](std::size_t i, std::size_t j, std::size_t k) {
+    return static_cast<std::uint8_t>(samples[i + 2500 * (j + 3 * k)]);
+  };
+  const GreyPicture x = picture(volume, {Axis::kX, 2003, {0, 255}});
+  const GreyPicture y = picture(volume, {Axis::kY, 1, {0, 255}});
+  const GreyPicture z = picture(volume, {Axis::kZ, 4, {0, 255}});
+  for (std::size_t j = 0; j < 3; ++j) {
+    for (std::size_t k = 0; k < 5; ++k) EXPECT_EQ(x.pixels[k * 3 + j], at(2003, j, k));
+  }
+  for (std::size_t i = 0; i < 2500; ++i) {
+    for (std::size_t k = 0; k < 5; ++k) ASSERT_EQ(y.pixels[k * 2500 + i], at(i, 1, k));
+    for (std::size_t j = 0; j < 3; ++j) ASSERT_EQ(z.pixels[j * 2500 + i], at(i, j, 4));
+  }
+}
 
 TEST_F(SliceTest, HasTheSamplesOfEachAxisInTheirOrder) {
   const auto volume = numbered();
