@@ -187,8 +187,8 @@ int run(const Options& options, const sigset_t& signals) {
   store::JobStoreOptions job_options = options.jobs;
   job_options.mesher_version = jobs::kMesherVersion;
   store::SqliteJobStore jobs(database, blobs, job_options);
-  if (const std::size_t count = jobs.reap_predecessor()) {
-    spdlog::warn("{} jobs ran when the last daemon ended", count);
+  if (const std::size_t count = jobs.reap()) {
+    spdlog::warn("{} jobs ran when the last daemon ended; they are run again", count);
   }
   store::RetentionOptions retention_options;
   retention_options.keep = keep;
@@ -205,11 +205,14 @@ int run(const Options& options, const sigset_t& signals) {
   store::SqliteOutbox outbox(database);
   callbacks::Callbacks callbacks(outbox, targets, callback_options(options),
                                  http::callback_reporter(metrics));
+  const jobs::JobProgram job_program = {
+      .file = beside_this_program("isomesh-job"),
+      .setup = {.readable = folder.blobs(), .threads = mesh::thread_count()}};
   const jobs::PipelineLimits limits = {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
   const jobs::Housekeeper housekeeper(retention, housekeeping_interval(keep));
   jobs::Histograms histograms(blobs);
-  jobs::Estimator estimator(volumes, blobs, jobs, limits);
+  jobs::Estimator estimator(volumes, blobs, jobs, limits, job_program);
   http::ServerOptions server_options = options.http;
   server_options.tls = files.tls.get();
   server_options.connections = net::connections_within(net::raise_descriptor_limit());
@@ -221,6 +224,7 @@ int run(const Options& options, const sigset_t& signals) {
   // still logged and counted.
   const jobs::WorkerOptions worker_options = {
       .threads = options.workers,
+      .program = job_program,
       .limits = limits,
       .lease = std::chrono::seconds(options.lease_seconds),
       .longest_job = std::chrono::minutes(options.longest_job_minutes)};
@@ -247,7 +251,6 @@ int main(int argc, char** argv) {
   constexpr int kWrongUsage = 2;
   try {
     const sigset_t signals = block_signals();
-    jobs::keep_freed_memory();
     start_log(LogFormat::kText, LogLevel::kInfo);
     Options options;
     TokenRequest token;

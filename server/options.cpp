@@ -140,7 +140,7 @@ void add_options(CLI::App& cli, Options& options) {
       ->envname("ISOMESH_WORKERS")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  cli.add_option("--threads", options.threads, "Threads that all jobs share; 0: one a processor")
+  cli.add_option("--threads", options.threads, "Threads of each job; 0: one a processor")
       ->envname("ISOMESH_THREADS")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();

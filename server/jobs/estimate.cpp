@@ -4,11 +4,8 @@
 #include <cmath>
 #include <map>
 
-#include "proto/samples.h"
 #include "server/codec/encode.h"
 #include "server/jobs/stored_samples.h"
-#include "server/mesh/extract.h"
-#include "server/volume/canonical.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -52,16 +49,6 @@ double encode_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   return as_double(surface.triangles) * (slowest + (sum - slowest) / 2);
 }
 
-template <class T>
-SurfaceSize count_as(const volume::CanonicalVolume& canonical, const mesh::ExtractOptions& options,
-                     const std::stop_token& stop) {
-  const volume::CanonicalHeader& header = canonical.header();
-  const mesh::Lattice<T> lattice = {reinterpret_cast<const T*>(canonical.samples().data()),
-                                    {header.dims[0], header.dims[1], header.dims[2]},
-                                    mesh::lattice_to_space(header.geometry)};
-  return size_of(count_surface(lattice, options, {stop, nullptr}));
-}
-
 }  // namespace
 
 void CostModel::learn(const Job& job, std::uint64_t samples) {
@@ -101,9 +88,7 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   estimate.volume = volume.id;
   estimate.iso = parameters.iso.value_or(volume.suggested_iso);
   estimate.scheme = parameters.scheme;
-  const SurfaceSize surface =
-      count(viewer, volume,
-            {.iso = estimate.iso, .scheme = parameters.scheme, .close = parameters.close});
+  const SurfaceSize surface = count(viewer, volume, parameters, estimate.iso);
   estimate.triangles = surface.triangles;
   estimate.vertices = surface.vertices;
   estimate.memory_bytes = estimate_memory(surface, parameters);
@@ -119,16 +104,22 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
 }
 
 SurfaceSize Estimator::count(const store::Viewer& viewer, const Volume& volume,
-                             const mesh::ExtractOptions& options) {
-  const auto size =
-      counts_.get({viewer, volume.id, options.iso, options.scheme, options.close}, [&] {
-        const store::LocalBlob file = stored_samples(blobs_, volume.id, stop_.get_token());
-        const volume::CanonicalVolume canonical(file.path);
-        return with_sample(volume.type, [&](auto sample) {
-          return count_as<decltype(sample)>(canonical, options, stop_.get_token());
-        });
-      });
-  return *size;
+                             const MeshParameters& parameters, double iso) {
+  const auto find = [&] {
+    const std::stop_token stop = stop_.get_token();
+    const store::LocalBlob file = stored_samples(blobs_, volume.id, stop);
+    const JobOrder order = {.work = JobOrder::Work::kCount,
+                            .file = file.path,
+                            .volume = volume,
+                            .parameters = parameters,
+                            .iso = iso,
+                            .memory_bytes = limits_.memory_bytes};
+    return made_of_intact(blobs_, volume.id, stop, [&] {
+      const Lock lock(process_mutex_);
+      return process_.count(order, stop);
+    });
+  };
+  return *counts_.get({viewer, volume.id, iso, parameters.scheme, parameters.close}, find);
 }
 
 CostModel Estimator::model(const store::Viewer& viewer) const {

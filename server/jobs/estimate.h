@@ -7,6 +7,7 @@
 #include <string>
 #include <tuple>
 
+#include "base/mutex.h"
 #include "proto/types.h"
 #include "server/jobs/memo.h"
 #include "server/jobs/pipeline.h"
@@ -54,18 +55,19 @@ class CostModel {
   std::map<MeshFormat, Correction> files_;  // kFewBytes for those that are not here
 };
 
-// Estimates jobs on stored volumes. Counts of the last surfaces are kept. Thread safe; what it is
+// Estimates jobs on stored volumes, whose surfaces a process of its own counts. Counts of the last
+// surfaces are kept. Thread safe; what it is
 // made of must outlive it.
 class Estimator {
  public:
   Estimator(const store::VolumeStore& volumes, const store::BlobStore& blobs,
-            const store::JobStore& jobs, const PipelineLimits& limits)
-      : volumes_(volumes), blobs_(blobs), jobs_(jobs), limits_(limits) {}
+            const store::JobStore& jobs, const PipelineLimits& limits, const JobProgram& program)
+      : volumes_(volumes), blobs_(blobs), jobs_(jobs), limits_(limits), process_(program) {}
 
   // Triangles and vertices are exact, before the filter of components; the rest follows from them
   // and from the jobs of the viewer's that are finished: those of others would tell of them. Throws
   // Error kNotFound without the volume, kUnusableVolume when the stored samples are damaged,
-  // kUnavailable when too many wait for an estimate already or after stop().
+  // ProcessEnded, kUnavailable when too many wait for an estimate already or after stop().
   Estimate estimate(const store::Viewer& viewer, const JobParameters& parameters);
 
   // Ends the counting that is under way, for good.
@@ -79,7 +81,7 @@ class Estimator {
   static constexpr std::size_t kMostWaiting = 12;
 
   SurfaceSize count(const store::Viewer& viewer, const Volume& volume,
-                    const mesh::ExtractOptions& options);
+                    const MeshParameters& parameters, double iso);
   CostModel model(const store::Viewer& viewer) const;
 
   const store::VolumeStore& volumes_;
@@ -87,6 +89,8 @@ class Estimator {
   const store::JobStore& jobs_;
   const PipelineLimits limits_;
   std::stop_source stop_;
+  Mutex process_mutex_;
+  JobProcess process_ ISOMESH_GUARDED_BY(process_mutex_);  // counts, one surface after the other
   Memo<Surface, SurfaceSize> counts_{kSurfaces, kMostWaiting};
 };
 

@@ -1,7 +1,7 @@
 #include "server/jobs/histograms.h"
 
 #include <algorithm>
-#include <span>
+#include <functional>
 #include <vector>
 
 #include "server/jobs/stored_samples.h"
@@ -11,19 +11,29 @@
 namespace isomesh::jobs {
 namespace {
 
-volume::ValueCounts count_values(const volume::CanonicalVolume& canonical, const Volume& volume) {
-  const std::span<const std::byte> samples = canonical.samples();
-  constexpr std::size_t kSmallestPart = std::size_t{4} << 20;
-  const std::size_t parts = std::clamp<std::size_t>(samples.size() / kSmallestPart, 1,
-                                                    static_cast<std::size_t>(mesh::thread_count()));
+constexpr std::uint64_t kBlockBytes = std::uint64_t{4} << 20;
+
+// Counts the samples that begin at these bytes of them, at most a block in memory.
+void add_part(const volume::CanonicalFile& canonical, std::uint64_t begin, std::uint64_t end,
+              volume::ValueCounts& counts) {
+  std::vector<std::byte> block;
+  for (; begin < end; begin += block.size()) {
+    block.resize(std::min(kBlockBytes, end - begin));
+    canonical.read(begin, block);
+    volume::add_values(block, canonical.header().type, counts);
+  }
+}
+
+volume::ValueCounts count_values(const volume::CanonicalFile& canonical, const Volume& volume) {
+  const std::uint64_t bytes = canonical.header().sample_bytes();
+  const auto parts = std::clamp<std::uint64_t>(bytes / kBlockBytes, 1,
+                                               static_cast<std::uint64_t>(mesh::thread_count()));
   const std::size_t sample_bytes = bytes_per_sample(volume.type);
-  const std::size_t part_bytes = samples.size() / sample_bytes / parts * sample_bytes;
+  const std::uint64_t part_bytes = bytes / sample_bytes / parts * sample_bytes;
   std::vector<volume::ValueCounts> counts(parts, volume::no_values(volume.type, volume.range));
   mesh::parallel_for({}, parts, [&](std::size_t part) {
     const bool is_last = part + 1 == parts;
-    volume::add_values(
-        samples.subspan(part * part_bytes, is_last ? std::dynamic_extent : part_bytes), volume.type,
-        counts[part]);
+    add_part(canonical, part * part_bytes, is_last ? bytes : (part + 1) * part_bytes, counts[part]);
   });
   for (std::size_t part = 1; part < parts; ++part) {
     std::ranges::transform(counts[0].counts, counts[part].counts, counts[0].counts.begin(),
@@ -37,7 +47,8 @@ volume::ValueCounts count_values(const volume::CanonicalVolume& canonical, const
 Histogram Histograms::of(const store::Viewer& viewer, const Volume& volume, std::size_t bins) {
   const auto values = counts_.get({viewer, volume.id}, [&] {
     const store::LocalBlob file = stored_samples(blobs_, volume.id);
-    return count_values(volume::CanonicalVolume(file.path), volume);
+    return made_of_intact(blobs_, volume.id, {},
+                          [&] { return count_values(volume::CanonicalFile(file.path), volume); });
   });
   return {volume.id, volume.range, volume::rebinned(*values, bins)};
 }

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include <spdlog/spdlog.h>
-#include <sys/wait.h>
 
 #include "proto/error.h"
 #include "server/process/sandbox.h"
@@ -27,12 +26,6 @@ std::string while_reading(const process::ImportReport& report) {
   return report.reading.empty() ? "" : " while reading " + report.reading;
 }
 
-std::string how_it_ended(const std::optional<int>& status) {
-  if (!status) return "without an answer";
-  if (WIFSIGNALED(*status)) return "by signal " + std::to_string(WTERMSIG(*status));
-  return "with status " + std::to_string(WEXITSTATUS(*status));
-}
-
 [[noreturn]] void refuse_dead(const std::string& how, const process::ImportReport& report) {
   const std::string what = "The import ended " + how + while_reading(report);
   spdlog::error("{}", what);
@@ -50,7 +43,7 @@ void check(const Volume& volume, const process::ImportTask& task) {
   for (const Note& note : volume.notes) {
     if (find_note(note.code) == nullptr) throw_lying();
   }
-  const volume::CanonicalVolume canonical(task.target);
+  const volume::CanonicalFile canonical(task.target);
   const volume::CanonicalHeader& header = canonical.header();
   const auto [low, high] = volume.range;
   if (header.dims != volume.dims || header.type != volume.type ||
@@ -95,7 +88,7 @@ process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::Impo
 ImportRunner::ImportRunner(const RunnerOptions& options)
     : options_(options), prepared_(options.program, options.at_once) {
   if (!process::has_landlock()) {
-    spdlog::warn("this kernel has no Landlock: imports could read files of this user");
+    spdlog::warn("this kernel has no Landlock: imports and jobs could read files of this user");
   }
 }
 
@@ -133,7 +126,7 @@ std::optional<Volume> ImportRunner::run_in(process::Child child, const process::
     const auto status = child.ended_within(kEnd);
     if (heard.ending == Ending::kClosed && !report.begun) return std::nullopt;
     prepared_.renew();
-    refuse_dead(how_it_ended(status), report);
+    refuse_dead(process::how_it_ended(status), report);
   }
   // Ended before the file is checked, so that nothing can change it afterwards.
   child.end();

@@ -10,7 +10,7 @@ namespace {
 using Json = nlohmann::json;
 
 [[noreturn]] void throw_malformed() {
-  throw Error(ErrorCode::kInternal, "A message between a worker and its process is malformed.");
+  throw Error(ErrorCode::kInternal, "A message between the daemon and a job is malformed.");
 }
 
 std::string line_of(const Json& json) {
@@ -27,7 +27,14 @@ auto read_line(std::string_view line, const Read& read) {
   }
 }
 
-Json to_json(const Timing& timing) {
+// Parameters and summaries have a form as parts of a job.
+Job job_with(const MeshParameters& parameters) {
+  Job job;
+  static_cast<MeshParameters&>(job.parameters) = parameters;
+  return job;
+}
+
+Json json_of(const Timing& timing) {
   return {timing.queue, timing.load, timing.extract, timing.smooth, timing.encode, timing.total};
 }
 
@@ -40,46 +47,78 @@ Timing timing_from(const Json& json) {
           .total = json.at(5)};
 }
 
-std::vector<std::string> strings_of(const std::vector<std::filesystem::path>& paths) {
-  return {paths.begin(), paths.end()};
+Json json_of(const JobProgress& progress) {
+  return {{"stage", static_cast<int>(progress.stage)},
+          {"share", progress.share},
+          {"timing", json_of(progress.timing)}};
 }
 
-Error error_of(const Json& json) {
+Json json_of(const JobPiece& piece) { return {{"file", piece.file}, {"bytes", piece.bytes}}; }
+
+Json json_of(const MadeMesh& made) {
+  Job job;
+  job.mesh = made.summary;
+  return {{"made", isomesh::to_json(job)}, {"timing", json_of(made.timing)}};
+}
+
+Json json_of(const mesh::SurfaceSize& size) {
+  return {{"counted", {size.triangles, size.vertices, size.layers, size.largest_layer}}};
+}
+
+Json json_of(const Error& error) {
+  return {{"code", std::string(describe(error.code()).name)}, {"detail", error.what()}};
+}
+
+JobProgress progress_from(const Json& json) {
+  const int stage = json.at("stage").get<int>();
+  if (stage < 0 || stage > static_cast<int>(Stage::kDone)) throw_malformed();
+  return {static_cast<Stage>(stage), json.at("share").get<double>(),
+          timing_from(json.at("timing"))};
+}
+
+MadeMesh made_from(const Json& json) {
+  const Job job = job_from_record(json.at("made").get<std::string>());
+  if (!job.mesh) throw_malformed();
+  return {*job.mesh, timing_from(json.at("timing"))};
+}
+
+mesh::SurfaceSize size_from(const Json& json) {
+  return {.triangles = json.at(0),
+          .vertices = json.at(1),
+          .layers = json.at(2),
+          .largest_layer = json.at(3)};
+}
+
+Error error_from(const Json& json) {
   return {error_code_of(json.at("code").get<std::string>()), json.at("detail").get<std::string>()};
 }
 
 }  // namespace
 
 std::string to_line(const JobSetup& setup) {
-  return line_of({{"readable", setup.readable.string()},
-                  {"writable", setup.writable.string()},
-                  {"threads", setup.threads}});
+  return line_of({{"readable", setup.readable.string()}, {"threads", setup.threads}});
 }
 
 std::string to_line(const JobOrder& order) {
-  return line_of({{"volume", order.volume.string()},
-                  {"job", isomesh::to_json(order.job)},
+  Volume volume;
+  volume.id = order.volume.id;
+  volume.notes = order.volume.notes;
+  return line_of({{"work", static_cast<int>(order.work)},
+                  {"file", order.file.string()},
+                  {"volume", isomesh::to_json(volume)},
+                  {"job", isomesh::to_json(job_with(order.parameters))},
                   {"iso", order.iso},
                   {"memory_bytes", order.memory_bytes},
-                  {"files", strings_of(order.files)}});
+                  {"disk_bytes", order.disk_bytes}});
 }
 
-std::string to_line(const JobProgress& progress) {
-  return line_of({{"stage", static_cast<int>(progress.stage)},
-                  {"share", progress.share},
-                  {"timing", to_json(progress.timing)}});
-}
-
-std::string made_line(const Job& job) { return line_of({{"made", isomesh::to_json(job)}}); }
-
-std::string error_line(const Error& error) {
-  return line_of({{"code", std::string(describe(error.code()).name)}, {"detail", error.what()}});
+std::string to_line(const JobAnswer& answer) {
+  return line_of(std::visit([](const auto& one) { return json_of(one); }, answer));
 }
 
 JobSetup setup_from(std::string_view line) {
   return read_line(line, [](const Json& json) {
     return JobSetup{.readable = json.at("readable").get<std::string>(),
-                    .writable = json.at("writable").get<std::string>(),
                     .threads = json.at("threads").get<int>()};
   });
 }
@@ -87,30 +126,24 @@ JobSetup setup_from(std::string_view line) {
 std::optional<JobOrder> order_from(std::string_view line) {
   return read_line(line, [](const Json& json) -> std::optional<JobOrder> {
     if (json.contains("cancel")) return std::nullopt;
-    JobOrder order = {.volume = json.at("volume").get<std::string>(),
-                      .job = job_from_record(json.at("job").get<std::string>()),
-                      .iso = json.at("iso").get<double>(),
-                      .memory_bytes = json.at("memory_bytes").get<std::uint64_t>(),
-                      .files = {}};
-    for (const Json& file : json.at("files")) order.files.emplace_back(file.get<std::string>());
-    if (order.files.size() != order.job.parameters.formats.size()) throw_malformed();
-    return order;
+    return JobOrder{.work = static_cast<JobOrder::Work>(json.at("work").get<int>()),
+                    .file = json.at("file").get<std::string>(),
+                    .volume = volume_from_record(json.at("volume").get<std::string>()),
+                    .parameters = job_from_record(json.at("job").get<std::string>()).parameters,
+                    .iso = json.at("iso").get<double>(),
+                    .memory_bytes = json.at("memory_bytes").get<std::uint64_t>(),
+                    .disk_bytes = json.at("disk_bytes").get<std::uint64_t>()};
   });
 }
 
 JobAnswer answer_from(std::string_view line) {
-  return read_line(line, [](const Json& json) {
-    JobAnswer answer;
-    if (json.contains("made")) answer.made = job_from_record(json.at("made").get<std::string>());
-    if (json.contains("code")) answer.error = error_of(json);
-    if (json.contains("stage")) {
-      const int stage = json.at("stage").get<int>();
-      if (stage < 0 || stage > static_cast<int>(Stage::kDone)) throw_malformed();
-      answer.progress = {static_cast<Stage>(stage), json.at("share").get<double>(),
-                         timing_from(json.at("timing"))};
-    }
-    if (!answer.made && !answer.error && !answer.progress) throw_malformed();
-    return answer;
+  return read_line(line, [](const Json& json) -> JobAnswer {
+    if (json.contains("stage")) return progress_from(json);
+    if (json.contains("file")) return JobPiece{json.at("file"), json.at("bytes")};
+    if (json.contains("made")) return made_from(json);
+    if (json.contains("counted")) return size_from(json.at("counted"));
+    if (json.contains("code")) return error_from(json);
+    throw_malformed();
   });
 }
 

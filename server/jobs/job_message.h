@@ -1,58 +1,71 @@
-// What a worker and the process that makes its meshes tell each other, in lines of JSON over a
-// socket. The worker sends one set-up, then orders, one after the other, and may ask to cancel the
-// one that is under way. The process answers an order with lines of progress and one end.
+// What the daemon and a process that makes meshes for it tell each other over a socket, in lines of
+// JSON. The daemon sends one set-up, then orders, one after the other, and may ask to cancel the
+// one that is under way. The process answers an order with progress, first of all, with the bytes
+// of the files as they are made, and with one end.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
+#include <variant>
 
 #include "proto/error.h"
 #include "proto/types.h"
 #include "server/jobs/make_mesh.h"
+#include "server/mesh/extract.h"
 
 namespace isomesh::jobs {
 
-// What holds for all jobs of a process.
+// What holds for all orders of a process.
 struct JobSetup {
   std::filesystem::path readable;  // the folder of the volumes
-  std::filesystem::path writable;  // the folder of the files that are made
   int threads = 1;                 // of the kernels
 };
 
 struct JobOrder {
-  std::filesystem::path volume;  // its canonical file, which has been found intact
-  Job job;                       // its parameters say which volume and what to make of it
-  double iso = 0;                // whatever the parameters say of it
+  enum class Work {
+    kMesh,
+    kCount,  // only how large the surface is
+  };
+
+  Work work = Work::kMesh;
+  std::filesystem::path file;  // of the volume: canonical, and found intact
+  Volume volume;               // its id and notes
+  MeshParameters parameters;
+  double iso = 0;  // whatever the parameters say of it
   std::uint64_t memory_bytes = 0;
-  std::vector<std::filesystem::path> files;  // to be made, one for each format
+  std::uint64_t disk_bytes = 0;  // of all files together
 };
 
 struct JobProgress {
   Stage stage = Stage::kLoad;
   double share = 0;
+  Timing timing;  // of the stages that have ended
+};
+
+// Tells that so many bytes follow the line, which are the next ones of a file.
+struct JobPiece {
+  std::size_t file = 0;  // of the parameters' formats
+  std::size_t bytes = 0;
+};
+
+struct MadeMesh {
+  MeshSummary summary;  // without files
   Timing timing;
 };
 
-// One answer: exactly one of these is there.
-struct JobAnswer {
-  std::optional<JobProgress> progress;
-  std::optional<Job>
-      made;  // with mesh and timing; the files have sizes and neither digest nor href
-  std::optional<Error> error;
-};
+// The last three end the order.
+using JobAnswer = std::variant<JobProgress, JobPiece, MadeMesh, mesh::SurfaceSize, Error>;
 
 inline constexpr std::string_view kCancelMessage = "{\"cancel\":true}\n";
 
 // Each is one line with its break. The readers throw Error kInternal for a line of another form.
 std::string to_line(const JobSetup& setup);
 std::string to_line(const JobOrder& order);
-std::string to_line(const JobProgress& progress);
-std::string made_line(const Job& job);
-std::string error_line(const Error& error);
+std::string to_line(const JobAnswer& answer);
 JobSetup setup_from(std::string_view line);
 // Empty when the line asks to cancel.
 std::optional<JobOrder> order_from(std::string_view line);

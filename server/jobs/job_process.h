@@ -1,44 +1,76 @@
-// Jobs run in a process of their own, which is kept from one job to the next so that its memory is
-// mapped already.
+// Meshes are made in a process that makes nothing else meanwhile, so that whatever ends it is known
+// to have been the job's doing. It is kept from one job to the next: its memory is mapped already.
 #pragma once
 
+#include <chrono>
+#include <exception>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
+#include <string_view>
+#include <vector>
 
+#include "server/codec/encode.h"
 #include "server/jobs/job_message.h"
 #include "server/jobs/make_mesh.h"
 #include "server/process/child.h"
 
 namespace isomesh::jobs {
 
-// One worker's process. Not thread safe; the thread that calls run() must live as long as this,
-// because the process dies with it.
+// The processes that make meshes.
+struct JobProgram {
+  std::filesystem::path file;  // isomesh-job
+  JobSetup setup;
+};
+
+// The process ended in the middle of an order. The text says how, without anything of the machine,
+// and may be shown to a client.
+class ProcessEnded : public Error {
+ public:
+  explicit ProcessEnded(const std::string& text) : Error(ErrorCode::kInternal, text) {}
+};
+
+// One process. Not thread safe.
 class JobProcess {
  public:
-  JobProcess(const std::filesystem::path& program, const JobSetup& setup)
-      : program_(program), setup_(setup) {}
+  explicit JobProcess(const JobProgram& program);
 
-  // Runs a job in the process, which is started when there is none. Returns the job with its mesh
-  // and timing; the files are where the order wants them, and not on disk yet. Throws what
-  // make_mesh throws, and Error kInternal when the process ends: then this job ended it, and the
-  // next one gets a new process.
-  Job run(const JobOrder& order, const std::stop_token& stop, const Report& report);
+  // Makes a mesh in the process, which is started where there is none. `sinks` has one for each of
+  // the parameters' formats, and gets its bytes on this thread. When `stop` is requested or a sink
+  // throws, the process is asked to stop, and is killed when it has not done so soon. Throws what
+  // make_mesh and the sinks throw, ProcessEnded, and Error kInternal or kUnavailable when no
+  // process can be started.
+  MadeMesh make(const JobOrder& order, std::span<const codec::Sink> sinks,
+                const std::stop_token& stop, const Report& report);
 
-  // Of the process; none before the first job and after one that ended it.
-  std::optional<pid_t> pid() const { return child_ ? std::optional(child_->pid()) : std::nullopt; }
+  // Counts a surface in the same way.
+  mesh::SurfaceSize count(const JobOrder& order, const std::stop_token& stop);
 
  private:
-  // The next whole line; empty when the process has ended.
-  std::optional<std::string> next_line(const std::stop_token& stop);
-  [[noreturn]] void throw_ended();
+  struct Talk;
 
-  const std::filesystem::path program_;
-  const JobSetup setup_;
+  JobAnswer end_of(const JobOrder& order, std::span<const codec::Sink> sinks,
+                   const std::stop_token& stop, const Report& report);
+  void start();
+  // Empty when the process had ended before it began.
+  std::optional<JobAnswer> follow(Talk& talk);
+  void pass_on(const JobPiece& piece, Talk& talk);
+  void pass_on(const JobProgress& progress, Talk& talk);
+  // Empty when the process has ended.
+  std::optional<std::string_view> next_line(Talk& talk);
+  // Adds to what was heard; false when the process has ended.
+  bool hear(Talk& talk);
+  // Asks the process to stop when it is to; throws when it does not.
+  void look_at_stop(Talk& talk);
+  [[noreturn]] void throw_ended(const Talk& talk);
+
+  const JobProgram program_;
   std::optional<process::Child> child_;
-  std::string heard_;  // beyond the last line that was taken
-  bool is_cancelled_ = false;
+  std::vector<char> heard_;
+  std::size_t begin_ = 0;  // of what was heard and is not taken yet
+  std::size_t end_ = 0;
 };
 
 }  // namespace isomesh::jobs

@@ -1,25 +1,28 @@
-// isomesh-job: makes the meshes of one worker, one after the other, in memory that stays mapped.
+// isomesh-job: makes the meshes of one worker, one after the other, in memory that stays mapped. It
+// reads volumes and writes nothing: what it makes goes to the daemon over the socket.
+#include <algorithm>
 #include <array>
 #include <cerrno>
-#include <csignal>
+#include <chrono>
 #include <cstdlib>
-#include <memory>
 #include <new>
 #include <optional>
+#include <span>
+#include <string>
 #include <thread>
 #include <typeinfo>
+#include <utility>
+#include <vector>
 
-#include <sys/prctl.h>
 #include <unistd.h>
 
 #include "base/mutex.h"
 #include "server/jobs/job_message.h"
+#include "server/jobs/make_mesh.h"
 #include "server/jobs/memory.h"
-#include "server/jobs/pipeline.h"
 #include "server/mesh/parallel.h"
 #include "server/process/child.h"
 #include "server/process/sandbox.h"
-#include "server/store/files/files.h"
 #include "server/volume/canonical.h"
 
 namespace {
@@ -27,18 +30,42 @@ namespace {
 using namespace isomesh;
 using namespace isomesh::jobs;
 
-constexpr std::size_t kWorkspaceBudgetBytes = std::size_t{1} << 30;
+// What is kept between jobs: enough for a surface of some twenty million triangles, and a share of
+// what a job may take.
+constexpr std::uint64_t kMostKeptBytes = std::uint64_t{1} << 30;
+constexpr std::uint64_t kKeptShare = 4;
+// Beside what a job takes: for the C library, and for the stacks and the like of each thread.
+constexpr std::uint64_t kHeadroomBytes = std::uint64_t{64} << 20;
+constexpr std::uint64_t kThreadBytes = std::uint64_t{16} << 20;
+constexpr std::chrono::milliseconds kBetweenReports{20};
+// Of 64^3 samples; jobs side by side keep the processors busy.
+constexpr std::uint64_t kFewSampleBytes = std::uint64_t{1} << 18;
 
-void say(std::string_view message) {
-  while (!message.empty()) {
-    const ssize_t count = ::write(process::kChildDescriptor, message.data(), message.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) std::_Exit(EXIT_FAILURE);  // the daemon is gone
-    message.remove_prefix(static_cast<std::size_t>(count));
+// The socket's other end. Lines and pieces come whole, from whichever thread. Thread safe.
+class Speaker {
+ public:
+  void say(const JobAnswer& answer, std::span<const std::byte> piece = {}) {
+    const std::string line = to_line(answer);
+    const Lock lock(mutex_);
+    write(std::as_bytes(std::span(line)));
+    write(piece);
   }
-}
 
-// The lines that come. At the end of the other side, the process ends.
+ private:
+  static void write(std::span<const std::byte> bytes) {
+    while (!bytes.empty()) {
+      const ssize_t count = ::write(process::kChildDescriptor, bytes.data(), bytes.size());
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) std::_Exit(EXIT_FAILURE);  // the daemon is gone
+      bytes = bytes.subspan(static_cast<std::size_t>(count));
+    }
+  }
+
+  Mutex mutex_;
+};
+
+// The lines that come. At the end of the other side, so with the daemon however that ends, the
+// process ends. Not thread safe.
 class Lines {
  public:
   std::string next() {
@@ -60,7 +87,7 @@ class Lines {
   std::string text_;
 };
 
-// What the thread that reads has for the one that works.
+// What the thread that reads has for the one that works. Thread safe.
 class Desk {
  public:
   void put(JobOrder order) {
@@ -88,75 +115,125 @@ class Desk {
   std::stop_source stop_ ISOMESH_GUARDED_BY(mutex_);
 };
 
-Job make(const JobOrder& order, const std::stop_token& stop, Workspace& workspace) {
-  const Report report = [](Stage stage, double share, const Timing& timing) {
-    say(to_line(JobProgress{stage, share, timing}));
+// Tells how far a job is: each stage, and within one a few times a second. Thread safe.
+class Reporter {
+ public:
+  explicit Reporter(Speaker& speaker) : speaker_(speaker) {}
+
+  void tell(Stage stage, double share, const Timing& timing) {
+    const auto now = std::chrono::steady_clock::now();
+    {
+      const Lock lock(mutex_);
+      if (stage == stage_ && now - told_ < kBetweenReports) return;
+      stage_ = stage;
+      told_ = now;
+    }
+    speaker_.say(JobProgress{stage, share, timing});
+  }
+
+ private:
+  Speaker& speaker_;
+  Mutex mutex_;
+  Stage stage_ ISOMESH_GUARDED_BY(mutex_) = Stage::kQueue;
+  std::chrono::steady_clock::time_point told_ ISOMESH_GUARDED_BY(mutex_);
+};
+
+SampleArray array_of(const volume::CanonicalVolume& canonical) {
+  const volume::CanonicalHeader& header = canonical.header();
+  return {header.type, header.dims, header.geometry, canonical.samples().data()};
+}
+
+MadeMesh make(const JobOrder& order, const std::stop_token& stop, Speaker& speaker,
+              Workspace& workspace) {
+  Reporter reporter(speaker);
+  const Report report = [&reporter](Stage stage, double share, const Timing& timing) {
+    reporter.tell(stage, share, timing);
   };
   Progress progress(stop, report);
   progress.enter(Stage::kLoad, kLoadShare, &Timing::load);
-  const volume::CanonicalVolume canonical(order.volume);
+  const volume::CanonicalVolume canonical(order.file);
   canonical.preload();
-  std::vector<std::unique_ptr<store::File>> files;
   std::vector<codec::Sink> sinks;
-  for (const auto& path : order.files) {
-    store::File& file =
-        *files.emplace_back(std::make_unique<store::File>(store::File::create(path)));
-    sinks.emplace_back([&file](std::span<const std::byte> bytes) { file.write(bytes); });
+  for (std::size_t i = 0; i < order.parameters.formats.size(); ++i) {
+    sinks.emplace_back([&speaker, i](std::span<const std::byte> bytes) {
+      speaker.say(JobPiece{i, bytes.size()}, bytes);
+    });
   }
-  const volume::CanonicalHeader& header = canonical.header();
-  Job job = order.job;
-  job.mesh = make_mesh({header.type, header.dims, header.geometry, canonical.samples().data()},
-                       {job.parameters.volume, job.parameters, order.iso, order.memory_bytes},
-                       sinks, progress, workspace.mesh);
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    job.mesh->files[job.parameters.formats[i]] = {files[i]->size(), "", ""};
-  }
+  std::optional<mesh::OneThread> alone;
+  if (canonical.header().sample_bytes() <= kFewSampleBytes) alone.emplace();
+  MadeMesh made;
+  made.summary =
+      make_mesh(array_of(canonical),
+                {order.volume, order.parameters, order.iso, order.memory_bytes, order.disk_bytes},
+                sinks, progress, workspace.mesh);
   progress.end_stage();
-  job.timing = progress.timing();
-  return job;
+  made.timing = progress.timing();
+  return made;
 }
 
+mesh::SurfaceSize count(const JobOrder& order, const std::stop_token& stop, Speaker& speaker) {
+  speaker.say(JobProgress{});  // it has begun
+  const volume::CanonicalVolume canonical(order.file);
+  return count_surface(array_of(canonical), order.parameters, order.iso, {stop, nullptr});
+}
+
+struct Ending {
+  JobAnswer answer;
+  bool is_last = false;  // what the process has been through is not to be trusted with another job
+};
+
 // Every exception becomes a message here, because nothing else leaves this process.
-std::string answer_to(const JobOrder& order, const std::stop_token& stop, Workspace& workspace) {
+Ending work(const JobOrder& order, const std::stop_token& stop, Speaker& speaker,
+            Workspace& workspace) {
   try {
-    process::limit_memory(order.memory_bytes);
-    return made_line(make(order, stop, workspace));
+    if (order.work == JobOrder::Work::kCount) return {count(order, stop, speaker)};
+    return {make(order, stop, speaker, workspace)};
   } catch (const Error& error) {
-    return error_line(error);
+    return {error};
   } catch (const std::bad_alloc&) {
-    return error_line({ErrorCode::kTooLarge, "the job took more memory than the " +
-                                                 std::to_string(order.memory_bytes) +
-                                                 " bytes that it may have"});
+    constexpr std::uint64_t kMebibyte = 1 << 20;
+    return {Error(ErrorCode::kTooLarge, "the job takes more memory than the " +
+                                            std::to_string(order.memory_bytes / kMebibyte) +
+                                            " MiB that it may have"),
+            true};
   } catch (const std::exception& error) {
-    return error_line({ErrorCode::kInternal,
-                       std::string("A job ended with an exception: ") + typeid(error).name()});
+    return {Error(ErrorCode::kInternal,
+                  std::string("A job ended with an exception: ") + typeid(error).name()),
+            true};
+  }
+}
+
+void read_orders(Lines& lines, Desk& desk) {
+  for (;;) {
+    if (auto order = order_from(lines.next())) {
+      desk.put(*std::move(order));
+    } else {
+      desk.cancel();
+    }
   }
 }
 
 }  // namespace
 
 int main() {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   keep_freed_memory();
   Lines lines;
   const JobSetup setup = setup_from(lines.next());
-  process::confine_job(setup.readable, setup.writable);
+  const std::uint64_t headroom =
+      kHeadroomBytes + kThreadBytes * static_cast<std::uint64_t>(setup.threads);
+  const process::MemoryLimit memory;
+  process::confine_job(setup.readable);
   mesh::set_thread_count(setup.threads);
   Desk desk;
-  const std::jthread reader([&] {
-    for (;;) {
-      if (auto order = order_from(lines.next())) {
-        desk.put(*std::move(order));
-      } else {
-        desk.cancel();
-      }
-    }
-  });
+  const std::jthread reader([&] { read_orders(lines, desk); });
+  Speaker speaker;
   Workspace workspace;
   for (;;) {
     const auto [order, stop] = desk.take();
-    const std::string answer = answer_to(order, stop, workspace);
-    workspace.trim(kWorkspaceBudgetBytes);
-    say(answer);
+    memory.set(order.memory_bytes + headroom);
+    const Ending ending = work(order, stop, speaker, workspace);
+    if (!ending.is_last) workspace.trim(std::min(kMostKeptBytes, order.memory_bytes / kKeptShare));
+    speaker.say(ending.answer);
+    if (ending.is_last) std::_Exit(EXIT_SUCCESS);
   }
 }

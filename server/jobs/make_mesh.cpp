@@ -69,15 +69,24 @@ void check_disk(const mesh::Mesh& mesh, const MeshRequest& request) {
 }
 
 template <class T>
+mesh::Lattice<T> lattice_of(const SampleArray& samples) {
+  return {reinterpret_cast<const T*>(samples.bytes),
+          {samples.dims[0], samples.dims[1], samples.dims[2]},
+          mesh::lattice_to_space(samples.geometry)};
+}
+
+mesh::ExtractOptions extract_options(const MeshParameters& parameters, double iso) {
+  return {.iso = iso,
+          .scheme = parameters.scheme,
+          .interpolation = parameters.interpolation,
+          .close = parameters.close};
+}
+
+template <class T>
 void extract_as(const SampleArray& samples, const MeshRequest& request, const Progress& progress,
                 mesh::Mesh& mesh) {
-  const mesh::Lattice<T> lattice = {reinterpret_cast<const T*>(samples.bytes),
-                                    {samples.dims[0], samples.dims[1], samples.dims[2]},
-                                    mesh::lattice_to_space(samples.geometry)};
-  const mesh::ExtractOptions options = {.iso = request.iso,
-                                        .scheme = request.parameters.scheme,
-                                        .interpolation = request.parameters.interpolation,
-                                        .close = request.parameters.close};
+  const mesh::Lattice<T> lattice = lattice_of<T>(samples);
+  const mesh::ExtractOptions options = extract_options(request.parameters, request.iso);
   const mesh::SurfaceCount count = count_surface(lattice, options, progress.context(0, 0.2));
   check_memory(count, request.parameters, request.memory_bytes);
   extract_surface(lattice, options, count, progress.context(0.2, 1), mesh);
@@ -161,6 +170,19 @@ void Progress::enter(Stage stage, double share, double Timing::*elapsed) {
 void Progress::end_stage() {
   if (elapsed_ == nullptr) return;
   timing_.*elapsed_ = std::chrono::duration<double, std::milli>(Clock::now() - began_).count();
+}
+
+mesh::SurfaceSize count_surface(const SampleArray& samples, const MeshParameters& parameters,
+                                double iso, const mesh::Context& context) {
+  return with_sample(samples.type, [&](auto sample) {
+    return size_of(count_surface(lattice_of<decltype(sample)>(samples),
+                                 extract_options(parameters, iso), context));
+  });
+}
+
+void Workspace::trim(std::size_t budget_bytes) {
+  const std::size_t held = mesh.positions.capacity_bytes() + mesh.triangles.capacity_bytes();
+  if (held > budget_bytes) *this = {};
 }
 
 std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters) {

@@ -57,6 +57,15 @@ class Progress {
   std::chrono::steady_clock::time_point began_;
 };
 
+// The memory that jobs are made in, kept from one to the next so that its pages are mapped already.
+// Not thread safe.
+struct Workspace {
+  mesh::Mesh mesh;
+
+  // Gives memory back when it exceeds `budget_bytes`: one giant job must not keep it for ever.
+  void trim(std::size_t budget_bytes);
+};
+
 // A volume in memory, as Volume describes it.
 struct SampleArray {
   SampleType type = SampleType::kUint8;
@@ -74,6 +83,10 @@ struct MeshRequest {
   // Of all files together; the disk may hold other things now, but never more than that.
   std::uint64_t disk_bytes = std::numeric_limits<std::uint64_t>::max();
 };
+
+// How large the surface is, before the filter of components. Throws Error kCancelled.
+mesh::SurfaceSize count_surface(const SampleArray& samples, const MeshParameters& parameters,
+                                double iso, const mesh::Context& context);
 
 // How much memory a job with a surface of that size takes at its peak, beside its mapped volume:
 // mesh, smoothing, encoders. An upper estimate.

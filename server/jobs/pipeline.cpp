@@ -1,30 +1,37 @@
 #include "server/jobs/pipeline.h"
 
 #include <algorithm>
+#include <chrono>
 #include <memory>
-#include <optional>
+#include <span>
 #include <vector>
 
 #include "server/jobs/stored_samples.h"
-#include "server/mesh/parallel.h"
-#include "server/volume/canonical.h"
 
 namespace isomesh::jobs {
+namespace {
 
-void Workspace::trim(std::size_t budget_bytes) {
-  const std::size_t held = mesh.positions.capacity_bytes() + mesh.triangles.capacity_bytes();
-  if (held > budget_bytes) *this = {};
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
+
+// What the disk could hold of the files: the volume has to be there too.
+std::uint64_t disk_for_files(const store::BlobStore& blobs, const Volume& volume) {
+  const std::uint64_t capacity = blobs.capacity();
+  return capacity - std::min(capacity, blobs.size(volume.id).value_or(0));
+}
+
+}  // namespace
 
 PipelineResult run_pipeline(const Volume& volume, const MeshParameters& parameters,
                             const PipelineLimits& limits, const store::BlobStore& blobs,
-                            Workspace& workspace, std::stop_token stop, const Report& report) {
-  Progress progress(stop, report);
-  progress.enter(Stage::kLoad, kLoadShare, &Timing::load);
+                            JobProcess& process, std::stop_token stop, const Report& report) {
+  const auto began = Clock::now();
+  report(Stage::kLoad, 0, {});
   const store::LocalBlob file = stored_samples(blobs, volume.id, stop);
-  const volume::CanonicalVolume canonical(file.path);
-  canonical.preload();
-  const std::uint64_t file_bytes = blobs.size(volume.id).value_or(0);
+  const double checking = milliseconds_since(began);
 
   // Committed together at the end: a job that ends on the way leaves no file of it.
   std::vector<std::unique_ptr<store::BlobWriter>> writers;
@@ -33,25 +40,29 @@ PipelineResult run_pipeline(const Volume& volume, const MeshParameters& paramete
     store::BlobWriter& writer = *writers.emplace_back(blobs.begin());
     sinks.emplace_back([&writer](std::span<const std::byte> bytes) { writer.write(bytes); });
   }
-  const volume::CanonicalHeader& header = canonical.header();
-  // Of 64^3 samples; jobs side by side keep the processors busy.
-  constexpr std::uint64_t kFewSampleBytes = std::uint64_t{1} << 18;
-  std::optional<mesh::OneThread> alone;
-  if (header.sample_bytes() <= kFewSampleBytes) alone.emplace();
-  // The volume has to be there too.
-  const std::uint64_t capacity = blobs.capacity();
-  const std::uint64_t disk_bytes = capacity - std::min(capacity, file_bytes);
-  PipelineResult result;
-  result.mesh = make_mesh({header.type, header.dims, header.geometry, canonical.samples().data()},
-                          {volume, parameters, parameters.iso.value_or(volume.suggested_iso),
-                           limits.memory_bytes, disk_bytes},
-                          sinks, progress, workspace.mesh);
+  const auto with_checking = [&](Timing timing) {
+    timing.load += checking;
+    return timing;
+  };
+  const auto pass_on = [&](Stage stage, double share, const Timing& timing) {
+    report(stage, share, with_checking(timing));
+  };
+  const JobOrder order = {.file = file.path,
+                          .volume = volume,
+                          .parameters = parameters,
+                          .iso = parameters.iso.value_or(volume.suggested_iso),
+                          .memory_bytes = limits.memory_bytes,
+                          .disk_bytes = disk_for_files(blobs, volume)};
+  MadeMesh made = made_of_intact(blobs, volume.id, stop,
+                                 [&] { return process.make(order, sinks, stop, pass_on); });
+  const auto stored = Clock::now();
+  PipelineResult result = {std::move(made.summary), with_checking(made.timing)};
   for (std::size_t i = 0; i < writers.size(); ++i) {
     const store::Blob blob = writers[i]->commit();
     result.mesh.files[parameters.formats[i]] = {blob.bytes, blob.key, ""};
   }
-  progress.end_stage();
-  result.timing = progress.timing();
+  result.timing.encode += milliseconds_since(stored);
+  report(Stage::kEncode, 1, result.timing);
   return result;
 }
 

@@ -16,8 +16,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-// What a worker keeps between jobs: enough for a surface of some twenty million triangles.
-constexpr std::size_t kWorkspaceBudgetBytes = std::size_t{1} << 30;
 // How often a running job tells how far it is and learns that it is to stop.
 constexpr milliseconds kBetweenRenewals{100};
 constexpr milliseconds kBetweenReaps{1000};
@@ -127,14 +125,13 @@ bool Workers::drain(milliseconds wait) {
 }
 
 void Workers::work(const std::stop_token& stop, const std::string& name) {
-  Workspace workspace;
+  JobProcess process(options_.program);
   while (!stop.stop_requested()) {
     try {
       if (!blobs_.has_room()) {
         pause(stop, kLongestIdle);
       } else if (const auto lease = jobs_.claim(name, options_.lease)) {
-        run(*lease, workspace);
-        workspace.trim(kWorkspaceBudgetBytes);
+        run(*lease, process);
       } else {
         jobs_.wait_for_work(stop, kLongestIdle);
       }
@@ -148,7 +145,7 @@ void Workers::work(const std::stop_token& stop, const std::string& name) {
   ended_.notify_all();
 }
 
-void Workers::run(const store::Lease& lease, Workspace& workspace) {
+void Workers::run(const store::Lease& lease, JobProcess& process) {
   const auto run = std::make_shared<Run>(lease);
   {
     const Lock lock(runs_mutex_);
@@ -160,12 +157,17 @@ void Workers::run(const store::Lease& lease, Workspace& workspace) {
   try {
     const Volume volume = volumes_.get(lease.owner, lease.parameters.volume);
     PipelineResult result =
-        run_pipeline(volume, lease.parameters, options_.limits, blobs_, workspace, run->token(),
+        run_pipeline(volume, lease.parameters, options_.limits, blobs_, process, run->token(),
                      [&](Stage stage, double share, const Timing& so_far) {
                        if (run->advance({stage, share, so_far})) renew(*run);
                      });
     outcome.mesh = std::move(result.mesh);
     outcome.timing = result.timing;
+  } catch (const ProcessEnded& end) {
+    outcome.error = to_problem(end, path);
+    outcome.error->detail = end.what();  // of the job rather than of the service, so it is told
+    outcome.may_retry = true;
+    spdlog::error("job {}, attempt {}: {}", lease.id, lease.attempt, end.what());
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kOutOfSpace) run->stop(Reason::kFullDisk);
     if (error.code() == ErrorCode::kUnavailable) run->stop(Reason::kExhausted);
@@ -175,9 +177,9 @@ void Workers::run(const store::Lease& lease, Workspace& workspace) {
       spdlog::error("job {}, attempt {}: {}", lease.id, lease.attempt, error.what());
     }
   } catch (const std::bad_alloc&) {
-    outcome.error =
-        to_problem({ErrorCode::kTooLarge, "there is not enough memory for this surface"}, path);
-    spdlog::error("job {}, attempt {}: out of memory", lease.id, lease.attempt);
+    // The service's memory, not the job's.
+    run->stop(Reason::kExhausted);
+    spdlog::error("job {}, attempt {}: the service is out of memory", lease.id, lease.attempt);
   } catch (const std::exception& error) {
     outcome.error = to_problem({ErrorCode::kInternal, error.what()}, path);
     outcome.may_retry = true;

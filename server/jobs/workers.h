@@ -18,14 +18,15 @@ namespace isomesh::jobs {
 
 struct WorkerOptions {
   std::size_t threads = 2;
+  JobProgram program = {};
   PipelineLimits limits = {};
   std::chrono::milliseconds lease{30'000};  // how soon a dead worker's job is run again
   std::chrono::minutes longest_job{60};     // one that runs longer fails
 };
 
-// The threads that run jobs, one job each at a time; the kernels' own threads are shared between
-// them. One more thread prolongs their leases and looks after those that ran out. The stores must
-// outlive it. Thread safe.
+// The threads that run jobs, one job each at a time, in a process that each keeps. One more thread
+// prolongs their leases and looks after those that ran out. The stores must outlive it. Thread
+// safe.
 class Workers {
  public:
   Workers(const WorkerOptions& options, store::JobStore& jobs, const store::VolumeStore& volumes,
@@ -44,7 +45,7 @@ class Workers {
   class Run;
 
   void work(const std::stop_token& stop, const std::string& name);
-  void run(const store::Lease& lease, Workspace& workspace);
+  void run(const store::Lease& lease, JobProcess& process);
   void conclude(const Run& run, store::Outcome outcome);
   std::chrono::milliseconds full_disk_delay(const std::string& job);
   void renew(Run& run);

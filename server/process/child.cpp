@@ -1,8 +1,10 @@
 #include "server/process/child.h"
 
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <csignal>
+#include <cstring>
 #include <thread>
 
 #include <fcntl.h>
@@ -146,6 +148,15 @@ bool Child::reap(bool waiting) {
     found = ::waitpid(pid_, &status_, waiting ? 0 : WNOHANG);
   } while (found < 0 && errno == EINTR);
   return reaped_ = found != 0;
+}
+
+std::string how_it_ended(const std::optional<int>& status) {
+  if (!status) return "without an answer";
+  if (!WIFSIGNALED(*status)) return "with status " + std::to_string(WEXITSTATUS(*status));
+  const char* const known = ::sigdescr_np(WTERMSIG(*status));
+  std::string name = known == nullptr ? "unknown" : known;
+  name[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(name[0])));
+  return "with signal " + std::to_string(WTERMSIG(*status)) + " (" + name + ')';
 }
 
 Child start_program(const std::filesystem::path& program) {

@@ -82,6 +82,10 @@ class Child {
   bool reaped_ = false;
 };
 
+// "with signal 9 (killed)", "with status 1", "without an answer": of a status as waitpid gives it,
+// and of none. Ends a sentence.
+std::string how_it_ended(const std::optional<int>& status);
+
 // Starts a program that inherits nothing of this process but one end of a socket: its environment
 // is empty and its signals have their defaults. Safe with threads running. Throws Error kInternal.
 Child start_program(const std::filesystem::path& program);

@@ -5,9 +5,10 @@
 #include <cerrno>
 #include <csignal>
 #include <cstddef>
-#include <fstream>
 #include <initializer_list>
 #include <limits>
+#include <sstream>
+#include <string>
 
 #include <fcntl.h>
 #include <linux/landlock.h>
@@ -97,7 +98,7 @@ void allow(const Descriptor& ruleset, const std::filesystem::path& path, std::ui
       "landlock_add_rule");
 }
 
-// Leaves `readable`, a file or a folder, and all of the folder `writable`.
+// Leaves `readable`, a file or a folder, and all of the folder `writable`, where one is named.
 void restrict_files(const std::filesystem::path& readable, const std::filesystem::path& writable) {
   const long version = landlock_version();
   if (version < 1) return;
@@ -112,7 +113,7 @@ void restrict_files(const std::filesystem::path& readable, const std::filesystem
                                   LANDLOCK_ACCESS_FS_MAKE_DIR | LANDLOCK_ACCESS_FS_REMOVE_FILE |
                                   LANDLOCK_ACCESS_FS_REMOVE_DIR | kTruncate;
   allow(ruleset, readable, kRead);
-  allow(ruleset, writable, kWork & attributes.handled_access_fs);
+  if (!writable.empty()) allow(ruleset, writable, kWork & attributes.handled_access_fs);
   require(::syscall(SYS_landlock_restrict_self, ruleset.number(), 0) == 0,
           "landlock_restrict_self");
 }
@@ -248,16 +249,23 @@ void confine_process(Threads threads) {
 
 void confine_ahead() { confine_process(Threads::kOne); }
 
-void confine_job(const std::filesystem::path& readable, const std::filesystem::path& writable) {
+void confine_job(const std::filesystem::path& readable) {
   confine_process(Threads::kMany);
-  restrict_files(readable, writable);
+  limit(RLIMIT_FSIZE, 0);
+  restrict_files(readable, {});
 }
 
-void limit_memory(std::uint64_t more_bytes) {
+MemoryLimit::MemoryLimit() : usage_(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC)) {
+  require(usage_.number() >= 0, "open");
+}
+
+void MemoryLimit::set(std::uint64_t more_bytes) const {
   if constexpr (!kLimitMemory) return;
+  std::array<char, 256> text = {};
+  require(::pread(usage_.number(), text.data(), text.size() - 1, 0) > 0, "pread");
+  std::istringstream numbers(text.data());
   std::uint64_t present = 0;  // in pages; the sixth number is of data and stack
-  std::ifstream file("/proc/self/statm");
-  for (int number = 0; number < 6; ++number) file >> present;
+  for (int number = 0; number < 6; ++number) numbers >> present;
   present *= static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
   rlimit bounds = {};
   require(::getrlimit(RLIMIT_DATA, &bounds) == 0, "getrlimit");

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <filesystem>
 
+#include "base/descriptor.h"
+
 namespace isomesh::process {
 
 struct Confinement {
@@ -29,15 +31,24 @@ void confine_ahead();
 // confine_ahead(), once. Throws as that does; a kernel without Landlock is no error.
 void confine_to(const Confinement& confinement);
 
-// Confines a process that works for long, with threads: it may read below one folder and do
-// anything below another, and has the calls of confine_ahead() and those that make threads. Throws
-// as that does. Must be called before a second thread is started, once, and instead of the two
-// above.
-void confine_job(const std::filesystem::path& readable, const std::filesystem::path& writable);
+// Confines a process that works for long, with threads: it may read below one folder and write
+// nothing, and has the calls of confine_ahead() and those that make threads. Throws as that does.
+// Must be called before a second thread is started, once, and instead of the two above.
+void confine_job(const std::filesystem::path& readable);
 
-// From now on the process's private memory is at most so many bytes more than it is. May be called
-// again and again.
-void limit_memory(std::uint64_t more_bytes);
+// Limits the process's private memory (RLIMIT_DATA), again and again. To be made before the process
+// is confined. Not thread safe.
+class MemoryLimit {
+ public:
+  // Throws Error kInternal, as set() does.
+  MemoryLimit();
+
+  // From now on the process has at most so many bytes more than it has.
+  void set(std::uint64_t more_bytes) const;
+
+ private:
+  Descriptor usage_;  // a confined process could not open it any more
+};
 
 // Whether the kernel can keep a process from other files. Thread safe.
 bool has_landlock();

@@ -121,12 +121,10 @@ struct QueueDepth {
 };
 
 struct JobStoreOptions {
-  std::size_t max_queued = 1000;  // a longer queue accepts nothing
-  int attempts = 3;               // how often a job is begun that fails or ends its worker
+  std::size_t max_queued = 1000;                // a longer queue accepts nothing
+  int attempts = 3;                             // how often a job is begun that fails
   std::chrono::milliseconds retry_delay{1000};  // after the first attempt; four times it after each
-  // A run that ends with its process counts as an attempt when it has lasted longer.
-  std::chrono::milliseconds short_run{1000};
-  std::string mesher_version = {};  // results of another one are not reused
+  std::string mesher_version = {};              // results of another one are not reused
 };
 
 // Thread safe. Every verb is one transaction; nothing is held open between them. All may throw
@@ -155,8 +153,8 @@ class JobStore {
   // Returns when a claim may succeed, `longest` is over or `stop` is requested. True: try.
   virtual bool wait_for_work(const std::stop_token& stop, std::chrono::milliseconds longest) = 0;
 
-  // Prolongs the lease to `lease` from now and tells how far the job is. Meant to be called often:
-  // it reaches the disk only when a third of the lease is used up.
+  // Prolongs the lease to `length` from now and tells how far the job is. Meant to be called often:
+  // it does not reach the disk.
   virtual Standing renew(const Lease& lease, const Progress& progress,
                          std::chrono::milliseconds length) = 0;
 
@@ -170,16 +168,10 @@ class JobStore {
   virtual bool put_back(const Lease& lease, std::chrono::milliseconds delay,
                         std::optional<WaitingFor> waiting_for = {}) = 0;
 
-  // Ends the runs whose leases have run out: their jobs are queued again, have failed after the
-  // last attempt, or are cancelled. Anyone may call. Returns how many there were.
+  // Ends the runs whose leases have run out, and those whose process is known to be gone: their
+  // jobs are queued again, or are cancelled. No attempt is counted, however often that happens: it
+  // is the service that ended or stood still. Anyone may call. Returns how many there were.
   virtual std::size_t reap() = 0;
-
-  // Ends the runs of the process whose place this one has taken, which is gone, without waiting
-  // for their leases to run out. To be called once, before anything is claimed. Returns how many
-  // there were. It counts as an attempt of a job that was the only one to run and had run for a
-  // while. Otherwise nobody knows which job ended the process, or whether a job did: no attempt is
-  // counted, and only a job to which this happened ten times fails.
-  virtual std::size_t reap_predecessor() = 0;
 
   // A queued job never runs, a running one is asked to stop, a finished one stays as it is. Throws
   // Error kNotFound or kGone.

@@ -4,6 +4,7 @@
 #include <csignal>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -64,6 +65,15 @@ class FaultTest : public testing::Test {
       if (attempt(passes)) return true;
     }
     return false;
+  }
+
+  static constexpr const char* kJobProgram = "isomesh-job";
+
+  // The processes that the daemon makes meshes in.
+  std::set<pid_t> job_processes() {
+    std::set<pid_t> found = children_of(daemon().pid());
+    std::erase_if(found, [](pid_t process) { return program_of(process) != kJobProgram; });
+    return found;
   }
 
   // Runs SQL on the data folder's database; returns the first column of the last row.

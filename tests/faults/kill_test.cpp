@@ -98,8 +98,7 @@ class Kill : public FaultTest {
     }
   }
 
-  // Waits until the job that has waited longest has ended. A job that three lives in a row could
-  // not finish is failed by design; so that only what is wrong fails here, also on a slow machine,
+  // Waits until the job that has waited longest has ended. So that some end also on a slow machine,
   // every second life gets that far.
   void let_the_oldest_end() {
     std::vector<Job> waiting = daemon().client().jobs(JobState::kRunning).jobs;

@@ -1,5 +1,6 @@
 // What becomes of jobs whose daemon dies, sleeps or is stopped while they run.
 #include <algorithm>
+#include <set>
 #include <string>
 #include <thread>
 
@@ -57,28 +58,108 @@ TEST_F(Leases, StoppedBeyondTheLeaseItsLateResultIsRefused) {
     return now.state == JobState::kRunning && now.started != before.started;
   }));
   EXPECT_THAT(daemon().errors(), HasSubstr("had lost its lease"));
+  EXPECT_EQ(run_sql("SELECT attempts FROM jobs WHERE id = '" + before.id + "'"), "1");
   daemon().client().cancel(before.id);
   EXPECT_EQ(ended(before.id).state, JobState::kCancelled);
   EXPECT_EQ(blob_count(), 1U);
 }
 
-TEST_F(Leases, AJobThatEndsItsDaemonThreeTimesFailsAndOthersGoOn) {
-  start({"--workers", "1"});
-  const Job deadly = endless_job();
-  const std::string other = submit(daemon(), small_volume(), 100).id;
-  for (int death = 1; death <= 3; ++death) {
-    ASSERT_TRUE(comes_to(deadly.id, JobState::kRunning)) << death;
-    // Its daemon's death is charged to a job when it has run for a while.
-    ASSERT_TRUE(eventually(
-        [&] { return run_sql("SELECT is_long FROM jobs WHERE id = '" + deadly.id + "'") == "1"; }));
+// Nobody knows what ended it, and a job could have ended only its own process.
+TEST_F(Leases, ADaemonsDeathIsChargedToNoJob) {
+  start({"--workers", "2"});
+  const Job first = endless_job();
+  const Job second = begun_job(1000, 49);
+  for (int death = 1; death <= 5; ++death) {
+    for (const Job& job : {first, second}) {
+      ASSERT_TRUE(comes_to(job.id, JobState::kRunning)) << death;
+      EXPECT_EQ(run_sql("SELECT attempts FROM jobs WHERE id = '" + job.id + "'"), "1") << death;
+    }
     kill();
-    start({"--workers", "1"});
+    start({"--workers", "2"});
   }
-  const Job failed = job(deadly.id);
+  for (const Job& job : {first, second}) {
+    ASSERT_TRUE(comes_to(job.id, JobState::kRunning));
+    daemon().client().cancel(job.id);
+    EXPECT_EQ(ended(job.id).state, JobState::kCancelled);
+  }
+}
+
+TEST_F(Leases, AJobsProcessDiesWithItsDaemon) {
+  start();
+  endless_job();
+  const std::set<pid_t> processes = job_processes();
+  ASSERT_FALSE(processes.empty());
+  kill();
+  for (const pid_t process : processes) {
+    EXPECT_TRUE(eventually([&] { return program_of(process) != kJobProgram; }));
+  }
+}
+
+TEST_F(Leases, AJobWhoseProcessIsKilledThreeTimesFailsAndItsNeighbourGoesOn) {
+  start({"--workers", "2"});
+  const Job neighbour = endless_job();
+  const std::set<pid_t> others = job_processes();
+  ASSERT_EQ(others.size(), 1U);
+  const Job deadly = begun_job(1000, 49);
+  for (int death = 1; death <= 3; ++death) {
+    ASSERT_TRUE(eventually([&] { return job(deadly.id).stage == Stage::kSmooth; })) << death;
+    for (const pid_t process : job_processes()) {
+      if (!others.contains(process)) ::kill(process, SIGKILL);
+    }
+    ASSERT_TRUE(eventually([&] { return job(deadly.id).stage != Stage::kSmooth; })) << death;
+  }
+  const Job failed = ended(deadly.id);
   EXPECT_EQ(failed.state, JobState::kFailed);
   ASSERT_TRUE(failed.error);
-  EXPECT_THAT(failed.error->detail, HasSubstr("3 times"));
-  EXPECT_EQ(ended(other).state, JobState::kSucceeded);
+  EXPECT_EQ(failed.error->detail,
+            "The process that made it ended with signal 9 (killed) in the stage \"smooth\".");
+  const Job now = job(neighbour.id);
+  EXPECT_EQ(now.state, JobState::kRunning);
+  EXPECT_EQ(now.started, job(neighbour.id).started);
+  EXPECT_TRUE(job_processes().contains(*others.begin()));
+  EXPECT_EQ(run_sql("SELECT attempts FROM jobs WHERE id = '" + neighbour.id + "'"), "1");
+  daemon().client().cancel(neighbour.id);
+  EXPECT_EQ(ended(submit(daemon(), small_volume(), 100).id).state, JobState::kSucceeded);
+}
+
+// The disk gives way under a job, and nobody else notices.
+TEST_F(Leases, AVolumeThatIsCutUnderARunningJobEndsThatJobAlone) {
+  start({"--workers", "1"});
+  const Volume volume = upload(daemon(), long_upload());
+  const auto file = daemon().data() / "blobs" / volume.id.substr(0, 2) / volume.id;
+  const std::string bytes = read_file(file);
+  Job job;
+  // One that has been read whole by then is none the worse for it.
+  for (int tries = 0; tries < 40 && job.state != JobState::kFailed; ++tries) {
+    write_file(file, bytes);
+    job = submit(daemon(), volume, 40 + 0.5 * tries, R"("passes": 0)");
+    std::this_thread::sleep_for(std::chrono::milliseconds(tries));
+    std::filesystem::resize_file(file, 4096);
+    job = ended(job.id);
+    ASSERT_TRUE(job.state == JobState::kSucceeded || job.state == JobState::kFailed);
+  }
+  ASSERT_EQ(job.state, JobState::kFailed);
+  EXPECT_EQ(job.error->status, 422);
+  EXPECT_THAT(job.error->detail, HasSubstr("damaged"));
+  for (const std::string view : {"/slice.png", "/histogram"}) {
+    EXPECT_TRUE(
+        is_problem(daemon().get("/v1/volumes/" + volume.id + view), ErrorCode::kUnusableVolume));
+  }
+  EXPECT_EQ(ended(submit(daemon(), small_volume(), 100).id).state, JobState::kSucceeded);
+}
+
+TEST_F(Leases, AJobStopsInTheMiddleOfAStream) {
+  start({"--workers", "1"});
+  const std::string id =
+      submit(daemon(), upload(daemon(), long_upload()), 50, R"("passes": 0, "draco": {"speed": 0})")
+          .id;
+  ASSERT_TRUE(eventually([&] { return job(id).stage == Stage::kEncode; }));
+  const std::set<pid_t> before = job_processes();
+  ASSERT_EQ(before.size(), 1U);
+  daemon().client().cancel(id);
+  EXPECT_EQ(ended(id).state, JobState::kCancelled);
+  EXPECT_FALSE(job_processes().contains(*before.begin())) << "it was not interrupted";
+  EXPECT_EQ(ended(submit(daemon(), small_volume(), 100).id).state, JobState::kSucceeded);
 }
 
 // Whoever ends a daemon in an orderly way may do so as often as he likes.

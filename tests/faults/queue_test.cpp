@@ -156,6 +156,24 @@ TEST_F(Queue, AFullDiskIsToldAndAcceptedJobsStay) {
   EXPECT_TRUE(eventually([&] { return scratch_count() == 0; }));
 }
 
+// The samples of both fit; what one would make does not.
+TEST_F(Queue, AJobHasMemoryOfItsOwn) {
+  start({"--workers", "2", "--threads", "2", "--job-memory", "64MiB"});
+  const Job refused = ended(submit(daemon(), upload(daemon(), long_upload()), 50).id);
+  EXPECT_EQ(refused.state, JobState::kFailed);
+  EXPECT_EQ(refused.error->status, 413);
+  EXPECT_THAT(refused.error->detail, testing::HasSubstr("64 MiB are allowed"));
+  EXPECT_EQ(ended(submit(daemon(), small_volume(), 100).id).state, JobState::kSucceeded);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // there memory is not limited
+  for (const pid_t process : job_processes()) {
+    const std::string limits = read_file("/proc/" + std::to_string(process) + "/limits");
+    const std::size_t line = limits.find("Max data size");
+    ASSERT_NE(line, std::string::npos);
+    EXPECT_LT(std::stoull(limits.substr(limits.find_first_of("0123456789", line))), 1ULL << 30);
+  }
+#endif
+}
+
 // The mesh does not fit; the job is run again when there is room, and no attempt is counted.
 TEST_F(Queue, AJobThatFindsTheDiskFullWaitsForRoom) {
   start({"--workers", "1"});

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iostream>
 #include <random>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -44,19 +45,11 @@ class Soak : public FaultTest {
   }
 
   Sample look() {
-    const std::string process = "/proc/" + std::to_string(daemon().process_id());
     Sample sample;
-    std::ifstream status(process + "/status");
-    for (std::string line; std::getline(status, line);) {
-      const auto number = [&] { return std::stoull(line.substr(line.find(':') + 1)); };
-      if (line.starts_with("VmRSS:")) sample.memory_bytes = number() * 1024;
-      if (line.starts_with("Threads:")) sample.threads = number();
-    }
+    std::set<pid_t> processes = job_processes();
+    processes.insert(daemon().process_id());
+    for (const pid_t process : processes) add("/proc/" + std::to_string(process), sample);
     std::error_code gone;
-    for ([[maybe_unused]] const auto& entry :
-         std::filesystem::directory_iterator(process + "/fd", gone)) {
-      ++sample.descriptors;
-    }
     for (std::filesystem::recursive_directory_iterator entry(folder_ / "data", gone), end;
          entry != end; entry.increment(gone)) {
       std::error_code absent;
@@ -64,6 +57,21 @@ class Soak : public FaultTest {
       if (!absent) sample.disk_bytes += bytes;
     }
     return sample;
+  }
+
+  // What a process, by its folder in /proc, has of all but the disk.
+  static void add(const std::string& process, Sample& sample) {
+    std::ifstream status(process + "/status");
+    for (std::string line; std::getline(status, line);) {
+      const auto number = [&] { return std::stoull(line.substr(line.find(':') + 1)); };
+      if (line.starts_with("VmRSS:")) sample.memory_bytes += number() * 1024;
+      if (line.starts_with("Threads:")) sample.threads += number();
+    }
+    std::error_code gone;
+    for ([[maybe_unused]] const auto& entry :
+         std::filesystem::directory_iterator(process + "/fd", gone)) {
+      ++sample.descriptors;
+    }
   }
 
   // What a client of each kind does once. Refusals are part of the load.

@@ -115,17 +115,38 @@ Finished run(const std::vector<std::string>& command, const std::vector<std::str
   return {status, process.output(), process.errors()};
 }
 
+namespace {
+
+struct Status {
+  std::string program;
+  pid_t parent = 0;
+};
+
+// Empty when the process has ended, whether it has been waited for or not.
+std::optional<Status> status_of(const std::string& process) {
+  std::ifstream file("/proc/" + process + "/stat");
+  std::string line;
+  std::getline(file, line);
+  const std::size_t begin = line.find('(');
+  const std::size_t end = line.rfind(')');
+  if (end == std::string::npos || line[end + 2] == 'Z') return std::nullopt;
+  return Status{line.substr(begin + 1, end - begin - 1), std::stoi(line.substr(end + 4))};
+}
+
+}  // namespace
+
+std::string program_of(pid_t process) {
+  const auto status = status_of(std::to_string(process));
+  return status ? status->program : "";
+}
+
 std::set<pid_t> children_of(pid_t parent) {
   std::set<pid_t> found;
   for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
     const std::string name = entry.path().filename();
     if (name.find_first_not_of("0123456789") != std::string::npos) continue;
-    std::ifstream file(entry.path() / "stat");
-    std::string line;
-    std::getline(file, line);
-    const std::size_t end = line.rfind(')');
-    if (end == std::string::npos || line[end + 2] == 'Z') continue;
-    if (std::stoi(line.substr(end + 4)) == parent) found.insert(std::stoi(name));
+    const auto status = status_of(name);
+    if (status && status->parent == parent) found.insert(std::stoi(name));
   }
   return found;
 }

@@ -68,6 +68,9 @@ Finished run(const std::vector<std::string>& command,
 // The processes whose parent is `parent` and that have not ended.
 std::set<pid_t> children_of(pid_t parent);
 
+// The name of a process's program, at most 15 letters of it; empty when the process has ended.
+std::string program_of(pid_t process);
+
 // Calls `condition` until it is true; false when it is not within that time.
 bool eventually(const std::function<bool()>& condition, std::chrono::seconds longest = kLongest);
 

@@ -48,9 +48,7 @@ CREATE TABLE jobs(
   cancelling INTEGER NOT NULL,
   idempotency_key TEXT,
   request_digest TEXT,
-  record TEXT NOT NULL,
-  interruptions INTEGER NOT NULL DEFAULT 0,  -- runs that ended with their process, uncharged
-  is_long INTEGER NOT NULL DEFAULT 0         -- its run has lasted a while
+  record TEXT NOT NULL
 ) WITHOUT ROWID;
 CREATE INDEX jobs_queue ON jobs(priority, id) WHERE state = 0;
 CREATE INDEX jobs_running ON jobs(lease_until) WHERE state = 1;

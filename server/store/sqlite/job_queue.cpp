@@ -14,9 +14,6 @@ namespace {
 
 constexpr std::chrono::milliseconds kBetweenProgressEvents{100};
 constexpr std::chrono::seconds kRetryAfter{1};
-// A process that dies under several jobs says little about each of them, and one that is killed
-// from outside says nothing. But a job that is there every time is not run for ever.
-constexpr int kMostInterruptions = 10;
 
 std::int64_t microseconds(std::chrono::milliseconds time) {
   return std::chrono::microseconds(time).count();
@@ -36,14 +33,6 @@ double milliseconds_since(std::int64_t begin_us) {
   throw Error(is_gone ? ErrorCode::kGone : ErrorCode::kNotFound, detail, {{"volume", detail}});
 }
 
-// A problem of ours, told with what is known: it would help nobody to hide it.
-Problem lost_worker(const Job& job, int attempts) {
-  Problem problem = to_problem(Error(ErrorCode::kInternal, ""), "/v1/jobs/" + job.id);
-  problem.detail = "The service ended " + std::to_string(attempts) +
-                   " times while it ran this job; the job is not begun again.";
-  return problem;
-}
-
 }  // namespace
 
 Submission SqliteJobStore::submit(const JobSpec& spec) {
@@ -59,7 +48,7 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
                                         "idempotency_key = ?",
                                     spec.owner, spec.idempotency_key);
       if (earlier.next()) {
-        constexpr int kAfterTheRow = 10;
+        constexpr int kAfterTheRow = 7;
         if (earlier.text(kAfterTheRow) != spec.request_digest)
           return {Submission::Kind::kConflict, {}, {}};
         return {Submission::Kind::kExisting, with_progress(row_of(earlier)), {}};
@@ -128,7 +117,7 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   row.job.started = timestamp();
   row.job.timing.queue = milliseconds_since(row.accepted);
   change->run(
-      "UPDATE jobs SET state = 1, attempts = ?, fence = ?, claimed = ?, is_long = 0, worker = ?, "
+      "UPDATE jobs SET state = 1, attempts = ?, fence = ?, claimed = ?, worker = ?, "
       "waiting_for = NULL, record = ? WHERE id = ?",
       row.attempts, row.fence, now, worker, to_json(row.job), row.job.id);
   change.announce(row, EventKind::kStage);
@@ -149,29 +138,12 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
 
 Standing SqliteJobStore::renew(const Lease& lease, const Progress& progress,
                                std::chrono::milliseconds length) {
-  std::optional<Live> run;
-  {
-    const Lock lock(live_mutex_);
-    if (const Live* const known = live(lease)) run = *known;
-  }
-  const Steady now = Steady::clock::now();
-  if (!run || run->lease_until < now) return Standing::kLost;
+  if (!is_held(lease.id, lease.fence)) return Standing::kLost;
   tell(lease, progress);
-  const bool is_long = now - run->claimed >= options_.short_run;
-  if (is_long != run->is_long) {
-    // What it is charged for when it takes the machine down with it.
-    Change change(*this);
-    const int held =
-        change->run("UPDATE jobs SET is_long = ? WHERE id = ? AND fence = ? AND state = 1",
-                    is_long ? 1 : 0, lease.id, lease.fence);
-    if (held == 0) return Standing::kLost;
-    change.commit();
-  }
   const Lock lock(live_mutex_);
   Live* const renewed = live(lease);
   if (renewed == nullptr) return Standing::kLost;
-  renewed->lease_until = now + length;
-  renewed->is_long = is_long;
+  renewed->lease_until = Steady::clock::now() + length;
   return renewed->cancelling ? Standing::kCancel : Standing::kOk;
 }
 
@@ -216,13 +188,8 @@ bool SqliteJobStore::put_back(const Lease& lease, std::chrono::milliseconds dela
     Change change(*this);
     auto held = leased(change.connection(), lease);
     if (!held) return false;
-    if (held->cancelling) {
-      end(change, *held, JobState::kCancelled);
-    } else {
-      held->attempts -= 1;
-      held->job.waiting_for = waiting_for;
-      queue_again(change, *held, delay);
-    }
+    held->job.waiting_for = waiting_for;
+    give_back(change, *held, delay);
     change.commit();
     return true;
   });
@@ -243,14 +210,7 @@ std::size_t SqliteJobStore::reap() {
     }
     std::erase_if(rows, [this](const Row& row) { return is_held(row.job.id, row.fence); });
     for (Row& row : rows) {
-      if (row.cancelling) {
-        end(change, row, JobState::kCancelled);
-      } else if (row.attempts >= options_.attempts || row.interruptions >= kMostInterruptions) {
-        row.job.error = lost_worker(row.job, row.attempts + row.interruptions);
-        end(change, row, JobState::kFailed);
-      } else {
-        queue_again(change, row, std::chrono::milliseconds(0));
-      }
+      give_back(change, row, std::chrono::milliseconds(0));
       forget_run(row.job.id, row.fence);
     }
     change.commit();
@@ -258,25 +218,6 @@ std::size_t SqliteJobStore::reap() {
   });
   if (reaped > 0) wake_workers();
   return reaped;
-}
-
-std::size_t SqliteJobStore::reap_predecessor() {
-  database_.freeing([&] {
-    Transaction transaction(database_.writer());
-    std::int64_t running = 0;
-    {
-      Query query = transaction->query("SELECT count(*) FROM jobs WHERE state = 1");
-      query.next();
-      running = query.integer(0);
-    }
-    transaction->run(
-        "UPDATE jobs SET attempts = attempts - 1, interruptions = interruptions + 1 WHERE state = "
-        "1 "
-        "AND (is_long = 0 OR ? > 1)",
-        running);
-    transaction.commit();
-  });
-  return reap();
 }
 
 Job SqliteJobStore::cancel(const Viewer& viewer, const std::string& id) {
@@ -352,6 +293,12 @@ void SqliteJobStore::succeed_alike(Change& change, const Row& row, const MeshSum
     other.job.timing.queue = milliseconds_since(other.accepted);
     succeed(change, other, mesh);
   }
+}
+
+void SqliteJobStore::give_back(Change& change, Row& row, std::chrono::milliseconds delay) const {
+  if (row.cancelling) return end(change, row, JobState::kCancelled);
+  row.attempts -= 1;
+  queue_again(change, row, delay);
 }
 
 void SqliteJobStore::queue_again(Change& change, Row& row, std::chrono::milliseconds delay) const {

@@ -14,9 +14,6 @@ struct SqliteJobStore::Row {
   std::string result_key;
   std::int64_t accepted = 0;
   int attempts = 0;
-  int interruptions = 0;  // runs that ended with their process and that count as no attempt
-  std::int64_t claimed = 0;
-  bool is_long = false;  // its run has lasted the store's short_run
   std::uint64_t fence = 0;
   bool cancelling = false;
 };
@@ -54,8 +51,7 @@ class SqliteJobStore::Change {
 
 // The columns that row_of() reads.
 inline constexpr const char* kRowColumns =
-    "record, owner, result_key, accepted, attempts, fence, cancelling, interruptions, "
-    "claimed, is_long";
+    "record, owner, result_key, accepted, attempts, fence, cancelling";
 
 // A job is not kept waiting for longer: if one seems to be, the clock was set back.
 inline constexpr std::int64_t kLongestWaitUs = std::int64_t{3600} * 1'000'000;

@@ -198,9 +198,6 @@ SqliteJobStore::Row SqliteJobStore::row_of(const Query& query) {
   row.attempts = static_cast<int>(query.integer(4));
   row.fence = static_cast<std::uint64_t>(query.integer(5));
   row.cancelling = query.integer(6) != 0;
-  row.interruptions = static_cast<int>(query.integer(7));
-  row.claimed = query.integer(8);
-  row.is_long = query.integer(9) != 0;
   return row;
 }
 

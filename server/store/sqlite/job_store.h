@@ -31,8 +31,6 @@ class SqliteJobStore : public JobStore {
   bool put_back(const Lease& lease, std::chrono::milliseconds delay,
                 std::optional<WaitingFor> waiting_for) override;
   std::size_t reap() override;
-  // Whoever has the data folder's lock knows that no other process holds a lease.
-  std::size_t reap_predecessor() override;
   Job cancel(const Viewer& viewer, const std::string& id) override;
   Job get(const Viewer& viewer, const std::string& id) const override;
   JobAccount account(const std::string& id) const override;
@@ -61,7 +59,6 @@ class SqliteJobStore : public JobStore {
     std::uint64_t fence = 0;
     Steady claimed;
     Steady lease_until;
-    bool is_long = false;
     bool cancelling = false;
     std::optional<Progress> progress = {};  // none before the first renewal
     EventLog::Clock::time_point told = {};
@@ -84,6 +81,8 @@ class SqliteJobStore : public JobStore {
   void end(Change& change, Row& row, JobState state) const;
   void succeed(Change& change, Row& row, const MeshSummary& mesh) const;
   void succeed_alike(Change& change, const Row& row, const MeshSummary& mesh) const;
+  // Queues a job again whose run counts as no attempt, or ends it cancelled.
+  void give_back(Change& change, Row& row, std::chrono::milliseconds delay) const;
   void queue_again(Change& change, Row& row, std::chrono::milliseconds delay) const;
   std::chrono::milliseconds delay_after(int attempts) const;
   std::vector<Event> kept_events(const Viewer& viewer, const std::string& job, std::uint64_t since,

@@ -58,7 +58,7 @@ class OpenApi : public testing::Test {
   jobs::VolumeLibrary library_{
       data_, blobs_, volumes_, retention_, volume::SizeLimits{}, jobs::RunnerOptions{}};
   jobs::Histograms histograms_{blobs_};
-  jobs::Estimator estimator_{volumes_, blobs_, jobs_, jobs::PipelineLimits{}};
+  jobs::Estimator estimator_{volumes_, blobs_, jobs_, jobs::PipelineLimits{}, jobs::JobProgram{}};
   Metrics metrics_;
   store::SqliteOutbox outbox_{database_};
   const callbacks::CallbackTargets targets_{{}};

@@ -1,11 +1,12 @@
 #include "server/jobs/estimate.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "server/jobs/histograms.h"
 #include "server/jobs/workers.h"
 #include "tests/support/errors.h"
 #include "tests/support/jobs.h"
+#include "tests/unit/jobs/faulty_job.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
@@ -14,11 +15,11 @@ namespace {
 class EstimateTest : public test::JobsFixture {
  protected:
   Job run(const JobParameters& parameters) {
-    const Workers workers({.threads = 1}, jobs_, volumes_, blobs_);
+    const Workers workers({.threads = 1, .program = job_program()}, jobs_, volumes_, blobs_);
     return test::end_of(jobs_, "", job_of(jobs_.submit({"", parameters, "", ""})).id);
   }
 
-  Estimator estimator_{volumes_, blobs_, jobs_, {.memory_bytes = 4 << 20}};
+  Estimator estimator_{volumes_, blobs_, jobs_, {.memory_bytes = 4 << 20}, job_program()};
 };
 
 TEST_F(EstimateTest, CountsWhatTheJobMakes) {
@@ -93,6 +94,25 @@ TEST_F(EstimateTest, RefusesWhatIsNotThereOrHasStopped) {
   EXPECT_TRUE(test::code_thrown_by([&] { estimator_.estimate("", parameters_of(volume, 0)); }));
 }
 
+// Whatever it does to the process that counts.
+TEST_F(EstimateTest, SamplesThatAreCutMeanwhileAreDamaged) {
+  const Volume volume = add_much();
+  const test::CutBlobs cut(data_);
+  Estimator estimator(volumes_, cut, jobs_, {}, job_program());
+  EXPECT_EQ(test::code_thrown_by([&] { estimator.estimate("", parameters_of(volume, 50)); }),
+            ErrorCode::kUnusableVolume);
+}
+
+TEST_F(EstimateTest, AProcessThatDiesIsToldAndReplaced) {
+  const Volume volume = add_sphere();
+  Estimator faulty(volumes_, blobs_, jobs_, {}, job_program(FAULTY_JOB));
+  const auto error =
+      test::thrown_by([&] { faulty.estimate("", parameters_of(volume, test::kKilled)); });
+  ASSERT_TRUE(error);
+  EXPECT_THAT(error->what(), testing::HasSubstr("with signal 9 (killed)"));
+  EXPECT_EQ(faulty.estimate("", parameters_of(volume, test::kAnswers)).triangles, 0U);
+}
+
 TEST_F(EstimateTest, JobsOfOthersShiftNothing) {
   const Volume volume = add_sphere();
   volumes_.add("other", volume);
@@ -154,6 +174,15 @@ TEST_F(HistogramsTest, CountAllSamples) {
   EXPECT_EQ(two.range, volume.range);
   EXPECT_EQ(two.counts.at(0) + two.counts.at(1), volume.sample_count());
   EXPECT_EQ(histograms.of("", volume, 101).counts.at(100), two.counts[1]);
+}
+
+// Mapped, they would end the whole service.
+TEST_F(HistogramsTest, SamplesThatAreCutMeanwhileAreDamaged) {
+  const Volume volume = add_much();
+  const test::CutBlobs cut(data_);
+  Histograms histograms(cut);
+  EXPECT_EQ(test::code_thrown_by([&] { histograms.of("", volume, 2); }),
+            ErrorCode::kUnusableVolume);
 }
 
 // An answer that comes at once would tell that somebody else has the volume, too.

@@ -1,16 +1,19 @@
 // The stores of one daemon in a folder of the test, and volumes to put into them.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 
 #include <gtest/gtest.h>
 
+#include "server/jobs/job_process.h"
 #include "server/jobs/volume_library.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/sqlite/database.h"
 #include "server/store/sqlite/job_store.h"
 #include "server/store/sqlite/volume_store.h"
+#include "server/volume/canonical.h"
 #include "tests/support/files.h"
 #include "tests/support/shapes.h"
 
@@ -41,6 +44,12 @@ class JobsFixture : public testing::Test {
     return result;
   }
 
+  // The real program of jobs, or another one in its place.
+  jobs::JobProgram job_program(const std::filesystem::path& file = ISOMESH_JOB,
+                               int threads = 2) const {
+    return {.file = file, .setup = {.readable = data_.blobs(), .threads = threads}};
+  }
+
   static JobParameters parameters_of(const Volume& volume, double iso);
 
   std::size_t blob_count() const { return files_below(data_.blobs()).size(); }
@@ -61,6 +70,18 @@ class JobsFixture : public testing::Test {
       retention_,
       volume::SizeLimits{},
       jobs::RunnerOptions{.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT}};
+};
+
+// Blobs of which one is cut right after it was found intact.
+class CutBlobs : public store::FileBlobStore {
+ public:
+  explicit CutBlobs(const store::DataFolder& data) : FileBlobStore(data) {}
+
+  bool is_intact(const std::string& key, const std::stop_token& stop) const override {
+    const bool is = FileBlobStore::is_intact(key, stop);
+    std::filesystem::resize_file(path_of(key), volume::kHeaderBytes);
+    return is;
+  }
 };
 
 }  // namespace isomesh::test

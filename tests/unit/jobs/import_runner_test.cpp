@@ -56,7 +56,8 @@ void expect_refused(const Error& error, const std::string& reason) {
 
 TEST(ImportRunner, ACrashIsOneRefusedUpload) {
   Faulty faulty;
-  expect_refused(faulty.run("crash"), "ended by signal 11 while reading nifti");
+  expect_refused(faulty.run("crash"),
+                 "ended with signal 11 (segmentation fault) while reading nifti");
   expect_refused(faulty.run("exit"), "ended with status 7 while reading nifti");
   expect_refused(faulty.run(""), "ended with status 0 while reading nifti");
 }
@@ -128,7 +129,7 @@ TEST(ImportRunner, FilesHaveALimit) {
 // Under a sanitizer memory is not limited: see sandbox.cpp.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST(ImportRunner, MemoryHasALimit) {
-  expect_refused(Faulty().run("memory"), "ended by signal 6 while reading nifti");
+  expect_refused(Faulty().run("memory"), "ended with signal 6 (aborted) while reading nifti");
 }
 #endif
 

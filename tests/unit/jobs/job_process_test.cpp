@@ -1,96 +1,263 @@
 #include "server/jobs/job_process.h"
 
 #include <csignal>
+#include <optional>
 #include <set>
-#include <thread>
+#include <string>
+#include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "tests/support/errors.h"
 #include "tests/support/process.h"
+#include "tests/unit/jobs/faulty_job.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
 namespace {
 
+using testing::HasSubstr;
+
+const Report kQuiet = [](Stage, double, const Timing&) {};
+
 class JobProcessTest : public test::JobsFixture {
  protected:
-  JobOrder order_of(const Volume& volume, double iso) {
-    Job job;
-    job.id = "job";
-    job.created = volume.created;
-    job.parameters = parameters_of(volume, iso);
-    return {.volume = blobs_.path_of(volume.id),
-            .job = job,
-            .iso = iso,
-            .memory_bytes = std::uint64_t{1} << 30,
-            .files = {data_.scratch() / ("made" + std::to_string(++made_))}};
+  JobOrder order_of(const Volume& volume, double iso, int passes = 5) const {
+    JobOrder order = {.file = blobs_.path_of(volume.id),
+                      .volume = volume,
+                      .parameters = {},
+                      .iso = iso,
+                      .memory_bytes = std::uint64_t{1} << 30,
+                      .disk_bytes = std::uint64_t{1} << 30};
+    order.parameters.passes = passes;
+    return order;
   }
 
-  const Report ignore_ = [](Stage, double, const Timing&) {};
-  int made_ = 0;
-  JobProcess process_{ISOMESH_JOB,
-                      {.readable = data_.blobs(), .writable = data_.scratch(), .threads = 2}};
+  // What the process makes; its bytes are in bytes_.
+  MadeMesh make(JobProcess& process, const JobOrder& order, const Report& report = kQuiet,
+                const std::stop_token& stop = {}) {
+    bytes_.assign(order.parameters.formats.size(), "");
+    std::vector<codec::Sink> sinks;
+    for (std::string& bytes : bytes_) {
+      sinks.emplace_back([&bytes](std::span<const std::byte> piece) {
+        bytes.append(reinterpret_cast<const char*>(piece.data()), piece.size());
+      });
+    }
+    return process.make(order, sinks, stop, report);
+  }
+
+  std::optional<Error> refusal(JobProcess& process, const JobOrder& order,
+                               const Report& report = kQuiet) {
+    return test::thrown_by([&] { make(process, order, report); });
+  }
+
+  // The processes of jobs; the fixture has some for imports, too.
+  std::set<pid_t> started() const {
+    std::set<pid_t> found = test::children_of(::getpid());
+    std::erase_if(found, [](pid_t child) { return test::program_of(child) != "isomesh-job"; });
+    return found;
+  }
+
+  std::vector<std::string> bytes_;
+  JobProcess process_{job_program()};
+  JobProcess faulty_{job_program(FAULTY_JOB)};
 };
 
 TEST_F(JobProcessTest, MakesOneMeshAfterTheOtherInTheSameProcess) {
   const Volume sphere = add_sphere();
   std::set<Stage> stages;
-  std::set<pid_t> children;
+  std::set<pid_t> processes;
   for (const double iso : {0.0, 0.5, 1.0}) {
-    const JobOrder order = order_of(sphere, iso);
-    const Job job =
-        process_.run(order, {}, [&](Stage stage, double, const Timing&) { stages.insert(stage); });
-    ASSERT_TRUE(job.mesh);
-    EXPECT_GT(job.mesh->triangles, 0U);
-    EXPECT_EQ(job.mesh->files.begin()->second.bytes, std::filesystem::file_size(order.files[0]));
-    children.insert(process_.pid().value());
+    JobOrder order = order_of(sphere, iso);
+    order.parameters.formats = {MeshFormat::kStl, MeshFormat::kDrc};
+    const MadeMesh made =
+        make(process_, order, [&](Stage stage, double, const Timing&) { stages.insert(stage); });
+    EXPECT_GT(made.summary.triangles, 0U);
+    EXPECT_GT(made.timing.encode, 0);
+    EXPECT_EQ(bytes_[0].size(), 84 + 50 * made.summary.triangles);
+    EXPECT_THAT(bytes_[1], testing::StartsWith("DRACO"));
+    processes.merge(started());
+    EXPECT_EQ(processes.size(), 1U);
   }
-  EXPECT_EQ(children.size(), 1U);
-  EXPECT_TRUE(stages.contains(Stage::kExtract));
-  EXPECT_TRUE(stages.contains(Stage::kEncode));
+  EXPECT_EQ(stages, (std::set{Stage::kLoad, Stage::kExtract, Stage::kSmooth, Stage::kEncode}));
 }
 
-TEST_F(JobProcessTest, AJobThatIsStoppedEndsAndTheNextOneRuns) {
+TEST_F(JobProcessTest, CountsTheSurfaceThatItWouldMake) {
+  const Volume sphere = add_sphere();
+  JobOrder order = order_of(sphere, 0);
+  const MadeMesh made = make(process_, order);
+  order.work = JobOrder::Work::kCount;
+  const mesh::SurfaceSize size = process_.count(order, {});
+  EXPECT_EQ(size.triangles, made.summary.triangles);
+  EXPECT_EQ(size.vertices, made.summary.vertices);
+  EXPECT_GT(size.layers, 0U);
+  EXPECT_GT(size.largest_layer, 0U);
+}
+
+TEST_F(JobProcessTest, AJobThatIsStoppedEndsAndTheNextOneRunsInTheSameProcess) {
   const Volume much = add_much();
-  JobOrder order = order_of(much, 50);
-  order.job.parameters.passes = 1000;
   std::stop_source stop;
   const auto error = test::thrown_by([&] {
-    process_.run(order, stop.get_token(), [&](Stage stage, double, const Timing&) {
-      if (stage == Stage::kSmooth) stop.request_stop();
-    });
+    make(
+        process_, order_of(much, 50, 1000),
+        [&](Stage stage, double, const Timing&) {
+          if (stage == Stage::kSmooth) stop.request_stop();
+        },
+        stop.get_token());
   });
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), ErrorCode::kCancelled);
-  EXPECT_TRUE(process_.run(order_of(much, 50), {}, ignore_).mesh);
+  EXPECT_GT(make(process_, order_of(much, 50, 0)).summary.triangles, 0U);
 }
+
+// What cannot be interrupted is ended with its process.
+TEST_F(JobProcessTest, AJobThatDoesNotStopIsKilled) {
+  const Volume sphere = add_sphere();
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_EQ(test::code_thrown_by(
+                [&] { make(faulty_, order_of(sphere, test::kIsDeaf), kQuiet, stop.get_token()); }),
+            ErrorCode::kCancelled);
+  EXPECT_NO_THROW(make(faulty_, order_of(sphere, test::kAnswers)));
+}
+
+TEST_F(JobProcessTest, ADiskThatIsFullStopsTheJobAndIsTold) {
+  const Volume much = add_much();
+  const codec::Sink full = [](std::span<const std::byte>) {
+    throw Error(ErrorCode::kOutOfSpace, "the disk is full");
+  };
+  JobOrder order = order_of(much, 50, 0);
+  order.parameters.formats = {MeshFormat::kStl};
+  EXPECT_EQ(test::code_thrown_by([&] { process_.make(order, {{full}}, {}, kQuiet); }),
+            ErrorCode::kOutOfSpace);
+  EXPECT_GT(make(process_, order).summary.triangles, 0U);
+}
+
+class KilledIn : public JobProcessTest, public testing::WithParamInterface<Stage> {};
+
+TEST_P(KilledIn, TheJobIsToldHowAndTheNextOneRuns) {
+  const Volume much = add_much();
+  const int passes = GetParam() == Stage::kEncode ? 0 : 1000;
+  const auto error =
+      refusal(process_, order_of(much, 50, passes), [&](Stage stage, double, const Timing&) {
+        if (stage != GetParam()) return;
+        for (const pid_t child : started()) ::kill(child, SIGKILL);
+      });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kInternal);
+  EXPECT_THAT(error->what(), HasSubstr("ended with signal 9 (killed) in the stage"));
+  EXPECT_GT(make(process_, order_of(much, 50, 0)).summary.triangles, 0U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Stages, KilledIn,
+                         testing::Values(Stage::kLoad, Stage::kExtract, Stage::kSmooth,
+                                         Stage::kEncode),
+                         [](const auto& stage) { return std::string(to_string(stage.param)); });
 
 // The file is cut while it is mapped: the signal ends the process, and nothing else.
 TEST_F(JobProcessTest, ADiskThatGivesWayEndsOneJob) {
   const Volume sphere = add_sphere();
   const Volume much = add_much();
-  JobOrder order = order_of(much, 50);
-  order.job.parameters.passes = 1000;
-  const auto error = test::thrown_by([&] {
-    process_.run(order, {}, [&](Stage stage, double, const Timing&) {
-      if (stage == Stage::kLoad) std::filesystem::resize_file(order.volume, 4096);
+  const std::string intact = blob(much.id);
+  std::optional<Error> error;
+  // A process that has read all of it by then shows nothing.
+  for (int tries = 0; tries < 20 && !error; ++tries) {
+    test::write_file(blobs_.path_of(much.id), intact);
+    const JobOrder order = order_of(much, 50, 0);
+    error = refusal(process_, order, [&](Stage stage, double, const Timing&) {
+      if (stage == Stage::kLoad) std::filesystem::resize_file(order.file, 4096);
     });
-  });
+  }
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), ErrorCode::kInternal);
-  EXPECT_TRUE(process_.run(order_of(sphere, 0), {}, ignore_).mesh);
+  EXPECT_GT(make(process_, order_of(sphere, 0)).summary.triangles, 0U);
 }
 
 TEST_F(JobProcessTest, AnIdleProcessThatDiedCostsNoJob) {
   const Volume sphere = add_sphere();
-  process_.run(order_of(sphere, 0), {}, ignore_);
-  const pid_t first = process_.pid().value();
-  ::kill(first, SIGKILL);
-  ASSERT_TRUE(test::eventually([&] { return !test::children_of(::getpid()).contains(first); }));
-  EXPECT_TRUE(process_.run(order_of(sphere, 0.5), {}, ignore_).mesh);
+  make(process_, order_of(sphere, 0));
+  for (const pid_t child : started()) ::kill(child, SIGKILL);
+  ASSERT_TRUE(test::eventually([&] { return started().empty(); }));
+  EXPECT_GT(make(process_, order_of(sphere, 0.5)).summary.triangles, 0U);
 }
+
+TEST_F(JobProcessTest, SaysHowAProcessEnded) {
+  const Volume sphere = add_sphere();
+  const auto error = refusal(faulty_, order_of(sphere, test::kExits));
+  ASSERT_TRUE(error);
+  EXPECT_STREQ(error->what(),
+               "The process that made it ended with status 3 in the stage \"encode\".");
+  EXPECT_THAT(refusal(faulty_, order_of(sphere, test::kDiesInAFile))->what(),
+              HasSubstr("with signal 9 (killed)"));
+}
+
+TEST_F(JobProcessTest, BelievesNothingThatIsNotAsAgreed) {
+  const Volume sphere = add_sphere();
+  for (const double fault : {test::kTalksNonsense, test::kMakesAnotherFile, test::kTalksForEver,
+                             test::kAnswersAnotherOrder, test::kNeverBegins}) {
+    const auto error = refusal(faulty_, order_of(sphere, fault));
+    ASSERT_TRUE(error) << fault;
+    EXPECT_EQ(error->code(), ErrorCode::kInternal) << fault;
+    EXPECT_NO_THROW(make(faulty_, order_of(sphere, test::kAnswers))) << fault;
+  }
+}
+
+TEST_F(JobProcessTest, AProgramThatIsNotThereIsAnError) {
+  const Volume sphere = add_sphere();
+  JobProcess absent(job_program(folder_ / "absent"));
+  EXPECT_EQ(refusal(absent, order_of(sphere, 0))->code(), ErrorCode::kInternal);
+}
+
+// Under the sanitizers memory is not limited.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+// What a line of /proc/PID/limits says, in bytes.
+std::string soft_limit_of(pid_t process, const std::string& name) {
+  const std::string limits = test::read_file("/proc/" + std::to_string(process) + "/limits");
+  const std::size_t line = limits.find(name);
+  if (line == std::string::npos) return "";
+  const std::size_t begin = limits.find_first_not_of(' ', line + name.size());
+  return limits.substr(begin, limits.find(' ', begin) - begin);
+}
+
+TEST_F(JobProcessTest, AJobHasTheMemoryOfItsOrder) {
+  const Volume sphere = add_sphere();
+  JobOrder order = order_of(sphere, 0);
+  for (const std::uint64_t memory : {std::uint64_t{1} << 30, std::uint64_t{1} << 28}) {
+    order.memory_bytes = memory;
+    make(process_, order);
+    const std::string limit = soft_limit_of(*started().begin(), "Max data size");
+    ASSERT_NE(limit, "unlimited");
+    EXPECT_GE(std::stoull(limit), memory);
+    EXPECT_LE(std::stoull(limit), memory + (std::uint64_t{512} << 20));
+  }
+}
+
+// In a process of its own, because its children inherit what cannot be taken back.
+TEST_F(JobProcessTest, AJobThatTakesMoreThanItMayIsToldSo) {
+  const Volume much = add_much();
+  const pid_t tester = ::fork();
+  if (tester == 0) {
+    const rlimit little = {std::uint64_t{64} << 20, std::uint64_t{64} << 20};
+    if (::setrlimit(RLIMIT_DATA, &little) != 0) ::_exit(1);
+    JobProcess process(job_program());
+    const auto error = refusal(process, order_of(much, 50));
+    if (!error || error->code() != ErrorCode::kTooLarge) ::_exit(2);
+    ::_exit(error->what() == std::string("the job takes more memory than the 1024 MiB that it may "
+                                         "have")
+                ? 0
+                : 3);
+  }
+  int status = -1;
+  EXPECT_EQ(::waitpid(tester, &status, 0), tester);
+  EXPECT_EQ(status, 0);
+}
+
+#endif
 
 }  // namespace
 }  // namespace isomesh::jobs

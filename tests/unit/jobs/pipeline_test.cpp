@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/codec/encode.h"
 #include "tests/support/draco_decoder.h"
 #include "tests/support/errors.h"
-#include "tests/support/kernels.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
@@ -27,14 +27,15 @@ class PipelineTest : public test::JobsFixture {
  protected:
   PipelineResult run(const Volume& volume, const JobParameters& parameters,
                      const Report& report = kQuiet, std::stop_token stop = {}) {
-    Workspace workspace;
-    return run_pipeline(volume, parameters, {}, blobs_, workspace, std::move(stop), report);
+    return run_pipeline(volume, parameters, {}, blobs_, process_, std::move(stop), report);
   }
 
   // The bytes of the one format that was asked for.
   std::string mesh_bytes(const PipelineResult& result) {
     return blob(result.mesh.files.begin()->second.sha256);
   }
+
+  JobProcess process_{job_program()};
 };
 
 TEST_F(PipelineTest, MakesAMeshOfASphere) {
@@ -157,22 +158,23 @@ TEST_F(PipelineTest, EveryWayGivesTheSameBytesOnAnyNumberOfThreads) {
       parameters.interpolation = interpolation;
       std::set<std::string> results;
       for (const int threads : {1, 2, 3, 8}) {
-        const test::ThreadCount count(threads);
-        results.insert(mesh_bytes(run(volume, parameters)));
+        JobProcess process(job_program(ISOMESH_JOB, threads));
+        results.insert(
+            mesh_bytes(run_pipeline(volume, parameters, {}, blobs_, process, {}, kQuiet)));
       }
       EXPECT_EQ(results.size(), 1U);
     }
   }
 }
 
-TEST_F(PipelineTest, AWorkspaceKeepsNothingOfTheJobBefore) {
+TEST_F(PipelineTest, AProcessKeepsNothingOfTheJobBefore) {
   const Volume volume = add_sphere();
   const Volume other = add(test::noise<std::uint8_t>({0, 1}, {9, 9, 9}, 2), SampleType::kUint8);
   const std::string expected = mesh_bytes(run(volume, parameters_of(volume, 0)));
-  Workspace workspace;
-  run_pipeline(other, parameters_of(other, 1), {}, blobs_, workspace, {}, kQuiet);
+  JobProcess process(job_program());
+  run_pipeline(other, parameters_of(other, 1), {}, blobs_, process, {}, kQuiet);
   const auto result =
-      run_pipeline(volume, parameters_of(volume, 0), {}, blobs_, workspace, {}, kQuiet);
+      run_pipeline(volume, parameters_of(volume, 0), {}, blobs_, process, {}, kQuiet);
   EXPECT_EQ(mesh_bytes(result), expected);
 }
 
@@ -332,6 +334,47 @@ TEST_F(PipelineTest, AVolumeWhoseSamplesAreGoneIsUnusable) {
   blobs_.erase(volume.id);
   EXPECT_EQ(test::code_thrown_by([&] { run(volume, parameters_of(volume, 0)); }),
             ErrorCode::kUnusableVolume);
+}
+
+TEST_F(PipelineTest, AVolumeWhoseSamplesAreCutBeforeTheyAreReadIsUnusable) {
+  const Volume volume = add_sphere();
+  const test::CutBlobs cut(data_);
+  EXPECT_EQ(test::code_thrown_by([&] {
+              run_pipeline(volume, parameters_of(volume, 0), {}, cut, process_, {}, kQuiet);
+            }),
+            ErrorCode::kUnusableVolume);
+}
+
+// It ends the process, and that is nobody's fault but the disk's.
+TEST_F(PipelineTest, AVolumeWhoseSamplesAreCutWhileTheyAreReadIsUnusable) {
+  const Volume volume = add_much();
+  const std::string intact = blob(volume.id);
+  JobParameters parameters = parameters_of(volume, 50);
+  parameters.passes = 0;
+  std::optional<ErrorCode> code;
+  // A process that has read all of it by then shows nothing.
+  for (int tries = 0; tries < 20 && !code; ++tries) {
+    test::write_file(blobs_.path_of(volume.id), intact);
+    bool is_checked = false;  // the second time it loads
+    const Report cut = [&](Stage stage, double, const Timing&) {
+      if (stage != Stage::kLoad) return;
+      if (is_checked) std::filesystem::resize_file(blobs_.path_of(volume.id), 4096);
+      is_checked = true;
+    };
+    code = test::code_thrown_by([&] { run(volume, parameters, cut); });
+  }
+  EXPECT_EQ(code, ErrorCode::kUnusableVolume);
+}
+
+TEST_F(PipelineTest, RefusesAJobThatWouldTakeTooMuchMemory) {
+  const Volume volume = add_much();
+  const auto error = test::thrown_by([&] {
+    run_pipeline(volume, parameters_of(volume, 50), {.memory_bytes = 1 << 20}, blobs_, process_, {},
+                 kQuiet);
+  });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kTooLarge);
+  EXPECT_THAT(error->what(), testing::HasSubstr("1 MiB are allowed"));
 }
 
 TEST(Workspace, GivesBackWhatIsBeyondItsBudget) {

@@ -13,6 +13,7 @@
 #include "server/mesh/parallel.h"
 #include "tests/support/jobs.h"
 #include "tests/support/process.h"
+#include "tests/unit/jobs/faulty_job.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::jobs {
@@ -24,7 +25,9 @@ using test::kLongest;
 
 class WorkersTest : public test::JobsFixture {
  protected:
-  static WorkerOptions threads(std::size_t count) { return {.threads = count}; }
+  WorkerOptions threads(std::size_t count, const char* program = ISOMESH_JOB) const {
+    return {.threads = count, .program = job_program(program)};
+  }
 
   std::string submit(const JobParameters& parameters) {
     return job_of(jobs_.submit({"", parameters, "", ""})).id;
@@ -192,6 +195,52 @@ TEST_F(WorkersTest, ARunningJobStopsWhenItIsCancelled) {
   EXPECT_EQ(job.state, JobState::kCancelled);
   EXPECT_FALSE(job.mesh || job.error);
   EXPECT_EQ(blob_count(), before);
+}
+
+// It cannot be interrupted, so it is killed; the next job gets another process.
+TEST_F(WorkersTest, AJobThatDoesNotStopIsKilledWhenItIsCancelled) {
+  const Workers workers(threads(1, FAULTY_JOB), jobs_, volumes_, blobs_);
+  const Volume volume = add_sphere();
+  const std::string deaf = submit(parameters_of(volume, test::kIsDeaf));
+  ASSERT_TRUE(eventually([&] { return jobs_.get("", deaf).stage == Stage::kEncode; }));
+  jobs_.cancel("", deaf);
+  EXPECT_EQ(test::end_of(jobs_, "", deaf).state, JobState::kCancelled);
+  const Job next = test::end_of(jobs_, "", submit(parameters_of(volume, test::kAnswers)));
+  EXPECT_EQ(next.state, JobState::kSucceeded);
+}
+
+// A stream of libdraco's takes seconds, in which nothing is looked at.
+TEST_F(WorkersTest, AJobStopsInTheMiddleOfAStream) {
+  const Workers workers(threads(1), jobs_, volumes_, blobs_);
+  JobParameters parameters = parameters_of(add_much(), 50);
+  parameters.passes = 0;
+  parameters.draco.speed = 0;
+  const std::string id = submit(parameters);
+  ASSERT_TRUE(eventually([&] { return jobs_.get("", id).stage == Stage::kEncode; }));
+  jobs_.cancel("", id);
+  EXPECT_EQ(test::end_of(jobs_, "", id).state, JobState::kCancelled);
+  EXPECT_EQ(blob_count(), 1U);
+  EXPECT_TRUE(eventually([&] { return scratch_count() == 0; }));
+}
+
+TEST_F(WorkersTest, AProcessThatDiesIsChargedToItsJobAlone) {
+  const Workers workers(threads(2, FAULTY_JOB), jobs_, volumes_, blobs_);
+  const Volume volume = add_sphere();
+  const std::string neighbour = submit(parameters_of(volume, test::kIsDeaf));
+  ASSERT_TRUE(eventually([&] { return jobs_.get("", neighbour).stage == Stage::kEncode; }));
+  const auto started = jobs_.get("", neighbour).started;
+  const std::string deadly = submit(parameters_of(volume, test::kKilled));
+  const Job job = test::end_of(jobs_, "", deadly);
+  EXPECT_EQ(job.state, JobState::kFailed);
+  ASSERT_TRUE(job.error);
+  EXPECT_EQ(job.error->status, 500);
+  EXPECT_EQ(job.error->detail,
+            "The process that made it ended with signal 9 (killed) in the stage \"encode\".");
+  EXPECT_EQ(jobs_.account(deadly).attempts, 3);
+  EXPECT_EQ(jobs_.get("", neighbour).state, JobState::kRunning);
+  EXPECT_EQ(jobs_.get("", neighbour).started, started);
+  EXPECT_EQ(jobs_.account(neighbour).attempts, 1);
+  jobs_.cancel("", neighbour);
 }
 
 TEST_F(WorkersTest, ARunningJobTellsItsProgress) {

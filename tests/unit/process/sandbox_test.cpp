@@ -8,9 +8,11 @@
 #include <cstdlib>
 #include <ctime>
 #include <functional>
+#include <thread>
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -165,6 +167,74 @@ TEST_F(Sandbox, SaysWhenAFolderCannotBeAllowed) {
   // A kernel without Landlock is not asked to allow anything.
   EXPECT_EQ(WIFEXITED(status) && WEXITSTATUS(status) == 0, has_landlock());
 }
+
+// --- Jobs
+
+class JobSandbox : public Sandbox {
+ protected:
+  bool confined(const std::function<bool()>& holds) const {
+    const int status = status_of([&] {
+      confine_job(folder_.path());
+      return holds();
+    });
+    return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+  }
+};
+
+TEST_F(JobSandbox, LeavesOneFolderToRead) {
+  test::write_file(scratch_ / "other", "bytes");
+  EXPECT_TRUE(confined([&] { return ::open((folder_ / "upload").c_str(), O_RDONLY) >= 0; }));
+  EXPECT_EQ(confined([&] { return ::open((scratch_ / "other").c_str(), O_RDONLY) >= 0; }),
+            !has_landlock());
+}
+
+TEST_F(JobSandbox, LeavesNothingToWrite) {
+  EXPECT_TRUE(confined([&] {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const int file = ::open((folder_ / "new").c_str(), O_WRONLY | O_CREAT, 0600);
+    return file < 0 || fails(::write(file, "x", 1), EFBIG);
+  }));
+  EXPECT_EQ(confined([&] { return ::unlink((folder_ / "upload").c_str()) == 0; }), !has_landlock());
+}
+
+TEST_F(JobSandbox, LeavesThreadsAndTakesProcessesAndSockets) {
+  EXPECT_TRUE(confined([] {
+    std::atomic<bool> has_run = false;
+    std::jthread([&] { has_run = true; }).join();
+    return has_run.load();
+  }));
+  EXPECT_TRUE(confined([] { return fails(::fork(), EPERM); }));
+  EXPECT_TRUE(confined([] { return fails(::socket(AF_UNIX, SOCK_STREAM, 0), EPERM); }));
+  EXPECT_TRUE(confined([] { return fails(::kill(::getppid(), 0), EPERM); }));
+}
+
+// Under the sanitizers memory is not limited.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+TEST_F(JobSandbox, LimitsMemoryAgainAndAgain) {
+  const auto can_have = [](std::size_t bytes) {
+    void* const memory =
+        ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (memory == MAP_FAILED) return false;
+    ::munmap(memory, bytes);
+    return true;
+  };
+  constexpr std::size_t kMebibyte = 1 << 20;
+  const int status = status_of([&] {
+    const MemoryLimit limit;
+    confine_job(folder_.path());
+    limit.set(64 * kMebibyte);
+    if (!can_have(60 * kMebibyte) || can_have(80 * kMebibyte)) return false;
+    limit.set(256 * kMebibyte);
+    if (!can_have(200 * kMebibyte)) return false;
+    limit.set(64 * kMebibyte);
+    return !can_have(80 * kMebibyte);
+  });
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+#endif
 
 }  // namespace
 }  // namespace isomesh::process

@@ -82,7 +82,7 @@ TEST_P(FaultConformance, AReapedJobIsClaimedAgainAndItsLateWorkerIsRefused) {
   EXPECT_EQ(jobs().reap(), 0U);
   EXPECT_EQ(jobs().get("", job.id), job);
   const Lease lease = claimed();
-  EXPECT_EQ(lease.attempt, 2);
+  EXPECT_EQ(lease.attempt, 1);
   EXPECT_GT(lease.fence, late.fence);
   EXPECT_EQ(jobs().renew(late, {Stage::kEncode, 0.9, {}}, kLongLease), Standing::kLost);
   EXPECT_FALSE(jobs().finish(late, some_mesh()));
@@ -91,20 +91,39 @@ TEST_P(FaultConformance, AReapedJobIsClaimedAgainAndItsLateWorkerIsRefused) {
   EXPECT_TRUE(jobs().finish(lease, some_mesh()));
 }
 
-TEST_P(FaultConformance, AJobThatLosesItsWorkersFailsAfterThreeAttemptsAndOthersGoOn) {
+// Whether it stood still or died, the service did that.
+TEST_P(FaultConformance, AJobThatLosesItsWorkersIsNeverCharged) {
   const std::string id = submit().id;
-  const std::string next = submit().id;
-  for (int attempt = 1; attempt <= 3; ++attempt) {
-    const Lease lease = expired();
+  for (int run = 1; run <= 12; ++run) {
+    const bool stands_still = run % 2 == 0;
+    const Lease lease = stands_still ? expired() : claimed();
     EXPECT_EQ(lease.id, id);
-    EXPECT_EQ(lease.attempt, attempt);
-    jobs().reap();
+    EXPECT_EQ(lease.attempt, 1);
+    EXPECT_EQ(jobs().renew(lease, {Stage::kSmooth, 0.5, {}}, kLongLease),
+              stands_still ? Standing::kLost : Standing::kOk);
+    if (stands_still) {
+      EXPECT_EQ(jobs().reap(), 1U);
+    } else {
+      restart();
+    }
+    EXPECT_EQ(jobs().get("", id).state, JobState::kQueued);
+    EXPECT_EQ(jobs().account(id).attempts, 0);
   }
-  const Job job = jobs().get("", id);
-  EXPECT_EQ(job.state, JobState::kFailed);
-  ASSERT_TRUE(job.error);
-  EXPECT_THAT(job.error->detail, testing::HasSubstr("3 times"));
-  EXPECT_EQ(claimed().id, next);
+  EXPECT_TRUE(jobs().finish(claimed(), some_mesh()));
+}
+
+// What the job itself has failed at stays counted.
+TEST_P(FaultConformance, ALostWorkerForgivesNoFailure) {
+  const std::string id = submit().id;
+  EXPECT_TRUE(jobs().finish(claimed(), failure(true)));
+  claimed();
+  restart();
+  EXPECT_EQ(jobs().account(id).attempts, 1);
+  EXPECT_TRUE(jobs().finish(claimed(), failure(true)));
+  const Lease last = claimed();
+  EXPECT_EQ(last.attempt, 3);
+  EXPECT_TRUE(jobs().finish(last, failure(true)));
+  EXPECT_EQ(jobs().get("", id).state, JobState::kFailed);
 }
 
 TEST_P(FaultConformance, APutBackCountsNoAttempt) {

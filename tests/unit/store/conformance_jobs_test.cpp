@@ -427,28 +427,13 @@ TEST_P(JobConformance, AJobThatRanAtACrashIsClaimedAgain) {
   EXPECT_TRUE(jobs().finish(after, some_mesh()));
 }
 
-// A run is held to be a while old, and charged, once its lease was renewed that late.
-TEST_P(JobConformance, ACrashUnderAJobThatHadJustBegunIsNoAttempt) {
-  submit();
-  claimed();
-  restart();
-  const Lease second = claimed();
-  EXPECT_EQ(second.attempt, 1);
-  EXPECT_EQ(jobs().renew(second, {Stage::kSmooth, 0.5, {}}, kLongLease), Standing::kOk);
-  restart();
-  EXPECT_EQ(claimed().attempt, 2);
-}
-
-// Which of several it was that ended the process, nobody knows; killed from outside, it was none.
-TEST_P(JobConformance, ACrashUnderSeveralJobsIsChargedToNoneUntilTheTenth) {
+TEST_P(JobConformance, ACrashUnderSeveralJobsIsChargedToNone) {
   const std::vector<std::string> ids = {submit().id, submit().id};
-  for (int crash = 1; crash <= 10; ++crash) {
+  for (int crash = 1; crash <= 12; ++crash) {
     EXPECT_EQ(claimed().attempt, 1);
     EXPECT_EQ(claimed().attempt, 1);
     restart();
-    for (const std::string& id : ids) {
-      EXPECT_EQ(jobs().get("", id).state, crash < 10 ? JobState::kQueued : JobState::kFailed);
-    }
+    for (const std::string& id : ids) EXPECT_EQ(jobs().get("", id).state, JobState::kQueued);
   }
 }
 

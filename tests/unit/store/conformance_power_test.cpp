@@ -73,16 +73,12 @@ TEST_P(PowerConformance, AClaimThatIsLostIsMadeAgain) {
   EXPECT_EQ(jobs().get("", job.id).state, JobState::kSucceeded);
 }
 
-// Or a job that takes its machine down would do so for ever.
-TEST_P(PowerConformance, ARunThatHadLastedAWhileIsCharged) {
+TEST_P(PowerConformance, AFailureStaysCounted) {
   const std::string id = submit().id;
-  for (int attempt = 1; attempt <= 3; ++attempt) {
-    const Lease lease = claimed();
-    EXPECT_EQ(lease.attempt, attempt);
-    EXPECT_EQ(jobs().renew(lease, {Stage::kSmooth, 0.5, {}}, kLongLease), Standing::kOk);
-    lose_power();
-  }
-  EXPECT_EQ(jobs().get("", id).state, JobState::kFailed);
+  EXPECT_TRUE(jobs().finish(claimed(), failure(true)));
+  lose_power();
+  EXPECT_EQ(jobs().account(id).attempts, 1);
+  EXPECT_EQ(claimed().attempt, 2);
 }
 
 }  // namespace

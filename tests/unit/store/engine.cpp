@@ -26,7 +26,7 @@ class SqliteEngine : public Engine {
   void restart() override {
     close();
     open();
-    jobs_->reap_predecessor();
+    jobs_->reap();
   }
 
   void lose_power() override {
@@ -34,7 +34,7 @@ class SqliteEngine : public Engine {
     close();
     power_.reset();
     begin_life();
-    jobs_->reap_predecessor();
+    jobs_->reap();
   }
 
  private:
@@ -72,7 +72,6 @@ class SqliteEngine : public Engine {
     jobs_.emplace(*database_, *blobs_,
                   store::JobStoreOptions{.max_queued = options_.max_queued,
                                          .retry_delay = options_.retry_delay,
-                                         .short_run = std::chrono::milliseconds(0),
                                          .mesher_version = "test"});
   }
 
