@@ -1,5 +1,6 @@
 #include "server/volume/size.h"
 
+#include <cassert>
 #include <limits>
 #include <string>
 
@@ -10,17 +11,6 @@
 
 namespace isomesh::volume {
 namespace {
-
-void check_beyond(std::span<const std::uint64_t> sizes) {
-  for (std::size_t axis = 3; axis < sizes.size(); ++axis) {
-    if (sizes[axis] == 1) continue;
-    const std::string size = std::to_string(sizes[axis]);
-    throw_unusable(axis == 3 ? "The file holds a time series of " + size +
-                                   " volumes, where one volume is needed."
-                             : "The file has " + size + " values along its axis " +
-                                   axis_name(axis) + ", where one volume is needed.");
-  }
-}
 
 // Throws for the sizes that a request names, as volume_dims does for those in a file.
 void check_dims(const RawDescription& description) {
@@ -37,13 +27,11 @@ void check_dims(const RawDescription& description) {
 
 std::array<std::uint32_t, 3> volume_dims(std::span<const std::uint64_t> sizes) {
   constexpr std::uint64_t kMostSamples = std::uint64_t{1} << 60;
+  assert(sizes.size() <= 3);
   std::array<std::uint32_t, 3> dims = {1, 1, 1};
   std::uint64_t samples = 1;
   for (std::size_t axis = 0; axis < sizes.size(); ++axis) {
     if (sizes[axis] == 0) throw_unusable("The size along " + axis_name(axis) + " is 0.");
-  }
-  check_beyond(sizes);
-  for (std::size_t axis = 0; axis < sizes.size() && axis < dims.size(); ++axis) {
     if (sizes[axis] > std::numeric_limits<std::uint32_t>::max() ||
         samples > kMostSamples / sizes[axis]) {
       throw_unusable("The header's sizes are not believable: " + std::to_string(sizes[axis]) +

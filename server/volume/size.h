@@ -13,9 +13,9 @@ struct SizeLimits {
   std::uint64_t max_sample_bytes = std::uint64_t{16} << 30;  // of a volume's samples
 };
 
-// The three sizes of a volume, from all sizes that a header tells. Missing ones are 1, and those
-// beyond the third must be 1. Throws Error kUnusableVolume for a size of 0, a series of volumes, or
-// so many samples that their bytes cannot be counted.
+// The three sizes of a volume, from those that a header tells along its first axes, three at most;
+// missing ones are 1. Throws Error kUnusableVolume for a size of 0, or so many samples that their
+// bytes cannot be counted.
 std::array<std::uint32_t, 3> volume_dims(std::span<const std::uint64_t> sizes);
 
 // Throws Error kTooLarge when the canonical samples would exceed the limits. `sample_count` is one
