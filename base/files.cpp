@@ -75,6 +75,17 @@ ScratchFile::~ScratchFile() {
 
 void ScratchFile::write(std::span<const std::byte> bytes) { write_all(file_, bytes); }
 
+bool same_bytes(const std::filesystem::path& one, const std::filesystem::path& other) {
+  constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
+  const InputFile a(one);
+  const InputFile b(other);
+  if (a.size() != b.size()) return false;
+  for (std::uint64_t at = 0; at < a.size(); at += kPieceBytes) {
+    if (a.text(at, kPieceBytes) != b.text(at, kPieceBytes)) return false;
+  }
+  return true;
+}
+
 std::string read_whole(const std::filesystem::path& path) {
   const InputFile file(path);
   return file.text(0, file.size());

@@ -64,6 +64,9 @@ class ScratchFile {
   Descriptor file_;
 };
 
+// Whether both files hold the same bytes. Throws as InputFile does.
+bool same_bytes(const std::filesystem::path& one, const std::filesystem::path& other);
+
 // The file's whole text. Throws Error kNotFound or kInternal.
 std::string read_whole(const std::filesystem::path& path);
 

@@ -43,10 +43,9 @@ struct Reader {
   bool (*sniff)(std::string_view head) = nullptr;
   // Reads the input and writes the task's target. Throws as import_volume does.
   Volume (*parse)(const Input& input) = nullptr;
-  // How many bytes the compressed file may inflate to, before it is taken for a bomb. Null: as many
-  // as samples are accepted, and the headroom.
-  std::uint64_t (*most_inflated_bytes)(const InputFile& file, const SizeLimits& limits,
-                                       const ImportOptions& options) = nullptr;
+  // How many bytes may come with such a beginning, which is plain: all of the file, or at least the
+  // first kBeginningBytes of it. Null for archives and raw samples. Throws as `parse` does.
+  MostBytes (*most_bytes)(const InputFile& beginning, const ImportTask& task) = nullptr;
   // The companions that hold the samples of a header, so that they are no volumes of their own.
   // Null for formats whose headers name none. Throws as `parse` does.
   std::vector<std::string> (*data_names)(const InputFile& file,

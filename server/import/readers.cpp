@@ -32,32 +32,36 @@ constexpr Reader kReaders[] = {
      .title = "NIfTI",
      .sniff = is_nifti,
      .parse = parse_with<parse_nifti>,
-     .most_inflated_bytes = most_nifti_bytes,
+     .most_bytes = most_nifti_bytes,
      .data_names = nifti_data_names},
     {.name = "nrrd",
      .title = "NRRD",
      .sniff = is_nrrd,
      .parse = parse_with<parse_nrrd>,
-     .most_inflated_bytes = most_nrrd_bytes,
+     .most_bytes = most_nrrd_bytes,
      .data_names = nrrd_data_names},
     {.name = "metaimage",
      .title = "MetaImage",
      .sniff = is_metaimage,
      .parse = parse_with<parse_metaimage>,
-     .most_inflated_bytes = most_metaimage_bytes,
+     .most_bytes = most_metaimage_bytes,
      .data_names = metaimage_data_names},
-    {.name = "vti", .title = "VTI", .sniff = is_vti, .parse = parse_with<parse_vti>},
+    {.name = "vti",
+     .title = "VTI",
+     .sniff = is_vti,
+     .parse = parse_with<parse_vti>,
+     .most_bytes = most_vti_bytes},
     {.name = "dicom",
      .title = "DICOM",
      .content = Content::kSlices,
      .sniff = is_dicom,
-     .parse = parse_dicom},
+     .parse = parse_dicom,
+     .most_bytes = most_dicom_bytes},
     {.name = "archive",
      .title = "a ZIP or TAR of one",
      .content = Content::kFiles,
      .sniff = is_archive,
-     .parse = parse_archive,
-     .most_inflated_bytes = most_archive_bytes},
+     .parse = parse_archive},
 };
 
 const Reader* sniff_plain(std::string_view head) {
@@ -92,6 +96,30 @@ void tell(const Reader& reader, const Input& input) {
   if (input.listener) input.listener(reader.name);
 }
 
+// The beginning of what a compressed file holds, in a file of its own.
+class InflatedBeginning {
+ public:
+  InflatedBeginning(const InputFile& file, const std::filesystem::path& scratch)
+      : scratch_(scratch, ".beginning") {
+    const std::string head = file.text(0, kBeginningBytes);
+    const std::string plain = inflate_head(std::as_bytes(std::span(head)), kBeginningBytes);
+    scratch_.write(std::as_bytes(std::span(plain)));
+  }
+
+  InputFile file() const { return InputFile(scratch_.path()); }
+
+ private:
+  ScratchFile scratch_;
+};
+
+// How many bytes a compressed file may inflate to, before it is taken for a bomb.
+std::uint64_t most_inflated_bytes(const Reader& reader, const InputFile& file,
+                                  const ImportTask& task) {
+  if (reader.most_bytes == nullptr) return most_archive_bytes(file.size(), task.limits);
+  const InflatedBeginning beginning(file, task.scratch);
+  return reader.most_bytes(beginning.file(), task).file;
+}
+
 // What chooses within files of another kind is a mistake.
 void check_options(const Reader& reader, const ImportOptions& options) {
   const bool is_volume = reader.content == Content::kVolume;
@@ -117,15 +145,30 @@ const Reader* sniff(const InputFile& file) {
   return sniff(std::as_bytes(std::span(head)));
 }
 
+MostBytes most_bytes_of(const Reader& reader, const InputFile& beginning, const ImportTask& task) {
+  if (!is_compressed(beginning)) return reader.most_bytes(beginning, task);
+  const InflatedBeginning plain(beginning, task.scratch);
+  MostBytes most = reader.most_bytes(plain.file(), task);
+  // Whatever deflate cannot compress it stores, with a few bytes for each block.
+  constexpr std::uint64_t kStoredShare = 100;
+  most.file += most.file / kStoredShare;
+  return most;
+}
+
+std::vector<std::string> data_names_of(const Reader& reader, const InputFile& beginning,
+                                       const Companions& companions, const ImportTask& task) {
+  if (reader.data_names == nullptr) return {};
+  if (!is_compressed(beginning)) return reader.data_names(beginning, companions);
+  const InflatedBeginning plain(beginning, task.scratch);
+  return reader.data_names(plain.file(), companions);
+}
+
 Volume read_input(const Reader& reader, Input input) {
   tell(reader, input);
   check_options(reader, input.task.options);
   const InputFile file(input.path);
   if (!is_compressed(file)) return parse(reader, input);
-  const SizeLimits& limits = input.task.limits;
-  const std::uint64_t most = reader.most_inflated_bytes != nullptr
-                                 ? reader.most_inflated_bytes(file, limits, input.task.options)
-                                 : limits.max_sample_bytes + kHeadroomBytes;
+  const std::uint64_t most = most_inflated_bytes(reader, file, input.task);
   ScratchFile plain(input.task.scratch, ".plain");
   gunzip(file, most, plain);
   input.path = plain.path();

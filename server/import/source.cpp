@@ -66,6 +66,16 @@ Note trailing_note(std::uint64_t bytes) {
                                                "out.");
 }
 
+Note duplicate_note(std::size_t files) {
+  return note_of(NoteCode::kDuplicateFile,
+                 std::to_string(files) + (files == 1 ? " file" : " files") +
+                     " came more than once, byte for byte, and each was taken once.");
+}
+
+std::string reason_of_double(std::string_view first_name) {
+  return "it is the same as " + in_quotes(first_name);
+}
+
 std::vector<DataFile> data_files_of(const std::vector<std::string>& names,
                                     const Companions& companions, const Skip& skip,
                                     SourceVolume& volume) {

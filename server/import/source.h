@@ -19,6 +19,13 @@
 
 namespace isomesh::import {
 
+// How many bytes of a file decide how long it may be, and how many it can have by what they tell.
+inline constexpr std::size_t kBeginningBytes = std::size_t{1} << 20;
+struct MostBytes {
+  std::uint64_t file = 0;
+  std::uint64_t data = 0;  // each of the data files that its header names
+};
+
 enum class Encoding {
   kRaw,
   kDeflate,  // a gzip or zlib stream
@@ -104,6 +111,10 @@ std::vector<DataFile> data_files_of(const std::vector<std::string>& names,
 // block up. A whole slice more means that the header describes another volume.
 bool may_trail(std::uint64_t bytes, const SourceVolume& volume);
 Note trailing_note(std::uint64_t bytes);
+
+// Of so many files that came a second time, and why one of them is ignored.
+Note duplicate_note(std::size_t files);
+std::string reason_of_double(std::string_view first_name);
 
 // How the volumes of one file differ.
 struct Difference {

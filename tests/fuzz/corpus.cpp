@@ -47,7 +47,10 @@ std::vector<std::string> metaimage_files() {
   return {
       metaimage(small_metaimage(), kSamples),
       metaimage(with(small_metaimage(), "CompressedData", "True"), zlib(kSamples)),
-      metaimage(with(with(small_metaimage(), "BinaryData", "False"), "DimSize", "2 1 1"), "1 2")};
+      metaimage(with(with(small_metaimage(), "BinaryData", "False"), "DimSize", "2 1 1"), "1 2"),
+      "ObjectType = Image\nNDims = 4\nDimSize = 2 3 2 2\nElementSpacing = 1 1 1 0.5\n"
+      "Seq_Frame0000_Timestamp = 7\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n" +
+          kSamples};
 }
 
 std::vector<std::string> vti_files() {
@@ -58,6 +61,7 @@ std::vector<std::string> vti_files() {
     }
   }
   files.push_back(vti({.form = VtiForm::kAscii, .extent = "0 1 0 0 0 1"}, "1 2 3 4"));
+  files.push_back(gzip(vti({}, kSamples)));
   return files;
 }
 
@@ -72,6 +76,7 @@ std::vector<std::string> archive_files() {
                {"2", kSamples.substr(12)},
                {"a.mhd", metaimage(with(small_metaimage(), "ElementDataFile", "%01d 1 2 1"), "")}}),
           zip({{"a.hdr", nifti({.magic = "ni1", .vox_offset = 0}, "")}, {"a.img", kSamples}}),
+          zip({{"a.nii", nifti({}, kSamples)}, {"b.nii", nifti({}, kSamples)}}),
           zip({{"a.nii.gz", gzip(nifti({}, kSamples))}, {"README", "text"}})};
 }
 
@@ -124,6 +129,7 @@ std::vector<std::string> dicom_files() {
   const std::vector<std::string> slices = {dicom_file("1.2.840.10008.1.2.1"),
                                            dicom_meta("1.2.840.10008.1.2.1") + dicom_data(),
                                            dicom_data(),
+                                           gzip(dicom_file("1.2.840.10008.1.2.1")),
                                            dicom_file("1.2.840.10008.1.2.5"),
                                            dicom_file("1.2.840.10008.1.2.4.70"),
                                            dicom_file("1.2.840.10008.1.2.4.80"),

@@ -147,11 +147,49 @@ bool is_regular(archive_entry* entry) {
 
 class Unpacker {
  public:
-  Unpacker(const std::filesystem::path& source, const std::filesystem::path& folder,
-           const ArchiveLimits& limits)
-      : file_(source), reader_(file_), folder_(folder), limits_(limits) {}
+  Unpacker(const std::filesystem::path& source, const ArchiveLimits& limits)
+      : file_(source), reader_(file_), limits_(limits) {}
 
-  std::vector<ArchiveMember> unpack_all() {
+  std::vector<ArchiveMember> unpack(const std::filesystem::path& folder, const MemberBound& bound) {
+    std::vector<ArchiveMember> members;
+    std::set<std::string> names;
+    for_each_file([&](archive_entry* entry, const std::string& name) {
+      if (base_of(name).empty()) {
+        throw_unusable("The archive is damaged: its member " + std::to_string(entries_) +
+                       " is a file without a name.");
+      }
+      if (!names.insert(name).second) {
+        throw_unusable("The archive has the member " + in_quotes(name) + " twice.");
+      }
+      if (::archive_entry_size_is_set(entry) != 0) {
+        check_total(static_cast<std::uint64_t>(::archive_entry_size(entry)));
+      }
+      const std::filesystem::path place = folder / std::to_string(entries_);
+      std::filesystem::create_directory(place);
+      ArchiveMember member = {.name = name, .path = place / plain_name(name)};
+      if (unpack_one(member, bound)) members.push_back(member);
+      if (!member.is_whole && ::archive_entry_size_is_set(entry) != 0) {
+        members.back().bytes = static_cast<std::uint64_t>(::archive_entry_size(entry));
+      }
+    });
+    reader_.require_end();
+    return members;
+  }
+
+  void unpack_whole(const std::map<std::string, std::filesystem::path>& places,
+                    const std::map<std::filesystem::path, std::uint64_t>& most) {
+    for_each_file([&](archive_entry*, const std::string& name) {
+      const auto place = places.find(name);
+      if (place == places.end()) return;
+      const Descriptor target(::open(place->second.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
+      if (target.number() < 0) throw_system_error("open", errno);
+      write_rest(name, target, 0, most.at(place->second));
+    });
+  }
+
+ private:
+  template <class Use>
+  void for_each_file(const Use& use) {
     while (archive_entry* entry = reader_.next()) {
       if (++entries_ > limits_.max_members) {
         throw Error(ErrorCode::kTooLarge, "The archive has more than " +
@@ -161,37 +199,45 @@ class Unpacker {
       if (::archive_entry_is_encrypted(entry) != 0) {
         throw_unusable("The archive is encrypted; send it without a password.");
       }
-      if (is_regular(entry) && !is_hidden(name)) unpack_one(entry, name);
+      if (is_regular(entry) && !is_hidden(name)) use(entry, name);
     }
-    reader_.require_end();
-    return std::move(members_);
   }
 
- private:
-  void unpack_one(archive_entry* entry, const std::string& name) {
-    if (base_of(name).empty()) {
-      throw_unusable("The archive is damaged: its member " + std::to_string(entries_) +
-                     " is a file without a name.");
-    }
-    if (!names_.insert(name).second) {
-      throw_unusable("The archive has the member " + in_quotes(name) + " twice.");
-    }
-    if (::archive_entry_size_is_set(entry) != 0) {
-      check_total(static_cast<std::uint64_t>(::archive_entry_size(entry)));
-    }
-    const std::filesystem::path place = folder_ / std::to_string(entries_);
-    std::filesystem::create_directory(place);
-    const std::filesystem::path path = place / plain_name(name);
-    const Descriptor target(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
+  // False for an empty one.
+  bool unpack_one(ArchiveMember& member, const MemberBound& bound) {
+    const Descriptor target(
+        ::open(member.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
     if (target.number() < 0) throw_system_error("open", errno);
-    std::uint64_t bytes = 0;
-    while (const std::size_t count = reader_.read(buffer_)) {
-      check_total(count);
-      total_ += count;
-      bytes += count;
-      write_all(target, std::span(buffer_).first(count));
+    while (member.bytes < kBeginningBytes) {
+      const std::size_t count = write_piece(target, kBeginningBytes - member.bytes);
+      if (count == 0) return member.bytes > 0;
+      member.bytes += count;
     }
-    if (bytes > 0) members_.push_back({name, path});
+    const auto most = bound(member.path);
+    member.is_whole = most.has_value();
+    member.bytes = most ? write_rest(member.name, target, member.bytes, *most) : 0;
+    return true;
+  }
+
+  // Writes what follows `bytes` of a member. Returns how many it has.
+  std::uint64_t write_rest(const std::string& name, const Descriptor& target, std::uint64_t bytes,
+                           std::uint64_t most) {
+    while (const std::size_t count = write_piece(target, buffer_.size())) {
+      bytes += count;
+      if (bytes <= most) continue;
+      throw_unusable("The archive's member " + in_quotes(name) + " holds more than the " +
+                     std::to_string(most) + " bytes that its header lets it have.");
+    }
+    return bytes;
+  }
+
+  std::size_t write_piece(const Descriptor& target, std::uint64_t most) {
+    const auto piece = std::span(buffer_).first(std::min<std::uint64_t>(buffer_.size(), most));
+    const std::size_t count = reader_.read(piece);
+    check_total(count);
+    total_ += count;
+    write_all(target, piece.first(count));
+    return count;
   }
 
   void check_total(std::uint64_t further) const {
@@ -212,10 +258,7 @@ class Unpacker {
 
   InputFile file_;
   Reader reader_;
-  std::filesystem::path folder_;
   ArchiveLimits limits_;
-  std::vector<ArchiveMember> members_;
-  std::set<std::string> names_;
   std::size_t entries_ = 0;
   std::uint64_t total_ = 0;
   std::vector<std::byte> buffer_ = std::vector<std::byte>(std::size_t{1} << 18);
@@ -253,9 +296,19 @@ std::string_view folder_of(std::string_view name) {
 std::string_view base_of(std::string_view name) { return name.substr(folder_of(name).size()); }
 
 std::vector<ArchiveMember> unpack(const std::filesystem::path& archive,
-                                  const std::filesystem::path& folder,
-                                  const ArchiveLimits& limits) {
-  return Unpacker(archive, folder, limits).unpack_all();
+                                  const std::filesystem::path& folder, const ArchiveLimits& limits,
+                                  const MemberBound& bound) {
+  return Unpacker(archive, limits).unpack(folder, bound);
+}
+
+void unpack_whole(const std::filesystem::path& archive, const std::vector<ArchiveMember>& members,
+                  const std::map<std::filesystem::path, std::uint64_t>& most,
+                  const ArchiveLimits& limits) {
+  std::map<std::string, std::filesystem::path> places;
+  for (const ArchiveMember& member : members) {
+    if (most.contains(member.path)) places.emplace(member.name, member.path);
+  }
+  Unpacker(archive, limits).unpack_whole(places, most);
 }
 
 }  // namespace isomesh::import

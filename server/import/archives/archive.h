@@ -4,6 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,16 +27,29 @@ struct ArchiveLimits {
 struct ArchiveMember {
   std::string name;  // as the archive has it, with its folders; never used as a path
   std::filesystem::path
-      path;  // where it was unpacked to: ends with its name as far as that is plain
+      path;                 // where it was unpacked to: ends with its name as far as that is plain
+  bool is_whole = true;     // otherwise only its first kBeginningBytes are there
+  std::uint64_t bytes = 0;  // of all of it; 0 for one that is not whole and does not tell
 };
 
-// Unpacks the regular files of a ZIP or a plain TAR. Each gets a folder of its own below `folder`,
-// which exists and is empty. Links, devices and empty or hidden files are passed over. Throws Error
-// kUnusableVolume when the archive is damaged, truncated or encrypted, when anything follows its
-// end, when two members have one name, and when it unpacks to more than most_unpacked_bytes;
-// kTooLarge beyond the limits.
+// How many bytes a member of more than kBeginningBytes may have, of which the path holds so many;
+// empty to leave it at those.
+using MemberBound = std::function<std::optional<std::uint64_t>(const std::filesystem::path&)>;
+
+// Unpacks the regular files of a ZIP or a plain TAR, large ones as far as `bound` says. Each gets a
+// folder of its own below `folder`, which exists and is empty. Links, devices and empty or hidden
+// files are passed over. Throws Error kUnusableVolume when the archive is damaged, truncated or
+// encrypted, when anything follows its end, when two members have one name, and when a member has
+// more bytes than its bound or all tell more than most_unpacked_bytes; kTooLarge beyond the limits.
 std::vector<ArchiveMember> unpack(const std::filesystem::path& archive,
-                                  const std::filesystem::path& folder, const ArchiveLimits& limits);
+                                  const std::filesystem::path& folder, const ArchiveLimits& limits,
+                                  const MemberBound& bound);
+
+// Unpacks members of that archive whole, to their paths: those whose paths `most` holds, up to so
+// many bytes each. Throws as unpack does.
+void unpack_whole(const std::filesystem::path& archive, const std::vector<ArchiveMember>& members,
+                  const std::map<std::filesystem::path, std::uint64_t>& most,
+                  const ArchiveLimits& limits);
 
 // The part of a member's name before and with the last "/", and the part behind it.
 std::string_view folder_of(std::string_view name);

@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <functional>
+#include <map>
+#include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <stdlib.h>
@@ -42,11 +46,46 @@ class MembersFolder {
 struct FoundVolume {
   ArchiveMember member;
   const Reader* reader = nullptr;
+  std::vector<std::string> doubles = {};  // names of members that are the same
 };
 
 ArchiveLimits limits_of(const SizeLimits& limits) {
   return {.max_bytes = limits.max_sample_bytes + kHeadroomBytes};
 }
+
+// Slices are needed in any case. Of others it is not known yet whether, and for data files not how
+// many bytes they may have.
+std::optional<std::uint64_t> most_of_slice(const std::filesystem::path& beginning,
+                                           const ImportTask& task) {
+  const InputFile file(beginning);
+  const Reader* reader = sniff(file);
+  if (reader == nullptr || reader->content != Content::kSlices) return std::nullopt;
+  return most_bytes_of(*reader, file, task).file;
+}
+
+// The members of an archive, of which large ones are unpacked when they are needed.
+class Members {
+ public:
+  explicit Members(const Input& input)
+      : input_(input),
+        folder_(input.task.scratch),
+        all_(unpack(input.path, folder_.path(), limits_of(input.task.limits),
+                    [&](const auto& beginning) { return most_of_slice(beginning, input.task); })) {}
+
+  const std::vector<ArchiveMember>& all() const { return all_; }
+
+  // The files that hold the samples of a header. Throws Error kUnusableVolume when they are
+  // missing.
+  std::vector<std::filesystem::path> data_of(const FoundVolume& found) const;
+
+  // Unpacks a volume and its data files whole, up to what its header tells.
+  void complete(const FoundVolume& found);
+
+ private:
+  const Input& input_;
+  MembersFolder folder_;
+  std::vector<ArchiveMember> all_;
+};
 
 Companions companions_of(const ArchiveMember& header, const std::vector<ArchiveMember>& members) {
   const std::string_view folder = folder_of(header.name);
@@ -57,6 +96,36 @@ Companions companions_of(const ArchiveMember& header, const std::vector<ArchiveM
     companions.files.emplace(below.lexically_normal().generic_string(), member.path);
   }
   return companions;
+}
+
+std::vector<std::filesystem::path> Members::data_of(const FoundVolume& found) const {
+  std::vector<std::filesystem::path> data;
+  const auto& [member, reader, doubles] = found;
+  const Companions companions = companions_of(member, all_);
+  for (const std::string& name :
+       data_names_of(*reader, InputFile(member.path), companions, input_.task)) {
+    data.push_back(companion(name, companions));
+  }
+  return data;
+}
+
+void Members::complete(const FoundVolume& found) {
+  std::set<std::filesystem::path> cut;
+  for (const ArchiveMember& member : all_) {
+    if (!member.is_whole) cut.insert(member.path);
+  }
+  if (cut.empty()) return;
+  const MostBytes most = most_bytes_of(*found.reader, InputFile(found.member.path), input_.task);
+  std::map<std::filesystem::path, std::uint64_t> wanted;
+  if (cut.contains(found.member.path)) wanted.emplace(found.member.path, most.file);
+  for (const std::filesystem::path& data : data_of(found)) {
+    if (cut.contains(data)) wanted.emplace(data, most.data);
+  }
+  if (wanted.empty()) return;
+  unpack_whole(input_.path, all_, wanted, limits_of(input_.task.limits));
+  for (ArchiveMember& member : all_) {
+    if (wanted.contains(member.path)) member.is_whole = true;
+  }
 }
 
 std::vector<FoundVolume> files_of_formats(const std::vector<ArchiveMember>& members) {
@@ -76,20 +145,51 @@ std::vector<FoundVolume> files_of_formats(const std::vector<ArchiveMember>& memb
 // Files that hold the samples of a header among them. A header that is damaged names none here;
 // when its volume is read it is refused with its reason.
 std::set<std::filesystem::path> data_of(const std::vector<FoundVolume>& found,
-                                        const std::vector<ArchiveMember>& members) {
-  std::set<std::filesystem::path> data;
-  for (const auto& [member, reader] : found) {
-    if (reader->data_names == nullptr) continue;
-    const Companions companions = companions_of(member, members);
+                                        const Members& members) {
+  std::set<std::filesystem::path> all;
+  for (const FoundVolume& volume : found) {
     try {
-      for (const std::string& name : reader->data_names(InputFile(member.path), companions)) {
-        data.insert(companion(name, companions));
-      }
+      for (const std::filesystem::path& data : members.data_of(volume)) all.insert(data);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::kUnusableVolume) throw;
     }
   }
-  return data;
+  return all;
+}
+
+// Whether two volumes have the same bytes, those of their data files too.
+bool are_same(const FoundVolume& one, const FoundVolume& other, Members& members) {
+  try {
+    for (const FoundVolume* volume : {&one, &other}) members.complete(*volume);
+    std::vector<std::filesystem::path> files = members.data_of(one);
+    std::vector<std::filesystem::path> others = members.data_of(other);
+    files.push_back(one.member.path);
+    others.push_back(other.member.path);
+    return std::ranges::equal(files, others, same_bytes);
+  } catch (const Error& error) {
+    // What cannot be read is refused with its reason, under either name.
+    if (describe(error.code()).status >= 500) throw;
+    return false;
+  }
+}
+
+// Takes each file once. Files of one size that begin alike are compared with the first of them
+// only, which bounds the work and finds copies where there are some.
+std::vector<FoundVolume> without_doubles(std::vector<FoundVolume> volumes, Members& members) {
+  using Likeness = std::pair<std::uint64_t, std::size_t>;  // the size, and a hash of the beginning
+  std::vector<FoundVolume> kept;
+  std::map<Likeness, std::size_t> first_like_it;
+  for (FoundVolume& volume : volumes) {
+    const std::string beginning = InputFile(volume.member.path).text(0, kBeginningBytes);
+    const Likeness likeness = {volume.member.bytes, std::hash<std::string>{}(beginning)};
+    const auto [first, is_new] = first_like_it.try_emplace(likeness, kept.size());
+    if (!is_new && are_same(kept[first->second], volume, members)) {
+      kept[first->second].doubles.push_back(volume.member.name);
+    } else {
+      kept.push_back(std::move(volume));
+    }
+  }
+  return kept;
 }
 
 // What an archive holds: volumes of a file each, with their data files, and one of all slices.
@@ -101,8 +201,8 @@ struct Contents {
   std::vector<ArchiveMember> others;
 };
 
-Contents contents_of(const std::vector<ArchiveMember>& members) {
-  const std::vector<FoundVolume> found = files_of_formats(members);
+Contents contents_of(Members& members) {
+  const std::vector<FoundVolume> found = files_of_formats(members.all());
   const std::set<std::filesystem::path> data = data_of(found, members);
   Contents contents;
   std::set<std::filesystem::path> taken = data;
@@ -116,9 +216,10 @@ Contents contents_of(const std::vector<ArchiveMember>& members) {
       contents.volumes.push_back(volume);
     }
   }
-  for (const ArchiveMember& member : members) {
+  for (const ArchiveMember& member : members.all()) {
     if (!taken.contains(member.path)) contents.others.push_back(member);
   }
+  contents.volumes = without_doubles(std::move(contents.volumes), members);
   return contents;
 }
 
@@ -133,14 +234,20 @@ Volume read_slices(const Contents& contents, const Input& input) {
   return volume;
 }
 
-Volume read_file(const FoundVolume& found, const std::vector<ArchiveMember>& members,
-                 const Input& input) {
-  const auto& [member, reader] = found;
+Volume read_file(const FoundVolume& found, Members& members, const Input& input) {
+  const auto& [member, reader, doubles] = found;
+  members.complete(found);
   Volume volume = read_input(*reader, {.path = member.path,
-                                       .companions = companions_of(member, members),
+                                       .companions = companions_of(member, members.all()),
                                        .task = input.task,
                                        .listener = input.listener});
   volume.name = std::string(base_of(member.name));
+  if (doubles.empty()) return volume;
+  volume.notes.push_back(duplicate_note(doubles.size()));
+  constexpr std::size_t kMostNamed = 100;
+  for (std::size_t at = 0; at < std::min(kMostNamed, doubles.size()); ++at) {
+    volume.ignored.push_back({std::string(base_of(doubles[at])), reason_of_double(member.name)});
+  }
   return volume;
 }
 
@@ -151,7 +258,7 @@ Volume read_file(const FoundVolume& found, const std::vector<ArchiveMember>& mem
     choices.push_back({"member", std::string(process::kDicomMember),
                        std::to_string(contents.slices.size()) + " DICOM files"});
   }
-  for (const auto& [member, reader] : contents.volumes) {
+  for (const auto& [member, reader, doubles] : contents.volumes) {
     choices.push_back({"member", member.name, std::string(reader->title)});
   }
   std::string names;
@@ -168,13 +275,13 @@ Volume read_file(const FoundVolume& found, const std::vector<ArchiveMember>& mem
   throw_choice(reason, std::move(choices));
 }
 
-Volume read_members(const std::vector<ArchiveMember>& members, const Input& input) {
+Volume read_members(Members& members, const Input& input) {
   const Contents contents = contents_of(members);
   const std::string& asked = input.task.options.member;
   const std::size_t count = contents.volumes.size() + (contents.slices.empty() ? 0 : 1);
   if (count == 0) {
     throw Error(ErrorCode::kUnsupportedMedia, "None of the archive's " +
-                                                  std::to_string(members.size()) +
+                                                  std::to_string(members.all().size()) +
                                                   " files is a volume of a format that is read.");
   }
   if (!contents.slices.empty() &&
@@ -182,8 +289,9 @@ Volume read_members(const std::vector<ArchiveMember>& members, const Input& inpu
     return read_slices(contents, input);
   }
   if (asked.empty() && count == 1) return read_file(contents.volumes.front(), members, input);
-  const auto found = std::ranges::find_if(
-      contents.volumes, [&](const FoundVolume& volume) { return volume.member.name == asked; });
+  const auto found = std::ranges::find_if(contents.volumes, [&](const FoundVolume& volume) {
+    return volume.member.name == asked || std::ranges::count(volume.doubles, asked) > 0;
+  });
   if (found == contents.volumes.end()) offer_members(contents, asked);
   return read_file(*found, members, input);
 }
@@ -193,13 +301,13 @@ Volume read_members(const std::vector<ArchiveMember>& members, const Input& inpu
 bool is_archive(std::string_view head) { return is_zip(head) || is_tar(head); }
 
 Volume parse_archive(const Input& input) {
-  const MembersFolder folder(input.task.scratch);
-  return read_members(unpack(input.path, folder.path(), limits_of(input.task.limits)), input);
+  Members members(input);
+  return read_members(members, input);
 }
 
-std::uint64_t most_archive_bytes(const InputFile& file, const SizeLimits& limits,
-                                 const ImportOptions& /*options*/) {
-  return std::min(limits_of(limits).max_bytes + kHeadroomBytes, most_unpacked_bytes(file.size()));
+std::uint64_t most_archive_bytes(std::uint64_t compressed_bytes, const SizeLimits& limits) {
+  return std::min(limits_of(limits).max_bytes + kHeadroomBytes,
+                  most_unpacked_bytes(compressed_bytes));
 }
 
 }  // namespace isomesh::import

@@ -16,8 +16,7 @@ bool is_archive(std::string_view head);
 // reading throw.
 Volume parse_archive(const Input& input);
 
-// How many bytes a compressed TAR may inflate to.
-std::uint64_t most_archive_bytes(const InputFile& file, const SizeLimits& limits,
-                                 const ImportOptions& options);
+// How many bytes a compressed TAR of this size may inflate to.
+std::uint64_t most_archive_bytes(std::uint64_t compressed_bytes, const SizeLimits& limits);
 
 }  // namespace isomesh::import

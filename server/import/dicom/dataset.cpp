@@ -30,8 +30,27 @@ void inflate(const InputFile& file, std::uint64_t offset, std::uint64_t limit,
       [&](std::span<const std::byte> piece) { scratch.write(piece); }, Wrapping::kNone);
   if (bytes > limit) {
     throw_unusable("The deflated file holds more than the " + std::to_string(limit) +
-                   " bytes that a volume may have.");
+                   " bytes that its header lets it have.");
   }
+}
+
+// The inflated beginning, in a file of its own.
+void inflate_beginning(const InputFile& file, std::uint64_t offset, ScratchFile& scratch) {
+  inflate_range(
+      file, {offset, file.size() - offset}, kBeginningBytes,
+      [&](std::span<const std::byte> piece) { scratch.write(piece); }, Wrapping::kNone);
+}
+
+std::uint64_t most_bytes(const DataSet& data, std::uint64_t most_sample_bytes) {
+  constexpr std::uint64_t kMostHeaderBytes = std::uint64_t{1} << 26;
+  constexpr std::uint64_t kMostOfOthers = std::uint64_t{1} << 28;
+  const auto number = [&](Tag tag) -> double { return data.unsigned_number(tag).value_or(0); };
+  const auto frames = static_cast<double>(data.integer(kNumberOfFrames).value_or(1));
+  const double bytes =
+      number(kRows) * number(kColumns) * number(kBitsAllocated) / 8 * std::max(frames, 1.0);
+  if (bytes == 0) return kMostOfOthers;
+  const auto most = static_cast<double>(most_sample_bytes);
+  return kMostHeaderBytes + static_cast<std::uint64_t>(std::min(bytes * 2, most));
 }
 
 }  // namespace
@@ -124,13 +143,32 @@ std::vector<double> DataSet::binary_reals(Tag tag) const {
   return result;
 }
 
+std::uint64_t most_file_bytes(const InputFile& beginning, const std::filesystem::path& scratch,
+                              std::uint64_t most_sample_bytes) {
+  try {
+    const MetaInformation meta = parse_meta_information(beginning, beginning_of(beginning));
+    if (meta.transfer_syntax != kDeflated) {
+      return most_bytes(parse_beginning(beginning, meta.end, meta.transfer_syntax),
+                        most_sample_bytes);
+    }
+    // What it takes deflated is less than that.
+    ScratchFile inflated(scratch, ".beginning");
+    inflate_beginning(beginning, meta.end, inflated);
+    return most_bytes(parse_beginning(InputFile(inflated.path()), 0, meta.transfer_syntax),
+                      most_sample_bytes);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kUnusableVolume) throw;
+    return most_bytes({}, most_sample_bytes);
+  }
+}
+
 DicomFile::DicomFile(const std::filesystem::path& path, const std::filesystem::path& scratch,
-                     std::uint64_t most_bytes)
+                     std::uint64_t most_sample_bytes)
     : file_(path), meta_(parse_meta_information(file_, beginning_of(file_))) {
   std::uint64_t begin = meta_.end;
   if (transfer_syntax() == kDeflated) {
     scratch_.emplace(scratch, ".inflated");
-    inflate(file_, begin, most_bytes, *scratch_);
+    inflate(file_, begin, most_file_bytes(file_, scratch, most_sample_bytes), *scratch_);
     inflated_.emplace(scratch_->path());
     begin = 0;
   }

@@ -88,14 +88,21 @@ struct MetaInformation {
   std::uint64_t end = 0;  // where the data set begins
 };
 
+// How many bytes a file may have that begins so: of its image, twice what its rows, columns, frames
+// and bits take, since compression may make them more, beside headers; of another object, or where
+// the beginning does not tell, some hundred million. A deflated file's inflated beginning is put
+// into `scratch`. Never throws because of the bytes.
+std::uint64_t most_file_bytes(const InputFile& beginning, const std::filesystem::path& scratch,
+                              std::uint64_t most_sample_bytes);
+
 // One DICOM file. Immutable.
 class DicomFile {
  public:
-  // Reads up to the pixels. A deflated file is inflated into `scratch`, up to `most_bytes` bytes.
-  // Throws Error kUnusableVolume when the file is truncated, corrupt or of a transfer syntax that
-  // is not known.
+  // Reads up to the pixels. A deflated file is inflated into `scratch`, up to what its beginning
+  // tells (most_file_bytes). Throws Error kUnusableVolume when the file is truncated, corrupt or of
+  // a transfer syntax that is not known.
   DicomFile(const std::filesystem::path& path, const std::filesystem::path& scratch,
-            std::uint64_t most_bytes);
+            std::uint64_t most_sample_bytes);
 
   // The file that the offsets of `pixels` count from: this one, or what it was inflated to.
   const InputFile& bytes() const { return inflated_ ? *inflated_ : file_; }

@@ -22,19 +22,17 @@ namespace isomesh::import {
 namespace dicom {
 namespace {
 
-// Added to the bytes of samples to bound what a deflated file may inflate to.
-constexpr std::uint64_t kMostHeaderBytes = std::uint64_t{1} << 26;
-
 // Keeps the file of the last slice open, because the next slice is often in it, too.
 class OpenFile {
  public:
-  OpenFile(std::span<const Source> sources, std::filesystem::path scratch, std::uint64_t most_bytes)
-      : sources_(sources), scratch_(std::move(scratch)), most_bytes_(most_bytes) {}
+  OpenFile(std::span<const Source> sources, std::filesystem::path scratch,
+           std::uint64_t most_sample_bytes)
+      : sources_(sources), scratch_(std::move(scratch)), most_sample_bytes_(most_sample_bytes) {}
 
   FrameReader& reader(std::size_t index) {
     if (!file_ || index_ != index) {
       reader_.reset();
-      file_.emplace(sources_[index].path, scratch_, most_bytes_);
+      file_.emplace(sources_[index].path, scratch_, most_sample_bytes_);
       reader_.emplace(*file_, sources_[index].image);
       index_ = index;
     }
@@ -46,7 +44,7 @@ class OpenFile {
  private:
   std::span<const Source> sources_;
   std::filesystem::path scratch_;
-  std::uint64_t most_bytes_;
+  std::uint64_t most_sample_bytes_;
   std::size_t index_ = 0;
   std::optional<DicomFile> file_;
   std::optional<FrameReader> reader_;
@@ -103,6 +101,9 @@ bool write_stack(const Stack& stack, SampleType type, OpenFile& file, std::span<
 }
 
 Volume write_volume(const Stack& stack, Volume volume, OpenFile& file, const ImportTask& task) {
+  // What cannot be decoded takes no room on the disk: a small stream may tell any number of rows.
+  std::vector<std::byte> first(stack.slices.front().image->layout.frame_bytes());
+  read_slice(stack, 0, file, first);
   const std::vector<SampleType> types =
       are_labels(stack) ? std::vector{label_type(stack.slices)} : candidate_types(stack.slices);
   for (const SampleType type : types) {
@@ -149,13 +150,13 @@ bool is_dicom(std::string_view head) {
 }
 
 Volume import_dicom(std::span<const std::filesystem::path> files, const ImportTask& task) {
-  const std::uint64_t most_bytes = task.limits.max_sample_bytes + dicom::kMostHeaderBytes;
-  dicom::Upload upload = dicom::read_headers(files, task.scratch, most_bytes);
+  const std::uint64_t most_sample_bytes = task.limits.max_sample_bytes;
+  dicom::Upload upload = dicom::read_headers(files, task.scratch, most_sample_bytes);
   const std::vector<dicom::Source> sources =
       choose_series(std::move(upload.sources), task.options.series);
   std::vector<Note> notes = std::move(upload.notes);
   const dicom::Stack stack = dicom::choose_stack(dicom::slices_of(sources), task.options, notes);
-  dicom::OpenFile file(sources, task.scratch, most_bytes);
+  dicom::OpenFile file(sources, task.scratch, most_sample_bytes);
   Volume volume = dicom::write_volume(stack, dicom::describe_volume(stack), file, task);
   const dicom::Image& image = *stack.slices.front().image;
   volume.presets = volume::presets_for(image.modality, image.rescale_type, volume.range);
@@ -164,6 +165,10 @@ Volume import_dicom(std::span<const std::filesystem::path> files, const ImportTa
   volume.dicom = dicom::identify(stack, sources, file.data());
   if (!volume.dicom->series_description.empty()) volume.name = volume.dicom->series_description;
   return volume;
+}
+
+MostBytes most_dicom_bytes(const InputFile& beginning, const ImportTask& task) {
+  return {.file = dicom::most_file_bytes(beginning, task.scratch, task.limits.max_sample_bytes)};
 }
 
 Volume parse_dicom(const Input& input) { return import_dicom({&input.path, 1}, input.task); }

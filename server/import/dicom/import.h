@@ -29,6 +29,9 @@ bool is_dicom(std::string_view head);
 // kOutOfSpace, kInternal. Thread safe.
 Volume import_dicom(std::span<const std::filesystem::path> files, const ImportTask& task);
 
+// As most_file_bytes of dataset.h.
+MostBytes most_dicom_bytes(const InputFile& beginning, const ImportTask& task);
+
 // The volume of one file. Throws as import_dicom does.
 Volume parse_dicom(const Input& input);
 

@@ -95,8 +95,7 @@ class Parser {
     return is_representation(window(at_ + 4, 2));
   }
 
-  ParsedFile file(const Encoding& encoding) {
-    ParsedFile result;
+  void read_file(const Encoding& encoding, ParsedFile& result) {
     result.data.big_endian = encoding.big_endian;
     while (at_ < end()) {
       // Media that are read in blocks leave zeros and other bytes after the last element.
@@ -108,7 +107,6 @@ class Parser {
       }
       read_outer_element(head, encoding, result.data);
     }
-    return result;
   }
 
  private:
@@ -323,6 +321,11 @@ class Parser {
   std::size_t kept_bytes_ = 0;
 };
 
+Encoding encoding_of(Parser& parser, std::string_view transfer_syntax) {
+  const bool big_endian = transfer_syntax == kExplicitBigEndian;
+  return {big_endian || parser.looks_explicit(), big_endian};
+}
+
 }  // namespace
 
 bool is_representation(std::string_view text) {
@@ -343,9 +346,23 @@ MetaInformation parse_meta_information(const InputFile& file, std::uint64_t offs
 
 ParsedFile parse_data_set(const InputFile& file, std::uint64_t offset,
                           std::string_view transfer_syntax) {
+  ParsedFile result;
   Parser parser(file, offset);
-  const bool big_endian = transfer_syntax == kExplicitBigEndian;
-  return parser.file({big_endian || parser.looks_explicit(), big_endian});
+  parser.read_file(encoding_of(parser, transfer_syntax), result);
+  return result;
+}
+
+DataSet parse_beginning(const InputFile& file, std::uint64_t offset,
+                        std::string_view transfer_syntax) {
+  ParsedFile result;
+  Parser parser(file, offset);
+  try {
+    parser.read_file(encoding_of(parser, transfer_syntax), result);
+  } catch (const Error& error) {
+    // The file's end, which may lie anywhere. What else is wrong is found when all of it is read.
+    if (error.code() != ErrorCode::kUnusableVolume) throw;
+  }
+  return std::move(result.data);
 }
 
 }  // namespace isomesh::import::dicom

@@ -32,4 +32,9 @@ struct ParsedFile {
 ParsedFile parse_data_set(const InputFile& file, std::uint64_t offset,
                           std::string_view transfer_syntax);
 
+// The elements of a data set of which the file may hold only the beginning, as far as they can be
+// read; never throws because of the bytes.
+DataSet parse_beginning(const InputFile& file, std::uint64_t offset,
+                        std::string_view transfer_syntax);
+
 }  // namespace isomesh::import::dicom

@@ -68,50 +68,34 @@ bool begins_as_dicom(const std::filesystem::path& path) {
   return is_dicom(head);
 }
 
-bool same_bytes(const std::filesystem::path& one, const std::filesystem::path& other) {
-  constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
-  const InputFile a(one);
-  const InputFile b(other);
-  if (a.size() != b.size()) return false;
-  for (std::uint64_t at = 0; at < a.size(); at += kPieceBytes) {
-    if (a.text(at, kPieceBytes) != b.text(at, kPieceBytes)) return false;
-  }
-  return true;
-}
-
 // Reads the files of one upload.
 class HeaderReader {
  public:
-  HeaderReader(std::filesystem::path scratch, std::uint64_t most_bytes)
-      : scratch_(std::move(scratch)), most_bytes_(most_bytes) {}
+  HeaderReader(std::filesystem::path scratch, std::uint64_t most_sample_bytes)
+      : scratch_(std::move(scratch)), most_sample_bytes_(most_sample_bytes) {}
 
   void read(const std::filesystem::path& path) {
     if (!begins_as_dicom(path)) return ignore(upload_, path, "it is no DICOM file");
-    const DicomFile file(path, scratch_, most_bytes_);
+    const DicomFile file(path, scratch_, most_sample_bytes_);
     if (const auto reason = reason_to_ignore(file)) return ignore(upload_, path, *reason);
     Source source = describe_source(path, file);
     const std::string& uid = source.instance.sop_instance_uid;
     const auto [known, is_new] = first_with_uid_.try_emplace(uid, path);
     if (!is_new && same_bytes(known->second, path)) {
       ++doubles_;
-      return ignore(upload_, path, "it is the same as " + in_quotes(name_of(known->second)));
+      return ignore(upload_, path, reason_of_double(name_of(known->second)));
     }
     upload_.sources.push_back(std::move(source));
   }
 
   Upload finish() {
-    if (doubles_ > 0) {
-      upload_.notes.push_back(
-          note_of(NoteCode::kDuplicateFile,
-                  std::to_string(doubles_) + (doubles_ == 1 ? " file" : " files") +
-                      " came more than once, byte for byte, and each was taken once."));
-    }
+    if (doubles_ > 0) upload_.notes.push_back(duplicate_note(doubles_));
     return std::move(upload_);
   }
 
  private:
   std::filesystem::path scratch_;
-  std::uint64_t most_bytes_;
+  std::uint64_t most_sample_bytes_;
   Upload upload_;
   std::map<std::string, std::filesystem::path> first_with_uid_;
   std::size_t doubles_ = 0;
@@ -158,8 +142,8 @@ std::string joined_titles(const std::vector<Choice>& choices) {
 }  // namespace
 
 Upload read_headers(std::span<const std::filesystem::path> files,
-                    const std::filesystem::path& scratch, std::uint64_t most_bytes) {
-  HeaderReader reader(scratch, most_bytes);
+                    const std::filesystem::path& scratch, std::uint64_t most_sample_bytes) {
+  HeaderReader reader(scratch, most_sample_bytes);
   for (const std::filesystem::path& path : files) {
     try {
       reader.read(path);

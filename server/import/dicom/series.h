@@ -33,7 +33,7 @@ struct Upload {
 // Reads the headers of all files. One that came twice, byte for byte, is taken once. Throws Error
 // kUnusableVolume when a DICOM file is truncated or corrupt, or none holds images.
 Upload read_headers(std::span<const std::filesystem::path> files,
-                    const std::filesystem::path& scratch, std::uint64_t most_bytes);
+                    const std::filesystem::path& scratch, std::uint64_t most_sample_bytes);
 
 // The sources of the series, or of the only one when `uid` is empty. Throws Error kUnusableVolume
 // when that leaves a choice, with all series in its choices, or a source has a fault.

@@ -270,6 +270,49 @@ Geometry geometry_of(const Fields& fields, std::size_t axes) {
   return geometry;
 }
 
+// When a frame was taken, as the trackers of PLUS and Slicer's sequences write it; empty where that
+// is not told.
+std::string timestamp_of(const Fields& fields, std::uint64_t frame) {
+  std::string number = std::to_string(frame);
+  number.insert(0, 4 - std::min<std::size_t>(number.size(), 4), '0');
+  const auto seconds = parse_double(optional(fields, "Seq_Frame" + number + "_Timestamp"));
+  return seconds ? "time " + to_text(*seconds) + " s" : std::string();
+}
+
+// Where a volume lies along the axes beyond the third, of which the fourth runs fastest; its number
+// where the header tells neither an origin nor a distance along a single such axis.
+std::string place_of(const Fields& fields, std::span<const std::uint64_t> sizes,
+                     std::uint64_t index) {
+  const auto spacing = numbers_of(one_of(fields, {"ElementSpacing"}, sizes.size()));
+  const auto origin = numbers_of(one_of(fields, {"Offset", "Position", "Origin"}, sizes.size()));
+  std::string place;
+  std::uint64_t rest = index;
+  for (std::size_t axis = 3; axis < sizes.size(); ++axis) {
+    const auto at = static_cast<double>(rest % sizes[axis]);
+    rest /= sizes[axis];
+    const double step = spacing.empty() ? 1 : spacing[axis];
+    const double first = origin.empty() ? 0 : origin[axis];
+    if (sizes.size() == 4 && step == 1 && first == 0) return "volume " + std::to_string(index);
+    if (sizes[axis] == 1) continue;
+    place += (place.empty() ? "axis " : ", axis ") + std::to_string(axis + 1) + " at " +
+             to_text(first + step * at);
+  }
+  return place;
+}
+
+Difference difference_of(const Fields& fields, const std::vector<std::uint64_t>& sizes) {
+  if (!timestamp_of(fields, 0).empty()) {
+    return {.what = "time", .title = [&](std::uint64_t index) {
+              const std::string time = timestamp_of(fields, index);
+              return time.empty() ? "volume " + std::to_string(index) : time;
+            }};
+  }
+  const bool is_fourth = sizes.size() <= 4;
+  return {.what = is_fourth ? "their place along the fourth axis"
+                            : "their place along the axes beyond the third",
+          .title = [&](std::uint64_t index) { return place_of(fields, sizes, index); }};
+}
+
 // Their dims, type and encoding, and which of several volumes they are.
 SourceVolume samples_of(const Fields& fields, const std::vector<std::uint64_t>& sizes,
                         const ImportOptions& options) {
@@ -284,10 +327,7 @@ SourceVolume samples_of(const Fields& fields, const std::vector<std::uint64_t>& 
                                    "The slope and offset of the MetaImage header's samples were "
                                    "applied; programs that pass over them show other values."));
   }
-  choose_volume(volumes_beyond(sizes),
-                {.what = "their fourth axis",
-                 .title = [](std::uint64_t index) { return "volume " + std::to_string(index); }},
-                options, volume);
+  choose_volume(volumes_beyond(sizes), difference_of(fields, sizes), options, volume);
   return volume;
 }
 
@@ -326,14 +366,16 @@ SourceVolume parse_metaimage(const InputFile& file, const Companions& companions
   return volume;
 }
 
-std::uint64_t most_metaimage_bytes(const InputFile& file, const SizeLimits& limits,
-                                   const ImportOptions& options) {
-  const std::string head = file.text(0, kMostHeaderBytes);
-  const Header header = read_header(inflate_head(std::as_bytes(std::span(head)), kMostHeaderBytes));
-  if (is_detached(header.fields)) return kMostHeaderBytes + kHeadroomBytes;
-  const SourceVolume volume = samples_of(header.fields, sizes_of(header.fields), options);
-  check_limits(volume, limits);
-  return header.bytes + volume.most_encoded_bytes() + kHeadroomBytes;
+MostBytes most_metaimage_bytes(const InputFile& beginning, const ImportTask& task) {
+  constexpr std::uint64_t kMostSkipped = std::uint64_t{64} << 20;
+  const Header header = read_header(beginning.text(0, kMostHeaderBytes));
+  const Fields& fields = header.fields;
+  const SourceVolume volume = samples_of(fields, sizes_of(fields), task.options);
+  check_limits(volume, task.limits);
+  const std::uint64_t samples = volume.most_encoded_bytes() + kHeadroomBytes;
+  if (!is_detached(fields)) return {.file = header.bytes + samples};
+  const std::uint64_t skipped = std::min(data_skip(fields).value_or(kMostSkipped), kMostSkipped);
+  return {.file = kMostHeaderBytes + kHeadroomBytes, .data = skipped + samples};
 }
 
 }  // namespace isomesh::import

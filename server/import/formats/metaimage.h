@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/files.h"
+#include "server/import/reader.h"
 #include "server/import/source.h"
 
 namespace isomesh::import {
@@ -25,9 +26,8 @@ SourceVolume parse_metaimage(const InputFile& file, const Companions& companions
 // The data files that a header without samples names.
 std::vector<std::string> metaimage_data_names(const InputFile& file, const Companions& companions);
 
-// How many bytes a compressed file may inflate to: what the header in its beginning describes.
-// Throws as parse_metaimage does, and Error kTooLarge beyond the limits.
-std::uint64_t most_metaimage_bytes(const InputFile& file, const SizeLimits& limits,
-                                   const ImportOptions& options);
+// As the header in its beginning tells. Throws as parse_metaimage does, and Error kTooLarge beyond
+// the limits.
+MostBytes most_metaimage_bytes(const InputFile& beginning, const ImportTask& task);
 
 }  // namespace isomesh::import

@@ -397,16 +397,14 @@ std::vector<std::string> nifti_data_names(const InputFile& file, const Companion
   return {image_name(companions)};
 }
 
-std::uint64_t most_nifti_bytes(const InputFile& file, const SizeLimits& limits,
-                               const ImportOptions& options) {
-  const std::string head = file.text(0, kSniffBytes);
-  const NiftiHeader header =
-      read_nifti_header(inflate_head(std::as_bytes(std::span(head)), kNiftiHeaderBytes));
-  // A compressed header of a pair holds nothing else.
-  if (header.is_detached) return kHeadroomBytes;
-  const SourceVolume volume = describe(header, options);
-  check_limits(volume, limits);
-  return payload_offset(header) + volume.stored_bytes() + kHeadroomBytes;
+MostBytes most_nifti_bytes(const InputFile& beginning, const ImportTask& task) {
+  const NiftiHeader header = read_nifti_header(beginning.text(0, kNiftiHeaderBytes));
+  const SourceVolume volume = describe(header, task.options);
+  check_limits(volume, task.limits);
+  const std::uint64_t samples =
+      payload_offset(header) + volume.most_encoded_bytes() + kHeadroomBytes;
+  if (header.is_detached) return {.file = kHeadroomBytes, .data = samples};
+  return {.file = samples};
 }
 
 }  // namespace isomesh::import

@@ -33,9 +33,7 @@ SourceVolume parse_nifti(const InputFile& file, const Companions& companions,
 // The file beside a header that holds its samples; none for one with its samples in it.
 std::vector<std::string> nifti_data_names(const InputFile& file, const Companions& companions);
 
-// How many bytes a compressed file may inflate to, as its header tells. Throws Error kTooLarge for
-// volumes beyond the limits.
-std::uint64_t most_nifti_bytes(const InputFile& file, const SizeLimits& limits,
-                               const ImportOptions& options);
+// As its header tells. Throws as parse_nifti does, and Error kTooLarge beyond the limits.
+MostBytes most_nifti_bytes(const InputFile& beginning, const ImportTask& task);
 
 }  // namespace isomesh::import

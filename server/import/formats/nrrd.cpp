@@ -295,19 +295,20 @@ SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
   return volume;
 }
 
-std::uint64_t most_nrrd_bytes(const InputFile& file, const SizeLimits& limits,
-                              const ImportOptions& options) {
+MostBytes most_nrrd_bytes(const InputFile& beginning, const ImportTask& task) {
   constexpr std::int64_t kMostSkipped = std::int64_t{64} << 20;
-  const std::string head = file.text(0, kMostHeaderBytes);
-  const Header header = read_header(inflate_head(std::as_bytes(std::span(head)), kMostHeaderBytes));
-  if (header.fields.contains(kDataFile)) return kMostHeaderBytes + kHeadroomBytes;
+  const Header header = read_header(beginning.text(0, kMostHeaderBytes));
+  const Fields& fields = header.fields;
   const SourceVolume volume =
-      samples_of(header.fields, nrrd_sizes(header.fields, sizes_of(header.fields)), options);
-  check_limits(volume, limits);
+      samples_of(fields, nrrd_sizes(fields, sizes_of(fields)), task.options);
+  check_limits(volume, task.limits);
   const std::int64_t skipped =
-      std::clamp<std::int64_t>(skip_field(header.fields, "byteskip"), 0, kMostSkipped);
-  return header.bytes + static_cast<std::uint64_t>(skipped) + volume.most_encoded_bytes() +
-         kHeadroomBytes;
+      std::clamp<std::int64_t>(skip_field(fields, "byteskip"), 0, kMostSkipped);
+  const std::uint64_t samples =
+      static_cast<std::uint64_t>(skipped) + volume.most_encoded_bytes() + kHeadroomBytes;
+  const std::uint64_t list = kMostHeaderBytes + kHeadroomBytes;  // of names
+  if (fields.contains(kDataFile)) return {.file = list, .data = samples};
+  return {.file = header.bytes + samples};
 }
 
 }  // namespace isomesh::import

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/files.h"
+#include "server/import/reader.h"
 #include "server/import/source.h"
 
 namespace isomesh::import {
@@ -22,9 +23,8 @@ SourceVolume parse_nrrd(const InputFile& file, const Companions& companions,
 // The data files that a header without samples names.
 std::vector<std::string> nrrd_data_names(const InputFile& file, const Companions& companions);
 
-// How many bytes a compressed file may inflate to: what the header in its beginning describes.
-// Throws as parse_nrrd does, and Error kTooLarge beyond the limits.
-std::uint64_t most_nrrd_bytes(const InputFile& file, const SizeLimits& limits,
-                              const ImportOptions& options);
+// As the header in its beginning tells. Throws as parse_nrrd does, and Error kTooLarge beyond the
+// limits.
+MostBytes most_nrrd_bytes(const InputFile& beginning, const ImportTask& task);
 
 }  // namespace isomesh::import

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "base/files.h"
+#include "server/import/reader.h"
 #include "server/import/source.h"
 
 namespace isomesh::import {
@@ -16,5 +17,9 @@ bool is_vti(std::string_view head);
 // taken for LPS, as programs made with ITK write it. Throws Error kUnusableVolume.
 SourceVolume parse_vti(const InputFile& file, const Companions& companions,
                        const ImportOptions& options);
+
+// As the image's extent tells, with room for other arrays than the samples. Throws Error
+// kUnusableVolume where the file does not begin with that.
+MostBytes most_vti_bytes(const InputFile& beginning, const ImportTask& task);
 
 }  // namespace isomesh::import

@@ -6,6 +6,7 @@
 
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/files.h"
+#include "tests/unit/import/vti_writer.h"
 #include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
@@ -212,9 +213,76 @@ TEST(Archive, OneOfSeveralVolumesIsChosenByItsName) {
               HasSubstr("member"));
 }
 
+TEST(Archive, OneFileTwiceIsTakenOnce) {
+  const std::string volume = nifti({}, kSamples);
+  const std::string file = zip({{"a.nii", volume}, {"old/a.nii", volume}, {"c.nii", volume}});
+  for (const char* asked : {"", "a.nii", "c.nii"}) {
+    const Outcome outcome = import_bytes(file, {}, {.member = asked});
+    EXPECT_EQ(outcome.error, "");
+    EXPECT_EQ(outcome.volume.name, "a.nii");
+    EXPECT_THAT(codes_of(outcome), testing::ElementsAre("duplicate-file"));
+    ASSERT_EQ(outcome.volume.ignored.size(), 2U);
+    EXPECT_EQ(outcome.volume.ignored[0].name, "a.nii");
+    EXPECT_THAT(outcome.volume.ignored[1].reason, HasSubstr("same as \"a.nii\""));
+  }
+  // Beside another volume it is one of two.
+  const std::string other = nrrd(small_nrrd(), kSamples);
+  EXPECT_EQ(import_bytes(zip({{"a.nii", volume}, {"b.nii", volume}, {"c.nrrd", other}}))
+                .remedy.choices.size(),
+            2U);
+}
+
+TEST(Archive, AHeaderTwiceIsOneVolumeOnlyWithTheSameData) {
+  const std::string other(kSamples.rbegin(), kSamples.rend());
+  const auto both = [&](const std::string& second) {
+    return import_bytes(zip({{"a/head.mhd", mhd()},
+                             {"a/head.raw", kSamples},
+                             {"b/head.mhd", mhd()},
+                             {"b/head.raw", second}}));
+  };
+  EXPECT_THAT(codes_of(both(kSamples)), testing::ElementsAre("duplicate-file"));
+  EXPECT_EQ(both(other).remedy.choices.size(), 2U);
+}
+
+// Large members are unpacked when they are needed, and no further than their headers tell.
+TEST(Archive, LargeMembersAreReadWhole) {
+  const std::string samples(std::size_t{2} << 20, 'a');
+  const Lines large = with(small_nrrd(), "sizes", "128 128 128");
+  const std::string other = samples + std::string(10, 'b');
+  const std::vector<Member> members = {{"notes.bin", std::string(std::size_t{3} << 20, 'x')},
+                                       {"h.raw", samples},
+                                       {"h.nhdr", nrrd(with(large, "data file", "h.raw"), "")},
+                                       {"a.nrrd", nrrd(large, other)},
+                                       {"b.nrrd", nrrd(large, other)},
+                                       {"c.nrrd.gz", gzip(nrrd(large, samples))}};
+  for (const std::string& file : forms(members)) {
+    for (const char* asked : {"h.nhdr", "a.nrrd", "b.nrrd", "c.nrrd.gz"}) {
+      const Outcome outcome = import_bytes(file, {}, {.member = asked});
+      ASSERT_EQ(outcome.error, "") << asked;
+      EXPECT_EQ(outcome.sample_bytes(), samples) << asked;
+    }
+    EXPECT_EQ(import_bytes(file).remedy.choices.size(), 3U);
+  }
+}
+
+TEST(Archive, MembersAreNoLargerThanTheirHeadersTell) {
+  const std::string zeros(std::size_t{3} << 20, '\0');
+  const auto refused = [](const std::vector<Member>& members) {
+    expect_refused(members, HasSubstr("that its header lets it have"));
+  };
+  refused({{"a.nrrd", nrrd(small_nrrd(), zeros)}});
+  refused({{"a.nii", nifti({}, zeros)}});
+  refused({{"a.mha", metaimage(small_metaimage(), zeros)}});
+  refused({{"a.vti", vti({}, kSamples) + zeros}});
+  refused({{"h.mhd", mhd()}, {"head.raw", zeros}});
+  refused({{"h.nhdr", nhdr()}, {"head.raw", zeros}});
+  refused({{"h.hdr", nifti({.magic = "ni1", .vox_offset = 0}, "")}, {"h.img", zeros}});
+}
+
 TEST(Archive, SeveralVolumesAreNamed) {
   const std::string volume = nifti({}, kSamples);
-  expect_refused({{"a.nii", volume}, {"b/c.nii", volume}},
+  const std::string other = nifti({.pixdim = {1, 2, 1, 1, 1, 1, 1, 1}}, kSamples);
+  expect_refused({{"a.nii", volume}, {"b/c.nii", other}},
                  AllOf(HasSubstr("2 volumes"), HasSubstr("\"a.nii\", \"b/c.nii\"")));
 }
 

@@ -116,6 +116,7 @@ TEST(Damage, BombsAreStoppedByCounting) {
   EXPECT_THAT(import_bytes(gzip(nifti({}, zeros))).error, HasSubstr("holds more"));
   EXPECT_THAT(import_bytes(gzip(nrrd(small_nrrd(), zeros)), {.max_sample_bytes = 1000}).error,
               HasSubstr("holds more"));
+  EXPECT_THAT(import_bytes(gzip(vti({}, kSmallSamples) + zeros)).error, HasSubstr("holds more"));
   EXPECT_THAT(import_bytes(nrrd(with(small_nrrd(), "encoding", "gzip"), gzip(zeros))).error,
               HasSubstr("more samples"));
   EXPECT_THAT(

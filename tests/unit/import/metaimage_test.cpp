@@ -137,6 +137,33 @@ TEST(MetaImage, RefusesWhatIsNoVolumeOfNumbers) {
   EXPECT_TRUE(import_metaimage(with(lines, "DimSize", "4 3 2 1")).imported());
 }
 
+// As the choices call them.
+std::vector<std::string> titles_of(const Lines& lines) {
+  std::vector<std::string> titles;
+  for (const Choice& choice : import_metaimage(lines).remedy.choices)
+    titles.push_back(choice.title);
+  return titles;
+}
+
+TEST(MetaImage, ItsVolumesAreToldByWhatTheHeaderSays) {
+  Lines lines = with(with(small_metaimage(), "NDims", "4"), "DimSize", "4 3 1 2");
+  lines = with(with(lines, "TransformMatrix", ""), "Offset", "");
+  const Lines plain = with(lines, "ElementSpacing", "1 1 1 1");
+  EXPECT_THAT(titles_of(plain), testing::ElementsAre("volume 0", "volume 1"));
+  lines = with(with(lines, "ElementSpacing", "1 1 1 0.5"), "Offset", "0 0 0 2");
+  EXPECT_THAT(titles_of(lines), testing::ElementsAre("axis 4 at 2", "axis 4 at 2.5"));
+  Lines times = plain;
+  times.insert(times.begin(),
+               {{"Seq_Frame0000_Timestamp", "7.25"}, {"Seq_Frame0001_Timestamp", "8"}});
+  times.insert(times.begin(), {"ObjectSubType", "Sequence"});
+  EXPECT_THAT(titles_of(times), testing::ElementsAre("time 7.25 s", "time 8 s"));
+  Lines five = with(with(plain, "NDims", "5"), "DimSize", "2 3 1 2 2");
+  five = with(five, "ElementSpacing", "1 1 1 1 1");
+  EXPECT_THAT(titles_of(five),
+              testing::ElementsAre("axis 4 at 0, axis 5 at 0", "axis 4 at 1, axis 5 at 0",
+                                   "axis 4 at 0, axis 5 at 1", "axis 4 at 1, axis 5 at 1"));
+}
+
 TEST(MetaImage, RefusesHeadersThatContradictThemselves) {
   EXPECT_FALSE(import_with("NDims", "2").imported());
   EXPECT_FALSE(import_with("NDims", "11").imported());

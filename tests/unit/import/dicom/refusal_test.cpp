@@ -6,7 +6,9 @@
 
 #include "server/import/dicom/import.h"
 #include "server/import/dicom/tags.h"
+#include "tests/unit/import/archives.h"
 #include "tests/unit/import/dicom/objects.h"
+#include "tests/unit/import/writers.h"
 
 namespace isomesh::import::test {
 namespace {
@@ -218,6 +220,16 @@ TEST(DicomRefusal, OfAFileThatInflatesWithoutEnd) {
       import_objects({{"bomb", object.file(kDeflate)}}, {}, {.max_sample_bytes = 1 << 20});
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
   EXPECT_THAT(outcome.error, HasSubstr("deflated file holds more"));
+}
+
+TEST(DicomRefusal, OfACompressedFileThatHoldsMoreThanItsHeaderTells) {
+  const std::string zeros(std::size_t{80} << 20, '\0');
+  const DicomObject enhanced = DicomSeries{}.enhanced({0, 1, 2, 3, 4, 5});
+  EXPECT_TRUE(import_bytes(gzip(enhanced.file())).imported());
+  EXPECT_THAT(import_bytes(gzip(enhanced.file() + zeros)).error, HasSubstr("holds more"));
+  EXPECT_THAT(import_bytes(gzip(enhanced.file(kImplicit) + zeros)).error, HasSubstr("holds more"));
+  EXPECT_THAT(import_bytes(zip({{"a.dcm", enhanced.file() + zeros}})).error,
+              HasSubstr("that its header lets it have"));
 }
 
 TEST(DicomRefusal, OfEveryTruncation) {
