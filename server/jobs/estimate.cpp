@@ -98,7 +98,7 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   for (const MeshFormat format : parameters.formats) {
     estimate.bytes[format] = costs.file_bytes(format, surface, parameters);
   }
-  const store::QueueDepth depth = jobs_.depth();
+  const store::QueueDepth depth = jobs_.depth(viewer);
   estimate.queue = {depth.all_queued(), depth.running};
   return estimate;
 }

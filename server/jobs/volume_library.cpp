@@ -71,7 +71,7 @@ std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,
 void VolumeLibrary::erase(const store::Viewer& viewer, const std::string& id) {
   const std::scoped_lock lock(mutex_);
   volumes_.erase(viewer, id);
-  if (!volumes_.names(id)) blobs_.erase(id);
+  eraser_.erase(id);
 }
 
 }  // namespace isomesh::jobs

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "proto/types.h"
+#include "server/jobs/blob_eraser.h"
 #include "server/jobs/import_runner.h"
 #include "server/process/import_message.h"
 #include "server/store/blob_store.h"
@@ -54,9 +55,12 @@ class VolumeLibrary {
   // Ends the imports that run or wait, and refuses further ones.
   void stop_imports() { runner_.stop(); }
 
-  // The records that the viewer sees; the samples go with the last. Throws Error kNotFound, kGone,
-  // and kNotReady while a job needs the volume.
+  // The records that the viewer sees; the samples go soon after the last. Throws Error kNotFound,
+  // kGone, and kNotReady while a job needs the volume.
   void erase(const store::Viewer& viewer, const std::string& id);
+
+  // Waits until the samples of erased volumes are gone.
+  void finish_erasing() { eraser_.finish(); }
 
  private:
   const store::DataFolder& folder_;
@@ -68,6 +72,7 @@ class VolumeLibrary {
   // Held while a blob and its record come or go together: shared by those that come, which wait for
   // the disk side by side.
   std::shared_mutex mutex_;
+  BlobEraser eraser_{blobs_, volumes_, mutex_};
 };
 
 }  // namespace isomesh::jobs

@@ -193,7 +193,8 @@ class JobStore {
                                     std::uint64_t since,
                                     std::chrono::milliseconds timeout) const = 0;
 
-  virtual QueueDepth depth() const = 0;
+  // Of the jobs that the viewer sees.
+  virtual QueueDepth depth(const Viewer& viewer) const = 0;
 
   // True when submit would answer kBusy.
   virtual bool is_full() const = 0;

@@ -7,7 +7,7 @@ namespace isomesh::http {
 namespace {
 
 Levels levels_of(const App& app) {
-  const store::QueueDepth depth = app.services.jobs.depth();
+  const store::QueueDepth depth = app.services.jobs.depth(std::nullopt);
   Levels levels;
   for (std::size_t i = 0; i < levels.queued.size(); ++i) levels.queued[i] = depth.queued[i];
   levels.running = depth.running;

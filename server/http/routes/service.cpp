@@ -12,7 +12,7 @@ void add_service_routes(App& app) {
     if (!app.services.blobs.has_room()) {
       throw Error(ErrorCode::kUnavailable, "the disk is full: nothing new is accepted");
     }
-    if (app.services.jobs.depth().waiting_for_disk > 0) {
+    if (app.services.jobs.depth(std::nullopt).waiting_for_disk > 0) {
       throw Error(ErrorCode::kUnavailable, "jobs wait for room on the disk");
     }
     response.set_body("ok\n", "text/plain");

@@ -112,21 +112,23 @@ std::vector<Event> SqliteJobStore::kept_events(const Viewer& viewer, const std::
   return events;
 }
 
-QueueDepth SqliteJobStore::depth() const {
+QueueDepth SqliteJobStore::depth(const Viewer& viewer) const {
   const Reading reading(database_.reader());
+  const std::string mine = viewer ? " AND owner = ?1" : " AND ?1 IS NULL";
   QueueDepth depth;
-  Query queued =
-      reading->query("SELECT priority, count(*) FROM jobs WHERE state = 0 GROUP BY priority");
+  Query queued = reading->query(
+      "SELECT priority, count(*) FROM jobs WHERE state = 0" + mine + " GROUP BY priority", viewer);
   while (queued.next()) {
     depth.queued.at(static_cast<std::size_t>(queued.integer(0))) =
         static_cast<std::size_t>(queued.integer(1));
   }
-  Query running = reading->query("SELECT count(*) FROM jobs WHERE state = 1");
+  Query running = reading->query("SELECT count(*) FROM jobs WHERE state = 1" + mine, viewer);
   running.next();
   depth.running = static_cast<std::size_t>(running.integer(0));
   Query waiting = reading->query(
-      "SELECT count(*) FROM jobs WHERE state = 0 AND waiting_for IS NOT NULL AND waiting_for = ?",
-      WaitingFor::kDisk);
+      "SELECT count(*) FROM jobs WHERE state = 0 AND waiting_for IS NOT NULL AND waiting_for = ?2" +
+          mine,
+      viewer, WaitingFor::kDisk);
   waiting.next();
   depth.waiting_for_disk = static_cast<std::size_t>(waiting.integer(0));
   return depth;

@@ -38,7 +38,7 @@ class SqliteJobStore : public JobStore {
                         const std::string& after, std::size_t limit) const override;
   std::vector<Event> events(const Viewer& viewer, const std::string& job, std::uint64_t since,
                             std::chrono::milliseconds timeout) const override;
-  QueueDepth depth() const override;
+  QueueDepth depth(const Viewer& viewer) const override;
   bool is_full() const override;
   void refuse_new() override;
   void close() override;

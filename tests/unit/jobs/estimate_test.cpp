@@ -119,8 +119,14 @@ TEST_F(EstimateTest, JobsOfOthersShiftNothing) {
   const JobParameters parameters = parameters_of(volume, 0);
   const Estimate before = estimator_.estimate("", parameters);
   jobs_.submit({"other", parameters, "", ""});
+  JobParameters waiting = parameters;
+  waiting.passes += 1;
+  jobs_.submit({"other", waiting, "", ""});
   const auto lease = jobs_.claim("worker", std::chrono::minutes(1));
   ASSERT_TRUE(lease);
+  EXPECT_EQ(estimator_.estimate("", parameters).queue, Estimate::Queue{});
+  EXPECT_EQ(estimator_.estimate("other", parameters).queue, (Estimate::Queue{1, 1}));
+  EXPECT_EQ(estimator_.estimate(std::nullopt, parameters).queue, (Estimate::Queue{1, 1}));
   store::Outcome outcome;
   outcome.mesh.emplace().triangles = before.triangles;
   outcome.timing.encode = 1e7;

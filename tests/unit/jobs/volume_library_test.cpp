@@ -78,6 +78,7 @@ TEST_F(VolumeLibraryTest, ErasesRecordAndBlob) {
   const Volume volume = add_bytes(bytes_).first;
   library_.erase("", volume.id);
   EXPECT_FALSE(volumes_.contains("", volume.id));
+  library_.finish_erasing();
   EXPECT_EQ(blob_count(), 0U);
   EXPECT_EQ(code_thrown_by([&] { library_.erase("", volume.id); }), ErrorCode::kNotFound);
   EXPECT_TRUE(add_bytes(bytes_).second);
@@ -91,6 +92,7 @@ TEST_F(VolumeLibraryTest, KeepsAVolumeThatAJobNeeds) {
   EXPECT_EQ(blob_count(), 1U);
   jobs_.cancel("", job);
   library_.erase("", volume.id);
+  library_.finish_erasing();
   EXPECT_EQ(blob_count(), 0U);
 }
 
@@ -103,9 +105,11 @@ TEST_F(VolumeLibraryTest, SamplesStayUntilTheirLastOwnerGoes) {
   EXPECT_TRUE(library_.add("other", folder_ / "upload", options).second);
   EXPECT_EQ(blob_count(), 1U);
   library_.erase("one", id);
+  library_.finish_erasing();
   EXPECT_EQ(blob_count(), 1U);
   EXPECT_TRUE(volumes_.contains("other", id));
   library_.erase("other", id);
+  library_.finish_erasing();
   EXPECT_EQ(blob_count(), 0U);
 }
 
@@ -128,6 +132,36 @@ TEST_F(VolumeLibraryTest, WhatAnotherHasNeedsAsMuchRoomAsWhatIsNew) {
   EXPECT_EQ(add_as("other", others), ErrorCode::kOutOfSpace);
   EXPECT_EQ(add_as("other", bytes_), ErrorCode::kOutOfSpace);
   EXPECT_EQ(add_as("", bytes_), std::nullopt);
+}
+
+// Whoever erases does not wait for the disk, which takes long for what is large and no time for
+// what another owner has.
+TEST_F(VolumeLibraryTest, AVolumeIsErasedBeforeItsSamplesAre) {
+  const Volume volume = add_bytes(bytes_).first;
+  std::shared_mutex coming;
+  BlobEraser eraser(blobs_, volumes_, coming);
+  {
+    const std::shared_lock somebody_stores(coming);
+    volumes_.erase("", volume.id);
+    eraser.erase(volume.id);
+    EXPECT_EQ(blob_count(), 1U);
+  }
+  eraser.finish();
+  EXPECT_EQ(blob_count(), 0U);
+}
+
+TEST_F(VolumeLibraryTest, SamplesThatCameAgainMeanwhileStay) {
+  const Volume volume = add_bytes(bytes_).first;
+  std::shared_mutex coming;
+  BlobEraser eraser(blobs_, volumes_, coming);
+  {
+    const std::shared_lock somebody_stores(coming);
+    volumes_.erase("", volume.id);
+    eraser.erase(volume.id);
+    volumes_.add("other", volume);
+  }
+  eraser.finish();
+  EXPECT_EQ(blob_count(), 1U);
 }
 
 TEST_F(VolumeLibraryTest, ErasingAnUnknownOneIsNotFound) {

@@ -175,15 +175,15 @@ TEST_P(JobConformance, AJobThatIsPutBackSaysWhatItWaitsForUntilItRuns) {
   const std::string id = submit().id;
   jobs().put_back(claimed(), milliseconds(0), WaitingFor::kDisk);
   EXPECT_EQ(jobs().get("", id).waiting_for, WaitingFor::kDisk);
-  EXPECT_EQ(jobs().depth().waiting_for_disk, 1U);
+  EXPECT_EQ(jobs().depth(std::nullopt).waiting_for_disk, 1U);
   restart();
   EXPECT_EQ(jobs().get("", id).waiting_for, WaitingFor::kDisk);
   const Lease lease = claimed();
   EXPECT_EQ(jobs().get("", id).waiting_for, std::nullopt);
-  EXPECT_EQ(jobs().depth().waiting_for_disk, 0U);
+  EXPECT_EQ(jobs().depth(std::nullopt).waiting_for_disk, 0U);
   jobs().put_back(lease, milliseconds(0), WaitingFor::kDisk);
   EXPECT_EQ(jobs().cancel("", id).waiting_for, std::nullopt);
-  EXPECT_EQ(jobs().depth().waiting_for_disk, 0U);
+  EXPECT_EQ(jobs().depth(std::nullopt).waiting_for_disk, 0U);
 }
 
 TEST_P(JobConformance, AJobThatIsPutBackForLaterLetsOthersGoFirst) {
@@ -340,10 +340,12 @@ TEST_P(JobConformance, TheDepthIsCountedByPriority) {
   for (const Priority priority : {Priority::kStat, Priority::kBulk, Priority::kBulk}) {
     submit(unlike(priority));
   }
-  const QueueDepth depth = jobs().depth();
+  const QueueDepth depth = jobs().depth(std::nullopt);
   EXPECT_THAT(depth.queued, ElementsAre(1U, 0U, 2U));
   EXPECT_EQ(depth.running, 1U);
   EXPECT_EQ(depth.all_queued(), 3U);
+  EXPECT_EQ(jobs().depth("").all_queued(), 3U);
+  EXPECT_EQ(jobs().depth("other").all_queued() + jobs().depth("other").running, 0U);
 }
 
 // --- Listing

@@ -1,0 +1,52 @@
+#include "server/jobs/blob_eraser.h"
+
+#include <exception>
+#include <memory>
+
+#include <spdlog/spdlog.h>
+
+#include "base/error.h"
+
+namespace isomesh::jobs {
+
+void BlobEraser::erase(const std::string& key) {
+  const Lock lock(mutex_);
+  waiting_.push_back(key);
+  changed_.notify_all();
+}
+
+void BlobEraser::finish() {
+  Lock lock(mutex_);
+  changed_.wait(lock, [this]() ISOMESH_REQUIRES(mutex_) { return waiting_.empty(); });
+}
+
+void BlobEraser::run(const std::stop_token& stop) {
+  Lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, stop, [this]() ISOMESH_REQUIRES(mutex_) { return !waiting_.empty(); });
+    if (waiting_.empty()) return;
+    const std::string key = waiting_.front();
+    lock.unlock();
+    erase_now(key);
+    lock.lock();
+    waiting_.pop_front();
+    changed_.notify_all();
+  }
+}
+
+void BlobEraser::erase_now(const std::string& key) {
+  try {
+    // While it is open only its name goes. The disk takes long to free the bytes of a large one,
+    // and nobody is to wait for that.
+    const std::unique_ptr<store::BlobReader> held = blobs_.open(key);
+    const std::scoped_lock lock(coming_);
+    if (!volumes_.names(key)) blobs_.erase(key);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kNotFound) return;
+    spdlog::error("the samples of an erased volume are left to be swept: {}", error.what());
+  } catch (const std::exception& error) {
+    spdlog::error("the samples of an erased volume are left to be swept: {}", error.what());
+  }
+}
+
+}  // namespace isomesh::jobs
