@@ -33,9 +33,12 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
   volume.id = blob.key;
   volume.created = timestamp();
   if (!volume.name && !name.empty()) volume.name = name;
-  auto added = volumes_.add(owner, volume);
+  auto [stored, is_new] = volumes_.add(owner, volume);
   blobs_.settle(blob.key);
-  return added;
+  // They are of the file that has been read, which may be another one than the first.
+  stored.notes = std::move(volume.notes);
+  stored.ignored = std::move(volume.ignored);
+  return {std::move(stored), is_new};
 }
 
 std::vector<UploadedVolume> VolumeLibrary::add_all(const std::string& owner,

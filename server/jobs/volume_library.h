@@ -33,7 +33,8 @@ class VolumeLibrary {
 
   // Imports an uploaded file, in a process of its own. `name` is what the client calls it, for a
   // volume that has no name of its own within the file. Second: false when the owner had the same
-  // samples and geometry already; the record stays what it was then. Throws what ImportRunner::run
+  // samples and geometry already; the record stays what it was then, but the volume that is
+  // returned has the notes and the ignored files of this upload. Throws what ImportRunner::run
   // throws, and kOutOfSpace.
   std::pair<Volume, bool> add(const std::string& owner, const std::filesystem::path& upload,
                               const process::ImportOptions& options = {},

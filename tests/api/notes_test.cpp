@@ -7,6 +7,7 @@
 
 #include "proto/json.h"
 #include "tests/api/daemon.h"
+#include "tests/api/dicom_bytes.h"
 #include "tests/support/deflate.h"
 
 namespace isomesh::test {
@@ -31,11 +32,6 @@ std::string nrrd(const std::string& fields, const std::string& samples = kSample
 std::string metaimage(const std::string& fields, const std::string& samples = kSamples) {
   return "ObjectType = Image\nNDims = 3\nDimSize = 4 3 2\nElementType = MET_UCHAR\n" + fields +
          "ElementDataFile = LOCAL\n" + samples;
-}
-
-template <class Number>
-void put(std::string& bytes, std::size_t at, Number number) {
-  bytes.replace(at, sizeof(Number), reinterpret_cast<const char*>(&number), sizeof(Number));
 }
 
 struct NiftiFields {
@@ -75,27 +71,6 @@ std::string not_finite() {
   return samples;
 }
 
-// Elements of explicit little-endian DICOM.
-std::string element(std::uint16_t group, std::uint16_t number, const std::string& kind,
-                    std::string value) {
-  if (value.size() % 2 != 0) value += kind == "UI" ? '\0' : ' ';
-  std::string head(8, '\0');
-  put(head, 0, group);
-  put(head, 2, number);
-  head.replace(4, 2, kind);
-  const bool is_long = kind == "OW" || kind == "OB" || kind == "SQ";
-  if (is_long) head.resize(12);
-  if (is_long) put(head, 8, static_cast<std::uint32_t>(value.size()));
-  if (!is_long) put(head, 6, static_cast<std::uint16_t>(value.size()));
-  return head + value;
-}
-
-std::string number(std::uint16_t group, std::uint16_t tag, std::uint16_t value) {
-  std::string bytes(2, '\0');
-  put(bytes, 0, value);
-  return element(group, tag, "US", bytes);
-}
-
 // One slice of a CT of 4 x 4 samples.
 std::string slice(int index, const std::string& frame_of_reference) {
   const std::string uid = "1.2.826.0.1.3680043.9.1." + std::to_string(index);
@@ -115,28 +90,6 @@ std::string slice(int index, const std::string& frame_of_reference) {
          number(0x28, 0x102, 15) + number(0x28, 0x103, 0) +
          element(0x7fe0, 0x10, "OW",
                  std::string(16, static_cast<char>(index)) + std::string(16, 'a'));
-}
-
-std::string little(std::uint32_t value) {
-  std::string bytes(4, '\0');
-  put(bytes, 0, value);
-  return bytes;
-}
-
-std::string sequence(std::uint16_t group, std::uint16_t tag,
-                     const std::vector<std::string>& items) {
-  std::string value;
-  for (const std::string& item : items) {
-    value +=
-        std::string("\xFE\xFF\x00\xE0", 4) + little(static_cast<std::uint32_t>(item.size())) + item;
-  }
-  return element(group, tag, "SQ", value);
-}
-
-std::string dicom(const std::string& data_set) {
-  const std::string meta = element(2, 0x10, "UI", "1.2.840.10008.1.2.1");
-  return std::string(128, '\0') + "DICM" +
-         element(2, 0, "UL", little(static_cast<std::uint32_t>(meta.size()))) + meta + data_set;
 }
 
 // 8 x 8 samples of 8 bits.
@@ -352,13 +305,29 @@ TEST_F(NotesTest, AFormTellsItsFilesName) {
   EXPECT_EQ(volume_from_json(answer.body).name, "ct.nrrd");
 }
 
-// The same samples and geometry are one volume: it says what its first upload showed.
-TEST_F(NotesTest, AreThoseOfTheUploadThatCameFirst) {
-  const Answer first = daemon_.send("POST", "/v1/volumes", nrrd(""));
+// The same samples and geometry are one volume, whose record is that of the first upload. Each
+// upload's answer says how its own file was read.
+TEST_F(NotesTest, AreInTheAnswerOfTheirUploadAndInTheRecordOfTheFirst) {
+  const Volume first = volume_from_json(daemon_.send("POST", "/v1/volumes", nrrd("")).body);
   const Answer again = daemon_.send("POST", "/v1/volumes", nrrd("", kSamples + "more"));
   EXPECT_EQ(again.status, 200);
-  EXPECT_EQ(volume_from_json(again.body), volume_from_json(first.body));
-  EXPECT_THAT(volume_from_json(again.body).notes, IsEmpty());
+  Volume volume = volume_from_json(again.body);
+  EXPECT_THAT(volume.notes, ElementsAre(Field(&Note::code, "trailing-bytes")));
+  volume.notes = first.notes;
+  EXPECT_EQ(volume, first);
+  EXPECT_EQ(daemon_.client().volume(first.id), first);
+  const Answer third = daemon_.send("POST", "/v1/volumes", nrrd(""));
+  EXPECT_THAT(volume_from_json(third.body).notes, IsEmpty());
+}
+
+TEST_F(NotesTest, OneFileTwiceInAnArchiveIsOneVolume) {
+  const Shown twice = {{{"a.nrrd", nrrd("")}, {"copy of a.nrrd", nrrd("")}}};
+  const Finished uploaded = upload_files(twice, "twice");
+  ASSERT_EQ(uploaded.status, 0) << uploaded.errors;
+  const Volume volume = volume_from_json(uploaded.output);
+  EXPECT_EQ(volume.name, "a.nrrd");
+  EXPECT_THAT(volume.notes, ElementsAre(Field(&Note::code, "duplicate-file")));
+  EXPECT_THAT(volume.ignored, ElementsAre(Field(&IgnoredObject::name, "copy of a.nrrd")));
 }
 
 }  // namespace

@@ -1,9 +1,11 @@
-// The table of options in README.md is what the daemon's --help says.
+// The tables in README.md and docs/ are what the programs say.
+#include <filesystem>
 #include <sstream>
 #include <string>
 
 #include <gtest/gtest.h>
 
+#include "proto/notes.h"
 #include "tests/support/files.h"
 #include "tests/support/process.h"
 
@@ -50,6 +52,17 @@ TEST(Readme, ItsTableOfOptionsIsTheHelpsOwn) {
   EXPECT_NE(read_file(ISOMESH_README).find("|---|---|---|\n" + table + '\n'), std::string::npos)
       << "README.md must hold these rows and no others:\n"
       << table;
+}
+
+// So that a new note is told of there too.
+TEST(Readme, ItsTableOfNotesIsThatOfTheProgram) {
+  std::string table = "| code | in meshes | meaning |\n|---|---|---|\n";
+  for (const NoteDescription& note : note_descriptions()) {
+    table += "| `" + std::string(note.name) + "` | " + (note.is_in_mesh ? "yes" : "") + " | " +
+             std::string(note.meaning) + " |\n";
+  }
+  const auto docs = std::filesystem::path(ISOMESH_README).parent_path() / "docs/uploads.md";
+  EXPECT_TRUE(read_file(docs).ends_with(table)) << "docs/uploads.md must end with:\n" << table;
 }
 
 }  // namespace

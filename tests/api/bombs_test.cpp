@@ -1,0 +1,105 @@
+// Small uploads that tell or unpack to what no machine has room for. Each is read by a process with
+// little memory and time, and is to be refused for what it is before it has taken either.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/json.h"
+#include "tests/api/daemon.h"
+#include "tests/api/dicom_bytes.h"
+#include "tests/api/problems.h"
+#include "tests/support/deflate.h"
+#include "tests/unit/import/archives.h"
+
+namespace isomesh::test {
+namespace {
+
+using testing::AnyOf;
+using testing::HasSubstr;
+
+std::string big_endian(std::uint32_t value, std::size_t bytes) {
+  std::string text;
+  for (std::size_t at = bytes; at-- > 0;) text += static_cast<char>(value >> (8 * at) & 0xFFU);
+  return text;
+}
+
+// A JPEG 2000 stream (ISO/IEC 15444-1, annex A) of one empty tile of that size: 16 bits, no wavelet
+// levels, reversible. Its packets say that no block has any bytes, which means samples of one
+// value.
+std::string blank_jpeg_2000(std::uint32_t size) {
+  const auto four = [](std::uint32_t value) { return big_endian(value, 4); };
+  const auto two = [](std::uint32_t value) { return big_endian(value, 2); };
+  const std::string image = four(size) + four(size) + four(0) + four(0);
+  const std::string packets(16, '\0');
+  return two(0xFF4F) + two(0xFF51) + two(41) + two(0) + image + image + two(1) +
+         std::string("\x0F\1\1") + two(0xFF52) + two(12) + std::string("\0\0\0\1\0", 5) +
+         std::string("\0\4\4\0\1", 5) + two(0xFF5C) + two(4) + std::string("\x40\x80") +
+         two(0xFF90) + two(10) + two(0) + four(static_cast<std::uint32_t>(14 + packets.size())) +
+         std::string("\0\1", 2) + two(0xFF93) + packets + two(0xFFD9);
+}
+
+// A slice of a CT in JPEG 2000 whose every header tells that size.
+std::string blank_slice(std::uint16_t size, int index) {
+  const std::string place = "0\\0\\" + std::to_string(index);
+  std::string stream = blank_jpeg_2000(size);
+  if (stream.size() % 2 != 0) stream += '\0';
+  const auto item = [](std::uint16_t number, const std::string& value) {
+    std::string head("\xFE\xFF\0\0", 4);
+    put(head, 2, number);
+    return head + little(static_cast<std::uint32_t>(value.size())) + value;
+  };
+  std::string pixels("\xE0\x7F\x10\0OB\0\0\xFF\xFF\xFF\xFF", 12);
+  pixels += item(0xE000, "") + item(0xE000, stream) + item(0xE0DD, "");
+  return dicom(
+      element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") +
+          element(8, 0x18, "UI", "1.2.3." + std::to_string(index)) + element(8, 0x60, "CS", "CT") +
+          element(0x20, 0xe, "UI", "1.2.3.4") + element(0x20, 0x32, "DS", place) +
+          element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + number(0x28, 2, 1) +
+          element(0x28, 4, "CS", "MONOCHROME2") + number(0x28, 0x10, size) +
+          number(0x28, 0x11, size) + element(0x28, 0x30, "DS", "1\\1") + number(0x28, 0x100, 16) +
+          number(0x28, 0x101, 16) + number(0x28, 0x102, 15) + number(0x28, 0x103, 0) + pixels,
+      "1.2.840.10008.1.2.4.90");
+}
+
+std::string blank_series(std::uint16_t size) {
+  return import::test::zip({{"1.dcm", blank_slice(size, 1)}, {"2.dcm", blank_slice(size, 2)}});
+}
+
+class BombsTest : public testing::Test {
+ protected:
+  Problem refusal_of(const std::string& bomb) {
+    const Answer answer = daemon_.send("POST", "/v1/volumes", bomb);
+    EXPECT_TRUE(is_problem(answer, ErrorCode::kUnusableVolume)) << answer.body;
+    return problem_from_json(answer.body);
+  }
+
+  const Daemon daemon_{{"--import-memory", "256MiB", "--import-seconds", "30"}};
+};
+
+// So that the others are not refused for how they are written.
+TEST_F(BombsTest, ASmallBlankSeriesIsAVolume) {
+  const Answer answer = daemon_.send("POST", "/v1/volumes", blank_series(64));
+  ASSERT_EQ(answer.status, 201) << answer.body;
+  EXPECT_EQ(volume_from_json(answer.body).dims, (std::array<std::uint32_t, 3>{64, 64, 2}));
+}
+
+TEST_F(BombsTest, JpegsThatTellBillionsOfSamplesAreRefused) {
+  const auto refused = [&](std::uint16_t size, const auto& matcher) {
+    const std::string bomb = blank_series(size);
+    ASSERT_LT(bomb.size(), 10'000U);
+    EXPECT_THAT(refusal_of(bomb).detail, matcher);
+  };
+  refused(60000, HasSubstr("more than can be decoded"));
+  // What could be decoded takes more memory than an import may have.
+  refused(16000, AnyOf(HasSubstr("memory"), HasSubstr("corrupt")));
+}
+
+TEST_F(BombsTest, WhatUnpacksToMoreThanItsHeaderTellsIsRefused) {
+  const std::string zeros(std::size_t{100} << 20, '\0');
+  const std::string header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 3 2\nencoding: raw\n\n";
+  EXPECT_THAT(refusal_of(import::test::zip({{"a.nrrd", header + zeros}})).detail,
+              HasSubstr("that its header lets it have"));
+  EXPECT_THAT(refusal_of(gzip(header + zeros)).detail, HasSubstr("holds more than"));
+}
+
+}  // namespace
+}  // namespace isomesh::test
