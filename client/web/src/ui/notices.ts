@@ -80,5 +80,12 @@ export async function askText(title: string, text: string, action: string): Prom
   const dialog = h('dialog', { class: 'dialog', 'aria-label': title });
   const input = h('input', { type: 'text', value: text, maxlength: 255, 'aria-label': title });
   const agree = button(action, () => dialog.close('yes'), { class: 'primary' });
+  input.addEventListener('keydown', (event) => {
+    // Enter also ends what an input method composes.
+    if (event.key !== 'Enter' || event.isComposing) return;
+    // Or it would press the button that had the focus before the dialog.
+    event.preventDefault();
+    agree.click();
+  });
   return (await showDialog(title, input, agree, dialog)) ? input.value.trim() : null;
 }

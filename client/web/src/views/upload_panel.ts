@@ -1,24 +1,29 @@
 // Where volumes are dropped: one file, a folder of slices, or several files.
-import { ApiError, asApiError, choicesOf, mayPass } from '../api/problem';
-import type { Choice, UploadedVolume } from '../api/types';
+import { ApiError, asApiError, mayPass } from '../api/problem';
+import type { UploadedVolume } from '../api/types';
 import { upload, type RawDescription } from '../api/upload';
-import { button, field, h, icon } from '../ui/dom';
+import { button, h, icon } from '../ui/dom';
 import { formatBytes } from '../ui/format';
 import { refusal } from '../ui/notices';
 import type { Scope } from '../ui/signal';
 import { filesOfDrop, filesOfList, gather, type Gathered } from '../volume/gather';
 import type { NamedFile } from '../volume/tar';
+import { outcomeList, outcomeOf, type Outcome } from './outcomes';
 import { rawForm } from './raw_form';
+import { acceptButton, choiceForms, type Choices } from './remedies';
 
 const arrow = 'M8 11V2.5M4.5 6 8 2.5 11.5 6M2.5 10.5v3h11v-3';
 
 // What a person added to an upload that was refused.
 interface Addition {
   raw?: RawDescription;
-  choices?: Readonly<Record<string, string>>;
+  choices?: Choices;
+  // What became of the upload's volumes, of which `choices` names one that is tried again.
+  outcomes?: readonly Outcome[];
 }
 
-type OnVolumes = (uploaded: UploadedVolume[]) => void;
+// Called with the only volume of an upload, or with none after an upload of several, which stay listed here.
+type OnVolumes = (only: UploadedVolume | null) => void;
 
 // How far an upload is.
 class Progress {
@@ -115,15 +120,38 @@ export class UploadPanel {
         signal: controller.signal,
         onProgress: (sent) => progress.show(sent),
       });
-      if (this.scope.isOver) return;
-      this.showIdle();
-      this.onVolumes(uploaded);
+      if (!this.scope.isOver) this.showUploaded(uploaded, gathered, addition);
     } catch (error) {
-      if (this.scope.isOver) return;
-      if (error instanceof DOMException && error.name === 'AbortError') this.showIdle();
-      else this.showRefused(asApiError(error), gathered, addition);
+      if (!this.scope.isOver) this.showFailed(error, gathered, addition);
     } finally {
       this.running = null;
+    }
+  }
+
+  private showUploaded(uploaded: UploadedVolume[], gathered: Gathered, { outcomes, choices = {} }: Addition): void {
+    const [first] = uploaded;
+    if (outcomes && first) {
+      this.showOutcomes(withOutcome(outcomes, choices, { ...first, member: choices['member'] ?? '' }), gathered);
+    } else if (uploaded.length > 1 || !first?.volume) {
+      this.showOutcomes(uploaded.map((each) => outcomeOf(each, choices)), gathered);
+    } else {
+      this.showIdle();
+      this.onVolumes(first);
+    }
+  }
+
+  private showFailed(error: unknown, gathered: Gathered, addition: Addition): void {
+    const { outcomes, choices = {} } = addition;
+    const isCancelled = error instanceof DOMException && error.name === 'AbortError';
+    if (outcomes) {
+      const shown = isCancelled
+        ? outcomes
+        : outcomes.map((each) => (each.member === choices['member'] ? { ...each, choices, error: asApiError(error) } : each));
+      this.showOutcomes(shown, gathered);
+    } else if (isCancelled) {
+      this.showIdle();
+    } else {
+      this.showRefused(asApiError(error), gathered, addition);
     }
   }
 
@@ -156,14 +184,28 @@ export class UploadPanel {
   private showRefused(error: ApiError, gathered: Gathered, before: Addition): void {
     this.element.classList.remove('busy');
     const again = mayPass(error) && button('Try again', () => void this.send(gathered, before));
-    const addTo = (more: Record<string, string>): void =>
-      void this.send(gathered, { ...before, choices: { ...before.choices, ...more } });
-    const parts: Node[] = [refusal(error, again, acceptButton(error, before, addTo), this.otherButton())];
-    for (const [parameter, choices] of choicesOf(error)) parts.push(choiceForm(parameter, choices, addTo));
+    const known = before.choices ?? {};
+    const sendWith = (choices: Choices): void => void this.send(gathered, { ...before, choices });
+    const parts: Node[] = [
+      refusal(error, again, acceptButton(error, known, sendWith), this.otherButton()),
+      ...choiceForms(error, known, sendWith),
+    ];
     if (error.status === 415 && gathered.count === 1) {
       parts.push(rawForm(gathered.body.size, (raw) => void this.send(gathered, { raw })));
     }
     this.body.replaceChildren(...parts);
+  }
+
+  // What became of several volumes stays until the next upload, since each refused one may be tried again.
+  private showOutcomes(outcomes: readonly Outcome[], gathered: Gathered): void {
+    this.element.classList.remove('busy');
+    const stored = outcomes.filter(({ volume }) => volume !== null).length;
+    this.body.replaceChildren(
+      h('h2', { role: 'status' }, `${stored} of the ${outcomes.length} volumes in the upload were stored`),
+      outcomeList(outcomes, (_, choices) => void this.send(gathered, { choices, outcomes })),
+      h('div', { class: 'actions' }, button('Upload another', () => this.showIdle())),
+    );
+    this.onVolumes(null);
   }
 
   private showUnusable(error: ApiError): void {
@@ -175,32 +217,6 @@ export class UploadPanel {
   }
 }
 
-// Has the upload taken in spite of what it was refused for, beside what was accepted before.
-function acceptButton(
-  { remedy: { overridable } }: ApiError,
-  before: Addition,
-  onAccept: (more: Record<string, string>) => void,
-): HTMLButtonElement | false {
-  if (overridable === undefined) return false;
-  const accept = [before.choices?.['accept'], overridable].filter(Boolean).join(',');
-  return button('Take it in spite of this', () => onAccept({ accept }));
-}
-
-function choiceForm(
-  parameter: Choice['parameter'],
-  choices: Choice[],
-  onChoice: (more: Record<string, string>) => void,
-): HTMLElement {
-  const noun = { series: 'series', member: 'file', volume: 'volume' }[parameter];
-  const select = h(
-    'select',
-    {},
-    ...choices.map(({ value, title }) => h('option', { value }, title === '' ? value : `${title} (${value})`)),
-  );
-  return h(
-    'div',
-    { class: 'series' },
-    field(`${noun.charAt(0).toUpperCase()}${noun.slice(1)} to read`, select),
-    button(`Upload this ${noun}`, () => onChoice({ [parameter]: select.value }), { class: 'primary' }),
-  );
+function withOutcome(outcomes: readonly Outcome[], choices: Choices, uploaded: UploadedVolume): Outcome[] {
+  return outcomes.map((each) => (each.member === uploaded.member ? outcomeOf(uploaded, choices) : each));
 }

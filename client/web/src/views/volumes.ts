@@ -1,6 +1,5 @@
 // The first view: upload, the volumes that are there, the last surfaces.
 import { eraseVolume, listJobs, listVolumes, slicePicture } from '../api/client';
-import { errorOfProblem } from '../api/problem';
 import type { Job, Volume } from '../api/types';
 import { inWords } from '../job/parameters';
 import { button, h } from '../ui/dom';
@@ -143,19 +142,15 @@ export async function volumesView(scope: Scope): Promise<HTMLElement> {
     surfaces.replaceChildren(...jobs.map((job) => surfaceRow(job, nameIn(byId, job.volume))));
     if (jobs.length === 0) surfaces.append(h('li', { class: 'empty' }, 'No surfaces yet.'));
   };
-  const panel = new UploadPanel(scope, (uploaded) => {
-    const [first] = uploaded;
-    if (uploaded.length === 1 && first?.volume) {
-      if (first.status === 200) tell('This volume was there already.');
-      go(['volumes', first.volume.id]);
-      return;
+  const panel = new UploadPanel(scope, (only) => {
+    if (only?.volume) {
+      // Its page shows the notes of the file that came first.
+      const notes = only.volume.notes.map(({ detail }) => detail);
+      if (only.status === 200) tell(['This volume was there already.', ...notes].join(' '));
+      go(['volumes', only.volume.id]);
+    } else {
+      void show().catch(tellError);
     }
-    for (const { member, problem } of uploaded) {
-      if (problem) tellError(errorOfProblem({ ...problem, title: `${member}: ${problem.title}` }));
-    }
-    const stored = uploaded.filter(({ volume }) => volume !== null).length;
-    tell(`${stored} of the ${uploaded.length} volumes in the upload were stored.`);
-    void show().catch(tellError);
   });
   await show();
   return h(

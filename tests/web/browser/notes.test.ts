@@ -1,0 +1,175 @@
+// What the daemon says about an upload, and what a person may answer.
+import { describe, expect, it } from 'vitest';
+import { ctSlice, samples, seriesNifti, smallNrrd } from './files';
+import { drop, setup } from './support';
+
+const at = setup();
+
+// Would run if the page took a text for HTML; `faults` holds what the content policy blocks.
+const hostile = '<img src=x onerror="document.title=1">';
+
+async function expectText(text: string): Promise<void> {
+  const { page } = at;
+  await expect.poll(() => page.locator('body').innerText()).toContain(text);
+  expect(await page.locator('img[src=x]').count()).toBe(0);
+  expect(await page.title()).not.toBe('1');
+}
+
+const volumePage = /#\/volumes\/[0-9a-f]{64}/;
+
+// The queries of the uploads that the page sends from now on.
+function uploadsOf(page: typeof at.page): string[] {
+  const queries: string[] = [];
+  page.on('request', (request) => {
+    const url = new URL(request.url());
+    if (request.method() === 'POST' && url.pathname === '/v1/volumes') queries.push(decodeURIComponent(url.search));
+  });
+  return queries;
+}
+
+describe('an upload of several volumes', () => {
+  it('is answered for one by one, and what is refused can be tried again', async () => {
+    const { daemon, page } = at;
+    await page.goto(daemon.url);
+    const queries = uploadsOf(page);
+    const hostileName = `${hostile}.nrrd`.replace('/', '');
+    await drop(page, [
+      { name: hostileName, bytes: smallNrrd() },
+      { name: 'times.nii', bytes: seriesNifti() },
+      { name: 'cut.nrrd', bytes: smallNrrd([], samples.subarray(0, 5)) },
+      { name: 'readme.txt', bytes: Buffer.from('what this is') },
+    ]);
+    const rows = page.locator('.outcomes > li');
+    await expect.poll(() => rows.count()).toBe(3);
+    await expectText(hostileName);
+    expect(await page.locator('.drop h2').innerText()).toBe('1 of the 3 volumes in the upload were stored');
+    expect(await page.locator('[data-member="cut.nrrd"]').innerText()).toContain('truncated');
+    await expect.poll(() => page.locator('[data-volume]').count()).toBe(1);
+
+    const times = page.locator('[data-member="times.nii"]');
+    await times.getByLabel('Volume to read').selectOption({ label: 'time 1 (1)' });
+    await times.getByRole('button', { name: 'Upload this volume' }).click();
+    await expect.poll(() => page.locator('.outcomes .stored').count()).toBe(2);
+    expect(queries).toEqual(['', '?member=times.nii&volume=1']);
+    expect(await page.locator('[data-member="cut.nrrd"]').getAttribute('class')).toBe('refused');
+    await expect.poll(() => page.locator('[data-volume]').count()).toBe(2);
+
+    await times.getByRole('link').click();
+    await page.waitForURL(volumePage);
+    expect(await page.locator('[data-note="volume-chosen"]').innerText()).toContain('Volume 1');
+    await page.goto(daemon.url);
+    await expectText(hostileName);
+  });
+});
+
+describe('a refusal', () => {
+  it('that lists the volumes of a file has one of them uploaded', async () => {
+    const { daemon, page } = at;
+    await page.goto(daemon.url);
+    await drop(page, [{ name: 'two.nii', bytes: seriesNifti() }]);
+    await expect.poll(() => page.locator('.refusal').innerText()).toContain('2 volumes');
+    await page.getByLabel('Volume to read').selectOption('0');
+    await page.getByRole('button', { name: 'Upload this volume' }).click();
+    await page.waitForURL(volumePage);
+    expect(await page.locator('[data-note="volume-chosen"]').innerText()).toContain('Volume 0');
+  });
+
+  it('that a person may overrule is taken in spite of it, and says so', async () => {
+    const { daemon, page } = at;
+    await page.goto(daemon.url);
+    const queries = uploadsOf(page);
+    // Two and two slices in one frame of reference.
+    const slices = [1, 2, 3, 4].map((index) => ({
+      name: `${index}.dcm`,
+      bytes: ctSlice(index, index < 3 ? '1.9.1' : '1.9.2', hostile),
+    }));
+    await drop(page, slices);
+    await page.getByRole('button', { name: 'Take it in spite of this' }).click();
+    await page.waitForURL(volumePage);
+    expect(queries).toEqual(['', '?accept=frame-of-reference']);
+    await expect.poll(() => page.locator('[data-note="frame-of-reference"]').count()).toBe(1);
+    await expectText(hostile); // the series' name
+  });
+});
+
+describe('notes and what was left out', () => {
+  it('are shown as text, whatever a file holds', async () => {
+    const { daemon, page } = at;
+    await page.goto(daemon.url);
+    const fields = [
+      'space: LPS',
+      'space directions: (1,0,0) (0,1,0) (0,0,3)',
+      'space units: "pixel" "pixel" "pixel"',
+    ];
+    await drop(page, [{ name: 'unit.nrrd', bytes: smallNrrd(fields) }]);
+    await page.waitForURL(volumePage);
+    expect(await page.locator('[data-note="unit-unknown"]').innerText()).toContain('pixel');
+    // Details repeat little of a file, and no page should rely on that.
+    await page.route('**/v1/volumes/*', async (route) => {
+      const answer = await route.fetch();
+      const volume = (await answer.json()) as { notes: { code: string; detail: string }[] };
+      volume.notes = [{ code: `"><${hostile}`, detail: hostile }];
+      await route.fulfill({ response: answer, json: volume });
+    });
+    await page.reload();
+    await expectText(hostile);
+    expect(await page.locator('.notes img').count()).toBe(0);
+    await page.unroute('**/v1/volumes/*');
+
+    await page.goto(daemon.url);
+    const name = hostile.replace('/', '');
+    await drop(page, [
+      ...[1, 2].map((index) => ({ name: `${index}.dcm`, bytes: ctSlice(index, '1.9', 'one') })),
+      { name, bytes: Buffer.from('no volume') },
+    ]);
+    await page.waitForURL(volumePage);
+    await page.locator('summary', { hasText: '1 file was left out' }).click();
+    await expectText('it is no DICOM file');
+  });
+});
+
+describe('a volume', () => {
+  it('that was there already says what its new file showed', async () => {
+    const { daemon, page } = at;
+    const fields = ['spacings: 1 1 4'];
+    await daemon.upload(smallNrrd(fields));
+    await page.goto(daemon.url);
+    await drop(page, [{ name: 'longer.nrrd', bytes: Buffer.concat([smallNrrd(fields), Buffer.from('more')]) }]);
+    await page.waitForURL(volumePage);
+    await expect.poll(() => page.locator('.toast').innerText()).toMatch(/there already.*4 bytes more/);
+    expect(await page.locator('[data-note]').count()).toBe(0);
+  });
+
+  it('is renamed, by the button and by the Enter key, and keeps a name that is no HTML', async () => {
+    const { daemon, page } = at;
+    const id = await daemon.upload(smallNrrd(['spacings: 1 1 2']));
+    const open = `${daemon.url}/#/volumes/${id}`;
+    await page.goto(open);
+    const rename = async (name: string, end: () => Promise<void>): Promise<void> => {
+      await page.getByRole('button', { name: 'Rename' }).click();
+      await page.getByLabel('Name of this volume').and(page.locator('input')).fill(name);
+      await end();
+      await expect.poll(() => page.locator('dialog').count()).toBe(0);
+    };
+    const byButton = (name: string) => () => page.locator('dialog').getByRole('button', { name }).click();
+    const title = page.locator('h1 > span');
+    const facts = await title.innerText();
+    await rename('skull', byButton('Rename'));
+    await expect.poll(() => title.innerText()).toBe('skull');
+    await rename('head', byButton('Cancel'));
+    expect(await title.innerText()).toBe('skull');
+    await rename(hostile, () => page.keyboard.press('Enter'));
+    await expect.poll(() => title.innerText()).toBe(hostile);
+    await page.reload();
+    await expectText(hostile);
+    await daemon.submit({ volume: id, iso: 110, formats: ['stl'] }, 30);
+    await page.goto(`${daemon.url}/#/`);
+    await expect.poll(() => page.locator(`[data-volume="${id}"] strong`).getAttribute('title')).toBe(hostile);
+    await expectText(hostile);
+    await page.goto(`${daemon.url}/#/jobs`);
+    await expectText(hostile);
+    await page.goto(open);
+    await rename('', byButton('Rename'));
+    await expect.poll(() => title.innerText()).toBe(facts);
+  });
+});
