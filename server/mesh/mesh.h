@@ -36,6 +36,15 @@ struct Mesh {
   // vertices of its boundary.
   std::vector<std::uint64_t> on_border;
 
+  // Of the walls between several labels (separate.h): the vertices where more than two walls meet,
+  // a bit each. Empty of a surface that has one inside and one outside.
+  std::vector<std::uint64_t> on_line;
+
+  // False where on_line is empty.
+  bool is_on_line(std::size_t vertex) const {
+    return !on_line.empty() && (on_line[vertex / kFlagBits] >> (vertex % kFlagBits) & 1) != 0;
+  }
+
   // False where on_border is empty.
   bool is_on_border(std::size_t vertex) const {
     return !on_border.empty() && (on_border[vertex / kFlagBits] >> (vertex % kFlagBits) & 1) != 0;

@@ -1,5 +1,5 @@
-// Which samples are inside, one bit each, and the logic on 64 samples at a time that extraction
-// counts and walks with. Compiled once for each instruction set, see slabs.cpp.
+// Which samples are inside, one bit each, and the logic on 64 samples at a time that extraction at
+// an iso-value counts and walks with. Compiled once for each instruction set, see slabs.cpp.
 #if defined(ISOMESH_SIGNS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOMESH_SIGNS_INL_H_
 #undef ISOMESH_SIGNS_INL_H_
@@ -12,26 +12,21 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <vector>
 
 #include <hwy/highway.h>
 
+#include "server/mesh/rows-inl.h"
 #include "server/mesh/slabs.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isomesh::mesh::HWY_NAMESPACE {
 
-using Word = std::uint64_t;  // 64 samples of a row, the lowest bit the smallest x
-inline constexpr unsigned kWordBits = 64;
-inline constexpr Word kEvenX = 0x5555555555555555;
-
 // The signs of one plane of samples. Each row ends in one word of zeros, so that the word after a
 // row's last one can be read.
 class SignPlane {
  public:
-  explicit SignPlane(const Dims& dims)
-      : words_((dims.x + kWordBits - 1) / kWordBits), bits_((words_ + 1) * dims.y) {}
+  explicit SignPlane(const Dims& dims) : words_(words_of(dims.x)), bits_((words_ + 1) * dims.y) {}
 
   std::size_t words() const { return words_; }
   Word* row(std::size_t y) { return bits_.data() + y * (words_ + 1); }
@@ -42,13 +37,6 @@ class SignPlane {
   std::vector<Word> bits_;
 };
 
-// Eight bytes of 0 or 1 to the eight bits of a byte, the first byte the lowest bit.
-inline std::uint8_t pack_byte(const std::uint8_t* flags) {
-  std::uint64_t bytes = 0;
-  std::memcpy(&bytes, flags, sizeof bytes);
-  return static_cast<std::uint8_t>(bytes * 0x0102040810204080 >> 56);
-}
-
 // The signs of up to 64 samples; bits beyond `count` are zero.
 template <class T>
 HWY_INLINE Word classify_word(const T* samples, std::size_t count, T smallest) {
@@ -58,11 +46,7 @@ HWY_INLINE Word classify_word(const T* samples, std::size_t count, T smallest) {
   } else {
     for (std::size_t x = 0; x < count; ++x) flags[x] = samples[x] >= smallest ? 1 : 0;
   }
-  Word word = 0;
-  for (unsigned byte = 0; byte < 8; ++byte) {
-    word |= Word{pack_byte(flags.data() + byte * std::size_t{8})} << (byte * 8);
-  }
-  return word;
+  return pack_word(flags);
 }
 
 // Fills `plane` with the signs of the samples of plane z.
@@ -108,27 +92,6 @@ void classify_with_margin(const Lattice<T>& lattice, std::uint32_t z, T smallest
   }
 }
 
-// The signs of the eight corners of 64 cells of a row: word c holds corner c of each.
-using CornerWords = std::array<Word, 8>;
-
-// Bit i of byte j of the result is bit j of word i, for the 64 bits of eight words.
-inline std::array<std::uint8_t, kWordBits> transpose(const std::array<Word, 8>& words) {
-  std::array<std::uint8_t, kWordBits> bytes;
-  for (unsigned group = 0; group < 8; ++group) {
-    Word square = 0;  // row r: byte `group` of word r
-    for (unsigned r = 0; r < 8; ++r) square |= (words[r] >> (group * 8) & 0xFF) << (r * 8);
-    // Swaps ever larger squares across the diagonal (H. S. Warren, Hacker's Delight, 7-3).
-    Word swap = (square ^ square >> 7) & 0x00AA00AA00AA00AA;
-    square ^= swap ^ swap << 7;
-    swap = (square ^ square >> 14) & 0x0000CCCC0000CCCC;
-    square ^= swap ^ swap << 14;
-    swap = (square ^ square >> 28) & 0x00000000F0F0F0F0;
-    square ^= swap ^ swap << 28;
-    std::memcpy(bytes.data() + group * std::size_t{8}, &square, sizeof square);
-  }
-  return bytes;
-}
-
 inline unsigned count_in_tetrahedron(const CornerWords& corners,
                                      const std::array<std::uint8_t, 4>& tetrahedron, Word cells) {
   const Word a = corners[tetrahedron[0]];
@@ -140,25 +103,20 @@ inline unsigned count_in_tetrahedron(const CornerWords& corners,
   return static_cast<unsigned>(std::popcount(odd) + 2 * std::popcount(mixed & ~odd));
 }
 
-// One row of cells: the four rows of signs around it, and which of its cells and edges there are.
-// Beyond the lattice's upper borders there are no rows; the last ones stand for them, and what
-// depends on their signs is left out.
-class CellRow {
+// What numbering a row leaves for the triangles of the layer: its crossed cells with their cases.
+struct SignCells {
+  Word crossed = 0;
+  std::array<std::uint8_t, kWordBits> cases;
+};
+
+// One row of cells: the four rows of signs around it.
+class SignRow : public RowShape {
  public:
-  // `even` are the samples of even parity in a word of the row.
-  CellRow(const Dims& dims, Scheme scheme, Word even, const SignPlane& low, const SignPlane& high,
-          std::uint32_t y, std::uint32_t z)
-      : last_x_(dims.x - 1),
-        has_y_(y + 1 < dims.y),
-        has_z_(z + 1 < dims.z),
-        five_(scheme == Scheme::kFive),
-        even_(even) {
-    const std::uint32_t next = has_y_ ? y + 1 : y;
-    rows_[0] = low.row(y);
-    rows_[1] = low.row(next);
-    rows_[2] = high.row(y);
-    rows_[3] = high.row(next);
-  }
+  SignRow(const RowShape& shape, const std::array<CellSplit, 2>& splits, const SignPlane& low,
+          const SignPlane& high, std::uint32_t y)
+      : RowShape(shape),
+        splits_(splits),
+        rows_{low.row(y), low.row(next_row(y)), high.row(y), high.row(next_row(y))} {}
 
   // Quick test on the signs alone: false when no sample of word w has a crossed edge.
   bool may_cross(std::size_t w) const {
@@ -171,6 +129,41 @@ class CellRow {
     return any != 0 && all != ~Word{0};
   }
 
+  // The samples of word w that own a crossed edge; what is known of its cells goes to `cells`.
+  Word describe(std::size_t w, SignCells& cells) const {
+    const CornerWords signs = corners(w);
+    const std::array<Word, 8> crossed = crossed_edges(w, signs);
+    cells.crossed = crossed_cells(w, signs);
+    cells.cases = transpose(signs);
+    Word owners = 0;
+    for (const Word edges : crossed) owners |= edges;
+    return owners;
+  }
+
+  // Lists the places of the vertices that the sample at x owns, which is `bit` of the word that
+  // `cells` are of. At least eight places of the list are written, and only those before what is
+  // returned are valid.
+  HWY_INLINE std::uint32_t* list(std::size_t x, unsigned bit, const SignCells& cells,
+                                 std::uint32_t* next) const {
+    const unsigned directions = splits_[parity_at(x)].crossed[cells.cases[bit]] & existing_at(x);
+    const auto& members = kMembers[directions];
+    for (std::size_t i = 0; i < kEdgePlaces; ++i) {
+      next[i] = static_cast<std::uint32_t>(x * kEdgePlaces) + members[i];
+    }
+    return next + std::popcount(directions);
+  }
+
+  WordCount count(std::size_t w) const {
+    const CornerWords signs = corners(w);
+    WordCount count;
+    for (const Word edges : crossed_edges(w, signs)) {
+      count.vertices += static_cast<unsigned>(std::popcount(edges));
+    }
+    count.triangles = count_triangles(w, signs);
+    return count;
+  }
+
+ private:
   CornerWords corners(std::size_t w) const {
     CornerWords corners;
     for (unsigned r = 0; r < 4; ++r) {
@@ -180,93 +173,75 @@ class CellRow {
     return corners;
   }
 
-  // Word d: the samples whose edge of direction d exists and is crossed; word 0 is zero.
   std::array<Word, 8> crossed_edges(std::size_t w, const CornerWords& corners) const {
-    const Word next_x = has_next(w);
-    // Beyond the last x there are no samples at all.
-    const Word here = next_x << 1 | (w == 0 ? 1 : has_next(w - 1) >> 63);
-    std::array<Word, 8> crossed = {};
-    for (unsigned direction = 1; direction < 8; ++direction) {
-      if ((existing() >> direction & 1) == 0) continue;
-      Word edges = corners[0] ^ corners[direction];
-      if (five_ && std::popcount(direction) == 2) {
-        // The diagonal of a face joins its two other corners when its sample is odd.
-        const unsigned low = direction & (~direction + 1);
-        edges = (edges & even_) | ((corners[low] ^ corners[direction ^ low]) & ~even_);
-      }
-      crossed[direction] = edges & ((direction & 1) != 0 ? next_x : here);
-    }
-    return crossed;
-  }
-
-  // The set (bit d: direction d) of edges that the row's samples own, but for the sample of the
-  // largest x, which owns no edge with a part along x.
-  unsigned existing() const {
-    constexpr unsigned kAll = 0b11111110;
-    constexpr unsigned kWithY = 0b11001100;
-    constexpr unsigned kWithZ = 0b11110000;
-    constexpr unsigned kFiveHasNone = 0b10000000;
-    return kAll & ~(has_y_ ? 0 : kWithY) & ~(has_z_ ? 0 : kWithZ) & ~(five_ ? kFiveHasNone : 0);
-  }
-
-  // The same for the sample at x.
-  unsigned existing_at(std::size_t x) const {
-    constexpr unsigned kWithX = 0b10101010;
-    return x == last_x_ ? existing() & ~kWithX : existing();
+    return edges_where(w, [&](unsigned a, unsigned b) { return corners[a] ^ corners[b]; });
   }
 
   // The cells that exist and have corners on both sides.
   Word crossed_cells(std::size_t w, const CornerWords& corners) const {
-    if (!has_y_ || !has_z_) return 0;
     Word any = 0;
     Word all = ~Word{0};
     for (const Word corner : corners) {
       any |= corner;
       all &= corner;
     }
-    return any & ~all & has_next(w);
+    return any & ~all & cells(w);
   }
 
-  // How many triangles these 64 cells have; `splits` of cells of even and odd parity.
-  unsigned count_triangles(std::size_t w, const CornerWords& corners,
-                           const std::array<CellSplit, 2>& splits) const {
+  unsigned count_triangles(std::size_t w, const CornerWords& corners) const {
     const Word cells = crossed_cells(w, corners);
     if (cells == 0) return 0;
     unsigned count = 0;
-    for (std::size_t t = 0; t < splits[0].tetrahedra; ++t) {
-      count += count_in_tetrahedron(corners, splits[0].corners[t], five_ ? cells & even_ : cells);
-      if (five_) count += count_in_tetrahedron(corners, splits[1].corners[t], cells & ~even_);
+    for (std::size_t t = 0; t < splits_[0].tetrahedra; ++t) {
+      count +=
+          count_in_tetrahedron(corners, splits_[0].corners[t], is_five() ? cells & even() : cells);
+      if (is_five()) {
+        count += count_in_tetrahedron(corners, splits_[1].corners[t], cells & ~even());
+      }
     }
     return count;
   }
 
- private:
-  // The samples whose next neighbour along x exists.
-  Word has_next(std::size_t w) const {
-    const std::size_t begin = w * kWordBits;
-    if (begin + kWordBits <= last_x_) return ~Word{0};
-    return begin >= last_x_ ? 0 : (Word{1} << (last_x_ - begin)) - 1;
-  }
-
+  const std::array<CellSplit, 2>& splits_;
   std::array<const Word*, 4> rows_;  // at (y, z), (y + 1, z), (y, z + 1), (y + 1, z + 1)
-  std::size_t last_x_;
-  bool has_y_;
-  bool has_z_;
-  bool five_;
-  Word even_;
 };
 
-// The signs of the planes around the one that is worked on, each classified once as z rises.
-template <class T>
-class SignWindow {
+// Writes the triangles of the cells of one row.
+class SignCellWriter {
  public:
-  SignWindow(const Extraction<T>& extraction, std::uint32_t first)
+  SignCellWriter(const std::array<CellSplit, 2>& splits, const SignRow& row,
+                 const EdgeOffsets& offsets)
+      : splits_(splits), row_(row), offsets_(offsets) {}
+
+  // Of the cell at x, which is `bit` of the word that `cells` are of.
+  HWY_INLINE Triangle* write(std::size_t x, unsigned bit, const SignCells& cells,
+                             const std::uint32_t* places, Triangle* out) const {
+    return write_case(splits_[row_.parity_at(x)].cases[cells.cases[bit]], places, offsets_, out);
+  }
+
+ private:
+  const std::array<CellSplit, 2>& splits_;
+  const SignRow row_;
+  const EdgeOffsets& offsets_;
+};
+
+// What the walk is told of an iso-value's signs: those of the planes around the one that is worked
+// on, each classified once as z rises.
+template <class T>
+class SignField {
+ public:
+  using Marched = Extraction<T>;
+  using Output = Mesh;
+  using Cells = SignCells;
+  using Row = SignRow;
+  static constexpr std::size_t kPlaces = kEdgePlaces;
+  static constexpr bool kHasLines = false;
+
+  SignField(const Extraction<T>& extraction, std::uint32_t first)
       : extraction_(extraction),
         dims_(extraction.dims),
         planes_{SignPlane(dims_), SignPlane(dims_), SignPlane(dims_)},
         next_(first) {}
-
-  std::size_t words() const { return planes_[0].words(); }
 
   // Classifies up to the plane above z. Afterwards rows of z - 1 and z can be asked for.
   void reach(std::uint32_t z) {
@@ -280,14 +255,58 @@ class SignWindow {
     }
   }
 
-  CellRow row(std::uint32_t y, std::uint32_t z) const {
+  SignRow row(std::uint32_t y, std::uint32_t z) const {
     const std::uint32_t above = std::min(z + 1, dims_.z - 1);
     const Word even = extraction_.parity(0, y, z) == 0 ? kEvenX : ~kEvenX;
-    return {dims_, extraction_.scheme, even, planes_[z % kPlanes], planes_[above % kPlanes], y, z};
+    return {RowShape(dims_, extraction_.scheme, even, y, z), extraction_.splits,
+            planes_[z % kPlanes], planes_[above % kPlanes], y};
+  }
+
+  static Mesh& mesh_of(Mesh& mesh) { return mesh; }
+
+  EdgeFrame frame(unsigned parity, std::size_t direction) const {
+    const LatticeToSpace& map = extraction_.lattice.to_space;
+    const EdgeEnds ends = extraction_.splits[parity].ends[direction];
+    EdgeFrame frame;
+    frame.from = sample_offset(ends.from);
+    frame.to = sample_offset(ends.to);
+    frame.start = space_offset(map, ends.from);
+    frame.run = space_offset(map, ends.to) - frame.start;
+    return frame;
+  }
+
+  // The share of the way along its edge of each vertex in a row between the lattice's own samples.
+  template <std::uint32_t kMargin>
+  auto shares(std::uint32_t y, std::uint32_t z) const {
+    const Lattice<T>& lattice = extraction_.lattice;
+    const T* samples = lattice.samples - kMargin +
+                       (std::size_t{z - kMargin} * lattice.dims.y + (y - kMargin)) * lattice.dims.x;
+    return [samples, this](std::size_t x, const EdgeFrame& edge) {
+      return extraction_.placement.share(samples[x + edge.from], samples[x + edge.to]);
+    };
+  }
+
+  BorderVertex place_at_border(std::uint32_t x, std::uint32_t y, std::uint32_t z,
+                               std::size_t direction, const EdgeFrame& /*frame*/) const {
+    const CellSplit& split = extraction_.splits[extraction_.parity(x, y, z)];
+    const auto placed = extraction_.border->place(
+        {std::int64_t{x} - 1, std::int64_t{y} - 1, std::int64_t{z} - 1}, split.ends[direction]);
+    return {placed.position, placed.on_border};
+  }
+
+  SignCellWriter cell_writer(std::uint32_t y, std::uint32_t z, const EdgeOffsets& offsets,
+                             Mesh& /*output*/) const {
+    return {extraction_.splits, row(y, z), offsets};
   }
 
  private:
   static constexpr std::uint32_t kPlanes = 3;
+
+  std::ptrdiff_t sample_offset(unsigned corner) const {
+    const std::ptrdiff_t row = extraction_.lattice.dims.x;
+    const std::ptrdiff_t plane = row * extraction_.lattice.dims.y;
+    return (corner & 1) + (corner >> 1 & 1) * row + (corner >> 2) * plane;
+  }
 
   const Extraction<T>& extraction_;
   const Dims dims_;

@@ -23,19 +23,27 @@ struct Slab {
 };
 
 // How many layers of phantoms are around the volume.
-inline std::uint32_t margin_of(const ExtractOptions& options) { return options.close ? 1 : 0; }
+inline std::uint32_t margin_of(bool close) { return close ? 1 : 0; }
 
 // The samples that are marched over: the lattice's, and the phantoms around them.
-inline Dims marched_dims(const Dims& dims, const ExtractOptions& options) {
-  const std::uint32_t more = 2 * margin_of(options);
+inline Dims marched_dims(const Dims& dims, bool close) {
+  const std::uint32_t more = 2 * margin_of(close);
   return {dims.x + more, dims.y + more, dims.z + more};
 }
 
-// What all slabs of an extraction share. Samples are numbered with the phantoms, so the lattice's
-// begin at `margin`. Immutable while slabs are worked on.
+// The ways to split cells of even and odd parity, wound for the lattice.
+std::array<CellSplit, 2> splits_of(Scheme scheme, bool left_handed);
+
+// What is marched over. Samples are numbered with the phantoms, so the lattice's begin at `margin`.
+// Immutable while slabs are worked on.
 template <class T>
-struct Extraction {
-  Extraction(const Lattice<T>& the_lattice, const ExtractOptions& options, T the_smallest);
+struct Marching {
+  Marching(const Lattice<T>& the_lattice, Scheme the_scheme, bool close)
+      : lattice(the_lattice),
+        margin(margin_of(close)),
+        dims(marched_dims(the_lattice.dims, close)),
+        scheme(the_scheme),
+        splits(splits_of(the_scheme, the_lattice.to_space.determinant() < 0)) {}
 
   // 0 or 1: whether i+j+k is even or odd, in the lattice's own numbers, of the cell or sample that
   // is (x, y, z) when phantoms are numbered too.
@@ -47,10 +55,17 @@ struct Extraction {
   std::uint32_t margin;
   Dims dims;  // of what is marched over
   Scheme scheme;
+  std::array<CellSplit, 2> splits;
+};
+
+// What all slabs of an extraction at an iso-value share.
+template <class T>
+struct Extraction : Marching<T> {
+  Extraction(const Lattice<T>& the_lattice, const ExtractOptions& options, T the_smallest);
+
   T smallest;  // the smallest value that is inside
   Placement placement;
   std::optional<BorderPlacement<T>> border;  // of a surface that is closed
-  std::array<CellSplit, 2> splits;           // by parity, wound for the lattice
 };
 
 // The memory that a slab numbers its vertices in. A slab that has ended gives its block back and
@@ -82,12 +97,12 @@ class IndexMemory {
 };
 
 // Places a sample, by direction, for the indices of the vertices on the edges that it owns.
-inline constexpr std::size_t kPlaces = 8;
+inline constexpr std::size_t kEdgePlaces = 8;
 
 // How many indices a slab works with that marches over such samples: those of one plane and two
-// rows.
-inline std::size_t index_memory_size(const Dims& dims) {
-  return (std::size_t{dims.y} + 2) * dims.x * kPlaces;
+// rows, of so many places a sample.
+inline std::size_t index_memory_size(const Dims& dims, std::size_t places) {
+  return (std::size_t{dims.y} + 2) * dims.x * places;
 }
 
 // Pass 1, count: how many vertices and triangles layer k has goes to layer_vertices[k + 1] and
