@@ -5,6 +5,7 @@
 #include <exception>
 #include <memory>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "base/mutex.h"
@@ -117,8 +118,8 @@ void parallel_for(const Context& context, std::size_t tasks,
   for (std::size_t task = 0; task < tasks; ++task) loop.run(task);
 }
 
-OneThread::OneThread() { is_one_thread = true; }
-OneThread::~OneThread() { is_one_thread = false; }
+OneThread::OneThread() : before_(std::exchange(is_one_thread, true)) {}
+OneThread::~OneThread() { is_one_thread = before_; }
 
 #ifdef ISOMESH_PARALLEL_TBB
 

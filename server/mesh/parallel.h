@@ -15,13 +15,16 @@ void parallel_for(const Context& context, std::size_t tasks,
                   const std::function<void(std::size_t)>& body);
 
 // While it lives, the loops that its thread begins run on that thread alone: with little to do,
-// waking the others takes longer. Not to be nested.
+// waking the others takes longer, and within a loop's task they have tasks of their own.
 class OneThread {
  public:
   OneThread();
   ~OneThread();
   OneThread(const OneThread&) = delete;
   OneThread& operator=(const OneThread&) = delete;
+
+ private:
+  const bool before_;
 };
 
 // How many threads all loops share, at least 1; the default is the number of processors. To be

@@ -41,10 +41,13 @@ struct SmoothingEffect {
   double max_displacement_mm = 0;
 };
 
-// Smooths the mesh, an oriented manifold, in place. A vertex on the boundary stays where it is
-// and, of a closed surface, one on the border of the volume: caps stay flat, and closing a surface
-// does not change how the rest of it is smoothed. The result is the same to the byte for any number
-// of threads. Throws Error kCancelled; the positions are indeterminate then.
+// Smooths the mesh, an oriented manifold or the walls between labels, in place. A vertex on the
+// boundary stays where it is and, of a closed surface, one on the border of the volume: caps stay
+// flat, and closing a surface does not change how the rest of it is smoothed. Of the walls between
+// labels (separate.h) a vertex on a line where three of them meet goes to the mean of its two
+// neighbours along that line, and one where lines meet or end stays; so walls stay what two labels
+// share. Enclosed volumes of SmoothingEffect mean nothing then. The result is the same to the byte
+// for any number of threads. Throws Error kCancelled; the positions are indeterminate then.
 SmoothingEffect smooth(const SmoothOptions& options, const Context& context, Mesh& mesh);
 
 // An upper bound of what `smooth` takes beside the mesh, in bytes, on the present number of

@@ -45,6 +45,18 @@ class Links {
     return true;
   }
 
+  // A neighbour along a line where walls meet, as a triangle at that line names it.
+  bool add_on_line(Place place) {
+    const auto count = static_cast<std::size_t>(fan_++);
+    if (count >= kUsualNeighbors) return false;
+    neighbors_[count] = place;
+    return true;
+  }
+
+  // On a line three walls meet, so each of its triangles names a neighbour along it, three times
+  // for each. A vertex where a line ends or lines meet has not two such neighbours.
+  bool is_within_line() const { return fan_ == 6; }
+
   // In an oriented manifold the triangles name each neighbour once as the next corner and once as
   // the previous one, and the sum of the differences is zero, unless the vertex lies on the
   // boundary: then its first neighbour is never a next one and its last never a previous one.
@@ -76,9 +88,11 @@ struct LayerLinks {
 };
 
 // Lists, for the vertices of two layers, the corners that follow them in the triangles that name
-// both layers' vertices. The differences below are modulo 2^32 and 2^64.
+// both layers' vertices; for those on a line where walls meet, `is_on_line`, the corners that are
+// on it too, whichever side they are of. The differences below are modulo 2^32 and 2^64.
+template <bool kHasLines, class IsOnLine>
 void add_neighbors(std::span<const Triangle> triangles, const LayerLinks& lower,
-                   const LayerLinks& upper, Links* links) {
+                   const LayerLinks& upper, IsOnLine is_on_line, Links* links) {
   const Place upper_shift = upper.first_place - upper.first * kPlacesPerPosition;
   const Place lower_shift = lower.first_place - lower.first * kPlacesPerPosition;
   const auto place_of = [&](std::uint32_t vertex) {
@@ -89,6 +103,16 @@ void add_neighbors(std::span<const Triangle> triangles, const LayerLinks& lower,
     const bool is_upper = vertex >= upper.first;
     const std::size_t index =
         vertex + (is_upper ? upper.first_index - upper.first : lower.first_index - lower.first);
+    if constexpr (kHasLines) {
+      if (is_on_line(vertex)) {
+        for (const std::uint32_t other : {next, previous}) {
+          if (!is_on_line(other) || links[index].add_on_line(place_of(other))) continue;
+          const LayerLinks& layer = is_upper ? upper : lower;
+          layer.more->push_back({vertex - layer.first, place_of(other)});
+        }
+        return;
+      }
+    }
     if (links[index].add(next, previous, next_place)) return;
     const LayerLinks& layer = is_upper ? upper : lower;
     layer.more->push_back({vertex - layer.first, next_place});
@@ -248,8 +272,13 @@ class Sweep {
       begin_links(layer + 1);
       upper = layer_links(layer + 1);
     }
-    add_neighbors(round_.mesh.triangles_of(layer, layer + 1), layer_links(layer), upper,
-                  links_.data());
+    const auto triangles = round_.mesh.triangles_of(layer, layer + 1);
+    const auto is_on_line = [&](std::uint32_t v) { return round_.mesh.is_on_line(v); };
+    if (round_.mesh.on_line.empty()) {
+      add_neighbors<false>(triangles, layer_links(layer), upper, is_on_line, links_.data());
+    } else {
+      add_neighbors<true>(triangles, layer_links(layer), upper, is_on_line, links_.data());
+    }
     weigh(layer);
     auto& more = more_neighbors(layer);
     std::ranges::stable_sort(more, {}, &MoreNeighbor::vertex);
@@ -262,7 +291,9 @@ class Sweep {
     const std::uint64_t first = round_.first_vertex(layer);
     const std::size_t count = vertices(layer);
     for (std::size_t v = 0; v < count; ++v) {
-      const bool is_fixed = link[v].is_on_boundary() || round_.mesh.is_on_border(first + v);
+      const bool is_held =
+          round_.mesh.is_on_line(first + v) ? !link[v].is_within_line() : link[v].is_on_boundary();
+      const bool is_fixed = is_held || round_.mesh.is_on_border(first + v);
       link[v].set_weight(is_fixed ? 0 : link[v].one_over_count());
     }
   }

@@ -120,6 +120,12 @@ constexpr Corner kMirrorX = 1;
 
 }  // namespace
 
+CellCase tetrahedron_case(const std::array<std::uint8_t, 4>& corners, unsigned inside) {
+  CellCase result;
+  add_tetrahedron(result, corners, inside);
+  return result;
+}
+
 const CellSplit& cell_split(Scheme scheme, bool odd) {
   static const CellSplit six = make_split(kPaperSix, 0);
   static const CellSplit five_even = make_split(kPaperFive, 0);

@@ -51,6 +51,10 @@ struct CellSplit {
   std::array<std::uint8_t, 256> crossed = {};
 };
 
+// The surface in one tetrahedron of a cell alone, of whose corners those in the set `inside` (bit
+// c: corner c) are inside.
+CellCase tetrahedron_case(const std::array<std::uint8_t, 4>& corners, unsigned inside);
+
 // The split of a cell whose corner 0 has even or odd i+j+k; with six tetrahedra they are the same.
 const CellSplit& cell_split(Scheme scheme, bool odd);
 

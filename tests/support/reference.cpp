@@ -4,25 +4,14 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <span>
 #include <utility>
 
 #include "proto/samples.h"
 #include "tests/support/points.h"
+#include "tests/support/tetrahedra.h"
 
 namespace isomesh::test {
 namespace {
-
-using Sample = std::array<std::uint32_t, 3>;
-using Tetrahedron = std::array<unsigned, 4>;
-
-// The paper's Table 1.
-constexpr Sample kCorners[8] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
-                                {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
-constexpr Tetrahedron kSixTetrahedra[6] = {{0, 2, 3, 6}, {0, 1, 2, 6}, {0, 1, 5, 6},
-                                           {0, 3, 6, 7}, {0, 4, 6, 7}, {0, 4, 5, 6}};
-constexpr Tetrahedron kFiveTetrahedra[5] = {
-    {0, 2, 3, 7}, {0, 1, 2, 5}, {0, 4, 5, 7}, {2, 5, 6, 7}, {0, 2, 5, 7}};
 
 Point mean_in_space(const std::vector<Sample>& samples, const mesh::LatticeToSpace& map) {
   Point sum = {0, 0, 0};
@@ -48,37 +37,19 @@ class ReferenceBuilder {
   }
 
   ReferenceMesh build() {
-    if (!lattice_.dims.has_cells()) return std::move(mesh_);
-    const mesh::Dims& dims = mesh_.dims;
-    for (std::uint32_t k = 0; k + 1 < dims.z; ++k) {
-      for (std::uint32_t j = 0; j + 1 < dims.y; ++j) {
-        for (std::uint32_t i = 0; i + 1 < dims.x; ++i) add_cell({i, j, k});
+    for_each_tetrahedron(mesh_.dims, options_.scheme, margin_, [&](const Tetrahedron& corners) {
+      std::vector<Sample> inside;
+      std::vector<Sample> outside;
+      for (const Sample& sample : corners.samples) {
+        (value(sample) >= static_cast<long double>(options_.iso) ? inside : outside)
+            .push_back(sample);
       }
-    }
+      if (!inside.empty() && !outside.empty()) add_patch(inside, outside, corners.layer);
+    });
     return std::move(mesh_);
   }
 
  private:
-  void add_cell(const Sample& cell) {
-    const bool five = options_.scheme == Scheme::kFive;
-    // By the volume's own numbers, which are `margin_` smaller.
-    const bool mirrored = five && (cell[0] + cell[1] + cell[2] + 3 * margin_) % 2 == 1;
-    const std::span<const Tetrahedron> table =
-        five ? std::span<const Tetrahedron>(kFiveTetrahedra) : kSixTetrahedra;
-    for (const Tetrahedron& tetrahedron : table) {
-      std::vector<Sample> inside;
-      std::vector<Sample> outside;
-      for (const unsigned corner : tetrahedron) {
-        const Sample& c = kCorners[corner];
-        const std::uint32_t x = mirrored ? 1 - c[0] : c[0];
-        const Sample sample = {cell[0] + x, cell[1] + c[1], cell[2] + c[2]};
-        (value(sample) >= static_cast<long double>(options_.iso) ? inside : outside)
-            .push_back(sample);
-      }
-      if (!inside.empty() && !outside.empty()) add_patch(inside, outside, cell[2]);
-    }
-  }
-
   void add_patch(const std::vector<Sample>& inside, const std::vector<Sample>& outside,
                  std::uint32_t layer) {
     std::vector<std::pair<Sample, Sample>> edges;

@@ -110,6 +110,16 @@ TEST(OneThread, KeepsLoopsOnTheThreadThatBeginsThem) {
   set_thread_count(before);
 }
 
+TEST(OneThread, OutlivesOneWithinIt) {
+  const test::ThreadCount three(3);
+  {
+    const OneThread alone;
+    { const OneThread within; }
+    EXPECT_EQ(thread_count(), 1);
+  }
+  EXPECT_EQ(thread_count(), 3);
+}
+
 TEST(Context, ThrowsOnlyWhenStopped) {
   std::stop_source source;
   const Context context{source.get_token(), {}};

@@ -1,0 +1,42 @@
+// Which labels a segmentation has, and which of them are to be separated.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/mesh/context.h"
+#include "server/mesh/lattice.h"
+
+namespace isomesh::mesh {
+
+// What the samples say of one label.
+struct LabelVoxels {
+  std::int64_t label = 0;
+  std::uint64_t voxels = 0;
+  double volume_mm3 = 0;  // of so many voxels
+  // The smallest and the largest sample along x, y and z that has it.
+  std::array<std::uint32_t, 3> low = {0, 0, 0};
+  std::array<std::uint32_t, 3> high = {0, 0, 0};
+
+  bool operator==(const LabelVoxels&) const = default;
+};
+
+// All values that the samples have, the background's too, ascending, in one walk. For the six
+// integer types of SampleType. The same for any number of threads; O(labels) memory for each.
+// Throws Error kUnusableVolume when there are more than kMostLabels (separate.h) beside one for the
+// background, and kCancelled.
+template <class T>
+std::vector<LabelVoxels> count_labels(const Lattice<T>& lattice, const Context& context);
+
+// The labels to separate, ascending: those that are wanted, or all but the background. Throws Error
+// kInvalidParameter, field "labels", when the background is among those that are wanted or none is,
+// and kUnusableVolume when some of them are not in `present`, naming them, or when there are more
+// than kMostLabels.
+std::vector<std::int64_t> select_labels(
+    std::span<const LabelVoxels> present, std::int64_t background,
+    const std::optional<std::vector<std::int64_t>>& wanted = std::nullopt);
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,197 @@
+#include "server/mesh/label_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/mesh/smooth.h"
+#include "tests/support/errors.h"
+#include "tests/unit/mesh/separated.h"
+
+namespace isomesh::mesh {
+namespace {
+
+using test::SampleVolume;
+
+// The layers of a label's own surface are as mesh.h has them.
+void expect_layers(const Mesh& mesh) {
+  ASSERT_EQ(mesh.layer_vertices.back(), mesh.positions.size());
+  ASSERT_EQ(mesh.layer_triangles.back(), mesh.triangles.size());
+  for (std::size_t k = 0; k < mesh.layers(); ++k) {
+    for (const Triangle& triangle : mesh.triangles_of(k, k + 1)) {
+      for (const std::uint32_t v : triangle) {
+        ASSERT_GE(v, mesh.layer_vertices[k]);
+        ASSERT_LT(v, mesh.layer_vertices[std::min(k + 2, mesh.layers())]);
+      }
+    }
+  }
+}
+
+TEST(LabelSurface, IsSoundAndClosedWhateverTheLabelsAre) {
+  for (std::size_t count = 2; count < 10; ++count) {
+    const auto volume = label_noise(count, {9, 8, 7}, 90 + count, test::oblique_geometry());
+    for (const SeparateOptions& options :
+         all_separations(consecutive<std::int64_t>(1, count - 1))) {
+      SCOPED_TRACE(describe(volume.dims, options));
+      const SeparatingSurface surface = separated(volume, options);
+      for (std::size_t number = 1; number < count; ++number) {
+        const Mesh mesh = label_mesh(surface, number);
+        expect_layers(mesh);
+        const test::Surface own = test::surface_of(mesh);
+        ASSERT_TRUE(test::is_sound(own));
+        if (options.close) {
+          ASSERT_TRUE(test::topology_of(own).boundary_edges.empty());
+          ASSERT_GT(test::extent_of(own).volume, 0);
+        } else {
+          ASSERT_TRUE(test::boundary_is_on_border(own, volume.dims, volume.lattice().to_space));
+        }
+      }
+    }
+  }
+}
+
+TEST(LabelSurface, HasTheTrianglesThatWereCounted) {
+  auto volume = label_cells(9, {70, 21, 30}, 12, 89);
+  for (std::size_t i = 0; i < volume.samples.size(); i += 11) volume.samples[i] = i % 9;
+  for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, 9))) {
+    SCOPED_TRACE(describe(volume.dims, options));
+    const SeparatingSurface surface = separated(volume, options);
+    const LabelTriangles triangles(surface);
+    const auto counts = count_label_triangles(volume.lattice(), options, {});
+    ASSERT_EQ(counts.size(), 10U);
+    for (std::size_t n = 1; n < counts.size(); ++n) EXPECT_EQ(counts[n], triangles.of(n).size());
+    const auto background = std::ranges::count(surface.sides, 0, &WallSides::front);
+    EXPECT_EQ(counts[0], static_cast<std::uint64_t>(background));
+  }
+}
+
+TEST(LabelSurface, OfOneLabelIsAll) {
+  const auto volume = label_noise(2, {20, 9, 12}, 91);
+  for (const SeparateOptions& options : all_separations({1})) {
+    const SeparatingSurface surface = separated(volume, options);
+    EXPECT_TRUE(test::same_bytes(label_mesh(surface, 1), surface.mesh));
+  }
+}
+
+TEST(LabelSurface, OfALabelThatNoSampleHasIsEmpty) {
+  const SeparatingSurface surface = separated(label_noise(2, {9, 9, 9}, 92), {{1, 7}});
+  const Mesh mesh = label_mesh(surface, 2);
+  EXPECT_EQ(mesh.positions.size(), 0U);
+  EXPECT_EQ(mesh.triangles.size(), 0U);
+  EXPECT_EQ(mesh.layers(), surface.mesh.layers());
+}
+
+// Without a background the labels fill the box of the voxels, but for what is cut off along its
+// edges: an eighth of a voxel at most for each.
+TEST(LabelVolumes, FillTheBoxOfTheVoxels) {
+  constexpr double kVoxels = 11.0 * 9 * 8;
+  constexpr double kVoxelsAlongEdges = 4 * (11 + 9 + 8);
+  for (const auto& [name, geometry] : test::all_geometries()) {
+    SCOPED_TRACE(name);
+    const auto volume = label_noise(6, {11, 9, 8}, 93, geometry);
+    const double voxel = std::abs(volume.lattice().to_space.determinant());
+    for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
+      const auto labels = select_labels(count_labels(volume.lattice(), {}), 99);
+      const SeparatingSurface surface = separated(volume, {labels, scheme, true});
+      double sum = 0;
+      for (const LabelMeasure& label : measure_labels(surface, LabelTriangles(surface), {})) {
+        EXPECT_TRUE(label.is_closed());
+        sum += label.extent.volume_mm3;
+      }
+      EXPECT_LE(sum, kVoxels * voxel * (1 + 1e-4));
+      EXPECT_GE(sum, (kVoxels - kVoxelsAlongEdges / 8) * voxel);
+    }
+  }
+}
+
+// What is in front of the union of all is the background.
+double volume_of_union(const SeparatingSurface& surface) {
+  test::Surface outer;
+  for (const Vec3& p : surface.mesh.positions) outer.points.push_back({p[0], p[1], p[2]});
+  for (std::size_t t = 0; t < surface.sides.size(); ++t) {
+    if (surface.sides[t].front == 0) outer.triangles.push_back(surface.mesh.triangles[t]);
+  }
+  return test::extent_of(outer).volume;
+}
+
+TEST(LabelVolumes, AreThatOfTheirUnionAndAboutThatOfTheVoxels) {
+  const auto volume = label_cells(9, {48, 44, 40}, 14, 94);
+  const auto present = count_labels(volume.lattice(), {});
+  const auto labels = select_labels(present, 0);
+  for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
+    SeparatingSurface surface = separated(volume, {labels, scheme, true});
+    for (const int passes : {0, 10}) {
+      smooth({.passes = passes, .max_displacement_mm = 0.5}, {}, surface.mesh);
+      const auto measures = measure_labels(surface, LabelTriangles(surface), {});
+      double sum = 0;
+      double voxels = 0;
+      for (std::size_t n = 0; n < measures.size(); ++n) {
+        sum += measures[n].extent.volume_mm3;
+        voxels += present[n + 1].volume_mm3;
+        ASSERT_EQ(measures[n].label, present[n + 1].label);
+        EXPECT_NEAR(measures[n].extent.volume_mm3, present[n + 1].volume_mm3,
+                    0.05 * present[n + 1].volume_mm3);
+      }
+      EXPECT_NEAR(sum, volume_of_union(surface), 1e-6 * sum);
+      EXPECT_NEAR(sum, voxels, 0.02 * voxels);
+    }
+  }
+}
+
+TEST(MeasureLabels, SaysWhatEachSurfaceIs) {
+  const auto volume = label_cells(9, {40, 21, 30}, 12, 95);
+  for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, 9))) {
+    const SeparatingSurface surface = separated(volume, options);
+    const auto measures = measure_labels(surface, LabelTriangles(surface), {});
+    ASSERT_EQ(measures.size(), 9U);
+    for (std::size_t n = 0; n < measures.size(); ++n) {
+      const Mesh mesh = label_mesh(surface, n + 1);
+      const test::Surface own = test::surface_of(mesh);
+      const test::TopologyFacts topology = test::topology_of(own);
+      const test::ExtentFacts extent = test::extent_of(own, mesh.origin);
+      const LabelMeasure& measure = measures[n];
+      EXPECT_EQ(measure.label, static_cast<std::int64_t>(n + 1));
+      EXPECT_EQ(measure.vertices, own.points.size());
+      EXPECT_EQ(measure.triangles, own.triangles.size());
+      EXPECT_EQ(measure.topology.components, topology.components);
+      EXPECT_EQ(measure.topology.euler, topology.euler);
+      EXPECT_EQ(measure.topology.boundary_edges, topology.boundary_edges.size());
+      EXPECT_EQ(measure.is_closed(), topology.boundary_edges.empty());
+      EXPECT_TRUE(measure.topology.manifold);
+      EXPECT_TRUE(measure.topology.oriented);
+      EXPECT_NEAR(measure.extent.area_mm2, extent.area, 1e-6 * extent.area);
+      EXPECT_NEAR(measure.extent.volume_mm3, extent.volume, 1e-6 * std::abs(extent.volume));
+    }
+  }
+}
+
+TEST(MeasureLabels, IsTheSameForAnyNumberOfThreads) {
+  const SeparatingSurface surface =
+      separated(label_cells(9, {40, 21, 30}, 12, 96), {consecutive<std::int64_t>(1, 9)});
+  const auto figures = [&](int threads) {
+    const test::ThreadCount some(threads);
+    std::vector<double> result;
+    for (const LabelMeasure& m : measure_labels(surface, LabelTriangles(surface), {})) {
+      result.insert(result.end(), {m.extent.area_mm2, m.extent.volume_mm3, m.extent.low[0]});
+    }
+    return result;
+  };
+  const auto single = figures(1);
+  for (const int threads : {2, 16}) EXPECT_EQ(figures(threads), single);
+}
+
+TEST(MeasureLabels, EndsWhenItIsCancelled) {
+  const SeparatingSurface surface = separated(label_noise(4, {9, 9, 9}, 97), {{1, 2, 3}});
+  std::stop_source source;
+  source.request_stop();
+  EXPECT_EQ(test::code_thrown_by([&] {
+              measure_labels(surface, LabelTriangles(surface), {source.get_token(), {}});
+            }),
+            ErrorCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace isomesh::mesh
