@@ -9,7 +9,9 @@
 #include <gmock/gmock.h>
 #include <zlib.h>
 
+#include "server/mesh/labels.h"
 #include "tests/bench/ct_head.h"
+#include "tests/bench/labels.h"
 #include "tests/bench/paper.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/stages.h"
@@ -107,6 +109,15 @@ TEST(Timing, PairsPrepareUntimedAndRunEquallyOften) {
   EXPECT_EQ(ours, 5);
   EXPECT_EQ(peers, 5);
   EXPECT_EQ(prepared, 5);
+}
+
+TEST(LabelBody, HasAllItsLabels) {
+  const Samples body = label_body(64);
+  const mesh::Lattice<std::uint8_t> lattice = {body.as<std::uint8_t>(), body.dims, {}};
+  const auto labels = mesh::count_labels(lattice, {});
+  ASSERT_EQ(labels.size(), kBodyLabels + 1);
+  EXPECT_EQ(labels.front().label, 0);
+  EXPECT_EQ(labels.back().label, static_cast<std::int64_t>(kBodyLabels));
 }
 
 TEST(SvgPlot, LeavesOutWhatAnAxisCannotShow) {

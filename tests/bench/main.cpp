@@ -14,6 +14,7 @@
 
 #include "server/jobs/memory.h"
 #include "tests/bench/benchmarks.h"
+#include "tests/bench/labels.h"
 #include "tests/bench/machine.h"
 #include "tests/bench/memory.h"
 #include "tests/bench/peers.h"
@@ -100,6 +101,15 @@ int run_service(const Options& options, const std::filesystem::path& daemon) {
   return 0;
 }
 
+int run_labels(std::uint32_t samples, int threads) {
+  for (const int count : threads > 0 ? std::vector{threads} : std::vector{1, 2}) {
+    std::cout << count << (count == 1 ? " thread\n" : " threads\n")
+              << to_table(measure_label_findings(samples, count));
+  }
+  if (!peers_available()) std::cout << '\n' << peers_description() << '\n';
+  return 0;
+}
+
 std::string check_filter(const std::string& text) {
   try {
     const std::regex filter(text);
@@ -137,6 +147,13 @@ int run_program(int argc, char** argv) {
       ->check(CLI::ExistingFile);
   service->fallthrough();  // --volume, --iso and --threads may stand behind it
 
+  std::uint32_t samples = 300;
+  CLI::App* labels = app.add_subcommand(
+      "labels", "Separate a synthetic body of 104 labels, beside the peers' one run a label");
+  labels->add_option("--samples", samples, "Of the body along each axis")
+      ->check(CLI::Range(64, 1024));
+  labels->fallthrough();
+
   std::string stage;
   std::uint32_t size = 0;
   int threads = 1;
@@ -154,6 +171,7 @@ int run_program(int argc, char** argv) {
   if (*memory) return run_memory_command(stage, size, threads);
   warn_when_busy();
   if (*service) return run_service(options, daemon);
+  if (*labels) return run_labels(samples, options.threads);
   return *report ? write_report(folder, daemon) : run(options);
 }
 

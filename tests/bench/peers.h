@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "tests/bench/samples.h"
@@ -33,6 +34,8 @@ class Peers {
 
   void flying_edges();
   void marching_cubes();
+  // One run a label, of which all meshes are kept.
+  void discrete_flying_edges(std::span<const std::int64_t> labels);
   // These take the last Flying Edges mesh, which they keep.
   void smooth(int passes);         // vtkSmoothPolyDataFilter
   void windowed_sinc(int passes);  // vtkWindowedSincPolyDataFilter

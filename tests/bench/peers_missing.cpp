@@ -18,6 +18,7 @@ Peers::~Peers() = default;
 void Peers::set_threads(int) {}
 void Peers::flying_edges() {}
 void Peers::marching_cubes() {}
+void Peers::discrete_flying_edges(std::span<const std::int64_t>) {}
 void Peers::smooth(int) {}
 void Peers::windowed_sinc(int) {}
 std::uint64_t Peers::draco() const { return 0; }

@@ -1,8 +1,10 @@
 #include <stdexcept>
+#include <vector>
 
 #include <malloc.h>
 #include <vtkCellArray.h>
 #include <vtkDataArray.h>
+#include <vtkDiscreteFlyingEdges3D.h>
 #include <vtkFloatArray.h>
 #include <vtkFlyingEdges3D.h>
 #include <vtkImageData.h>
@@ -100,6 +102,7 @@ struct Peers::Vtk {
   double iso = 0;
   vtkSmartPointer<vtkPolyData> mesh;   // the last Flying Edges mesh
   vtkSmartPointer<vtkPolyData> other;  // what came from it, or another surface
+  std::vector<vtkSmartPointer<vtkPolyData>> labels;
 };
 
 bool peers_available() { return true; }
@@ -110,7 +113,7 @@ std::string peers_description() {
 }
 
 Peers::Peers(const Samples& samples, double iso)
-    : vtk_(std::make_unique<Vtk>(Vtk{image_of(samples), iso, nullptr, nullptr})) {}
+    : vtk_(std::make_unique<Vtk>(Vtk{image_of(samples), iso, nullptr, nullptr, {}})) {}
 
 Peers::~Peers() = default;
 
@@ -119,6 +122,14 @@ void Peers::set_threads(int threads) { set_vtk_threads(threads); }
 void Peers::flying_edges() { vtk_->mesh = contour<vtkFlyingEdges3D>(vtk_->image, vtk_->iso); }
 
 void Peers::marching_cubes() { vtk_->other = contour<vtkMarchingCubes>(vtk_->image, vtk_->iso); }
+
+void Peers::discrete_flying_edges(std::span<const std::int64_t> labels) {
+  vtk_->labels.clear();
+  for (const std::int64_t label : labels) {
+    vtk_->labels.push_back(
+        contour<vtkDiscreteFlyingEdges3D>(vtk_->image, static_cast<double>(label)));
+  }
+}
 
 void Peers::smooth(int passes) {
   vtk_->other = smoothed<vtkSmoothPolyDataFilter>(vtk_->mesh, passes);
@@ -139,6 +150,7 @@ std::uint64_t Peers::pipeline() {
 void Peers::release() {
   vtk_->mesh = nullptr;
   vtk_->other = nullptr;
+  vtk_->labels.clear();
   malloc_trim(0);
 }
 
