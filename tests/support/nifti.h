@@ -10,6 +10,8 @@ namespace isomesh::test {
 
 inline constexpr const char* kBrainFile = "/usr/share/mricron/templates/ch2.nii.gz";
 inline constexpr double kBrainIso = 60;
+// 116 regions of that brain, each a label.
+inline constexpr const char* kAtlasFile = "/usr/share/mricron/templates/aal.nii.gz";
 
 // The samples of a gzipped little-endian NIfTI-1 file of uint8 with three dimensions, with the
 // identity as geometry whatever the file says. Throws std::runtime_error that names the file when

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "server/mesh/smooth.h"
 #include "tests/support/errors.h"
+#include "tests/support/nifti.h"
 #include "tests/unit/mesh/separated.h"
 
 namespace isomesh::mesh {
@@ -139,6 +141,25 @@ TEST(LabelVolumes, AreThatOfTheirUnionAndAboutThatOfTheVoxels) {
       EXPECT_NEAR(sum, voxels, 0.02 * voxels);
     }
   }
+}
+
+TEST(LabelVolumes, OfAnAtlasAreThatOfItsVoxels) {
+  const auto volume = test::read_nifti_samples(test::kAtlasFile);
+  const auto present = count_labels(volume.lattice(), {});
+  const auto labels = select_labels(present, 0);
+  EXPECT_EQ(labels.size(), 116U);
+  const SeparatingSurface surface = separated(volume, {labels});
+  double sum = 0;
+  for (const LabelMeasure& label : measure_labels(surface, LabelTriangles(surface), {})) {
+    EXPECT_TRUE(label.is_closed());
+    EXPECT_TRUE(label.topology.manifold);
+    EXPECT_TRUE(label.topology.oriented);
+    sum += label.extent.volume_mm3;
+  }
+  const double voxels = std::accumulate(
+      present.begin() + 1, present.end(), 0.0,
+      [](double total, const LabelVoxels& label) { return total + label.volume_mm3; });
+  EXPECT_NEAR(sum, voxels, 0.001 * voxels);
 }
 
 TEST(MeasureLabels, SaysWhatEachSurfaceIs) {
