@@ -21,9 +21,9 @@ inline constexpr std::size_t kFlagBits = 64;  // of a word of Mesh::on_border
 // names only vertices of layers k and k+1, and work on a run of layers touches no others than those
 // next to it.
 //
-// As extraction leaves it, every vertex lies on one lattice edge and every lattice edge carries at
-// most one vertex. The surface is an oriented manifold whose boundary, if it was not closed, lies
-// on the border of the volume.
+// As extraction at an iso-value leaves it, every vertex lies on one lattice edge and every lattice
+// edge carries at most one vertex. The surface is an oriented manifold whose boundary, if it was
+// not closed, lies on the border of the volume.
 struct Mesh {
   std::array<double, 3> origin = {0, 0, 0};  // where the sample (0,0,0) lies
   Buffer<Vec3> positions;

@@ -39,8 +39,6 @@ std::vector<LabelVoxels> naively_counted(const test::SampleVolume<T>& volume) {
 
 template <class T>
 class CountLabels : public testing::Test {};
-using LabelTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
-                                  std::uint32_t, std::int32_t>;
 TYPED_TEST_SUITE(CountLabels, LabelTypes);
 
 TYPED_TEST(CountLabels, AreThoseOfANaiveWalk) {

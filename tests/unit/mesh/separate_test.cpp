@@ -106,8 +106,6 @@ TEST(Separate, OfSingleCellsIsTheReferencesSurface) {
 
 template <class T>
 class SeparateTypes : public testing::Test {};
-using LabelTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
-                                  std::uint32_t, std::int32_t>;
 TYPED_TEST_SUITE(SeparateTypes, LabelTypes);
 
 TYPED_TEST(SeparateTypes, HaveTheirWholeRange) {

@@ -18,6 +18,10 @@
 
 namespace isomesh::mesh {
 
+// What a label can be.
+using LabelTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
+                                  std::uint32_t, std::int32_t>;
+
 template <class T>
 void separate_into(SeparatingSurface& surface, const test::SampleVolume<T>& volume,
                    const SeparateOptions& options) {

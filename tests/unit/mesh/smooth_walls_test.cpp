@@ -207,6 +207,40 @@ TEST(SmoothWallsWithin, MovesNoVertexFarther) {
   }
 }
 
+// Where smoothing puts the vertices that lie in no face of the box of the samples and not beyond.
+std::vector<Vec3> inner_smoothed(const test::SampleVolume<std::uint8_t>& volume,
+                                 const SeparateOptions& options, const SmoothOptions& smoothing) {
+  SeparatingSurface surface = separated(volume, options);
+  const std::array<std::uint32_t, 3> counts = {volume.dims.x, volume.dims.y, volume.dims.z};
+  std::vector<bool> is_inner(surface.mesh.positions.size(), true);
+  for (std::size_t v = 0; v < is_inner.size(); ++v) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float at = surface.mesh.positions[v][axis];
+      if (at <= 0 || at >= static_cast<float>(counts[axis] - 1)) is_inner[v] = false;
+    }
+    if (!options.close) continue;
+    EXPECT_EQ(surface.mesh.is_on_border(v), !is_inner[v]);
+  }
+  smooth_walls(smoothing, surface);
+  std::vector<Vec3> inner;
+  for (std::size_t v = 0; v < is_inner.size(); ++v) {
+    if (is_inner[v]) inner.push_back(surface.mesh.positions[v]);
+  }
+  return inner;
+}
+
+TEST(SmoothWallsBorder, ClosingDoesNotChangeTheRest) {
+  const auto volume = label_cells(12, {40, 21, 30}, 12, 107);
+  const auto labels = consecutive<std::int64_t>(1, 12);
+  for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
+    for (const SmoothOptions& options : {SmoothOptions{7, 1}, SmoothOptions{5, 0.6, -0.64, 0.2}}) {
+      const auto open = inner_smoothed(volume, {labels, scheme, false}, options);
+      EXPECT_GT(open.size(), 1000U);
+      EXPECT_EQ(inner_smoothed(volume, {labels, scheme, true}, options), open);
+    }
+  }
+}
+
 TEST(SmoothWallsShape, TwoLabelsAreSmoothedAsAnIsosurfaceIs) {
   const auto volume = test::noise<std::uint8_t>({0, 1}, {20, 17, 60}, 105);
   for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
