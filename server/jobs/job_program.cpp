@@ -215,6 +215,13 @@ void read_orders(Lines& lines, Desk& desk) {
 
 }  // namespace
 
+#if defined(__SANITIZE_THREAD__)
+// What the sanitizer finds is read by nobody here, so it has to end the process.
+extern "C" const char* __tsan_default_options();  // NOLINT: the name that it looks for
+
+const char* __tsan_default_options() { return "halt_on_error=1"; }
+#endif
+
 int main() {
   keep_freed_memory();
   Lines lines;
