@@ -1,5 +1,6 @@
 #include "server/jobs/blob_eraser.h"
 
+#include <chrono>
 #include <exception>
 #include <memory>
 
@@ -8,6 +9,12 @@
 #include "base/error.h"
 
 namespace isomesh::jobs {
+namespace {
+
+// An answer is on its way then. The thread that sends it would wait for a processor meanwhile.
+constexpr std::chrono::milliseconds kPause{100};
+
+}  // namespace
 
 void BlobEraser::erase(const std::string& key) {
   const Lock lock(mutex_);
@@ -17,7 +24,10 @@ void BlobEraser::erase(const std::string& key) {
 
 void BlobEraser::finish() {
   Lock lock(mutex_);
+  ++hurries_;
+  changed_.notify_all();
   changed_.wait(lock, [this]() ISOMESH_REQUIRES(mutex_) { return waiting_.empty(); });
+  --hurries_;
 }
 
 void BlobEraser::run(const std::stop_token& stop) {
@@ -25,6 +35,8 @@ void BlobEraser::run(const std::stop_token& stop) {
   for (;;) {
     changed_.wait(lock, stop, [this]() ISOMESH_REQUIRES(mutex_) { return !waiting_.empty(); });
     if (waiting_.empty()) return;
+    changed_.wait_for(lock, stop, kPause,
+                      [this]() ISOMESH_REQUIRES(mutex_) { return hurries_ > 0; });
     const std::string key = waiting_.front();
     lock.unlock();
     erase_now(key);

@@ -43,6 +43,7 @@ class BlobEraser {
   Mutex mutex_;
   Condition changed_;
   std::deque<std::string> waiting_ ISOMESH_GUARDED_BY(mutex_);  // the first is under way
+  int hurries_ ISOMESH_GUARDED_BY(mutex_) = 0;                  // of those that wait for the end
   std::jthread thread_;                                         // last, because it uses the others
 };
 
