@@ -251,6 +251,7 @@ int main(int argc, char** argv) {
   constexpr int kWrongUsage = 2;
   try {
     const sigset_t signals = block_signals();
+    jobs::keep_freed_memory();
     start_log(LogFormat::kText, LogLevel::kInfo);
     Options options;
     TokenRequest token;

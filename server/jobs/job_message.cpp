@@ -1,5 +1,7 @@
 #include "server/jobs/job_message.h"
 
+#include <vector>
+
 #include <nlohmann/json.hpp>
 
 #include "proto/json.h"
@@ -13,24 +15,60 @@ using Json = nlohmann::json;
   throw Error(ErrorCode::kInternal, "A message between the daemon and a job is malformed.");
 }
 
+// Stands before a job's record, where a line has one. Within JSON it is always escaped.
+constexpr char kBeforeRecord = '\t';
+
 std::string line_of(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
+}
+
+// The record as it is: within the other JSON it would be escaped, and read twice.
+std::string line_of(const Json& json, const Job& job) {
+  std::string line = line_of(json);
+  line.back() = kBeforeRecord;
+  return line + isomesh::to_json(job) + '\n';
 }
 
 // Reads a line; what JSON finds wrong with it makes it malformed.
 template <class Read>
 auto read_line(std::string_view line, const Read& read) {
   try {
-    return read(Json::parse(line));
+    return read(Json::parse(line.substr(0, line.find(kBeforeRecord))));
   } catch (const Json::exception&) {
     throw_malformed();
   }
+}
+
+Job record_of(std::string_view line) {
+  const std::size_t before = line.find(kBeforeRecord);
+  if (before == std::string_view::npos) throw_malformed();
+  return job_from_record(line.substr(before + 1));
+}
+
+Json json_of(const std::vector<Note>& notes) {
+  Json json = Json::array();
+  for (const Note& note : notes) json.push_back({note.code, note.detail});
+  return json;
+}
+
+std::vector<Note> notes_from(const Json& json) {
+  std::vector<Note> notes;
+  for (const Json& note : json) {
+    notes.push_back({note.at(0).get<std::string>(), note.at(1).get<std::string>()});
+  }
+  return notes;
 }
 
 // Parameters and summaries have a form as parts of a job.
 Job job_with(const MeshParameters& parameters) {
   Job job;
   static_cast<MeshParameters&>(job.parameters) = parameters;
+  return job;
+}
+
+Job job_with(const MeshSummary& summary) {
+  Job job;
+  job.mesh = summary;
   return job;
 }
 
@@ -55,18 +93,18 @@ Json json_of(const JobProgress& progress) {
 
 Json json_of(const JobPiece& piece) { return {{"file", piece.file}, {"bytes", piece.bytes}}; }
 
-Json json_of(const MadeMesh& made) {
-  Job job;
-  job.mesh = made.summary;
-  return {{"made", isomesh::to_json(job)}, {"timing", json_of(made.timing)}};
-}
-
 Json json_of(const mesh::SurfaceSize& size) {
   return {{"counted", {size.triangles, size.vertices, size.layers, size.largest_layer}}};
 }
 
 Json json_of(const Error& error) {
   return {{"code", std::string(describe(error.code()).name)}, {"detail", error.what()}};
+}
+
+std::string line_for(const auto& answer) { return line_of(json_of(answer)); }
+
+std::string line_for(const MadeMesh& made) {
+  return line_of({{"made", json_of(made.timing)}}, job_with(made.summary));
 }
 
 JobProgress progress_from(const Json& json) {
@@ -76,10 +114,9 @@ JobProgress progress_from(const Json& json) {
           timing_from(json.at("timing"))};
 }
 
-MadeMesh made_from(const Json& json) {
-  const Job job = job_from_record(json.at("made").get<std::string>());
+MadeMesh made_from(const Json& json, const Job& job) {
   if (!job.mesh) throw_malformed();
-  return {*job.mesh, timing_from(json.at("timing"))};
+  return {*job.mesh, timing_from(json.at("made"))};
 }
 
 mesh::SurfaceSize size_from(const Json& json) {
@@ -100,20 +137,18 @@ std::string to_line(const JobSetup& setup) {
 }
 
 std::string to_line(const JobOrder& order) {
-  Volume volume;
-  volume.id = order.volume.id;
-  volume.notes = order.volume.notes;
   return line_of({{"work", static_cast<int>(order.work)},
                   {"file", order.file.string()},
-                  {"volume", isomesh::to_json(volume)},
-                  {"job", isomesh::to_json(job_with(order.parameters))},
+                  {"volume", order.volume.id},
+                  {"notes", json_of(order.volume.notes)},
                   {"iso", order.iso},
                   {"memory_bytes", order.memory_bytes},
-                  {"disk_bytes", order.disk_bytes}});
+                  {"disk_bytes", order.disk_bytes}},
+                 job_with(order.parameters));
 }
 
 std::string to_line(const JobAnswer& answer) {
-  return line_of(std::visit([](const auto& one) { return json_of(one); }, answer));
+  return std::visit([](const auto& one) { return line_for(one); }, answer);
 }
 
 JobSetup setup_from(std::string_view line) {
@@ -124,23 +159,26 @@ JobSetup setup_from(std::string_view line) {
 }
 
 std::optional<JobOrder> order_from(std::string_view line) {
-  return read_line(line, [](const Json& json) -> std::optional<JobOrder> {
+  return read_line(line, [&](const Json& json) -> std::optional<JobOrder> {
     if (json.contains("cancel")) return std::nullopt;
-    return JobOrder{.work = static_cast<JobOrder::Work>(json.at("work").get<int>()),
-                    .file = json.at("file").get<std::string>(),
-                    .volume = volume_from_record(json.at("volume").get<std::string>()),
-                    .parameters = job_from_record(json.at("job").get<std::string>()).parameters,
-                    .iso = json.at("iso").get<double>(),
-                    .memory_bytes = json.at("memory_bytes").get<std::uint64_t>(),
-                    .disk_bytes = json.at("disk_bytes").get<std::uint64_t>()};
+    JobOrder order = {.work = static_cast<JobOrder::Work>(json.at("work").get<int>()),
+                      .file = json.at("file").get<std::string>(),
+                      .volume = {},
+                      .parameters = record_of(line).parameters,
+                      .iso = json.at("iso").get<double>(),
+                      .memory_bytes = json.at("memory_bytes").get<std::uint64_t>(),
+                      .disk_bytes = json.at("disk_bytes").get<std::uint64_t>()};
+    order.volume.id = json.at("volume").get<std::string>();
+    order.volume.notes = notes_from(json.at("notes"));
+    return order;
   });
 }
 
 JobAnswer answer_from(std::string_view line) {
-  return read_line(line, [](const Json& json) -> JobAnswer {
+  return read_line(line, [&](const Json& json) -> JobAnswer {
     if (json.contains("stage")) return progress_from(json);
     if (json.contains("file")) return JobPiece{json.at("file"), json.at("bytes")};
-    if (json.contains("made")) return made_from(json);
+    if (json.contains("made")) return made_from(json, record_of(line));
     if (json.contains("counted")) return size_from(json.at("counted"));
     if (json.contains("code")) return error_from(json);
     throw_malformed();

@@ -212,6 +212,54 @@ TEST_F(JobProcessTest, AProgramThatIsNotThereIsAnError) {
   EXPECT_EQ(refusal(absent, order_of(sphere, 0))->code(), ErrorCode::kInternal);
 }
 
+TEST(JobMessage, ArrivesAsItWasSent) {
+  JobOrder order = {.work = JobOrder::Work::kCount,
+                    .file = "/a folder/with\ttabs",
+                    .volume = {},
+                    .parameters = {},
+                    .iso = 0.1,
+                    .memory_bytes = std::uint64_t{1} << 60,
+                    .disk_bytes = ~std::uint64_t{0}};
+  order.volume.id = "id";
+  order.volume.notes = {{"code", "one\nand\tanother"}, {"other", ""}};
+  order.parameters.passes = 17;
+  order.parameters.lambda = 0.7;
+  order.parameters.formats = {MeshFormat::kStl, MeshFormat::kGlb};
+  const std::string line = to_line(order);
+  EXPECT_EQ(line.find('\n'), line.size() - 1);
+  const auto read = order_from(line.substr(0, line.size() - 1));
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->work, order.work);
+  EXPECT_EQ(read->file, order.file);
+  EXPECT_EQ(read->volume.id, order.volume.id);
+  EXPECT_EQ(read->volume.notes, order.volume.notes);
+  EXPECT_EQ(read->parameters, order.parameters);
+  EXPECT_EQ(read->iso, order.iso);
+  EXPECT_EQ(read->memory_bytes, order.memory_bytes);
+  EXPECT_EQ(read->disk_bytes, order.disk_bytes);
+
+  MadeMesh made;
+  made.summary.triangles = 12;
+  made.summary.quality.closed = true;
+  made.timing.smooth = 1.5;
+  const auto made_again = std::get<MadeMesh>(answer_from(to_line(made)));
+  EXPECT_EQ(made_again.summary, made.summary);
+  EXPECT_EQ(made_again.timing.smooth, 1.5);
+  const auto error =
+      std::get<Error>(answer_from(to_line(Error(ErrorCode::kTooLarge, "too\tlarge"))));
+  EXPECT_EQ(error.code(), ErrorCode::kTooLarge);
+  EXPECT_STREQ(error.what(), "too\tlarge");
+}
+
+TEST(JobMessage, AnotherFormIsRefused) {
+  EXPECT_FALSE(order_from(kCancelMessage));
+  for (const char* line : {"", "{}", "[]", "{\"stage\":9,\"share\":0,\"timing\":[0,0,0,0,0,0]}",
+                           "{\"made\":[0,0,0,0,0,0]}", "{\"made\":[0,0,0,0,0,0]}\t{}"}) {
+    EXPECT_EQ(test::code_thrown_by([&] { answer_from(line); }), ErrorCode::kInternal) << line;
+    EXPECT_EQ(test::code_thrown_by([&] { order_from(line); }), ErrorCode::kInternal) << line;
+  }
+}
+
 // Under the sanitizers memory is not limited.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 
