@@ -225,7 +225,7 @@ TEST_F(UploadTest, AnErasedVolumeIsGone) {
   EXPECT_EQ(daemon_.send("DELETE", path).status, 204);
   EXPECT_TRUE(is_problem(daemon_.get(path), ErrorCode::kNotFound));
   EXPECT_TRUE(is_problem(daemon_.send("DELETE", path), ErrorCode::kNotFound));
-  EXPECT_THAT(files_left(), IsEmpty());
+  EXPECT_TRUE(eventually([&] { return files_left().empty(); }));
 }
 
 TEST_F(UploadTest, AVolumeThatAJobNeedsIsKept) {
