@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <numeric>
 
 namespace isomesh::codec::edgebreaker {
 namespace {
@@ -29,8 +28,12 @@ std::byte* write_state(std::uint32_t state, std::byte* out) {
 
 // Takes parts away from the most probable symbols, so that they sum up to `sum` - `excess`.
 void take_away(std::vector<std::uint32_t>& parts, std::int64_t sum, std::int64_t excess) {
-  std::vector<std::uint32_t> order(parts.size());
-  std::iota(order.begin(), order.end(), 0);
+  if (excess == 0) return;
+  // Most symbols of a large alphabet have one part, which they keep.
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t symbol = 0; symbol < parts.size(); ++symbol) {
+    if (parts[symbol] > 1) order.push_back(symbol);
+  }
   std::ranges::stable_sort(order, std::greater<>(), [&](std::uint32_t i) { return parts[i]; });
   const std::int64_t wanted = sum - excess;
   while (excess > 0) {

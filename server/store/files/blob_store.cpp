@@ -21,6 +21,7 @@ namespace {
 constexpr std::size_t kPrefix = 2;
 constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
 constexpr std::chrono::hours kBelieved{1};
+constexpr std::chrono::minutes kBetweenForgetting{5};
 // Of all blobs, what one sweep may take: a tenth, but a few always.
 constexpr std::size_t kSweptShare = 10;
 constexpr std::size_t kSweptAtLeast = 16;
@@ -216,7 +217,10 @@ bool FileBlobStore::is_intact(const std::string& key, const std::stop_token& sto
 void FileBlobStore::believe(const std::string& key, const std::string& traits) const {
   const auto now = std::chrono::steady_clock::now();
   const Lock lock(intact_mutex_);
-  std::erase_if(intact_, [&](const auto& entry) { return now - entry.second.when >= kBelieved; });
+  if (now >= next_forgetting_) {  // not at every blob: there may be a million
+    std::erase_if(intact_, [&](const auto& entry) { return now - entry.second.when >= kBelieved; });
+    next_forgetting_ = now + kBetweenForgetting;
+  }
   intact_[key] = {traits, now};
 }
 

@@ -87,6 +87,7 @@ class FileBlobStore : public BlobStore {
   mutable bool has_folders_ ISOMESH_GUARDED_BY(folders_mutex_) = false;  // all, on the disk
   mutable Mutex intact_mutex_;
   mutable std::map<std::string, Check> intact_ ISOMESH_GUARDED_BY(intact_mutex_);
+  mutable Steady next_forgetting_ ISOMESH_GUARDED_BY(intact_mutex_);
   mutable Condition checked_;
   mutable std::set<std::string> under_check_ ISOMESH_GUARDED_BY(intact_mutex_);
 };
