@@ -22,7 +22,11 @@ class ParkedTest : public testing::Test {
   }
 
   std::atomic<int> resumed_ = 0;
+  std::atomic<int> told_ = 0;
   std::atomic<bool> ended_ = false;
+  Descriptor ours_;
+  Descriptor theirs_;
+  // Declared last: its thread may look at all of them until it has ended.
   Parked parked_{[this](const std::string&) { return ended_.load(); }};
 };
 
@@ -76,20 +80,16 @@ class WatchedTest : public ParkedTest {
                   .descriptor = ours_.number(),
                   .abandoned = abandoned});
   }
-
-  Descriptor ours_;
-  Descriptor theirs_;
 };
 
 TEST_F(WatchedTest, ANoticedEndIsToldOnceAndTheRequestWaitsOn) {
-  std::atomic<int> told = 0;
-  park_watched([&] { ++told; });
+  park_watched([this] { ++told_; });
   theirs_ = Descriptor();
-  EXPECT_TRUE(test::eventually([&] { return told == 1; }));
+  EXPECT_TRUE(test::eventually([&] { return told_ == 1; }));
   EXPECT_EQ(resumed_, 0);
   parked_.job_ended("a");
   EXPECT_EQ(resumed_, 1);
-  EXPECT_EQ(told, 1);
+  EXPECT_EQ(told_, 1);
 }
 
 TEST_F(WatchedTest, WhoeverHasNothingToDoAtTheEndGoesOn) {
@@ -100,12 +100,11 @@ TEST_F(WatchedTest, WhoeverHasNothingToDoAtTheEndGoesOn) {
 }
 
 TEST_F(WatchedTest, MoreThatIsSentIsNoEnd) {
-  std::atomic<int> told = 0;
-  park_watched([&] { ++told; });
+  park_watched([this] { ++told_; });
   ASSERT_EQ(::send(theirs_.number(), "more", 4, 0), 4);
   park("b", std::chrono::milliseconds(20));
   EXPECT_TRUE(test::eventually([&] { return resumed_ == 1; }));
-  EXPECT_EQ(told, 0);
+  EXPECT_EQ(told_, 0);
 }
 
 TEST_F(ParkedTest, ClosingResumesAll) {
