@@ -1,4 +1,5 @@
 // What becomes of files that a disk has spoilt.
+#include <algorithm>
 #include <string>
 
 #include "tests/api/problems.h"
@@ -37,7 +38,9 @@ TEST_F(Damage, AMeshIsNotServedAndMadeAgain) {
   EXPECT_FALSE(refused.header("retry-after").empty());
   ASSERT_TRUE(eventually([&] { return daemon().get(mesh(job).href).status == 200; }));
   EXPECT_EQ(mesh_of(job), bytes);
-  EXPECT_EQ(daemon().client().jobs().jobs.size(), 2U) << "it was made again once";
+  // Whoever asks just as it is there again gets a job that takes it over.
+  const auto jobs = daemon().client().jobs().jobs;
+  EXPECT_EQ(std::ranges::count(jobs, false, &Job::reused), 2) << "it was made again once";
   EXPECT_EQ(this->job(job.id), job);
 }
 
