@@ -15,6 +15,9 @@ namespace isomesh {
 
 using Json = nlohmann::ordered_json;
 
+// The word for all labels that a volume has.
+inline constexpr const char* kAllLabels = "all";
+
 void visit(Is<Preset> auto& self, auto&& field) {
   field("name", self.name);
   field("iso", self.iso);
@@ -71,7 +74,7 @@ void visit(Is<Volume> auto& self, auto&& field) {
   field("presets", self.presets);
   field("ignored", self.ignored);
   field("notes", self.notes);
-  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? self.dicom.has_value() : true) {
+  if (is_told(self, self.dicom.has_value())) {
     field("dicom", self.dicom);
   }
 }
@@ -129,6 +132,30 @@ void visit(Is<MeshSummary::Displacement> auto& self, auto&& field) {
   field("max", self.max);
 }
 
+void visit(Is<LabelFile> auto& self, auto&& field) {
+  field("bytes", self.bytes);
+  field("sha256", self.sha256);
+  field("offset", self.offset);
+  field("href", self.href);
+}
+
+void visit(Is<LabelSummary> auto& self, auto&& field) {
+  field("label", self.label);
+  field("name", self.name);
+  field("color", self.color);
+  field("voxels", self.voxels);
+  field("voxels_mm3", self.voxels_mm3);
+  field("triangles", self.triangles);
+  field("vertices", self.vertices);
+  field("closed", self.closed);
+  field("manifold", self.manifold);
+  field("oriented", self.oriented);
+  field("components", self.components);
+  field("area_mm2", self.area_mm2);
+  field("volume_mm3", self.volume_mm3);
+  field("files", self.files);
+}
+
 void visit(Is<MeshSummary> auto& self, auto&& field) {
   field("triangles", self.triangles);
   field("vertices", self.vertices);
@@ -143,6 +170,9 @@ void visit(Is<MeshSummary> auto& self, auto&& field) {
   field("displacement_mm", self.displacement_mm);
   field("bounds", self.bounds);
   field("files", self.files);
+  if (is_told(self, !self.labels.empty())) {
+    field("labels", self.labels);
+  }
 }
 
 void visit(Is<FieldError> auto& self, auto&& field) {
@@ -161,18 +191,16 @@ void visit(Is<Problem> auto& self, auto&& field) {
   field("title", self.title);
   field("status", self.status);
   field("detail", self.detail);
-  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? !self.instance.empty() : true) {
+  if (is_told(self, !self.instance.empty())) {
     field("instance", self.instance);
   }
-  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? !self.errors.empty() : true) {
+  if (is_told(self, !self.errors.empty())) {
     field("errors", self.errors);
   }
-  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? !self.remedy.overridable.empty()
-                                                               : true) {
+  if (is_told(self, !self.remedy.overridable.empty())) {
     field("overridable", self.remedy.overridable);
   }
-  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? !self.remedy.choices.empty()
-                                                               : true) {
+  if (is_told(self, !self.remedy.choices.empty())) {
     field("choices", self.remedy.choices);
   }
 }
@@ -220,9 +248,16 @@ void visit(Is<Estimate::Queue> auto& self, auto&& field) {
   field("running", self.running);
 }
 
+void visit(Is<Estimate::Label> auto& self, auto&& field) {
+  field("label", self.label);
+  field("triangles", self.triangles);
+}
+
 void visit(Is<Estimate> auto& self, auto&& field) {
   field("volume", self.volume);
-  field("iso", self.iso);
+  if (is_told(self, self.iso.has_value())) {
+    field("iso", self.iso);
+  }
   field("scheme", self.scheme);
   field("triangles", self.triangles);
   field("vertices", self.vertices);
@@ -231,6 +266,9 @@ void visit(Is<Estimate> auto& self, auto&& field) {
   field("fits", self.fits);
   field("milliseconds", self.milliseconds);
   field("queue", self.queue);
+  if (is_told(self, !self.labels.empty())) {
+    field("labels", self.labels);
+  }
 }
 
 }  // namespace isomesh

@@ -1,5 +1,6 @@
 #include "proto/json.h"
 
+#include <charconv>
 #include <type_traits>
 
 #include <nlohmann/json.hpp>
@@ -13,6 +14,8 @@ template <class T>
 constexpr bool kIsPerFormat = false;
 template <class T>
 constexpr bool kIsPerFormat<std::map<MeshFormat, T>> = true;
+template <class T>
+constexpr bool kIsPerLabel = std::is_same_v<T, LabelTexts> || std::is_same_v<T, LabelValues>;
 
 // --- Writing -------------------------------------------------------------------------------------
 
@@ -50,6 +53,12 @@ Json write(const T& value) {
     Json object = Json::object();
     for (const auto& [format, file] : value) object[std::string(to_string(format))] = write(file);
     return object;
+  } else if constexpr (kIsPerLabel<T>) {
+    Json object = Json::object();
+    for (const auto& [label, text] : value) object[std::to_string(label)] = write(text);
+    return object;
+  } else if constexpr (std::is_same_v<T, LabelChoice>) {
+    return value.is_all() ? Json(kAllLabels) : write(value.values);
   } else if constexpr (std::is_arithmetic_v<T> || std::is_same_v<T, std::string>) {
     return Json(value);
   } else if constexpr (requires { value.begin(); }) {
@@ -89,6 +98,17 @@ void check_kind(bool right) {
   if (!right) throw Error(ErrorCode::kInternal, "the server's answer has a member of a wrong kind");
 }
 
+bool may_be_absent(const char* /*name*/) { return false; }
+bool may_be_absent(const Parameter& parameter) { return parameter.may_be_absent; }
+
+// What a label is called as a member's name.
+std::int64_t label_from(const std::string& text) {
+  std::int64_t label = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), label);
+  check_kind(error == std::errc{} && end == text.data() + text.size());
+  return label;
+}
+
 template <class T>
 void read_field(const Json& json, std::optional<T>& value) {
   if (json.is_null() || (json.is_string() && std::is_same_v<T, double>)) {
@@ -116,6 +136,11 @@ void read(const Json& json, T& value) {
     for (const auto& [name, file] : json.items()) {
       if (const auto format = from_string<MeshFormat>(name)) read(file, value[*format]);
     }
+  } else if constexpr (kIsPerLabel<T>) {
+    check_kind(json.is_object());
+    for (const auto& [name, text] : json.items()) read(text, value[label_from(name)]);
+  } else if constexpr (std::is_same_v<T, LabelChoice>) {
+    if (json != kAllLabels) read(json, value.values);
   } else if constexpr (std::is_arithmetic_v<T> || std::is_same_v<T, std::string>) {
     value = json.get<T>();
   } else if constexpr (requires { value.emplace_back(); }) {
@@ -126,17 +151,21 @@ void read(const Json& json, T& value) {
     for (std::size_t i = 0; i < value.size(); ++i) read(json.at(i), value[i]);
   } else {
     check_kind(json.is_object());
-    visit(value, [&](const char* name, auto& member) {
-      // RFC 9457 requires no member of a problem; lists of a volume came after the first version.
+    visit(value, [&](const auto& name, auto& member) {
+      // RFC 9457 requires no member of a problem; lists of other things came after the first
+      // version, or are left out where they are empty.
       using Member = std::remove_reference_t<decltype(member)>;
+      constexpr bool kMayHaveNoList = std::is_same_v<T, Volume> || std::is_same_v<T, MeshSummary> ||
+                                      std::is_same_v<T, Estimate>;
       constexpr bool kMayBeMissing =
           std::is_same_v<T, Problem> || kIsOptional<Member> ||
-          (std::is_same_v<T, Volume> && !std::is_same_v<Member, std::string> &&
+          (kMayHaveNoList && !std::is_same_v<Member, std::string> &&
            requires { member.emplace_back(); });
-      if (const auto found = json.find(name); found != json.end()) {
+      const char* const key = name;
+      if (const auto found = json.find(key); found != json.end()) {
         read_field(*found, member);
-      } else if (!kMayBeMissing) {
-        throw Error(ErrorCode::kInternal, std::string("the server's answer lacks ") + name);
+      } else if (!kMayBeMissing && !may_be_absent(name)) {
+        throw Error(ErrorCode::kInternal, std::string("the server's answer lacks ") + key);
       }
     });
   }

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <concepts>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
@@ -45,12 +46,21 @@ struct Parameter {
   std::array<const char*, 4> values = {};  // what the values of an enumeration mean, in their order
   std::array<std::optional<SmoothingCase>, 2> cases = {};  // none: for every kind of smoothing
   bool is_required = false;
+  const char* unless = nullptr;  // of one that is required: which other one may stand in its place
+  const char* needs = nullptr;   // the one without which it means nothing
+  bool may_be_absent = false;    // from the parameters of a job that it does not concern
   bool in_query = true;
   const char* query = nullptr;   // what a query calls it, unless `name`
   const char* option = nullptr;  // what the command calls it, unless as a query, without the unit
 
   operator const char*() const { return name; }
 };
+
+// Whether a member is visited that is left out of what is written when there is nothing to say.
+template <class T>
+bool is_told(T& /*owner*/, bool has_something) {
+  return has_something || !std::is_const_v<T>;
+}
 
 void visit(Is<ComponentFilter> auto& self, auto&& parameter) {
   constexpr double kMost = std::numeric_limits<std::uint32_t>::max();
@@ -90,13 +100,76 @@ void visit(Is<DracoParameters> auto& self, auto&& parameter) {
 }
 
 void visit(Is<MeshParameters> auto& self, auto&& parameter) {
-  parameter(Parameter{.name = "iso",
-                      .title = "Iso-value",
-                      .help = "The iso-value, in the volume's units, or Otsu's threshold.",
-                      .more = "A sample is inside when its value is >= iso.",
-                      .when_empty = "otsu",
-                      .is_required = true},
-            self.iso);
+  const bool by_iso = is_told(self, !self.labels);
+  const bool by_labels = is_told(self, self.labels.has_value());
+  if (by_iso) {
+    parameter(Parameter{.name = "iso",
+                        .title = "Iso-value",
+                        .help = "The iso-value, in the volume's units, or Otsu's threshold.",
+                        .more = "A sample is inside when its value is >= iso.",
+                        .when_empty = "otsu",
+                        .is_required = true,
+                        .unless = "labels",
+                        .may_be_absent = true},
+              self.iso);
+  }
+  if (by_labels) {
+    constexpr double kLeast = std::numeric_limits<std::int32_t>::min();
+    constexpr double kMost = std::numeric_limits<std::uint32_t>::max();
+    parameter(
+        Parameter{.name = "labels",
+                  .title = "Labels",
+                  .help = "In place of an iso-value: the labels of a segmentation, each with a "
+                          "surface of its own, or all of them.",
+                  .more = "Neighbours share the wall between them. All other values, and those "
+                          "that are not listed, are background. Vertices lie half-way between two "
+                          "samples; passes are 10 unless the request says, and no vertex moves "
+                          "farther than half the smallest spacing.",
+                  .minimum = kLeast,
+                  .maximum = kMost,
+                  .may_be_absent = true},
+        self.labels);
+    parameter(Parameter{.name = "background",
+                        .title = "Background",
+                        .help = "The value of samples without a label.",
+                        .minimum = kLeast,
+                        .maximum = kMost,
+                        .needs = "labels",
+                        .may_be_absent = true},
+              self.background);
+    parameter(Parameter{.name = "label_names",
+                        .title = "Names of labels",
+                        .help = "What labels are called, by their values.",
+                        .more = "Those that are left out are called as the volume's file says.",
+                        .needs = "labels",
+                        .may_be_absent = true,
+                        .in_query = false,
+                        .option = "label-name"},
+              self.label_names);
+    parameter(Parameter{.name = "label_colors",
+                        .title = "Colours of labels",
+                        .help = "The colours of labels, as #rrggbb, by their values.",
+                        .more = "Those that are left out have the colour that the volume's file "
+                                "says, or one of a fixed series.",
+                        .needs = "labels",
+                        .may_be_absent = true,
+                        .in_query = false,
+                        .option = "label-color"},
+              self.label_colors);
+    parameter(Parameter{.name = "label_values",
+                        .title = "Values of labels",
+                        .help = "Labels that are made of the samples of several values, by their "
+                                "own.",
+                        .more = "A value may belong to several labels, which then overlap there. "
+                                "Those that are left out are as the volume's file says.",
+                        .minimum = kLeast,
+                        .maximum = kMost,
+                        .needs = "labels",
+                        .may_be_absent = true,
+                        .in_query = false,
+                        .option = "label-values"},
+              self.label_values);
+  }
   parameter(Parameter{.name = "scheme",
                       .title = "Tetrahedra per cell",
                       .help = "Tetrahedra per cell.",
@@ -104,13 +177,16 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                       .values = {"Fewer triangles; every second cell is mirrored",
                                  "The same split in every cell"}},
             self.scheme);
-  parameter(Parameter{.name = "interpolation",
-                      .title = "Vertices on edges",
-                      .help = "Where a vertex lies on its edge.",
-                      .more = "`midpoint` puts all half-way.",
-                      .values = {"Where the iso-value lies between two samples",
-                                 "Half-way between two samples"}},
-            self.interpolation);
+  if (by_iso) {
+    parameter(Parameter{.name = "interpolation",
+                        .title = "Vertices on edges",
+                        .help = "Where a vertex lies on its edge.",
+                        .more = "`midpoint` puts all half-way.",
+                        .values = {"Where the iso-value lies between two samples",
+                                   "Half-way between two samples"},
+                        .may_be_absent = true},
+              self.interpolation);
+  }
   parameter(Parameter{.name = "passes",
                       .title = "Passes",
                       .help = "How often the surface is smoothed.",
@@ -157,7 +233,8 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                       .title = "Move at most",
                       .help = "Smoothing moves no vertex farther than this from where it was "
                               "extracted.",
-                      .more = "Millimetres; null: as far as it goes.",
+                      .more = "Millimetres; null: as far as it goes, and of labels half the smallest "
+                              "spacing.",
                       .unit = "mm",
                       .minimum = 0},
             self.max_displacement_mm);
@@ -175,7 +252,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                         "smoothing.",
                 .more = "With both members, the largest of those that are large enough. Parts "
                         "are compared by their triangles, equal ones by their first vertex. "
-                        "Without members all are kept."},
+                        "Without members all are kept. Not for labels."},
       self.components);
   parameter(Parameter{.name = "formats",
                       .title = "Files to make",
@@ -207,10 +284,10 @@ void visit(Is<JobParameters> auto& self, auto&& parameter) {
                       .values = {"Before all others", "After all that are stat",
                                  "When nothing else waits"}},
             self.priority);
-  // A job that asked for no call does not say so.
-  if (std::is_const_v<std::remove_reference_t<decltype(self)>> ? self.callback.has_value() : true) {
+  if (is_told(self, self.callback.has_value())) {
     parameter(Parameter{.name = "callback",
                         .help = "Have the server tell this address when the job has ended.",
+                        .may_be_absent = true,
                         .in_query = false},
               self.callback);
   }

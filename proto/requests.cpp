@@ -14,24 +14,30 @@ namespace {
 
 // What a query calls a parameter, where it stands in a body and how its text is read.
 struct QueryName {
+  enum class Kind { kValue, kText, kTexts, kLabels };
+
   std::string path;
-  bool is_text = false;
-  bool is_list = false;
+  Kind kind = Kind::kValue;
 };
+
+template <class Member>
+constexpr QueryName::Kind kind_of() {
+  if (std::is_same_v<Member, std::string>) return QueryName::Kind::kText;
+  if (std::is_same_v<Member, std::vector<MeshFormat>>) return QueryName::Kind::kTexts;
+  if (std::is_same_v<Member, std::optional<LabelChoice>>) return QueryName::Kind::kLabels;
+  return QueryName::Kind::kValue;
+}
 
 // The table's parameters by their names in a query.
 const std::map<std::string, QueryName>& query_names() {
   static const std::map<std::string, QueryName> names = [] {
     std::map<std::string, QueryName> by_name;
-    const JobParameters parameters;
+    JobParameters parameters;  // not constant, for those members that may be absent
     visit_leaves(parameters,
                  [&](const std::string& path, const Parameter& parameter, const auto& member) {
                    using Member = std::remove_cvref_t<decltype(member)>;
                    if (!parameter.in_query) return;
-                   by_name[query_name_of(parameter)] = {
-                       .path = path,
-                       .is_text = std::is_same_v<Member, std::string>,
-                       .is_list = std::is_same_v<Member, std::vector<MeshFormat>>};
+                   by_name[query_name_of(parameter)] = {.path = path, .kind = kind_of<Member>()};
                  });
     return by_name;
   }();
@@ -88,6 +94,7 @@ class RequestReader {
     return as_in_query_ ? spelled_in_query(field) : field;
   }
 
+  static constexpr std::size_t kMostLabels = 65535;
   static constexpr std::size_t kMostErrors = 20;
   static constexpr std::size_t kLongestName = 64;
 
@@ -191,6 +198,90 @@ class RequestReader {
     }
   }
 
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::int64_t& value) {
+    read_whole(json, path, parameter, value);
+  }
+
+  // Ascending, each once.
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::vector<std::int64_t>& values) {
+    if (!json.is_array() || json.empty() || json.size() > kMostLabels) {
+      return add(path, "must be a list of 1 to " + std::to_string(kMostLabels) + " whole numbers");
+    }
+    for (const Json& element : json) {
+      const std::size_t before = errors_.size();
+      read_member(element, path, parameter, values.emplace_back());
+      if (errors_.size() > before) return;
+    }
+    std::ranges::sort(values);
+    const auto repeated = std::ranges::unique(values);
+    values.erase(repeated.begin(), repeated.end());
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::optional<LabelChoice>& value) {
+    value.emplace();
+    if (json == kAllLabels) return;
+    if (!json.is_array()) {
+      return add(path, "must be \"all\" or a list of labels, which are whole numbers");
+    }
+    read_member(json, path, parameter, value->values);
+  }
+
+  // By the labels' own values.
+  template <class T>
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::map<std::int64_t, T>& value) {
+    if (!json.is_object() || json.size() > kMostLabels) {
+      return add(path, "must be an object with at most " + std::to_string(kMostLabels) +
+                           " members, which are named by labels");
+    }
+    for (const auto& [name, element] : json.items()) {
+      const Json label = Json::parse(name, nullptr, false);
+      std::int64_t key = 0;
+      const std::size_t before = errors_.size();
+      const std::string place = path + '.' + name;
+      read_member(label, place, label_range(), key);
+      if (errors_.size() == before) read_of_label(element, place, parameter, value[key]);
+      if (errors_.size() > before) return;
+    }
+  }
+
+  void read_of_label(const Json& json, const std::string& path, const Parameter& parameter,
+                     std::vector<std::int64_t>& values) {
+    read_member(json, path, parameter, values);
+  }
+
+  void read_of_label(const Json& json, const std::string& path, const Parameter& parameter,
+                     std::string& value) {
+    constexpr std::size_t kLongest = 255;
+    read_member(json, path, parameter, value);
+    if (std::string_view(parameter.name) == "label_colors") {
+      if (!is_color(value)) add(path, "must be a colour such as \"#d8654f\"");
+    } else if (trimmed(value).empty() || value.size() > kLongest || has_control_characters(value)) {
+      add(path, "must be a text of 1 to 255 bytes on one line");
+    }
+  }
+
+  static bool is_color(std::string_view text) {
+    return text.size() == 7 && text[0] == '#' &&
+           text.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string_view::npos;
+  }
+
+  // What a label may be, as the table has it.
+  static const Parameter& label_range() {
+    static const Parameter range = [] {
+      MeshParameters parameters;  // not constant, for those members that may be absent
+      Parameter found;
+      visit(parameters, [&](const Parameter& parameter, const auto& /*member*/) {
+        if (std::string_view(parameter.name) == "background") found = parameter;
+      });
+      return found;
+    }();
+    return range;
+  }
+
   void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
                    ParameterGroup auto& value) {
     if (!json.is_object()) return add(path, "must be an object");
@@ -258,17 +349,50 @@ void check_case(const std::string& path, const Parameter& parameter, Smoothing s
   }
 }
 
+// What is for iso-values alone, or for labels alone.
+void check_labels(const Json& json, const JobParameters& parameters, RequestReader& reader) {
+  const auto refuse_if = [&](bool is_wrong, const char* name, const std::string& message) {
+    if (is_wrong) reader.add(name, message);
+  };
+  if (!parameters.labels) {
+    const bool zips = std::ranges::find(parameters.formats, MeshFormat::kZip) != parameters.formats.end();
+    return refuse_if(zips, "formats", "\"zip\" holds a file of each label, so it needs labels");
+  }
+  refuse_if(json.contains("iso"), "iso", "cannot stand beside labels");
+  refuse_if(json.contains("interpolation") && parameters.interpolation == Interpolation::kLinear,
+            "interpolation", "must be \"midpoint\" for labels, which have no values between them");
+  refuse_if(!parameters.components.keeps_all(), "components",
+            "cannot stand beside labels: a part that is left out would leave a hole in its "
+            "neighbours");
+  refuse_if(std::ranges::binary_search(parameters.labels->values, parameters.background), "labels",
+            "must not name the background, " + std::to_string(parameters.background));
+}
+
+// The members that such a job has another default for than others.
+JobParameters defaults_of(const Json& json) {
+  return json.contains("labels") ? label_parameters({}) : JobParameters{};
+}
+
 JobParameters read_parameters(const Json& json, bool with_volume, RequestReader& reader) {
-  JobParameters parameters;
+  JobParameters parameters = defaults_of(json);
   reader.read_object(json, parameters, "");
   visit_leaves(
       parameters, [&](const std::string& path, const Parameter& parameter, const auto& member) {
-        const bool is_expected = parameter.is_required && (with_volume || path != "volume");
+        const bool is_expected = parameter.is_required && (with_volume || path != "volume") &&
+                                 !(parameter.unless != nullptr && json.contains(parameter.unless));
         if (is_expected && !json.contains(pointer_to(path))) reader.add(path, "is required");
         if constexpr (std::is_same_v<decltype(member), const std::optional<double>&>) {
           check_case(path, parameter, parameters.smoothing, member, reader);
         }
       });
+  JobParameters all;  // not constant, for those members that may be absent
+  visit(all, [&](const Parameter& parameter, const auto& /*member*/) {
+    if (parameter.needs == nullptr || json.contains(parameter.needs)) return;
+    if (json.contains(parameter.name)) {
+      reader.add(parameter.name, std::string("is only for jobs with ") + parameter.needs);
+    }
+  });
+  check_labels(json, parameters, reader);
   reader.throw_if_any();
   if (!parameters.lambda) parameters.lambda = default_lambda(parameters.smoothing);
   return parameters;
@@ -286,7 +410,21 @@ bool is_for_bodies(const std::string& name) {
 
 // A query's text as the JSON value of a body.
 Json value_of(const std::string& text, const QueryName& name) {
-  return name.is_text ? Json(text) : name.is_list ? list_of(text) : value_of(text);
+  switch (name.kind) {
+    case QueryName::Kind::kText:
+      return text;
+    case QueryName::Kind::kTexts:
+      return list_of(text);
+    case QueryName::Kind::kLabels: {
+      if (text == kAllLabels) return text;
+      Json labels = list_of(text);
+      for (Json& label : labels) label = value_of(label.get<std::string>());
+      return labels;
+    }
+    case QueryName::Kind::kValue:
+      break;
+  }
+  return value_of(text);
 }
 
 std::string text_of(const Json& value) {
@@ -359,7 +497,9 @@ QueryParameters to_query(const JobParameters& parameters) {
   const Json json = Json::parse(to_json(parameters));
   QueryParameters query;
   for (const auto& [name, place] : query_names()) {
-    const Json& value = json.at(pointer_to(place.path));
+    const Json::json_pointer pointer = pointer_to(place.path);
+    if (!json.contains(pointer)) continue;
+    const Json& value = json.at(pointer);
     if (!value.is_null()) query.emplace_back(name, text_of(value));
   }
   return query;

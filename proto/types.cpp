@@ -1,5 +1,7 @@
 #include "proto/types.h"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "proto/samples.h"
@@ -43,7 +45,7 @@ struct Names<MeshFormat> {
   static constexpr std::array kTable = {
       std::pair{MeshFormat::kDrc, "drc"}, std::pair{MeshFormat::kGlb, "glb"},
       std::pair{MeshFormat::kStl, "stl"}, std::pair{MeshFormat::kPly, "ply"},
-      std::pair{MeshFormat::kObj, "obj"}};
+      std::pair{MeshFormat::kObj, "obj"}, std::pair{MeshFormat::kZip, "zip"}};
 };
 
 template <>
@@ -100,8 +102,51 @@ bool is_final(JobState state) {
          state == JobState::kCancelled;
 }
 
-std::string mesh_path(const std::string& job, MeshFormat format) {
-  return "/v1/jobs/" + job + "/mesh." + std::string(to_string(format));
+JobParameters label_parameters(LabelChoice labels) {
+  constexpr int kPasses = 10;
+  JobParameters parameters;
+  parameters.labels = std::move(labels);
+  parameters.interpolation = Interpolation::kMidpoint;
+  parameters.passes = kPasses;
+  return parameters;
+}
+
+bool holds_all_labels(MeshFormat format) {
+  switch (format) {
+    case MeshFormat::kGlb:
+    case MeshFormat::kPly:
+    case MeshFormat::kObj:
+      return true;
+    case MeshFormat::kDrc:
+    case MeshFormat::kStl:
+    case MeshFormat::kZip:
+      break;
+  }
+  return false;
+}
+
+std::vector<MeshFormat> files_of(const MeshParameters& parameters) {
+  if (!parameters.labels) return parameters.formats;
+  std::vector<MeshFormat> files;
+  std::ranges::copy_if(parameters.formats, std::back_inserter(files), holds_all_labels);
+  if (!zipped_formats(parameters).empty()) files.push_back(MeshFormat::kZip);
+  return files;
+}
+
+std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters) {
+  std::vector<MeshFormat> zipped;
+  for (const MeshFormat format : parameters.formats) {
+    if (format != MeshFormat::kGlb && format != MeshFormat::kZip) zipped.push_back(format);
+  }
+  const bool is_asked = std::ranges::find(parameters.formats, MeshFormat::kZip) != parameters.formats.end();
+  if (zipped.empty() && is_asked) zipped.push_back(MeshFormat::kStl);
+  return zipped;
+}
+
+std::string mesh_path(const std::string& job, MeshFormat format,
+                      std::optional<std::int64_t> label) {
+  return "/v1/jobs/" + job + "/mesh." + std::string(to_string(format)) +
+         (label ? "?label=" + std::to_string(*label) : "");
 }
 
 std::string_view to_string(SampleType value) { return name_of(value); }

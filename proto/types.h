@@ -139,7 +139,8 @@ struct UploadedVolume {
 enum class Scheme { kFive = 5, kSix = 6 };  // tetrahedra per cell
 enum class Interpolation { kLinear, kMidpoint };
 enum class Smoothing { kLaplacian, kTaubin };
-enum class MeshFormat { kDrc, kGlb, kStl, kPly, kObj };
+// kZip: one file for each label, in the other formats that are asked for, but glb; else in STL.
+enum class MeshFormat { kDrc, kGlb, kStl, kPly, kObj, kZip };
 enum class Priority { kStat, kRoutine, kBulk };  // claimed in this order
 
 struct DracoParameters {
@@ -158,6 +159,17 @@ struct ComponentFilter {
   bool keeps_all() const { return !keep && !min_triangles; }
   bool operator==(const ComponentFilter&) const = default;
 };
+
+// Which labels of a segmentation a job separates.
+struct LabelChoice {
+  std::vector<std::int64_t> values;  // empty: all that the volume has
+
+  bool is_all() const { return values.empty(); }
+  bool operator==(const LabelChoice&) const = default;
+};
+
+using LabelTexts = std::map<std::int64_t, std::string>;
+using LabelValues = std::map<std::int64_t, std::vector<std::int64_t>>;
 
 // Whom to tell that a job has ended.
 struct Callback {
@@ -182,6 +194,13 @@ struct MeshParameters {
   std::vector<MeshFormat> formats = {MeshFormat::kDrc};
   DracoParameters draco;
   bool normals = false;  // in glb
+  // Of a job by labels, which has no iso-value and no interpolation: its vertices lie half-way.
+  // label_parameters() has its defaults.
+  std::optional<LabelChoice> labels = {};
+  std::int64_t background = 0;  // the value of what is no label
+  LabelTexts label_names = {};
+  LabelTexts label_colors = {};   // "#rrggbb"
+  LabelValues label_values = {};  // of labels that are more than the samples of their own value
 
   bool operator==(const MeshParameters&) const = default;
 };
@@ -195,6 +214,20 @@ struct JobParameters : MeshParameters {
   bool operator==(const JobParameters&) const = default;
 };
 
+// A job by labels with the defaults that such a job has; those of a job at an iso-value are the
+// structure's own.
+JobParameters label_parameters(LabelChoice labels);
+
+// Whether one file of that format holds all labels.
+bool holds_all_labels(MeshFormat format);
+
+// The files that a job makes, in order: its formats; of a job by labels those that hold all labels,
+// and a ZIP of the others.
+std::vector<MeshFormat> files_of(const MeshParameters& parameters);
+
+// The formats of the files in a ZIP of labels, in order.
+std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters);
+
 // The share of the way to the mean of its neighbours that a vertex goes, unless the client says.
 double default_lambda(Smoothing smoothing);
 
@@ -207,8 +240,9 @@ enum class WaitingFor { kDisk };  // room for its files
 // True for the three states that a job does not leave again.
 bool is_final(JobState state);
 
-// The path of a job's mesh on its server.
-std::string mesh_path(const std::string& job, MeshFormat format);
+// The path of a job's mesh, or of one of its labels, on its server.
+std::string mesh_path(const std::string& job, MeshFormat format,
+                      std::optional<std::int64_t> label = std::nullopt);
 
 // Wall-clock milliseconds of each stage; a stage that has not run yet is 0.
 struct Timing {
@@ -228,6 +262,37 @@ struct MeshFile {
   std::string href;    // path on the same server
 
   bool operator==(const MeshFile&) const = default;
+};
+
+// One label's file, which is a part of the ZIP.
+struct LabelFile {
+  std::uint64_t bytes = 0;
+  std::string sha256;        // hex
+  std::uint64_t offset = 0;  // of its first byte in the ZIP
+  std::string href;          // path on the same server
+
+  bool operator==(const LabelFile&) const = default;
+};
+
+// One label of a finished job: the samples that have it, and its own surface after smoothing. What
+// two labels share is in the surfaces of both.
+struct LabelSummary {
+  std::int64_t label = 0;
+  std::optional<std::string> name = {};
+  std::optional<std::string> color = {};  // "#rrggbb"
+  std::uint64_t voxels = 0;
+  double voxels_mm3 = 0;
+  std::uint64_t triangles = 0;
+  std::uint64_t vertices = 0;
+  bool closed = false;
+  bool manifold = false;
+  bool oriented = false;
+  std::uint64_t components = 0;
+  double area_mm2 = 0;
+  double volume_mm3 = 0;  // that it encloses
+  std::map<MeshFormat, LabelFile> files = {};
+
+  bool operator==(const LabelSummary&) const = default;
 };
 
 // How a quantity is spread over the triangles of a mesh. All zero when there are none.
@@ -262,7 +327,9 @@ struct MeshQuality {
 };
 
 // What a finished job says about its mesh. Lengths in millimetres, after smoothing unless named
-// otherwise.
+// otherwise. Of a job by labels: triangles, vertices and areas are those of the walls, each once;
+// volumes are those of all labels together; components and boundary edges are those of the labels'
+// own surfaces, and quality says what holds for every one of them.
 struct MeshSummary {
   struct Enclosed {
     double extracted = 0;
@@ -300,6 +367,7 @@ struct MeshSummary {
   Displacement displacement_mm;
   std::array<std::array<double, 3>, 2> bounds = {};  // smallest and largest corner; 0 when empty
   std::map<MeshFormat, MeshFile> files;
+  std::vector<LabelSummary> labels = {};  // ascending; of a job by labels
 
   bool operator==(const MeshSummary&) const = default;
 };
@@ -340,8 +408,16 @@ struct Estimate {
     bool operator==(const Queue&) const = default;
   };
 
+  // Of one label's own surface.
+  struct Label {
+    std::int64_t label = 0;
+    std::uint64_t triangles = 0;  // exact
+
+    bool operator==(const Label&) const = default;
+  };
+
   std::string volume;
-  double iso = 0;  // Otsu's threshold where that was asked for
+  std::optional<double> iso = {};  // Otsu's threshold where that was asked for; none by labels
   Scheme scheme = Scheme::kSix;
   std::uint64_t triangles = 0;  // exact, as `vertices`
   std::uint64_t vertices = 0;
@@ -350,6 +426,7 @@ struct Estimate {
   bool fits = false;                          // whether one job may take that much
   double milliseconds = 0;                    // of the run, without the time in the queue
   Queue queue;
+  std::vector<Label> labels = {};  // ascending; of a job by labels
 
   bool operator==(const Estimate&) const = default;
 };

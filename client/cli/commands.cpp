@@ -77,10 +77,12 @@ Volume upload(Client& client, const Options& options, ProgressBar& bar) {
   throw several_volumes(volumes);
 }
 
-void fetch(Client& client, const std::string& id, const Output& output, ProgressBar& bar) {
-  client.fetch(id, output.format, output.path, [&](std::uint64_t done, std::uint64_t total) {
-    bar.transfer("download", done, total);
-  });
+void fetch(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
+           std::optional<std::int64_t> label = std::nullopt) {
+  client.fetch(
+      id, output.format, output.path,
+      [&](std::uint64_t done, std::uint64_t total) { bar.transfer("download", done, total); },
+      label);
   bar.clear();
 }
 
@@ -231,7 +233,9 @@ int fetch(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
   ProgressBar bar;
   const Stopwatch downloading;
-  for (const Output& output : options.outputs) fetch(client, options.id, output, bar);
+  for (const Output& output : options.outputs) {
+    fetch(client, options.id, output, bar, options.label);
+  }
   const ClientTiming seen{.download = downloading.milliseconds()};
   const Job job = client.job(options.id);
   if (options.json) {

@@ -24,6 +24,7 @@ Examples:
   isomesh mesh head.nii.gz --iso 60 -o head.drc
   isomesh mesh ct.nrrd --iso otsu --passes 10 -o bone.glb -o bone.stl
   isomesh mesh ct.raw --dims 512,512,300 --type int16 --spacing 0.7,0.7,1 --iso 300 -o ct.stl
+  isomesh mesh organs.seg.nrrd --labels all -o body.glb -o organs.zip
   isomesh submit $(isomesh upload head.nii.gz) --iso 60 --format drc,stl
   isomesh --server https://meshes.example.org --json list
 
@@ -186,7 +187,8 @@ std::string values_and_default(const Parameter& parameter, const T& standard) {
   } else if constexpr (std::is_same_v<T, std::vector<MeshFormat>>) {
     return ", of " + listed(names_from<MeshFormat>()) +
            " (default: " + std::string(to_string(standard.front())) + ")";
-  } else if constexpr (std::is_same_v<T, int> || std::is_same_v<T, double>) {
+  } else if constexpr (std::is_same_v<T, int> || std::is_same_v<T, std::int64_t> ||
+                       std::is_same_v<T, double>) {
     return " (default: " + number_text(standard) + ")";
   } else {
     std::string defaults;
@@ -275,6 +277,53 @@ class ParameterOptions {
   }
 
   CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, std::optional<LabelChoice>& value) {
+    return isomesh::cli::add(app_, name, "all|N,..", help, [&value, name](const std::string& text) {
+      value.emplace();
+      if (text != "all") value->values = labels_from(name, text);
+    });
+  }
+
+  // `--label-name 3=Liver`, once for each label.
+  template <class T>
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, std::map<std::int64_t, T>& value) {
+    constexpr bool kIsList = std::is_same_v<T, std::vector<std::int64_t>>;
+    return app_
+        .add_option_function<std::vector<std::string>>(
+            name,
+            [&value, name](const std::vector<std::string>& texts) {
+              for (const std::string& text : texts) {
+                const std::size_t sign = text.find('=');
+                const auto label = number_from<std::int64_t>(std::string_view(text).substr(0, sign));
+                if (sign == std::string::npos || !label) {
+                  refuse(name, "\"" + text + "\" must begin with a label and =");
+                }
+                const std::string own = text.substr(sign + 1);
+                if constexpr (kIsList) {
+                  value[*label] = labels_from(name, own);
+                } else {
+                  value[*label] = own;
+                }
+              }
+            },
+            help + ". May be repeated")
+        ->type_name(kIsList ? "LABEL=N,.." : "LABEL=TEXT")
+        ->expected(1)
+        ->take_all();
+  }
+
+  static std::vector<std::int64_t> labels_from(const std::string& name, const std::string& text) {
+    std::vector<std::int64_t> labels;
+    for (const std::string_view each : split(text, ',')) {
+      const auto label = number_from<std::int64_t>(each);
+      if (!label) refuse(name, "must be whole numbers separated by commas");
+      labels.push_back(*label);
+    }
+    return labels;
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
                         const std::string& help, std::optional<Callback>& value) {
     return isomesh::cli::add(app_, name, "URL", help,
                              [&value](const std::string& text) { value = Callback{text}; });
@@ -286,8 +335,24 @@ class ParameterOptions {
 // The formats are given otherwise where the mesh is written to files.
 enum class Formats { kAsOption, kByFiles };
 
+// What is required, and what needs or excludes what.
+void relate(const Parameter& parameter, const std::map<std::string, CLI::Option*>& options) {
+  CLI::Option* const option = options.at(parameter.name);
+  if (parameter.needs != nullptr) option->needs(options.at(parameter.needs));
+  if (!parameter.is_required) {
+    option->group("Job");
+  } else if (parameter.unless == nullptr) {
+    option->required();
+  } else {
+    CLI::Option* const other = options.at(parameter.unless);
+    option->excludes(other);
+  }
+}
+
 void add_parameters(CLI::App& app, JobParameters& parameters, Formats formats) {
-  ParameterOptions options(app);
+  ParameterOptions all(app);
+  std::map<std::string, CLI::Option*> options;  // by the parameters' names
+  std::vector<Parameter> added;
   visit_leaves(parameters,
                [&](const std::string& /*path*/, const Parameter& parameter, auto& member) {
                  using Member = std::remove_reference_t<decltype(member)>;
@@ -295,14 +360,19 @@ void add_parameters(CLI::App& app, JobParameters& parameters, Formats formats) {
                  if (is_formats && formats == Formats::kByFiles) return;
                  // The volume is the command's file or its first argument.
                  if constexpr (!std::is_same_v<Member, std::string>) {
-                   CLI::Option* option = options.add(parameter, member);
-                   if (parameter.is_required) {
-                     option->required();
-                   } else {
-                     option->group("Job");
-                   }
+                   options[parameter.name] = all.add(parameter, member);
+                   added.push_back(parameter);
                  }
                });
+  for (const Parameter& parameter : added) relate(parameter, options);
+  CLI::Option* const labels = options.at("labels");
+  options.at("interpolation")->excludes(labels);  // their vertices lie half-way
+  app.parse_complete_callback(
+      [&parameters, labels, iso = options.at("iso"), passes = options.at("passes")] {
+        if (labels->count() + iso->count() == 0) throw CLI::RequiredError("--iso or --labels");
+        const bool is_by_labels = labels->count() > 0;
+        if (is_by_labels && passes->count() == 0) parameters.passes = label_parameters({}).passes;
+      });
 }
 
 // ".drc, .glb or .stl": what a file's name may end in.
@@ -393,6 +463,8 @@ class Parser {
     CLI::App& fetch = command(Command::kFetch, "fetch", "Download the mesh of a finished job");
     add_id(fetch, options_, "JOB");
     add_outputs(fetch, options_);
+    add_number<std::int64_t>(fetch, "--label", "Of a job by labels: this label's own surface",
+                             [&](std::int64_t label) { options_.label = label; });
 
     add_id(command(Command::kCancel, "cancel", "Cancel a job"), options_, "JOB");
 
@@ -419,6 +491,7 @@ class Parser {
       const int status = app_.exit(error, out, err);
       throw EarlyExit(status == 0 ? 0 : kWrongUsage, status == 0 ? out.str() : err.str());
     }
+    if (options_.command == Command::kMesh) check_outputs();
     return std::move(options_);
   }
 
@@ -427,6 +500,23 @@ class Parser {
     CLI::App* app = app_.add_subcommand(name, help);
     app->callback([this, value] { options_.command = value; });
     return *app;
+  }
+
+  // Some files hold one label only, and others only labels.
+  void check_outputs() const {
+    const auto& labels = options_.parameters.labels;
+    for (const Output& output : options_.outputs) {
+      const std::string file = output.path.string();
+      if (!labels && output.format == MeshFormat::kZip) {
+        throw EarlyExit(kWrongUsage, "-o: " + file + " is for --labels, a file of each\n");
+      }
+      const bool holds_one = !holds_all_labels(output.format) && output.format != MeshFormat::kZip;
+      if (labels && holds_one && labels->values.size() != 1) {
+        throw EarlyExit(kWrongUsage, "-o: " + file +
+                                         " would hold one label; .glb, .ply and .obj hold all, "
+                                         ".zip a file of each\n");
+      }
+    }
   }
 
   Options options_;

@@ -49,6 +49,7 @@ struct Options {
   std::string cursor;                        // list
   bool volumes = false;                      // list
   std::string name;                          // rename
+  std::optional<std::int64_t> label;         // fetch
 };
 
 // Ends the program before any command runs: help, the version, or wrong usage. `text` belongs on

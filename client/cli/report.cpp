@@ -32,7 +32,17 @@ std::string percent(double part, double whole) {
 }
 
 std::string iso_of(const JobParameters& parameters) {
+  if (parameters.labels) return "labels";
   return parameters.iso ? human_number(*parameters.iso) : "otsu";
+}
+
+// What a job is asked to make a surface of.
+std::string subject_of(const JobParameters& parameters) {
+  const auto& labels = parameters.labels;
+  if (!labels) {
+    return "iso " + iso_of(parameters) + ", " + std::string(to_string(parameters.interpolation));
+  }
+  return labels->is_all() ? "all labels" : std::to_string(labels->values.size()) + " labels";
 }
 
 std::string extent(const MeshSummary& mesh, std::size_t axis) {
@@ -50,6 +60,21 @@ std::string topology_of(const MeshQuality& quality) {
 std::string size_of(const MeshFile& file) {
   const std::string exact = grouped(static_cast<std::int64_t>(file.bytes)) + " B";
   return file.bytes < 1000 ? exact : human_bytes(file.bytes) + " (" + exact + ")";
+}
+
+std::string labels_report(const std::vector<LabelSummary>& labels) {
+  Rows rows = {{"label", "name", "triangles", "mm³", "mm³ of voxels", "topology"}};
+  for (const LabelSummary& label : labels) {
+    std::string topology = label.closed ? "closed" : "open";
+    if (!label.manifold) topology += ", not manifold";
+    if (!label.oriented) topology += ", not oriented";
+    rows.push_back({std::to_string(label.label), label.name.value_or(""),
+                    grouped(static_cast<std::int64_t>(label.triangles)), fixed(label.volume_mm3, 1),
+                    fixed(label.voxels_mm3, 1), topology});
+  }
+  return in_columns({Align::kRight, Align::kLeft, Align::kRight, Align::kRight, Align::kRight,
+                     Align::kLeft},
+                    rows);
 }
 
 }  // namespace
@@ -101,7 +126,8 @@ std::string mesh_report(const MeshSummary& mesh) {
   for (const auto& [format, file] : mesh.files) {
     rows.push_back({"mesh." + std::string(to_string(format)), size_of(file)});
   }
-  return in_columns({Align::kLeft, Align::kLeft}, rows);
+  std::string text = in_columns({Align::kLeft, Align::kLeft}, rows);
+  return mesh.labels.empty() ? text : text + '\n' + labels_report(mesh.labels);
 }
 
 std::string volume_report(const Volume& volume) {
@@ -182,9 +208,8 @@ std::string job_report(const Job& job) {
         {"stage", std::string(to_string(job.stage)) + ", " + fixed(100 * job.progress, 0) + " %"});
   }
   rows.push_back({"volume", asked.volume});
-  rows.push_back({"parameters", "iso " + iso_of(asked) + ", scheme " +
+  rows.push_back({"parameters", subject_of(asked) + ", scheme " +
                                     std::to_string(static_cast<int>(asked.scheme)) + ", " +
-                                    std::string(to_string(asked.interpolation)) + ", " +
                                     std::to_string(asked.passes) + " passes of " +
                                     std::string(to_string(asked.smoothing)) +
                                     (asked.close ? ", closed" : "")});

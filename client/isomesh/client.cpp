@@ -173,7 +173,7 @@ std::string next_of(const std::string& page) {
   return next != json.end() && next->is_string() ? next->get<std::string>() : std::string();
 }
 
-const MeshFile& file_of(const Job& job, MeshFormat format) {
+MeshFile file_of(const Job& job, MeshFormat format, std::optional<std::int64_t> label) {
   if (job.state == JobState::kCancelled)
     throw Error(ErrorCode::kCancelled, "the job was cancelled");
   if (job.state == JobState::kFailed) {
@@ -183,20 +183,27 @@ const MeshFile& file_of(const Job& job, MeshFormat format) {
     throw Error(ErrorCode::kNotReady,
                 "the job is " + std::string(to_string(job.state)) + ", its mesh is not ready");
   }
-  const auto found = job.mesh->files.find(format);
-  if (found == job.mesh->files.end()) {
-    throw Error(ErrorCode::kNotFound,
-                "the job was not asked for the format \"" + std::string(to_string(format)) + "\"");
+  if (const auto found = job.mesh->files.find(format); !label && found != job.mesh->files.end()) {
+    return found->second;
   }
-  return found->second;
+  for (const LabelSummary& each : job.mesh->labels) {
+    const auto found = each.files.find(format);
+    if (found == each.files.end() || (label ? *label != each.label : job.mesh->labels.size() > 1)) {
+      continue;
+    }
+    return {found->second.bytes, found->second.sha256, found->second.href};
+  }
+  throw Error(ErrorCode::kNotFound, "the job has no file of the format \"" +
+                                        std::string(to_string(format)) + '"' +
+                                        (label ? " of the label " + std::to_string(*label) : ""));
 }
 
 // Writes a mesh as it arrives and compares it with the size and digest that the job announced.
 class Download {
  public:
-  Download(const MeshFile& announced, const std::filesystem::path& target,
+  Download(MeshFile announced, const std::filesystem::path& target,
            const TransferProgress& progress)
-      : announced_(announced), file_(target), progress_(progress) {}
+      : announced_(std::move(announced)), file_(target), progress_(progress) {}
 
   void restart() {
     if (received_ == 0) return;
@@ -224,7 +231,7 @@ class Download {
                 "the mesh that arrived is not the one that the job describes");
   }
 
-  const MeshFile& announced_;
+  const MeshFile announced_;
   PartFile file_;
   const TransferProgress& progress_;
   std::optional<Sha256> sha256_{std::in_place};
@@ -428,10 +435,10 @@ Job Client::follow(const std::string& id, const JobListener& listener) {
 }
 
 void Client::fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,
-                   const TransferProgress& progress) {
+                   const TransferProgress& progress, std::optional<std::int64_t> label) {
   const Job done = job(id);
-  Download download(file_of(done, format), target, progress);
-  HttpRequest request{.target = job_path(id) + "/mesh." + std::string(to_string(format))};
+  Download download(file_of(done, format, label), target, progress);
+  HttpRequest request{.target = mesh_path(path_segment(id), format, label)};
   request.sink = [&](std::string_view piece) { download.take(piece); };
   impl_->repeat(request, [&] { download.restart(); });
   download.publish();

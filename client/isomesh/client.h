@@ -146,9 +146,11 @@ class Client {
   // Writes the mesh of a finished job to `target`, which appears only when all of its bytes have
   // come and have the SHA-256 that the job states. Throws kNotReady when the job is not done, the
   // job's own error when it failed, kCancelled when it was cancelled, kNotFound when it was not
-  // asked for that format, kDigestMismatch when other bytes came.
+  // asked for that format, kDigestMismatch when other bytes came. Of a job by labels, with `label`,
+  // one label's own surface.
   void fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,
-             const TransferProgress& progress = {});
+             const TransferProgress& progress = {},
+             std::optional<std::int64_t> label = std::nullopt);
 
  private:
   class Impl;

@@ -100,6 +100,9 @@ constexpr bool kIsCallback = std::is_same_v<T, std::optional<Callback>>;
 template <class T>
 constexpr bool kIsChoice = Enumeration<T>;
 
+template <class T>
+constexpr bool kIsOfLabels = std::is_same_v<T, LabelTexts> || std::is_same_v<T, LabelValues>;
+
 template <class Enum>
 std::vector<std::string> value_names() {
   std::vector<std::string> names;
@@ -220,6 +223,11 @@ void write_choice(Yaml& yaml, const Parameter& parameter) {
   });
 }
 
+std::string label_list(const Parameter& parameter) {
+  return "{ type: array, minItems: 1, items: { type: integer, minimum: " +
+         number_text(*parameter.minimum) + ", maximum: " + number_text(*parameter.maximum) + " } }";
+}
+
 // Its type, and whatever else it may be.
 template <class T>
 void write_type(Yaml& yaml, const Parameter& parameter, const T& standard) {
@@ -229,6 +237,17 @@ void write_type(Yaml& yaml, const Parameter& parameter, const T& standard) {
     yaml.line("minItems: 1");
     yaml.line("default: " + in_brackets({name_of(standard.front())}));
     yaml.line("x-query: " + query_name_of(parameter));
+  } else if constexpr (std::is_same_v<T, std::optional<LabelChoice>>) {
+    yaml.under("oneOf", [&] {
+      yaml.line("- const: all");
+      yaml.line("- " + label_list(parameter));
+    });
+  } else if constexpr (kIsOfLabels<T>) {
+    yaml.line("type: object");
+    yaml.line("propertyNames: { pattern: '^-?[0-9]+$' }");
+    const bool is_list = std::is_same_v<T, LabelValues>;
+    yaml.line("additionalProperties: " + (is_list ? label_list(parameter) : "{ type: string }"));
+    yaml.line("default: {}");
   } else if (parameter.when_empty != nullptr) {
     yaml.under("oneOf", [&] {
       yaml.line("- type: number");
@@ -260,10 +279,10 @@ constexpr bool kStandsAlone =
     !std::is_same_v<T, std::string> && !std::is_same_v<T, std::vector<MeshFormat>>;
 
 template <class T>
-void write_properties(Yaml& yaml, const T& parameters);
+void write_properties(Yaml& yaml, T& parameters);
 
 template <class T>
-void write_property(Yaml& yaml, const Parameter& parameter, const T& member) {
+void write_property(Yaml& yaml, const Parameter& parameter, T& member) {
   if constexpr (kIsCallback<T> || (kStandsAlone<T> && !ParameterGroup<T>)) {
     yaml.line(std::string(parameter.name) + ": { " +
               reference("schemas", schema_name_of(parameter)) + " }");
@@ -280,17 +299,17 @@ void write_property(Yaml& yaml, const Parameter& parameter, const T& member) {
 }
 
 template <class T>
-void write_properties(Yaml& yaml, const T& parameters) {
+void write_properties(Yaml& yaml, T& parameters) {
   yaml.line("type: object");
   yaml.line("additionalProperties: false");
   yaml.under("properties", [&] {
-    visit(parameters, [&](const Parameter& parameter, const auto& member) {
+    visit(parameters, [&](const Parameter& parameter, auto& member) {
       write_property(yaml, parameter, member);
     });
   });
 }
 
-// With every member that a job may have.
+// Not constant, for those members that may be absent.
 JobParameters complete_parameters() {
   JobParameters parameters;
   parameters.callback.emplace();
@@ -299,7 +318,7 @@ JobParameters complete_parameters() {
 
 std::string schemas() {
   Yaml yaml(2);
-  const JobParameters parameters = complete_parameters();
+  JobParameters parameters = complete_parameters();
   visit_leaves(parameters, [&](const std::string&, const Parameter& parameter, const auto& member) {
     using Member = std::remove_cvref_t<decltype(member)>;
     if constexpr (kStandsAlone<Member> && !kIsCallback<Member>) {
@@ -313,15 +332,21 @@ std::string schemas() {
     write_properties(yaml, parameters);
   });
   std::vector<std::string> required;
+  std::vector<std::string> alternatives;
   std::vector<std::string> always;
-  visit(parameters, [&](const Parameter& parameter, const auto& member) {
-    if (parameter.is_required) required.emplace_back(parameter.name);
-    if (!kIsCallback<std::remove_cvref_t<decltype(member)>>) always.emplace_back(parameter.name);
+  visit(parameters, [&](const Parameter& parameter, const auto& /*member*/) {
+    if (parameter.is_required && parameter.unless == nullptr) required.emplace_back(parameter.name);
+    if (parameter.unless != nullptr) {
+      alternatives = {"{ required: [" + std::string(parameter.name) + "] }",
+                      "{ required: [" + std::string(parameter.unless) + "] }"};
+    }
+    if (!parameter.may_be_absent) always.emplace_back(parameter.name);
   });
   const std::string base = "allOf: [{ " + reference("schemas", "JobParameters") + " }]";
   yaml.under("JobRequest", [&] {
     yaml.line(base);
     yaml.line("required: " + in_brackets(required));
+    yaml.line("oneOf: " + in_brackets(alternatives));
   });
   yaml.under("CompleteJobParameters", [&] {
     yaml.line("description: All of them, with the defaults of those that were left out.");
@@ -336,7 +361,7 @@ std::string schemas() {
 // Calls each(parameter) for those that a query spells as a body does.
 template <class Each>
 void visit_query(const Each& each) {
-  const JobParameters parameters;
+  JobParameters parameters = complete_parameters();
   visit_leaves(parameters, [&](const std::string&, const Parameter& parameter, const auto& member) {
     if constexpr (kStandsAlone<std::remove_cvref_t<decltype(member)>>) {
       if (parameter.in_query) each(parameter);
@@ -350,7 +375,7 @@ std::string query() {
     yaml.under(schema_name_of(parameter), [&] {
       yaml.line("name: " + query_name_of(parameter));
       yaml.line("in: query");
-      if (parameter.is_required) yaml.line("required: true");
+      if (parameter.is_required && parameter.unless == nullptr) yaml.line("required: true");
       yaml.text("description", parameter.help);
       yaml.line("schema: { " + reference("schemas", schema_name_of(parameter)) + " }");
     });
@@ -369,7 +394,10 @@ std::string query_references() {
 std::string formats() {
   Yaml yaml(2);
   yaml.under("MeshFormat", [&] {
-    yaml.line("description: A mesh file's format and suffix. STL and PLY are binary.");
+    yaml.text("description",
+              "A mesh file's format and suffix. STL and PLY are binary. `zip` is for labels: it "
+              "holds one file of each label, in the other formats that are asked for, `glb` "
+              "aside, or in STL.");
     yaml.line("type: string");
     yaml.line("enum: " + in_brackets(value_names<MeshFormat>()));
   });

@@ -29,12 +29,12 @@ struct DracoStream {
   std::optional<mesh::PartTopology> topology;
 };
 
-// Consecutive triangles [begin, end).
 // The topology of a mesh whose triangles these streams have between them; none where one of them
 // has shown nothing, or it does not follow.
 std::optional<mesh::Topology> topology_of(const mesh::Mesh& mesh, std::span<DracoStream> streams,
                                           const mesh::Context& context);
 
+// Consecutive triangles [begin, end).
 struct Run {
   std::size_t begin = 0;
   std::size_t end = 0;

@@ -30,6 +30,11 @@ std::optional<mesh::Topology> without_topology(const mesh::Mesh& mesh, const Pro
   return std::nullopt;
 }
 
+std::optional<mesh::Topology> refuse_zip(const mesh::Mesh&, const Provenance&,
+                                         const mesh::Context&, const Sink&) {
+  throw Error(ErrorCode::kInternal, "a ZIP holds labels, not one surface");
+}
+
 bool never(const MeshParameters& /*parameters*/) { return false; }
 
 bool if_ours(const MeshParameters& parameters) { return is_own_draco(parameters.draco); }
@@ -108,6 +113,30 @@ constexpr std::array kFormats = {
            .memory_bytes = no_memory,
            .shows_topology = never,
            .encode = without_topology<encode_obj>},
+    Format{.format = MeshFormat::kZip,
+           .media_type = "application/zip",
+           .milliseconds_per_triangle = 3.0e-5,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 double bytes = 22;
+                 for (const MeshFormat format : zipped_formats(parameters)) {
+                   bytes += describe(format).bytes(surface, parameters);
+                 }
+                 return bytes;
+               },
+           .memory_bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 // What is encoded at once, and its bytes.
+                 std::uint64_t bytes = 0;
+                 for (const MeshFormat format : zipped_formats(parameters)) {
+                   const Format& row = describe(format);
+                   bytes += row.memory_bytes(surface, parameters) +
+                            static_cast<std::uint64_t>(row.bytes(surface, parameters));
+                 }
+                 return bytes;
+               },
+           .shows_topology = never,
+           .encode = refuse_zip},
 };
 
 }  // namespace

@@ -19,6 +19,8 @@
 
 namespace isomesh::codec {
 
+struct Grid;  // draco/grid.h
+
 // Our own Draco encoder walks over all triangles, by which it knows the mesh's topology: same as
 // measure_topology's. Encoders that may use it return it where they have.
 
@@ -33,10 +35,12 @@ bool is_own_draco(const DracoParameters& draco);
 // millimetres in LPS. Positions are quantised to draco.position_bits bits on a cubic grid that
 // covers the mesh closely, so that a decoded vertex is within half a grid step of its place along
 // each axis. The stream keeps the number of vertices and triangles. The bytes do not depend on the
-// number of threads. Thread safe. Throws Error kUnusableVolume where a position is not finite,
-// kInternal when libdraco refuses, and kCancelled, which libdraco's one call does not look at.
+// number of threads. With a `grid` that is the one, and not the mesh's own. Thread safe. Throws
+// Error kUnusableVolume where a position is not finite, kInternal when libdraco refuses, and
+// kCancelled, which libdraco's one call does not look at.
 std::optional<mesh::Topology> encode_drc(const mesh::Mesh& mesh, const DracoParameters& draco,
-                                         const mesh::Context& context, const Sink& sink);
+                                         const mesh::Context& context, const Sink& sink,
+                                         const Grid* grid = nullptr);
 
 // STL, PLY and OBJ are written as they go, in some megabytes of memory, formatted side by side. The
 // bytes do not depend on the number of threads.

@@ -1,17 +1,11 @@
 #include <charconv>
-#include <string_view>
 
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
+#include "server/codec/records.h"
 
 namespace isomesh::codec {
 namespace {
-
-constexpr std::string_view kHeader = "# isomesh, millimetres, LPS\n";
-// Without an exponent, which some readers do not know: a sign, up to 39 digits before the point, or
-// a point and up to 54 digits behind it.
-constexpr std::size_t kMostFloatBytes = 64;
-constexpr std::size_t kMostIndexBytes = 10;
 
 // Space for `most` more bytes is there.
 template <class... Format>
@@ -22,30 +16,36 @@ char* append_number(char* out, std::size_t most, Format... number) {
 
 }  // namespace
 
+std::byte* write_obj_vertex(const mesh::Vec3& position, std::byte* begin) {
+  char* out = reinterpret_cast<char*>(begin);
+  *out++ = 'v';
+  for (const float coordinate : position) {
+    // The shortest text that reads as the same number.
+    out = append_number(out, kMostFloatBytes, coordinate, std::chars_format::fixed);
+  }
+  *out++ = '\n';
+  return reinterpret_cast<std::byte*>(out);
+}
+
+std::byte* write_obj_face(const mesh::Triangle& triangle, std::byte* begin) {
+  char* out = reinterpret_cast<char*>(begin);
+  *out++ = 'f';
+  for (const std::uint32_t vertex : triangle) {
+    out = append_number(out, kMostIndexBytes, std::uint64_t{vertex} + 1);  // OBJ counts from 1
+  }
+  *out++ = '\n';
+  return reinterpret_cast<std::byte*>(out);
+}
+
 void encode_obj(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink) {
   context.throw_if_stopped();
-  sink(std::as_bytes(std::span(kHeader)));
+  sink(std::as_bytes(std::span(kObjHeader)));
   BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
-  constexpr std::size_t kMostVertexBytes = 2 + 3 * (1 + kMostFloatBytes);
-  writer.write(mesh.positions.size(), kMostVertexBytes, [&](std::size_t v, std::byte* begin) {
-    char* out = reinterpret_cast<char*>(begin);
-    *out++ = 'v';
-    for (const float coordinate : mesh.positions[v]) {
-      // The shortest text that reads as the same number.
-      out = append_number(out, kMostFloatBytes, coordinate, std::chars_format::fixed);
-    }
-    *out++ = '\n';
-    return reinterpret_cast<std::byte*>(out);
+  writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
+    return write_obj_vertex(mesh.positions[v], out);
   });
-  constexpr std::size_t kMostFaceBytes = 2 + 3 * (1 + kMostIndexBytes);
-  writer.write(mesh.triangles.size(), kMostFaceBytes, [&](std::size_t t, std::byte* begin) {
-    char* out = reinterpret_cast<char*>(begin);
-    *out++ = 'f';
-    for (const std::uint32_t vertex : mesh.triangles[t]) {
-      out = append_number(out, kMostIndexBytes, std::uint64_t{vertex} + 1);  // OBJ counts from 1
-    }
-    *out++ = '\n';
-    return reinterpret_cast<std::byte*>(out);
+  writer.write(mesh.triangles.size(), kMostObjFaceBytes, [&](std::size_t t, std::byte* out) {
+    return write_obj_face(mesh.triangles[t], out);
   });
 }
 

@@ -4,38 +4,42 @@
 
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
+#include "server/codec/records.h"
 
 namespace isomesh::codec {
-namespace {
 
 static_assert(std::endian::native == std::endian::little, "the PLY written here is little-endian");
 
-constexpr std::size_t kFaceBytes = 1 + sizeof(mesh::Triangle);
-
-std::string header_of(const mesh::Mesh& mesh) {
+std::string ply_header(std::size_t vertices, std::size_t faces, std::string_view of_faces) {
   return "ply\nformat binary_little_endian 1.0\ncomment isomesh, millimetres, LPS\nelement "
          "vertex " +
-         std::to_string(mesh.positions.size()) +
+         std::to_string(vertices) +
          "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
-         std::to_string(mesh.triangles.size()) +
-         "\nproperty list uchar uint vertex_indices\nend_header\n";
+         std::to_string(faces) + "\nproperty list uchar uint vertex_indices\n" +
+         std::string(of_faces) + "end_header\n";
 }
 
-}  // namespace
+std::byte* write_ply_vertex(const mesh::Vec3& position, std::byte* out) {
+  std::memcpy(out, &position, kPlyVertexBytes);
+  return out + kPlyVertexBytes;
+}
+
+std::byte* write_ply_face(const mesh::Triangle& triangle, std::byte* out) {
+  *out = std::byte{3};
+  std::memcpy(out + 1, &triangle, sizeof triangle);
+  return out + kPlyFaceBytes;
+}
 
 void encode_ply(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink) {
   context.throw_if_stopped();
-  const std::string header = header_of(mesh);
+  const std::string header = ply_header(mesh.positions.size(), mesh.triangles.size(), "");
   sink(std::as_bytes(std::span(header)));
   BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
-  writer.write(mesh.positions.size(), sizeof(mesh::Vec3), [&](std::size_t v, std::byte* out) {
-    std::memcpy(out, &mesh.positions[v], sizeof(mesh::Vec3));
-    return out + sizeof(mesh::Vec3);
+  writer.write(mesh.positions.size(), kPlyVertexBytes, [&](std::size_t v, std::byte* out) {
+    return write_ply_vertex(mesh.positions[v], out);
   });
-  writer.write(mesh.triangles.size(), kFaceBytes, [&](std::size_t t, std::byte* out) {
-    *out = std::byte{3};
-    std::memcpy(out + 1, &mesh.triangles[t], sizeof(mesh::Triangle));
-    return out + kFaceBytes;
+  writer.write(mesh.triangles.size(), kPlyFaceBytes, [&](std::size_t t, std::byte* out) {
+    return write_ply_face(mesh.triangles[t], out);
   });
 }
 

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <map>
 
+#include "proto/json.h"
 #include "server/codec/encode.h"
+#include "server/jobs/mesh_cost.h"
 #include "server/jobs/stored_samples.h"
 
 namespace isomesh::jobs {
@@ -41,12 +43,39 @@ double smooth_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
 double encode_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   double slowest = kMeasurePerTriangle;
   double sum = kMeasurePerTriangle;
-  for (const MeshFormat format : parameters.formats) {
+  for (const MeshFormat format : files_of(parameters)) {
     const double each = codec::describe(format).milliseconds_per_triangle;
     slowest = std::max(slowest, each);
     sum += each;
   }
   return as_double(surface.triangles) * (slowest + (sum - slowest) / 2);
+}
+
+// Files of labels have the triangles of each label's own surface.
+SurfaceSize surface_in_files(const CountedSurface& counted) {
+  if (counted.labels.empty()) return counted.size;
+  SurfaceSize all;
+  for (const Estimate::Label& label : counted.labels) all.triangles += label.triangles;
+  all.vertices = all.triangles / 2;
+  return all;
+}
+
+SurfaceSize surface_in_files(const MeshSummary& mesh) {
+  CountedSurface counted = {.size = {mesh.triangles, mesh.vertices}};
+  for (const LabelSummary& label : mesh.labels) {
+    counted.labels.push_back({label.label, label.triangles});
+  }
+  return surface_in_files(counted);
+}
+
+// What tells the surfaces of labels of a volume apart.
+std::string key_of_labels(const MeshParameters& parameters) {
+  if (!parameters.labels) return {};
+  MeshParameters labels;
+  labels.labels = parameters.labels;
+  labels.background = parameters.background;
+  labels.label_values = parameters.label_values;
+  return to_json(labels);
 }
 
 }  // namespace
@@ -61,9 +90,10 @@ void CostModel::learn(const Job& job, std::uint64_t samples) {
   add(extract_, job.timing.extract, extract_ms(surface, samples));
   add(smooth_, job.timing.smooth, smooth_ms(surface, job.parameters));
   add(encode_, job.timing.encode, encode_ms(surface, job.parameters));
+  const SurfaceSize in_files = surface_in_files(*job.mesh);
   for (const auto& [format, file] : job.mesh->files) {
     add(files_.try_emplace(format, kFewBytes).first->second, as_double(file.bytes),
-        codec::describe(format).bytes(surface, job.parameters));
+        codec::describe(format).bytes(in_files, job.parameters));
   }
 }
 
@@ -86,25 +116,29 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   const Volume volume = volumes_.get(viewer, parameters.volume);
   Estimate estimate;
   estimate.volume = volume.id;
-  estimate.iso = parameters.iso.value_or(volume.suggested_iso);
+  const double iso = parameters.iso.value_or(volume.suggested_iso);
+  if (!parameters.labels) estimate.iso = iso;
   estimate.scheme = parameters.scheme;
-  const SurfaceSize surface = count(viewer, volume, parameters, estimate.iso);
+  const CountedSurface counted = count(viewer, volume, parameters, iso);
+  const SurfaceSize& surface = counted.size;
+  estimate.labels = counted.labels;
   estimate.triangles = surface.triangles;
   estimate.vertices = surface.vertices;
   estimate.memory_bytes = estimate_memory(surface, parameters);
   estimate.fits = estimate.memory_bytes <= limits_.memory_bytes;
   const CostModel costs = model(viewer);
   estimate.milliseconds = costs.milliseconds(surface, volume.sample_count(), parameters);
-  for (const MeshFormat format : parameters.formats) {
-    estimate.bytes[format] = costs.file_bytes(format, surface, parameters);
+  const SurfaceSize in_files = surface_in_files(counted);
+  for (const MeshFormat format : files_of(parameters)) {
+    estimate.bytes[format] = costs.file_bytes(format, in_files, parameters);
   }
   const store::QueueDepth depth = jobs_.depth(viewer);
   estimate.queue = {depth.all_queued(), depth.running};
   return estimate;
 }
 
-SurfaceSize Estimator::count(const store::Viewer& viewer, const Volume& volume,
-                             const MeshParameters& parameters, double iso) {
+CountedSurface Estimator::count(const store::Viewer& viewer, const Volume& volume,
+                                const MeshParameters& parameters, double iso) {
   const auto find = [&] {
     const std::stop_token stop = stop_.get_token();
     const store::LocalBlob file = stored_samples(blobs_, volume.id, stop);
@@ -119,7 +153,9 @@ SurfaceSize Estimator::count(const store::Viewer& viewer, const Volume& volume,
       return process_.count(order, stop);
     });
   };
-  return *counts_.get({viewer, volume.id, iso, parameters.scheme, parameters.close}, find);
+  return *counts_.get({viewer, volume.id, iso, key_of_labels(parameters), parameters.scheme,
+                       parameters.close},
+                      find);
 }
 
 CostModel Estimator::model(const store::Viewer& viewer) const {

@@ -74,14 +74,14 @@ class Estimator {
   void stop() { stop_.request_stop(); }
 
  private:
-  // Viewer (see Histograms), volume, iso-value, scheme, whether it is closed.
-  using Surface = std::tuple<store::Viewer, std::string, double, Scheme, bool>;
+  // Viewer (see Histograms), volume, iso-value or labels, scheme, whether it is closed.
+  using Surface = std::tuple<store::Viewer, std::string, double, std::string, Scheme, bool>;
 
   static constexpr std::size_t kSurfaces = 1024;
   static constexpr std::size_t kMostWaiting = 12;
 
-  SurfaceSize count(const store::Viewer& viewer, const Volume& volume,
-                    const MeshParameters& parameters, double iso);
+  CountedSurface count(const store::Viewer& viewer, const Volume& volume,
+                       const MeshParameters& parameters, double iso);
   CostModel model(const store::Viewer& viewer) const;
 
   const store::VolumeStore& volumes_;
@@ -91,7 +91,7 @@ class Estimator {
   std::stop_source stop_;
   Mutex process_mutex_;
   JobProcess process_ ISOMESH_GUARDED_BY(process_mutex_);  // counts, one surface after the other
-  Memo<Surface, SurfaceSize> counts_{kSurfaces, kMostWaiting};
+  Memo<Surface, CountedSurface> counts_{kSurfaces, kMostWaiting};
 };
 
 }  // namespace isomesh::jobs

@@ -93,8 +93,11 @@ Json json_of(const JobProgress& progress) {
 
 Json json_of(const JobPiece& piece) { return {{"file", piece.file}, {"bytes", piece.bytes}}; }
 
-Json json_of(const mesh::SurfaceSize& size) {
-  return {{"counted", {size.triangles, size.vertices, size.layers, size.largest_layer}}};
+Json json_of(const CountedSurface& counted) {
+  const auto& [triangles, vertices, layers, largest_layer] = counted.size;
+  Json labels = Json::array();
+  for (const auto& [label, count] : counted.labels) labels.push_back({label, count});
+  return {{"counted", {triangles, vertices, layers, largest_layer}}, {"labels", labels}};
 }
 
 Json json_of(const Error& error) {
@@ -119,11 +122,14 @@ MadeMesh made_from(const Json& json, const Job& job) {
   return {*job.mesh, timing_from(json.at("made"))};
 }
 
-mesh::SurfaceSize size_from(const Json& json) {
-  return {.triangles = json.at(0),
-          .vertices = json.at(1),
-          .layers = json.at(2),
-          .largest_layer = json.at(3)};
+CountedSurface counted_from(const Json& json) {
+  const Json& size = json.at("counted");
+  CountedSurface counted = {.size = {.triangles = size.at(0),
+                                     .vertices = size.at(1),
+                                     .layers = size.at(2),
+                                     .largest_layer = size.at(3)}};
+  for (const Json& label : json.at("labels")) counted.labels.push_back({label.at(0), label.at(1)});
+  return counted;
 }
 
 Error error_from(const Json& json) {
@@ -179,7 +185,7 @@ JobAnswer answer_from(std::string_view line) {
     if (json.contains("stage")) return progress_from(json);
     if (json.contains("file")) return JobPiece{json.at("file"), json.at("bytes")};
     if (json.contains("made")) return made_from(json, record_of(line));
-    if (json.contains("counted")) return size_from(json.at("counted"));
+    if (json.contains("counted")) return counted_from(json);
     if (json.contains("code")) return error_from(json);
     throw_malformed();
   });

@@ -48,7 +48,7 @@ struct JobProgress {
 
 // Tells that so many bytes follow the line, which are the next ones of a file.
 struct JobPiece {
-  std::size_t file = 0;  // of the parameters' formats
+  std::size_t file = 0;  // of files_of(parameters)
   std::size_t bytes = 0;
 };
 
@@ -58,7 +58,7 @@ struct MadeMesh {
 };
 
 // The last three end the order.
-using JobAnswer = std::variant<JobProgress, JobPiece, MadeMesh, mesh::SurfaceSize, Error>;
+using JobAnswer = std::variant<JobProgress, JobPiece, MadeMesh, CountedSurface, Error>;
 
 inline constexpr std::string_view kCancelMessage = "{\"cancel\":true}\n";
 

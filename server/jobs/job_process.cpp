@@ -46,9 +46,9 @@ MadeMesh JobProcess::make(const JobOrder& order, std::span<const codec::Sink> si
   return std::get<MadeMesh>(end_of(order, sinks, stop, report));
 }
 
-mesh::SurfaceSize JobProcess::count(const JobOrder& order, const std::stop_token& stop) {
+CountedSurface JobProcess::count(const JobOrder& order, const std::stop_token& stop) {
   const Report nobody = [](Stage, double, const Timing&) {};
-  return std::get<mesh::SurfaceSize>(end_of(order, {}, stop, nobody));
+  return std::get<CountedSurface>(end_of(order, {}, stop, nobody));
 }
 
 JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink> sinks,

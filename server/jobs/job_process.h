@@ -38,7 +38,7 @@ class JobProcess {
   explicit JobProcess(const JobProgram& program);
 
   // Makes a mesh in the process, which is started where there is none. `sinks` has one for each of
-  // the parameters' formats, and gets its bytes on this thread. When `stop` is requested or a sink
+  // files_of(the parameters), and gets its bytes on this thread. When `stop` is requested or a sink
   // throws, the process is asked to stop, and is killed when it has not done so soon. Throws what
   // make_mesh and the sinks throw, ProcessEnded, and Error kInternal or kUnavailable when no
   // process can be started.
@@ -46,7 +46,7 @@ class JobProcess {
                 const std::stop_token& stop, const Report& report);
 
   // Counts a surface in the same way.
-  mesh::SurfaceSize count(const JobOrder& order, const std::stop_token& stop);
+  CountedSurface count(const JobOrder& order, const std::stop_token& stop);
 
  private:
   struct Talk;

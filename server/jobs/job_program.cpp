@@ -18,6 +18,7 @@
 
 #include "base/mutex.h"
 #include "server/jobs/job_message.h"
+#include "server/jobs/make_labels.h"
 #include "server/jobs/make_mesh.h"
 #include "server/jobs/memory.h"
 #include "server/mesh/parallel.h"
@@ -154,7 +155,7 @@ MadeMesh make(const JobOrder& order, const std::stop_token& stop, Speaker& speak
   const volume::CanonicalVolume canonical(order.file);
   canonical.preload();
   std::vector<codec::Sink> sinks;
-  for (std::size_t i = 0; i < order.parameters.formats.size(); ++i) {
+  for (std::size_t i = 0; i < files_of(order.parameters).size(); ++i) {
     sinks.emplace_back([&speaker, i](std::span<const std::byte> bytes) {
       speaker.say(JobPiece{i, bytes.size()}, bytes);
     });
@@ -162,19 +163,23 @@ MadeMesh make(const JobOrder& order, const std::stop_token& stop, Speaker& speak
   std::optional<mesh::OneThread> alone;
   if (canonical.header().sample_bytes() <= kFewSampleBytes) alone.emplace();
   MadeMesh made;
-  made.summary =
-      make_mesh(array_of(canonical),
-                {order.volume, order.parameters, order.iso, order.memory_bytes, order.disk_bytes},
-                sinks, progress, workspace.mesh);
+  const MeshRequest request = {order.volume, order.parameters, order.iso, order.memory_bytes,
+                               order.disk_bytes};
+  const SampleArray samples = array_of(canonical);
+  made.summary = order.parameters.labels
+                     ? make_labels(samples, request, sinks, progress, workspace.walls)
+                     : make_mesh(samples, request, sinks, progress, workspace.mesh);
   progress.end_stage();
   made.timing = progress.timing();
   return made;
 }
 
-mesh::SurfaceSize count(const JobOrder& order, const std::stop_token& stop, Speaker& speaker) {
+CountedSurface count(const JobOrder& order, const std::stop_token& stop, Speaker& speaker) {
   speaker.say(JobProgress{});  // it has begun
   const volume::CanonicalVolume canonical(order.file);
-  return count_surface(array_of(canonical), order.parameters, order.iso, {stop, nullptr});
+  const SampleArray samples = array_of(canonical);
+  if (order.parameters.labels) return count_labels(samples, order.parameters, {stop, nullptr});
+  return {count_surface(samples, order.parameters, order.iso, {stop, nullptr})};
 }
 
 struct Ending {

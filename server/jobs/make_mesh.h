@@ -10,11 +10,13 @@
 #include <span>
 #include <stop_token>
 #include <string_view>
+#include <vector>
 
 #include "proto/types.h"
 #include "server/codec/encode.h"
 #include "server/mesh/extract.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/separate.h"
 
 namespace isomesh::jobs {
 
@@ -60,7 +62,8 @@ class Progress {
 // The memory that jobs are made in, kept from one to the next so that its pages are mapped already.
 // Not thread safe.
 struct Workspace {
-  mesh::Mesh mesh;
+  mesh::Mesh mesh;                // of jobs at an iso-value
+  mesh::SeparatingSurface walls;  // of jobs by labels
 
   // Gives memory back when it exceeds `budget_bytes`: one giant job must not keep it for ever.
   void trim(std::size_t budget_bytes);
@@ -84,19 +87,22 @@ struct MeshRequest {
   std::uint64_t disk_bytes = std::numeric_limits<std::uint64_t>::max();
 };
 
+// How large a surface would be.
+struct CountedSurface {
+  mesh::SurfaceSize size;
+  std::vector<Estimate::Label> labels = {};  // of a job by labels
+};
+
 // How large the surface is, before the filter of components. Throws Error kCancelled.
 mesh::SurfaceSize count_surface(const SampleArray& samples, const MeshParameters& parameters,
                                 double iso, const mesh::Context& context);
 
-// How much memory a job with a surface of that size takes at its peak, beside its mapped volume:
-// mesh, smoothing, encoders. An upper estimate.
-std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
-
 // Extracts, smooths, measures and encodes; `sinks` has one for each of the parameters' formats, in
 // their order. The files of the summary are empty. `mesh` is worked in, and left as it was encoded.
 // `progress` enters the stages; the caller ends the last one, when the bytes are where they belong.
-// Throws Error kCancelled, kTooLarge with the estimate when the job would take more than it may
-// (told before memory is taken) or than the disk could ever hold, and kInternal.
+// The parameters have no labels: see make_labels.h. Throws Error kCancelled, kTooLarge with the
+// estimate when the job would take more than it may (told before memory is taken) or than the disk
+// could ever hold, and kInternal.
 MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
                       std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh);
 

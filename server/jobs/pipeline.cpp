@@ -36,7 +36,8 @@ PipelineResult run_pipeline(const Volume& volume, const MeshParameters& paramete
   // Committed together at the end: a job that ends on the way leaves no file of it.
   std::vector<std::unique_ptr<store::BlobWriter>> writers;
   std::vector<codec::Sink> sinks;
-  for (std::size_t i = 0; i < parameters.formats.size(); ++i) {
+  const std::vector<MeshFormat> files = files_of(parameters);
+  for (std::size_t i = 0; i < files.size(); ++i) {
     store::BlobWriter& writer = *writers.emplace_back(blobs.begin());
     sinks.emplace_back([&writer](std::span<const std::byte> bytes) { writer.write(bytes); });
   }
@@ -59,7 +60,7 @@ PipelineResult run_pipeline(const Volume& volume, const MeshParameters& paramete
   PipelineResult result = {std::move(made.summary), with_checking(made.timing)};
   for (std::size_t i = 0; i < writers.size(); ++i) {
     const store::Blob blob = writers[i]->commit();
-    result.mesh.files[parameters.formats[i]] = {blob.bytes, blob.key, ""};
+    result.mesh.files[files[i]] = {blob.bytes, blob.key, ""};
   }
   result.timing.encode += milliseconds_since(stored);
   report(Stage::kEncode, 1, result.timing);

@@ -33,21 +33,21 @@ class LabelPlane {
         numbers_(stride_ * dims.y),
         wholes_(words_ * dims.y) {}
 
-  const LabelNumber* row(std::size_t y) const { return numbers_.data() + y * stride_; }
+  const PartNumber* row(std::size_t y) const { return numbers_.data() + y * stride_; }
   // For each word, the label that its samples and the one behind them have, or kMixed.
   const std::int32_t* wholes(std::size_t y) const { return wholes_.data() + y * words_; }
 
   // `fill` writes the samples of a row.
   template <class Fill>
   void fill_row(std::size_t y, Fill fill) {
-    LabelNumber* row = numbers_.data() + y * stride_;
+    PartNumber* row = numbers_.data() + y * stride_;
     fill(row);
     std::fill(row + dims_.x, row + stride_, row[dims_.x - 1]);
     for (std::size_t w = 0; w < words_; ++w) {
-      const LabelNumber* word = row + w * kWordBits;
-      LabelNumber change = 0;
+      const PartNumber* word = row + w * kWordBits;
+      PartNumber change = 0;
       for (std::size_t x = 0; x < kWordBits; ++x) {
-        change = static_cast<LabelNumber>(change | (word[x] ^ word[x + 1]));
+        change = static_cast<PartNumber>(change | (word[x] ^ word[x + 1]));
       }
       wholes_[y * words_ + w] = change == 0 ? std::int32_t{word[0]} : kMixed;
     }
@@ -57,7 +57,7 @@ class LabelPlane {
   Dims dims_;
   std::size_t words_;
   std::size_t stride_;
-  std::vector<LabelNumber> numbers_;
+  std::vector<PartNumber> numbers_;
   std::vector<std::int32_t> wholes_;
 };
 
@@ -70,8 +70,8 @@ void classify(const Separation<T>& separation, std::uint32_t z, LabelPlane& plan
     return at < margin || at >= samples + margin;
   };
   for (std::uint32_t y = 0; y < separation.dims.y; ++y) {
-    plane.fill_row(y, [&](LabelNumber* row) {
-      std::fill_n(row, separation.dims.x, LabelNumber{0});
+    plane.fill_row(y, [&](PartNumber* row) {
+      std::fill_n(row, separation.dims.x, PartNumber{0});
       if (is_outside(y, inner.y) || is_outside(z, inner.z)) return;
       const T* samples =
           separation.lattice.samples + (std::size_t{z - margin} * inner.y + (y - margin)) * inner.x;
@@ -81,7 +81,7 @@ void classify(const Separation<T>& separation, std::uint32_t z, LabelPlane& plan
 }
 
 // The samples of a word that have another label in `a` than in `b`.
-HWY_INLINE Word differing(const LabelNumber* a, const LabelNumber* b) {
+HWY_INLINE Word differing(const PartNumber* a, const PartNumber* b) {
   std::array<std::uint8_t, kWordBits> flags;
   for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = a[x] != b[x] ? 1 : 0;
   return pack_word(flags);

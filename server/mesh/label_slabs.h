@@ -25,12 +25,15 @@ namespace isomesh::mesh {
 template <class T>
 struct Separation : Marching<T> {
   Separation(const Lattice<T>& the_lattice, const SeparateOptions& options)
-      : Marching<T>(the_lattice, options.scheme, options.close), index(options.labels) {
+      : Marching<T>(the_lattice, options.scheme, options.close),
+        parts(options.labels, options.values),
+        index(parts) {
     const bool left_handed = the_lattice.to_space.determinant() < 0;
     walls = {make_wall_cases(options.scheme, false, left_handed),
              make_wall_cases(options.scheme, true, left_handed)};
   }
 
+  LabelParts parts;
   LabelIndex<T> index;
   std::array<WallCases, 2> walls;  // by parity, wound for the lattice
 };

@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "server/mesh/extent-inl.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::mesh {
@@ -110,11 +111,9 @@ LabelTriangles::LabelTriangles(const SeparatingSurface& surface)
                                           " cannot be numbered with 32 bits");
   }
   for (const auto& [front, back] : surface.sides) {
-    ++ends_[front];
-    ++ends_[back];
+    surface.parts.visit_labels(front, back, [&](std::size_t label, bool) { ++ends_[label]; });
   }
   // While the lists are filled, an end is where its list goes on.
-  ends_[0] = 0;
   std::uint64_t begin = 0;
   for (std::size_t n = 1; n < ends_.size(); ++n) {
     const std::uint64_t size = ends_[n];
@@ -124,8 +123,8 @@ LabelTriangles::LabelTriangles(const SeparatingSurface& surface)
   triangles_.resize_for_overwrite(begin);
   for (std::uint32_t t = 0; t < surface.sides.size(); ++t) {
     const auto& [front, back] = surface.sides[t];
-    if (front != 0) triangles_[ends_[front]++] = t;
-    triangles_[ends_[back]++] = t;
+    surface.parts.visit_labels(front, back,
+                               [&](std::size_t label, bool) { triangles_[ends_[label]++] = t; });
   }
 }
 
@@ -139,7 +138,7 @@ void extract_label(const SeparatingSurface& surface, const LabelTriangles& trian
   mesh.triangles.resize_for_overwrite(own.size());
   for (std::size_t t = 0; t < own.size(); ++t) {
     const auto& [a, b, c] = from.triangles[own[t]];
-    const bool is_inside_out = surface.sides[own[t]].front == number;
+    const bool is_inside_out = surface.parts.belongs(surface.sides[own[t]].front, number);
     mesh.triangles[t] = {choice.before(a), choice.before(is_inside_out ? c : b),
                          choice.before(is_inside_out ? b : c)};
   }
@@ -157,6 +156,25 @@ std::vector<LabelMeasure> measure_labels(const SeparatingSurface& surface,
   parallel_for(context, measures.size(),
                [&](std::size_t n) { measures[n] = measure(surface, triangles, n + 1, quiet); });
   return measures;
+}
+
+double enclosed_by_all(const SeparatingSurface& surface, const Context& context) {
+  const Mesh& mesh = surface.mesh;
+  std::vector<LayerExtent> layers(mesh.layers());
+  parallel_for(context, layers.size(), [&](std::size_t layer) {
+    std::vector<Triangle> outer;
+    for (std::uint64_t t = mesh.layer_triangles[layer]; t < mesh.layer_triangles[layer + 1]; ++t) {
+      if (surface.sides[t].front == 0) outer.push_back(mesh.triangles[t]);
+    }
+    layers[layer].add_triangles(outer, mesh.origin,
+                                [&](std::uint32_t v) { return load(mesh.positions[v]); });
+    for (std::uint64_t v = mesh.layer_vertices[layer]; v < mesh.layer_vertices[layer + 1]; ++v) {
+      layers[layer].add_vertex(load(mesh.positions[v]));
+    }
+  });
+  LayerExtent whole;
+  for (const LayerExtent& layer : layers) whole.add(layer);
+  return whole.extent().volume_mm3;
 }
 
 }  // namespace isomesh::mesh

@@ -53,4 +53,8 @@ struct LabelMeasure {
 std::vector<LabelMeasure> measure_labels(const SeparatingSurface& surface,
                                          const LabelTriangles& triangles, const Context& context);
 
+// What all labels enclose together, in cubic millimetres: of a surface that is not closed as
+// Extent::volume_mm3 is. The same for any number of threads. Throws Error kCancelled.
+double enclosed_by_all(const SeparatingSurface& surface, const Context& context);
+
 }  // namespace isomesh::mesh

@@ -33,7 +33,7 @@ struct LabelCells {
 };
 
 // Whether all of a slot's corners have different labels.
-HWY_INLINE bool is_crossed(const Slot& slot, const std::array<LabelNumber, 8>& labels) {
+HWY_INLINE bool is_crossed(const Slot& slot, const std::array<PartNumber, 8>& labels) {
   const auto [a, b, c, d] = slot.corners;
   if (labels[a] == labels[b]) return false;
   if (slot.size == 2) return true;
@@ -42,7 +42,7 @@ HWY_INLINE bool is_crossed(const Slot& slot, const std::array<LabelNumber, 8>& l
   return labels[a] != labels[d] && labels[b] != labels[d] && labels[c] != labels[d];
 }
 
-HWY_INLINE unsigned pattern_in(const std::array<LabelNumber, 8>& labels,
+HWY_INLINE unsigned pattern_in(const std::array<PartNumber, 8>& labels,
                                const std::array<std::uint8_t, 4>& corners) {
   return pattern_of(
       std::array{labels[corners[0]], labels[corners[1]], labels[corners[2]], labels[corners[3]]});
@@ -103,7 +103,7 @@ class LabelRow : public RowShape {
     }
     LabelCells cells;
     describe(w, others, cells);
-    visit_walls(w, cells, [&](LabelNumber, LabelNumber, unsigned n) { count.triangles += n; });
+    visit_walls(w, cells, [&](PartNumber, PartNumber, unsigned n) { count.triangles += n; });
     for (Word rest = cells.several; rest != 0; rest &= rest - 1) {
       const auto bit = static_cast<unsigned>(std::countr_zero(rest));
       const std::uint32_t slots = slots_at(w * kWordBits + bit);
@@ -125,7 +125,7 @@ class LabelRow : public RowShape {
     }
     for (Word rest = cells.crossed & cells.several; rest != 0; rest &= rest - 1) {
       const std::size_t x = w * kWordBits + static_cast<unsigned>(std::countr_zero(rest));
-      const std::array<LabelNumber, 8> labels = labels_at(x);
+      const std::array<PartNumber, 8> labels = labels_at(x);
       const unsigned parity = parity_at(x);
       for (std::size_t t = 0; t < splits_[parity].tetrahedra; ++t) {
         const unsigned pattern = pattern_in(labels, splits_[parity].corners[t]);
@@ -137,12 +137,12 @@ class LabelRow : public RowShape {
     }
   }
 
-  LabelNumber label(unsigned corner, std::size_t x) const {
+  PartNumber label(unsigned corner, std::size_t x) const {
     return rows_[corner >> 1][x + (corner & 1)];
   }
 
-  std::array<LabelNumber, 8> labels_at(std::size_t x) const {
-    std::array<LabelNumber, 8> labels;
+  std::array<PartNumber, 8> labels_at(std::size_t x) const {
+    std::array<PartNumber, 8> labels;
     for (unsigned corner = 0; corner < 8; ++corner) labels[corner] = label(corner, x);
     return labels;
   }
@@ -176,7 +176,7 @@ class LabelRow : public RowShape {
       const auto bit = static_cast<unsigned>(std::countr_zero(rest));
       const std::size_t x = w * kWordBits + bit;
       const unsigned others_here = cells.cases[bit];
-      const LabelNumber other = label(static_cast<unsigned>(std::countr_zero(others_here)), x);
+      const PartNumber other = label(static_cast<unsigned>(std::countr_zero(others_here)), x);
       bool is_several = false;
       for (unsigned more = others_here & (others_here - 1); more != 0; more &= more - 1) {
         is_several |= label(static_cast<unsigned>(std::countr_zero(more)), x) != other;
@@ -188,7 +188,7 @@ class LabelRow : public RowShape {
 
   // The set (bit s: slot s) of the vertices that the sample at x owns.
   std::uint32_t slots_at(std::size_t x) const {
-    const std::array<LabelNumber, 8> labels = labels_at(x);
+    const std::array<PartNumber, 8> labels = labels_at(x);
     const WallCases& walls = walls_[parity_at(x)];
     std::uint32_t slots = 0;
     for (std::uint32_t rest = walls.existing[axes_at(x)]; rest != 0; rest &= rest - 1) {
@@ -201,7 +201,7 @@ class LabelRow : public RowShape {
   const std::array<CellSplit, 2>& splits_;
   const std::array<WallCases, 2>& walls_;
   // At (y, z), (y + 1, z), (y, z + 1), (y + 1, z + 1).
-  std::array<const LabelNumber*, 4> rows_;
+  std::array<const PartNumber*, 4> rows_;
   std::array<const std::int32_t*, 4> wholes_;
 };
 
@@ -232,7 +232,7 @@ class LabelCellWriter {
 
  private:
   Triangle* write_several(std::size_t x, const std::uint32_t* places, Triangle* out) const {
-    const std::array<LabelNumber, 8> labels = row_.labels_at(x);
+    const std::array<PartNumber, 8> labels = row_.labels_at(x);
     const unsigned parity = row_.parity_at(x);
     const CellSplit& split = separation_.splits[parity];
     const auto index = [&](VertexName name) {
@@ -388,7 +388,7 @@ class LabelField {
   std::uint32_t next_;
 };
 
-// Adds to each label's place how many triangles its own surface has in the slab.
+// Adds to the place of each label's number how many triangles its own surface has in the slab.
 template <class T>
 void tally_slab_of(const Separation<T>& separation, const Slab& slab,
                    std::span<std::uint64_t> triangles) {
@@ -402,9 +402,10 @@ void tally_slab_of(const Separation<T>& separation, const Slab& slab,
       for (std::size_t w = 0; w < words; ++w) {
         if (!row.may_cross(w)) continue;
         row.describe(w, cells);
-        row.visit_walls(w, cells, [&](LabelNumber a, LabelNumber b, unsigned count) {
-          triangles[a] += count;
-          triangles[b] += count;
+        row.visit_walls(w, cells, [&](PartNumber a, PartNumber b, unsigned count) {
+          separation.parts.visit_labels(a, b, [&](std::size_t label, bool) {
+            triangles[label] += count;
+          });
         });
       }
     }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <string>
 #include <type_traits>
 #include <unordered_map>
@@ -141,6 +142,29 @@ std::vector<LabelVoxels> count_labels(const Lattice<T>& lattice, const Context& 
     label.label = value;
     label.volume_mm3 = static_cast<double>(label.voxels) * voxel_mm3;
     labels.push_back(label);
+  }
+  std::ranges::sort(labels, {}, &LabelVoxels::label);
+  return labels;
+}
+
+std::vector<LabelVoxels> labels_of(std::span<const LabelVoxels> present, std::int64_t background,
+                                   const ValuesOfLabels& values) {
+  std::set<std::int64_t> taken = {background};
+  std::vector<LabelVoxels> labels;
+  for (const auto& [label, own] : values) {
+    LabelVoxels whole = {.label = label};
+    for (const std::int64_t value : own) {
+      taken.insert(value);
+      const auto found = std::ranges::lower_bound(present, value, {}, &LabelVoxels::label);
+      if (found == present.end() || found->label != value) continue;
+      add(*found, whole);
+      whole.volume_mm3 += found->volume_mm3;
+    }
+    taken.insert(label);
+    if (whole.voxels > 0) labels.push_back(whole);
+  }
+  for (const LabelVoxels& value : present) {
+    if (!taken.contains(value.label)) labels.push_back(value);
   }
   std::ranges::sort(labels, {}, &LabelVoxels::label);
   return labels;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -31,12 +32,21 @@ struct LabelVoxels {
 template <class T>
 std::vector<LabelVoxels> count_labels(const Lattice<T>& lattice, const Context& context);
 
-// The labels to separate, ascending: those that are wanted, or all but the background. Throws Error
-// kInvalidParameter, field "labels", when the background is among those that are wanted or none is,
-// and kUnusableVolume when some of them are not in `present`, naming them, or when there are more
-// than kMostLabels.
+// Labels that are not the samples of their own value, with all values whose samples belong to them.
+using ValuesOfLabels = std::map<std::int64_t, std::vector<std::int64_t>>;
+
+// The labels that there are: those of `values`, and each value of `present` that is neither the
+// background nor in those. Ascending; those without voxels are left out. What is said of a label of
+// several values is what its values have together.
+std::vector<LabelVoxels> labels_of(std::span<const LabelVoxels> present, std::int64_t background,
+                                   const ValuesOfLabels& values = {});
+
+// The labels to separate, ascending: those that are wanted, or all. `labels` are those that there
+// are. Throws Error kInvalidParameter, field "labels", when the background is among those that are
+// wanted or none is, and kUnusableVolume when some of them are not there, naming them, or when
+// there are more than kMostLabels.
 std::vector<std::int64_t> select_labels(
-    std::span<const LabelVoxels> present, std::int64_t background,
+    std::span<const LabelVoxels> labels, std::int64_t background,
     const std::optional<std::vector<std::int64_t>>& wanted = std::nullopt);
 
 }  // namespace isomesh::mesh

@@ -51,6 +51,7 @@ void extract_walls(const Lattice<T>& lattice, const SeparateOptions& options,
   mesh.on_line.assign((count.vertices() + kFlagBits - 1) / kFlagBits, 0);
   surface.sides.resize_for_overwrite(count.triangles());
   surface.labels = options.labels;
+  surface.parts = LabelParts(options.labels, options.values);
   if (count.vertices() == 0) return context.throw_if_stopped();
 
   write_pass(Separation<T>(lattice, options), kSlotPlaces, context, mesh, surface);

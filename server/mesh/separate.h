@@ -15,11 +15,13 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include "server/mesh/buffer.h"
 #include "server/mesh/context.h"
 #include "server/mesh/extract.h"
+#include "server/mesh/label_parts.h"
 #include "server/mesh/lattice.h"
 #include "server/mesh/mesh.h"
 
@@ -35,14 +37,18 @@ struct SeparateOptions {
   std::vector<std::int64_t> labels;
   Scheme scheme = Scheme::kSix;
   bool close = false;  // cap labels where they meet the lattice's border
+  // Of labels that are not the samples of their own value: all values whose samples belong to them.
+  // One value may belong to several labels; what overlaps is separated from what does not.
+  std::map<std::int64_t, std::vector<std::int64_t>> values = {};
 };
 
-// The labels on the two sides of a triangle, by their numbers: 0 is the background, and 1 is the
-// first of SeparateOptions::labels. A triangle is counter-clockwise seen from `front`, which is the
-// smaller number: so the background is always in front.
+// What is on the two sides of a triangle, by the numbers of LabelParts: 0 is the background, and 1
+// is the first of SeparateOptions::labels where none of them has other values. A triangle is
+// counter-clockwise seen from `front`, which is the smaller number: so the background is always in
+// front.
 struct WallSides {
-  std::uint16_t front = 0;
-  std::uint16_t back = 0;
+  PartNumber front = 0;
+  PartNumber back = 0;
 
   bool operator==(const WallSides&) const = default;
 };
@@ -54,7 +60,8 @@ struct WallSides {
 struct SeparatingSurface {
   Mesh mesh;
   Buffer<WallSides> sides;           // of each triangle
-  std::vector<std::int64_t> labels;  // by number less one
+  std::vector<std::int64_t> labels;  // ascending
+  LabelParts parts;                  // whose sides these are
 };
 
 // Counts without writing; exact. A lattice without cells, or with one label alone and not closed,
@@ -63,8 +70,9 @@ template <class T>
 SurfaceCount count_walls(const Lattice<T>& lattice, const SeparateOptions& options,
                          const Context& context);
 
-// How many triangles the surface of each label alone has (label_surface.h), by its number: 0 is the
-// background. Without writing; exact. Takes as many counts for each of some tasks. Thread safe.
+// How many triangles the surface of each label alone has (label_surface.h), by its place in
+// SeparateOptions::labels from 1 on. Without writing; exact. Takes as many counts for each of some
+// tasks. Thread safe.
 // Throws Error kCancelled.
 template <class T>
 std::vector<std::uint64_t> count_label_triangles(const Lattice<T>& lattice,

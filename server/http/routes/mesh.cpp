@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -63,6 +64,11 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
   if (parameters.formats.size() != 1) {
     throw invalid_parameter("format", "must be one format: the answer is one file");
   }
+  const auto& labels = parameters.labels;
+  if (labels && labels->values.size() != 1 && files_of(parameters) != parameters.formats) {
+    throw invalid_parameter("format", "must hold all labels, as glb, ply, obj and zip do: the "
+                                      "answer is one file");
+  }
   const process::ImportOptions options = import_options_of(request);
   const std::string key = idempotency_key_of(request);
   const auto place = place_for_upload(app, request);
@@ -84,7 +90,7 @@ std::optional<Continuation> mesh_in_one(App& app, const Request& request, Respon
     if (!is_final(job.state) && app.stopping) {
       throw Error(ErrorCode::kUnavailable, "the service is shutting down");
     }
-    answer_mesh(app, asked, out, job, job.parameters.formats.front());
+    answer_mesh(app, asked, out, job, {job.parameters.formats.front(), std::nullopt});
   };
   const Job job = submit_with_volume(app, request, response);
   auto continuation = answer_at_end(app, request, response, job, kLongestJob, answer);
@@ -97,9 +103,59 @@ std::optional<Continuation> mesh_in_one(App& app, const Request& request, Respon
   return continuation;
 }
 
+// The bytes of a file: a blob, or a part of one.
+struct Stored {
+  std::string blob;
+  std::uint64_t begin = 0;
+  std::uint64_t bytes = 0;
+  std::string sha256;
+  std::string name;  // for those who save it
+};
+
+std::string listed_labels(const std::vector<LabelSummary>& labels) {
+  constexpr std::size_t kMostNamed = 50;
+  std::string text;
+  for (std::size_t n = 0; n < std::min(labels.size(), kMostNamed); ++n) {
+    text += (n == 0 ? "" : ", ") + std::to_string(labels[n].label);
+    if (labels[n].name) text += " (" + *labels[n].name + ')';
+  }
+  const std::size_t more = labels.size() - std::min(labels.size(), kMostNamed);
+  return more == 0 ? text : text + " and " + std::to_string(more) + " more";
+}
+
+const LabelSummary& label_of(const MeshSummary& mesh, const WhichMesh& which) {
+  if (mesh.labels.empty()) throw invalid_parameter("label", "is for jobs by labels");
+  if (!which.label && mesh.labels.size() == 1) return mesh.labels.front();
+  const auto found = std::ranges::find(mesh.labels, which.label.value_or(0), &LabelSummary::label);
+  if (!which.label || found == mesh.labels.end()) {
+    throw invalid_parameter("label", "must be one of " + listed_labels(mesh.labels));
+  }
+  return *found;
+}
+
+Stored stored_mesh(const MeshSummary& mesh, const WhichMesh& which) {
+  const std::string suffix(to_string(which.format));
+  const auto whole = mesh.files.find(which.format);
+  if (!which.label && whole != mesh.files.end()) {
+    const MeshFile& file = whole->second;
+    return {file.sha256, 0, file.bytes, file.sha256, "mesh." + suffix};
+  }
+  const auto zipped = [&](const LabelSummary& label) { return label.files.contains(which.format); };
+  if (which.label || std::ranges::any_of(mesh.labels, zipped)) {
+    const LabelSummary& label = label_of(mesh, which);
+    if (const auto found = label.files.find(which.format); found != label.files.end()) {
+      const LabelFile& file = found->second;
+      return {mesh.files.at(MeshFormat::kZip).sha256, file.offset, file.bytes, file.sha256,
+              "mesh-" + std::to_string(label.label) + '.' + suffix};
+    }
+  }
+  throw Error(ErrorCode::kNotFound, "the job was not asked for the format \"" + suffix + '"' +
+                                        (which.label ? " of each label" : ""));
+}
+
 // Has a damaged file made again, and says what becomes of that.
-void check_intact(const App& app, const Job& job, const MeshFile& file) {
-  if (store::is_there_and_intact(app.services.blobs, file.sha256, {})) return;
+void check_intact(const App& app, const Job& job, const Stored& file) {
+  if (store::is_there_and_intact(app.services.blobs, file.blob, {})) return;
   spdlog::error("the mesh of job {} is damaged", job.id);
   const Job again = app.services.jobs.remake(job.id);
   if (again.error) throw to_error(*again.error);
@@ -109,7 +165,7 @@ void check_intact(const App& app, const Job& job, const MeshFile& file) {
 }  // namespace
 
 void answer_mesh(const App& app, const Request& request, Response& response, const Job& job,
-                 MeshFormat format) {
+                 const WhichMesh& which) {
   if (job.error) throw to_error(*job.error);
   if (job.state == JobState::kCancelled) {
     throw Error(ErrorCode::kCancelled, "the job was cancelled and has no mesh");
@@ -118,12 +174,7 @@ void answer_mesh(const App& app, const Request& request, Response& response, con
     throw Error(ErrorCode::kNotReady,
                 "the job is " + std::string(to_string(job.state)) + ": its mesh is not ready");
   }
-  const std::string name(to_string(format));
-  const auto found = job.mesh->files.find(format);
-  if (found == job.mesh->files.end()) {
-    throw Error(ErrorCode::kNotFound, "the job was not asked for the format \"" + name + '"');
-  }
-  const MeshFile& file = found->second;
+  const Stored file = stored_mesh(*job.mesh, which);
   const std::string etag = '"' + file.sha256 + '"';
   const bool is_read = request.method != "POST";
   if (is_read) check_if_match(request, etag);
@@ -146,22 +197,25 @@ void answer_mesh(const App& app, const Request& request, Response& response, con
                                              std::to_string(range.first + range.length - 1) + '/' +
                                              std::to_string(file.bytes));
   }
-  response.set_header("Content-Disposition", "attachment; filename=\"mesh." + name + '"');
-  response.stream = {.source = blob_source(app.services.blobs.open(file.sha256), range),
-                     .media_type = std::string(codec::describe(format).media_type),
+  response.set_header("Content-Disposition", "attachment; filename=\"" + file.name + '"');
+  const ByteRange in_blob = {file.begin + range.first, range.length};
+  response.stream = {.source = blob_source(app.services.blobs.open(file.blob), in_blob),
+                     .media_type = std::string(codec::describe(which.format).media_type),
                      .framing = Framing::kLength,
                      .length = range.length};
 }
 
 void add_mesh_routes(App& app) {
   add_get(app, "/v1/jobs/{id}/mesh.{format}", [&app](const auto& request, auto& response) {
-    check_known(request, {});
+    check_known(request, {"label"});
     const auto format = from_string<MeshFormat>(request.path_parameter("format"));
     if (!format) {
       throw Error(ErrorCode::kNotFound, "a mesh has the suffix " + names_of<MeshFormat>());
     }
+    WhichMesh which = {*format, std::nullopt};
+    if (request.has_parameter("label")) which.label = whole_number_of(request, "label", 0);
     answer_mesh(app, request, response,
-                app.services.jobs.get(viewer_of(request), request.path_parameter("id")), *format);
+                app.services.jobs.get(viewer_of(request), request.path_parameter("id")), which);
   });
   add_post(app, "/v1/mesh", [&app](const auto& request, auto& response) {
     return mesh_in_one(app, request, response);

@@ -98,9 +98,15 @@ std::optional<Continuation> answer_at_end(App& app, const Request& request, Resp
                                           const Job& job, std::chrono::milliseconds wait,
                                           const JobAnswer& answer);
 
+// Which file of a finished job.
+struct WhichMesh {
+  MeshFormat format = MeshFormat::kDrc;
+  std::optional<std::int64_t> label = {};  // one label's own
+};
+
 // Answers with a finished job's mesh file: entity tag, one range, timings.
 void answer_mesh(const App& app, const Request& request, Response& response, const Job& job,
-                 MeshFormat format);
+                 const WhichMesh& which);
 
 void add_volume_routes(App& app);
 void add_job_routes(App& app);

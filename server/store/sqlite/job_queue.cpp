@@ -276,6 +276,11 @@ void SqliteJobStore::succeed(Change& change, Row& row, const MeshSummary& mesh) 
     change->run("INSERT OR IGNORE INTO meshes VALUES(?, ?, ?)", row.job.id, file.sha256,
                 file.bytes);
   }
+  for (LabelSummary& label : row.job.mesh->labels) {
+    for (auto& [format, file] : label.files) {
+      file.href = mesh_path(row.job.id, format, label.label);
+    }
+  }
   end(change, row, JobState::kSucceeded);
 }
 

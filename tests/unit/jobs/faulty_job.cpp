@@ -39,7 +39,7 @@ void die() {
 
 JobAnswer empty_answer(JobOrder::Work work) {
   if (work == JobOrder::Work::kMesh) return MadeMesh{};
-  return mesh::SurfaceSize{};
+  return CountedSurface{};
 }
 
 void work(const JobOrder& order) {

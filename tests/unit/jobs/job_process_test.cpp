@@ -91,7 +91,7 @@ TEST_F(JobProcessTest, CountsTheSurfaceThatItWouldMake) {
   JobOrder order = order_of(sphere, 0);
   const MadeMesh made = make(process_, order);
   order.work = JobOrder::Work::kCount;
-  const mesh::SurfaceSize size = process_.count(order, {});
+  const mesh::SurfaceSize size = process_.count(order, {}).size;
   EXPECT_EQ(size.triangles, made.summary.triangles);
   EXPECT_EQ(size.vertices, made.summary.vertices);
   EXPECT_GT(size.layers, 0U);

@@ -1,0 +1,134 @@
+#include "server/codec/encode_labels.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "proto/error.h"
+#include "server/codec/block_writer.h"
+#include "server/codec/records.h"
+
+namespace isomesh::codec {
+namespace {
+
+constexpr std::size_t kFaceBytes = kPlyFaceBytes + sizeof(std::uint32_t);
+
+std::size_t faces_of(const LabelledSurface& surface) {
+  std::size_t faces = 0;
+  for (std::size_t n = 1; n <= surface.labels.size(); ++n) faces += surface.triangles.of(n).size();
+  return faces;
+}
+
+// Of the label's own surface, turned outward.
+mesh::Triangle face_of(const LabelledSurface& surface, std::size_t number, std::uint32_t triangle) {
+  const mesh::Triangle& wall = surface.walls.mesh.triangles[triangle];
+  const bool is_inside_out =
+      surface.walls.parts.belongs(surface.walls.sides[triangle].front, number);
+  return is_inside_out ? mesh::Triangle{wall[0], wall[2], wall[1]} : wall;
+}
+
+// One colour of the series after the other is a golden section of the circle of hues away.
+std::array<double, 3> series_color(std::int64_t label) {
+  constexpr double kGoldenSection = 0.6180339887498949;
+  constexpr double kSaturation = 0.5;
+  constexpr double kValue = 0.9;
+  const double turns = static_cast<double>(label) * kGoldenSection;
+  const double hue = 6 * (turns - std::floor(turns));
+  std::array<double, 3> color;
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    // A. R. Smith's hexcone (1978), in the form that needs no cases.
+    const double k = std::fmod(5 - 2 * static_cast<double>(channel) + hue, 6);
+    color[channel] =
+        kValue * (1 - kSaturation * std::max(0.0, std::min({k, 4 - k, 1.0})));
+  }
+  return color;
+}
+
+}  // namespace
+
+std::string title_of(const LabelSummary& label) {
+  return label.name.value_or("label " + std::to_string(label.label));
+}
+
+std::array<double, 3> color_of(const LabelSummary& label) {
+  if (!label.color || label.color->size() != 7) return series_color(label.label);
+  std::array<double, 3> color;
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    unsigned byte = 0;
+    const char* digits = label.color->data() + 1 + 2 * channel;
+    std::from_chars(digits, digits + 2, byte, 16);
+    color[channel] = byte / 255.0;
+  }
+  return color;
+}
+
+void encode_labels_ply(const LabelledSurface& surface, const mesh::Context& context,
+                       const Sink& sink) {
+  context.throw_if_stopped();
+  const mesh::Mesh& mesh = surface.walls.mesh;
+  const std::size_t faces = faces_of(surface);
+  const bool is_wide = !surface.labels.empty() &&
+                       surface.labels.back().label > std::numeric_limits<std::int32_t>::max();
+  const std::string header = ply_header(
+      mesh.positions.size(), faces, is_wide ? "property uint label\n" : "property int label\n");
+  sink(std::as_bytes(std::span(header)));
+  BlockWriter writer(context, sink, mesh.positions.size() + faces);
+  writer.write(mesh.positions.size(), kPlyVertexBytes, [&](std::size_t v, std::byte* out) {
+    return write_ply_vertex(mesh.positions[v], out);
+  });
+  for (std::size_t n = 1; n <= surface.labels.size(); ++n) {
+    const auto label = static_cast<std::uint32_t>(surface.labels[n - 1].label);  // or of an int
+    const auto own = surface.triangles.of(n);
+    writer.write(own.size(), kFaceBytes, [&](std::size_t t, std::byte* out) {
+      out = write_ply_face(face_of(surface, n, own[t]), out);
+      std::memcpy(out, &label, sizeof label);
+      return out + sizeof label;
+    });
+  }
+}
+
+void encode_labels_obj(const LabelledSurface& surface, const mesh::Context& context,
+                       const Sink& sink) {
+  context.throw_if_stopped();
+  const mesh::Mesh& mesh = surface.walls.mesh;
+  sink(std::as_bytes(std::span(kObjHeader)));
+  BlockWriter writer(context, sink, mesh.positions.size() + faces_of(surface));
+  writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
+    return write_obj_vertex(mesh.positions[v], out);
+  });
+  for (std::size_t n = 1; n <= surface.labels.size(); ++n) {
+    std::string group = "g " + title_of(surface.labels[n - 1]);
+    // A blank would begin another group's name.
+    std::replace_if(group.begin() + 2, group.end(), [](char c) { return c == ' ' || c == '\t'; }, '_');
+    group += '\n';
+    sink(std::as_bytes(std::span(group)));
+    const auto own = surface.triangles.of(n);
+    writer.write(own.size(), kMostObjFaceBytes, [&](std::size_t t, std::byte* out) {
+      return write_obj_face(face_of(surface, n, own[t]), out);
+    });
+  }
+}
+
+void encode_labels(const LabelledSurface& surface, MeshFormat format, const Provenance& provenance,
+                   const mesh::Context& context, const Sink& sink) {
+  switch (format) {
+    case MeshFormat::kGlb:
+      return encode_labels_glb(surface, provenance, context, sink);
+    case MeshFormat::kPly:
+      return encode_labels_ply(surface, context, sink);
+    case MeshFormat::kObj:
+      return encode_labels_obj(surface, context, sink);
+    case MeshFormat::kDrc:
+    case MeshFormat::kStl:
+    case MeshFormat::kZip:
+      break;
+  }
+  throw Error(ErrorCode::kInternal, "a file of that format does not hold all labels");
+}
+
+}  // namespace isomesh::codec

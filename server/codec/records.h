@@ -1,0 +1,31 @@
+// The records that files of one surface and files of labels are made of; private to this folder.
+// Each function writes one record at `out`, where there is room for it, and returns where it ends.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include "server/mesh/mesh.h"
+
+namespace isomesh::codec {
+
+// Up to and with "end_header". `of_faces`: lines of the faces' properties behind their vertices.
+std::string ply_header(std::size_t vertices, std::size_t faces, std::string_view of_faces);
+
+inline constexpr std::size_t kPlyVertexBytes = sizeof(mesh::Vec3);
+inline constexpr std::size_t kPlyFaceBytes = 1 + sizeof(mesh::Triangle);  // without properties
+std::byte* write_ply_vertex(const mesh::Vec3& position, std::byte* out);
+std::byte* write_ply_face(const mesh::Triangle& triangle, std::byte* out);
+
+inline constexpr std::string_view kObjHeader = "# isomesh, millimetres, LPS\n";
+// Without an exponent, which some readers do not know: a sign, up to 39 digits before the point, or
+// a point and up to 54 digits behind it.
+inline constexpr std::size_t kMostFloatBytes = 64;
+inline constexpr std::size_t kMostIndexBytes = 10;
+inline constexpr std::size_t kMostObjVertexBytes = 2 + 3 * (1 + kMostFloatBytes);
+inline constexpr std::size_t kMostObjFaceBytes = 2 + 3 * (1 + kMostIndexBytes);
+std::byte* write_obj_vertex(const mesh::Vec3& position, std::byte* out);
+std::byte* write_obj_face(const mesh::Triangle& triangle, std::byte* out);
+
+}  // namespace isomesh::codec

@@ -1,0 +1,185 @@
+#include "server/codec/zip/label_zip.h"
+
+#include <algorithm>
+#include <exception>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+
+#include <archive.h>
+#include <archive_entry.h>
+
+#include "base/hex.h"
+#include "base/sha256.h"
+#include "proto/error.h"
+#include "server/codec/draco/grid.h"
+#include "server/mesh/label_surface.h"
+#include "server/mesh/parallel.h"
+
+namespace isomesh::codec {
+namespace {
+
+// Labels are encoded side by side, some at a time, until they have so many triangles together.
+constexpr std::size_t kTrianglesAtOnce = 1'000'000;
+constexpr std::size_t kLabelsAtOnce = 256;
+
+// A ZIP whose bytes go to a sink at once, so that it is known where each file begins.
+class ZipWriter {
+ public:
+  explicit ZipWriter(const Sink& sink) : sink_(sink), archive_(archive_write_new()) {
+    check(archive_ ? archive_write_set_format_zip(archive_.get()) : ARCHIVE_FATAL);
+    check(archive_write_set_options(archive_.get(), "zip:compression=store,zip:hdrcharset=UTF-8"));
+    check(archive_write_set_bytes_per_block(archive_.get(), 0));
+    check(archive_write_open(archive_.get(), this, nullptr, write, nullptr));
+  }
+
+  // Returns where the file's bytes begin.
+  std::uint64_t add(const std::string& name, std::span<const std::byte> bytes) {
+    const std::unique_ptr<archive_entry, Free> entry(archive_entry_new());
+    check(entry ? ARCHIVE_OK : ARCHIVE_FATAL);
+    archive_entry_set_pathname_utf8(entry.get(), name.c_str());
+    archive_entry_set_filetype(entry.get(), AE_IFREG);
+    archive_entry_set_perm(entry.get(), 0644);
+    archive_entry_set_size(entry.get(), static_cast<la_int64_t>(bytes.size()));
+    check(archive_write_header(archive_.get(), entry.get()));
+    const std::uint64_t begin = written_;
+    const la_ssize_t taken = archive_write_data(archive_.get(), bytes.data(), bytes.size());
+    check(taken == static_cast<la_ssize_t>(bytes.size()) ? ARCHIVE_OK : ARCHIVE_FATAL);
+    return begin;
+  }
+
+  void finish() { check(archive_write_close(archive_.get())); }
+
+ private:
+  struct Free {
+    void operator()(archive* all) const { archive_write_free(all); }
+    void operator()(archive_entry* entry) const { archive_entry_free(entry); }
+  };
+
+  // An exception may not pass through the library.
+  static la_ssize_t write(archive* /*all*/, void* self, const void* bytes, std::size_t count) {
+    auto& writer = *static_cast<ZipWriter*>(self);
+    if (writer.failure_) return -1;
+    try {
+      writer.sink_(std::span(static_cast<const std::byte*>(bytes), count));
+    } catch (...) {
+      writer.failure_ = std::current_exception();
+      return -1;
+    }
+    writer.written_ += count;
+    return static_cast<la_ssize_t>(count);
+  }
+
+  void check(int status) const {
+    if (failure_) std::rethrow_exception(failure_);
+    if (status == ARCHIVE_OK) return;
+    const char* reason = archive_ ? archive_error_string(archive_.get()) : nullptr;
+    throw Error(ErrorCode::kInternal, std::string("a ZIP could not be written: ") +
+                                          (reason == nullptr ? "no memory" : reason));
+  }
+
+  const Sink& sink_;
+  std::uint64_t written_ = 0;
+  std::exception_ptr failure_;
+  std::unique_ptr<archive, Free> archive_;
+};
+
+// What a file is called: no path, nothing that a system has a use for, and no two alike, whether or
+// not capitals count.
+class FileNames {
+ public:
+  std::string of(const LabelSummary& label) {
+    std::string name;
+    for (const char c : title_of(label)) {
+      const bool is_plain =
+          static_cast<unsigned char>(c) >= ' ' && std::string_view("/\\:*?\"<>|").find(c) ==
+                                                      std::string_view::npos;
+      name += is_plain ? c : '_';
+    }
+    while (!name.empty() && (name.back() == '.' || name.back() == ' ')) name.pop_back();
+    if (name.starts_with('.') || name.empty()) name.insert(name.begin(), '_');
+    const std::string title = name;
+    for (int more = 0; !taken_.insert(lowered(name)).second; ++more) {
+      name = title + '-' + std::to_string(label.label) + (more == 0 ? "" : '-' + std::to_string(more));
+    }
+    return name;
+  }
+
+ private:
+  static std::string lowered(std::string name) {
+    for (char& c : name) {
+      if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    }
+    return name;
+  }
+
+  std::set<std::string> taken_;
+};
+
+struct Encoded {
+  std::vector<std::byte> bytes;
+  std::string sha256;
+};
+
+Encoded encode_one(const mesh::Mesh& mesh, MeshFormat format, const Grid& grid,
+                   const Provenance& provenance, const mesh::Context& context) {
+  Encoded encoded;
+  Sha256 hash;
+  const Sink sink = [&](std::span<const std::byte> piece) {
+    encoded.bytes.insert(encoded.bytes.end(), piece.begin(), piece.end());
+    hash.update(piece);
+  };
+  if (format == MeshFormat::kDrc) {
+    encode_drc(mesh, provenance.parameters.draco, context, sink, &grid);
+  } else {
+    encode(mesh, format, provenance, context, sink);
+  }
+  encoded.sha256 = to_hex(hash.finish());
+  return encoded;
+}
+
+}  // namespace
+
+std::vector<LabelFiles> encode_labels_zip(const LabelledSurface& surface,
+                                          std::span<const MeshFormat> formats,
+                                          const Provenance& provenance,
+                                          const mesh::Context& context, const Sink& sink) {
+  const Grid grid = grid_of(surface.walls.mesh, provenance.parameters.draco.position_bits);
+  const mesh::Context quiet = {context.stop, nullptr};
+  const std::size_t labels = surface.labels.size();
+  std::vector<LabelFiles> files(labels);
+  FileNames names;
+  ZipWriter zip(sink);
+  for (std::size_t begin = 0, end = 0; begin < labels; begin = end) {
+    for (std::size_t triangles = 0;
+         end < labels && end - begin < kLabelsAtOnce && triangles < kTrianglesAtOnce; ++end) {
+      triangles += surface.triangles.of(end + 1).size();
+    }
+    std::vector<std::vector<Encoded>> encoded(end - begin);
+    mesh::parallel_for(quiet, encoded.size(), [&](std::size_t task) {
+      mesh::Mesh mesh;
+      extract_label(surface.walls, surface.triangles, begin + task + 1, mesh);
+      for (const MeshFormat format : formats) {
+        encoded[task].push_back(encode_one(mesh, format, grid, provenance, quiet));
+      }
+    });
+    for (std::size_t n = begin; n < end; ++n) {
+      const std::string name = names.of(surface.labels[n]);
+      for (std::size_t f = 0; f < formats.size(); ++f) {
+        Encoded& file = encoded[n - begin][f];
+        const std::string suffix(to_string(formats[f]));
+        const std::uint64_t offset = zip.add(name + '.' + suffix, file.bytes);
+        files[n][formats[f]] = {.bytes = file.bytes.size(),
+                                .sha256 = std::move(file.sha256),
+                                .offset = offset,
+                                .href = {}};
+      }
+    }
+    if (context.progress) context.progress(static_cast<double>(end) / static_cast<double>(labels));
+  }
+  zip.finish();
+  return files;
+}
+
+}  // namespace isomesh::codec

@@ -1,0 +1,82 @@
+#include "server/jobs/mesh_cost.h"
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "server/codec/encode.h"
+#include "server/mesh/label_parts.h"
+#include "server/mesh/separate.h"
+
+namespace isomesh::jobs {
+namespace {
+
+std::uint64_t mesh_bytes(const mesh::SurfaceSize& surface) {
+  return surface.vertices * sizeof(mesh::Vec3) + surface.triangles * sizeof(mesh::Triangle);
+}
+
+// What labels take beside their walls: whose sides the triangles are, which triangles are whose,
+// and, at worst, all labels' own surfaces at once. A triangle is in two of them at most.
+std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
+  return surface.triangles * (sizeof(mesh::WallSides) + 2 * sizeof(std::uint32_t)) +
+         2 * mesh_bytes(surface);
+}
+
+// What the files take at least.
+std::uint64_t least_file_bytes(const mesh::SurfaceSize& surface, const MeshParameters& parameters) {
+  double bytes = 0;
+  for (const MeshFormat format : files_of(parameters)) {
+    const double guess = codec::describe(format).bytes(surface, parameters);
+    bytes += format == MeshFormat::kStl ? guess : guess / 2;
+  }
+  return static_cast<std::uint64_t>(bytes);
+}
+
+}  // namespace
+
+mesh::SmoothOptions smooth_options(const MeshParameters& parameters) {
+  const bool is_taubin = parameters.smoothing == Smoothing::kTaubin;
+  const double lambda = parameters.lambda.value_or(default_lambda(parameters.smoothing));
+  return {.passes = parameters.passes,
+          .lambda = lambda,
+          .mu = is_taubin ? mesh::taubin_mu(lambda, parameters.pass_band) : 0,
+          .max_displacement_mm =
+              parameters.max_displacement_mm.value_or(std::numeric_limits<double>::infinity())};
+}
+
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters) {
+  std::uint64_t encoding = surface.vertices * 2 * sizeof(std::uint32_t);  // measured meanwhile
+  for (const MeshFormat format : files_of(parameters)) {
+    encoding += codec::describe(format).memory_bytes(surface, parameters);
+  }
+  const std::uint64_t smoothing = smoothing_memory(smooth_options(parameters), surface);
+  return mesh_bytes(surface) + smoothing +
+         (parameters.labels ? 2 * encoding + label_bytes(surface) : encoding);
+}
+
+void check_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
+                  std::uint64_t allowed_bytes) {
+  const std::uint64_t needed = estimate_memory(surface, parameters);
+  if (needed <= allowed_bytes) return;
+  constexpr std::uint64_t kMebibyte = 1 << 20;
+  throw Error(ErrorCode::kTooLarge,
+              "the surface has " + std::to_string(surface.triangles) + " triangles and " +
+                  std::to_string(surface.vertices) + " vertices; the job would take about " +
+                  std::to_string(needed / kMebibyte) + " MiB of memory, and " +
+                  std::to_string(allowed_bytes / kMebibyte) + " MiB are allowed");
+}
+
+void check_disk(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
+                std::uint64_t allowed_bytes) {
+  const std::uint64_t needed = least_file_bytes(surface, parameters);
+  if (needed <= allowed_bytes) return;
+  constexpr std::uint64_t kKibibyte = 1 << 10;
+  throw Error(ErrorCode::kTooLarge,
+              "the surface has " + std::to_string(surface.triangles) +
+                  " triangles; its files would take " + std::to_string(needed / kKibibyte) +
+                  " KiB or more, and the disk can never hold more than " +
+                  std::to_string(allowed_bytes / kKibibyte) + " KiB of them");
+}
+
+}  // namespace isomesh::jobs
