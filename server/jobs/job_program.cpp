@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "base/mutex.h"
+#include "base/niceness.h"
 #include "server/jobs/job_message.h"
 #include "server/jobs/make_labels.h"
 #include "server/jobs/make_mesh.h"
@@ -228,6 +229,7 @@ const char* __tsan_default_options() { return "halt_on_error=1"; }
 #endif
 
 int main() {
+  be_nicer(kComputingNiceness);
   keep_freed_memory();
   Lines lines;
   const JobSetup setup = setup_from(lines.next());

@@ -10,6 +10,8 @@
 #include <sys/epoll.h>
 #include <unistd.h>
 
+#include "base/niceness.h"
+
 namespace isomesh::net {
 namespace {
 
@@ -17,8 +19,6 @@ constexpr int kMostEvents = 128;
 constexpr int kTickMilliseconds = 1000;  // how often sources and deadlines are looked at
 constexpr std::size_t kBytesPerTurn = std::size_t{1} << 20;  // then it is the next one's turn
 constexpr std::size_t kMostIgnored = std::size_t{64} << 20;
-// Of the computing threads: whoever asks for what is there already goes before.
-constexpr int kNiceness = 10;
 constexpr std::uint64_t kWakeup = 0;  // what epoll calls it; responses have higher numbers
 
 // An exception of one source must not end the thread that serves all.
@@ -55,7 +55,8 @@ bool is_sent(Response& response, bool request_is_whole) {
 Sender::Sender(const SenderLimits& limits)
     : limits_(limits),
       epoll_(new_epoll()),
-      computing_(limits.computing_threads, std::numeric_limits<std::size_t>::max(), kNiceness) {
+      computing_(limits.computing_threads, std::numeric_limits<std::size_t>::max(),
+                 kComputingNiceness) {
   epoll_event event = {};
   event.events = EPOLLIN;
   event.data.u64 = kWakeup;

@@ -1,11 +1,9 @@
 #include "server/net/task_queue.h"
 
 #include <algorithm>
-#include <tuple>
 #include <utility>
 
-#include <unistd.h>
-
+#include "base/niceness.h"
 #include "base/share.h"
 
 namespace isomesh::net {
@@ -14,8 +12,7 @@ BoundedTaskQueue::BoundedTaskQueue(std::size_t threads, std::size_t capacity, in
     : capacity_(capacity), idle_(threads) {
   for (std::size_t i = 0; i < threads; ++i) {
     threads_.emplace_back([this, niceness] {
-      // On Linux of this thread alone. It is refused to nobody, and what it returns is no error.
-      std::ignore = ::nice(niceness);
+      be_nicer(niceness);
       work();
     });
   }

@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
+#include "base/niceness.h"
 #include "proto/error.h"
 
 namespace isomesh::process {
@@ -83,6 +84,7 @@ pid_t fork_sibling() {
 
 void become_copy(Descriptor socket, const std::function<void()>& work) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  be_nicer(kImportNiceness);
   if (::dup2(socket.number(), kChildDescriptor) != kChildDescriptor) std::_Exit(EXIT_FAILURE);
   if (socket.number() != kChildDescriptor) socket = Descriptor();
   work();

@@ -12,8 +12,8 @@ namespace isomesh::process {
 
 // The side of the program: serves the socket kChildDescriptor until its other end is closed, and
 // ends the process then. `work` runs in each copy, which ends after it; the copy's
-// kChildDescriptor is a socket of its own, and it dies with the daemon. Needs a process with one
-// thread, which start_program has started.
+// kChildDescriptor is a socket of its own, it is nicer by kImportNiceness (base/niceness.h), and it
+// dies with the daemon. Needs a process with one thread, which start_program has started.
 [[noreturn]] void serve_copies(const std::function<void()>& work);
 
 // The side of the daemon: a copy, which is a child of this process, not of `server`. The thread

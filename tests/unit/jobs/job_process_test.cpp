@@ -1,5 +1,6 @@
 #include "server/jobs/job_process.h"
 
+#include <algorithm>
 #include <csignal>
 #include <optional>
 #include <set>
@@ -12,6 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/niceness.h"
 #include "tests/support/errors.h"
 #include "tests/support/process.h"
 #include "tests/unit/jobs/faulty_job.h"
@@ -66,6 +68,16 @@ class JobProcessTest : public test::JobsFixture {
   JobProcess process_{job_program()};
   JobProcess faulty_{job_program(FAULTY_JOB)};
 };
+
+// Requests go before meshes where the processors are busy.
+TEST_F(JobProcessTest, ItsProcessIsNicerThanTheDaemon) {
+  make(process_, order_of(add_sphere(), 0.5));
+  for (const pid_t process : started()) {
+    EXPECT_EQ(::getpriority(PRIO_PROCESS, static_cast<id_t>(process)),
+              std::min(::getpriority(PRIO_PROCESS, 0) + kComputingNiceness, 19));
+  }
+  EXPECT_EQ(started().size(), 1U);
+}
 
 TEST_F(JobProcessTest, MakesOneMeshAfterTheOtherInTheSameProcess) {
   const Volume sphere = add_sphere();

@@ -6,6 +6,7 @@
 
 #include <dirent.h>
 #include <sys/auxv.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "base/hex.h"
@@ -48,8 +49,9 @@ void answer() {
   if (question == "hang") {
     for (;;) ::pause();
   }
-  const std::string text = question == "which"
-                               ? random_of_this_program()
+  const std::string text = question == "which" ? random_of_this_program()
+                           : question == "niceness"
+                               ? std::to_string(::getpriority(PRIO_PROCESS, 0))
                                : "questions " + std::to_string(questions) + ", descriptors " +
                                      std::to_string(open_descriptors());
   if (::write(kChildDescriptor, text.data(), text.size()) < 0) ::_exit(1);

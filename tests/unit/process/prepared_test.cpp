@@ -11,9 +11,11 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/niceness.h"
 #include "proto/error.h"
 #include "server/process/fork_server.h"
 #include "tests/support/files.h"
@@ -44,6 +46,13 @@ TEST(PreparedProcesses, EachIsACopyThatWasNeverUsed) {
     ASSERT_TRUE(status);
     EXPECT_EQ(*status, 0);
   }
+}
+
+// Whoever asks for what is there already goes before those who bring something.
+TEST(PreparedProcesses, AreNicerThanTheirParent) {
+  PreparedProcesses prepared(COPIED_PROGRAM, 1);
+  const int nicer = std::min(::getpriority(PRIO_PROCESS, 0) + kImportNiceness, 19);
+  EXPECT_EQ(answer_of(prepared.take(), "niceness"), std::to_string(nicer));
 }
 
 TEST(PreparedProcesses, AreNeverMoreThanWereAskedForAndTheirProgram) {
