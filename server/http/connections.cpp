@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "base/niceness.h"
 #include "server/http/library.h"
 #include "server/net/address.h"
 
@@ -29,7 +30,7 @@ struct Connections::Exchange {
         body(connection, limits, stopping),
         request(request_of(connection)) {}
 
-  const std::string party;
+  std::string party;
   net::IncomingBody body;
   Request request;
   Response response;
@@ -44,6 +45,7 @@ Connections::~Connections() { close(std::chrono::milliseconds(0)); }
 
 void Connections::open(int listening) {
   sender_.emplace(options_.sender);
+  computing_.emplace(options_.computing_threads, options_.backlog, kComputingNiceness);
   tasks_.emplace(options_.threads, options_.backlog);
   parked_.emplace(handlers_.has_ended);
   acceptor_.emplace(
@@ -67,6 +69,7 @@ void Connections::close(std::chrono::milliseconds patience) {
   if (acceptor_) acceptor_->stop();
   if (parked_) parked_->close();
   if (tasks_) tasks_->shutdown();
+  if (computing_) computing_->shutdown();
   if (sender_) sender_->stop(patience);
 }
 
@@ -78,12 +81,16 @@ void Connections::refuse(std::unique_ptr<net::ByteStream> stream, const std::str
       false);
 }
 
+void Connections::refuse_one_of_many(Exchange& exchange) {
+  refuse(exchange.body.take_stream(), exchange.request.remote_address,
+         {ErrorCode::kUnavailable, "too many requests are under way"});
+}
+
 void Connections::enqueue(const std::shared_ptr<Exchange>& exchange, const Answer& answer) {
   if (tasks_->try_enqueue(exchange->party, [this, exchange, answer] { serve(exchange, answer); })) {
     return;
   }
-  refuse(exchange->body.take_stream(), exchange->request.remote_address,
-         {ErrorCode::kUnavailable, "too many requests are under way"});
+  refuse_one_of_many(*exchange);
 }
 
 void Connections::serve(const std::shared_ptr<Exchange>& exchange, const Answer& answer) {
@@ -91,6 +98,7 @@ void Connections::serve(const std::shared_ptr<Exchange>& exchange, const Answer&
   WrittenResponse written =
       pass_through_library(exchange->request, exchange->body, exchange->response,
                            [&] { continuation = answer(*exchange); });
+  if (continuation && continuation->computing_for) return compute(exchange, *continuation);
   if (continuation) return park(exchange, *continuation);
   if (handlers_.on_answered) {
     handlers_.on_answered(exchange->request, exchange->response,
@@ -121,15 +129,28 @@ void Connections::park(const std::shared_ptr<Exchange>& exchange,
   parked_->park(std::move(parked));
 }
 
-// The library sees the request once more, to write the response. A request that was accepted has
-// its turn however many wait, unless the service ends.
-void Connections::go_on(const std::shared_ptr<Exchange>& exchange, const Resume& resume) {
-  const bool has_turn = tasks_->enqueue_rest(exchange->party, [this, exchange, resume] {
-    serve(exchange, [&resume](Exchange& waited) {
-      resume(waited.request, waited.response);
-      return std::optional<Continuation>();
-    });
+// Those that are told apart by their address so far may be by their owner now.
+void Connections::compute(const std::shared_ptr<Exchange>& exchange,
+                          const Continuation& continuation) {
+  exchange->party = *continuation.computing_for;
+  const bool is_accepted = computing_->try_enqueue(
+      exchange->party,
+      [this, exchange, resume = continuation.resume] { answer_by(exchange, resume); });
+  if (!is_accepted) refuse_one_of_many(*exchange);
+}
+
+// The library sees the request once more, to write the response.
+void Connections::answer_by(const std::shared_ptr<Exchange>& exchange, const Resume& resume) {
+  serve(exchange, [&resume](Exchange& waited) {
+    resume(waited.request, waited.response);
+    return std::optional<Continuation>();
   });
+}
+
+// A request that was accepted has its turn however many wait, unless the service ends.
+void Connections::go_on(const std::shared_ptr<Exchange>& exchange, const Resume& resume) {
+  const bool has_turn = tasks_->enqueue_rest(
+      exchange->party, [this, exchange, resume] { answer_by(exchange, resume); });
   if (has_turn) return;
   refuse(exchange->body.take_stream(), exchange->request.remote_address,
          {ErrorCode::kUnavailable, "the service is shutting down"});

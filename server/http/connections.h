@@ -28,6 +28,9 @@ struct ConnectionOptions {
   std::size_t connections = 2048;
   std::size_t threads = 32;   // requests that are worked on at once
   std::size_t backlog = 512;  // requests that wait for a thread
+  // Of those that are computed (Continuation::computing_for), how many at once; as many as the
+  // others may wait.
+  std::size_t computing_threads = 12;
   net::AcceptorLimits acceptor;
   net::BodyLimits body;
   net::SenderLimits sender;
@@ -85,10 +88,13 @@ class Connections {
 
   void refuse(std::unique_ptr<net::ByteStream> stream, const std::string& address,
               const Error& error);
+  void refuse_one_of_many(Exchange& exchange);
   void enqueue(const std::shared_ptr<Exchange>& exchange, const Answer& answer);
   void serve(const std::shared_ptr<Exchange>& exchange, const Answer& answer);
   void park(const std::shared_ptr<Exchange>& exchange, const Continuation& continuation);
+  void compute(const std::shared_ptr<Exchange>& exchange, const Continuation& continuation);
   void go_on(const std::shared_ptr<Exchange>& exchange, const Resume& resume);
+  void answer_by(const std::shared_ptr<Exchange>& exchange, const Resume& resume);
 
   const ConnectionOptions options_;
   const ConnectionHandlers handlers_;
@@ -97,6 +103,7 @@ class Connections {
   net::FairPlaces places_;
   std::optional<net::Sender> sender_;
   std::optional<net::Parked> parked_;
+  std::optional<net::BoundedTaskQueue> computing_;
   std::optional<net::BoundedTaskQueue> tasks_;
   std::optional<net::Acceptor> acceptor_;
 };

@@ -46,14 +46,16 @@ struct Response {
 };
 
 // What a handler leaves to be done instead of answering: `resume` answers when the job has ended,
-// or at `until` whatever has become of the job. No thread is held until then.
+// or at `until` whatever has become of the job. No thread is held until then. With `computing_for`
+// there is no job: `resume` answers on a thread that computes, when it is that party's turn.
 struct Continuation {
-  std::string job;
-  std::chrono::steady_clock::time_point until;
+  std::string job = {};
+  std::chrono::steady_clock::time_point until = {};
   std::function<void(const Request& request, Response& response)> resume;
   // Called once, before `resume`, when the client has gone meanwhile. Without it `resume` is, since
   // there is nobody to wait for.
   std::function<void(const Request& request)> abandoned = {};
+  std::optional<std::string> computing_for = {};
 };
 
 // Answers, or leaves that to a continuation. May throw: Error becomes the problem that it names,

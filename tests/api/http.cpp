@@ -55,6 +55,20 @@ int connected_to(const std::string& url, const std::string& from) {
   return connected(AF_INET, address, from);
 }
 
+// What the chunks of a body hold; as much of it as has come.
+std::string joined(const std::string& chunks) {
+  std::string bytes;
+  for (std::size_t at = 0; at < chunks.size();) {
+    const std::size_t size =
+        std::stoul(chunks.substr(at, chunks.find("\r\n", at) - at), nullptr, 16);
+    if (size == 0) break;
+    at = chunks.find("\r\n", at) + 2;
+    bytes += chunks.substr(at, size);
+    at += size + 2;
+  }
+  return bytes;
+}
+
 Answer parse(const std::string& text) {
   Answer answer;
   const std::size_t end = text.find("\r\n\r\n");
@@ -71,6 +85,7 @@ Answer parse(const std::string& text) {
     answer.headers.emplace(lower(line.substr(0, colon)), value);
   }
   answer.body = text.substr(end + 4);
+  if (answer.header("transfer-encoding") == "chunked") answer.body = joined(answer.body);
   return answer;
 }
 

@@ -14,7 +14,7 @@ using Headers = std::vector<std::pair<std::string, std::string>>;
 struct Answer {
   int status = 0;
   std::multimap<std::string, std::string> headers;  // names in lower case
-  std::string body;
+  std::string body;                                 // without the lines between chunks
 
   // The value of the header, whose name is in lower case; empty without one.
   std::string header(const std::string& name) const;

@@ -17,18 +17,6 @@ using namespace test;
 
 class InspectTest : public testing::Test {
  protected:
-  // As a chunked body's bytes.
-  static std::string joined(const std::string& chunks) {
-    std::string bytes;
-    for (std::size_t at = 0;;) {
-      const std::size_t size = std::stoul(chunks.substr(at), nullptr, 16);
-      if (size == 0) return bytes;
-      at = chunks.find("\r\n", at) + 2;
-      bytes += chunks.substr(at, size);
-      at += size + 2;
-    }
-  }
-
   Answer slice(const std::string& query = {}) const {
     return daemon_.get(path_ + "/slice.png" + (query.empty() ? "" : '?' + query));
   }
@@ -37,7 +25,7 @@ class InspectTest : public testing::Test {
     const Answer answer = slice(query);
     EXPECT_EQ(answer.status, 200) << answer.body;
     EXPECT_EQ(answer.header("content-type"), "image/png");
-    return read_png(joined(answer.body));
+    return read_png(answer.body);
   }
 
   Histogram histogram(const std::string& query = {}) const {

@@ -365,5 +365,35 @@ TEST_F(JobsTest, ListsComeInPages) {
   EXPECT_TRUE(blames(daemon_.get("/v1/volumes?cursor=" + next), "cursor"));
 }
 
+// Sent as it is made, unlike a list of the usual length.
+TEST_F(JobsTest, ALongListComesInPieces) {
+  const Job first = finished_job(daemon_);
+  const std::string body = R"({"volume": ")" + first.parameters.volume + R"(", "iso": 100})";
+  std::vector<std::string> ids = {first.id};
+  while (ids.size() < 250) {
+    ids.push_back(job_from_json(daemon_.send("POST", "/v1/jobs?wait=30", body).body).id);
+  }
+  std::ranges::reverse(ids);
+  const auto expect_page = [&](const Answer& answer, std::size_t begin, std::size_t end) {
+    EXPECT_EQ(answer.status, 200) << answer.body;
+    EXPECT_EQ(answer.header("content-type"), "application/json");
+    EXPECT_EQ(answer.header("cache-control"), "no-store");
+    std::vector<std::string> listed;
+    for (const Job& job : jobs_from_json(answer.body)) listed.push_back(job.id);
+    EXPECT_EQ(listed, std::vector(ids.begin() + static_cast<std::ptrdiff_t>(begin),
+                                  ids.begin() + static_cast<std::ptrdiff_t>(end)));
+    const auto next = nlohmann::json::parse(answer.body)["next"];
+    return next.is_null() ? "" : "&cursor=" + next.get<std::string>();
+  };
+  const Answer most = daemon_.get("/v1/jobs?limit=220");
+  EXPECT_EQ(most.header("transfer-encoding"), "chunked");
+  const std::string next = expect_page(most, 0, 220);
+  EXPECT_EQ(expect_page(daemon_.get("/v1/jobs?limit=220" + next), 220, 250), "");
+  EXPECT_EQ(expect_page(daemon_.get("/v1/jobs?limit=1000"), 0, 250), "");
+  EXPECT_EQ(expect_page(daemon_.get("/v1/jobs?limit=1000&state=succeeded"), 0, 250), "");
+  const Answer old = answer_to(daemon_.url(), "GET /v1/jobs?limit=1000 HTTP/1.0\r\n\r\n");
+  EXPECT_EQ(expect_page(old, 0, 250), "");
+}
+
 }  // namespace
 }  // namespace isomesh

@@ -52,16 +52,15 @@ void append_chunk(std::string_view piece, std::string& bytes) {
   bytes.append(size.data(), end).append("\r\n").append(piece).append("\r\n");
 }
 
-class SliceSource : public net::Source {
+class ComputedSource : public net::Source {
  public:
-  SliceSource(std::unique_ptr<volume::SlicePng> picture, bool in_chunks)
-      : picture_(std::move(picture)), in_chunks_(in_chunks) {}
+  ComputedSource(NextPiece next, bool in_chunks) : next_(std::move(next)), in_chunks_(in_chunks) {}
 
   bool computes() const override { return true; }
 
   More next(std::string& bytes) override {
     if (is_over_) return More::kEnd;
-    const auto piece = picture_->next();
+    const auto piece = next_();
     is_over_ = !piece;
     if (!in_chunks_) {
       bytes.append(piece.value_or(""));
@@ -72,7 +71,7 @@ class SliceSource : public net::Source {
   }
 
  private:
-  std::unique_ptr<volume::SlicePng> picture_;
+  const NextPiece next_;
   const bool in_chunks_;
   bool is_over_ = false;
 };
@@ -88,9 +87,8 @@ std::unique_ptr<net::Source> text_source(std::string_view text) {
   return std::make_unique<TextSource>(text);
 }
 
-std::unique_ptr<net::Source> slice_source(std::unique_ptr<volume::SlicePng> picture,
-                                          bool in_chunks) {
-  return std::make_unique<SliceSource>(std::move(picture), in_chunks);
+std::unique_ptr<net::Source> computed_source(NextPiece next, bool in_chunks) {
+  return std::make_unique<ComputedSource>(std::move(next), in_chunks);
 }
 
 }  // namespace isomesh::http

@@ -3,7 +3,6 @@
 
 #include "base/text.h"
 #include "proto/json.h"
-#include "server/http/answers/sources.h"
 #include "server/http/request_values.h"
 #include "server/http/routes/routes.h"
 #include "server/jobs/stored_samples.h"
@@ -34,7 +33,6 @@ void histogram(App& app, const Request& request, Response& response) {
   const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
   const std::uint64_t bins = whole_number_of(request, "bins", {1, kMostBins}, kUsualBins);
   if (is_known(request, response, '"' + volume.id + ".bins" + std::to_string(bins) + '"')) return;
-  const auto place = app.inspections.take(party_of(request));
   response.status = 200;
   response.set_body(to_json(app.services.histograms.of(viewer_of(request), volume, bins)),
                     "application/json");
@@ -64,18 +62,14 @@ void slice(App& app, const Request& request, Response& response) {
   if (is_known(request, response, etag)) return;
   const auto canonical = std::make_shared<const volume::CanonicalFile>(
       jobs::stored_samples(app.services.blobs, volume.id).path);
-  auto picture = std::make_unique<volume::SlicePng>(canonical, choice);
-  const bool in_chunks = request.version != "HTTP/1.0";
-  response.status = 200;
+  const auto picture = std::make_shared<volume::SlicePng>(canonical, choice);
   response.set_header("Accept-Ranges", "none");
-  response.stream = {.source = slice_source(std::move(picture), in_chunks),
-                     .media_type = "image/png",
-                     .framing = in_chunks ? Framing::kChunks : Framing::kUntilConnectionEnds};
+  answer_pieces(request, response, "image/png",
+                [picture] { return std::optional<std::string>(picture->next()); });
 }
 
 void estimate(App& app, const Request& request, Response& response) {
   const JobParameters parameters = parse_job_parameters(request.query, VolumeIn::kQuery);
-  const auto place = app.inspections.take(party_of(request));
   answer_json(response, 200,
               to_json(app.services.estimator.estimate(viewer_of(request), parameters)));
 }
@@ -84,12 +78,14 @@ void estimate(App& app, const Request& request, Response& response) {
 
 void add_inspect_routes(App& app) {
   const std::string volume = "/v1/volumes/{id}";
-  add_get(app, volume + "/histogram",
-          [&app](const auto& request, auto& response) { histogram(app, request, response); });
-  add_get(app, volume + "/slice.png",
-          [&app](const auto& request, auto& response) { slice(app, request, response); });
-  add_get(app, "/v1/estimate",
-          [&app](const auto& request, auto& response) { estimate(app, request, response); });
+  add_computed_get(app, volume + "/histogram", [&app](const auto& request, auto& response) {
+    histogram(app, request, response);
+  });
+  add_computed_get(app, volume + "/slice.png",
+                   [&app](const auto& request, auto& response) { slice(app, request, response); });
+  add_computed_get(app, "/v1/estimate", [&app](const auto& request, auto& response) {
+    estimate(app, request, response);
+  });
 }
 
 }  // namespace isomesh::http

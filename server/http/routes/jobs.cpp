@@ -7,7 +7,6 @@
 #include "base/sha256.h"
 #include "base/text.h"
 #include "proto/json.h"
-#include "server/http/answers/sources.h"
 #include "server/http/request_values.h"
 #include "server/http/routes/routes.h"
 #include "server/http/upload.h"
@@ -59,13 +58,15 @@ void list(App& app, const Request& request, Response& response) {
   }
   const std::string after = id_after(request, kJobCursor);
   const std::size_t limit = whole_number_of(request, "limit", kListLengths, kUsualListLength);
-  std::vector<Job> jobs = app.services.jobs.list(viewer_of(request), state, after, limit + 1);
-  std::string next;
-  if (jobs.size() > limit) {
-    jobs.pop_back();
-    next = cursor_after(kJobCursor, jobs.back().id);
-  }
-  answer_json(response, 200, to_json(jobs, next));
+  answer_list<Job>(
+      request, response,
+      {.kind = kJobCursor,
+       .after = after,
+       .limit = limit,
+       .read = [&jobs = app.services.jobs, viewer = viewer_of(request), state](
+                   const std::string& from,
+                   std::size_t count) { return jobs.list(viewer, state, from, count); },
+       .place_of = [](const Job& job) { return job.id; }});
 }
 
 void cancel(App& app, const Request& request, Response& response) {
@@ -131,8 +132,8 @@ void events(App& app, const Request& request, Response& response) {
 void add_job_routes(App& app) {
   add_post(app, kJobs,
            [&app](const auto& request, auto& response) { return submit(app, request, response); });
-  add_get(app, kJobs,
-          [&app](const auto& request, auto& response) { list(app, request, response); });
+  add_computed_get(app, kJobs,
+                   [&app](const auto& request, auto& response) { list(app, request, response); });
   add_get(app, kJobs + "/{id}",
           [&app](const auto& request, auto& response) { return get(app, request, response); });
   add_delete(app, kJobs + "/{id}",

@@ -114,6 +114,15 @@ void answer_json(Response& response, int status, const std::string& json) {
   response.set_body(json, "application/json");
 }
 
+void answer_pieces(const Request& request, Response& response, const char* media_type,
+                   NextPiece next) {
+  const bool in_chunks = request.version != "HTTP/1.0";
+  response.status = 200;
+  response.stream = {.source = computed_source(std::move(next), in_chunks),
+                     .media_type = media_type,
+                     .framing = in_chunks ? Framing::kChunks : Framing::kUntilConnectionEnds};
+}
+
 std::string etag_of(const std::string& text) {
   constexpr std::size_t kEnough = 32;  // hex digits, of 64
   return '"' + sha256_of(text).substr(0, kEnough) + '"';

@@ -4,12 +4,16 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "proto/error.h"
 #include "proto/types.h"
 #include "server/http/answers/event_stream.h"
+#include "server/http/answers/list_page.h"
+#include "server/http/answers/sources.h"
 #include "server/http/connections.h"
 #include "server/http/guards/access.h"
 #include "server/http/guards/origin.h"
@@ -31,7 +35,6 @@ struct App {
   Metrics& metrics = services.metrics;
   net::FairPlaces uploads;
   net::FairPlaces streams;  // of events
-  net::FairPlaces inspections{jobs::Histograms::kMostWaiting, "histograms and estimates"};
   Broadcaster events;
   OriginRules rules;  // constant once the server is bound
   const std::uint64_t began_us =
@@ -56,6 +59,13 @@ template <class Run>
 void add_get(App& app, const std::string& pattern, const Run& run) {
   for (const char* method : {"GET", "HEAD"}) app.router.add(method, pattern, handler_of(run));
 }
+// The same for what is computed: `run` is called by threads for that, in turn with those of others.
+template <class Run>
+void add_computed_get(App& app, const std::string& pattern, const Run& run) {
+  add_get(app, pattern, [run](const Request& request, Response& /*response*/) {
+    return std::optional(Continuation{.resume = run, .computing_for = party_of(request)});
+  });
+}
 template <class Run>
 void add_post(App& app, const std::string& pattern, const Run& run) {
   app.router.add("POST", pattern, handler_of(run));
@@ -70,6 +80,22 @@ void add_delete(App& app, const std::string& pattern, const Run& run) {
 }
 
 void answer_json(Response& response, int status, const std::string& json);
+
+// Answers 200 with a body that is computed in pieces.
+void answer_pieces(const Request& request, Response& response, const char* media_type,
+                   NextPiece next);
+
+// Answers with a page of a list: what is one piece of it as any JSON, else in pieces.
+template <class Row>
+void answer_list(const Request& request, Response& response, ListRequest<Row> list) {
+  const auto page = std::make_shared<ListPage<Row>>(std::move(list));
+  std::optional<std::string> first = page->next();
+  if (page->is_over()) return answer_json(response, 200, *first);
+  response.set_header("Cache-Control", "no-store");
+  answer_pieces(request, response, "application/json", [page, first = std::move(first)]() mutable {
+    return first ? std::exchange(first, std::nullopt) : page->next();
+  });
+}
 
 // The entity tag of what is represented by that text.
 std::string etag_of(const std::string& text);

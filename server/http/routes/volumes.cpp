@@ -43,15 +43,19 @@ void list(App& app, const Request& request, Response& response) {
   const std::string after = id_after(request, kVolumeCursor);
   if (!after.empty() && !is_place(after)) throw wrong_cursor();
   const std::size_t limit = whole_number_of(request, "limit", kListLengths, kUsualListLength);
-  std::vector<Volume> volumes = app.services.volumes.list(viewer_of(request), after, limit + 1);
-  std::string next;
-  if (volumes.size() > limit) {
-    volumes.pop_back();
-    next = cursor_after(kVolumeCursor, store::cursor_of(volumes.back()));
-  }
-  // Lists leave out the identifiers of slices, of which one volume may have thousands.
-  for (Volume& volume : volumes) volume.dicom.reset();
-  answer_json(response, 200, to_json(volumes, next));
+  const auto read = [&volumes = app.services.volumes, viewer = viewer_of(request)](
+                        const std::string& from, std::size_t count) {
+    std::vector<Volume> rows = volumes.list(viewer, from, count);
+    // Lists leave out the identifiers of slices, of which one volume may have thousands.
+    for (Volume& row : rows) row.dicom.reset();
+    return rows;
+  };
+  answer_list<Volume>(request, response,
+                      {.kind = kVolumeCursor,
+                       .after = after,
+                       .limit = limit,
+                       .read = read,
+                       .place_of = store::cursor_of});
 }
 
 void get(App& app, const Request& request, Response& response) {
@@ -86,8 +90,8 @@ void erase(App& app, const Request& request, Response& response) {
 void add_volume_routes(App& app) {
   add_post(app, kVolumes,
            [&app](const auto& request, auto& response) { upload(app, request, response); });
-  add_get(app, kVolumes,
-          [&app](const auto& request, auto& response) { list(app, request, response); });
+  add_computed_get(app, kVolumes,
+                   [&app](const auto& request, auto& response) { list(app, request, response); });
   add_get(app, kVolumes + "/{id}",
           [&app](const auto& request, auto& response) { get(app, request, response); });
   add_patch(app, kVolumes + "/{id}",

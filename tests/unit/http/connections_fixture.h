@@ -12,9 +12,11 @@
 #include <utility>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "server/http/connections.h"
 #include "server/http/router.h"
+#include "server/net/address.h"
 #include "server/net/listener.h"
 #include "tests/api/http.h"
 #include "tests/support/process.h"
@@ -171,6 +173,23 @@ class ConnectionsTest : public testing::Test {
       out.stream = {std::make_unique<Thought>(known.get_future().share()), "text/plain",
                     Framing::kUntilConnectionEnds, 0};
     });
+    // Computed, and answered with how nice the thread is that does that.
+    const auto compute = [this](const std::shared_future<void>& gate) {
+      return [this, gate](const Request& asked, Response&) -> std::optional<Continuation> {
+        return Continuation{.resume =
+                                [this, gate](const Request&, Response& response) {
+                                  ++runs_;
+                                  gate.wait();
+                                  response.set_body(std::to_string(::getpriority(PRIO_PROCESS, 0)),
+                                                    "text/plain");
+                                },
+                            .computing_for = net::party_of(asked.remote_address)};
+      };
+    };
+    std::promise<void> open;
+    open.set_value();
+    add("GET", "/compute", compute(computing_.get_future().share()));
+    add("GET", "/compute-fast", compute(open.get_future().share()));
     add("GET", "/echo", [](const Request& request, Response& response) {
       response.set_body(std::string(request.header("X-Echo")), "text/plain");
     });
@@ -228,6 +247,7 @@ class ConnectionsTest : public testing::Test {
   std::atomic<bool> busy_ = false;
   std::promise<void> go_;
   std::promise<void> thinking_;
+  std::promise<void> computing_;
   std::chrono::milliseconds wait_ = 60s;
   std::deque<Connection> clients_;
   std::optional<Connections> connections_;

@@ -1,5 +1,6 @@
 // Who is greedy, thinks long or goes away costs the others nothing.
 #include <chrono>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -108,6 +109,36 @@ TEST_F(StrangersTest, WhatIsComputedHoldsNobodyUp) {
   for (std::size_t n = 1; n < clients_.size(); ++n) {
     EXPECT_EQ(clients_[n].receive().body, "thought");
   }
+}
+
+// However much a stranger asks for, another's first turn comes at once.
+TEST_F(StrangersTest, WhatAStrangerHasComputedWaitsForTheStrangersOwn) {
+  ConnectionOptions few = options();
+  few.computing_threads = 4;
+  open(few);
+  hang_on(20, request("GET", "/compute"), kStranger);
+  ASSERT_TRUE(eventually([&] { return runs_ == 2; }));
+  const std::string niceness = get("/compute-fast").body;
+  EXPECT_EQ(niceness, std::to_string(std::min(::getpriority(PRIO_PROCESS, 0) + 10, 19)));
+  EXPECT_EQ(get("/status").body, "ok");
+  EXPECT_EQ(runs_, 3);
+  computing_.set_value();
+  for (const Connection& connection : clients_) EXPECT_EQ(connection.receive().body, niceness);
+}
+
+TEST_F(StrangersTest, WhatTooManyWaitForIsRefused) {
+  ConnectionOptions narrow = options();
+  narrow.computing_threads = 2;
+  narrow.backlog = 2;
+  open(narrow);
+  hang_on(1, request("GET", "/compute"));
+  ASSERT_TRUE(eventually([&] { return runs_ == 1; }));
+  hang_on(2, request("GET", "/compute"));  // one of them is its share of those that may wait
+  EXPECT_TRUE(eventually([&] { return connections_->sending() == 1; }));
+  computing_.set_value();
+  std::multiset<int> statuses;
+  for (const Connection& connection : clients_) statuses.insert(connection.receive().status);
+  EXPECT_EQ(statuses, (std::multiset<int>{200, 200, 503}));
 }
 
 TEST_F(StrangersTest, WhoeverIsGoneWhileItIsComputedIsLetGo) {
