@@ -20,6 +20,15 @@ InputFile InputFile::chosen(const std::filesystem::path& path) { return {path, p
 InputFile::InputFile(const std::filesystem::path& path, std::string shown)
     : shown_(std::move(shown)), file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
   if (file_.number() < 0) fail("opening a file", errno);
+  look();
+}
+
+InputFile::InputFile(Descriptor file, std::string shown)
+    : shown_(std::move(shown)), file_(std::move(file)) {
+  look();
+}
+
+void InputFile::look() {
   struct stat status = {};
   if (::fstat(file_.number(), &status) != 0) fail("reading a file's size", errno);
   if (!S_ISREG(status.st_mode)) {

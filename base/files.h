@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "base/descriptor.h"
 
@@ -17,6 +18,9 @@ class InputFile {
  public:
   // Throws Error kInternal or kNotFound when it cannot be opened or is no regular file.
   explicit InputFile(const std::filesystem::path& path);
+
+  // Takes a file that is open for reading. Throws Error kInternal when it is no regular file.
+  explicit InputFile(Descriptor file) : InputFile(std::move(file), "") {}
 
   // The same for a file that a person chose: what goes wrong, now or later, is Error
   // kInvalidParameter that names the file.
@@ -38,6 +42,8 @@ class InputFile {
 
  private:
   InputFile(const std::filesystem::path& path, std::string shown);
+  InputFile(Descriptor file, std::string shown);
+  void look();
   [[noreturn]] void fail(std::string_view call, int error_number) const;
 
   std::string shown_;  // what messages call it; empty where they must not

@@ -205,9 +205,8 @@ int run(const Options& options, const sigset_t& signals) {
   store::SqliteOutbox outbox(database);
   callbacks::Callbacks callbacks(outbox, targets, callback_options(options),
                                  http::callback_reporter(metrics));
-  const jobs::JobProgram job_program = {
-      .file = beside_this_program("isomesh-job"),
-      .setup = {.readable = folder.blobs(), .threads = mesh::thread_count()}};
+  const jobs::JobProgram job_program = {.file = beside_this_program("isomesh-job"),
+                                        .setup = {.threads = mesh::thread_count()}};
   const jobs::PipelineLimits limits = {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
   const jobs::Housekeeper housekeeper(retention, housekeeping_interval(keep));

@@ -138,13 +138,10 @@ Error error_from(const Json& json) {
 
 }  // namespace
 
-std::string to_line(const JobSetup& setup) {
-  return line_of({{"readable", setup.readable.string()}, {"threads", setup.threads}});
-}
+std::string to_line(const JobSetup& setup) { return line_of({{"threads", setup.threads}}); }
 
 std::string to_line(const JobOrder& order) {
   return line_of({{"work", static_cast<int>(order.work)},
-                  {"file", order.file.string()},
                   {"volume", order.volume.id},
                   {"notes", json_of(order.volume.notes)},
                   {"iso", order.iso},
@@ -158,17 +155,15 @@ std::string to_line(const JobAnswer& answer) {
 }
 
 JobSetup setup_from(std::string_view line) {
-  return read_line(line, [](const Json& json) {
-    return JobSetup{.readable = json.at("readable").get<std::string>(),
-                    .threads = json.at("threads").get<int>()};
-  });
+  return read_line(
+      line, [](const Json& json) { return JobSetup{.threads = json.at("threads").get<int>()}; });
 }
 
 std::optional<JobOrder> order_from(std::string_view line) {
   return read_line(line, [&](const Json& json) -> std::optional<JobOrder> {
     if (json.contains("cancel")) return std::nullopt;
     JobOrder order = {.work = static_cast<JobOrder::Work>(json.at("work").get<int>()),
-                      .file = json.at("file").get<std::string>(),
+                      .file = {},
                       .volume = {},
                       .parameters = record_of(line).parameters,
                       .iso = json.at("iso").get<double>(),

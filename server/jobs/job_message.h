@@ -21,8 +21,7 @@ namespace isomesh::jobs {
 
 // What holds for all orders of a process.
 struct JobSetup {
-  std::filesystem::path readable;  // the folder of the volumes
-  int threads = 1;                 // of the kernels
+  int threads = 1;  // of the kernels
 };
 
 struct JobOrder {
@@ -32,8 +31,10 @@ struct JobOrder {
   };
 
   Work work = Work::kMesh;
-  std::filesystem::path file;  // of the volume: canonical, and found intact
-  Volume volume;               // its id and notes
+  // Of the volume: canonical, and found intact. The process gets it open, with the first bytes of
+  // the line, and not its path.
+  std::filesystem::path file;
+  Volume volume;  // its id and notes
   MeshParameters parameters;
   double iso = 0;  // whatever the parameters say of it
   std::uint64_t memory_bytes = 0;

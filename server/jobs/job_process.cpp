@@ -8,6 +8,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
+#include "base/files.h"
 #include "proto/error.h"
 
 namespace isomesh::jobs {
@@ -53,11 +54,12 @@ CountedSurface JobProcess::count(const JobOrder& order, const std::stop_token& s
 
 JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink> sinks,
                              const std::stop_token& stop, const Report& report) {
+  const InputFile file(order.file);
   for (int tries = 0; tries < kMostEarlyEnds; ++tries) {
     start();
     Talk talk = {order, sinks, stop, report};
     try {
-      child_->say(to_line(order));
+      child_->say(to_line(order), file.descriptor());
       auto end = follow(talk);
       if (!end) {
         spdlog::warn("a process had ended before its job began");

@@ -1,5 +1,6 @@
 // isomesh-job: makes the meshes of one worker, one after the other, in memory that stays mapped. It
-// reads volumes and writes nothing: what it makes goes to the daemon over the socket.
+// reads the volumes that it is given open and writes nothing: what it makes goes to the daemon over
+// the socket.
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -16,6 +17,8 @@
 
 #include <unistd.h>
 
+#include "base/descriptor.h"
+#include "base/files.h"
 #include "base/mutex.h"
 #include "base/niceness.h"
 #include "server/jobs/job_message.h"
@@ -24,6 +27,7 @@
 #include "server/jobs/memory.h"
 #include "server/mesh/parallel.h"
 #include "server/process/child.h"
+#include "server/process/passing.h"
 #include "server/process/sandbox.h"
 #include "server/volume/canonical.h"
 
@@ -66,8 +70,8 @@ class Speaker {
   Mutex mutex_;
 };
 
-// The lines that come. At the end of the other side, so with the daemon however that ends, the
-// process ends. Not thread safe.
+// The lines that come, and the files with them. At the end of the other side, so with the daemon
+// however that ends, the process ends. Not thread safe.
 class Lines {
  public:
   std::string next() {
@@ -78,23 +82,34 @@ class Lines {
         text_.erase(0, end + 1);
         return line;
       }
-      const ssize_t count = ::read(process::kChildDescriptor, piece.data(), piece.size());
-      if (count < 0 && errno == EINTR) continue;
-      if (count <= 0) std::_Exit(EXIT_SUCCESS);
-      text_.append(piece.data(), static_cast<std::size_t>(count));
+      process::Received received = process::receive(process::kChildDescriptor, piece);
+      if (received.count < 0 && errno == EINTR) continue;
+      if (received.count <= 0) std::_Exit(EXIT_SUCCESS);
+      text_.append(piece.data(), static_cast<std::size_t>(received.count));
+      if (received.passed.number() >= 0) file_ = std::move(received.passed);
     }
   }
 
+  // The file that came last, once.
+  Descriptor take_file() { return std::move(file_); }
+
  private:
   std::string text_;
+  Descriptor file_;
+};
+
+// An order and the volume that it is of.
+struct Task {
+  JobOrder order;
+  Descriptor file;
 };
 
 // What the thread that reads has for the one that works. Thread safe.
 class Desk {
  public:
-  void put(JobOrder order) {
+  void put(Task task) {
     const Lock lock(mutex_);
-    order_ = std::move(order);
+    task_ = std::move(task);
     stop_ = std::stop_source();
     came_.notify_one();
   }
@@ -102,18 +117,18 @@ class Desk {
     const Lock lock(mutex_);
     stop_.request_stop();
   }
-  std::pair<JobOrder, std::stop_token> take() {
+  std::pair<Task, std::stop_token> take() {
     Lock lock(mutex_);
-    came_.wait(lock, [this]() ISOMESH_REQUIRES(mutex_) { return order_.has_value(); });
-    std::pair<JobOrder, std::stop_token> taken = {*std::move(order_), stop_.get_token()};
-    order_.reset();
+    came_.wait(lock, [this]() ISOMESH_REQUIRES(mutex_) { return task_.has_value(); });
+    std::pair<Task, std::stop_token> taken = {*std::move(task_), stop_.get_token()};
+    task_.reset();
     return taken;
   }
 
  private:
   Mutex mutex_;
   Condition came_;
-  std::optional<JobOrder> order_ ISOMESH_GUARDED_BY(mutex_);
+  std::optional<Task> task_ ISOMESH_GUARDED_BY(mutex_);
   std::stop_source stop_ ISOMESH_GUARDED_BY(mutex_);
 };
 
@@ -145,15 +160,15 @@ SampleArray array_of(const volume::CanonicalVolume& canonical) {
   return {header.type, header.dims, header.geometry, canonical.samples().data()};
 }
 
-MadeMesh make(const JobOrder& order, const std::stop_token& stop, Speaker& speaker,
-              Workspace& workspace) {
+MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspace& workspace) {
+  const JobOrder& order = task.order;
   Reporter reporter(speaker);
   const Report report = [&reporter](Stage stage, double share, const Timing& timing) {
     reporter.tell(stage, share, timing);
   };
   Progress progress(stop, report);
   progress.enter(Stage::kLoad, kLoadShare, &Timing::load);
-  const volume::CanonicalVolume canonical(order.file);
+  const volume::CanonicalVolume canonical(InputFile(std::move(task.file)));
   canonical.preload();
   std::vector<codec::Sink> sinks;
   for (std::size_t i = 0; i < files_of(order.parameters).size(); ++i) {
@@ -175,12 +190,13 @@ MadeMesh make(const JobOrder& order, const std::stop_token& stop, Speaker& speak
   return made;
 }
 
-CountedSurface count(const JobOrder& order, const std::stop_token& stop, Speaker& speaker) {
+CountedSurface count(Task task, const std::stop_token& stop, Speaker& speaker) {
   speaker.say(JobProgress{});  // it has begun
-  const volume::CanonicalVolume canonical(order.file);
+  const volume::CanonicalVolume canonical(InputFile(std::move(task.file)));
   const SampleArray samples = array_of(canonical);
-  if (order.parameters.labels) return count_labels(samples, order.parameters, {stop, nullptr});
-  return {count_surface(samples, order.parameters, order.iso, {stop, nullptr})};
+  const MeshParameters& parameters = task.order.parameters;
+  if (parameters.labels) return count_labels(samples, parameters, {stop, nullptr});
+  return {count_surface(samples, parameters, task.order.iso, {stop, nullptr})};
 }
 
 struct Ending {
@@ -189,17 +205,17 @@ struct Ending {
 };
 
 // Every exception becomes a message here, because nothing else leaves this process.
-Ending work(const JobOrder& order, const std::stop_token& stop, Speaker& speaker,
-            Workspace& workspace) {
+Ending work(Task task, const std::stop_token& stop, Speaker& speaker, Workspace& workspace) {
+  const std::uint64_t memory_bytes = task.order.memory_bytes;
   try {
-    if (order.work == JobOrder::Work::kCount) return {count(order, stop, speaker)};
-    return {make(order, stop, speaker, workspace)};
+    if (task.order.work == JobOrder::Work::kCount) return {count(std::move(task), stop, speaker)};
+    return {make(std::move(task), stop, speaker, workspace)};
   } catch (const Error& error) {
     return {error};
   } catch (const std::bad_alloc&) {
     constexpr std::uint64_t kMebibyte = 1 << 20;
     return {Error(ErrorCode::kTooLarge, "the job takes more memory than the " +
-                                            std::to_string(order.memory_bytes / kMebibyte) +
+                                            std::to_string(memory_bytes / kMebibyte) +
                                             " MiB that it may have"),
             true};
   } catch (const std::exception& error) {
@@ -212,7 +228,7 @@ Ending work(const JobOrder& order, const std::stop_token& stop, Speaker& speaker
 void read_orders(Lines& lines, Desk& desk) {
   for (;;) {
     if (auto order = order_from(lines.next())) {
-      desk.put(*std::move(order));
+      desk.put({*std::move(order), lines.take_file()});
     } else {
       desk.cancel();
     }
@@ -236,17 +252,18 @@ int main() {
   const std::uint64_t headroom =
       kHeadroomBytes + kThreadBytes * static_cast<std::uint64_t>(setup.threads);
   const process::MemoryLimit memory;
-  process::confine_job(setup.readable);
+  process::confine_job();
   mesh::set_thread_count(setup.threads);
   Desk desk;
   const std::jthread reader([&] { read_orders(lines, desk); });
   Speaker speaker;
   Workspace workspace;
   for (;;) {
-    const auto [order, stop] = desk.take();
-    memory.set(order.memory_bytes + headroom);
-    const Ending ending = work(order, stop, speaker, workspace);
-    if (!ending.is_last) workspace.trim(std::min(kMostKeptBytes, order.memory_bytes / kKeptShare));
+    auto [task, stop] = desk.take();
+    const std::uint64_t memory_bytes = task.order.memory_bytes;
+    memory.set(memory_bytes + headroom);
+    const Ending ending = work(std::move(task), stop, speaker, workspace);
+    if (!ending.is_last) workspace.trim(std::min(kMostKeptBytes, memory_bytes / kKeptShare));
     speaker.say(ending.answer);
     if (ending.is_last) std::_Exit(EXIT_SUCCESS);
   }

@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
+#include "server/process/passing.h"
 
 namespace isomesh::process {
 namespace {
@@ -102,6 +103,15 @@ void Child::say(std::string_view message) const {
     if (count < 0) return;
     message.remove_prefix(static_cast<std::size_t>(count));
   }
+}
+
+void Child::say(std::string_view message, int passed) const {
+  ssize_t count = 0;
+  do {
+    count = send_with(socket_.number(), message, passed);
+  } while (count < 0 && errno == EINTR);
+  if (count >= 0) return say(message.substr(static_cast<std::size_t>(count)));
+  if (errno != EPIPE && errno != ECONNRESET) throw_system_error("sendmsg", errno);
 }
 
 void Child::tell(std::string_view message) const {

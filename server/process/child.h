@@ -57,7 +57,11 @@ class Child {
   // to.
   void say(std::string_view message) const;
 
-  // The same, and closes this direction.
+  // The same, and a descriptor with it, which stays the caller's. Throws Error kInternal or
+  // kUnavailable when that cannot be passed.
+  void say(std::string_view message, int passed) const;
+
+  // As the first, and closes this direction.
   void tell(std::string_view message) const;
 
   // Everything that it says until it closes its end, at most `most_bytes` (about).

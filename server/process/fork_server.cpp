@@ -5,7 +5,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
-#include <cstring>
+#include <utility>
 
 #include <linux/sched.h>
 #include <poll.h>
@@ -17,6 +17,7 @@
 #include "base/error.h"
 #include "base/niceness.h"
 #include "proto/error.h"
+#include "server/process/passing.h"
 
 namespace isomesh::process {
 namespace {
@@ -26,48 +27,14 @@ using Clock = std::chrono::steady_clock;
 // Getting ready takes some hundredths of a second, on a busy machine some tenths.
 constexpr std::chrono::seconds kLongestAnswer{20};
 
-// A message of one byte with room for one descriptor.
-struct DescriptorMessage {
-  DescriptorMessage() {
-    header.msg_iov = &content;
-    header.msg_iovlen = 1;
-    header.msg_control = control.data();
-    header.msg_controllen = control.size();
-  }
-  DescriptorMessage(const DescriptorMessage&) = delete;
-  DescriptorMessage& operator=(const DescriptorMessage&) = delete;
-
-  char byte = 0;
-  iovec content = {&byte, 1};
-  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control = {};
-  msghdr header = {};
-};
-
-void send_descriptor(const Descriptor& socket, const Descriptor& sent) {
-  DescriptorMessage message;
-  cmsghdr* const part = CMSG_FIRSTHDR(&message.header);
-  part->cmsg_level = SOL_SOCKET;
-  part->cmsg_type = SCM_RIGHTS;
-  part->cmsg_len = CMSG_LEN(sizeof(int));
-  const int number = sent.number();
-  std::memcpy(CMSG_DATA(part), &number, sizeof(number));
-  if (::sendmsg(socket.number(), &message.header, MSG_NOSIGNAL) != 1) {
-    throw_system_error("sendmsg", errno);
-  }
-}
-
 // None when the other end is closed.
 Descriptor receive_descriptor() {
-  DescriptorMessage message;
-  ssize_t count = 0;
-  do {
-    count = ::recvmsg(kChildDescriptor, &message.header, MSG_CMSG_CLOEXEC);
-  } while (count < 0 && errno == EINTR);
-  const cmsghdr* const part = count == 1 ? CMSG_FIRSTHDR(&message.header) : nullptr;
-  if (part == nullptr || part->cmsg_type != SCM_RIGHTS) return Descriptor();
-  int number = -1;
-  std::memcpy(&number, CMSG_DATA(part), sizeof(number));
-  return Descriptor(number);
+  std::array<char, 1> byte = {};
+  for (;;) {
+    Received received = receive(kChildDescriptor, byte);
+    if (received.count < 0 && errno == EINTR) continue;
+    return std::move(received.passed);
+  }
 }
 
 // The C library's fork cannot make a sibling. What its own does besides is about other threads,
@@ -107,7 +74,9 @@ void serve_copies(const std::function<void()>& work) {
 
 Child copy_of(const Child& server, const std::stop_token& stop) {
   SocketPair sockets = make_socket_pair();
-  send_descriptor(server.socket(), sockets.theirs);
+  if (send_with(server.socket().number(), "?", sockets.theirs.number()) != 1) {
+    throw_system_error("sendmsg", errno);
+  }
   sockets.theirs = Descriptor();
   const auto deadline = Clock::now() + kLongestAnswer;
   while (Clock::now() < deadline) {

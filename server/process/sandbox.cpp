@@ -98,7 +98,7 @@ void allow(const Descriptor& ruleset, const std::filesystem::path& path, std::ui
       "landlock_add_rule");
 }
 
-// Leaves `readable`, a file or a folder, and all of the folder `writable`, where one is named.
+// Leaves the file `readable` and all of the folder `writable`, where they are named.
 void restrict_files(const std::filesystem::path& readable, const std::filesystem::path& writable) {
   const long version = landlock_version();
   if (version < 1) return;
@@ -112,7 +112,7 @@ void restrict_files(const std::filesystem::path& readable, const std::filesystem
                                   LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_MAKE_REG |
                                   LANDLOCK_ACCESS_FS_MAKE_DIR | LANDLOCK_ACCESS_FS_REMOVE_FILE |
                                   LANDLOCK_ACCESS_FS_REMOVE_DIR | kTruncate;
-  allow(ruleset, readable, kRead);
+  if (!readable.empty()) allow(ruleset, readable, kRead);
   if (!writable.empty()) allow(ruleset, writable, kWork & attributes.handled_access_fs);
   require(::syscall(SYS_landlock_restrict_self, ruleset.number(), 0) == 0,
           "landlock_restrict_self");
@@ -196,6 +196,7 @@ void filter_calls(Threads threads) {
     filter.allow(SCMP_SYS(clone), {0, SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD});
     filter.fail(SCMP_SYS(clone3), ENOSYS);
     filter.allow(SCMP_SYS(sched_setaffinity));
+    filter.allow(SCMP_SYS(recvmsg));  // nothing makes another socket than the one it has
     filter.allow(SCMP_SYS(prctl), argument_is(0, PR_SET_NAME));
   }
   for (const int call : kAllowedCalls) filter.allow(call);
@@ -249,10 +250,10 @@ void confine_process(Threads threads) {
 
 void confine_ahead() { confine_process(Threads::kOne); }
 
-void confine_job(const std::filesystem::path& readable) {
+void confine_job() {
   confine_process(Threads::kMany);
   limit(RLIMIT_FSIZE, 0);
-  restrict_files(readable, {});
+  restrict_files({}, {});
 }
 
 MemoryLimit::MemoryLimit() : usage_(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC)) {

@@ -31,10 +31,11 @@ void confine_ahead();
 // confine_ahead(), once. Throws as that does; a kernel without Landlock is no error.
 void confine_to(const Confinement& confinement);
 
-// Confines a process that works for long, with threads: it may read below one folder and write
-// nothing, and has the calls of confine_ahead() and those that make threads. Throws as that does.
-// Must be called before a second thread is started, once, and instead of the two above.
-void confine_job(const std::filesystem::path& readable);
+// Confines a process that works for long, with threads: it may open no file at all and write
+// nothing, and has the calls of confine_ahead() and those that make threads or receive descriptors,
+// which are all that it can read. Throws as that does. Must be called before a second thread is
+// started, once, and instead of the two above.
+void confine_job();
 
 // Limits the process's private memory (RLIMIT_DATA), again and again. To be made before the process
 // is confined. Not thread safe.

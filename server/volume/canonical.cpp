@@ -104,7 +104,9 @@ std::span<std::byte> CanonicalWriter::samples() {
   return {data_ + kHeaderBytes, size_ - kHeaderBytes};
 }
 
-CanonicalFile::CanonicalFile(const std::filesystem::path& path) : file_(path) {
+CanonicalFile::CanonicalFile(const std::filesystem::path& path) : CanonicalFile(InputFile(path)) {}
+
+CanonicalFile::CanonicalFile(InputFile file) : file_(std::move(file)) {
   header_ = from_text(file_.text(0, kHeaderBytes));
   const auto size = file_bytes(header_);
   if (!size || *size != file_.size()) throw_not_canonical("its size is not what its header tells");
@@ -115,8 +117,11 @@ void CanonicalFile::read(std::uint64_t offset, std::span<std::byte> target) cons
   if (file_.read(kHeaderBytes + offset, target) != target.size()) throw_damaged();
 }
 
-CanonicalVolume::CanonicalVolume(const std::filesystem::path& path) {
-  const CanonicalFile canonical(path);
+CanonicalVolume::CanonicalVolume(const std::filesystem::path& path)
+    : CanonicalVolume(InputFile(path)) {}
+
+CanonicalVolume::CanonicalVolume(InputFile file) {
+  const CanonicalFile canonical(std::move(file));
   header_ = canonical.header();
   size_ = canonical.file_.size();
   void* data = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, canonical.file_.descriptor(), 0);

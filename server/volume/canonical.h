@@ -56,6 +56,7 @@ class CanonicalFile {
   // Throws Error kInternal when the file is not a canonical volume of exactly the size that its
   // header tells.
   explicit CanonicalFile(const std::filesystem::path& path);
+  explicit CanonicalFile(InputFile file);
 
   const CanonicalHeader& header() const { return header_; }
 
@@ -77,6 +78,7 @@ class CanonicalVolume {
  public:
   // Throws as CanonicalFile does.
   explicit CanonicalVolume(const std::filesystem::path& path);
+  explicit CanonicalVolume(InputFile file);
   ~CanonicalVolume();
   CanonicalVolume(CanonicalVolume&&) noexcept;
   CanonicalVolume& operator=(CanonicalVolume&&) = delete;

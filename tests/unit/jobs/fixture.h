@@ -47,7 +47,7 @@ class JobsFixture : public testing::Test {
   // The real program of jobs, or another one in its place.
   jobs::JobProgram job_program(const std::filesystem::path& file = ISOMESH_JOB,
                                int threads = 2) const {
-    return {.file = file, .setup = {.readable = data_.blobs(), .threads = threads}};
+    return {.file = file, .setup = {.threads = threads}};
   }
 
   static JobParameters parameters_of(const Volume& volume, double iso);

@@ -2,6 +2,7 @@
 // import fares in it is tested with the runner that starts imports.
 #include "server/process/sandbox.h"
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
@@ -20,6 +21,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "server/process/child.h"
+#include "server/process/passing.h"
 #include "tests/support/files.h"
 
 namespace isomesh::process {
@@ -174,18 +177,34 @@ class JobSandbox : public Sandbox {
  protected:
   bool confined(const std::function<bool()>& holds) const {
     const int status = status_of([&] {
-      confine_job(folder_.path());
+      confine_job();
       return holds();
     });
     return WIFEXITED(status) && WEXITSTATUS(status) == 0;
   }
 };
 
-TEST_F(JobSandbox, LeavesOneFolderToRead) {
-  test::write_file(scratch_ / "other", "bytes");
-  EXPECT_TRUE(confined([&] { return ::open((folder_ / "upload").c_str(), O_RDONLY) >= 0; }));
-  EXPECT_EQ(confined([&] { return ::open((scratch_ / "other").c_str(), O_RDONLY) >= 0; }),
+TEST_F(JobSandbox, LeavesWhatIsOpenToRead) {
+  const Descriptor upload(::open((folder_ / "upload").c_str(), O_RDONLY));
+  char byte = 0;
+  EXPECT_TRUE(confined([&] { return ::pread(upload.number(), &byte, 1, 0) == 1; }));
+  EXPECT_EQ(confined([&] { return ::open((folder_ / "upload").c_str(), O_RDONLY) >= 0; }),
             !has_landlock());
+  // Nor does what is open lead to more than there is of it.
+  const std::string itself = "/proc/self/fd/" + std::to_string(upload.number());
+  EXPECT_EQ(confined([&] { return ::open(itself.c_str(), O_RDWR) >= 0; }), !has_landlock());
+}
+
+TEST_F(JobSandbox, LeavesTheWayInForDescriptors) {
+  const SocketPair sockets = make_socket_pair();
+  const Descriptor upload(::open((folder_ / "upload").c_str(), O_RDONLY));
+  ASSERT_EQ(send_with(sockets.ours.number(), "upload", upload.number()), 6);
+  EXPECT_TRUE(confined([&] {
+    std::array<char, 64> piece = {};
+    const Received received = receive(sockets.theirs.number(), piece);
+    char byte = 0;
+    return received.count == 6 && ::pread(received.passed.number(), &byte, 1, 0) == 1;
+  }));
 }
 
 TEST_F(JobSandbox, LeavesNothingToWrite) {
@@ -222,7 +241,7 @@ TEST_F(JobSandbox, LimitsMemoryAgainAndAgain) {
   constexpr std::size_t kMebibyte = 1 << 20;
   const int status = status_of([&] {
     const MemoryLimit limit;
-    confine_job(folder_.path());
+    confine_job();
     limit.set(64 * kMebibyte);
     if (!can_have(60 * kMebibyte) || can_have(80 * kMebibyte)) return false;
     limit.set(256 * kMebibyte);
