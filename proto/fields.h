@@ -33,6 +33,13 @@ void visit(Is<Note> auto& self, auto&& field) {
   field("detail", self.detail);
 }
 
+void visit(Is<LabelEntry> auto& self, auto&& field) {
+  field("label", self.label);
+  field("name", self.name);
+  field("color", self.color);
+  field("values", self.values);
+}
+
 void visit(Is<DicomInstance> auto& self, auto&& field) {
   field("sop_class_uid", self.sop_class_uid);
   field("sop_instance_uid", self.sop_instance_uid);
@@ -76,6 +83,9 @@ void visit(Is<Volume> auto& self, auto&& field) {
   field("notes", self.notes);
   if (is_told(self, self.dicom.has_value())) {
     field("dicom", self.dicom);
+  }
+  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(self)>>) {
+    field("labels", self.labels);  // written by to_record() alone
   }
 }
 

@@ -241,6 +241,12 @@ std::string volume_name_to_json(const std::optional<std::string>& name) {
   return body.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
+std::string to_record(const Volume& volume) {
+  Json record = write(volume);
+  if (!volume.labels.empty()) write_field(record, "labels", volume.labels);
+  return record.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 Volume volume_from_record(std::string_view text) { return from_record<Volume>(text); }
 Job job_from_record(std::string_view text) { return from_record<Job>(text); }
 

@@ -15,6 +15,7 @@
 
 namespace isomesh {
 
+// Without what only its owner's record has, its labels.
 std::string to_json(const Volume& volume);
 std::string to_json(const Job& job);
 std::string to_json(const JobParameters& parameters);
@@ -45,7 +46,10 @@ JobEvent job_event_from_json(std::string_view text);
 std::vector<Volume> volumes_from_json(std::string_view text);
 std::vector<Job> jobs_from_json(std::string_view text);
 
-// Reads what to_json() made in this version or an older one: members that it did not know yet have
+// A volume as a store keeps it and as an import tells it: to_json() with its labels.
+std::string to_record(const Volume& volume);
+
+// Reads what to_record(), or to_json() of a job, made in this version or an older one: members that it did not know yet have
 // their defaults. Throws Error kInternal.
 Volume volume_from_record(std::string_view text);
 Job job_from_record(std::string_view text);

@@ -97,6 +97,11 @@ double default_lambda(Smoothing smoothing) {
   return smoothing == Smoothing::kTaubin ? kTaubin : 1;
 }
 
+bool is_color(std::string_view text) {
+  return text.size() == 7 && text[0] == '#' &&
+         text.find_first_not_of("0123456789abcdef", 1) == std::string_view::npos;
+}
+
 bool is_final(JobState state) {
   return state == JobState::kSucceeded || state == JobState::kFailed ||
          state == JobState::kCancelled;

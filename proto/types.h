@@ -98,6 +98,24 @@ struct DicomIdentity {
   bool operator==(const DicomIdentity&) const = default;
 };
 
+// What a file says of one of its labels. Segments are named after organs, so that names may be shown
+// wherever the volume is.
+struct LabelEntry {
+  static constexpr std::size_t kMostNameBytes = 255;
+
+  std::int64_t label = 0;
+  std::string name = {};                  // UTF-8 without control characters; may be empty
+  std::optional<std::string> color = {};  // as is_color() has it
+  // The sample values that belong to it, ascending; empty: its own number alone. Where segments
+  // overlap, values number their combinations, and one value belongs to several labels.
+  std::vector<std::int64_t> values = {};
+
+  bool operator==(const LabelEntry&) const = default;
+};
+
+// Whether that is "#rrggbb", in lower case.
+bool is_color(std::string_view text);
+
 // The two ways in which a NIfTI header may say where its samples lie.
 enum class NiftiForm { kSform, kQform };
 
@@ -121,6 +139,10 @@ struct Volume {
   // upload that came first, as all but samples and geometry is.
   std::vector<Note> notes = {};
   std::optional<DicomIdentity> dicom;  // of a volume that came as DICOM
+  // What the upload told of its labels, ascending, at most kMostLabels. In records and in what an
+  // import tells, never in answers (json.h).
+  std::vector<LabelEntry> labels = {};
+  static constexpr std::size_t kMostLabels = 65535;
 
   std::uint64_t sample_count() const { return std::uint64_t{dims[0]} * dims[1] * dims[2]; }
   bool operator==(const Volume&) const = default;

@@ -11,6 +11,7 @@
 #include "proto/error.h"
 #include "server/process/sandbox.h"
 #include "server/volume/canonical.h"
+#include "server/volume/labels.h"
 #include "server/volume/unusable.h"
 
 namespace isomesh::jobs {
@@ -43,6 +44,7 @@ void check(const Volume& volume, const process::ImportTask& task) {
   for (const Note& note : volume.notes) {
     if (find_note(note.code) == nullptr) throw_lying();
   }
+  if (!volume::is_label_table(volume.labels)) throw_lying();
   const volume::CanonicalFile canonical(task.target);
   const volume::CanonicalHeader& header = canonical.header();
   const auto [low, high] = volume.range;

@@ -164,7 +164,7 @@ std::string reading_message(std::string_view format) {
 }
 
 std::string volume_message(const Volume& volume) {
-  return line_of(kVolume, Json::parse(isomesh::to_json(volume)));
+  return line_of(kVolume, Json::parse(to_record(volume)));
 }
 
 std::string error_message(const Error& error) { return line_of(kError, to_json(error)); }

@@ -35,7 +35,8 @@ class VolumeStore {
 
   virtual bool contains(const Viewer& viewer, const std::string& id) const = 0;
 
-  // Oldest first; at most `limit` that come after the one that `after` is the cursor of.
+  // Oldest first, without their labels; at most `limit` that come after the one that `after` is the
+  // cursor of.
   virtual std::vector<Volume> list(
       const Viewer& viewer, const std::string& after = {},
       std::size_t limit = std::numeric_limits<std::size_t>::max()) const = 0;

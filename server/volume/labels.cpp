@@ -1,10 +1,12 @@
 #include "server/volume/labels.h"
 
 #include <algorithm>
+#include <functional>
 #include <type_traits>
 #include <unordered_set>
 #include <vector>
 
+#include "base/text.h"
 #include "proto/samples.h"
 
 namespace isomesh::volume {
@@ -96,7 +98,19 @@ std::optional<std::size_t> count_labels(std::span<const Sample> samples, std::si
   return values.count();
 }
 
+bool is_entry(const LabelEntry& entry) {
+  return entry.name.size() <= LabelEntry::kMostNameBytes && !has_control_characters(entry.name) &&
+         (!entry.color || is_color(*entry.color)) &&
+         std::ranges::adjacent_find(entry.values, std::greater_equal()) == entry.values.end();
+}
+
 }  // namespace
+
+bool is_label_table(std::span<const LabelEntry> labels) {
+  return labels.size() <= Volume::kMostLabels && std::ranges::all_of(labels, is_entry) &&
+         std::ranges::adjacent_find(labels, std::greater_equal(), &LabelEntry::label) ==
+             labels.end();
+}
 
 std::optional<std::size_t> label_count(std::span<const std::byte> samples, SampleType type,
                                        const std::array<std::uint32_t, 3>& dims) {

@@ -1,4 +1,4 @@
-// Telling label maps from images.
+// Telling label maps from images, and what may be said of their labels.
 #pragma once
 
 #include <array>
@@ -17,5 +17,10 @@ namespace isomesh::volume {
 // labels. `samples` as for measure(). Thread safe.
 std::optional<std::size_t> label_count(std::span<const std::byte> samples, SampleType type,
                                        const std::array<std::uint32_t, 3>& dims);
+
+// Whether labels that are said to be a volume's are as Volume::labels has them: few enough,
+// ascending, with values ascending, short names without control characters, and colours that are
+// some. Thread safe.
+bool is_label_table(std::span<const LabelEntry> labels);
 
 }  // namespace isomesh::volume

@@ -36,7 +36,7 @@ std::pair<Volume, bool> SqliteVolumeStore::add(const std::string& owner, const V
     return {*known, false};
   }
   transaction->run("INSERT INTO volumes VALUES(?, ?, ?, ?, ?, ?)", owner, volume.id,
-                   us_of_timestamp(volume.created), now, volume.bytes, to_json(volume));
+                   us_of_timestamp(volume.created), now, volume.bytes, to_record(volume));
   transaction->run("DELETE FROM expired WHERE id = ? AND owner = ?", volume.id, owner);
   transaction.commit();
   return {volume, true};
@@ -54,7 +54,7 @@ Volume SqliteVolumeStore::rename(const std::string& owner, const std::string& id
   auto volume = find(transaction.connection(), owner, id);
   if (!volume) throw_missing(transaction.connection(), owner, id);
   volume->name = name;
-  transaction->run("UPDATE volumes SET record = ? WHERE owner = ? AND id = ?", to_json(*volume),
+  transaction->run("UPDATE volumes SET record = ? WHERE owner = ? AND id = ?", to_record(*volume),
                    owner, id);
   transaction.commit();
   return *volume;
@@ -82,7 +82,8 @@ std::vector<std::string> SqliteVolumeStore::records(const Viewer& viewer, const 
   const std::string id = space == std::string::npos ? "" : after.substr(space + 1);
   const Reading reading(database_.reader());
   Query query = reading->query(
-      "SELECT record FROM volumes WHERE (?1 IS NULL OR owner = ?1) AND (created, id) > (?2, ?3) "
+      "SELECT iif(instr(record, '\"labels\":['), json_remove(record, '$.labels'), record) FROM "
+      "volumes WHERE (?1 IS NULL OR owner = ?1) AND (created, id) > (?2, ?3) "
       "ORDER BY created, id LIMIT ?4",
       viewer, after.empty() ? std::int64_t{-1} : created, id,
       static_cast<std::int64_t>(std::min<std::size_t>(limit, 1 << 30)));

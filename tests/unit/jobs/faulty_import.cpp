@@ -18,6 +18,7 @@
 #include "server/process/fork_server.h"
 #include "server/process/import_message.h"
 #include "server/process/sandbox.h"
+#include "server/volume/canonical.h"
 
 namespace {
 
@@ -104,6 +105,17 @@ void lie() {
   say(volume_message(volume));
 }
 
+void lie_about_labels(const ImportOrder& order) {
+  Volume volume;
+  volume.format = "nifti";
+  volume.dims = {2, 2, 2};
+  volume.bytes = 8;
+  volume.labels = {{.label = 2, .name = "liver"}, {.label = 1, .name = "kidney"}};
+  const volume::CanonicalWriter writer(order.task.target,
+                                       {volume.dims, volume.type, volume.geometry});
+  say(volume_message(volume));
+}
+
 void misbehave(const std::string& what, const ImportOrder& order) {
   if (what == "crash") {
     std::signal(SIGSEGV, SIG_DFL);  // a sanitizer would make a status of it
@@ -121,6 +133,7 @@ void misbehave(const std::string& what, const ImportOrder& order) {
   if (what == "babble") say("{\"reading\": 7}\n");
   if (what == "forge") say("{\"reading\": \"nifti\\u000a[error] forged\"}\n");
   if (what == "lie") lie();
+  if (what == "lie about labels") lie_about_labels(order);
   confine_as(order);
   if (what == "memory") eat_memory();
   if (what == "file") write_beyond_limit(order);

@@ -77,6 +77,10 @@ TEST(ImportRunner, WordsThatAreNoneOfOursAreAnInternalError) {
   }
 }
 
+TEST(ImportRunner, LabelsOutOfOrderAreNotBelieved) {
+  EXPECT_EQ(Faulty().run("lie about labels").code(), ErrorCode::kInternal);
+}
+
 TEST(ImportRunner, AVolumeThatWasNotWrittenIsNotBelieved) {
   EXPECT_EQ(Faulty().run("lie").code(), ErrorCode::kInternal);
 }

@@ -180,6 +180,26 @@ TEST(AnswerJson, VolumesComeBackTheSame) {
   EXPECT_EQ(volumes_from_json(to_json(several)), several);
 }
 
+TEST(AnswerJson, LabelsAreInRecordsAndInNoAnswer) {
+  Volume volume = some_volume();
+  volume.labels = {{.label = -1, .name = "rest"},
+                   {.label = 2, .name = "M\xc3\xbcller", .color = "#0080ff", .values = {2, 300}}};
+  const json record = json::parse(to_record(volume));
+  EXPECT_EQ(record["labels"], json::parse(R"([
+      {"label": -1, "name": "rest", "color": null, "values": []},
+      {"label": 2, "name": "M\u00fcller", "color": "#0080ff", "values": [2, 300]}])"));
+  EXPECT_EQ(volume_from_record(to_record(volume)), volume);
+  EXPECT_EQ(to_json(volume), to_json(some_volume()));
+  EXPECT_EQ(to_record(some_volume()), to_json(some_volume()));
+}
+
+TEST(AnswerJson, AColorIsSixDigits) {
+  EXPECT_TRUE(is_color("#09afcd"));
+  for (const char* const text : {"", "#", "09afcd", "#09afc", "#09afcd0", "#09AFCD", "#09afcg"}) {
+    EXPECT_FALSE(is_color(text)) << text;
+  }
+}
+
 TEST(AnswerJson, JobsComeBackTheSame) {
   const std::vector<Job> several = {queued_job(), succeeded_job(), failed_job()};
   for (const Job& job : several) EXPECT_EQ(job_from_json(to_json(job)), job);

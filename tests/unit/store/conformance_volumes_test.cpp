@@ -80,6 +80,19 @@ TEST_P(VolumeConformance, ANameIsItsOwnersAlone) {
   EXPECT_EQ(code_thrown_by([&] { volumes().rename("nobody", "aa", "x"); }), ErrorCode::kNotFound);
 }
 
+TEST_P(VolumeConformance, LabelsAreItsOwnersAloneAndInNoList) {
+  Volume named = volume_of("aa");
+  named.labels = {{.label = 3, .name = "liver", .color = "#ff8000", .values = {3, 9}}};
+  volumes().add("", named);
+  volumes().add("other", volume_of("aa"));
+  restart();
+  EXPECT_EQ(volumes().get("", "aa"), named);
+  EXPECT_THAT(volumes().get("other", "aa").labels, testing::IsEmpty());
+  EXPECT_EQ(volumes().list(""), std::vector{volume_of("aa")});
+  EXPECT_EQ(volumes().rename("", "aa", "head").labels, named.labels);
+  EXPECT_EQ(volumes().get("", "aa").labels, named.labels);
+}
+
 TEST_P(VolumeConformance, OwnersHaveRecordsOfTheirOwn) {
   const Volume mine = volume_of("aa");
   const Volume theirs = volume_of("aa", "2025-01-01T00:00:00.000Z");

@@ -100,5 +100,29 @@ TEST(Labels, RealNumbersAreNoLabels) {
   EXPECT_EQ(labels_of(samples, {9, 1, 1}), std::nullopt);
 }
 
+TEST(LabelTable, IsAscendingAndPlain) {
+  const LabelEntry liver = {.label = 1, .name = "M\xc3\xbcller", .color = "#ff0000", .values = {}};
+  const LabelEntry kidney = {.label = 7, .name = {}, .color = {}, .values = {-1, 7, 300}};
+  EXPECT_TRUE(is_label_table({}));
+  EXPECT_TRUE(is_label_table(std::vector{liver, kidney}));
+  EXPECT_FALSE(is_label_table(std::vector{kidney, liver}));
+  EXPECT_FALSE(is_label_table(std::vector{liver, liver}));
+  EXPECT_FALSE(is_label_table(std::vector{LabelEntry{.label = 1, .values = {7, 7}}}));
+  EXPECT_FALSE(is_label_table(std::vector{LabelEntry{.label = 1, .color = "red"}}));
+  EXPECT_FALSE(is_label_table(std::vector{LabelEntry{.label = 1, .name = "a\nb"}}));
+  EXPECT_TRUE(is_label_table(std::vector{LabelEntry{.label = 1, .name = std::string(255, 'x')}}));
+  EXPECT_FALSE(is_label_table(std::vector{LabelEntry{.label = 1, .name = std::string(256, 'x')}}));
+}
+
+TEST(LabelTable, HasAtMostAsManyAsSixteenBitsTellApart) {
+  std::vector<LabelEntry> labels(Volume::kMostLabels);
+  for (std::size_t at = 0; at < labels.size(); ++at) {
+    labels[at].label = static_cast<std::int64_t>(at);
+  }
+  EXPECT_TRUE(is_label_table(labels));
+  labels.push_back({.label = 65535});
+  EXPECT_FALSE(is_label_table(labels));
+}
+
 }  // namespace
 }  // namespace isomesh::volume::test
