@@ -253,6 +253,23 @@ void visit(Is<Histogram> auto& self, auto&& field) {
   field("counts", self.counts);
 }
 
+void visit(Is<VolumeLabel> auto& self, auto&& field) {
+  field("label", self.label);
+  field("voxels", self.voxels);
+  field("volume_mm3", self.volume_mm3);
+  field("low", self.low);
+  field("high", self.high);
+  field("bounds", self.bounds);
+  field("name", self.name);
+  field("color", self.color);
+}
+
+void visit(Is<VolumeLabels> auto& self, auto&& field) {
+  field("volume", self.volume);
+  field("background", self.background);
+  field("labels", self.labels);
+}
+
 void visit(Is<Estimate::Queue> auto& self, auto&& field) {
   field("queued", self.queued);
   field("running", self.running);

@@ -218,6 +218,7 @@ std::string to_json(const JobParameters& parameters) { return to_text(parameters
 std::string to_json(const MeshParameters& parameters) { return to_text(parameters); }
 std::string to_json(const Problem& problem) { return to_text(problem); }
 std::string to_json(const Histogram& histogram) { return to_text(histogram); }
+std::string to_json(const VolumeLabels& labels) { return to_text(labels); }
 std::string to_json(const Estimate& estimate) { return to_text(estimate); }
 std::string to_json(const JobEvent& event) { return to_text(event); }
 
@@ -260,6 +261,9 @@ std::vector<Note> notes_from_json(std::string_view text) {
 }
 Problem problem_from_json(std::string_view text) { return from_text<Problem>(text); }
 Histogram histogram_from_json(std::string_view text) { return from_text<Histogram>(text); }
+VolumeLabels volume_labels_from_json(std::string_view text) {
+  return from_text<VolumeLabels>(text);
+}
 Estimate estimate_from_json(std::string_view text) { return from_text<Estimate>(text); }
 JobEvent job_event_from_json(std::string_view text) { return from_text<JobEvent>(text); }
 

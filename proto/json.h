@@ -22,6 +22,7 @@ std::string to_json(const JobParameters& parameters);
 std::string to_json(const MeshParameters& parameters);
 std::string to_json(const Problem& problem);
 std::string to_json(const Histogram& histogram);
+std::string to_json(const VolumeLabels& labels);
 std::string to_json(const Estimate& estimate);
 std::string to_json(const JobEvent& event);
 // {"volumes": [...], "next": cursor}; `next` is null on the last page.
@@ -41,6 +42,7 @@ std::vector<UploadedVolume> uploaded_volumes_from_json(std::string_view text);
 std::vector<Note> notes_from_json(std::string_view text);
 Problem problem_from_json(std::string_view text);
 Histogram histogram_from_json(std::string_view text);
+VolumeLabels volume_labels_from_json(std::string_view text);
 Estimate estimate_from_json(std::string_view text);
 JobEvent job_event_from_json(std::string_view text);
 std::vector<Volume> volumes_from_json(std::string_view text);

@@ -421,6 +421,30 @@ struct Histogram {
   bool operator==(const Histogram&) const = default;
 };
 
+// One label of a volume: what its samples say, and what its file did.
+struct VolumeLabel {
+  std::int64_t label = 0;
+  std::uint64_t voxels = 0;  // at least 1
+  double volume_mm3 = 0;     // of so many voxels
+  // The smallest and the largest sample along x, y and z that has it.
+  std::array<std::uint32_t, 3> low = {0, 0, 0};
+  std::array<std::uint32_t, 3> high = {0, 0, 0};
+  // The smallest and the largest corner, in millimetres (LPS), of the box of these voxels.
+  std::array<std::array<double, 3>, 2> bounds = {};
+  std::optional<std::string> name = {};
+  std::optional<std::string> color = {};  // as is_color() has it
+
+  bool operator==(const VolumeLabel&) const = default;
+};
+
+struct VolumeLabels {
+  std::string volume;
+  std::int64_t background = 0;
+  std::vector<VolumeLabel> labels;  // ascending, at most Volume::kMostLabels
+
+  bool operator==(const VolumeLabels&) const = default;
+};
+
 // What a job with these parameters would make and take.
 struct Estimate {
   struct Queue {

@@ -26,6 +26,7 @@
 #include "server/http/server.h"
 #include "server/jobs/estimate.h"
 #include "server/jobs/histograms.h"
+#include "server/jobs/label_lists.h"
 #include "server/jobs/housekeeper.h"
 #include "server/jobs/memory.h"
 #include "server/jobs/volume_library.h"
@@ -211,12 +212,13 @@ int run(const Options& options, const sigset_t& signals) {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
   const jobs::Housekeeper housekeeper(retention, housekeeping_interval(keep));
   jobs::Histograms histograms(blobs);
+  jobs::LabelLists labels(blobs);
   jobs::Estimator estimator(volumes, blobs, jobs, limits, job_program);
   http::ServerOptions server_options = options.http;
   server_options.tls = files.tls.get();
   server_options.connections = net::connections_within(net::raise_descriptor_limit());
   const http::Services services = {folder,     blobs,     volumes,           jobs,    library,
-                                   histograms, estimator, retention,         metrics, outbox,
+                                   histograms, labels, estimator, retention,         metrics, outbox,
                                    callbacks,  targets,   files.tokens.get()};
   http::Server server(services, server_options);
   // Declared after the server, so that the workers end before it and the end of their last job is

@@ -286,6 +286,12 @@ int info(const Options& options, const std::stop_token& stop) {
   return kDone;
 }
 
+int labels(const Options& options, const std::stop_token& stop) {
+  const VolumeLabels labels = client_of(options, stop).labels(options.id, options.background);
+  std::cout << (options.json ? to_json(labels) + '\n' : label_list(labels));
+  return kDone;
+}
+
 int rename(const Options& options, const std::stop_token& stop) {
   const auto name = options.name.empty() ? std::nullopt : std::optional(options.name);
   const Volume volume = client_of(options, stop).rename_volume(options.id, name);
@@ -317,6 +323,8 @@ int dispatch(const Options& options, const std::stop_token& stop) {
       return list(options, stop);
     case Command::kInfo:
       return info(options, stop);
+    case Command::kLabels:
+      return labels(options, stop);
   }
   return kWrongUsage;
 }

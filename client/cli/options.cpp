@@ -480,6 +480,13 @@ class Parser {
     list.add_flag("--volumes", options_.volumes, "List volumes instead");
 
     add_id(command(Command::kInfo, "info", "Show a volume"), options_, "VOLUME");
+
+    CLI::App& labels =
+        command(Command::kLabels, "labels", "List the labels of a volume that is a label map");
+    add_id(labels, options_, "VOLUME");
+    add_number<std::int64_t>(labels, "--background",
+                             "The value that belongs to no label (default: 0)",
+                             [&](std::int64_t value) { options_.background = value; });
   }
 
   Options parse(int argc, const char* const* argv) {

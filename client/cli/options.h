@@ -24,6 +24,7 @@ enum class Command {
   kRename,
   kList,
   kInfo,
+  kLabels,
 };
 
 // A file to write a mesh to, in the format that its suffix names.
@@ -50,6 +51,7 @@ struct Options {
   bool volumes = false;                      // list
   std::string name;                          // rename
   std::optional<std::int64_t> label;         // fetch
+  std::int64_t background = 0;               // labels
 };
 
 // Ends the program before any command runs: help, the version, or wrong usage. `text` belongs on

@@ -249,6 +249,16 @@ std::string volume_list(const std::vector<Volume>& volumes) {
                     rows);
 }
 
+std::string label_list(const VolumeLabels& labels) {
+  Rows rows = {{"label", "voxels", "mm3", "color", "name"}};
+  for (const VolumeLabel& label : labels.labels) {
+    rows.push_back({std::to_string(label.label), grouped(static_cast<std::int64_t>(label.voxels)),
+                    fixed(label.volume_mm3, 1), label.color.value_or(""), label.name.value_or("")});
+  }
+  return in_columns({Align::kRight, Align::kRight, Align::kRight, Align::kLeft, Align::kLeft},
+                    rows);
+}
+
 std::string job_json(const Job& job, const std::vector<std::filesystem::path>& outputs,
                      const ClientTiming& client) {
   auto json = nlohmann::ordered_json::parse(to_json(job));

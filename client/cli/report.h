@@ -32,6 +32,7 @@ std::string remedy_report(const Remedy& remedy);
 // One line each under a heading.
 std::string job_list(const std::vector<Job>& jobs);
 std::string volume_list(const std::vector<Volume>& volumes);
+std::string label_list(const VolumeLabels& labels);
 
 // The job as the server's JSON, with what the client adds: `outputs`, the files that were written,
 // and `client`, with `upload` and `download` in milliseconds.

@@ -361,6 +361,11 @@ Histogram Client::histogram(const std::string& id, std::uint32_t bins) {
   return histogram_from_json(impl_->repeat({.target = volume_path(id) + "/histogram" + query}));
 }
 
+VolumeLabels Client::labels(const std::string& id, std::int64_t background) {
+  const std::string query = query_string({{"background", std::to_string(background)}});
+  return volume_labels_from_json(impl_->repeat({.target = volume_path(id) + "/labels" + query}));
+}
+
 void Client::slice(const std::string& id, const SliceOptions& options,
                    const std::filesystem::path& target) {
   Query query = {{"axis", options.axis}};

@@ -118,6 +118,9 @@ class Client {
   Volume rename_volume(const std::string& id, const std::optional<std::string>& name);
   void erase_volume(const std::string& id);
   Histogram histogram(const std::string& id, std::uint32_t bins = 256);
+  // The labels that the samples have, but for the background. Throws kUnusableVolume when they are
+  // no whole numbers.
+  VolumeLabels labels(const std::string& id, std::int64_t background = 0);
   // Writes the picture, a PNG, to `target`.
   void slice(const std::string& id, const SliceOptions& options,
              const std::filesystem::path& target);

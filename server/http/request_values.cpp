@@ -161,6 +161,15 @@ std::uint64_t whole_number_of(const Request& request, const std::string& name,
   return *number;
 }
 
+std::int64_t whole_number_of(const Request& request, const std::string& name,
+                             std::int64_t otherwise) {
+  if (!request.has_parameter(name)) return otherwise;
+  const std::string_view text = request.parameter(name);
+  const auto number = parse_int64(text);
+  if (!number || text.starts_with('+')) throw invalid_parameter(name, "must be a whole number");
+  return *number;
+}
+
 std::optional<std::array<double, 2>> interval_of(const Request& request, const std::string& name) {
   if (!request.has_parameter(name)) return std::nullopt;
   const auto interval = numbers_of(name, request.parameter(name), 2);

@@ -48,6 +48,10 @@ struct WholeNumbers {
 std::uint64_t whole_number_of(const Request& request, const std::string& name,
                               const WholeNumbers& among, std::uint64_t otherwise);
 
+// The same of any that 64 bits hold.
+std::int64_t whole_number_of(const Request& request, const std::string& name,
+                             std::int64_t otherwise);
+
 // Two finite numbers of which the second is greater; empty without the parameter.
 std::optional<std::array<double, 2>> interval_of(const Request& request, const std::string& name);
 

@@ -12,6 +12,7 @@
 #include "server/http/upload.h"
 #include "server/jobs/estimate.h"
 #include "server/jobs/histograms.h"
+#include "server/jobs/label_lists.h"
 #include "server/jobs/volume_library.h"
 #include "server/net/address.h"
 #include "server/net/tls.h"
@@ -46,6 +47,7 @@ struct Services {
   store::JobStore& jobs;
   jobs::VolumeLibrary& library;
   jobs::Histograms& histograms;
+  jobs::LabelLists& labels;
   jobs::Estimator& estimator;
   store::Retention& retention;
   Metrics& metrics;

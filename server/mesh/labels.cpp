@@ -18,12 +18,6 @@ namespace {
 constexpr std::uint32_t kPlanesPerTask = 16;
 constexpr std::size_t kMostValues = kMostLabels + 1;  // with the background
 
-[[noreturn]] void throw_too_many() {
-  throw Error(ErrorCode::kUnusableVolume,
-              "the volume has more than " + std::to_string(kMostLabels) +
-                  " different values beside its background; these are no labels");
-}
-
 void add_run(LabelVoxels& label, std::uint32_t begin, std::uint32_t end, std::uint32_t y,
              std::uint32_t z) {
   const std::array<std::uint32_t, 3> first = {begin, y, z};
@@ -33,15 +27,6 @@ void add_run(LabelVoxels& label, std::uint32_t begin, std::uint32_t end, std::ui
     label.high[axis] = std::max(label.high[axis], last[axis]);
   }
   label.voxels += end - begin;
-}
-
-void add(const LabelVoxels& part, LabelVoxels& whole) {
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    whole.low[axis] =
-        whole.voxels == 0 ? part.low[axis] : std::min(whole.low[axis], part.low[axis]);
-    whole.high[axis] = std::max(whole.high[axis], part.high[axis]);
-  }
-  whole.voxels += part.voxels;
 }
 
 // The labels that have been met, by value.
@@ -70,7 +55,7 @@ class LabelTable<T, false> {
  public:
   LabelVoxels& at(T value) {
     LabelVoxels& label = labels_[value];
-    if (labels_.size() > kMostValues) throw_too_many();
+    if (labels_.size() > kMostValues) throw_too_many_labels();
     return label;
   }
 
@@ -123,6 +108,22 @@ std::string missing_labels(std::span<const std::int64_t> labels,
 
 }  // namespace
 
+void add_voxels(const LabelVoxels& part, LabelVoxels& whole) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    whole.low[axis] =
+        whole.voxels == 0 ? part.low[axis] : std::min(whole.low[axis], part.low[axis]);
+    whole.high[axis] = std::max(whole.high[axis], part.high[axis]);
+  }
+  whole.voxels += part.voxels;
+  whole.volume_mm3 += part.volume_mm3;
+}
+
+void throw_too_many_labels() {
+  throw Error(ErrorCode::kUnusableVolume,
+              "the volume has more than " + std::to_string(kMostLabels) +
+                  " different values beside its background; these are no labels");
+}
+
 template <class T>
 std::vector<LabelVoxels> count_labels(const Lattice<T>& lattice, const Context& context) {
   const std::uint32_t planes = lattice.dims.samples() == 0 ? 0 : lattice.dims.z;
@@ -133,8 +134,8 @@ std::vector<LabelVoxels> count_labels(const Lattice<T>& lattice, const Context& 
   });
   std::unordered_map<std::int64_t, LabelVoxels> joined;
   for (std::vector<LabelVoxels>& part : parts) {
-    for (const LabelVoxels& label : std::exchange(part, {})) add(label, joined[label.label]);
-    if (joined.size() > kMostValues) throw_too_many();
+    for (const LabelVoxels& label : std::exchange(part, {})) add_voxels(label, joined[label.label]);
+    if (joined.size() > kMostValues) throw_too_many_labels();
   }
   const double voxel_mm3 = std::abs(lattice.to_space.determinant());
   std::vector<LabelVoxels> labels;
@@ -154,18 +155,19 @@ std::vector<LabelVoxels> labels_of(std::span<const LabelVoxels> present, std::in
   for (const auto& [label, own] : values) {
     LabelVoxels whole = {.label = label};
     for (const std::int64_t value : own) {
+      if (value == background) continue;
       taken.insert(value);
       const auto found = std::ranges::lower_bound(present, value, {}, &LabelVoxels::label);
       if (found == present.end() || found->label != value) continue;
-      add(*found, whole);
-      whole.volume_mm3 += found->volume_mm3;
+      add_voxels(*found, whole);
     }
     taken.insert(label);
-    if (whole.voxels > 0) labels.push_back(whole);
+    if (whole.voxels > 0 && label != background) labels.push_back(whole);
   }
   for (const LabelVoxels& value : present) {
     if (!taken.contains(value.label)) labels.push_back(value);
   }
+  if (labels.size() > kMostLabels) throw_too_many_labels();
   std::ranges::sort(labels, {}, &LabelVoxels::label);
   return labels;
 }
@@ -192,7 +194,7 @@ std::vector<std::int64_t> select_labels(std::span<const LabelVoxels> present,
       throw Error(ErrorCode::kUnusableVolume, "the volume has no voxels of the labels " + missing);
     }
   }
-  if (labels.size() > kMostLabels) throw_too_many();
+  if (labels.size() > kMostLabels) throw_too_many_labels();
   return labels;
 }
 

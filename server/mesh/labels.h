@@ -32,12 +32,20 @@ struct LabelVoxels {
 template <class T>
 std::vector<LabelVoxels> count_labels(const Lattice<T>& lattice, const Context& context);
 
+// Adds what another part of the same samples says of the same label, or of one that it is joined
+// with.
+void add_voxels(const LabelVoxels& part, LabelVoxels& whole);
+
+// Throws Error kUnusableVolume: the samples have more than kMostLabels labels (separate.h).
+[[noreturn]] void throw_too_many_labels();
+
 // Labels that are not the samples of their own value, with all values whose samples belong to them.
 using ValuesOfLabels = std::map<std::int64_t, std::vector<std::int64_t>>;
 
 // The labels that there are: those of `values`, and each value of `present` that is neither the
 // background nor in those. Ascending; those without voxels are left out. What is said of a label of
-// several values is what its values have together.
+// several values is what its values have together. Throws Error kUnusableVolume when there are more
+// than kMostLabels.
 std::vector<LabelVoxels> labels_of(std::span<const LabelVoxels> present, std::int64_t background,
                                    const ValuesOfLabels& values = {});
 

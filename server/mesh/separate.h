@@ -28,7 +28,7 @@
 namespace isomesh::mesh {
 
 // So many labels at most beside the background.
-inline constexpr std::size_t kMostLabels = 65535;
+inline constexpr std::size_t kMostLabels = Volume::kMostLabels;
 
 struct SeparateOptions {
   // The values to separate, each once, ascending, at most kMostLabels and without the background's:

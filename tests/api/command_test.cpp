@@ -127,6 +127,14 @@ TEST_F(CommandTest, StepByStep) {
   EXPECT_EQ(info.status, 0);
   EXPECT_THAT(info.output, HasSubstr("21 x 20 x 19"));
   EXPECT_THAT(info.output, HasSubstr("\u2588"));  // the histogram's highest bar
+
+  const Finished labels = daemon_.command({"labels", volume, "--background", "-1"});
+  EXPECT_EQ(labels.status, 0);
+  EXPECT_THAT(labels.output, HasSubstr("voxels"));
+  const auto listed =
+      volume_labels_from_json(daemon_.command({"--json", "labels", volume}).output);
+  EXPECT_EQ(listed.volume, volume);
+  EXPECT_FALSE(listed.labels.empty());
   const Finished estimate =
       daemon_.command({"estimate", volume, "--iso", "100", "--format", "stl"});
   EXPECT_EQ(estimate.status, 0) << estimate.errors;

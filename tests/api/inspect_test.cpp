@@ -60,6 +60,41 @@ TEST_F(InspectTest, AHistogramIsRefusedByName) {
   EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/0123/histogram"), ErrorCode::kNotFound));
 }
 
+TEST_F(InspectTest, LabelsAreCountedAndKeptByTheClient) {
+  std::string samples(24, '\0');
+  samples[1] = samples[2] = 3;
+  samples[20] = 5;
+  const Volume volume = volume_from_json(
+      daemon_.send("POST", "/v1/volumes?dims=4,3,2&type=uint8&spacing=1,2,3", samples).body);
+  const std::string path = "/v1/volumes/" + volume.id + "/labels";
+  const Answer answer = daemon_.get(path);
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(answer.header("content-type"), "application/json");
+  EXPECT_EQ(answer.header("content-length"), std::to_string(answer.body.size()));
+  const VolumeLabels list = volume_labels_from_json(answer.body);
+  ASSERT_EQ(list.labels.size(), 2U);
+  EXPECT_EQ(list.labels[0].voxels, 2U);
+  EXPECT_EQ(list.labels[0].volume_mm3, 12);
+  EXPECT_EQ(daemon_.client().labels(volume.id), list);
+  EXPECT_EQ(daemon_.client().labels(volume.id, 3).labels.size(), 2U);
+  const std::string etag = answer.header("etag");
+  EXPECT_EQ(daemon_.get(path, {{"If-None-Match", etag}}).status, 304);
+  EXPECT_NE(daemon_.get(path + "?background=3").header("etag"), etag);
+}
+
+TEST_F(InspectTest, LabelsAreRefusedByName) {
+  for (const std::string background : {"", "x", "1.5", "+1", "%2B1", "99999999999999999999"}) {
+    EXPECT_TRUE(blames(daemon_.get(path_ + "/labels?background=" + background), "background"))
+        << background;
+  }
+  EXPECT_TRUE(blames(daemon_.get(path_ + "/labels?bins=1"), "bins"));
+  EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/0123/labels"), ErrorCode::kNotFound));
+  const Volume fractions = volume_from_json(
+      daemon_.send("POST", "/v1/volumes?dims=2,2,2&type=float32", std::string(32, '\0')).body);
+  EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/" + fractions.id + "/labels"),
+                         ErrorCode::kUnusableVolume));
+}
+
 TEST_F(InspectTest, ASliceIsTheSamplesOfTheUpload) {
   const GreyPicture z = picture("axis=z&index=3&window=0,255");
   EXPECT_EQ(z.width, 21U);

@@ -74,7 +74,7 @@ void probe_volumes(Statuses& statuses, const Job& running, const std::string& id
   statuses.probe(post, "/v1/volumes", two_volumes());
   statuses.probe("GET /v1/volumes", "/v1/volumes");
   statuses.probe("GET /v1/volumes", "/v1/volumes?cursor=x");
-  for (const std::string part : {"", "/histogram", "/slice.png"}) {
+  for (const std::string part : {"", "/histogram", "/labels", "/slice.png"}) {
     const std::string get = "GET /v1/volumes/{id}" + part;
     statuses.probe(get, "/v1/volumes/" + id + part);
     statuses.probe(get, "/v1/volumes/" + id + part + "?x=1");
@@ -169,6 +169,7 @@ void probe_damaged(Statuses& statuses, const Daemon& daemon) {
           .id;
   write_file(daemon.data() / "blobs" / id.substr(0, 2) / id, "spoilt");
   statuses.probe("GET /v1/volumes/{id}/histogram", "/v1/volumes/" + id + "/histogram");
+  statuses.probe("GET /v1/volumes/{id}/labels", "/v1/volumes/" + id + "/labels");
   statuses.probe("GET /v1/volumes/{id}/slice.png", "/v1/volumes/" + id + "/slice.png");
   statuses.probe("GET /v1/estimate", "/v1/estimate?iso=1&volume=" + id);
 }

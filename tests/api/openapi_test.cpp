@@ -158,6 +158,7 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
       {"VolumeList", to_json(std::vector{volume})},
       {"UploadedVolumes", to_json(std::vector{UploadedVolume{"ct.nrrd", 201, volume, job.error}})},
       {"Histogram", to_json(Histogram{"", {0, 1}, {1}})},
+      {"VolumeLabels", to_json(VolumeLabels{"", 0, {{.label = 1, .voxels = 1}}})},
       {"Estimate", to_json(estimate)},
       {"Problem", to_json(*job.error)}};
   for (const auto& [schema, text] : complete) {

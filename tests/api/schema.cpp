@@ -76,7 +76,7 @@ class Validator {
       if (json_of(says) != value) fault(where, value.dump() + " is not the constant");
     } else if (keyword == "pattern") {
       const auto fits = testing::ContainsRegex(says.Scalar());
-      if (!testing::Matches(fits)(value.get<std::string>())) {
+      if (value.is_string() && !testing::Matches(fits)(value.get<std::string>())) {
         fault(where, value.dump() + " does not match");
       }
     } else {

@@ -1,5 +1,7 @@
-// What a person looks at before starting a job: histograms, slices, estimates.
+// What a person looks at before starting a job: histograms, labels, slices,
+// estimates.
 #include <memory>
+#include <utility>
 
 #include "base/text.h"
 #include "proto/json.h"
@@ -17,22 +19,12 @@ constexpr std::uint64_t kUsualBins = 256;
 // A volume never changes under its id, so neither does what is made of it.
 constexpr const char* kForever = "private, max-age=31536000, immutable";
 
-// Sets the headers of what never changes. True when the client has it already: then the response is
-// complete.
-bool is_known(const Request& request, Response& response, const std::string& etag) {
-  check_if_match(request, etag);
-  response.set_header("ETag", etag);
-  response.set_header("Cache-Control", kForever);
-  if (!matches_etag(request, etag)) return false;
-  response.status = 304;
-  return true;
-}
-
 void histogram(App& app, const Request& request, Response& response) {
   check_known(request, {"bins"});
   const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
   const std::uint64_t bins = whole_number_of(request, "bins", {1, kMostBins}, kUsualBins);
-  if (is_known(request, response, '"' + volume.id + ".bins" + std::to_string(bins) + '"')) return;
+  const std::string etag = '"' + volume.id + ".bins" + std::to_string(bins) + '"';
+  if (is_known(request, response, etag, kForever)) return;
   response.status = 200;
   response.set_body(to_json(app.services.histograms.of(viewer_of(request), volume, bins)),
                     "application/json");
@@ -59,13 +51,28 @@ void slice(App& app, const Request& request, Response& response) {
   const std::string etag = '"' + volume.id + '.' + std::string(to_string(choice.axis)) +
                            std::to_string(choice.index) + '.' + to_text(choice.window[0]) + '.' +
                            to_text(choice.window[1]) + '"';
-  if (is_known(request, response, etag)) return;
+  if (is_known(request, response, etag, kForever)) return;
   const auto canonical = std::make_shared<const volume::CanonicalFile>(
       jobs::stored_samples(app.services.blobs, volume.id).path);
   const auto picture = std::make_shared<volume::SlicePng>(canonical, choice);
   response.set_header("Accept-Ranges", "none");
   answer_pieces(request, response, "image/png",
                 [picture] { return std::optional<std::string>(picture->next()); });
+}
+
+// Names come and go with the volume's record, so the list is not for ever.
+void labels(App& app, const Request& request, Response& response) {
+  check_known(request, {"background"});
+  const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
+  const std::int64_t background = whole_number_of(request, "background", 0);
+  auto json = app.services.labels.json_of(viewer_of(request), volume, background);
+  if (is_known(request, response, etag_of(*json), kAskEachTime)) return;
+  const std::size_t length = json->size();
+  response.status = 200;
+  response.stream = {.source = text_source(std::move(json)),
+                     .media_type = "application/json",
+                     .framing = Framing::kLength,
+                     .length = length};
 }
 
 void estimate(App& app, const Request& request, Response& response) {
@@ -80,6 +87,9 @@ void add_inspect_routes(App& app) {
   const std::string volume = "/v1/volumes/{id}";
   add_computed_get(app, volume + "/histogram", [&app](const auto& request, auto& response) {
     histogram(app, request, response);
+  });
+  add_computed_get(app, volume + "/labels", [&app](const auto& request, auto& response) {
+    labels(app, request, response);
   });
   add_computed_get(app, volume + "/slice.png",
                    [&app](const auto& request, auto& response) { slice(app, request, response); });

@@ -128,15 +128,18 @@ std::string etag_of(const std::string& text) {
   return '"' + sha256_of(text).substr(0, kEnough) + '"';
 }
 
-void answer_tagged_json(const Request& request, Response& response, const std::string& json) {
-  const std::string etag = etag_of(json);
+bool is_known(const Request& request, Response& response, const std::string& etag,
+              const char* cache_control) {
   check_if_match(request, etag);
   response.set_header("ETag", etag);
-  response.set_header("Cache-Control", "private, no-cache");  // ask each time
-  if (matches_etag(request, etag)) {
-    response.status = 304;
-    return;
-  }
+  response.set_header("Cache-Control", cache_control);
+  if (!matches_etag(request, etag)) return false;
+  response.status = 304;
+  return true;
+}
+
+void answer_tagged_json(const Request& request, Response& response, const std::string& json) {
+  if (is_known(request, response, etag_of(json), kAskEachTime)) return;
   response.status = 200;
   response.set_body(json, "application/json");
 }

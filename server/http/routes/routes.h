@@ -99,6 +99,12 @@ void answer_list(const Request& request, Response& response, ListRequest<Row> li
 
 // The entity tag of what is represented by that text.
 std::string etag_of(const std::string& text);
+// What may change: the client keeps it, and asks each time whether it is the same.
+inline constexpr const char* kAskEachTime = "private, no-cache";
+// Sets the headers of what is kept under that tag. True when the client has it already: then the
+// response is complete. Throws Error kPreconditionFailed.
+bool is_known(const Request& request, Response& response, const std::string& etag,
+              const char* cache_control);
 // Answers 200, or 304 when the client has the same already. Throws Error kPreconditionFailed.
 void answer_tagged_json(const Request& request, Response& response, const std::string& json);
 // How many entries of a list one response may have.

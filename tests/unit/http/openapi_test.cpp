@@ -58,12 +58,13 @@ class OpenApi : public testing::Test {
   jobs::VolumeLibrary library_{
       data_, blobs_, volumes_, retention_, volume::SizeLimits{}, jobs::RunnerOptions{}};
   jobs::Histograms histograms_{blobs_};
+  jobs::LabelLists labels_{blobs_};
   jobs::Estimator estimator_{volumes_, blobs_, jobs_, jobs::PipelineLimits{}, jobs::JobProgram{}};
   Metrics metrics_;
   store::SqliteOutbox outbox_{database_};
   const callbacks::CallbackTargets targets_{{}};
   callbacks::Callbacks callbacks_{outbox_, targets_, {}, {}};
-  App app_{Services{data_, blobs_, volumes_, jobs_, library_, histograms_, estimator_, retention_,
+  App app_{Services{data_, blobs_, volumes_, jobs_, library_, histograms_, labels_, estimator_, retention_,
                     metrics_, outbox_, callbacks_, targets_},
            ServerOptions{}};
   const YAML::Node description_ = YAML::LoadFile(ISOMESH_OPENAPI);
