@@ -41,6 +41,18 @@ bool has_control_characters(std::string_view text) {
   });
 }
 
+std::string printable(std::string_view text) {
+  std::string result;
+  for (const char letter : text) {
+    if (static_cast<unsigned char>(letter) < ' ' || letter == '\x7f') {
+      result += "\xef\xbf\xbd";
+    } else {
+      result += letter;
+    }
+  }
+  return result;
+}
+
 std::vector<std::string_view> split(std::string_view text, char separator) {
   std::vector<std::string_view> parts;
   for (std::size_t begin = 0; begin <= text.size();) {

@@ -16,6 +16,9 @@ std::string lower(std::string_view text);  // ASCII only
 
 bool has_control_characters(std::string_view text);  // other than tabs
 
+// A text that is UTF-8, or should be, with U+FFFD for each control character.
+std::string printable(std::string_view text);
+
 // The parts between separators, each without the white space around it; one more than there are
 // separators.
 std::vector<std::string_view> split(std::string_view text, char separator);

@@ -48,8 +48,9 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .meaning = "A file came more than once and was taken once."},
     {.code = NoteCode::kLooksLikeLabels,
      .name = "looks-like-labels",
-     .meaning = "The samples are few whole values in flat regions, such as a segmentation has; an "
-                "iso-value makes one surface of all that lie above it."},
+     .meaning = "The samples are labels, as the file says or as few whole values in flat regions "
+                "look: a job's `labels` suits them, and an iso-value makes one surface of all that "
+                "lie above it."},
     {.code = NoteCode::kFrameOfReference,
      .name = "frame-of-reference",
      .meaning = "The DICOM slices do not share one frame of reference; that they lie in one space "
@@ -65,6 +66,16 @@ constexpr NoteDescription kNoteDescriptions[] = {
      .name = "distance-assumed",
      .meaning = "The DICOM image does not tell how far apart its slices are; the thickness of a "
                 "slice was taken.",
+     .is_in_mesh = true},
+    {.code = NoteCode::kOverlappingSegments,
+     .name = "overlapping-segments",
+     .meaning = "Segments overlap; samples of several have values that number their combinations, "
+                "and a label is all values that its segment is in.",
+     .is_in_mesh = true},
+    {.code = NoteCode::kFractionalSegments,
+     .name = "fractional-segments",
+     .meaning = "A DICOM segmentation tells shares or probabilities; a segment is where they are "
+                "half of their maximum or more.",
      .is_in_mesh = true},
 };
 

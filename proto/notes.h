@@ -19,10 +19,12 @@ enum class NoteCode {
   kTrailingBytes,     // the data is longer than the header tells
   kValuesRescaled,    // by a slope that other programs pass over
   kDuplicateFile,     // a file came twice and was taken once
-  kLooksLikeLabels,   // few whole values in flat regions: a job's `labels` suits it, not `iso`
+  kLooksLikeLabels,   // told, or few whole values in flat regions: a job's `labels` suits it
   kFrameOfReference,  // DICOM: slices do not share one frame of reference
   kEmptyPlanes,       // DICOM: frames that a segmentation leaves out; they are planes of zeros
   kDistanceAssumed,   // DICOM: the distance between slices is not told; taken from the thickness
+  kOverlappingSegments,  // segments overlap; values number their combinations
+  kFractionalSegments,   // DICOM: segments are shares or probabilities; they begin at a half
 };
 
 struct NoteDescription {

@@ -90,6 +90,10 @@ std::size_t bytes_per_sample(SampleType type) {
   return with_sample(type, [](auto sample) { return sizeof(sample); });
 }
 
+bool is_integer(SampleType type) {
+  return with_sample(type, [](auto sample) { return std::is_integral_v<decltype(sample)>; });
+}
+
 double default_lambda(Smoothing smoothing) {
   // A third, as Taubin has it: larger shares move the brain's volume by more than a tenth of a
   // percent in 20 passes.

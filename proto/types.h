@@ -28,6 +28,7 @@ enum class SampleType {
 };
 
 std::size_t bytes_per_sample(SampleType type);
+bool is_integer(SampleType type);
 
 // Where the samples lie: sample (i,j,k) is at origin + direction * diag(spacing) * (i,j,k), in
 // millimetres, in DICOM's patient space (LPS). `direction` is row-major, its columns are the unit

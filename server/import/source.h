@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "proto/types.h"
@@ -75,6 +76,14 @@ struct VolumeOfFile {
 // empty, where they end with it.
 using Skip = std::optional<std::uint64_t>;
 
+// A segmentation whose segments lie in several layers, so that they may overlap. A layer is one of
+// the file's volumes.
+struct SegmentLayers {
+  bool is_interleaved = false;
+  // The label of a segment, by its layer and its value there. 0 is no segment's.
+  std::map<std::pair<std::uint64_t, std::int64_t>, std::uint32_t> labels;
+};
+
 struct SourceVolume {
   std::array<std::uint32_t, 3> dims = {0, 0, 0};
   VolumeOfFile chosen;
@@ -87,6 +96,8 @@ struct SourceVolume {
   std::vector<DataFile> data_files;
   Geometry geometry;
   std::vector<Note> notes;
+  std::vector<LabelEntry> labels;       // as label_table() has them
+  std::optional<SegmentLayers> layers;  // all volumes are read then, and `chosen` is the first
 
   std::uint64_t sample_count() const { return std::uint64_t{dims[0]} * dims[1] * dims[2]; }
   // What the samples of one volume and of all volumes take up in the file, once decoded.

@@ -9,6 +9,7 @@
 
 #include "proto/error.h"
 #include "proto/samples.h"
+#include "server/import/layers.h"
 #include "server/import/payload.h"
 #include "server/volume/labels.h"
 #include "server/volume/statistics.h"
@@ -38,6 +39,20 @@ void replace_non_finite(std::span<std::byte> samples, SampleType type, double sm
   });
 }
 
+// What the file says is known; otherwise samples may look as if.
+void note_labels(std::span<const std::byte> samples, Volume& volume) {
+  const std::size_t told = volume.labels.size();
+  const auto values = volume::label_count(samples, volume.type, volume.dims);
+  if (told == 0 && !values) return;
+  const std::string what =
+      told > 0 ? "The file tells of " + std::to_string(told) + (told == 1 ? " label" : " labels")
+               : "The samples are " + std::to_string(*values) +
+                     " whole values in flat regions, as labels are";
+  volume.notes.push_back(note_of(
+      NoteCode::kLooksLikeLabels,
+      what + ": mesh it with \"labels\": \"all\"; an iso-value makes one surface of all above it."));
+}
+
 }  // namespace
 
 Volume write_canonical(const PlainSamples& samples, Volume volume,
@@ -59,6 +74,9 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
   check_limits(source, task.limits);
   volume.notes = source.notes;
   std::ranges::copy(payload.notes(), std::back_inserter(volume.notes));
+  if (source.layers) return write_layers({payload.file(), payload.offset(), payload.layout()}, source, std::move(volume), task.target);
+  // Labels are whole numbers.
+  if (is_integer(canonical_type(payload.layout()))) volume.labels = source.labels;
   return write_canonical({payload.file(), payload.offset(), payload.layout()}, std::move(volume),
                          task.target);
 }
@@ -74,13 +92,7 @@ Volume finish(CanonicalWriter& writer, Volume volume) {
     volume.notes.push_back(
         note_of(NoteCode::kNonFiniteSamples, count + "numbers; they lie outside of the surface."));
   }
-  if (const auto values = volume::label_count(writer.samples(), volume.type, volume.dims)) {
-    volume.notes.push_back(note_of(
-        NoteCode::kLooksLikeLabels,
-        "The samples are " + std::to_string(*values) +
-            " whole values in flat regions, as labels are: an iso-value makes one surface of all "
-            "above it."));
-  }
+  note_labels(writer.samples(), volume);
   volume.range = statistics.range;
   volume.suggested_iso = statistics.otsu;
   volume.bytes = writer.samples().size();

@@ -12,10 +12,6 @@ namespace {
 
 constexpr std::size_t kMostValues = 65536;
 
-bool is_integer(SampleType type) {
-  return with_sample(type, [](auto sample) { return std::is_integral_v<decltype(sample)>; });
-}
-
 // Halves, because the difference of two doubles may be beyond the largest double.
 double half_width(const std::array<double, 2>& range) { return range[1] / 2 - range[0] / 2; }
 

@@ -176,6 +176,12 @@ const std::map<std::string, Shown>& shown() {
       {"looks-like-labels",
        {{{"a.nrrd",
           nrrd("", std::string(8, '\0') + std::string(8, '\1') + std::string(8, '\5'))}}}},
+      {"overlapping-segments",
+       {{{"a.seg.nrrd",
+          "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 2 2 2 2\nkinds: list domain domain "
+          "domain\nencoding: raw\nspace: LPS\nspace directions: none (1,0,0) (0,1,0) "
+          "(0,0,1)\nSegment0_Layer:=0\nSegment1_Layer:=1\n\n" +
+              std::string(16, '\1')}}}},
       {"empty-planes", {{{"a.dcm", sparse_segmentation()}}}},
       {"distance-assumed", {{{"a.dcm", mosaic()}}}},
       {"frame-of-reference",

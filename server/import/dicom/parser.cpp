@@ -4,6 +4,7 @@
 #include <array>
 
 #include "base/files.h"
+#include "base/text.h"
 #include "server/import/dicom/private_elements.h"
 #include "server/import/dicom/tags.h"
 #include "server/import/dicom/text.h"

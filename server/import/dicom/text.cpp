@@ -7,6 +7,7 @@
 
 #include <iconv.h>
 
+#include "base/text.h"
 #include "server/import/dicom/tags.h"
 
 namespace isomesh::import::dicom {
@@ -117,18 +118,6 @@ std::string converted(std::string_view text, const char* from) {
 }
 
 }  // namespace
-
-std::string printable(std::string_view text) {
-  std::string result;
-  for (const char letter : text) {
-    if (static_cast<unsigned char>(letter) < ' ' || letter == '\x7f') {
-      result += kReplacement;
-    } else {
-      result += letter;
-    }
-  }
-  return result;
-}
 
 std::string utf8(const DataSet& data, Tag tag) {
   const std::string_view text = data.text(tag);

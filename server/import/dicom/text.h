@@ -13,7 +13,4 @@ namespace isomesh::import::dicom {
 // U+FFFD.
 std::string utf8(const DataSet& data, Tag tag);
 
-// A text that is UTF-8, or should be, without control characters.
-std::string printable(std::string_view text);
-
 }  // namespace isomesh::import::dicom

@@ -12,6 +12,7 @@
 #include "base/text.h"
 #include "server/import/formats/file_pattern.h"
 #include "server/import/formats/nifti.h"
+#include "server/import/formats/nrrd_segments.h"
 #include "server/import/formats/nrrd_space.h"
 #include "server/import/reader.h"
 
@@ -257,6 +258,13 @@ SourceVolume samples_of(const Fields& fields, const NrrdSizes& sizes,
   volume.encoding = encoding_of(fields);
   volume.layout.type = type_of(fields);
   volume.layout.big_endian = is_big_endian(fields, volume.layout.type, volume.encoding);
+  const bool is_layered = sizes.volumes > 1 && !options.volume && has_segments(fields) &&
+                          is_integer(canonical_type(volume.layout));
+  if (is_layered) {
+    volume.chosen.count = sizes.volumes;
+    set_segments(fields, sizes.is_interleaved, false, volume);
+    return volume;
+  }
   choose_volume(
       sizes.volumes,
       {.what = sizes.volume_kind == "time" ? "time" : "their " + sizes.volume_kind,
@@ -264,6 +272,7 @@ SourceVolume samples_of(const Fields& fields, const NrrdSizes& sizes,
            [&](std::uint64_t index) { return sizes.volume_kind + ' ' + std::to_string(index); }},
       options, volume);
   volume.chosen.is_interleaved = sizes.is_interleaved && sizes.volumes > 1;
+  set_segments(fields, sizes.is_interleaved, true, volume);
   return volume;
 }
 

@@ -1,0 +1,200 @@
+// The segments that 3D Slicer tells of in NRRD headers.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/import/files.h"
+#include "tests/unit/import/writers.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+// A key of a segment, without "Segment" before it.
+using Key = std::pair<std::string, std::string>;
+
+std::string with_segments(const Lines& lines, const std::vector<Key>& keys, std::string_view samples) {
+  std::string file = nrrd(lines, samples);
+  std::string text;
+  for (const auto& [key, value] : keys) text += "Segment" + key + ":=" + value + '\n';
+  return file.insert(file.find("\n\n") + 1, text);
+}
+
+Lines layered(const std::string& sizes, const std::string& kinds, const std::string& directions) {
+  Lines lines = with(with(small_nrrd(), "dimension", "4"), "sizes", sizes);
+  return with(with(lines, "kinds", kinds), "space directions", directions);
+}
+
+// Two layers of 2 x 2 x 2 samples, the layers first.
+Lines layers_first() {
+  return layered("2 2 2 2", "list domain domain domain", "none (1,0,0) (0,1,0) (0,0,1)");
+}
+
+LabelEntry entry(std::int64_t label, const std::string& name,
+                 std::vector<std::int64_t> values = {}) {
+  return {.label = label, .name = name, .color = {}, .values = std::move(values)};
+}
+
+// Each sample is one of both segments in its layer.
+const std::vector<Key> kTwoLayers = {{"0_Name", "liver"},  {"0_LabelValue", "1"}, {"0_Layer", "0"},
+                                     {"1_Name", "tumour"}, {"1_LabelValue", "1"}, {"1_Layer", "1"}};
+
+TEST(NrrdSegments, HaveNamesAndColors) {
+  const std::string samples(24, '\3');
+  const Outcome outcome = import_bytes(with_segments(
+      small_nrrd(),
+      {{"0_ID", "a"}, {"0_Name", "M\xc3\xbcller \x01"}, {"0_LabelValue", "7"},
+       {"0_Color", "1 0.5 0"}, {"0_Layer", "0"},
+       {"1_Name", "spleen"}, {"1_LabelValue", "3"}, {"1_Color", "red"}},
+      samples));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.sample_bytes(), samples);
+  EXPECT_THAT(outcome.volume.labels,
+              ElementsAre(entry(3, "spleen"),
+                          LabelEntry{.label = 7, .name = "M\xc3\xbcller \xef\xbf\xbd",
+                                     .color = "#ff8000"}));
+  // Also where samples do not look as if.
+  EXPECT_THAT(codes_of(outcome), Contains("looks-like-labels"));
+  EXPECT_THAT(outcome.volume.notes.back().detail, HasSubstr("2 labels: mesh it with \"labels\""));
+}
+
+TEST(NrrdSegments, OfFractionsAreNoLabels) {
+  const Outcome outcome =
+      import_bytes(with_segments(with(with(small_nrrd(), "type", "float"), "endian", "little"), {{"0_Name", "liver"}},
+                                 bytes_of(some_samples<float>(24))));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_THAT(outcome.volume.labels, IsEmpty());
+  EXPECT_THAT(codes_of(outcome), Not(Contains("looks-like-labels")));
+}
+
+TEST(NrrdSegments, InLayersMayOverlap) {
+  // Of the eight samples 0 has the first alone, 1 the second, 2 both.
+  std::string first(8, '\0');
+  std::string second(8, '\0');
+  first[0] = first[2] = second[1] = second[2] = '\1';
+  std::string interleaved;
+  for (std::size_t at = 0; at < 8; ++at) interleaved += std::string{first[at], second[at]};
+  const Outcome outcome = import_bytes(with_segments(layers_first(), kTwoLayers, interleaved));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.dims, (std::array<std::uint32_t, 3>{2, 2, 2}));
+  EXPECT_EQ(outcome.volume.type, SampleType::kUint8);
+  // The tumour's value is the liver's in another layer, so that it gets another number.
+  EXPECT_THAT(samples_of<std::uint8_t>(outcome), ElementsAre(1, 2, 3, 0, 0, 0, 0, 0));
+  EXPECT_THAT(outcome.volume.labels,
+              ElementsAre(entry(1, "liver", {1, 3}), entry(2, "tumour", {2, 3})));
+  ASSERT_THAT(codes_of(outcome), ElementsAre("overlapping-segments", "looks-like-labels"));
+  EXPECT_EQ(outcome.volume.notes[0].detail,
+            "1 samples are of several segments; 1 value stands for the combinations.");
+  EXPECT_EQ(outcome.volume.range, (std::array<double, 2>{0, 3}));
+
+  const Outcome packed = import_bytes(with_segments(with(layers_first(), "encoding", "gzip"),
+                                                    kTwoLayers, gzip(interleaved)));
+  EXPECT_EQ(packed.canonical, outcome.canonical);
+  const Outcome planar = import_bytes(with_segments(
+      layered("2 2 2 2", "domain domain domain list", "(1,0,0) (0,1,0) (0,0,1) none"), kTwoLayers,
+      first + second));
+  EXPECT_EQ(planar.canonical, outcome.canonical);
+  EXPECT_EQ(planar.volume.labels, outcome.volume.labels);
+
+  const Outcome chosen =
+      import_bytes(with_segments(layers_first(), kTwoLayers, interleaved), {}, {.volume = 1});
+  ASSERT_EQ(chosen.error, "");
+  EXPECT_EQ(chosen.sample_bytes(), second);
+  EXPECT_THAT(chosen.volume.labels, ElementsAre(entry(1, "tumour")));
+}
+
+TEST(NrrdSegments, ThatDoNotOverlapKeepTheirNumbers) {
+  std::string samples(16, '\0');
+  samples[0] = '\7';
+  samples[3] = '\2';
+  std::vector<Key> keys = kTwoLayers;
+  keys[1].second = "7";
+  keys[4].second = "2";
+  const Outcome outcome = import_bytes(with_segments(layers_first(), keys, samples));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_THAT(samples_of<std::uint8_t>(outcome), ElementsAre(7, 2, 0, 0, 0, 0, 0, 0));
+  EXPECT_THAT(outcome.volume.labels, ElementsAre(entry(2, "tumour"), entry(7, "liver")));
+  EXPECT_THAT(codes_of(outcome), ElementsAre("looks-like-labels"));
+}
+
+// Versions before 5.0 have a layer for each segment, and do not say so.
+TEST(NrrdSegments, OfOldVersionsAreALayerEach) {
+  std::string samples(16, '\0');
+  samples[0] = samples[1] = '\1';
+  const Outcome outcome = import_bytes(
+      with_segments(layered("2 2 2 2", "vector domain domain domain", "none (1,0,0) (0,1,0) (0,0,1)"),
+                    {{"0_Name", "liver"}, {"1_Name", "tumour"}}, samples));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_THAT(outcome.volume.labels,
+              ElementsAre(entry(1, "liver", {3}), entry(2, "tumour", {3})));
+}
+
+TEST(NrrdSegments, ValuesOfNoSegmentAreLabelsWithoutAName) {
+  std::string samples(16, '\0');
+  samples[0] = '\1';
+  samples[2] = '\5';
+  const Outcome outcome = import_bytes(with_segments(layers_first(), kTwoLayers, samples));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_THAT(samples_of<std::uint8_t>(outcome), ElementsAre(1, 3, 0, 0, 0, 0, 0, 0));
+  EXPECT_THAT(outcome.volume.labels,
+              ElementsAre(entry(1, "liver"), entry(2, "tumour"), entry(3, "")));
+}
+
+// Nine segments of which every combination is somewhere.
+TEST(NrrdSegments, WithManyCombinationsHaveWiderValues) {
+  std::string samples;
+  std::vector<Key> keys;
+  for (int combination = 0; combination < 512; ++combination) {
+    for (int layer = 0; layer < 9; ++layer) {
+      samples += static_cast<char>(combination >> layer & 1);
+    }
+  }
+  for (int layer = 0; layer < 9; ++layer) {
+    keys.emplace_back(std::to_string(layer) + "_Layer", std::to_string(layer));
+  }
+  const Outcome outcome = import_bytes(
+      with_segments(layered("9 8 8 8", "list domain domain domain", "none (1,0,0) (0,1,0) (0,0,1)"),
+                    keys, samples));
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.type, SampleType::kUint16);
+  const auto values = samples_of<std::uint16_t>(outcome);
+  ASSERT_EQ(outcome.volume.labels.size(), 9U);
+  for (std::size_t at = 0; at < values.size(); ++at) {
+    for (std::size_t layer = 0; layer < 9; ++layer) {
+      const LabelEntry& label = outcome.volume.labels[layer];
+      EXPECT_EQ(std::ranges::binary_search(label.values, std::int64_t{values[at]}),
+                (at >> layer & 1) == 1)
+          << at << ' ' << layer;
+    }
+  }
+}
+
+// Seventeen independent segments are more than 16 bits tell apart.
+TEST(NrrdSegments, WithTooManyCombinationsAreRefused) {
+  std::string samples(std::size_t{17} << 17, '\0');
+  for (std::size_t at = 0; at < samples.size(); ++at) {
+    samples[at] = static_cast<char>(at / 17 >> at % 17 & 1);
+  }
+  const Outcome outcome = import_bytes(with_segments(
+      layered("17 64 64 32", "list domain domain domain", "none (1,0,0) (0,1,0) (0,0,1)"),
+      {{"0_Layer", "0"}}, samples));
+  EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
+  EXPECT_THAT(outcome.error, HasSubstr("65535 values do not tell them apart"));
+}
+
+TEST(NrrdSegments, OfNonsenseAreRefused) {
+  const std::string samples(16, '\0');
+  EXPECT_THAT(import_bytes(with_segments(layers_first(), {{"0_Layer", "2"}}, samples)).error,
+              HasSubstr("segment 0 lies in layer 2 of 2"));
+  EXPECT_THAT(import_bytes(with_segments(layers_first(), {{"0_Layer", "x"}}, samples)).error,
+              HasSubstr("Segment0_Layer"));
+  EXPECT_THAT(import_bytes(with_segments(layers_first(), {{"0_LabelValue", "1.5"}}, samples)).error,
+              HasSubstr("Segment0_LabelValue"));
+}
+
+}  // namespace
+}  // namespace isomesh::import::test
