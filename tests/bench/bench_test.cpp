@@ -11,7 +11,7 @@
 
 #include "server/mesh/labels.h"
 #include "tests/bench/ct_head.h"
-#include "tests/bench/labels.h"
+#include "tests/bench/label_body.h"
 #include "tests/bench/paper.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/stages.h"

@@ -1,15 +1,13 @@
 #include "tests/bench/labels.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numbers>
-#include <optional>
+#include <functional>
+#include <iomanip>
+#include <sstream>
 
-#include "server/mesh/label_surface.h"
-#include "server/mesh/labels.h"
-#include "server/mesh/separate.h"
-#include "server/mesh/smooth.h"
+#include "tests/bench/label_body.h"
+#include "tests/bench/label_stages.h"
 #include "tests/bench/numbers.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/stages.h"
@@ -18,173 +16,240 @@
 namespace isomesh::bench {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr Goal kPerLabelGoal = {0.1};
+constexpr Goal kSurfaceNetsGoal = {0.5};
 constexpr int kLabelPairs = 3;
-constexpr int kLabelPasses = 10;
-constexpr double kSpacing = 1.5;  // mm
-constexpr std::size_t kTubes = 24;
+constexpr std::size_t kProbes = 400'000;
 
-using Point = std::array<double, 3>;
-
-// Points that fill the unit cube evenly (M. Roberts, "The unreasonable effectiveness of quasirandom
-// sequences", 2018).
-Point even_point(std::size_t n) {
-  constexpr double kStep = 0.8191725133961645;  // the inverse of the root of x^4 = x + 1
-  Point point;
-  double step = 1;
-  for (double& coordinate : point) {
-    step *= kStep;
-    coordinate = std::fmod(0.5 + step * static_cast<double>(n + 1), 1);
-  }
-  return point;
+// A job's default for labels: no vertex leaves its half of the smallest spacing.
+mesh::SmoothOptions laplacian(const Samples& samples) {
+  return {.passes = 10, .max_displacement_mm = std::ranges::min(samples.geometry.spacing) / 2};
 }
 
-// The body's space is the unit cube.
-struct Ellipsoid {
-  Point centre;
-  Point radii;
-
-  bool contains(const Point& p) const {
-    double sum = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double share = (p[axis] - centre[axis]) / radii[axis];
-      sum += share * share;
-    }
-    return sum <= 1;
-  }
-};
-
-// Paints what the shape contains of its box.
-void paint(Samples& body, std::uint8_t label, const Ellipsoid& shape) {
-  const auto n = static_cast<double>(body.dims.x);
-  std::array<std::size_t, 3> low;
-  std::array<std::size_t, 3> high;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    low[axis] =
-        static_cast<std::size_t>(std::max(0.0, (shape.centre[axis] - shape.radii[axis]) * n));
-    high[axis] = static_cast<std::size_t>(
-        std::min(n, std::ceil((shape.centre[axis] + shape.radii[axis]) * n) + 1));
-  }
-  for (std::size_t z = low[2]; z < high[2]; ++z) {
-    for (std::size_t y = low[1]; y < high[1]; ++y) {
-      for (std::size_t x = low[0]; x < high[0]; ++x) {
-        const Point at = {static_cast<double>(x) / n, static_cast<double>(y) / n,
-                          static_cast<double>(z) / n};
-        if (shape.contains(at)) {
-          body.bytes[(z * body.dims.y + y) * body.dims.x + x] = std::byte{label};
-        }
-      }
-    }
-  }
+mesh::SmoothOptions taubin() {
+  constexpr double kLambda = 0.33;
+  constexpr double kPassBand = 0.1;
+  return {.passes = 20, .lambda = kLambda, .mu = mesh::taubin_mu(kLambda, kPassBand)};
 }
 
-// A tube through the body: balls along a wave.
-void paint_tube(Samples& body, std::uint8_t label, std::size_t number) {
-  constexpr double kRadius = 0.02;
-  constexpr int kBalls = 120;
-  const Point from = even_point(number);
-  for (int ball = 0; ball < kBalls; ++ball) {
-    const double share = static_cast<double>(ball) / kBalls;
-    const double wave = 0.06 * std::sin(4 * std::numbers::pi * share + static_cast<double>(number));
-    Point at = {0.1 + 0.8 * from[0] + wave, 0.1 + 0.8 * from[1] - wave, 0.1 + 0.8 * share};
-    std::ranges::rotate(at, at.begin() + static_cast<std::ptrdiff_t>(number % 3));
-    paint(body, label, {at, {kRadius, kRadius, kRadius}});
-  }
-}
-
-// Our way through all labels, in memory that is kept.
-class LabelStages {
+// Collects what is found about one segmentation.
+class LabelComparison {
  public:
-  explicit LabelStages(const Samples& body)
-      : lattice_{body.as<std::uint8_t>(), body.dims, mesh::lattice_to_space(body.geometry)} {
-    options_.labels = mesh::select_labels(mesh::count_labels(lattice_, {}), 0);
+  LabelComparison(const Samples& samples, const LabelPlan& plan)
+      : samples_(samples), plan_(plan), stages_(samples) {
+    stages_.extract();
+    which_ = std::to_string(stages_.labels().size()) + " labels, " + samples.name;
   }
 
-  void count_voxels() const { mesh::count_labels(lattice_, {}); }
-  void extract() {
-    mesh::extract_walls(lattice_, options_, mesh::count_walls(lattice_, options_, {}), {},
-                        surface_);
+  std::vector<Finding> run() {
+    compare_surface_nets();
+    compare_flying_edges();
+    add_alone("count_voxels", "voxels and bounds of each", [&] { stages_.count_voxels(); });
+    add_alone("measure", "topology, area and volume of each", [&] { stages_.measure(); });
+    const std::uint64_t triangles = stages_.size().triangles;
+    findings_.push_back({"labels/triangles",
+                         "triangles, " + which_,
+                         grouped(triangles),
+                         "",
+                         static_cast<double>(triangles),
+                         {}});
+    return std::move(findings_);
   }
-  void smooth() {
-    mesh::smooth({.passes = kLabelPasses, .max_displacement_mm = kSpacing / 2}, {}, surface_.mesh);
-  }
-  void measure() const { mesh::measure_labels(surface_, mesh::LabelTriangles(surface_), {}); }
-
-  const std::vector<std::int64_t>& labels() const { return options_.labels; }
-  MeshSize size() const { return {surface_.mesh.positions.size(), surface_.mesh.triangles.size()}; }
 
  private:
-  mesh::Lattice<std::uint8_t> lattice_;
-  mesh::SeparateOptions options_;
-  mesh::SeparatingSurface surface_;
+  void extract() { stages_.extract(); }
+  void extract_and_smooth() {
+    stages_.extract();
+    stages_.smooth(laplacian(samples_));
+  }
+
+  void add_alone(const std::string& name, const std::string& what,
+                 const std::function<void()>& ours) {
+    const double ms = median_ms({ours}, kLabelPairs);
+    findings_.push_back({"labels/" + name, what + ", ms, " + which_, milliseconds(ms), "", ms, {}});
+  }
+
+  void add(const std::string& name, const std::string& what, const Paired& times,
+           std::optional<Goal> goal) {
+    findings_.push_back({"labels/" + name, what + ", " + which_, milliseconds(times.ours_ms),
+                         milliseconds(times.peer_ms), times.ratio, goal});
+  }
+
+  void compare_surface_nets() {
+    if (plan_.surface_nets_root.empty()) return;
+    SurfaceNets nets(plan_.surface_nets_root, samples_, stages_.labels(), plan_.threads);
+    const Timed ours = {[&] { extract_and_smooth(); }};
+    time_ms(ours);
+    add("surface_nets", "all with 10 passes of smoothing / SurfaceNets with 16",
+        pair_times([&] { return time_ms(ours); }, [&] { return nets.run_ms(); }, kLabelPairs),
+        kSurfaceNetsGoal);
+  }
+
+  void compare_flying_edges() {
+    const Timed bare = {[&] { extract(); }};
+    const Timed smoothed = {[&] { extract_and_smooth(); }};
+    if (!peers_available()) {
+      add_alone("extract", "extraction of all", bare.run);
+      add_alone("extract_smooth", "the same and 10 passes of smoothing", smoothed.run);
+      return;
+    }
+    Peers peers(samples_, 0);
+    const auto release = [&] { peers.release(); };
+    const Timed theirs = {[&] { peers.discrete_flying_edges(stages_.labels()); }, release};
+    const Timed theirs_smoothed = {[&] {
+                                     peers.discrete_flying_edges(stages_.labels());
+                                     peers.smooth_labels();
+                                   },
+                                   release};
+    add("extract", "extraction of all / discrete Flying Edges a label",
+        time_in_pairs(bare, theirs, kLabelPairs), kPerLabelGoal);
+    add("extract_smooth", "with 10 passes of smoothing / with windowed sinc a label",
+        time_in_pairs(smoothed, theirs_smoothed, kLabelPairs), {});
+  }
+
+  const Samples& samples_;
+  const LabelPlan& plan_;
+  LabelStages stages_;
+  std::string which_;
+  std::vector<Finding> findings_;
 };
+
+LabelQuality::Volumes compare_volumes(const Walls& walls,
+                                      const std::vector<mesh::LabelVoxels>& voxels) {
+  const std::vector<double> enclosed = enclosed_volumes(walls, voxels.size());
+  LabelQuality::Volumes volumes;
+  double all_enclosed = 0;
+  double all_voxels = 0;
+  for (std::size_t l = 0; l < voxels.size(); ++l) {
+    all_enclosed += enclosed[l];
+    all_voxels += voxels[l].volume_mm3;
+    const double change = enclosed[l] / voxels[l].volume_mm3 - 1;
+    if (l > 0 && std::abs(change) <= std::abs(volumes.worst)) continue;
+    volumes.worst = change;
+    volumes.worst_label = voxels[l].label;
+    volumes.worst_voxels = voxels[l].voxels;
+  }
+  volumes.all = all_enclosed / all_voxels - 1;
+  return volumes;
+}
+
+// Looks at what is made in several ways, at the same points.
+class QualityOfWays {
+ public:
+  explicit QualityOfWays(const Samples& samples)
+      : stages_(samples), probes_(probes_near_walls(samples, stages_.labels(), kProbes)) {}
+
+  LabelStages& stages() { return stages_; }
+
+  LabelQuality look(const std::string& way, const Walls& walls, bool has_winding) const {
+    LabelQuality quality = {
+        way, {walls.positions.size(), walls.triangles.size()}, measure_sharing(walls, probes_), {}};
+    if (has_winding) quality.volumes = compare_volumes(walls, stages_.voxels());
+    return quality;
+  }
+
+ private:
+  LabelStages stages_;
+  std::vector<Probe> probes_;
+};
+
+std::string signed_percent(double share) {
+  return (share < 0 ? "" : "+") + fixed(100 * share, 2) + " %";
+}
+
+std::string of_points(std::uint64_t count, std::uint64_t points) {
+  return grouped(count) + " of " + grouped(points);
+}
 
 }  // namespace
 
-Samples label_body(std::uint32_t n) {
-  Samples body;
-  body.name = "body-" + std::to_string(n);
-  body.dims = {n, n, n};
-  body.geometry.spacing = {kSpacing, kSpacing, kSpacing};
-  body.bytes.resize(body.dims.samples());
-  std::uint8_t label = 0;
-  for (std::size_t e = 0; e < kBodyLabels - kTubes; ++e) {
-    const Point place = even_point(e);
-    const Point shape = even_point(e + kBodyLabels);
-    Ellipsoid ellipsoid;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      ellipsoid.centre[axis] = 0.15 + 0.7 * place[axis];
-      ellipsoid.radii[axis] = 0.05 + 0.06 * shape[axis];
-    }
-    paint(body, ++label, ellipsoid);
+std::vector<Samples> segmentations(std::uint32_t body_samples) {
+  std::vector<Samples> all;
+  all.push_back(label_body(body_samples));
+  for (const char* name : {"aal", "brodmann"}) {
+    const fs::path path =
+        fs::path("/usr/share/mricron/templates") / (std::string(name) + ".nii.gz");
+    if (!fs::exists(path)) continue;
+    all.push_back(load_labels(path));
+    all.back().name = name;
   }
-  for (std::size_t tube = 0; tube < kTubes; ++tube) paint_tube(body, ++label, tube);
-  return body;
+  return all;
 }
 
-std::vector<Finding> measure_label_findings(std::uint32_t n, int threads) {
-  set_threads(threads);
-  Peers::set_threads(threads);
-  const Samples body = label_body(n);
-  LabelStages stages(body);
+std::vector<Finding> measure_label_findings(const Samples& samples, const LabelPlan& plan) {
+  set_threads(plan.threads);
+  Peers::set_threads(plan.threads);
+  return LabelComparison(samples, plan).run();
+}
+
+std::vector<LabelQuality> measure_label_quality(const Samples& samples, const LabelPlan& plan) {
+  set_threads(plan.threads);
+  Peers::set_threads(plan.threads);
+  QualityOfWays ways(samples);
+  LabelStages& stages = ways.stages();
+  std::vector<LabelQuality> qualities;
   stages.extract();
-  const std::string which = std::to_string(stages.labels().size()) + " labels, " + body.name;
-  std::vector<Finding> findings;
-  const auto add_alone = [&](const std::string& name, const std::string& what, const Timed& ours) {
-    const double ms = median_ms(ours, kLabelPairs);
-    findings.push_back({"labels/" + name, what + ", ms, " + which, milliseconds(ms), "", ms, {}});
-  };
-  const Timed extract = {[&] { stages.extract(); }};
-  const Timed both = {[&] {
-    stages.extract();
-    stages.smooth();
-  }};
-  if (peers_available()) {
-    Peers peers(body, 0);
-    const Timed theirs = {[&] { peers.discrete_flying_edges(stages.labels()); },
-                          [&] { peers.release(); }};
-    const auto add = [&](const std::string& name, const std::string& what, const Timed& ours,
-                         std::optional<Goal> goal) {
-      const Paired times = time_in_pairs(ours, theirs, kLabelPairs);
-      findings.push_back({"labels/" + name, what + " / discrete Flying Edges a label, " + which,
-                          milliseconds(times.ours_ms), milliseconds(times.peer_ms), times.ratio,
-                          goal});
-    };
-    add("extract", "extraction of all", extract, kPerLabelGoal);
-    add("extract_smooth", "the same and 10 passes of smoothing", both, {});  // theirs is not smooth
-  } else {
-    add_alone("extract", "extraction of all", extract);
-    add_alone("extract_smooth", "the same and 10 passes of smoothing", both);
+  stages.smooth(laplacian(samples));
+  qualities.push_back(ways.look("isomesh, 10 Laplacian passes", stages.walls(), true));
+  stages.extract();
+  stages.smooth(taubin());
+  qualities.push_back(ways.look("isomesh, 20 Taubin passes", stages.walls(), true));
+  if (!plan.surface_nets_root.empty()) {
+    SurfaceNets nets(plan.surface_nets_root, samples, stages.labels(), plan.threads);
+    nets.run_ms();
+    qualities.push_back(ways.look("SurfaceNets, 16 passes", nets.walls(), false));
   }
-  add_alone("count_voxels", "voxels and bounds of each", {[&] { stages.count_voxels(); }});
-  add_alone("measure", "topology, area and volume of each", {[&] { stages.measure(); }});
-  findings.push_back({"labels/triangles",
-                      "triangles, " + which,
-                      grouped(stages.size().triangles),
-                      "",
-                      static_cast<double>(stages.size().triangles),
-                      {}});
-  return findings;
+  if (peers_available()) {
+    Peers peers(samples, 0);
+    peers.discrete_flying_edges(stages.labels());
+    peers.smooth_labels();
+    qualities.push_back(
+        ways.look("Flying Edges and windowed sinc a label", peers.label_walls(), true));
+  }
+  return qualities;
+}
+
+std::vector<std::string> quality_head() {
+  return {"",
+          "triangles",
+          "points in gaps",
+          "points in overlaps",
+          "volume of all",
+          "volume of the worst label"};
+}
+
+std::vector<std::vector<std::string>> quality_rows(const std::vector<LabelQuality>& qualities) {
+  std::vector<std::vector<std::string>> rows;
+  for (const LabelQuality& one : qualities) {
+    const Sharing& sharing = one.sharing;
+    rows.push_back({one.way, grouped(one.size.triangles),
+                    of_points(sharing.gaps, sharing.points_within_labels),
+                    of_points(sharing.overlaps, sharing.points),
+                    one.volumes ? signed_percent(one.volumes->all) : "-",
+                    one.volumes ? signed_percent(one.volumes->worst) + " (label " +
+                                      std::to_string(one.volumes->worst_label) + ", " +
+                                      grouped(one.volumes->worst_voxels) + " voxels)"
+                                : "-"});
+  }
+  return rows;
+}
+
+std::string to_table(const std::vector<LabelQuality>& qualities) {
+  std::vector<std::vector<std::string>> rows = quality_rows(qualities);
+  rows.insert(rows.begin(), quality_head());
+  std::ostringstream text;
+  for (const auto& row : rows) {
+    for (std::size_t column = 0; column < row.size(); ++column) {
+      std::size_t width = 0;
+      for (const auto& other : rows) width = std::max(width, other[column].size());
+      text << (column == 0 ? std::left : std::right) << std::setw(static_cast<int>(width) + 2)
+           << row[column];
+    }
+    text << '\n';
+  }
+  return text.str();
 }
 
 }  // namespace isomesh::bench

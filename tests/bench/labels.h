@@ -1,22 +1,54 @@
-// All labels of a segmentation, beside one run a label as others have it.
+// All labels of a segmentation, beside what others take for them.
 #pragma once
 
-#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
 #include <vector>
 
+#include "tests/bench/label_walls.h"
 #include "tests/bench/ratios.h"
 #include "tests/bench/samples.h"
+#include "tests/bench/stages.h"
+#include "tests/bench/surface_nets.h"
 
 namespace isomesh::bench {
 
-inline constexpr std::size_t kBodyLabels = 104;
+// The body of the given size, and the atlases of Debian's package mricron-data that are installed.
+std::vector<Samples> segmentations(std::uint32_t body_samples);
 
-// A body of 104 labels, 1 to 104, on n^3 samples of 1.5 mm: ellipsoids and bent tubes that touch
-// each other, on a background of 0. Deterministic. n: at least 64, so that all labels are there.
-Samples label_body(std::uint32_t n);
+struct LabelPlan {
+  int threads = 1;
+  std::filesystem::path surface_nets_root;  // see surface_nets.h; empty: without SurfaceNets
+};
 
 // Extraction of all labels, with and without smoothing, over what the peers take for them, to
 // vertices and triangles in memory; and what each label's measures take. Without peers ours alone.
-std::vector<Finding> measure_label_findings(std::uint32_t n, int threads);
+std::vector<Finding> measure_label_findings(const Samples& samples, const LabelPlan& plan);
+
+// How the smoothed surfaces of all labels share out space, made in one way.
+struct LabelQuality {
+  std::string way;
+  MeshSize size;
+  Sharing sharing;
+  // What the surfaces enclose over what the voxels do, less one: of all labels, and of the one
+  // where it is worst. Not known of a way whose triangles have no winding.
+  struct Volumes {
+    double all = 0;
+    double worst = 0;
+    std::int64_t worst_label = 0;
+    std::uint64_t worst_voxels = 0;
+  };
+  std::optional<Volumes> volumes;
+};
+
+// Of ours with two smoothings, and of the peers that there are.
+std::vector<LabelQuality> measure_label_quality(const Samples& samples, const LabelPlan& plan);
+
+// As rows of a table, and its head.
+std::vector<std::string> quality_head();
+std::vector<std::vector<std::string>> quality_rows(const std::vector<LabelQuality>& qualities);
+// As text for a terminal.
+std::string to_table(const std::vector<LabelQuality>& qualities);
 
 }  // namespace isomesh::bench

@@ -14,6 +14,7 @@
 
 #include "server/jobs/memory.h"
 #include "tests/bench/benchmarks.h"
+#include "tests/bench/label_stages.h"
 #include "tests/bench/labels.h"
 #include "tests/bench/machine.h"
 #include "tests/bench/memory.h"
@@ -37,6 +38,7 @@ struct Options {
   bool large = false;
   bool json = false;
   std::string filter = ".";
+  std::filesystem::path surface_nets_root;
 };
 
 // The real volume into the plan; a default one that is not installed is left out, saying so.
@@ -101,12 +103,27 @@ int run_service(const Options& options, const std::filesystem::path& daemon) {
   return 0;
 }
 
-int run_labels(std::uint32_t samples, int threads) {
-  for (const int count : threads > 0 ? std::vector{threads} : std::vector{1, 2}) {
-    std::cout << count << (count == 1 ? " thread\n" : " threads\n")
-              << to_table(measure_label_findings(samples, count));
+int run_labels(const Options& options, std::uint32_t body_samples) {
+  const std::vector<Samples> all = options.volume.empty()
+                                       ? segmentations(body_samples)
+                                       : std::vector{load_labels(options.volume)};
+  const std::vector<int> counts =
+      options.threads > 0 ? std::vector{options.threads} : std::vector{1, 2};
+  for (const int count : counts) {
+    for (const Samples& samples : all) {
+      std::cout << count << (count == 1 ? " thread\n" : " threads\n")
+                << to_table(measure_label_findings(samples, {count, options.surface_nets_root}))
+                << std::endl;
+    }
   }
-  if (!peers_available()) std::cout << '\n' << peers_description() << '\n';
+  for (const Samples& samples : all) {
+    std::cout << samples.name << '\n'
+              << to_table(
+                     measure_label_quality(samples, {counts.back(), options.surface_nets_root}))
+              << std::endl;
+  }
+  if (!peers_available()) std::cout << peers_description() << '\n';
+  if (options.surface_nets_root.empty()) std::cout << kNoSurfaceNets << '\n';
   return 0;
 }
 
@@ -136,9 +153,17 @@ int run_program(int argc, char** argv) {
       ->check(check_filter);
   app.add_flag("--json", options.json, "One JSON document instead of text");
 
+  app.add_option("--surface-nets-root", options.surface_nets_root,
+                 "For `labels` and `report`: the folder of a Debian 13 with python3-vtk9 and "
+                 "python3-numpy, as debootstrap makes it, whose vtkSurfaceNets3D is a peer; left "
+                 "out without it")
+      ->envname("ISOMESH_SURFACE_NETS_ROOT")
+      ->check(CLI::ExistingDirectory);
+
   std::filesystem::path folder;
   CLI::App* report = app.add_subcommand("report", "Write the report on the paper");
   report->add_option("DIR", folder, "Where REPORT.md and its plots go")->required();
+  report->fallthrough();
 
   std::filesystem::path daemon = daemon_beside_this();
   CLI::App* service =
@@ -149,8 +174,10 @@ int run_program(int argc, char** argv) {
 
   std::uint32_t samples = 300;
   CLI::App* labels = app.add_subcommand(
-      "labels", "Separate a synthetic body of 104 labels, beside the peers' one run a label");
-  labels->add_option("--samples", samples, "Of the body along each axis")
+      "labels",
+      "Separate all labels of --volume, or of a synthetic body and of Debian's atlases, beside the "
+      "peers: times, gaps, overlaps and volumes");
+  labels->add_option("--samples", samples, "Of the synthetic body along each axis")
       ->check(CLI::Range(64, 1024));
   labels->fallthrough();
 
@@ -171,8 +198,8 @@ int run_program(int argc, char** argv) {
   if (*memory) return run_memory_command(stage, size, threads);
   warn_when_busy();
   if (*service) return run_service(options, daemon);
-  if (*labels) return run_labels(samples, options.threads);
-  return *report ? write_report(folder, daemon) : run(options);
+  if (*labels) return run_labels(options, samples);
+  return *report ? write_report(folder, daemon, options.surface_nets_root) : run(options);
 }
 
 }  // namespace

@@ -80,19 +80,40 @@ vtkSmartPointer<vtkPolyData> smoothed(vtkPolyData* mesh, int passes) {
   return filter->GetOutput();
 }
 
-std::uint64_t draco_of(vtkPolyData* mesh) {
+std::span<const mesh::Vec3> positions_of(vtkPolyData* mesh) {
   auto* points = vtkFloatArray::SafeDownCast(mesh->GetPoints()->GetData());
   if (points == nullptr) throw std::logic_error("VTK's points are not of single precision");
-  const std::span positions(reinterpret_cast<const mesh::Vec3*>(points->GetPointer(0)),
-                            static_cast<std::size_t>(points->GetNumberOfTuples()));
+  return {reinterpret_cast<const mesh::Vec3*>(points->GetPointer(0)),
+          static_cast<std::size_t>(points->GetNumberOfTuples())};
+}
+
+// Of all triangles, one after the other.
+std::span<const long long> corners_of(vtkPolyData* mesh) {
   vtkCellArray* polys = mesh->GetPolys();
   if (!polys->IsStorage64Bit()) polys->ConvertTo64BitStorage();
   static_assert(sizeof(long long) == sizeof(vtkTypeInt64));
   const auto* corners = polys->GetConnectivityArray64();
-  return encode_in_one_call(
-      positions, std::span(reinterpret_cast<const long long*>(
-                               const_cast<vtkCellArray::ArrayType64*>(corners)->GetPointer(0)),
-                           static_cast<std::size_t>(polys->GetNumberOfConnectivityIds())));
+  return {reinterpret_cast<const long long*>(
+              const_cast<vtkCellArray::ArrayType64*>(corners)->GetPointer(0)),
+          static_cast<std::size_t>(polys->GetNumberOfConnectivityIds())};
+}
+
+std::uint64_t draco_of(vtkPolyData* mesh) {
+  return encode_in_one_call(positions_of(mesh), corners_of(mesh));
+}
+
+void append(vtkPolyData* mesh, mesh::WallSides sides, Walls& walls) {
+  if (mesh->GetNumberOfPolys() == 0) return;
+  const auto first = static_cast<std::uint32_t>(walls.positions.size());
+  const auto positions = positions_of(mesh);
+  walls.positions.insert(walls.positions.end(), positions.begin(), positions.end());
+  const auto corners = corners_of(mesh);
+  for (std::size_t c = 0; c < corners.size(); c += 3) {
+    walls.triangles.push_back({first + static_cast<std::uint32_t>(corners[c]),
+                               first + static_cast<std::uint32_t>(corners[c + 1]),
+                               first + static_cast<std::uint32_t>(corners[c + 2])});
+    walls.sides.push_back(sides);
+  }
 }
 
 }  // namespace
@@ -129,6 +150,31 @@ void Peers::discrete_flying_edges(std::span<const std::int64_t> labels) {
     vtk_->labels.push_back(
         contour<vtkDiscreteFlyingEdges3D>(vtk_->image, static_cast<double>(label)));
   }
+}
+
+void Peers::smooth_labels() {
+  constexpr int kPasses = 15;
+  constexpr double kPassBand = 0.001;
+  for (auto& mesh : vtk_->labels) {
+    const vtkNew<vtkWindowedSincPolyDataFilter> filter;
+    filter->SetInputData(bare(mesh));
+    filter->SetNumberOfIterations(kPasses);
+    filter->SetPassBand(kPassBand);
+    filter->BoundarySmoothingOff();
+    filter->FeatureEdgeSmoothingOff();
+    filter->NonManifoldSmoothingOn();
+    filter->NormalizeCoordinatesOn();
+    filter->Update();
+    mesh = filter->GetOutput();
+  }
+}
+
+Walls Peers::label_walls() const {
+  Walls walls;
+  for (std::size_t l = 0; l < vtk_->labels.size(); ++l) {
+    append(vtk_->labels[l], {0, static_cast<std::uint16_t>(l + 1)}, walls);
+  }
+  return walls;
 }
 
 void Peers::smooth(int passes) {

@@ -61,7 +61,8 @@ void write_opening(const std::optional<Subject>& head, const std::optional<Subje
 
 }  // namespace
 
-int write_report(const std::filesystem::path& folder, const std::filesystem::path& daemon) {
+int write_report(const std::filesystem::path& folder, const std::filesystem::path& daemon,
+                 const std::filesystem::path& surface_nets_root) {
   const int threads = std::min(2, processors());
   set_threads(threads);
   Peers::set_threads(threads);
@@ -102,6 +103,7 @@ int write_report(const std::filesystem::path& folder, const std::filesystem::pat
     write_choices(subjects, report);
     write_quality(subjects, report);
   }
+  write_labels(surface_nets_root, report);
   document.heading("Where measurement and paper differ");
   document.bullets(report.remarks);
   document.write();

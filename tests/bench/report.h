@@ -7,8 +7,10 @@ namespace isomesh::bench {
 
 // Measures for some minutes, on two threads or as many as the machine has, and writes REPORT.md and
 // the plots beside it into `folder`, which is made when it is missing. A volume that is not
-// installed is left out, and the report says so. `daemon` is the program isomeshd. Returns the exit
-// status. Throws std::runtime_error when a file cannot be written.
-int write_report(const std::filesystem::path& folder, const std::filesystem::path& daemon);
+// installed is left out, and the report says so. `daemon` is the program isomeshd;
+// `surface_nets_root` may be empty, see surface_nets.h. Returns the exit status. Throws
+// std::runtime_error when a file cannot be written.
+int write_report(const std::filesystem::path& folder, const std::filesystem::path& daemon,
+                 const std::filesystem::path& surface_nets_root);
 
 }  // namespace isomesh::bench

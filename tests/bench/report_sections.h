@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
@@ -47,6 +48,8 @@ void write_quality(const std::vector<Subject>& subjects, Report& report);
 void write_goals(const Plan& plan, Report& report);
 // What a daemon reports of its jobs, and how long requests take.
 void write_service(const ServicePlan& plan, Report& report);
+// All labels of a segmentation beside the peers. The root: see surface_nets.h.
+void write_labels(const std::filesystem::path& surface_nets_root, Report& report);
 // How much of a job is encoding, by libdraco and by our own encoder.
 void write_draco_share(const Subject& subject, Report& report);
 

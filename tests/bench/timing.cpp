@@ -31,6 +31,11 @@ double median_ms(const Timed& timed, int runs) {
 Paired time_in_pairs(const Timed& ours, const Timed& peer, int pairs) {
   time_ms(ours);
   time_ms(peer);
+  return pair_times([&] { return time_ms(ours); }, [&] { return time_ms(peer); }, pairs);
+}
+
+Paired pair_times(const std::function<double()>& ours, const std::function<double()>& peer,
+                  int pairs) {
   std::vector<double> our_times;
   std::vector<double> peer_times;
   std::vector<double> ratios;
@@ -38,11 +43,11 @@ Paired time_in_pairs(const Timed& ours, const Timed& peer, int pairs) {
     double our_time = 0;
     double peer_time = 0;
     if (i % 2 == 0) {
-      our_time = time_ms(ours);
-      peer_time = time_ms(peer);
+      our_time = ours();
+      peer_time = peer();
     } else {
-      peer_time = time_ms(peer);
-      our_time = time_ms(ours);
+      peer_time = peer();
+      our_time = ours();
     }
     our_times.push_back(our_time);
     peer_times.push_back(peer_time);

@@ -30,6 +30,10 @@ struct Paired {
 inline constexpr int kPairs = 9;
 Paired time_in_pairs(const Timed& ours, const Timed& peer, int pairs = kPairs);
 
+// The same for what times itself: each returns milliseconds, and nothing is warmed up.
+Paired pair_times(const std::function<double()>& ours, const std::function<double()>& peer,
+                  int pairs);
+
 // The exponent b of the power law y = a * x^b that fits the points best; they must be positive.
 double log_log_slope(const std::vector<std::array<double, 2>>& points);
 

@@ -1,0 +1,88 @@
+#include "tests/bench/label_stages.h"
+
+#include <cstring>
+#include <stdexcept>
+#include <type_traits>
+
+#include "server/mesh/label_surface.h"
+
+namespace isomesh::bench {
+namespace {
+
+// Calls use(lattice), which returns nothing.
+template <class Use>
+void with_lattice(const Samples& samples, Use use) {
+  visit_samples(samples, [&]<class T>(const T* values) {
+    if constexpr (std::is_integral_v<T>) {
+      use(mesh::Lattice<T>{values, samples.dims, mesh::lattice_to_space(samples.geometry)});
+    } else {
+      throw std::runtime_error(samples.name + " is no segmentation: its samples are no integers");
+    }
+  });
+}
+
+}  // namespace
+
+Samples padded(const Samples& samples) {
+  Samples result = samples;
+  const mesh::Dims from = samples.dims;
+  result.dims = {from.x + 2, from.y + 2, from.z + 2};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    result.geometry.origin[axis] -= samples.geometry.spacing[axis];
+  }
+  const std::size_t sample = bytes_per_sample(samples.type);
+  result.bytes.assign(result.dims.samples() * sample, std::byte{0});
+  const std::size_t row = from.x * sample;
+  for (std::size_t z = 0; z < from.z; ++z) {
+    for (std::size_t y = 0; y < from.y; ++y) {
+      const std::size_t to = ((z + 1) * result.dims.y + y + 1) * result.dims.x + 1;
+      std::memcpy(result.bytes.data() + to * sample, samples.bytes.data() + (z * from.y + y) * row,
+                  row);
+    }
+  }
+  return result;
+}
+
+Samples load_labels(const std::filesystem::path& path) {
+  Samples samples = load_volume(path).samples;
+  with_lattice(samples, [](const auto&) {});
+  samples.geometry.direction = Geometry{}.direction;
+  return padded(samples);
+}
+
+LabelStages::LabelStages(const Samples& samples) : samples_(samples) {
+  with_lattice(samples, [&](const auto& lattice) {
+    const auto present = mesh::count_labels(lattice, {});
+    options_.labels = mesh::select_labels(present, 0);
+    for (const mesh::LabelVoxels& one : present) {
+      if (one.label != 0) voxels_.push_back(one);
+    }
+  });
+}
+
+void LabelStages::count_voxels() const {
+  with_lattice(samples_, [](const auto& lattice) { mesh::count_labels(lattice, {}); });
+}
+
+void LabelStages::extract() {
+  with_lattice(samples_, [&](const auto& lattice) {
+    mesh::extract_walls(lattice, options_, mesh::count_walls(lattice, options_, {}), {}, surface_);
+  });
+}
+
+void LabelStages::smooth(const mesh::SmoothOptions& options) {
+  mesh::smooth(options, {}, surface_.mesh);
+}
+
+void LabelStages::measure() const {
+  mesh::measure_labels(surface_, mesh::LabelTriangles(surface_), {});
+}
+
+Walls LabelStages::walls() const {
+  const mesh::Mesh& mesh = surface_.mesh;
+  return {{mesh.positions.begin(), mesh.positions.end()},
+          {mesh.triangles.begin(), mesh.triangles.end()},
+          {surface_.sides.begin(), surface_.sides.end()}};
+}
+
+}  // namespace isomesh::bench

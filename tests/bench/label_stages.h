@@ -1,0 +1,45 @@
+// Our way through all labels of a segmentation.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "server/mesh/labels.h"
+#include "server/mesh/separate.h"
+#include "server/mesh/smooth.h"
+#include "tests/bench/label_walls.h"
+#include "tests/bench/samples.h"
+#include "tests/bench/stages.h"
+
+namespace isomesh::bench {
+
+// A segmentation for the bench: the samples of a file with one layer of background around them, so
+// that every label's surface is closed whoever makes it, and with the identity for directions,
+// which VTK's filters do not know. Throws std::runtime_error when the type is no integer.
+Samples load_labels(const std::filesystem::path& path);
+Samples padded(const Samples& samples);
+
+// In memory that is kept. Extract comes first. Background is 0. Not thread safe. Keeps a reference
+// to the samples, whose type must be an integer.
+class LabelStages {
+ public:
+  explicit LabelStages(const Samples& samples);
+
+  void count_voxels() const;
+  void extract();
+  void smooth(const mesh::SmoothOptions& options);
+  void measure() const;  // topology, area and volume of each label
+
+  const std::vector<std::int64_t>& labels() const { return options_.labels; }
+  const std::vector<mesh::LabelVoxels>& voxels() const { return voxels_; }  // of those labels
+  MeshSize size() const { return {surface_.mesh.positions.size(), surface_.mesh.triangles.size()}; }
+  Walls walls() const;
+
+ private:
+  const Samples& samples_;
+  std::vector<mesh::LabelVoxels> voxels_;
+  mesh::SeparateOptions options_;
+  mesh::SeparatingSurface surface_;
+};
+
+}  // namespace isomesh::bench

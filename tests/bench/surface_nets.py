@@ -1,0 +1,72 @@
+"""Runs vtkSurfaceNets3D of VTK 9.3 or newer on raw samples, for isomesh-bench (surface_nets.h).
+
+Usage: surface_nets.py ORDER, a JSON object of
+  "samples"     a file of raw samples, x fastest
+  "type"        their numpy type
+  "dims", "origin", "spacing"
+  "labels"      to separate; "background" is 0
+  "passes"      of the filter's smoothing
+  "runs"        after one that warms up
+  "output"      an existing folder
+Prints one JSON object: "version" and "backend" of VTK, and "milliseconds" of each run, from samples
+to points and triangles in memory. Writes the last run's "points" (float32), "triangles" (int64)
+and "sides" (float64, both labels of each triangle) into the folder.
+"""
+import json
+import pathlib
+import sys
+import time
+
+import numpy
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkLogger, vtkSMPTools, vtkVersion
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkFiltersCore import vtkSurfaceNets3D
+
+
+def surface_nets(image, labels, passes):
+    # Made anew for every run, because it would return what it has cached.
+    nets = vtkSurfaceNets3D()
+    nets.SetInputData(image)
+    for index, label in enumerate(labels):
+        nets.SetValue(index, label)
+    nets.SetBackgroundLabel(0)
+    nets.SetOutputMeshTypeToTriangles()
+    nets.SmoothingOn()
+    nets.SetNumberOfIterations(passes)
+    nets.Update()
+    return nets.GetOutput()
+
+
+def write(array, kind, path):
+    vtk_to_numpy(array).astype(kind).tofile(path)
+
+
+def main(order):
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_WARNING)
+    samples = numpy.fromfile(order["samples"], dtype=order["type"])
+    image = vtkImageData()
+    image.SetDimensions(order["dims"])
+    image.SetOrigin(order["origin"])
+    image.SetSpacing(order["spacing"])
+    image.GetPointData().SetScalars(numpy_to_vtk(samples))
+
+    times = []
+    for _ in range(order["runs"] + 1):
+        mesh = None  # freed before the next run begins
+        begin = time.perf_counter()
+        mesh = surface_nets(image, order["labels"], order["passes"])
+        times.append(1000 * (time.perf_counter() - begin))
+
+    folder = pathlib.Path(order["output"])
+    write(mesh.GetPoints().GetData(), numpy.float32, folder / "points")
+    write(mesh.GetPolys().GetConnectivityArray(), numpy.int64, folder / "triangles")
+    write(mesh.GetCellData().GetArray("BoundaryLabels"), numpy.float64, folder / "sides")
+    print(json.dumps({
+        "version": vtkVersion.GetVTKVersion(),
+        "backend": vtkSMPTools.GetBackend(),
+        "milliseconds": times[1:],
+    }))
+
+
+main(json.loads(sys.argv[1]))
