@@ -14,9 +14,11 @@ function resolved({ $ref, allOf = [], ...own }) {
   return Object.assign({}, ...[...named, ...allOf].map(resolved), own);
 }
 
-function kindOf(name, { type, enum: values, items }) {
+function kindOf(name, { type, enum: values, items, oneOf = [], additionalProperties }) {
   const types = [type].flat();
   if (values) return 'choice';
+  if (oneOf.some((one) => one.const === 'all')) return 'labels';
+  if (types.includes('object') && typeof additionalProperties === 'object') return 'by label';
   if (types.includes('array') && items && resolved(items).enum) return 'choices';
   for (const [known, kind] of Object.entries({ boolean: 'switch', integer: 'integer', number: 'number', string: 'text' })) {
     if (types.includes(known)) return kind;
@@ -41,7 +43,7 @@ function parameterOf(name, schema) {
   const query = all['x-query'] ?? name.split('.').at(-1);
   return {
     name,
-    kind: kindOf(name, all),
+    kind: kindOf(name, { ...all, oneOf: schema.oneOf }),
     title: all.title ?? name,
     help: (all.description ?? '').replaceAll('`', '').replace(/\s+/g, ' ').trim(),
     unit: all['x-unit'] ?? '',
@@ -62,7 +64,7 @@ function parametersOf(schema, prefix = '') {
   return Object.entries(schema.properties).flatMap(([member, given]) => {
     const inner = resolved(given);
     const name = prefix + member;
-    return inner.type === 'object' ? parametersOf(inner, `${name}.`) : [parameterOf(name, inner)];
+    return inner.properties ? parametersOf(inner, `${name}.`) : [parameterOf(name, inner)];
   });
 }
 
