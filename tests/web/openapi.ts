@@ -54,5 +54,15 @@ export const estimateNames: readonly string[] = (api.paths['/v1/estimate']?.get?
 
 // Whom to call when a job ends is for programs.
 export const notOfThePage = ['callback.url'];
-// The volume is chosen before, the iso-value in the histogram.
-export const notInTheForm = ['volume', 'iso', ...notOfThePage];
+// The volume is chosen before, the iso-value in the histogram, labels in their list; what labels are
+// called and are made of is the volume's.
+export const notInTheForm = [
+  'volume',
+  'iso',
+  'labels',
+  'background',
+  'label_names',
+  'label_colors',
+  'label_values',
+  ...notOfThePage,
+];

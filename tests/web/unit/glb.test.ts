@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { GlbReader } from '@/mesh/glb';
+import { GlbReader, type DracoPrimitive } from '@/mesh/glb';
 
 // A GLB whose primitives hold these bytes, in this order.
 function glb(streams: number[][], change: (gltf: Record<string, unknown>) => void = () => undefined): Uint8Array {
@@ -79,7 +79,34 @@ describe('GlbReader', () => {
     let found: unknown;
     const reader = new GlbReader({ onPrimitives: (parts) => (found = parts), onStream: () => undefined });
     reader.take(glb([[1]]));
-    expect(found).toEqual([{ offset: 0, length: 1, positionId: 7, triangles: 2, vertices: 4, low: [0, 0, 0], high: [1, 2, 3] }]);
+    expect(found).toEqual([{ offset: 0, length: 1, positionId: 7, triangles: 2, vertices: 4, low: [0, 0, 0], high: [1, 2, 3], part: null }]);
+  });
+
+  it('says whose surface a primitive is, and its colour as a screen has it', () => {
+    let found: DracoPrimitive[] = [];
+    const reader = new GlbReader({ onPrimitives: (parts) => (found = parts), onStream: () => undefined });
+    reader.take(
+      glb(three, (gltf) => {
+        const [{ primitives }] = gltf.meshes as [{ primitives: Record<string, unknown>[] }];
+        const [first, second, last] = primitives;
+        gltf.materials = [
+          { pbrMetallicRoughness: { baseColorFactor: [0.68668531, 0.13013648, 0, 1] } },
+          { name: 'without a colour' },
+        ];
+        gltf.meshes = [
+          { primitives: [{ ...first, material: 0 }, { ...second, material: 0 }] },
+          { primitives: [{ ...last, material: 1 }] },
+        ];
+        gltf.nodes = [
+          { name: 'labels', children: [1, 2, 3] },
+          { name: 'empty', extras: { label: 5 } },
+          { name: 'Putamen', mesh: 1, extras: { label: -2 } },
+          { name: 'Liver', mesh: 0, extras: { label: 7, voxels: 3 } },
+        ];
+      }),
+    );
+    const liver = { label: 7, colour: '#d86500' };
+    expect(found.map(({ part }) => part)).toEqual([liver, liver, { label: -2, colour: '#ffffff' }]);
   });
 
   it('is not complete while bytes are missing', () => {

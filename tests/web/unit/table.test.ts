@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { commandSnippet } from '@/job/snippets';
 import { defaultParameters, estimateQuery, jobRequest, parametersOfQuery, queryOfParameters } from '@/job/parameters';
-import { applies, fits, parameterOf, parameters, valueIn, withValue, type Parameter, type Value } from '@/job/table';
+import { applies, asText, fits, parameterOf, parameters, valueIn, withValue, type Parameter, type Value } from '@/job/table';
 import { shown } from '@/views/parameter_form';
 import { estimateNames, jobParameters, notInTheForm, notOfThePage } from '../openapi';
 
@@ -25,6 +25,9 @@ function otherValue(parameter: Parameter): Value {
       return minimum + (maximum - minimum) / 4;
     case 'text':
       return 'text';
+    case 'labels':
+    case 'by label':
+      throw new Error(`${parameter.name} is not in the form`);
   }
 }
 
@@ -53,10 +56,10 @@ describe('the table of parameters', () => {
     expect(fits(parameter, value, job)).toBe(true);
     expect(valueIn(jobRequest(job), parameter)).toEqual(value);
     expect(estimateNames).toContain(parameter.query);
-    expect(estimateQuery(job).get(parameter.query)).toBe(String(value));
+    expect(estimateQuery(job).get(parameter.query)).toBe(asText(value));
     const address = new URLSearchParams(queryOfParameters(job, defaults));
     expect(parametersOfQuery(address, defaults)).toEqual(job);
-    const option = value === true ? `--${parameter.option}` : `--${parameter.option} ${String(value)}`;
+    const option = value === true ? `--${parameter.option}` : `--${parameter.option} ${asText(value)}`;
     expect(commandSnippet('http://h:1', job, false)).toContain(option);
   });
 

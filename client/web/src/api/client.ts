@@ -1,7 +1,7 @@
 // The daemon's routes as functions. Failures are thrown as ApiError.
 import { asApiError, errorOf } from './problem';
 import { Signal } from '../ui/signal';
-import type { Axis, Estimate, Histogram, Job, JobList, JobRequest, Volume, VolumeList } from './types';
+import type { Axis, Estimate, Histogram, Job, JobList, JobRequest, Volume, VolumeLabels, VolumeList } from './types';
 
 const tokenKey = 'isomesh.token';
 
@@ -66,6 +66,10 @@ export async function eraseVolume(id: string): Promise<void> {
 
 export function histogramOf(id: string, bins: number, signal?: AbortSignal): Promise<Histogram> {
   return json(`/v1/volumes/${encodeURIComponent(id)}/histogram?bins=${bins}`, { signal });
+}
+
+export function labelsOf(id: string, background: number, signal?: AbortSignal): Promise<VolumeLabels> {
+  return json(`/v1/volumes/${encodeURIComponent(id)}/labels?background=${background}`, { signal });
 }
 
 // What a job with these parameters would make.

@@ -1,14 +1,16 @@
 // In which parameters jobs differ.
 import type { Job, JobParameters } from '../api/types';
-import { formatIso, formatValue } from '../ui/format';
-import { parameters, valueIn, type Parameter } from './table';
+import { formatValue } from '../ui/format';
+import { surfaceInWords } from './parameters';
+import { asText, parameters, valueIn, type Parameter } from './table';
 
 // Shorter than the title and the value.
 const words: Record<string, (job: JobParameters) => string> = {
   volume: ({ volume }) => `volume ${volume.slice(0, 8)}`,
-  iso: ({ iso }) => `iso ${formatIso(iso)}`,
+  iso: surfaceInWords,
+  labels: surfaceInWords,
   scheme: ({ scheme }) => `${scheme} tetrahedra`,
-  interpolation: ({ interpolation }) => interpolation,
+  interpolation: ({ interpolation }) => interpolation ?? 'midpoint',
   passes: ({ passes }) => `${passes} passes`,
   smoothing: ({ smoothing }) => smoothing,
   close: ({ close }) => (close ? 'closed' : 'open'),
@@ -20,7 +22,7 @@ function inWords(parameter: Parameter, job: JobParameters): string {
   const own = words[parameter.name];
   if (own) return own(job);
   const value = valueIn(job, parameter) ?? 'no limit';
-  const text = typeof value === 'number' ? `${formatValue(value)} ${parameter.unit}`.trim() : String(value);
+  const text = typeof value === 'number' ? `${formatValue(value)} ${parameter.unit}`.trim() : asText(value);
   return `${parameter.title.charAt(0).toLowerCase()}${parameter.title.slice(1)}: ${text}`;
 }
 
@@ -33,7 +35,7 @@ export function differences(jobs: readonly Job[]): string[] {
   );
   return jobs.map((job) =>
     varying.length > 0
-      ? varying.map((parameter) => inWords(parameter, job.parameters)).join(', ')
+      ? [...new Set(varying.map((parameter) => inWords(parameter, job.parameters)))].join(', ')
       : 'the same parameters',
   );
 }

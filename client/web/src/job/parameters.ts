@@ -1,13 +1,17 @@
 // A job's parameters as the page keeps them, in the form and in addresses, and as it sends them.
 import type { JobParameters, JobRequest, MeshFormat } from '../api/types';
+import { formatIso } from '../ui/format';
 import {
   applies,
+  asText,
   fits,
+  isByLabels,
   isDefault,
   meshFormats,
   parameterOf,
   parameters,
   valueIn,
+  withLabels,
   withValue,
   type Parameter,
   type Value,
@@ -15,11 +19,10 @@ import {
 
 // The daemon's defaults, but for the format: GLB is what the page shows.
 export function defaultParameters(volume: string, iso: number): JobParameters {
-  const given = { volume, iso, formats: ['glb'] };
-  return parameters.reduce(
-    (job, parameter) => (parameter.name in given ? job : withValue(job, parameter, parameter.default ?? null)),
-    given as Partial<JobParameters>,
-  ) as JobParameters;
+  const given: Partial<JobParameters> = { volume, iso, formats: ['glb'] };
+  return parameters
+    .filter(({ name, default: standard }) => !(name in given) && standard !== undefined)
+    .reduce((job, parameter) => withValue(job, parameter, parameter.default ?? null), given) as JobParameters;
 }
 
 // The job with another value of that parameter. What depends on the parameter (the step of a pass, on
@@ -50,8 +53,12 @@ function addressName({ name }: Parameter): string {
   return name.split('.').at(-1) ?? name;
 }
 
-function asText(value: Value | undefined): string {
-  return value === undefined || value === null ? '' : String(value);
+function fromJson(text: string): Value {
+  try {
+    return JSON.parse(text) as Value;
+  } catch {
+    return null;
+  }
 }
 
 function fromText({ kind, values }: Parameter, text: string): Value {
@@ -67,6 +74,10 @@ function fromText({ kind, values }: Parameter, text: string): Value {
       return text.split(',').filter((one) => values?.includes(one));
     case 'text':
       return text;
+    case 'labels':
+      return text === 'all' ? text : text.split(',').map(Number);
+    case 'by label':
+      return fromJson(text);
   }
 }
 
@@ -78,8 +89,10 @@ export function parametersOfQuery(query: URLSearchParams, defaults: JobParameter
     return text !== '' && fits(parameter, value, job) ? withValue(job, parameter, value) : job;
   };
   // What depends on another parameter is judged after that.
+  const labels = parameters.find(({ kind }) => kind === 'labels');
+  const start = labels ? withLabels(defaults, take(defaults, labels).labels) : defaults;
   const inAddress = parameters.filter(({ name }) => name !== 'volume');
-  const job = [...inAddress.filter(({ by }) => !by), ...inAddress.filter(({ by }) => by)].reduce(take, defaults);
+  const job = [...inAddress.filter(({ by }) => !by), ...inAddress.filter(({ by }) => by)].reduce(take, start);
   return { ...job, formats: withGlb(job.formats) };
 }
 
@@ -87,7 +100,7 @@ export function parametersOfQuery(query: URLSearchParams, defaults: JobParameter
 export function queryOfParameters(job: JobParameters, defaults: JobParameters): Record<string, string> {
   const textOf = (parameter: Parameter): string => {
     const text = asText(valueIn(job, parameter));
-    if (parameter.name === 'iso') return text;
+    if (parameter.name === 'iso') return isByLabels(job) ? '' : text;
     if (parameter.name === 'formats') return text === asText(defaults.formats) ? '' : text;
     return applies(parameter, job) && !isDefault(parameter, job) ? text : '';
   };
@@ -98,13 +111,13 @@ export function queryOfParameters(job: JobParameters, defaults: JobParameters): 
   );
 }
 
-const alwaysSaid = ['volume', 'iso', 'formats'];
+const alwaysSaid = ['volume', 'iso', 'labels', 'formats'];
 
 // The parameters that a request has to name: those that are not the daemon's defaults.
 export function toSay(job: JobParameters): Parameter[] {
   return parameters.filter(
     (parameter) =>
-      alwaysSaid.includes(parameter.name) || (applies(parameter, job) && !isDefault(parameter, job)),
+      applies(parameter, job) && (alwaysSaid.includes(parameter.name) || !isDefault(parameter, job)),
   );
 }
 
@@ -119,7 +132,7 @@ export function jobRequest(job: JobParameters): JobRequest {
 // The same as the query of an estimate.
 export function estimateQuery(job: JobParameters): URLSearchParams {
   return new URLSearchParams(
-    toSay(job).map((parameter) => [parameter.query, asText(valueIn(job, parameter))]),
+    toSay(job).filter(({ kind }) => kind !== 'by label').map((parameter) => [parameter.query, asText(valueIn(job, parameter))]),
   );
 }
 
@@ -127,10 +140,29 @@ export function isSameJob(a: JobParameters, b: JobParameters): boolean {
   return JSON.stringify(jobRequest(a)) === JSON.stringify(jobRequest(b));
 }
 
+// One file of these holds all labels; those of the others are in a ZIP.
+const wholeFormats: readonly MeshFormat[] = ['glb', 'ply', 'obj'];
+
+// The files that the job makes.
+export function filesOf({ labels, formats }: JobParameters): MeshFormat[] {
+  if (labels === undefined) return [...formats];
+  const whole = formats.filter((format) => wholeFormats.includes(format));
+  return whole.length < formats.length ? [...whole, 'zip'] : whole;
+}
+
+// Which surface: iso 60, all labels.
+export function surfaceInWords({ iso, labels }: JobParameters): string {
+  if (labels === undefined) return `iso ${formatIso(iso ?? 'otsu')}`;
+  if (labels === 'all') return 'all labels';
+  const [only] = labels;
+  return labels.length === 1 ? `label ${only}` : `${labels.length} labels`;
+}
+
 // In a few words, for titles: 6 tetrahedra, linear, 5 passes.
 export function inWords(job: JobParameters): string {
   const passes = job.passes === 1 ? '1 pass' : `${job.passes} passes`;
   const smoothing = job.smoothing === 'taubin' && job.passes > 0 ? ' (Taubin)' : '';
   const closed = job.close ? ', closed' : '';
-  return `${job.scheme} tetrahedra, ${job.interpolation}, ${passes}${smoothing}${closed}`;
+  const placed = isByLabels(job) ? '' : `, ${job.interpolation}`;
+  return `${job.scheme} tetrahedra${placed}, ${passes}${smoothing}${closed}`;
 }

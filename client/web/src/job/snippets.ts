@@ -1,7 +1,7 @@
 // How to do the same without the page.
 import type { JobParameters } from '../api/types';
-import { jobRequest, toSay } from './parameters';
-import { valueIn, type Parameter } from './table';
+import { filesOf, jobRequest, toSay } from './parameters';
+import { asText, valueIn, type ByLabel, type Parameter } from './table';
 
 function quoted(text: string): string {
   return /^[A-Za-z0-9_./:=,-]+$/.test(text) ? text : `'${text.replaceAll("'", `'\\''`)}'`;
@@ -13,7 +13,7 @@ export function curlSnippet(origin: string, job: JobParameters, hasToken: boolea
   lines.push(`-H 'Content-Type: application/json'`);
   lines.push(`-d ${quoted(JSON.stringify(jobRequest(job)))}`);
   const auth = hasToken ? ' -H "Authorization: Bearer $ISOMESH_TOKEN"' : '';
-  const downloads = job.formats.map(
+  const downloads = filesOf(job).map(
     (format) => `curl${auth} -o mesh.${format} ${quoted(`${origin}/v1/jobs/`)}JOB/mesh.${format}`,
   );
   return [`${lines.join(' \\\n  ')}`, '# JOB is the id in the answer', ...downloads].join('\n');
@@ -21,7 +21,11 @@ export function curlSnippet(origin: string, job: JobParameters, hasToken: boolea
 
 function optionFor(parameter: Parameter, job: JobParameters): string {
   const value = valueIn(job, parameter);
-  return value === true ? `--${parameter.option}` : `--${parameter.option} ${quoted(String(value))}`;
+  if (parameter.kind === 'by label') {
+    const each = Object.entries(value as ByLabel);
+    return each.map(([label, of]) => `--${parameter.option} ${quoted(`${label}=${String(of)}`)}`).join(' ');
+  }
+  return value === true ? `--${parameter.option}` : `--${parameter.option} ${quoted(asText(value))}`;
 }
 
 export function commandSnippet(origin: string, job: JobParameters, hasToken: boolean): string {
@@ -30,7 +34,7 @@ export function commandSnippet(origin: string, job: JobParameters, hasToken: boo
   const options = toSay(job)
     .filter(({ name }) => name !== 'volume')
     .map((parameter) => optionFor(parameter, job));
-  const fetched = job.formats.map((format) => `-o mesh.${format}`).join(' ');
+  const fetched = filesOf(job).map((format) => `-o mesh.${format}`).join(' ');
   return [
     `job=$(${isomesh} submit ${job.volume} \\`,
     `  ${options.join(' ')})`,
@@ -46,7 +50,7 @@ function enumeratorOf(name: string): string {
 
 export function librarySnippet(origin: string, job: JobParameters, hasToken: boolean): string {
   const token = hasToken ? ', .token = std::getenv("ISOMESH_TOKEN")' : '';
-  const fetched = job.formats.map(
+  const fetched = filesOf(job).map(
     (format) => `client.fetch(job.id, isomesh::MeshFormat::${enumeratorOf(format)}, "mesh.${format}");`,
   );
   return [

@@ -3,12 +3,21 @@
 import { parameters as all } from '../../generated/parameters';
 import type { JobParameters, MeshFormat, Priority } from '../api/types';
 
-export type Value = string | number | boolean | readonly string[] | null;
+// By labels' values.
+export type ByLabel = Readonly<Record<string, string | readonly number[]>>;
+export type Value = string | number | boolean | readonly string[] | readonly number[] | ByLabel | null;
+
+// Empty for no value.
+export function asText(value: Value | undefined): string {
+  if (value === undefined || value === null) return '';
+  if (typeof value !== 'object') return String(value);
+  return Array.isArray(value) ? value.join(',') : JSON.stringify(value);
+}
 
 export interface Parameter {
   // Where it stands in a job: passes, draco.speed.
   name: string;
-  kind: 'number' | 'integer' | 'switch' | 'choice' | 'choices' | 'text';
+  kind: 'number' | 'integer' | 'switch' | 'choice' | 'choices' | 'text' | 'labels' | 'by label';
   title: string;
   help: string;
   unit: string;
@@ -36,6 +45,16 @@ const forPrograms = ['callback.url'];
 
 export const parameters = all.filter(({ name }) => !forPrograms.includes(name));
 
+// A job goes by an iso-value or by labels; the daemon refuses what is for the other one.
+const forIso = ['iso', 'interpolation', 'components.keep', 'components.min_triangles'];
+const forLabels = ['labels', 'background', 'label_names', 'label_colors', 'label_values'];
+// What the daemon takes for labels where it takes something else for an iso-value.
+const labelDefaults: Readonly<Record<string, Value>> = { passes: 10 };
+
+export function isByLabels({ labels }: Partial<JobParameters>): boolean {
+  return labels !== undefined;
+}
+
 export function parameterOf(name: string): Parameter {
   const found = parameters.find((parameter) => parameter.name === name);
   if (!found) throw new Error(`proto/openapi.yaml has no job parameter ${name}`);
@@ -49,9 +68,10 @@ function valuesOf<T extends string>(name: string): readonly T[] {
 // In the order in which the daemon takes them.
 export const priorities = valuesOf<Priority>('priority');
 // GLB first: it is what the page shows.
+// A ZIP is no choice: it comes by itself where a format needs one, as it holds a file of each label.
 export const meshFormats: readonly MeshFormat[] = [
   'glb',
-  ...valuesOf<MeshFormat>('formats').filter((format) => format !== 'glb'),
+  ...valuesOf<MeshFormat>('formats').filter((format) => format !== 'glb' && format !== 'zip'),
 ];
 
 // A part of a job, by the names of its members.
@@ -71,12 +91,28 @@ export function withValue<Job extends Partial<JobParameters>>(job: Job, { name }
   return { ...job, [owner]: member === undefined ? value : { ...inner, [member]: value } };
 }
 
+// The job by those labels, or at its iso-value. What has the default of the one kind gets that of the other.
+export function withLabels(job: JobParameters, labels: JobParameters['labels']): JobParameters {
+  const next = { ...job, labels };
+  if (labels === undefined) delete next.labels;
+  return parameters
+    .filter(({ name }) => name in labelDefaults)
+    .filter((parameter) => valueIn(job, parameter) === defaultOf(parameter, job))
+    .reduce((result, parameter) => withValue(result, parameter, defaultOf(parameter, next) ?? null), next);
+}
+
 function caseOf({ by }: Parameter, job: JobParameters): { default?: number; maximum?: number } | undefined {
-  return by ? by.cases[String(valueIn(job, parameterOf(by.parameter)))] : {};
+  return by ? by.cases[asText(valueIn(job, parameterOf(by.parameter)))] : {};
+}
+
+// Whether the parameter is for jobs at an iso-value, or by labels, as this one is.
+export function isOfKind({ name }: Parameter, job: JobParameters): boolean {
+  return !(isByLabels(job) ? forIso : forLabels).includes(name);
 }
 
 // Whether the parameter is for such a job.
 export function applies(parameter: Parameter, job: JobParameters): boolean {
+  if (!isOfKind(parameter, job)) return false;
   return caseOf(parameter, job) !== undefined;
 }
 
@@ -86,6 +122,8 @@ export function maximumOf(parameter: Parameter, job: JobParameters): number | un
 
 // What the daemon takes when such a job does not say it; null: no limit.
 export function defaultOf(parameter: Parameter, job: JobParameters): Value | undefined {
+  const forThese = isByLabels(job) ? labelDefaults[parameter.name] : undefined;
+  if (forThese !== undefined) return forThese;
   return caseOf(parameter, job)?.default ?? parameter.default;
 }
 
@@ -111,13 +149,26 @@ export function fits(parameter: Parameter, value: Value, job: JobParameters): bo
       return Array.isArray(value) && value.length > 0 && value.every((one) => values.includes(one as string));
     case 'text':
       return typeof value === 'string';
+    case 'labels':
+      return value === 'all' || areLabels(value);
+    case 'by label':
+      return typeof value === 'object' && Object.entries(value).every(([label, of]) => isOfLabel(label, of));
   }
+}
+
+function areLabels(value: unknown): boolean {
+  return Array.isArray(value) && value.length > 0 && value.every(Number.isInteger);
+}
+
+function isOfLabel(label: string, value: unknown): boolean {
+  return /^-?\d+$/.test(label) && (typeof value === 'string' || areLabels(value));
 }
 
 // Whether the daemon takes that value without being told.
 export function isDefault(parameter: Parameter, job: JobParameters): boolean {
   const value = JSON.stringify(valueIn(job, parameter) ?? null);
-  return [parameter.default, defaultOf(parameter, job)].some(
+  const isOther = isByLabels(job) && parameter.name in labelDefaults;
+  return [isOther ? undefined : parameter.default, defaultOf(parameter, job)].some(
     (standard) => standard !== undefined && JSON.stringify(standard) === value,
   );
 }

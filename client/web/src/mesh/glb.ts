@@ -17,6 +17,13 @@ export interface DracoPrimitive {
   vertices: number;
   low: [number, number, number];
   high: [number, number, number];
+  part: Part | null;
+}
+
+// A label's own surface, in a node of its own.
+export interface Part {
+  label: number;
+  colour: string; // #rrggbb
 }
 
 interface Gltf {
@@ -25,11 +32,14 @@ interface Gltf {
     primitives: {
       attributes: Record<string, number>;
       indices?: number;
+      material?: number;
       extensions?: {
         KHR_draco_mesh_compression?: { bufferView: number; attributes: Record<string, number> };
       };
     }[];
   }[];
+  nodes?: { mesh?: number; extras?: { label?: unknown } | null }[];
+  materials?: { pbrMetallicRoughness?: { baseColorFactor?: number[] } }[];
   accessors?: { count: number; min?: number[]; max?: number[] }[];
   bufferViews?: { byteOffset?: number; byteLength: number }[];
 }
@@ -38,9 +48,34 @@ function vector(values: number[] | undefined): [number, number, number] {
   return [values?.[0] ?? 0, values?.[1] ?? 0, values?.[2] ?? 0];
 }
 
+// glTF's colours are linear, a screen's are not (IEC 61966-2-1).
+function screenColour([red = 1, green = 1, blue = 1]: readonly number[]): string {
+  const encode = (linear: number): number =>
+    linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055;
+  const digits = (linear: number): string =>
+    Math.round(255 * Math.min(1, Math.max(0, encode(linear))))
+      .toString(16)
+      .padStart(2, '0');
+  return `#${digits(red)}${digits(green)}${digits(blue)}`;
+}
+
+// The labels of meshes, by the meshes' numbers.
+function labelsOf({ nodes = [] }: Gltf): Map<number, number> {
+  const labels = new Map<number, number>();
+  for (const { mesh, extras } of nodes) {
+    const label = extras?.label;
+    if (mesh !== undefined && Number.isInteger(label)) labels.set(mesh, label as number);
+  }
+  return labels;
+}
+
 export function primitivesOf(gltf: Gltf): DracoPrimitive[] {
-  const primitives = (gltf.meshes ?? []).flatMap((mesh) => mesh.primitives);
-  return primitives.map((primitive) => {
+  const labels = labelsOf(gltf);
+  const primitives = (gltf.meshes ?? []).flatMap((mesh, number) =>
+    mesh.primitives.map((primitive) => ({ primitive, label: labels.get(number) })),
+  );
+  return primitives.map(({ primitive, label }) => {
+    const material = gltf.materials?.[primitive.material ?? -1]?.pbrMetallicRoughness;
     const draco = primitive.extensions?.KHR_draco_mesh_compression;
     const view = draco && gltf.bufferViews?.[draco.bufferView];
     const position = gltf.accessors?.[primitive.attributes.POSITION ?? -1];
@@ -57,6 +92,7 @@ export function primitivesOf(gltf: Gltf): DracoPrimitive[] {
       vertices: position.count,
       low: vector(position.min),
       high: vector(position.max),
+      part: label === undefined ? null : { label, colour: screenColour(material?.baseColorFactor ?? []) },
     };
   });
 }

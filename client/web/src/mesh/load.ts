@@ -3,7 +3,7 @@ import { headers, connected } from '../api/client';
 import { ApiError, asApiError, errorOf, unreachable } from '../api/problem';
 import type { Job, MeshFile } from '../api/types';
 import type { Block } from './blocks';
-import { GlbReader } from './glb';
+import { GlbReader, type DracoPrimitive, type Part } from './glb';
 import { decoders } from './pool';
 
 export interface LoadProgress {
@@ -19,7 +19,8 @@ export interface LoadTiming {
 }
 
 export interface LoadListener {
-  onBlocks: (blocks: Block[]) => void;
+  // Of one label, or of the only surface.
+  onBlocks: (blocks: Block[], part: Part | null) => void;
   onProgress: (progress: LoadProgress) => void;
 }
 
@@ -92,11 +93,11 @@ export async function loadMesh(
   };
   const began = performance.now();
   const decoding: Promise<void>[] = [];
-  const decode = (bytes: Uint8Array<ArrayBuffer>, positionId: number | null): void => {
-    const done = decoders.decode(bytes, positionId, signal).then((blocks) => {
+  const decode = (bytes: Uint8Array<ArrayBuffer>, primitive: DracoPrimitive | undefined): void => {
+    const done = decoders.decode(bytes, primitive?.positionId ?? null, signal).then((blocks) => {
       if (signal.aborted) return;
       for (const block of blocks) progress.triangles += block.index.length / 3;
-      listener.onBlocks(blocks);
+      listener.onBlocks(blocks, primitive?.part ?? null);
       listener.onProgress({ ...progress });
     });
     // Awaited with the others once all bytes are here. Without a handler until then, the browser would
@@ -106,12 +107,12 @@ export async function loadMesh(
   };
 
   if (format === 'glb') {
-    let positionIds: number[] = [];
+    let primitives: DracoPrimitive[] = [];
     const reader = new GlbReader({
-      onPrimitives: (primitives) => {
-        positionIds = primitives.map((primitive) => primitive.positionId);
+      onPrimitives: (all) => {
+        primitives = all;
       },
-      onStream: (index, bytes) => decode(bytes, positionIds[index] ?? null),
+      onStream: (index, bytes) => decode(bytes, primitives[index]),
     });
     await download(file, signal, (piece) => {
       reader.take(piece);
@@ -126,7 +127,7 @@ export async function loadMesh(
       progress.bytes += piece.length;
       listener.onProgress({ ...progress });
     });
-    decode(whole, null);
+    decode(whole, undefined);
   }
   const downloaded = performance.now();
   await Promise.all(decoding);

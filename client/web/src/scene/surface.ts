@@ -2,12 +2,7 @@
 // drawn over them. Draws when something changed, never for nothing.
 import {
   AmbientLight,
-  BufferAttribute,
-  BufferGeometry,
   DirectionalLight,
-  DoubleSide,
-  Mesh,
-  MeshPhongMaterial,
   PerspectiveCamera,
   Raycaster,
   Scene,
@@ -18,33 +13,25 @@ import {
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3 } from '../api/types';
 import type { Block } from '../mesh/blocks';
-import { Seams } from '../mesh/seams';
+import type { Part } from '../mesh/glb';
 import { OrientationCube } from './cube';
 import { Cut } from './cut';
 import { FrameBudget } from './budget';
-import { firstHit, keptBy, wholeRay } from './pick';
+import { Parts, type SurfaceStyle } from './parts';
+import { keptBy, wholeRay } from './pick';
 import { Rulers } from './rulers';
 import { onTap } from './tap';
 import { firstOffset, fitDistance, turned, viewOffsets, type CameraPlace, type ViewName } from './views';
 
-export interface SurfaceStyle {
-  shading: 'smooth' | 'flat';
-  wireframe: boolean;
-  opacity: number;
-}
-
-export const defaultStyle: SurfaceStyle = { shading: 'smooth', wireframe: false, opacity: 1 };
-
-interface DrawnBlock {
-  mesh: Mesh<BufferGeometry, MeshPhongMaterial>;
-  fine: BufferGeometry;
-  coarse: BufferGeometry;
-}
-
 const verticalAngle = 30;
 const fill = 1.02;
-const wiresPerFrame = 4;
 const settleDelay = 180;
+
+// A point of the surface, and whose it is; null: of the only surface, or of the slice on the cut.
+export interface Picked {
+  point: Vec3;
+  label: number | null;
+}
 
 export class Surface {
   readonly canvas: HTMLCanvasElement;
@@ -53,28 +40,20 @@ export class Surface {
   readonly budget = new FrameBudget();
   onCamera: (() => void) | null = null;
   // A click or tap; null where nothing is.
-  onPick: ((point: Vec3 | null) => void) | null = null;
+  onPick: ((picked: Picked | null) => void) | null = null;
 
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly camera = new PerspectiveCamera(verticalAngle, 1, 1, 1000);
   private readonly controls: OrbitControls;
   private readonly cube = new OrientationCube();
-  private readonly material = new MeshPhongMaterial({
-    color: 0xdcd6c8,
-    specular: 0x1c1c1c,
-    shininess: 24,
-    side: DoubleSide,
-  });
-  private readonly blocks: DrawnBlock[] = [];
-  private readonly seams = new Seams();
+  private readonly parts = new Parts(this.scene, () => this.draw());
   private readonly ray = new Raycaster();
   private readonly resizing: ResizeObserver;
   private bounds: [Vec3, Vec3] = [
     [-1, -1, -1],
     [1, 1, 1],
   ];
-  private style = defaultStyle;
   private scheduled = 0;
   private settling = 0;
   private isMoving = false;
@@ -120,28 +99,8 @@ export class Surface {
     this.fit(firstOffset);
   }
 
-  addBlocks(blocks: Block[]): void {
-    for (const block of blocks) {
-      const position = new BufferAttribute(block.positions, 3);
-      const normal = new BufferAttribute(block.normals, 4, true);
-      const geometry = (index: Uint16Array<ArrayBuffer>): BufferGeometry => {
-        const made = new BufferGeometry();
-        made.setAttribute('position', position);
-        made.setAttribute('normal', normal);
-        made.setIndex(new BufferAttribute(index, 1));
-        return made;
-      };
-      const fine = geometry(block.index);
-      const coarse = geometry(block.coarse);
-      fine.computeBoundingBox();
-      fine.computeBoundingSphere();
-      coarse.boundingSphere = fine.boundingSphere;
-      const mesh = new Mesh(this.isCoarse ? coarse : fine, this.material);
-      mesh.matrixAutoUpdate = false;
-      this.scene.add(mesh);
-      this.blocks.push({ mesh, fine, coarse });
-      this.seams.add(block);
-    }
+  addBlocks(blocks: Block[], part: Part | null): void {
+    this.parts.add(blocks, part);
     this.budget.soon(() => this.draw());
   }
 
@@ -151,24 +110,26 @@ export class Surface {
   }
 
   get triangles(): number {
-    return this.blocks.reduce((sum, block) => sum + (block.fine.index?.count ?? 0) / 3, 0);
+    return this.parts.triangles;
   }
 
   setStyle(style: SurfaceStyle): void {
-    const changed = style.shading !== this.style.shading;
-    this.style = style;
-    this.material.flatShading = style.shading === 'flat';
-    this.material.opacity = style.opacity;
-    this.material.transparent = style.opacity < 1;
-    this.material.depthWrite = style.opacity === 1;
-    if (style.wireframe !== this.material.wireframe) this.setWireframe(style.wireframe);
-    if (changed || this.material.transparent) this.material.needsUpdate = true;
+    this.parts.setStyle(style);
     this.draw();
   }
 
   setCut(isCut: boolean): void {
-    this.material.clippingPlanes = isCut ? [this.cut.plane] : null;
-    this.material.needsUpdate = true;
+    this.parts.setCut(isCut ? [this.cut.plane] : null);
+    this.draw();
+  }
+
+  setHidden(labels: ReadonlySet<number>): void {
+    this.parts.setHidden(labels);
+    this.draw();
+  }
+
+  setColour(label: number, colour: string): void {
+    this.parts.setColour(label, colour);
     this.draw();
   }
 
@@ -261,11 +222,7 @@ export class Surface {
     clearTimeout(this.settling);
     this.resizing.disconnect();
     this.controls.dispose();
-    for (const { fine, coarse } of this.blocks) {
-      fine.dispose();
-      coarse.dispose();
-    }
-    this.material.dispose();
+    this.parts.dispose();
     this.rulers.dispose();
     this.cut.dispose();
     this.cube.dispose();
@@ -347,21 +304,8 @@ export class Surface {
   private setCoarse(isCoarse: boolean): void {
     if (isCoarse === this.isCoarse) return;
     this.isCoarse = isCoarse;
-    for (const { mesh, fine, coarse } of this.blocks) mesh.geometry = isCoarse ? coarse : fine;
+    this.parts.setCoarse(isCoarse);
     this.draw();
-  }
-
-  // Wires are made of a block when it is first drawn with them, so that some blocks at a time turn.
-  private setWireframe(isOn: boolean): void {
-    this.material.wireframe = isOn;
-    if (!isOn) return;
-    for (const { mesh } of this.blocks) mesh.visible = false;
-    const show = (from: number): void => {
-      for (const { mesh } of this.blocks.slice(from, from + wiresPerFrame)) mesh.visible = true;
-      this.draw();
-      if (from < this.blocks.length) requestAnimationFrame(() => show(from + wiresPerFrame));
-    };
-    show(0);
   }
 
   private joinSeams(member: number): void {
@@ -369,12 +313,10 @@ export class Surface {
     const until = performance.now() + 6;
     let next = member;
     while (performance.now() < until) {
-      if (!this.seams.join(next)) {
+      if (!this.parts.joinSeams(next)) {
         this.draw();
         return;
       }
-      const normal = this.blocks[next]?.fine.getAttribute('normal');
-      if (normal) normal.needsUpdate = true;
       next += 1;
     }
     requestAnimationFrame(() => this.joinSeams(next));
@@ -389,26 +331,21 @@ export class Surface {
       this.look(face);
       return;
     }
-    if (this.onPick) this.onPick(this.pointAt((2 * x) / box.width - 1, 1 - (2 * y) / box.height));
+    if (this.onPick) this.onPick(this.pickedAt((2 * x) / box.width - 1, 1 - (2 * y) / box.height));
   }
 
   // The nearest point of the surface, or of the slice on its cut, that is seen there.
-  private pointAt(x: number, y: number): Vec3 | null {
+  private pickedAt(x: number, y: number): Picked | null {
     this.setCoarse(false);
     this.ray.setFromCamera(new Vector2(x, y), this.camera);
     const { ray } = this.ray;
-    const [plane] = this.material.clippingPlanes ?? [];
+    const plane = this.parts.cut;
     const { from, to } = plane ? keptBy(plane, ray) : wholeRay;
     const slice = this.cut.hit(this.ray)?.distance ?? Infinity;
-    const end = Math.min(to, slice);
-    let nearest = end;
-    for (const { fine } of this.blocks) {
-      if (!fine.index || !fine.boundingBox || !ray.intersectsBox(fine.boundingBox)) continue;
-      nearest = firstHit(fine.getAttribute('position').array, fine.index.array, ray, { from, to: nearest });
-    }
-    const found = nearest < end ? nearest : slice;
+    const hit = this.parts.hit(ray, { from, to: Math.min(to, slice) });
+    const found = hit?.at ?? slice;
     if (found === Infinity) return null;
     const point = ray.at(found, new Vector3());
-    return [point.x, point.y, point.z];
+    return { point: [point.x, point.y, point.z], label: hit?.label ?? null };
   }
 }

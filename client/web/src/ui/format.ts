@@ -75,6 +75,7 @@ export const formatNames: Record<string, string> = {
   stl: 'STL',
   ply: 'PLY',
   obj: 'OBJ',
+  zip: 'ZIP of labels',
   nifti: 'NIfTI',
   nrrd: 'NRRD',
   metaimage: 'MetaImage',

@@ -13,6 +13,7 @@ const keys: [string, string][] = [
   ['f', 'show all'],
   ['t w', 'flat shading, wires'],
   ['c m', 'cut, measure'],
+  ['h o e', 'of labels: hide the picked one, show only it, show all'],
   ['Esc Delete', 'take the last point back, remove all distances'],
 ];
 

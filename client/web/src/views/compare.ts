@@ -4,7 +4,8 @@ import { follow } from '../api/follow';
 import { ApiError, asApiError, errorOfProblem } from '../api/problem';
 import { isFinal, type Job, type Volume } from '../api/types';
 import { differences } from '../job/differences';
-import type { SurfaceStyle } from '../scene/surface';
+import { LabelState, labelsOfMesh } from '../job/labels';
+import type { SurfaceStyle } from '../scene/parts';
 import { placeOfText, placeToText, viewNames, viewTitles, type CameraPlace } from '../scene/views';
 import { button, h } from '../ui/dom';
 import { formatCount, formatMilliseconds, formatNumber, formatValue } from '../ui/format';
@@ -168,7 +169,12 @@ class Comparison {
   // A surface whose camera moves those of the others.
   private addPane(job: Job): SurfacePane {
     const camera = this.panes[0]?.camera ?? this.camera;
-    const pane = new SurfacePane(this.scope, job, { hasKeys: false, camera, volume: this.volume });
+    const pane = new SurfacePane(this.scope, job, {
+      hasKeys: false,
+      camera,
+      volume: this.volume,
+      labels: new LabelState(labelsOfMesh(job)),
+    });
     this.panes.push(pane);
     pane.onCamera = (place) => {
       for (const other of this.panes) if (other !== pane) other.follow(place);

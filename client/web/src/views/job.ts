@@ -2,8 +2,9 @@
 import { cancelJob, getJob, getVolume } from '../api/client';
 import { follow } from '../api/follow';
 import { asApiError, errorOfProblem } from '../api/problem';
-import { isFinal, type Job, type Volume } from '../api/types';
-import { inWords } from '../job/parameters';
+import { isFinal, type Job, type JobParameters, type Volume } from '../api/types';
+import { LabelState, labelsOfMesh } from '../job/labels';
+import { inWords, surfaceInWords } from '../job/parameters';
 import { placeOfText, placeToText } from '../scene/views';
 import { button, h } from '../ui/dom';
 import { formatIso, shortId } from '../ui/format';
@@ -12,6 +13,7 @@ import { noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { volumeName } from '../volume/names';
 import { againSection, changeLink, compareSection, downloads, numbers, quality, section, timings } from './job_panel';
+import { LabelList } from './label_list';
 import { SurfacePane } from './surface_pane';
 
 const stages = ['queue', 'load', 'extract', 'smooth', 'encode'];
@@ -27,11 +29,17 @@ async function volumeOf(job: Job): Promise<Volume | null> {
   }
 }
 
+function titleOf(parameters: JobParameters): string {
+  const { labels, iso } = parameters;
+  if (labels === undefined) return `Surface at ${formatIso(iso ?? 'otsu')}`;
+  return `Surfaces of ${surfaceInWords(parameters)}`;
+}
+
 function head(job: Job, volume: Volume | null): HTMLElement {
   return h(
     'header',
     { class: 'panel-head' },
-    h('h1', {}, `Surface at ${formatIso(job.parameters.iso)}`),
+    h('h1', {}, titleOf(job.parameters)),
     h('p', { class: 'of-volume' }, volume ? volumeName(volume) : 'Its volume was erased'),
     h('p', {}, inWords(job.parameters)),
     h(
@@ -143,7 +151,8 @@ function showSurface(
   const { mesh } = job;
   if (!mesh) return;
   const camera = placeOfText(route.query.get('cam') ?? '');
-  const pane = new SurfacePane(scope, job, { hasKeys: true, camera, volume });
+  const labels = new LabelState(labelsOfMesh(job));
+  const pane = new SurfacePane(scope, job, { hasKeys: true, camera, volume, labels });
   let noting = 0;
   pane.onCamera = (place) => {
     clearTimeout(noting);
@@ -154,6 +163,7 @@ function showSurface(
   const times = timings(job);
   panel.replaceChildren(
     head(job, volume),
+    ...(labels.labels.length > 0 ? [new LabelList(scope, job, labels).element] : []),
     section('Numbers', numbers(mesh)),
     times,
     downloads(job),

@@ -106,7 +106,7 @@ export async function submitVariant(job: Job, variant: Partial<JobParameters>): 
 export function downloads(job: Job): HTMLElement {
   const files = job.mesh?.files ?? {};
   const name = (format: string): string => `surface-${shortId(job.id)}.${format}`;
-  const missing = meshFormats.filter((format) => !files[format]);
+  const missing = meshFormats.filter((format) => !job.parameters.formats.includes(format));
   const make = async (format: MeshFormat): Promise<void> => {
     try {
       const variant = await submitVariant(job, { formats: withGlb([...job.parameters.formats, format]) });
@@ -121,7 +121,7 @@ export function downloads(job: Job): HTMLElement {
     h(
       'div',
       { class: 'downloads' },
-      ...meshFormats.flatMap((format) => {
+      ...[...meshFormats, 'zip'].flatMap((format) => {
         const file = files[format];
         return file
           ? [

@@ -3,8 +3,10 @@ import type { JobParameters, MeshFormat } from '../api/types';
 import { withGlb } from '../job/parameters';
 import {
   applies,
+  asText,
   defaultOf,
   fits,
+  isOfKind,
   maximumOf,
   meshFormats,
   parameterOf,
@@ -27,8 +29,9 @@ interface Control {
   update?: () => void;
 }
 
-// These are chosen elsewhere: the volume before, the iso-value in the histogram.
-const elsewhere = ['volume', 'iso'];
+// These are chosen elsewhere: the volume before, the iso-value in the histogram, labels in their list;
+// what labels are called and are made of is the volume's.
+const elsewhere = ['volume', 'iso', 'labels', 'background', 'label_names', 'label_colors', 'label_values'];
 // Those that are seen at once, in rows. All others are under "More".
 const front = [['scheme', 'interpolation'], ['smoothing', 'passes'], ['priority']];
 
@@ -53,7 +56,7 @@ function choiceControl(parameter: Parameter, host: FormHost): Control {
     label: capitalised(String(value)),
     title: valueHelp?.[String(value)],
   }));
-  const value = String(valueIn(host.job(), parameter));
+  const value = asText(valueIn(host.job(), parameter));
   const set = (text: string): void =>
     host.set(parameter, values.find((known) => String(known) === text) ?? text);
   return { element: segmented(labelOf(parameter), choices, value, set) };
@@ -91,7 +94,7 @@ function numberControl(parameter: Parameter, host: FormHost): Control {
     input.disabled = !isUsed;
     input.max = String(maximumOf(parameter, job) ?? '');
     input.placeholder = placeholderOf(parameter, job);
-    input.value = isUsed ? String(valueIn(job, parameter) ?? '') : '';
+    input.value = isUsed ? asText(valueIn(job, parameter)) : '';
     mark(true);
   };
   input.addEventListener('input', () => {
@@ -138,6 +141,7 @@ function controlFor(parameter: Parameter, host: FormHost): Control {
   throw new Error(`${parameter.name}: the page has no control for it`);
 }
 
+// For a job at an iso-value, or for one by labels, as the present one is.
 export function parameterForm(host: FormHost): HTMLElement {
   const dependents: { on: string; update: () => void }[] = [];
   const watching: FormHost = {
@@ -154,10 +158,11 @@ export function parameterForm(host: FormHost): HTMLElement {
     element.title = parameter.help;
     return element;
   };
+  const offered = shown.filter((parameter) => isOfKind(parameter, host.job()));
   const rows = front.map((names) =>
-    h('div', { class: 'row' }, ...names.map((name) => elementFor(parameterOf(name)))),
+    h('div', { class: 'row' }, ...names.map(parameterOf).filter((one) => offered.includes(one)).map(elementFor)),
   );
-  const others = shown.filter(({ name }) => !front.flat().includes(name));
+  const others = offered.filter(({ name }) => !front.flat().includes(name));
   return h(
     'div',
     { class: 'parameters' },

@@ -1,5 +1,5 @@
 // A volume and the iso-value to be chosen in it: #/volumes/ID.
-import { estimateOf, getVolume, histogramOf, listJobs, renameVolume, submitJob } from '../api/client';
+import { estimateOf, getVolume, histogramOf, listJobs, submitJob } from '../api/client';
 import { asApiError, type ApiError } from '../api/problem';
 import type { Estimate, JobParameters, Vec3, Volume } from '../api/types';
 import {
@@ -10,26 +10,26 @@ import {
   jobRequest,
   parametersOfQuery,
   queryOfParameters,
+  surfaceInWords,
 } from '../job/parameters';
-import { button, field, h, isTyping } from '../ui/dom';
+import { isByLabels, withLabels } from '../job/table';
+import { button, field, h, isTyping, segmented } from '../ui/dom';
 import {
   formatBytes,
   formatCount,
-  formatDims,
-  formatIso,
   formatMilliseconds,
   formatNames,
-  formatSpacing,
   formatValue,
 } from '../ui/format';
-import { askText, refusal, tellError } from '../ui/notices';
+import { refusal, tellError } from '../ui/notices';
 import { go, hashOf, noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { cssColour, theme } from '../ui/theme';
 import { defaultWindow, type Histogram } from '../volume/histogram';
-import { volumeName } from '../volume/names';
 import { SliceSource, type Window } from '../volume/slices';
+import { aboutVolume, sliceHelp } from './about_volume';
 import { HistogramView } from './histogram_view';
+import { LabelChoice, type Choice } from './label_choice';
 import { parameterForm } from './parameter_form';
 import { SliceView, type SliceHost } from './slice_view';
 
@@ -65,66 +65,11 @@ export async function prepareView(scope: Scope, route: Route): Promise<HTMLEleme
   return new Prepare(scope, route, volume, histogram).element;
 }
 
-// What of an upload was left out, because a person may miss it.
-function ignoredNote({ ignored }: Volume): HTMLElement | null {
-  if (ignored.length === 0) return null;
-  return h(
-    'details',
-    { class: 'more' },
-    h('summary', {}, ignored.length === 1 ? '1 file was left out' : `${ignored.length} files were left out`),
-    h('ul', {}, ...ignored.map(({ name, reason }) => h('li', {}, h('b', {}, name), `: ${reason}`))),
-  );
-}
-
-// What the server decided or corrected when it read the upload.
-function notesOf({ notes }: Volume): HTMLElement | null {
-  if (notes.length === 0) return null;
-  return h(
-    'ul',
-    { class: 'notes', 'aria-label': 'Notes' },
-    ...notes.map(({ code, detail }) => h('li', { 'data-note': code }, detail)),
-  );
-}
-
-// The volume's name, which a person can change.
-function nameHeading(volume: Volume): HTMLElement {
-  const text = h('span', {}, volumeName(volume));
-  const rename = async (): Promise<void> => {
-    const name = await askText('Name of this volume', volume.name ?? '', 'Rename');
-    if (name === null) return;
-    try {
-      volume.name = (await renameVolume(volume.id, name === '' ? null : name)).name;
-      text.textContent = volumeName(volume);
-    } catch (error) {
-      tellError(error);
-    }
-  };
-  return h('h1', {}, text, ' ', button('Rename', () => void rename(), { class: 'quiet' }));
-}
-
-function factsOf(volume: Volume): string {
-  return [
-    formatNames[volume.format] ?? volume.format,
-    volume.modality,
-    `${formatDims(volume.dims)}, ${volume.type}`,
-    formatSpacing(volume.spacing),
-    `values ${formatValue(volume.range[0])} to ${formatValue(volume.range[1])}`,
-  ]
-    .filter(Boolean)
-    .join(' \u00b7 ');
-}
-
-function sliceHelp(): HTMLElement {
-  return h(
-    'ul',
-    {},
-    h('li', {}, h('b', {}, 'Drag'), ' in a slice: window and level'),
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Wheel'), ' or arrow keys: next slice'),
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Click'), ': the other slices go there'),
-    h('li', { class: 'by-touch' }, h('b', {}, 'Slider'), ' below it: next slice'),
-    h('li', { class: 'by-touch' }, h('b', {}, 'Tap'), ': the other slices go there'),
-    h('li', {}, h('b', {}, 'Line in the histogram'), ': the iso-value', h('span', { class: 'by-mouse' }, '; arrow keys move it too')),
-  );
+function startOfQuery(query: URLSearchParams, volume: Volume, defaults: JobParameters): JobParameters {
+  const parameters = parametersOfQuery(query, defaults);
+  // An iso-value makes one surface of all labels above it, which hardly anybody wants.
+  const areLabels = isInteger(volume) && volume.notes.some(({ code }) => code === 'looks-like-labels');
+  return areLabels && !query.has('iso') && !isByLabels(parameters) ? withLabels(parameters, 'all') : parameters;
 }
 
 class Prepare {
@@ -138,6 +83,11 @@ class Prepare {
   private readonly isoInput: HTMLInputElement;
   private readonly estimate = h('div', { class: 'estimate', 'aria-live': 'polite' });
   private readonly run: HTMLButtonElement;
+  private readonly isoPart: HTMLElement;
+  private readonly labelPart = h('div');
+  private labelChoice: LabelChoice | null = null;
+  private hasLabel = true;
+  private readonly form = h('div');
   private readonly problem = h('div');
   private readonly surfaces = h('div', { class: 'made' });
   private readonly windowText = h('span', { class: 'window-text faint' });
@@ -145,13 +95,13 @@ class Prepare {
   private estimateTimer = 0;
 
   constructor(
-    scope: Scope,
+    private readonly scope: Scope,
     route: Route,
     private readonly volume: Volume,
     counts: Histogram,
   ) {
     this.defaults = defaultParameters(volume.id, volume.suggested_iso);
-    this.parameters = parametersOfQuery(route.query, this.defaults);
+    this.parameters = startOfQuery(route.query, volume, this.defaults);
     const common = defaultWindow(counts, volume.suggested_iso);
     this.window = windowOfQuery(route.query) ?? common;
     this.cursor = cursorOfQuery(route.query, volume);
@@ -160,7 +110,11 @@ class Prepare {
       volume,
       source: new SliceSource(volume, scope.signal),
       commonWindow: common,
-      state: () => ({ iso: this.iso, window: this.window, cursor: this.cursor }),
+      state: () => ({
+        iso: isByLabels(this.parameters) ? null : this.iso,
+        window: this.window,
+        cursor: this.cursor,
+      }),
       setWindow: (window) => {
         this.window = window;
         this.update();
@@ -181,7 +135,9 @@ class Prepare {
       if (Number.isFinite(this.isoInput.valueAsNumber)) this.setIso(this.isoInput.valueAsNumber);
     });
     this.run = button('Make the surface', () => void this.start(), { class: 'primary' });
+    this.isoPart = h('div', { class: 'by-iso' }, this.isoRow(), this.histogram.element);
     this.element = this.layout(common);
+    this.showKind();
     this.showSurfaces();
     scope.onEnd(() => {
       clearTimeout(this.estimateTimer);
@@ -198,7 +154,51 @@ class Prepare {
 
   private get iso(): number {
     const { iso } = this.parameters;
-    return iso === 'otsu' ? this.volume.suggested_iso : iso;
+    return typeof iso === 'number' ? iso : this.volume.suggested_iso;
+  }
+
+  // The controls that are for an iso-value, or those for labels.
+  private showKind(): void {
+    const byLabels = isByLabels(this.parameters);
+    this.isoPart.hidden = byLabels;
+    this.labelPart.hidden = !byLabels;
+    if (byLabels && !this.labelChoice) {
+      this.labelChoice = new LabelChoice(this.scope, this.volume.id, this.parameters, (choice) => this.setLabels(choice));
+      this.labelPart.append(this.labelChoice.element);
+    }
+    this.form.replaceChildren(
+      parameterForm({
+        job: () => this.parameters,
+        set: (parameter, value) => {
+          this.parameters = changed(this.parameters, parameter, value);
+          this.changed();
+        },
+      }),
+    );
+  }
+
+  private setKind(kind: 'iso' | 'labels'): void {
+    const isNone = kind === 'labels' && this.labelChoice !== null && this.labelChoice.choice() === undefined;
+    this.hasLabel = !isNone;
+    this.parameters = withLabels(this.parameters, kind === 'labels' ? (this.labelChoice?.choice() ?? 'all') : undefined);
+    this.showKind();
+    this.changed();
+  }
+
+  // While no label is chosen nothing can be made.
+  private setLabels({ labels, background }: Choice): void {
+    this.hasLabel = labels !== undefined;
+    this.parameters = { ...this.parameters, labels: labels ?? 'all', background };
+    this.changed();
+  }
+
+  private kindChoice(): HTMLElement | null {
+    if (!isInteger(this.volume)) return null;
+    const choices = [
+      { value: 'iso', label: 'Iso-value', title: 'One surface around all samples of that value or more' },
+      { value: 'labels', label: 'Labels', title: 'One surface around each label of a segmentation' },
+    ] as const;
+    return segmented('Surface by', choices, isByLabels(this.parameters) ? 'labels' : 'iso', (kind) => this.setKind(kind));
   }
 
   private layout(common: Window): HTMLElement {
@@ -214,15 +214,10 @@ class Prepare {
       h(
         'section',
         { class: 'panel', 'aria-label': 'Parameters' },
-        this.isoRow(),
-        this.histogram.element,
-        parameterForm({
-          job: () => this.parameters,
-          set: (parameter, value) => {
-            this.parameters = changed(this.parameters, parameter, value);
-            this.changed();
-          },
-        }),
+        this.kindChoice(),
+        this.isoPart,
+        this.labelPart,
+        this.form,
         this.estimate,
         this.problem,
         h('div', { class: 'run' }, this.run, h('span', { class: 'hint by-mouse' }, 'Ctrl + Enter')),
@@ -240,10 +235,7 @@ class Prepare {
     return h(
       'div',
       { class: 'slice-help' },
-      nameHeading(volume),
-      h('p', { class: 'facts' }, factsOf(volume)),
-      notesOf(volume),
-      ignoredNote(volume),
+      ...aboutVolume(volume),
       sliceHelp(),
       h('div', { class: 'actions' }, reset, this.windowText),
       this.surfaces,
@@ -278,7 +270,7 @@ class Prepare {
               h(
                 'li',
                 {},
-                h('a', { href: hashOf(['jobs', id]) }, `iso ${formatIso(parameters.iso)}`),
+                h('a', { href: hashOf(['jobs', id]) }, surfaceInWords(parameters)),
                 ` ${inWords(parameters)}`,
               ),
             ),
@@ -295,8 +287,16 @@ class Prepare {
   }
 
   private changed(): void {
+    this.run.disabled = !this.hasLabel;
     this.update();
-    this.askForEstimate();
+    if (this.hasLabel) this.askForEstimate();
+    else this.showNoLabel();
+  }
+
+  private showNoLabel(): void {
+    clearTimeout(this.estimateTimer);
+    this.estimating?.abort();
+    this.estimate.replaceChildren(h('p', { class: 'warning' }, 'Choose a label.'));
   }
 
   private update(): void {
@@ -351,7 +351,13 @@ class Prepare {
     );
     if (estimate.triangles === 0) {
       this.estimate.append(
-        h('p', { class: 'warning' }, 'No sample boundary has this value: the surface would be empty.'),
+        h(
+          'p',
+          { class: 'warning' },
+          isByLabels(this.parameters)
+            ? 'These labels have no boundary: the surface would be empty.'
+            : 'No sample boundary has this value: the surface would be empty.',
+        ),
       );
     }
     if (!estimate.fits) {
@@ -360,7 +366,7 @@ class Prepare {
           'p',
           { class: 'warning' },
           `This needs ${formatBytes(estimate.memory_bytes)} of memory, more than a job may take. ` +
-            'Choose an iso-value with fewer triangles.',
+            (isByLabels(this.parameters) ? 'Choose fewer labels.' : 'Choose an iso-value with fewer triangles.'),
         ),
       );
     }

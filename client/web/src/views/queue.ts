@@ -1,10 +1,10 @@
 // All jobs: what waits in which order, what runs, what is done. #/jobs
 import { cancelJob, listJobs, listVolumes } from '../api/client';
 import { isFinal, type Job, type Volume } from '../api/types';
-import { inWords } from '../job/parameters';
+import { inWords, surfaceInWords } from '../job/parameters';
 import { priorities } from '../job/table';
 import { button, h } from '../ui/dom';
-import { formatCount, formatIso, formatMilliseconds, formatTime, shortId } from '../ui/format';
+import { formatCount, formatMilliseconds, formatTime, shortId } from '../ui/format';
 import { tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
@@ -46,7 +46,7 @@ function stateCell(job: Job, place: number): HTMLElement {
 
 function surfaceCell(job: Job, volume: string): HTMLElement {
   return cell(
-    h('a', { href: hashOf(['jobs', job.id]) }, `iso ${formatIso(job.parameters.iso)}`),
+    h('a', { href: hashOf(['jobs', job.id]) }, surfaceInWords(job.parameters)),
     h('span', { class: 'faint' }, ` ${inWords(job.parameters)}`),
     h('span', { class: 'of-volume' }, volume),
   );

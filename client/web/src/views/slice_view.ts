@@ -7,7 +7,7 @@ import { axisIndex, slicePlane, type Plane, type SlicePlane } from '../volume/ge
 import { greyTable, inSlice, windowToFetch, type Slice, type SliceSource, type Window } from '../volume/slices';
 
 export interface SliceState {
-  iso: number;
+  iso: number | null; // of the contour
   window: Window;
   // The sample where the three planes meet.
   cursor: Vec3;
@@ -73,7 +73,7 @@ export class SliceView {
     const index = cursor[axisIndex(this.layout.normal)];
     this.slider.value = String(index);
     this.place.textContent = `${index + 1} / ${this.count(this.layout.normal)}`;
-    const fetched = windowToFetch(window, iso, this.host.commonWindow);
+    const fetched = windowToFetch(window, iso ?? window[0], this.host.commonWindow);
     const wanted = `${index}/${fetched.join(',')}`;
     if (wanted !== this.wanted) {
       this.wanted = wanted;
@@ -149,7 +149,7 @@ export class SliceView {
     const index = cursor[axisIndex(this.layout.normal)];
     this.canvas.setAttribute(
       'aria-label',
-      `${titles[this.plane]} slice ${index + 1} with the contour at iso-value ${iso}`,
+      `${titles[this.plane]} slice ${index + 1}${iso === null ? '' : ` with the contour at iso-value ${iso}`}`,
     );
   }
 
@@ -172,7 +172,7 @@ export class SliceView {
     context.drawImage(this.buffer, 0, 0);
 
     const { iso, cursor } = this.host.state();
-    const segments = contour(slice, inSlice(slice, iso));
+    const segments = iso === null ? [] : contour(slice, inSlice(slice, iso));
     const [column, row] = this.pictureAxes();
     context.translate(0.5, 0.5);
     context.beginPath();

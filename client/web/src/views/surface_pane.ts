@@ -4,8 +4,11 @@ import { asApiError } from '../api/problem';
 import type { Axis, Job, Volume } from '../api/types';
 import { loadMesh, viewableFile, type LoadTiming } from '../mesh/load';
 import { lengthOf } from '../scene/rulers';
-import { defaultStyle, Surface, type SurfaceStyle } from '../scene/surface';
+import { defaultStyle, type SurfaceStyle } from '../scene/parts';
+import { Surface, type Picked } from '../scene/surface';
 import { viewNames, viewTitles, type CameraPlace } from '../scene/views';
+import type { LabelState } from '../job/labels';
+import { isByLabels } from '../job/table';
 import { button, checkbox, h, isTyping } from '../ui/dom';
 import { formatCount, shortId } from '../ui/format';
 import { refusal, tell, tellError } from '../ui/notices';
@@ -15,6 +18,7 @@ import { cssColour } from '../ui/theme';
 import { axisIndex, patientAxes } from '../volume/geometry';
 import { defaultWindow } from '../volume/histogram';
 import type { Window } from '../volume/slices';
+import { PickedLabel } from './picked_label';
 
 const bins = 512;
 const turnStep = Math.PI / 36;
@@ -25,6 +29,8 @@ export interface PaneOptions {
   camera: CameraPlace | null;
   // Null where slices cannot be shown: the volume is gone.
   volume: Volume | null;
+  // Of a job by labels: which are shown and how.
+  labels: LabelState;
 }
 
 interface CutState {
@@ -43,6 +49,7 @@ export class SurfacePane {
   private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Loading the surface' });
   private readonly cutControls = h('div', { class: 'cut-controls', hidden: true });
   private readonly announcement = h('div', { class: 'sr-only', 'aria-live': 'polite' });
+  private readonly pickedLabel: PickedLabel;
   private style: SurfaceStyle = defaultStyle;
   private isMeasuring = false;
   private readonly cut: CutState;
@@ -59,6 +66,7 @@ export class SurfacePane {
     private readonly options: PaneOptions,
   ) {
     const { volume } = options;
+    this.pickedLabel = new PickedLabel(scope, options.labels);
     const [sagittal, coronal, axial] = volume ? patientAxes(volume) : (['x', 'y', 'z'] as const);
     this.cutAxes = [
       ['Axial', axial],
@@ -84,7 +92,7 @@ export class SurfacePane {
       return null;
     }
     if (mesh.triangles === 0) {
-      this.say('The surface is empty: no sample boundary has this iso-value.');
+      this.say(this.emptyText());
       return null;
     }
     let surface: Surface;
@@ -101,7 +109,10 @@ export class SurfacePane {
     if (this.options.camera) surface.moveTo(this.options.camera);
     try {
       const timing = await loadMesh(this.job, this.scope.signal, {
-        onBlocks: (blocks) => surface.addBlocks(blocks),
+        onBlocks: (blocks, part) => {
+          if (part) this.options.labels.learnColour(part.label, part.colour);
+          surface.addBlocks(blocks, part);
+        },
         onProgress: ({ bytes, totalBytes, triangles, totalTriangles }) => {
           this.bar.value = (bytes / totalBytes + triangles / Math.max(1, totalTriangles)) / 2;
           this.status.textContent =
@@ -160,6 +171,12 @@ export class SurfacePane {
     return this.surface?.budget.moving ?? [];
   }
 
+  private emptyText(): string {
+    return isByLabels(this.job.parameters)
+      ? 'The surface is empty: the labels have no boundary.'
+      : 'The surface is empty: no sample boundary has this iso-value.';
+  }
+
   private say(text: string): void {
     this.bar.parentElement?.remove();
     this.view.append(h('p', { class: 'overlay message' }, text));
@@ -171,23 +188,37 @@ export class SurfacePane {
       'The surface. Drag or use the arrow keys to turn it, shift and arrow keys to move it, plus and minus to zoom. Two fingers move and zoom it.',
     );
     surface.onCamera = () => this.onCamera?.(surface.place);
-    surface.onPick = (point) => {
-      if (!this.isMeasuring) return;
-      if (!point) {
-        tell('There is no surface at that place.');
-        return;
-      }
-      const ruler = surface.rulers.add(point);
-      surface.draw();
-      this.announcement.textContent = ruler
-        ? `${lengthOf(ruler).toFixed(1)} millimetres`
-        : 'First point set';
-    };
-    this.element.append(h('div', { class: 'tools' }, this.toolbar(surface), this.cutControls));
+    surface.onPick = (picked) => this.picked(picked, surface);
+    this.followLabels(surface);
+    this.element.append(h('div', { class: 'tools' }, this.toolbar(surface), this.cutControls, this.pickedLabel.element));
     this.scope.listen(surface.canvas, 'keydown', (event: KeyboardEvent) => this.moveKey(event, surface));
     if (this.options.hasKeys) {
       this.scope.listen(window, 'keydown', (event: KeyboardEvent) => this.toolKey(event, surface));
     }
+  }
+
+  private picked(picked: Picked | null, surface: Surface): void {
+    if (!this.isMeasuring) {
+      this.options.labels.pick(picked?.label ?? null);
+      return;
+    }
+    if (!picked) {
+      tell('There is no surface at that place.');
+      return;
+    }
+    const ruler = surface.rulers.add(picked.point);
+    surface.draw();
+    this.announcement.textContent = ruler ? `${lengthOf(ruler).toFixed(1)} millimetres` : 'First point set';
+  }
+
+  private followLabels(surface: Surface): void {
+    const { hidden, colours } = this.options.labels;
+    this.scope.onEnd(hidden.watch((labels) => surface.setHidden(labels)));
+    this.scope.onEnd(
+      colours.watch((all) => {
+        for (const [label, colour] of all) surface.setColour(label, colour);
+      }),
+    );
   }
 
   private toggle(name: string, text: string, title: string, onClick: () => void): HTMLButtonElement {
@@ -329,7 +360,8 @@ export class SurfacePane {
         shown = this.pictureWanted;
         const { axis, index } = this.cut;
         if (this.window === null) {
-          const iso = this.job.parameters.iso === 'otsu' ? volume.suggested_iso : this.job.parameters.iso;
+          const { iso: asked } = this.job.parameters;
+          const iso = typeof asked === 'number' ? asked : volume.suggested_iso;
           this.window = defaultWindow(await histogramOf(volume.id, bins, this.scope.signal), iso);
         }
         const blob = await slicePicture(volume.id, axis, index, this.window, this.scope.signal);
@@ -380,6 +412,9 @@ export class SurfacePane {
     else if (key === 'w') this.toggleWires();
     else if (key === 'c') this.toggleCut();
     else if (key === 'm') this.toggleMeasure();
+    else if (key === 'h') this.pickedLabel.hide();
+    else if (key === 'o') this.pickedLabel.isolate();
+    else if (key === 'e') this.options.labels.showAll();
     else if (key === 'escape') {
       surface.rulers.takeBack();
       surface.draw();

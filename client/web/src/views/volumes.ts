@@ -1,9 +1,9 @@
 // The first view: upload, the volumes that are there, the last surfaces.
 import { eraseVolume, listJobs, listVolumes, slicePicture } from '../api/client';
 import type { Job, Volume } from '../api/types';
-import { inWords } from '../job/parameters';
+import { inWords, surfaceInWords } from '../job/parameters';
 import { button, h } from '../ui/dom';
-import { formatBytes, formatCount, formatIso, formatSpacing, formatTime } from '../ui/format';
+import { formatBytes, formatCount, formatSpacing, formatTime } from '../ui/format';
 import { ask, tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
@@ -99,7 +99,7 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void): HTMLEle
 }
 
 export function jobLine(job: Job): string {
-  return `iso ${formatIso(job.parameters.iso)}, ${inWords(job.parameters)}`;
+  return `${surfaceInWords(job.parameters)}, ${inWords(job.parameters)}`;
 }
 
 function surfaceRow(job: Job, volume: string): HTMLElement {

@@ -1,0 +1,81 @@
+// The labels of a job's mesh as a person looks at them: which are shown, and in which colours.
+import type { Job, LabelSummary } from '../api/types';
+import { Signal } from '../ui/signal';
+
+interface Named {
+  label: number;
+  name?: string | null;
+}
+
+// As files call it.
+export function labelTitle({ label, name }: Named): string {
+  return name ?? `label ${label}`;
+}
+
+// Those whose title holds all of the words, or whose value is the text.
+export function matching<T extends Named>(labels: readonly T[], text: string): T[] {
+  const words = text.toLowerCase().split(/\s+/).filter(Boolean);
+  return labels.filter((one) => {
+    const title = labelTitle(one).toLowerCase();
+    return words.every((word) => title.includes(word) || String(one.label) === word);
+  });
+}
+
+export function labelsOfMesh({ mesh }: Job): readonly LabelSummary[] {
+  return (mesh as { labels?: LabelSummary[] } | null | undefined)?.labels ?? [];
+}
+
+export class LabelState {
+  readonly hidden = new Signal<ReadonlySet<number>>(new Set());
+  // The colours that a person chose or the file has; the others' are known once their surfaces come.
+  readonly colours = new Signal<ReadonlyMap<number, string>>(new Map());
+  readonly picked = new Signal<LabelSummary | null>(null);
+  private readonly byLabel: ReadonlyMap<number, LabelSummary>;
+
+  constructor(readonly labels: readonly LabelSummary[]) {
+    this.byLabel = new Map(labels.map((one) => [one.label, one]));
+    this.colours.value = new Map(labels.flatMap(({ label, color }) => (color ? [[label, color]] : [])));
+  }
+
+  isShown(label: number): boolean {
+    return !this.hidden.value.has(label);
+  }
+
+  show(label: number, isShown: boolean): void {
+    const hidden = new Set(this.hidden.value);
+    if (isShown) hidden.delete(label);
+    else hidden.add(label);
+    this.hidden.value = hidden;
+  }
+
+  isAlone(label: number): boolean {
+    return this.isShown(label) && this.hidden.value.size === this.labels.length - 1;
+  }
+
+  // Hides all others; all are shown again when they are hidden already.
+  isolate(label: number): void {
+    if (this.isAlone(label) && this.labels.length > 1) this.showAll();
+    else this.hidden.value = new Set(this.labels.map((one) => one.label).filter((other) => other !== label));
+  }
+
+  showAll(): void {
+    this.hidden.value = new Set();
+  }
+
+  hideAll(): void {
+    this.hidden.value = new Set(this.labels.map(({ label }) => label));
+  }
+
+  setColour(label: number, colour: string): void {
+    this.colours.value = new Map(this.colours.value).set(label, colour);
+  }
+
+  // The colour of a surface that has come, where nothing else says one.
+  learnColour(label: number, colour: string): void {
+    if (!this.colours.value.has(label)) this.setColour(label, colour);
+  }
+
+  pick(label: number | null): void {
+    this.picked.value = label === null ? null : (this.byLabel.get(label) ?? null);
+  }
+}

@@ -1,0 +1,235 @@
+// The blocks of triangles in a scene: of one surface, or of one for each label with a colour of its own.
+import {
+  BackSide,
+  BufferAttribute,
+  BufferGeometry,
+  DoubleSide,
+  FrontSide,
+  Mesh,
+  MeshPhongMaterial,
+  type Object3D,
+  type Plane,
+  type Ray,
+} from 'three';
+import type { Block } from '../mesh/blocks';
+import type { Part } from '../mesh/glb';
+import { Seams } from '../mesh/seams';
+import { firstHit, type Interval } from './pick';
+
+export interface SurfaceStyle {
+  shading: 'smooth' | 'flat';
+  wireframe: boolean;
+  opacity: number;
+}
+
+export const defaultStyle: SurfaceStyle = { shading: 'smooth', wireframe: false, opacity: 1 };
+
+export interface Hit {
+  at: number; // along the ray
+  label: number | null;
+}
+
+interface Look {
+  materials: MeshPhongMaterial[];
+  isShown: boolean;
+  seams: Seams;
+  blocks: number;
+}
+
+interface DrawnBlock {
+  // One mesh; of a label two, for its front and for its back.
+  meshes: Mesh<BufferGeometry, MeshPhongMaterial>[];
+  fine: BufferGeometry;
+  coarse: BufferGeometry;
+  look: Look;
+  label: number | null;
+  member: number; // of its look's blocks
+}
+
+const neutral = '#dcd6c8';
+const wiresPerFrame = 4;
+
+function material(colour: string): MeshPhongMaterial {
+  return new MeshPhongMaterial({ color: colour, specular: 0x1c1c1c, shininess: 24, side: DoubleSide });
+}
+
+// The wall that two labels share is there for each of them, and seen from inside of one it is the other's
+// front. Backs lie a little farther away, so that the two do not fight for the same depth.
+function labelMaterials(colour: string): MeshPhongMaterial[] {
+  const front = material(colour);
+  const back = material(colour);
+  front.side = FrontSide;
+  back.side = BackSide;
+  back.polygonOffset = true;
+  back.polygonOffsetFactor = 1;
+  back.polygonOffsetUnits = 1;
+  return [front, back];
+}
+
+export class Parts {
+  private readonly blocks: DrawnBlock[] = [];
+  private readonly looks = new Map<number | null, Look>();
+  private readonly colours = new Map<number, string>();
+  private hidden: ReadonlySet<number> = new Set();
+  private style = defaultStyle;
+  private planes: Plane[] | null = null;
+  private isCoarse = false;
+
+  constructor(
+    private readonly scene: Object3D,
+    private readonly draw: () => void,
+  ) {}
+
+  add(blocks: Block[], part: Part | null): void {
+    const label = part?.label ?? null;
+    const look = this.looks.get(label) ?? this.newLook(part);
+    for (const block of blocks) {
+      const position = new BufferAttribute(block.positions, 3);
+      const normal = new BufferAttribute(block.normals, 4, true);
+      const geometry = (index: Uint16Array<ArrayBuffer>): BufferGeometry => {
+        const made = new BufferGeometry();
+        made.setAttribute('position', position);
+        made.setAttribute('normal', normal);
+        made.setIndex(new BufferAttribute(index, 1));
+        return made;
+      };
+      const fine = geometry(block.index);
+      const coarse = geometry(block.coarse);
+      fine.computeBoundingBox();
+      fine.computeBoundingSphere();
+      coarse.boundingSphere = fine.boundingSphere;
+      const meshes = look.materials.map((made) => new Mesh(this.isCoarse ? coarse : fine, made));
+      const drawn = { meshes, fine, coarse, look, label, member: look.blocks };
+      look.blocks += 1;
+      for (const mesh of meshes) {
+        mesh.matrixAutoUpdate = false;
+        this.scene.add(mesh);
+      }
+      this.show(drawn);
+      this.blocks.push(drawn);
+      look.seams.add(block);
+    }
+  }
+
+  get triangles(): number {
+    return this.blocks.reduce((sum, { fine }) => sum + (fine.index?.count ?? 0) / 3, 0);
+  }
+
+  setStyle(style: SurfaceStyle): void {
+    const becameWire = style.wireframe && !this.style.wireframe;
+    this.style = style;
+    for (const look of this.looks.values()) this.apply(look);
+    if (becameWire) this.showBySteps();
+    else this.showAll();
+  }
+
+  // What is on the other side of these planes is not seen.
+  setCut(planes: Plane[] | null): void {
+    this.planes = planes;
+    for (const look of this.looks.values()) this.apply(look);
+    this.showAll();
+  }
+
+  get cut(): Plane | null {
+    return this.planes?.[0] ?? null;
+  }
+
+  setHidden(labels: ReadonlySet<number>): void {
+    this.hidden = labels;
+    for (const [label, look] of this.looks) look.isShown = label === null || !labels.has(label);
+    this.showAll();
+  }
+
+  setColour(label: number, colour: string): void {
+    this.colours.set(label, colour);
+    for (const made of this.looks.get(label)?.materials ?? []) made.color.set(colour);
+  }
+
+  setCoarse(isCoarse: boolean): void {
+    this.isCoarse = isCoarse;
+    for (const { meshes, fine, coarse } of this.blocks) {
+      for (const mesh of meshes) mesh.geometry = isCoarse ? coarse : fine;
+    }
+  }
+
+  // The first triangle of what is shown that the ray meets within the interval.
+  hit(ray: Ray, { from, to }: Interval): Hit | null {
+    let nearest: Hit | null = null;
+    for (const { fine, look, label } of this.blocks) {
+      if (!look.isShown || !fine.index || !fine.boundingBox || !ray.intersectsBox(fine.boundingBox)) continue;
+      const end = nearest?.at ?? to;
+      const at = firstHit(fine.getAttribute('position').array, fine.index.array, ray, { from, to: end });
+      if (at < end) nearest = { at, label };
+    }
+    return nearest;
+  }
+
+  // Makes the shading go on across the seams of one block; false when there is none of that number.
+  joinSeams(number: number): boolean {
+    const block = this.blocks[number];
+    if (!block) return false;
+    block.look.seams.join(block.member);
+    block.fine.getAttribute('normal').needsUpdate = true;
+    return true;
+  }
+
+  dispose(): void {
+    for (const { fine, coarse } of this.blocks) {
+      fine.dispose();
+      coarse.dispose();
+    }
+    for (const { materials } of this.looks.values()) for (const made of materials) made.dispose();
+  }
+
+  private newLook(part: Part | null): Look {
+    const colour = part ? (this.colours.get(part.label) ?? part.colour) : neutral;
+    const look = {
+      materials: part ? labelMaterials(colour) : [material(colour)],
+      isShown: !part || !this.hidden.has(part.label),
+      seams: new Seams(),
+      blocks: 0,
+    };
+    this.apply(look);
+    this.looks.set(part?.label ?? null, look);
+    return look;
+  }
+
+  private apply({ materials }: Look): void {
+    const { shading, wireframe, opacity } = this.style;
+    for (const made of materials) {
+      // What of it is a part of the shader.
+      made.needsUpdate =
+        made.flatShading !== (shading === 'flat') ||
+        made.transparent !== opacity < 1 ||
+        made.clippingPlanes !== this.planes;
+      made.flatShading = shading === 'flat';
+      made.wireframe = wireframe;
+      made.opacity = opacity;
+      made.transparent = opacity < 1;
+      made.depthWrite = opacity === 1;
+      made.clippingPlanes = this.planes;
+    }
+  }
+
+  // The back of a closed surface is only seen where it is cut or looked through.
+  private show({ meshes, look }: DrawnBlock): void {
+    const [front, back] = meshes;
+    if (front) front.visible = look.isShown;
+    if (back) back.visible = look.isShown && (this.planes !== null || this.style.opacity < 1 || this.style.wireframe);
+  }
+
+  private showAll(): void {
+    for (const block of this.blocks) this.show(block);
+  }
+
+  // Wires are made of a block when it is first drawn with them, so that some blocks at a time turn.
+  private showBySteps(): void {
+    for (const { meshes } of this.blocks) for (const mesh of meshes) mesh.visible = false;
+    const step = (from: number): void => {
+      for (const block of this.blocks.slice(from, from + wiresPerFrame)) this.show(block);
+      this.draw();
+      if (from < this.blocks.length) requestAnimationFrame(() => step(from + wiresPerFrame));
+    };
+    step(0);
+  }
+}

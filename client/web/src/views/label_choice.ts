@@ -1,0 +1,150 @@
+// Which labels of a volume are to be meshed: all of them, or those that are picked from a list.
+import { labelsOf } from '../api/client';
+import { asApiError } from '../api/problem';
+import type { JobParameters, VolumeLabel } from '../api/types';
+import { labelTitle, matching } from '../job/labels';
+import { button, checkbox, field, h } from '../ui/dom';
+import { formatCount } from '../ui/format';
+import { refusal } from '../ui/notices';
+import type { Scope } from '../ui/signal';
+
+export type Choice = Pick<JobParameters, 'labels' | 'background'>;
+
+// More rows than these a person searches.
+const mostRows = 500;
+
+export class LabelChoice {
+  readonly element: HTMLElement;
+  private readonly body = h('div', { class: 'label-choice' });
+  private background: number;
+  private asking: AbortController | null = null;
+  private labels: readonly VolumeLabel[] = [];
+  private readonly chosen = new Set<number>();
+  private readonly boxes = new Map<number, { element: HTMLElement; input: HTMLInputElement }>();
+  private readonly list = h('ul', { class: 'labels', 'aria-label': 'Labels' });
+  private readonly count = h('p', { class: 'hint', role: 'status' });
+  private text = '';
+
+  // Tells no labels while none is chosen.
+  constructor(
+    scope: Scope,
+    private readonly volume: string,
+    start: Choice,
+    private readonly onChange: (choice: Choice) => void,
+  ) {
+    this.background = start.background ?? 0;
+    const input = h('input', { type: 'number', step: 1, value: this.background });
+    input.addEventListener('change', () => {
+      if (!Number.isInteger(input.valueAsNumber)) return;
+      this.background = input.valueAsNumber;
+      this.ask('all');
+      this.changed();
+    });
+    this.element = h('div', { class: 'label-choice' }, this.body, field('Background', input, 'The value of samples without a label'));
+    scope.onEnd(() => this.asking?.abort());
+    this.ask(start.labels);
+  }
+
+  private ask(wanted: Choice['labels']): void {
+    this.asking?.abort();
+    const asking = new AbortController();
+    this.asking = asking;
+    this.body.replaceChildren(h('p', { role: 'status' }, 'Counting the labels'));
+    this.labels = [];
+    this.chosen.clear();
+    this.boxes.clear();
+    labelsOf(this.volume, this.background, asking.signal).then(
+      ({ labels }) => {
+        if (!asking.signal.aborted) this.show(labels, wanted);
+      },
+      (error: unknown) => {
+        if (!asking.signal.aborted) this.body.replaceChildren(refusal(asApiError(error)));
+      },
+    );
+  }
+
+  private show(labels: readonly VolumeLabel[], start: Choice['labels']): void {
+    this.labels = labels;
+    if (labels.length === 0) {
+      this.body.replaceChildren(h('p', { class: 'warning' }, 'All samples are background: there is no label.'));
+      return;
+    }
+    const wanted = Array.isArray(start) ? new Set(start) : null;
+    for (const { label } of labels) if (!wanted || wanted.has(label)) this.chosen.add(label);
+    this.text = '';
+    const search = h('input', { type: 'search', placeholder: 'Name or value', 'aria-label': 'Search the labels' });
+    search.addEventListener('input', () => {
+      this.text = search.value;
+      this.fill();
+    });
+    this.body.replaceChildren(
+      h(
+        'div',
+        { class: 'label-tools' },
+        search,
+        button('All', () => this.choose(true), { title: 'Choose all that are listed' }),
+        button('None', () => this.choose(false), { title: 'Choose none of those that are listed' }),
+      ),
+      this.list,
+      this.count,
+    );
+    this.fill();
+  }
+
+  // All that the search finds.
+  private choose(isOn: boolean): void {
+    for (const { label } of matching(this.labels, this.text)) {
+      if (isOn) this.chosen.add(label);
+      else this.chosen.delete(label);
+    }
+    this.changed();
+  }
+
+  private fill(): void {
+    const found = matching(this.labels, this.text).slice(0, mostRows);
+    this.list.replaceChildren(...found.map((label) => this.boxOf(label).element));
+    this.update();
+  }
+
+  private boxOf(label: VolumeLabel): { element: HTMLElement; input: HTMLInputElement } {
+    const known = this.boxes.get(label.label);
+    if (known) return known;
+    const check = checkbox(labelTitle(label), this.chosen.has(label.label), (isOn) => {
+      if (isOn) this.chosen.add(label.label);
+      else this.chosen.delete(label.label);
+      this.changed();
+    });
+    const swatch = h('span', { class: 'swatch', 'aria-hidden': 'true' });
+    // Not an attribute, which the content policy would not take.
+    if (label.color) swatch.style.backgroundColor = label.color;
+    const box = {
+      element: h(
+        'li',
+        { 'data-label': label.label },
+        swatch,
+        check,
+        h('span', { class: 'faint number' }, `${formatCount(label.voxels)} voxels`),
+      ),
+      input: check.querySelector('input') as HTMLInputElement,
+    };
+    this.boxes.set(label.label, box);
+    return box;
+  }
+
+  private update(): void {
+    for (const [label, { input }] of this.boxes) input.checked = this.chosen.has(label);
+    this.count.textContent = `${formatCount(this.chosen.size)} of ${formatCount(this.labels.length)} labels`;
+  }
+
+  private changed(): void {
+    this.update();
+    this.onChange({ labels: this.choice(), background: this.background });
+  }
+
+  // What is chosen now; undefined: nothing.
+  choice(): Choice['labels'] {
+    if (this.chosen.size === this.labels.length) return 'all';
+    const [first, ...others] = this.labels.map(({ label }) => label).filter((label) => this.chosen.has(label));
+    return first === undefined ? undefined : [first, ...others];
+  }
+}

@@ -1,0 +1,144 @@
+// The labels of a surface beside it: to be found, hidden, isolated, coloured and downloaded.
+import type { Job, LabelSummary } from '../api/types';
+import { labelTitle, matching, type LabelState } from '../job/labels';
+import { button, checkbox, h } from '../ui/dom';
+import { formatBytes, formatCount, formatNames, formatValue, shortId } from '../ui/format';
+import { tellError } from '../ui/notices';
+import { saveFile } from '../ui/save';
+import type { Scope } from '../ui/signal';
+
+// More rows than these a person searches.
+const mostRows = 500;
+
+export function volumeText({ volume_mm3: volume }: LabelSummary): string {
+  return `${formatValue(volume)} mm\u00b3`;
+}
+
+export function areaText({ area_mm2: area }: LabelSummary): string {
+  return `${formatValue(area)} mm\u00b2`;
+}
+
+interface Row {
+  element: HTMLElement;
+  shown: HTMLInputElement;
+  colour: HTMLInputElement;
+  alone: HTMLButtonElement;
+}
+
+export class LabelList {
+  readonly element: HTMLElement;
+  private readonly rows = new Map<number, Row>();
+  private readonly list = h('ul', { class: 'labels', 'aria-label': 'Labels' });
+  private readonly count = h('p', { class: 'hint', role: 'status' });
+  private text = '';
+
+  constructor(
+    scope: Scope,
+    private readonly job: Job,
+    private readonly state: LabelState,
+  ) {
+    const search = h('input', { type: 'search', placeholder: 'Name or value', 'aria-label': 'Search the labels' });
+    search.addEventListener('input', () => {
+      this.text = search.value;
+      this.fill();
+    });
+    this.element = h(
+      'section',
+      { class: 'panel-section label-list' },
+      h('h2', {}, 'Labels'),
+      h(
+        'div',
+        { class: 'label-tools' },
+        search,
+        button('Show all', () => state.showAll(), { title: 'Show every label (e)' }),
+        button('Hide all', () => state.hideAll()),
+      ),
+      this.list,
+      this.count,
+    );
+    this.fill();
+    scope.onEnd(state.hidden.subscribe(() => this.update()));
+    scope.onEnd(state.colours.subscribe(() => this.update()));
+    scope.onEnd(state.picked.subscribe((picked) => this.markPicked(picked)));
+  }
+
+  private fill(): void {
+    const found = matching(this.state.labels, this.text);
+    const shown = found.slice(0, mostRows);
+    this.list.replaceChildren(...shown.map((label) => this.rowOf(label).element));
+    const more = found.length - shown.length;
+    this.count.textContent =
+      `${formatCount(found.length)} of ${formatCount(this.state.labels.length)} labels` +
+      (more > 0 ? `; the first ${formatCount(mostRows)} are listed` : '');
+    this.update();
+  }
+
+  private rowOf(label: LabelSummary): Row {
+    const known = this.rows.get(label.label);
+    if (known) return known;
+    const title = labelTitle(label);
+    const check = checkbox(
+      title,
+      true,
+      (isOn) => this.state.show(label.label, isOn),
+      { 'aria-label': `Show ${title}` },
+    );
+    const shown = check.querySelector('input') as HTMLInputElement;
+    const colour = h('input', { type: 'color', 'aria-label': `Colour of ${title}`, title: 'Colour' });
+    colour.addEventListener('input', () => this.state.setColour(label.label, colour.value));
+    const alone = button('Only', () => this.state.isolate(label.label), {
+      class: 'quiet',
+      'aria-label': `Show only ${title}`,
+      'aria-pressed': 'false',
+      title: 'Hide all others',
+    });
+    const row = {
+      element: h(
+        'li',
+        { 'data-label': label.label },
+        colour,
+        h(
+          'div',
+          { class: 'label-text' },
+          check,
+          h('span', { class: 'faint' }, `${formatCount(label.triangles)} triangles, ${volumeText(label)}`),
+        ),
+        alone,
+        ...this.downloads(label, title),
+      ),
+      shown,
+      colour,
+      alone,
+    };
+    this.rows.set(label.label, row);
+    return row;
+  }
+
+  private downloads(label: LabelSummary, title: string): HTMLElement[] {
+    return Object.entries(label.files ?? {}).map(([format, { bytes, href }]) =>
+      button(
+        formatNames[format] ?? format,
+        () => void saveFile(href, `surface-${shortId(this.job.id)}-${label.label}.${format}`).catch(tellError),
+        { class: 'quiet', 'data-format': format, title: formatBytes(bytes), 'aria-label': `Download ${title} as ${formatNames[format] ?? format}` },
+      ),
+    );
+  }
+
+  private update(): void {
+    for (const [label, { shown, colour, alone }] of this.rows) {
+      shown.checked = this.state.isShown(label);
+      alone.setAttribute('aria-pressed', String(this.state.isAlone(label)));
+      const now = this.state.colours.value.get(label);
+      if (now !== undefined) colour.value = now;
+    }
+  }
+
+  private markPicked(picked: LabelSummary | null): void {
+    for (const [label, { element }] of this.rows) {
+      if (label === picked?.label) {
+        element.setAttribute('aria-current', 'true');
+        element.scrollIntoView({ block: 'nearest' });
+      } else element.removeAttribute('aria-current');
+    }
+  }
+}
