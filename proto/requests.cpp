@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <map>
 #include <set>
@@ -94,7 +95,6 @@ class RequestReader {
     return as_in_query_ ? spelled_in_query(field) : field;
   }
 
-  static constexpr std::size_t kMostLabels = 65535;
   static constexpr std::size_t kMostErrors = 20;
   static constexpr std::size_t kLongestName = 64;
 
@@ -206,8 +206,8 @@ class RequestReader {
   // Ascending, each once.
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
                    std::vector<std::int64_t>& values) {
-    if (!json.is_array() || json.empty() || json.size() > kMostLabels) {
-      return add(path, "must be a list of 1 to " + std::to_string(kMostLabels) + " whole numbers");
+    if (!json.is_array() || json.empty() || json.size() > Volume::kMostLabels) {
+      return add(path, "must be a list of 1 to " + std::to_string(Volume::kMostLabels) + " whole numbers");
     }
     for (const Json& element : json) {
       const std::size_t before = errors_.size();
@@ -233,8 +233,8 @@ class RequestReader {
   template <class T>
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
                    std::map<std::int64_t, T>& value) {
-    if (!json.is_object() || json.size() > kMostLabels) {
-      return add(path, "must be an object with at most " + std::to_string(kMostLabels) +
+    if (!json.is_object() || json.size() > Volume::kMostLabels) {
+      return add(path, "must be an object with at most " + std::to_string(Volume::kMostLabels) +
                            " members, which are named by labels");
     }
     for (const auto& [name, element] : json.items()) {
@@ -255,18 +255,13 @@ class RequestReader {
 
   void read_of_label(const Json& json, const std::string& path, const Parameter& parameter,
                      std::string& value) {
-    constexpr std::size_t kLongest = 255;
     read_member(json, path, parameter, value);
     if (std::string_view(parameter.name) == "label_colors") {
+      std::ranges::transform(value, value.begin(), [](unsigned char c) { return std::tolower(c); });
       if (!is_color(value)) add(path, "must be a colour such as \"#d8654f\"");
-    } else if (trimmed(value).empty() || value.size() > kLongest || has_control_characters(value)) {
+    } else if (trimmed(value).empty() || value.size() > LabelEntry::kMostNameBytes || has_control_characters(value)) {
       add(path, "must be a text of 1 to 255 bytes on one line");
     }
-  }
-
-  static bool is_color(std::string_view text) {
-    return text.size() == 7 && text[0] == '#' &&
-           text.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string_view::npos;
   }
 
   // What a label may be, as the table has it.

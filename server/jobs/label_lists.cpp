@@ -185,14 +185,18 @@ LabelValues values_of(const Volume& volume) {
   return values;
 }
 
-VolumeLabels LabelLists::of(const store::Viewer& viewer, const Volume& volume,
-                            std::int64_t background) {
-  const auto counts = counts_.get({viewer, volume.id}, [&] {
+std::shared_ptr<const std::vector<LabelVoxels>> LabelLists::counts(const store::Viewer& viewer,
+                                                                  const Volume& volume) {
+  return counts_.get({viewer, volume.id}, [&] {
     const store::LocalBlob file = stored_samples(blobs_, volume.id);
     return made_of_intact(blobs_, volume.id, {},
                           [&] { return count_values(volume::CanonicalFile(file.path), volume); });
   });
-  return list_of(*counts, volume, background);
+}
+
+VolumeLabels LabelLists::of(const store::Viewer& viewer, const Volume& volume,
+                            std::int64_t background) {
+  return list_of(*counts(viewer, volume), volume, background);
 }
 
 std::shared_ptr<const std::string> LabelLists::json_of(const store::Viewer& viewer,

@@ -36,6 +36,10 @@ class LabelLists {
   // kInternal.
   VolumeLabels of(const store::Viewer& viewer, const Volume& volume, std::int64_t background);
 
+  // All values that the samples have, the background's too, ascending. Throws as `of` does.
+  std::shared_ptr<const std::vector<mesh::LabelVoxels>> counts(const store::Viewer& viewer,
+                                                               const Volume& volume);
+
   // The same as JSON, shared by all that send it, since it may be long.
   std::shared_ptr<const std::string> json_of(const store::Viewer& viewer, const Volume& volume,
                                              std::int64_t background);

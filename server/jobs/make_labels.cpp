@@ -31,27 +31,6 @@ auto with_label(SampleType type, const Use& use) {
   });
 }
 
-// The labels that the parameters choose, as the samples have them.
-std::vector<mesh::LabelVoxels> chosen_labels(const SampleArray& samples,
-                                             const MeshParameters& parameters,
-                                             const mesh::Context& context) {
-  const auto there = mesh::labels_of(count_values(samples, context), parameters.background,
-                                     parameters.label_values);
-  std::optional<std::vector<std::int64_t>> wanted;
-  if (!parameters.labels->is_all()) wanted = parameters.labels->values;
-  const auto chosen = mesh::select_labels(there, parameters.background, wanted);
-  if (chosen.empty()) {
-    throw Error(ErrorCode::kUnusableVolume,
-                "the volume has no labels: all samples are background, " +
-                    std::to_string(parameters.background));
-  }
-  std::vector<mesh::LabelVoxels> labels;
-  std::ranges::copy_if(there, std::back_inserter(labels), [&](const mesh::LabelVoxels& label) {
-    return std::ranges::binary_search(chosen, label.label);
-  });
-  return labels;
-}
-
 mesh::SeparateOptions separate_options(const std::vector<mesh::LabelVoxels>& labels,
                                        const MeshParameters& parameters) {
   mesh::SeparateOptions options = {
@@ -148,7 +127,8 @@ std::vector<mesh::LabelVoxels> count_values(const SampleArray& samples,
 
 CountedSurface count_labels(const SampleArray& samples, const MeshParameters& parameters,
                             const mesh::Context& context) {
-  const auto options = separate_options(chosen_labels(samples, parameters, context), parameters);
+  const auto options = separate_options(
+      mesh::chosen_labels(count_values(samples, context), parameters), parameters);
   return with_label(samples.type, [&](auto sample) {
     const auto lattice = lattice_of<decltype(sample)>(samples);
     CountedSurface counted = {.size = size_of(count_walls(lattice, options, context)), .labels = {}};
@@ -166,7 +146,7 @@ MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
   const MeshParameters& parameters = request.parameters;
   MeshSummary summary;
   progress.enter(Stage::kExtract, kExtractShare, &Timing::extract);
-  const auto labels = chosen_labels(samples, parameters, progress.context(0, 0.2));
+  const auto labels = mesh::chosen_labels(count_values(samples, progress.context(0, 0.2)), parameters);
   separate(samples, separate_options(labels, parameters), request, progress, walls);
   summary.triangles = walls.mesh.triangles.size();
   summary.vertices = walls.mesh.positions.size();

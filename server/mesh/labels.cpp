@@ -149,7 +149,7 @@ std::vector<LabelVoxels> count_labels(const Lattice<T>& lattice, const Context& 
 }
 
 std::vector<LabelVoxels> labels_of(std::span<const LabelVoxels> present, std::int64_t background,
-                                   const ValuesOfLabels& values) {
+                                   const LabelValues& values) {
   std::set<std::int64_t> taken = {background};
   std::vector<LabelVoxels> labels;
   for (const auto& [label, own] : values) {
@@ -195,6 +195,24 @@ std::vector<std::int64_t> select_labels(std::span<const LabelVoxels> present,
     }
   }
   if (labels.size() > kMostLabels) throw_too_many_labels();
+  return labels;
+}
+
+std::vector<LabelVoxels> chosen_labels(std::span<const LabelVoxels> counted,
+                                       const MeshParameters& parameters) {
+  const auto there = labels_of(counted, parameters.background, parameters.label_values);
+  std::optional<std::vector<std::int64_t>> wanted;
+  if (!parameters.labels->is_all()) wanted = parameters.labels->values;
+  const auto chosen = select_labels(there, parameters.background, wanted);
+  if (chosen.empty()) {
+    throw Error(ErrorCode::kUnusableVolume,
+                "the volume has no labels: all samples are background, " +
+                    std::to_string(parameters.background));
+  }
+  std::vector<LabelVoxels> labels;
+  std::ranges::copy_if(there, std::back_inserter(labels), [&](const LabelVoxels& label) {
+    return std::ranges::binary_search(chosen, label.label);
+  });
   return labels;
 }
 

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "proto/types.h"
 #include "server/mesh/context.h"
 #include "server/mesh/lattice.h"
 
@@ -39,15 +40,12 @@ void add_voxels(const LabelVoxels& part, LabelVoxels& whole);
 // Throws Error kUnusableVolume: the samples have more than kMostLabels labels (separate.h).
 [[noreturn]] void throw_too_many_labels();
 
-// Labels that are not the samples of their own value, with all values whose samples belong to them.
-using ValuesOfLabels = std::map<std::int64_t, std::vector<std::int64_t>>;
-
-// The labels that there are: those of `values`, and each value of `present` that is neither the
-// background nor in those. Ascending; those without voxels are left out. What is said of a label of
+// The labels that there are: those that are not the samples of their own value, `values`, and each
+// value of `present` that is neither the background nor in those. Ascending; those without voxels are left out. What is said of a label of
 // several values is what its values have together. Throws Error kUnusableVolume when there are more
 // than kMostLabels.
 std::vector<LabelVoxels> labels_of(std::span<const LabelVoxels> present, std::int64_t background,
-                                   const ValuesOfLabels& values = {});
+                                   const LabelValues& values = {});
 
 // The labels to separate, ascending: those that are wanted, or all. `labels` are those that there
 // are. Throws Error kInvalidParameter, field "labels", when the background is among those that are
@@ -56,5 +54,10 @@ std::vector<LabelVoxels> labels_of(std::span<const LabelVoxels> present, std::in
 std::vector<std::int64_t> select_labels(
     std::span<const LabelVoxels> labels, std::int64_t background,
     const std::optional<std::vector<std::int64_t>>& wanted = std::nullopt);
+
+// The labels that a job chooses, with their voxels: `counted` are all values of the samples. Throws
+// as select_labels does, field "labels", and Error kUnusableVolume when there are none.
+std::vector<LabelVoxels> chosen_labels(std::span<const LabelVoxels> counted,
+                                       const MeshParameters& parameters);
 
 }  // namespace isomesh::mesh

@@ -76,7 +76,8 @@ void labels(App& app, const Request& request, Response& response) {
 }
 
 void estimate(App& app, const Request& request, Response& response) {
-  const JobParameters parameters = parse_job_parameters(request.query, VolumeIn::kQuery);
+  const JobParameters parameters =
+      settled(app, request, parse_job_parameters(request.query, VolumeIn::kQuery));
   answer_json(response, 200,
               to_json(app.services.estimator.estimate(viewer_of(request), parameters)));
 }

@@ -80,7 +80,8 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
   // A key belongs to one request: the same volume (by its id), the same parameters and, as "mesh"
   // says, this route.
   const std::string digest = key.empty() ? "" : sha256_of("mesh " + to_json(parameters));
-  return submitted(app, {owner_of(request), parameters, key, digest}, response);
+  return submitted(app, {owner_of(request), settled(app, request, parameters), key, digest},
+                   response);
 }
 
 // One request whose body is the volume and whose response is the mesh.

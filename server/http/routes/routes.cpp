@@ -10,6 +10,7 @@
 #include "base/text.h"
 #include "proto/json.h"
 #include "server/http/upload.h"
+#include "server/jobs/settle_labels.h"
 
 namespace isomesh::http {
 namespace {
@@ -155,6 +156,13 @@ std::string json_body(App& app, const Request& request) {
   const auto place =
       request.body->is_whole() ? net::FairPlaces::Place() : app.uploads.take(party_of(request));
   return read_text(request, kMostBodyBytes);
+}
+
+JobParameters settled(const App& app, const Request& request, JobParameters parameters) {
+  if (!parameters.labels) return parameters;
+  const store::Viewer viewer = viewer_of(request);
+  const Volume volume = app.services.volumes.get(viewer, parameters.volume);
+  return jobs::settle_labels(std::move(parameters), viewer, volume, app.services.labels);
 }
 
 Job submitted(App& app, const store::JobSpec& spec, Response& response) {

@@ -119,6 +119,10 @@ net::FairPlaces::Place place_for_upload(App& app, const Request& request);
 // takes one of the places of uploads. Throws as place_for_upload and read_text do.
 std::string json_body(App& app, const Request& request);
 
+// The parameters with what they leave to their volume: see jobs::settle_labels. Throws what that
+// does, and Error kNotFound without the volume.
+JobParameters settled(const App& app, const Request& request, JobParameters parameters);
+
 // Submits a job. Throws what store::job_of throws, and then says in `response` when to come again.
 Job submitted(App& app, const store::JobSpec& spec, Response& response);
 

@@ -1,0 +1,51 @@
+#include "server/jobs/settle_labels.h"
+
+#include <algorithm>
+#include <string>
+
+#include "server/mesh/labels.h"
+
+namespace isomesh::jobs {
+namespace {
+
+bool is_integer(SampleType type) {
+  return type != SampleType::kFloat32 && type != SampleType::kFloat64;
+}
+
+template <class T>
+void keep_chosen(const std::vector<std::int64_t>& chosen, std::map<std::int64_t, T>& texts) {
+  std::erase_if(texts, [&](const auto& entry) {
+    return !std::ranges::binary_search(chosen, entry.first);
+  });
+}
+
+}  // namespace
+
+JobParameters settle_labels(JobParameters parameters, const store::Viewer& viewer,
+                            const Volume& volume, LabelLists& lists) {
+  if (!is_integer(volume.type)) {
+    throw invalid_parameter("labels", "are for volumes of integers; this one has samples of type " +
+                                          std::string(to_string(volume.type)));
+  }
+  for (const auto& [label, values] : values_of(volume)) {
+    parameters.label_values.try_emplace(label, values);
+  }
+  const auto counts = lists.counts(viewer, volume);
+  const auto chosen = mesh::chosen_labels(*counts, parameters);
+  std::vector<std::int64_t> labels;
+  std::ranges::transform(chosen, std::back_inserter(labels), &mesh::LabelVoxels::label);
+  for (const LabelEntry& entry : volume.labels) {
+    if (!entry.name.empty()) parameters.label_names.try_emplace(entry.label, entry.name);
+    if (entry.color) parameters.label_colors.try_emplace(entry.label, *entry.color);
+  }
+  keep_chosen(labels, parameters.label_names);
+  keep_chosen(labels, parameters.label_colors);
+  // Of all labels, a value that is one's is none of its own; of some, the others' do not matter.
+  if (!parameters.labels->is_all()) keep_chosen(labels, parameters.label_values);
+  if (!parameters.max_displacement_mm) {
+    parameters.max_displacement_mm = *std::ranges::min_element(volume.geometry.spacing) / 2;
+  }
+  return parameters;
+}
+
+}  // namespace isomesh::jobs
