@@ -123,8 +123,9 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                           "surface of its own, or all of them.",
                   .more = "Neighbours share the wall between them. All other values, and those "
                           "that are not listed, are background. Vertices lie half-way between two "
-                          "samples; passes are 10 unless the request says, and no vertex moves "
-                          "farther than half the smallest spacing.",
+                          "samples. Unless the request says, there are 10 passes of half steps "
+                          "(lambda 0.5), and no vertex moves farther than half the smallest "
+                          "spacing.",
                   .minimum = kLeast,
                   .maximum = kMost,
                   .may_be_absent = true},
@@ -229,15 +230,16 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                 .maximum = 0.5,
                 .cases = {SmoothingCase{Smoothing::kTaubin}}},
       self.pass_band);
-  parameter(Parameter{.name = "max_displacement_mm",
-                      .title = "Move at most",
-                      .help = "Smoothing moves no vertex farther than this from where it was "
-                              "extracted.",
-                      .more = "Millimetres; null: as far as it goes, and of labels half the smallest "
-                              "spacing.",
-                      .unit = "mm",
-                      .minimum = 0},
-            self.max_displacement_mm);
+  parameter(
+      Parameter{.name = "max_displacement_mm",
+                .title = "Move at most",
+                .help = "Smoothing moves no vertex farther than this from where it was "
+                        "extracted.",
+                .more = "Millimetres; null: as far as it goes, and of labels half the smallest "
+                        "spacing.",
+                .unit = "mm",
+                .minimum = 0},
+      self.max_displacement_mm);
   parameter(
       Parameter{.name = "close",
                 .title = "Close the surface at the volume's border",

@@ -207,7 +207,8 @@ class RequestReader {
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
                    std::vector<std::int64_t>& values) {
     if (!json.is_array() || json.empty() || json.size() > Volume::kMostLabels) {
-      return add(path, "must be a list of 1 to " + std::to_string(Volume::kMostLabels) + " whole numbers");
+      return add(
+          path, "must be a list of 1 to " + std::to_string(Volume::kMostLabels) + " whole numbers");
     }
     for (const Json& element : json) {
       const std::size_t before = errors_.size();
@@ -259,7 +260,8 @@ class RequestReader {
     if (std::string_view(parameter.name) == "label_colors") {
       std::ranges::transform(value, value.begin(), [](unsigned char c) { return std::tolower(c); });
       if (!is_color(value)) add(path, "must be a colour such as \"#d8654f\"");
-    } else if (trimmed(value).empty() || value.size() > LabelEntry::kMostNameBytes || has_control_characters(value)) {
+    } else if (trimmed(value).empty() || value.size() > LabelEntry::kMostNameBytes ||
+               has_control_characters(value)) {
       add(path, "must be a text of 1 to 255 bytes on one line");
     }
   }
@@ -350,7 +352,8 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
     if (is_wrong) reader.add(name, message);
   };
   if (!parameters.labels) {
-    const bool zips = std::ranges::find(parameters.formats, MeshFormat::kZip) != parameters.formats.end();
+    const bool zips =
+        std::ranges::find(parameters.formats, MeshFormat::kZip) != parameters.formats.end();
     return refuse_if(zips, "formats", "\"zip\" holds a file of each label, so it needs labels");
   }
   refuse_if(json.contains("iso"), "iso", "cannot stand beside labels");
@@ -375,7 +378,10 @@ JobParameters read_parameters(const Json& json, bool with_volume, RequestReader&
       parameters, [&](const std::string& path, const Parameter& parameter, const auto& member) {
         const bool is_expected = parameter.is_required && (with_volume || path != "volume") &&
                                  !(parameter.unless != nullptr && json.contains(parameter.unless));
-        if (is_expected && !json.contains(pointer_to(path))) reader.add(path, "is required");
+        if (is_expected && !json.contains(pointer_to(path))) {
+          const std::string other = parameter.unless == nullptr ? "" : parameter.unless;
+          reader.add(path, other.empty() ? "is required" : "is required, or " + other);
+        }
         if constexpr (std::is_same_v<decltype(member), const std::optional<double>&>) {
           check_case(path, parameter, parameters.smoothing, member, reader);
         }
@@ -389,7 +395,7 @@ JobParameters read_parameters(const Json& json, bool with_volume, RequestReader&
   });
   check_labels(json, parameters, reader);
   reader.throw_if_any();
-  if (!parameters.lambda) parameters.lambda = default_lambda(parameters.smoothing);
+  if (!parameters.lambda) parameters.lambda = default_lambda(parameters);
   return parameters;
 }
 

@@ -111,6 +111,14 @@ bool is_final(JobState state) {
          state == JobState::kCancelled;
 }
 
+double default_lambda(const MeshParameters& parameters) {
+  // Whole steps leave the steps between half-way vertices as they are, and take half a percent off
+  // the volume of an atlas in ten passes; half steps even them out, and take a third.
+  constexpr double kLabels = 0.5;
+  const bool is_whole = parameters.smoothing == Smoothing::kLaplacian;
+  return parameters.labels && is_whole ? kLabels : default_lambda(parameters.smoothing);
+}
+
 JobParameters label_parameters(LabelChoice labels) {
   constexpr int kPasses = 10;
   JobParameters parameters;
@@ -147,7 +155,8 @@ std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters) {
   for (const MeshFormat format : parameters.formats) {
     if (format != MeshFormat::kGlb && format != MeshFormat::kZip) zipped.push_back(format);
   }
-  const bool is_asked = std::ranges::find(parameters.formats, MeshFormat::kZip) != parameters.formats.end();
+  const bool is_asked =
+      std::ranges::find(parameters.formats, MeshFormat::kZip) != parameters.formats.end();
   if (zipped.empty() && is_asked) zipped.push_back(MeshFormat::kStl);
   return zipped;
 }

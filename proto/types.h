@@ -99,8 +99,8 @@ struct DicomIdentity {
   bool operator==(const DicomIdentity&) const = default;
 };
 
-// What a file says of one of its labels. Segments are named after organs, so that names may be shown
-// wherever the volume is.
+// What a file says of one of its labels. Segments are named after organs, so that names may be
+// shown wherever the volume is.
 struct LabelEntry {
   static constexpr std::size_t kMostNameBytes = 255;
 
@@ -253,6 +253,7 @@ std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters);
 
 // The share of the way to the mean of its neighbours that a vertex goes, unless the client says.
 double default_lambda(Smoothing smoothing);
+double default_lambda(const MeshParameters& parameters);  // which labels have a say in
 
 enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };
 enum class Stage { kQueue, kLoad, kExtract, kSmooth, kEncode, kDone };

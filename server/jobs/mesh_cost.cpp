@@ -37,7 +37,7 @@ std::uint64_t least_file_bytes(const mesh::SurfaceSize& surface, const MeshParam
 
 mesh::SmoothOptions smooth_options(const MeshParameters& parameters) {
   const bool is_taubin = parameters.smoothing == Smoothing::kTaubin;
-  const double lambda = parameters.lambda.value_or(default_lambda(parameters.smoothing));
+  const double lambda = parameters.lambda.value_or(default_lambda(parameters));
   return {.passes = parameters.passes,
           .lambda = lambda,
           .mu = is_taubin ? mesh::taubin_mu(lambda, parameters.pass_band) : 0,
@@ -72,11 +72,11 @@ void check_disk(const mesh::SurfaceSize& surface, const MeshParameters& paramete
   const std::uint64_t needed = least_file_bytes(surface, parameters);
   if (needed <= allowed_bytes) return;
   constexpr std::uint64_t kKibibyte = 1 << 10;
-  throw Error(ErrorCode::kTooLarge,
-              "the surface has " + std::to_string(surface.triangles) +
-                  " triangles; its files would take " + std::to_string(needed / kKibibyte) +
-                  " KiB or more, and the disk can never hold more than " +
-                  std::to_string(allowed_bytes / kKibibyte) + " KiB of them");
+  throw Error(ErrorCode::kTooLarge, "the surface has " + std::to_string(surface.triangles) +
+                                        " triangles; its files would take " +
+                                        std::to_string(needed / kKibibyte) +
+                                        " KiB or more, and the disk can never hold more than " +
+                                        std::to_string(allowed_bytes / kKibibyte) + " KiB of them");
 }
 
 }  // namespace isomesh::jobs

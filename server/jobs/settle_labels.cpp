@@ -8,15 +8,10 @@
 namespace isomesh::jobs {
 namespace {
 
-bool is_integer(SampleType type) {
-  return type != SampleType::kFloat32 && type != SampleType::kFloat64;
-}
-
 template <class T>
 void keep_chosen(const std::vector<std::int64_t>& chosen, std::map<std::int64_t, T>& texts) {
-  std::erase_if(texts, [&](const auto& entry) {
-    return !std::ranges::binary_search(chosen, entry.first);
-  });
+  std::erase_if(
+      texts, [&](const auto& entry) { return !std::ranges::binary_search(chosen, entry.first); });
 }
 
 }  // namespace

@@ -55,6 +55,18 @@ std::vector<std::array<mesh::Vec3, 3>> read_with_assimp(const std::string& bytes
   return triangles;
 }
 
+std::vector<std::string> objects_in(const std::string& bytes, const std::string& suffix) {
+  const aiScene* scene =
+      aiImportFileFromMemory(bytes.data(), static_cast<unsigned>(bytes.size()), 0, suffix.c_str());
+  if (scene == nullptr) throw std::runtime_error(aiGetErrorString());
+  std::vector<std::string> names;
+  for (const aiMesh* mesh : std::span(scene->mMeshes, scene->mNumMeshes)) {
+    names.emplace_back(mesh->mName.C_Str());
+  }
+  aiReleaseImport(scene);
+  return names;
+}
+
 std::vector<GlbPrimitive> read_with_node(const std::string& glb) {
   const TemporaryFolder folder;
   write_file(folder / "mesh.glb", glb);

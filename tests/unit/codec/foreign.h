@@ -15,6 +15,9 @@ namespace isomesh::test {
 std::vector<std::array<mesh::Vec3, 3>> read_with_assimp(const std::string& bytes,
                                                         const std::string& suffix);
 
+// The names of the objects with triangles that assimp finds, in its order. Throws as the above.
+std::vector<std::string> objects_in(const std::string& bytes, const std::string& suffix);
+
 struct GlbPrimitive {
   DecodedMesh mesh;
   std::vector<mesh::Vec3> normals;  // of the points, or none

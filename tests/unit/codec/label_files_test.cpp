@@ -1,0 +1,307 @@
+// Files of labels: what two labels share has the same bits in both, whatever the format.
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <archive.h>
+#include <archive_entry.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "base/sha256.h"
+#include "server/codec/encode_labels.h"
+#include "server/codec/zip/label_zip.h"
+#include "server/mesh/smooth.h"
+#include "tests/unit/codec/decode.h"
+#include "tests/unit/codec/foreign.h"
+#include "tests/unit/mesh/separated.h"
+
+namespace isomesh::codec {
+namespace {
+
+using mesh::Vec3;
+using Places = std::set<Vec3>;
+
+constexpr std::size_t kLabels = 5;
+
+// Some labels that touch each other, smoothed; the second has a name and a colour.
+class LabelFilesTest : public testing::Test {
+ protected:
+  LabelFilesTest() {
+    const auto volume = mesh::label_cells(kLabels, {30, 26, 28}, 12, 401);
+    mesh::separate_into(walls_, volume,
+                        {mesh::consecutive<std::int64_t>(1, kLabels), Scheme::kSix, true});
+    smooth({.passes = 4, .lambda = 0.5}, {}, walls_.mesh);
+    triangles_ = std::make_unique<mesh::LabelTriangles>(walls_);
+    for (const mesh::LabelMeasure& measure : measure_labels(walls_, *triangles_, {})) {
+      const auto label = static_cast<std::int64_t>(labels_.size() + 1);
+      labels_.push_back({.label = label,
+                         .voxels = 10 * static_cast<std::uint64_t>(label),
+                         .triangles = measure.triangles,
+                         .area_mm2 = measure.extent.area_mm2,
+                         .volume_mm3 = measure.extent.volume_mm3});
+    }
+    labels_[1].name = "Left ventr\u00edculo";
+    labels_[1].color = "#ff8000";
+    provenance_.volume = "abc";
+    provenance_.parameters = label_parameters({});
+  }
+
+  LabelledSurface surface() const { return {walls_, *triangles_, labels_}; }
+
+  std::string encoded(MeshFormat format) const {
+    std::string bytes;
+    encode_labels(surface(), format, provenance_, {}, [&](std::span<const std::byte> piece) {
+      bytes.append(reinterpret_cast<const char*>(piece.data()), piece.size());
+    });
+    return bytes;
+  }
+
+  struct Zip {
+    std::string bytes;
+    std::vector<LabelFiles> files;
+  };
+
+  Zip zipped(const std::vector<MeshFormat>& formats) const {
+    Zip zip;
+    zip.files = encode_labels_zip(
+        surface(), formats, provenance_, {}, [&](std::span<const std::byte> piece) {
+          zip.bytes.append(reinterpret_cast<const char*>(piece.data()), piece.size());
+        });
+    return zip;
+  }
+
+  // The places that both labels have, as extraction and smoothing left them.
+  Places shared_places(std::size_t a, std::size_t b) const {
+    Places shared;
+    for (std::size_t t = 0; t < walls_.sides.size(); ++t) {
+      if (walls_.sides[t] !=
+          mesh::WallSides{static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b)})
+        continue;
+      for (const std::uint32_t v : walls_.mesh.triangles[t])
+        shared.insert(walls_.mesh.positions[v]);
+    }
+    return shared;
+  }
+
+  // Of each pair of neighbours, as many places are in both sets as their wall has, or a few less
+  // where quantisation lets some coincide.
+  void expect_shared(const std::vector<Places>& decoded) const {
+    std::size_t neighbours = 0;
+    for (std::size_t a = 1; a <= kLabels; ++a) {
+      for (std::size_t b = a + 1; b <= kLabels; ++b) {
+        const std::size_t shared = shared_places(a, b).size();
+        if (shared == 0) continue;
+        ++neighbours;
+        Places both;
+        std::ranges::set_intersection(decoded[a - 1], decoded[b - 1],
+                                      std::inserter(both, both.end()));
+        EXPECT_GE(both.size(), shared - shared / 100) << a << " and " << b;
+      }
+    }
+    EXPECT_GT(neighbours, 2U);
+  }
+
+  mesh::SeparatingSurface walls_;
+  std::unique_ptr<mesh::LabelTriangles> triangles_;
+  std::vector<LabelSummary> labels_;
+  Provenance provenance_;
+};
+
+// The names and bytes in a ZIP, as libarchive reads them.
+std::map<std::string, std::string> unzipped(const std::string& bytes) {
+  std::map<std::string, std::string> files;
+  archive* reader = archive_read_new();
+  archive_read_support_format_zip(reader);
+  EXPECT_EQ(archive_read_open_memory(reader, bytes.data(), bytes.size()), ARCHIVE_OK);
+  archive_entry* entry = nullptr;
+  while (archive_read_next_header(reader, &entry) == ARCHIVE_OK) {
+    std::string content(static_cast<std::size_t>(archive_entry_size(entry)), '\0');
+    EXPECT_EQ(archive_read_data(reader, content.data(), content.size()),
+              static_cast<la_ssize_t>(content.size()));
+    const char* name = archive_entry_pathname_utf8(entry);
+    files[name == nullptr ? "" : name] = content;
+  }
+  archive_read_free(reader);
+  return files;
+}
+
+Places places_in_stl(const std::string& bytes) {
+  Places places;
+  for (std::size_t facet = 84; facet + 50 <= bytes.size(); facet += 50) {
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      Vec3 place;
+      std::memcpy(&place, bytes.data() + facet + 12 * (corner + 1), sizeof place);
+      places.insert(place);
+    }
+  }
+  return places;
+}
+
+Places places_of(const test::DecodedMesh& decoded) {
+  return {decoded.points.begin(), decoded.points.end()};
+}
+
+TEST_F(LabelFilesTest, ZipHoldsAFileOfEachLabelThatIsARangeOfIt) {
+  const Zip zip = zipped({MeshFormat::kStl, MeshFormat::kDrc});
+  const auto files = unzipped(zip.bytes);
+  EXPECT_EQ(files.size(), 2 * kLabels);
+  EXPECT_TRUE(files.contains("label 1.stl"));
+  EXPECT_TRUE(files.contains("Left ventr\u00edculo.drc"));
+  std::vector<Places> stl;
+  std::vector<Places> drc;
+  for (std::size_t n = 0; n < kLabels; ++n) {
+    for (const auto& [format, file] : zip.files[n]) {
+      const std::string range = zip.bytes.substr(file.offset, file.bytes);
+      EXPECT_EQ(range, files.at(title_of(labels_[n]) + '.' + std::string(to_string(format))));
+      EXPECT_EQ(sha256_of(range), file.sha256);
+    }
+    const auto range_of = [&](MeshFormat format) {
+      const LabelFile& file = zip.files[n].at(format);
+      return zip.bytes.substr(file.offset, file.bytes);
+    };
+    const std::string facets = range_of(MeshFormat::kStl);
+    EXPECT_EQ(facets.size(), 84 + 50 * labels_[n].triangles);
+    stl.push_back(places_in_stl(facets));
+    const auto decoded = test::decode_in_process(range_of(MeshFormat::kDrc));
+    EXPECT_EQ(decoded.triangles.size(), labels_[n].triangles);
+    drc.push_back(places_of(decoded));
+  }
+  expect_shared(stl);
+  expect_shared(drc);
+}
+
+TEST_F(LabelFilesTest, TitlesThatAreAlikeOrNoFileNamesMakeNoTwoFilesOne) {
+  labels_[0].name = "../a/b";
+  labels_[1].name = "Same";
+  labels_[2].name = "same";
+  labels_[3].name = "same-3";
+  labels_[4].name = ".. ";
+  const auto files = unzipped(zipped({MeshFormat::kStl}).bytes);
+  std::vector<std::string> names;
+  for (const auto& [name, bytes] : files) names.push_back(name);
+  EXPECT_EQ(names, (std::vector<std::string>{"Same.stl", "_.._a_b.stl", "_.stl", "same-3-4.stl",
+                                             "same-3.stl"}));
+}
+
+TEST_F(LabelFilesTest, ZipIsTheSameOnAnyNumberOfThreads) {
+  const int before = mesh::thread_count();
+  mesh::set_thread_count(1);
+  const std::string one = zipped({MeshFormat::kDrc}).bytes;
+  mesh::set_thread_count(4);
+  const std::string four = zipped({MeshFormat::kDrc}).bytes;
+  mesh::set_thread_count(before);
+  EXPECT_EQ(one, four);
+}
+
+TEST_F(LabelFilesTest, ASinkThatThrowsEndsTheZipWithThat) {
+  EXPECT_THROW(
+      encode_labels_zip(surface(), std::array{MeshFormat::kStl}, provenance_, {},
+                        [](std::span<const std::byte>) { throw std::runtime_error("full"); }),
+      std::runtime_error);
+}
+
+TEST_F(LabelFilesTest, GlbHasANodeWithNameColourAndFiguresForEachLabel) {
+  const std::string glb = encoded(MeshFormat::kGlb);
+  const auto json_bytes = [&] {
+    std::uint32_t bytes = 0;
+    std::memcpy(&bytes, glb.data() + 12, sizeof bytes);
+    return bytes;
+  }();
+  const auto gltf = nlohmann::json::parse(glb.substr(20, json_bytes));
+  ASSERT_EQ(gltf["nodes"].size(), kLabels + 1);
+  EXPECT_EQ(gltf["nodes"][0]["children"].size(), kLabels);
+  for (std::size_t n = 0; n < kLabels; ++n) {
+    const auto& node = gltf["nodes"][gltf["nodes"][0]["children"][n].get<std::size_t>()];
+    EXPECT_EQ(node["name"], title_of(labels_[n]));
+    EXPECT_EQ(node["extras"]["label"], labels_[n].label);
+    EXPECT_EQ(node["extras"]["voxels"], labels_[n].voxels);
+    EXPECT_EQ(node["extras"]["volume_mm3"], labels_[n].volume_mm3);
+    EXPECT_EQ(node["extras"]["area_mm2"], labels_[n].area_mm2);
+    EXPECT_EQ(gltf["meshes"][node["mesh"].get<std::size_t>()]["name"], node["name"]);
+  }
+  // #ff8000 is 1, 0.216, 0 in linear light.
+  const auto color = gltf["materials"][1]["pbrMetallicRoughness"]["baseColorFactor"];
+  EXPECT_NEAR(color[0].get<double>(), 1, 1e-9);
+  EXPECT_NEAR(color[1].get<double>(), 0.2159, 1e-4);
+  EXPECT_NEAR(color[2].get<double>(), 0, 1e-9);
+  EXPECT_NE(gltf["materials"][0]["pbrMetallicRoughness"],
+            gltf["materials"][2]["pbrMetallicRoughness"]);
+  EXPECT_FALSE(gltf["asset"]["extras"].contains("iso"));
+}
+
+TEST_F(LabelFilesTest, GlbIsValidAndItsWallsAreShared) {
+  const auto primitives = test::read_with_node(encoded(MeshFormat::kGlb));
+  ASSERT_EQ(primitives.size(), kLabels);
+  std::vector<Places> places;
+  for (std::size_t n = 0; n < kLabels; ++n) {
+    EXPECT_EQ(primitives[n].mesh.triangles.size(), labels_[n].triangles);
+    places.push_back(places_of(primitives[n].mesh));
+  }
+  expect_shared(places);
+}
+
+TEST_F(LabelFilesTest, GlbHasNormalsWhereTheyAreAskedFor) {
+  provenance_.parameters.normals = true;
+  for (const auto& primitive : test::read_with_node(encoded(MeshFormat::kGlb))) {
+    EXPECT_EQ(primitive.normals.size(), primitive.mesh.points.size());
+  }
+}
+
+TEST_F(LabelFilesTest, LabelsWithoutTrianglesHaveANodeWithoutAMesh) {
+  const auto empty = test::constant<std::uint8_t>(3, {4, 4, 4});
+  mesh::separate_into(walls_, empty, {{3}, Scheme::kSix, false});
+  triangles_ = std::make_unique<mesh::LabelTriangles>(walls_);
+  labels_ = {{.label = 3}};
+  const std::string glb = encoded(MeshFormat::kGlb);
+  EXPECT_NE(glb.find("label 3"), std::string::npos);
+  EXPECT_EQ(unzipped(zipped({MeshFormat::kStl}).bytes).at("label 3.stl").size(), 84U);
+  EXPECT_NE(encoded(MeshFormat::kPly).find("element face 0"), std::string::npos);
+}
+
+TEST_F(LabelFilesTest, PlyHasEveryLabelsFacesWithItsValue) {
+  const std::string ply = encoded(MeshFormat::kPly);
+  EXPECT_NE(ply.find("property int label\nend_header\n"), std::string::npos);
+  std::size_t at = ply.find("end_header\n") + 11 + 12 * walls_.mesh.positions.size();
+  std::map<std::int32_t, std::uint64_t> faces;
+  for (; at + 17 <= ply.size(); at += 17) {
+    EXPECT_EQ(ply[at], 3);
+    std::int32_t label = 0;
+    std::memcpy(&label, ply.data() + at + 13, sizeof label);
+    ++faces[label];
+  }
+  EXPECT_EQ(at, ply.size());
+  for (const LabelSummary& label : labels_) {
+    EXPECT_EQ(faces[static_cast<std::int32_t>(label.label)], label.triangles);
+  }
+}
+
+TEST_F(LabelFilesTest, ObjHasAGroupForEachLabel) {
+  const std::string obj = encoded(MeshFormat::kObj);
+  std::istringstream lines(obj);
+  std::vector<std::pair<std::string, std::uint64_t>> groups;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("g ")) groups.emplace_back(line.substr(2), 0);
+    if (line.starts_with("f ")) ++groups.at(groups.size() - 1).second;
+  }
+  ASSERT_EQ(groups.size(), kLabels);
+  for (std::size_t n = 0; n < kLabels; ++n) EXPECT_EQ(groups[n].second, labels_[n].triangles);
+  EXPECT_EQ(groups[0].first, "label_1");
+  EXPECT_EQ(groups[1].first, "Left_ventr\u00edculo");
+  EXPECT_EQ(test::objects_in(obj, "obj"),
+            (std::vector<std::string>{"label_1", "Left_ventr\u00edculo", "label_3", "label_4",
+                                      "label_5"}));
+}
+
+TEST_F(LabelFilesTest, AFileOfOneSurfaceIsNoFileOfAllLabels) {
+  EXPECT_THROW(encoded(MeshFormat::kStl), Error);
+}
+
+}  // namespace
+}  // namespace isomesh::codec

@@ -1,0 +1,224 @@
+// Jobs by labels, from stored samples to stored files.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/jobs/estimate.h"
+#include "server/jobs/label_lists.h"
+#include "server/jobs/pipeline.h"
+#include "server/jobs/settle_labels.h"
+#include "tests/support/errors.h"
+#include "tests/unit/jobs/fixture.h"
+
+namespace isomesh::jobs {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+const Report kQuiet = [](Stage, double, const Timing&) {};
+
+class LabelJobsTest : public test::JobsFixture {
+ protected:
+  // Two balls, 3 and 7, that touch, and a cube, 9, apart; spacing 0.5, 1, 2.
+  Volume add_labels() {
+    auto samples = test::constant<std::int16_t>(0, {40, 24, 20});
+    samples.geometry.spacing = {0.5, 1, 2};
+    for (std::uint32_t k = 0; k < 20; ++k) {
+      for (std::uint32_t j = 0; j < 24; ++j) {
+        for (std::uint32_t i = 0; i < 40; ++i) {
+          const auto inside = [&](double x, double y, double z, double r) {
+            return std::hypot(i - x, j - y, k - z) < r;
+          };
+          if (inside(10, 8, 8, 5.5)) samples.at(i, j, k) = 3;
+          if (inside(18, 8, 8, 5.5)) samples.at(i, j, k) = 7;
+          if (i > 30 && i < 38 && j > 14 && j < 22 && k > 12 && k < 18) samples.at(i, j, k) = 9;
+        }
+      }
+    }
+    return add(samples, SampleType::kInt16);
+  }
+
+  JobParameters settled(const Volume& volume, JobParameters parameters) {
+    parameters.volume = volume.id;
+    return settle_labels(std::move(parameters), "", volume, lists_);
+  }
+
+  PipelineResult run(const Volume& volume, const JobParameters& parameters) {
+    return run_pipeline(volume, parameters, {}, blobs_, process_, {}, kQuiet);
+  }
+
+  LabelLists lists_{blobs_};
+  JobProcess process_{job_program()};
+};
+
+TEST_F(LabelJobsTest, MakeEveryLabelsClosedSurface) {
+  const Volume volume = add_labels();
+  JobParameters parameters = label_parameters({});
+  parameters.close = true;
+  parameters.formats = {MeshFormat::kGlb, MeshFormat::kStl};
+  const PipelineResult result = run(volume, settled(volume, parameters));
+  const MeshSummary& mesh = result.mesh;
+  ASSERT_EQ(mesh.labels.size(), 3U);
+  EXPECT_TRUE(mesh.quality.closed);
+  EXPECT_TRUE(mesh.quality.manifold);
+  EXPECT_TRUE(mesh.quality.oriented);
+  EXPECT_EQ(mesh.components, 3U);
+  EXPECT_EQ(mesh.quality.genus, 0);
+  const auto counted = lists_.of("", volume, 0).labels;
+  double sum = 0;
+  std::uint64_t triangles = 0;
+  for (std::size_t n = 0; n < 3; ++n) {
+    const LabelSummary& label = mesh.labels[n];
+    EXPECT_EQ(label.label, counted[n].label);
+    EXPECT_EQ(label.voxels, counted[n].voxels);
+    EXPECT_EQ(label.voxels_mm3, counted[n].volume_mm3);
+    EXPECT_NEAR(label.volume_mm3, label.voxels_mm3, 0.05 * label.voxels_mm3);
+    EXPECT_TRUE(label.closed && label.manifold && label.oriented);
+    EXPECT_EQ(label.files.at(MeshFormat::kStl).bytes, 84 + 50 * label.triangles);
+    sum += label.volume_mm3;
+    triangles += label.triangles;
+  }
+  EXPECT_NEAR(mesh.volume_mm3.smoothed, sum, 1e-6 * sum);
+  EXPECT_LT(mesh.triangles, triangles);  // the wall between 3 and 7 counts once
+  EXPECT_LE(mesh.displacement_mm.max, 0.25);
+  EXPECT_EQ(mesh.files.size(), 2U);
+  EXPECT_TRUE(mesh.files.contains(MeshFormat::kZip));
+  const std::string zip = blob(mesh.files.at(MeshFormat::kZip).sha256);
+  const LabelFile& file = mesh.labels[1].files.at(MeshFormat::kStl);
+  EXPECT_EQ(zip.substr(file.offset, 7), "isomesh");
+}
+
+TEST_F(LabelJobsTest, OfOneLabelAreThoseOfItsIsoValueAtMidpoints) {
+  const Volume volume = add_sphere();
+  auto samples = test::constant<std::uint8_t>(0, {20, 18, 16});
+  for (std::size_t n = 0; n < samples.samples.size(); n += 3) samples.samples[n] = 1;
+  const Volume two = add(samples, SampleType::kUint8);
+  JobParameters labels = label_parameters({});
+  labels.formats = {MeshFormat::kStl};
+  labels.passes = 3;
+  labels.lambda = 1;
+  labels.max_displacement_mm = 100;
+  const PipelineResult by_label = run(two, settled(two, labels));
+  JobParameters iso = parameters_of(two, 0.5);
+  iso.interpolation = Interpolation::kMidpoint;
+  iso.formats = {MeshFormat::kStl};
+  iso.passes = 3;
+  iso.max_displacement_mm = 100;
+  const PipelineResult by_iso = run(two, iso);
+  const std::string zip = blob(by_label.mesh.files.at(MeshFormat::kZip).sha256);
+  const LabelFile& file = by_label.mesh.labels.front().files.at(MeshFormat::kStl);
+  EXPECT_EQ(zip.substr(file.offset, file.bytes),
+            blob(by_iso.mesh.files.at(MeshFormat::kStl).sha256));
+  EXPECT_EQ(by_label.mesh.triangles, by_iso.mesh.triangles);
+  EXPECT_EQ(by_label.mesh.volume_mm3.extracted, by_iso.mesh.volume_mm3.extracted);
+}
+
+TEST_F(LabelJobsTest, LabelsThatAreNotChosenAreBackground) {
+  const Volume volume = add_labels();
+  JobParameters parameters = label_parameters({{3}});
+  parameters.formats = {MeshFormat::kZip};
+  const MeshSummary mesh = run(volume, settled(volume, parameters)).mesh;
+  ASSERT_EQ(mesh.labels.size(), 1U);
+  EXPECT_EQ(mesh.labels[0].triangles, mesh.triangles);
+  EXPECT_TRUE(mesh.labels[0].files.contains(MeshFormat::kStl));
+}
+
+TEST_F(LabelJobsTest, AreSettledByWhatTheVolumeSays) {
+  Volume volume = add_labels();
+  volume.labels = {{.label = 3, .name = "Liver", .color = "#112233"},
+                   {.label = 5, .name = "Both", .values = {3, 7}},
+                   {.label = 9, .name = "Bone"}};
+  JobParameters parameters = label_parameters({});
+  parameters.label_names = {{9, "Mine"}, {44, "Nobody"}};
+  const JobParameters all = settled(volume, parameters);
+  EXPECT_THAT(all.label_names, ElementsAre(std::pair(5, "Both"), std::pair(9, "Mine")));
+  EXPECT_EQ(all.max_displacement_mm, 0.25);
+  EXPECT_THAT(all.label_values, ElementsAre(std::pair(5, ElementsAre(3, 7))));
+
+  parameters.labels = LabelChoice{{9}};
+  const JobParameters one = settled(volume, parameters);
+  EXPECT_THAT(one.label_names, ElementsAre(std::pair(9, "Mine")));
+  EXPECT_TRUE(one.label_values.empty());
+  EXPECT_TRUE(one.label_colors.empty());
+}
+
+TEST_F(LabelJobsTest, ThatOverlapAreMadeWhole) {
+  Volume volume = add_labels();
+  volume.labels = {{.label = 1, .values = {3, 7}}, {.label = 2, .values = {7}}};
+  JobParameters parameters = label_parameters({{1, 2}});
+  parameters.close = true;
+  const MeshSummary mesh = run(volume, settled(volume, parameters)).mesh;
+  ASSERT_EQ(mesh.labels.size(), 2U);
+  EXPECT_GT(mesh.labels[0].voxels, mesh.labels[1].voxels);
+  for (const LabelSummary& label : mesh.labels) {
+    EXPECT_TRUE(label.closed && label.manifold && label.oriented);
+    EXPECT_NEAR(label.volume_mm3, label.voxels_mm3, 0.05 * label.voxels_mm3);
+  }
+  EXPECT_NEAR(mesh.volume_mm3.smoothed, mesh.labels[0].volume_mm3, 1e-6 * mesh.volume_mm3.smoothed);
+}
+
+TEST_F(LabelJobsTest, AreRefusedWithTheReason) {
+  const Volume volume = add_labels();
+  const auto reason_of = [&](const Volume& of, const LabelChoice& labels) {
+    const auto error = test::caught([&] { settled(of, label_parameters(labels)); });
+    return error ? std::pair(error->code(), std::string(error->what()))
+                 : std::pair(ErrorCode::kInternal, std::string("was taken"));
+  };
+  const auto [code, text] = reason_of(volume, {{3, 4, 5}});
+  EXPECT_EQ(code, ErrorCode::kUnusableVolume);
+  EXPECT_THAT(text, HasSubstr("4, 5"));
+  EXPECT_EQ(reason_of(add_sphere(), {}).first, ErrorCode::kInvalidParameter);  // floats
+  const Volume empty = add(test::constant<std::uint8_t>(0, {4, 4, 4}), SampleType::kUint8);
+  EXPECT_EQ(reason_of(empty, {}).first, ErrorCode::kUnusableVolume);
+
+  // The process finds the same for itself.
+  JobParameters unsettled = label_parameters({{4}});
+  unsettled.volume = volume.id;
+  const auto error = test::caught([&] { run(volume, unsettled); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kUnusableVolume);
+}
+
+TEST_F(LabelJobsTest, AreEstimatedExactly) {
+  const Volume volume = add_labels();
+  volumes_.add("", volume, 0);
+  Estimator estimator(volumes_, blobs_, jobs_, {}, job_program());
+  JobParameters parameters = label_parameters({});
+  parameters.close = true;
+  parameters.formats = {MeshFormat::kGlb, MeshFormat::kStl};
+  parameters = settled(volume, parameters);
+  const Estimate estimate = estimator.estimate("", parameters);
+  const MeshSummary mesh = run(volume, parameters).mesh;
+  EXPECT_EQ(estimate.triangles, mesh.triangles);
+  EXPECT_EQ(estimate.vertices, mesh.vertices);
+  EXPECT_FALSE(estimate.iso);
+  ASSERT_EQ(estimate.labels.size(), mesh.labels.size());
+  for (std::size_t n = 0; n < mesh.labels.size(); ++n) {
+    EXPECT_EQ(estimate.labels[n].label, mesh.labels[n].label);
+    EXPECT_EQ(estimate.labels[n].triangles, mesh.labels[n].triangles);
+  }
+  EXPECT_TRUE(estimate.bytes.contains(MeshFormat::kZip));
+  EXPECT_FALSE(estimate.bytes.contains(MeshFormat::kStl));
+
+  parameters.labels = LabelChoice{{9}};
+  EXPECT_EQ(estimator.estimate("", parameters).triangles, mesh.labels[2].triangles);
+}
+
+TEST_F(LabelJobsTest, TakeNoMoreMemoryThanTheyMay) {
+  const Volume volume = add_labels();
+  const auto error = test::caught([&] {
+    run_pipeline(volume, settled(volume, label_parameters({})), {.memory_bytes = 100'000}, blobs_,
+                 process_, {}, kQuiet);
+  });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kTooLarge);
+}
+
+}  // namespace
+}  // namespace isomesh::jobs
