@@ -1,7 +1,12 @@
 #include "server/jobs/volume_library.h"
 
+#include <array>
+#include <atomic>
+#include <functional>
+#include <shared_mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -18,13 +23,29 @@ class VolumeLibraryTest : public test::JobsFixture {
  protected:
   static constexpr std::array<std::uint32_t, 3> kDims = {2, 3, 4};
 
+  static process::ImportOptions raw(const Geometry& geometry = {}) {
+    return {
+        .raw = RawDescription{
+            .dims = kDims, .type = SampleType::kUint8, .geometry = geometry, .big_endian = false}};
+  }
+
   std::pair<Volume, bool> add_bytes(const std::string& bytes, const Geometry& geometry = {}) {
     test::write_file(folder_ / "upload", bytes);
-    return library_.add("", folder_ / "upload",
-                        {.raw = RawDescription{.dims = kDims,
-                                               .type = SampleType::kUint8,
-                                               .geometry = geometry,
-                                               .big_endian = false}});
+    return library_.add("", folder_ / "upload", raw(geometry));
+  }
+
+  // Has the eraser erase a volume of bytes_ while somebody stores what `meanwhile` does.
+  void erase_while_somebody_stores(const std::function<void(const Volume& volume)>& meanwhile) {
+    const Volume volume = add_bytes(bytes_).first;
+    std::shared_mutex coming;
+    BlobEraser eraser(blobs_, volumes_, coming);
+    {
+      const std::shared_lock somebody_stores(coming);
+      volumes_.erase("", volume.id);
+      eraser.erase(volume.id);
+      meanwhile(volume);
+    }
+    eraser.finish();
   }
 
   const std::string bytes_ = "abcdefghijklmnopqrstuvwx";
@@ -98,11 +119,8 @@ TEST_F(VolumeLibraryTest, KeepsAVolumeThatAJobNeeds) {
 
 TEST_F(VolumeLibraryTest, SamplesStayUntilTheirLastOwnerGoes) {
   test::write_file(folder_ / "upload", bytes_);
-  const RawDescription raw{
-      .dims = kDims, .type = SampleType::kUint8, .geometry = {}, .big_endian = false};
-  const process::ImportOptions options{.raw = raw};
-  const std::string id = library_.add("one", folder_ / "upload", options).first.id;
-  EXPECT_TRUE(library_.add("other", folder_ / "upload", options).second);
+  const std::string id = library_.add("one", folder_ / "upload", raw()).first.id;
+  EXPECT_TRUE(library_.add("other", folder_ / "upload", raw()).second);
   EXPECT_EQ(blob_count(), 1U);
   library_.erase("one", id);
   library_.finish_erasing();
@@ -121,12 +139,9 @@ TEST_F(VolumeLibraryTest, WhatAnotherHasNeedsAsMuchRoomAsWhatIsNew) {
                         {.max_bytes = volumes_.named_bytes()});
   VolumeLibrary library(data_, blobs_, volumes_, full, {},
                         {.bounds = {}, .at_once = 2, .program = ISOMESH_IMPORT});
-  const RawDescription raw{
-      .dims = kDims, .type = SampleType::kUint8, .geometry = {}, .big_endian = false};
   const auto add_as = [&](const std::string& owner, const std::string& bytes) {
     test::write_file(folder_ / "upload", bytes);
-    return code_thrown_by(
-        [&] { library.add(owner, folder_ / "upload", {.raw = raw, .series = {}}); });
+    return code_thrown_by([&] { library.add(owner, folder_ / "upload", raw()); });
   };
   const std::string others(bytes_.rbegin(), bytes_.rend());
   EXPECT_EQ(add_as("other", others), ErrorCode::kOutOfSpace);
@@ -137,30 +152,12 @@ TEST_F(VolumeLibraryTest, WhatAnotherHasNeedsAsMuchRoomAsWhatIsNew) {
 // Whoever erases does not wait for the disk, which takes long for what is large and no time for
 // what another owner has.
 TEST_F(VolumeLibraryTest, AVolumeIsErasedBeforeItsSamplesAre) {
-  const Volume volume = add_bytes(bytes_).first;
-  std::shared_mutex coming;
-  BlobEraser eraser(blobs_, volumes_, coming);
-  {
-    const std::shared_lock somebody_stores(coming);
-    volumes_.erase("", volume.id);
-    eraser.erase(volume.id);
-    EXPECT_EQ(blob_count(), 1U);
-  }
-  eraser.finish();
+  erase_while_somebody_stores([this](const Volume&) { EXPECT_EQ(blob_count(), 1U); });
   EXPECT_EQ(blob_count(), 0U);
 }
 
 TEST_F(VolumeLibraryTest, SamplesThatCameAgainMeanwhileStay) {
-  const Volume volume = add_bytes(bytes_).first;
-  std::shared_mutex coming;
-  BlobEraser eraser(blobs_, volumes_, coming);
-  {
-    const std::shared_lock somebody_stores(coming);
-    volumes_.erase("", volume.id);
-    eraser.erase(volume.id);
-    volumes_.add("other", volume);
-  }
-  eraser.finish();
+  erase_while_somebody_stores([this](const Volume& volume) { volumes_.add("other", volume); });
   EXPECT_EQ(blob_count(), 1U);
 }
 
@@ -174,9 +171,7 @@ TEST_F(VolumeLibraryTest, OfManyEqualUploadsOneIsNew) {
   std::vector<std::jthread> threads;
   for (int thread = 0; thread < 8; ++thread) {
     threads.emplace_back([&] {
-      const RawDescription raw{
-          .dims = kDims, .type = SampleType::kUint8, .geometry = {}, .big_endian = false};
-      if (library_.add("", folder_ / "upload", {.raw = raw}).second) ++added;
+      if (library_.add("", folder_ / "upload", raw()).second) ++added;
     });
   }
   threads.clear();

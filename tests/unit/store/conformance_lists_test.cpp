@@ -1,0 +1,89 @@
+// What every engine's lists of jobs hold, and for whom.
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "tests/support/errors.h"
+#include "tests/unit/store/engine.h"
+
+namespace isomesh::store {
+namespace {
+
+using std::chrono::milliseconds;
+using test::code_thrown_by;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+class JobListConformance : public test::EngineTest {
+ protected:
+  static std::vector<std::string> ids_of(const std::vector<Job>& jobs) {
+    std::vector<std::string> ids;
+    for (const Job& job : jobs) ids.push_back(job.id);
+    return ids;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Engines, JobListConformance, testing::ValuesIn(test::all_engines()),
+                         test::name_of);
+
+// --- Listing
+
+TEST_P(JobListConformance, ListsTheNewestFirstInPages) {
+  std::vector<std::string> ids;
+  for (int n = 0; n < 25; ++n) ids.push_back(submit().id);
+  const std::vector<std::string> expected(ids.rbegin(), ids.rend());
+  EXPECT_EQ(ids_of(jobs().list("", {}, "", 100)), expected);
+  std::vector<std::string> paged;
+  for (std::string after; paged.size() < expected.size();) {
+    const std::vector<std::string> page = ids_of(jobs().list("", {}, after, 10));
+    ASSERT_THAT(page, testing::Not(IsEmpty()));
+    paged.insert(paged.end(), page.begin(), page.end());
+    after = page.back();
+  }
+  EXPECT_EQ(paged, expected);
+  EXPECT_THAT(jobs().list("", {}, expected.back(), 10), IsEmpty());
+}
+
+TEST_P(JobListConformance, ListsByState) {
+  const std::string cancelled = submit().id;
+  jobs().cancel("", cancelled);
+  const std::string running = submit().id;
+  claimed();
+  const std::string queued = submit().id;
+  EXPECT_THAT(ids_of(jobs().list("", JobState::kCancelled, "", 10)), ElementsAre(cancelled));
+  EXPECT_THAT(ids_of(jobs().list("", JobState::kRunning, "", 10)), ElementsAre(running));
+  EXPECT_THAT(ids_of(jobs().list("", JobState::kQueued, "", 10)), ElementsAre(queued));
+  EXPECT_THAT(jobs().list("", JobState::kFailed, "", 10), IsEmpty());
+}
+
+TEST_P(JobListConformance, ACursorNeedNotNameAJob) {
+  const std::string id = submit().id;
+  EXPECT_THAT(jobs().list("", {}, "0", 10), IsEmpty());
+  EXPECT_THAT(ids_of(jobs().list("", {}, "~", 10)), ElementsAre(id));
+}
+
+// --- Owners
+
+TEST_P(JobListConformance, AnOwnerSeesItsOwnOnly) {
+  const std::string mine = submit(parameters(), "").id;
+  const std::string theirs = submit(parameters(), "other").id;
+  EXPECT_EQ(code_thrown_by([&] { jobs().get("", theirs); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_thrown_by([&] { jobs().cancel("", theirs); }), ErrorCode::kNotFound);
+  EXPECT_THAT(ids_of(jobs().list("other", {}, "", 10)), ElementsAre(theirs));
+  EXPECT_THAT(ids_of(jobs().list(std::nullopt, {}, "", 10)), ElementsAre(theirs, mine));
+  EXPECT_EQ(jobs().get(std::nullopt, theirs).id, theirs);
+  EXPECT_THAT(jobs().events("", theirs, 0, milliseconds(0)), IsEmpty());
+  EXPECT_EQ(jobs().events("other", "", 0, milliseconds(0)).size(), 1U);
+}
+
+TEST_P(JobListConformance, AnOwnersVolumeIsNoOthers) {
+  add_volume("other", "theirs");
+  JobParameters stolen = parameters();
+  stolen.volume = "theirs";
+  EXPECT_EQ(code_thrown_by([&] { submit(stolen, ""); }), ErrorCode::kNotFound);
+}
+
+}  // namespace
+}  // namespace isomesh::store
