@@ -5,9 +5,11 @@
 namespace isomesh {
 
 // Of an upload's import, which its answer waits for.
-inline constexpr int kImportNiceness = 5;
-// Of what takes long by its nature: meshes, and answers that are computed.
-inline constexpr int kComputingNiceness = 10;
+inline constexpr int kImportNiceness = 3;
+// Of answers that take long by their nature: lists, slices, histograms.
+inline constexpr int kComputingNiceness = 7;
+// Of meshes.
+inline constexpr int kJobNiceness = 10;
 
 // Makes the calling thread nicer by that, and with it the threads and processes that it starts from
 // now on. It cannot be undone. Thread safe.

@@ -245,7 +245,7 @@ const char* __tsan_default_options() { return "halt_on_error=1"; }
 #endif
 
 int main() {
-  be_nicer(kComputingNiceness);
+  be_nicer(kJobNiceness);
   keep_freed_memory();
   Lines lines;
   const JobSetup setup = setup_from(lines.next());

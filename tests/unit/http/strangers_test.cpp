@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/niceness.h"
 #include "tests/unit/http/connections_fixture.h"
 
 namespace isomesh::http::fixture {
@@ -119,7 +120,8 @@ TEST_F(StrangersTest, WhatAStrangerHasComputedWaitsForTheStrangersOwn) {
   hang_on(20, request("GET", "/compute"), kStranger);
   ASSERT_TRUE(eventually([&] { return runs_ == 2; }));
   const std::string niceness = get("/compute-fast").body;
-  EXPECT_EQ(niceness, std::to_string(std::min(::getpriority(PRIO_PROCESS, 0) + 10, 19)));
+  EXPECT_EQ(niceness,
+            std::to_string(std::min(::getpriority(PRIO_PROCESS, 0) + kComputingNiceness, 19)));
   EXPECT_EQ(get("/status").body, "ok");
   EXPECT_EQ(runs_, 3);
   computing_.set_value();

@@ -73,7 +73,7 @@ TEST_F(JobProcessTest, ItsProcessIsNicerThanTheDaemon) {
   make(process_, order_of(add_sphere(), 0.5));
   for (const pid_t process : started()) {
     EXPECT_EQ(::getpriority(PRIO_PROCESS, static_cast<id_t>(process)),
-              std::min(::getpriority(PRIO_PROCESS, 0) + kComputingNiceness, 19));
+              std::min(::getpriority(PRIO_PROCESS, 0) + kJobNiceness, 19));
   }
   EXPECT_EQ(started().size(), 1U);
 }
