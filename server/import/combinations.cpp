@@ -101,4 +101,14 @@ bool Combinations::write(std::span<const State> states, SampleType type,
                                     : write_as<std::uint16_t>(values, target);
 }
 
+std::optional<Note> Combinations::note() const {
+  if (overlapping_samples_ == 0) return std::nullopt;
+  return note_of(NoteCode::kOverlappingSegments,
+                 std::to_string(overlapping_samples_) +
+                     (overlapping_samples_ == 1 ? " sample is" : " samples are") +
+                     " of several segments; " + std::to_string(overlaps_) +
+                     (overlaps_ == 1 ? " value stands" : " values stand") +
+                     " for their combinations.");
+}
+
 }  // namespace isomesh::import

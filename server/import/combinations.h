@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -35,18 +36,15 @@ class Combinations {
   // more combinations than that.
   std::uint32_t value(State state);
 
-  // How many values stand for several labels.
-  std::size_t overlaps() const { return overlaps_; }
-
-  // How many samples of several labels value() was asked for by write().
-  std::uint64_t overlapping_samples() const { return overlapping_samples_; }
-
   // The values that have been asked for of each label of which another value than its own has; the
   // entries' `values` are set, those without an entry get one. Ascending.
   std::vector<LabelEntry> entries(std::vector<LabelEntry> named) const;
 
   // Writes the values of a run of samples as `type`, uint8 or uint16. False when one does not fit.
   bool write(std::span<const State> states, SampleType type, std::span<std::byte> target);
+
+  // How many of the samples that were written are of several labels; empty where none is.
+  std::optional<Note> note() const;
 
  private:
   // One label more than another combination.

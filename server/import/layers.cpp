@@ -108,14 +108,6 @@ std::optional<Combinations> write_states(const PlainSamples& samples, const Sour
 
 }  // namespace
 
-Note overlap_note(std::size_t combinations, std::uint64_t samples) {
-  return note_of(NoteCode::kOverlappingSegments,
-                 std::to_string(samples) + " samples are of several segments; " +
-                     std::to_string(combinations) +
-                     (combinations == 1 ? " value stands" : " values stand") +
-                     " for the combinations.");
-}
-
 Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Volume volume,
                     const std::filesystem::path& target) {
   for (const SampleType type : {SampleType::kUint8, SampleType::kUint16}) {
@@ -132,10 +124,7 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
         });
     if (!combinations) continue;
     volume.labels = combinations->entries(source.labels);
-    if (combinations->overlaps() > 0) {
-      volume.notes.push_back(
-          overlap_note(combinations->overlaps(), combinations->overlapping_samples()));
-    }
+    if (auto note = combinations->note()) volume.notes.push_back(std::move(*note));
     return finish(writer, std::move(volume));
   }
   throw Error(ErrorCode::kInternal, "No type holds the labels of a segmentation.");

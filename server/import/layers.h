@@ -15,7 +15,4 @@ namespace isomesh::import {
 Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Volume volume,
                     const std::filesystem::path& target);
 
-// How many segments overlap, and where, as a note tells it.
-Note overlap_note(std::size_t combinations, std::uint64_t samples);
-
 }  // namespace isomesh::import

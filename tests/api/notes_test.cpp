@@ -120,6 +120,25 @@ std::string sparse_segmentation() {
                element(0x7fe0, 0x10, "OW", halves(3 * 64)));
 }
 
+// Of one segment, in two planes.
+std::string fractional_segmentation() {
+  std::vector<std::string> frames;
+  for (const char* z : {"0", "1"}) {
+    frames.push_back(
+        sequence(0x20, 0x9113, {element(0x20, 0x32, "DS", "0\\0\\" + std::string(z))}) +
+        sequence(0x62, 0xa, {number(0x62, 0xb, 1)}));
+  }
+  const std::string shared =
+      sequence(0x20, 0x9116, {element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0")}) +
+      sequence(0x28, 0x9110, {element(0x28, 0x30, "DS", "1\\1")});
+  return dicom(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.66.4") +
+               element(8, 0x60, "CS", "SEG") + element(0x20, 0xe, "UI", "1.2.3.4") +
+               element(0x28, 8, "IS", "2") + square_image() +
+               element(0x62, 1, "CS", "FRACTIONAL") + number(0x62, 0xe, 255) +
+               sequence(0x5200, 0x9229, {shared}) + sequence(0x5200, 0x9230, frames) +
+               element(0x7fe0, 0x10, "OW", halves(2 * 64)));
+}
+
 std::string csa_field(std::string name, const std::vector<std::string>& values) {
   name.resize(64, '\0');
   std::string field = name + little(0) + "FD" + std::string(2, '\0') + little(4) +
@@ -182,6 +201,7 @@ const std::map<std::string, Shown>& shown() {
           "domain\nencoding: raw\nspace: LPS\nspace directions: none (1,0,0) (0,1,0) "
           "(0,0,1)\nSegment0_Layer:=0\nSegment1_Layer:=1\n\n" +
               std::string(16, '\1')}}}},
+      {"fractional-segments", {{{"a.dcm", fractional_segmentation()}}}},
       {"empty-planes", {{{"a.dcm", sparse_segmentation()}}}},
       {"distance-assumed", {{{"a.dcm", mosaic()}}}},
       {"frame-of-reference",

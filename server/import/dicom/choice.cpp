@@ -112,7 +112,7 @@ std::vector<Slice> choose_label_slices(std::vector<Slice> slices, const ImportOp
                                        std::vector<Note>& notes) {
   SeriesVolumes objects = one_an_object(slices);
   if (objects.volumes.size() > 1) return chosen_of(std::move(objects), options, notes);
-  if (!options.volume || !slices.front().image->segmentation->is_binary) {
+  if (!options.volume || slices.front().image->segmentation->kind == SegmentKind::kLabelMap) {
     return chosen_of({"", {{"", std::move(slices), 0}}}, options, notes);
   }
   std::vector<Slice> chosen = chosen_of(one_a_segment(slices), options, notes);

@@ -130,6 +130,18 @@ std::optional<std::uint32_t> DataSet::unsigned_number(Tag tag) const {
   return number;
 }
 
+std::vector<std::uint32_t> DataSet::unsigned_numbers(Tag tag) const {
+  const Element* element = find(tag);
+  if (element == nullptr || element->value.size() % 2 != 0) return {};
+  std::vector<std::uint32_t> numbers;
+  for (std::size_t at = 0; at < element->value.size(); at += 2) {
+    const auto first = static_cast<unsigned char>(element->value[at]);
+    const auto second = static_cast<unsigned char>(element->value[at + 1]);
+    numbers.push_back(big_endian ? first << 8U | second : second << 8U | first);
+  }
+  return numbers;
+}
+
 std::vector<double> DataSet::binary_reals(Tag tag) const {
   const Element* element = find(tag);
   if (element == nullptr || element->value.size() % sizeof(double) != 0) return {};

@@ -60,6 +60,9 @@ class DataSet {
   // Binary numbers of 16 (US) or 32 bits (UL).
   std::optional<std::uint32_t> unsigned_number(Tag tag) const;
 
+  // Binary numbers of 16 bits (US). Empty when there are none.
+  std::vector<std::uint32_t> unsigned_numbers(Tag tag) const;
+
   // Binary numbers of double precision (FD). Empty when there are none.
   std::vector<double> binary_reals(Tag tag) const;
 };

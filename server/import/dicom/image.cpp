@@ -42,9 +42,10 @@ void refuse_unplaced_frames(const DataSet& data, std::uint32_t frames) {
 }
 
 void check_label_layout(const Segmentation& segmentation, const PixelLayout& layout) {
-  const bool fits = segmentation.is_binary
-                        ? layout.bits_allocated == 1
-                        : layout.bits_allocated == 8 || layout.bits_allocated == 16;
+  const bool is_binary = segmentation.kind == SegmentKind::kBinary;
+  const bool is_label_map = segmentation.kind == SegmentKind::kLabelMap;
+  const bool fits = layout.bits_allocated == (is_binary ? 1U : 8U) ||
+                    (is_label_map && layout.bits_allocated == 16);
   if (fits && !layout.is_signed && !layout.is_float) return;
   throw_unusable("The DICOM segmentation's samples are no labels: they have " +
                  std::to_string(layout.bits_allocated) + " bits" +
@@ -79,7 +80,7 @@ Frame describe_frame(const DataSet& data, std::uint32_t number, const Image& ima
   frame.number = number;
   frame.plane = plane_of(attributes);
   frame.rescale = rescale_of(attributes.place(kPixelValueTransformationSequence));
-  if (image.segmentation && image.segmentation->is_binary) {
+  if (image.segmentation && image.segmentation->kind != SegmentKind::kLabelMap) {
     frame.segment = segment_of(data, number);
   }
   frame.phases = phases_of_frame(data, number);

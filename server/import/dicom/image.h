@@ -60,15 +60,24 @@ struct Frame {
 // A segment of a segmentation.
 struct Segment {
   std::uint32_t number = 0;
-  std::string label;  // UTF-8
+  std::string label;                 // UTF-8
+  std::optional<std::string> color;  // "#rrggbb"
 
   bool operator==(const Segment&) const = default;
+};
+
+// What the samples of a segmentation are.
+enum class SegmentKind {
+  kBinary,      // bits, in frames of one segment each
+  kFractional,  // shares or probabilities, in such frames
+  kLabelMap,    // numbers of segments
 };
 
 // What only segmentations (PS3.3, A.51 and A.108) have.
 struct Segmentation {
   std::vector<Segment> segments;
-  bool is_binary = false;                // else a label map
+  SegmentKind kind = SegmentKind::kBinary;
+  std::uint32_t maximum = 1;             // of fractional samples
   std::optional<double> slice_distance;  // mm
 };
 

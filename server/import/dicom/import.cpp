@@ -89,15 +89,15 @@ bool write_samples(const Stack& stack, SampleType type, OpenFile& file,
   return true;
 }
 
-bool write_stack(const Stack& stack, SampleType type, OpenFile& file, std::span<std::byte> target) {
-  if (!are_labels(stack)) return write_samples(stack, type, file, target);
-  write_labels(
-      stack, type,
+// Tells in the volume what its samples tell of labels.
+bool write_stack(const Stack& stack, OpenFile& file, std::span<std::byte> target, Volume& volume) {
+  if (!are_labels(stack)) return write_samples(stack, volume.type, file, target);
+  return write_labels(
+      stack, volume.type,
       [&](std::size_t place, std::span<std::byte> stored) {
         read_slice(stack, place, file, stored);
       },
-      target);
-  return true;
+      target, volume);
 }
 
 Volume write_volume(const Stack& stack, Volume volume, OpenFile& file, const ImportTask& task) {
@@ -105,12 +105,12 @@ Volume write_volume(const Stack& stack, Volume volume, OpenFile& file, const Imp
   std::vector<std::byte> first(stack.slices.front().image->layout.frame_bytes());
   read_slice(stack, 0, file, first);
   const std::vector<SampleType> types =
-      are_labels(stack) ? std::vector{label_type(stack.slices)} : candidate_types(stack.slices);
+      are_labels(stack) ? label_types(stack) : candidate_types(stack.slices);
   for (const SampleType type : types) {
     check_limits(volume.sample_count(), type, task.limits);
     volume.type = type;
     CanonicalWriter writer(task.target, {volume.dims, type, volume.geometry});
-    if (write_stack(stack, type, file, writer.samples())) return finish(writer, volume);
+    if (write_stack(stack, file, writer.samples(), volume)) return finish(writer, volume);
   }
   throw Error(ErrorCode::kInternal, "No type holds a DICOM volume's samples.");
 }
@@ -126,6 +126,15 @@ Volume describe_volume(const Stack& stack) {
   }
   if (!image.modality.empty()) volume.modality = image.modality;
   return volume;
+}
+
+// What is known to suit the volume, and may be better than what its samples suggest.
+void suggest(const Stack& stack, Volume& volume) {
+  const Image& image = *stack.slices.front().image;
+  volume.presets = volume::presets_for(image.modality, image.rescale_type, volume.range);
+  if (!are_labels(stack) || !are_shares(stack)) return;
+  volume.suggested_iso = half_of(stack);
+  if (half_of(stack) <= volume.range[1]) volume.presets.push_back({"segment", half_of(stack)});
 }
 
 DicomIdentity identify(const Stack& stack, std::span<const Source> sources, const DataSet& data) {
@@ -158,10 +167,12 @@ Volume import_dicom(std::span<const std::filesystem::path> files, const ImportTa
   const dicom::Stack stack = dicom::choose_stack(dicom::slices_of(sources), task.options, notes);
   dicom::OpenFile file(sources, task.scratch, most_sample_bytes);
   Volume volume = dicom::write_volume(stack, dicom::describe_volume(stack), file, task);
-  const dicom::Image& image = *stack.slices.front().image;
-  volume.presets = volume::presets_for(image.modality, image.rescale_type, volume.range);
+  dicom::suggest(stack, volume);
   volume.ignored = std::move(upload.ignored);
   std::ranges::move(notes, std::back_inserter(volume.notes));
+  if (dicom::are_labels(stack)) {
+    if (auto note = dicom::note_on_shares(stack)) volume.notes.push_back(std::move(*note));
+  }
   volume.dicom = dicom::identify(stack, sources, file.data());
   if (!volume.dicom->series_description.empty()) volume.name = volume.dicom->series_description;
   return volume;

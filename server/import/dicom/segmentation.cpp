@@ -2,18 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <numeric>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 
 #include "base/text.h"
 #include "proto/samples.h"
+#include "server/import/combinations.h"
 #include "server/import/dicom/attributes.h"
+#include "server/import/dicom/display_color.h"
 #include "server/import/dicom/placement.h"
 #include "server/import/dicom/tags.h"
 #include "server/import/dicom/text.h"
 #include "server/import/dicom/values.h"
 #include "server/import/dicom/vectors.h"
+#include "server/import/label_table.h"
 #include "server/import/source.h"
 
 namespace isomesh::import::dicom {
@@ -27,7 +32,7 @@ std::vector<Segment> segments_of(const DataSet& data) {
   if (sequence == nullptr) return segments;
   for (const DataSet& item : sequence->items) {
     const auto number = item.unsigned_number(kSegmentNumber);
-    if (number) segments.push_back({*number, utf8(item, kSegmentLabel)});
+    if (number) segments.push_back({*number, utf8(item, kSegmentLabel), display_color(item)});
   }
   std::ranges::sort(segments, {}, &Segment::number);
   return segments;
@@ -116,30 +121,108 @@ void refuse_doubled(const Stack& stack) {
                  " at one position.");
 }
 
-[[noreturn]] void throw_overlap(const Slice& slice, std::uint64_t one) {
-  const Image& image = *slice.image;
-  std::vector<Choice> choices;
-  for (const Segment& segment : image.segmentation->segments) {
-    choices.push_back(
-        {"volume", std::to_string(choices.size()), segment_name(image, segment.number)});
-  }
-  throw_choice("The segmentation's segments overlap, " + segment_name(image, one) + " and " +
-                   segment_name(image, slice.frame->segment) +
-                   " for two, so they make no single label map; choose one of its " +
-                   count_of(choices.size(), "segment") + " with volume=N.",
-               choices);
+SegmentKind kind_of(const DataSet& data) {
+  const std::string_view type = data.text(kSegmentationType);
+  if (type == "BINARY") return SegmentKind::kBinary;
+  if (type == "FRACTIONAL") return SegmentKind::kFractional;
+  if (type == "LABELMAP") return SegmentKind::kLabelMap;
+  throw_unusable("The DICOM segmentation is " + in_quotes(type) +
+                 ", which is unknown; binary and fractional ones and label maps are read.");
 }
 
-template <class Label>
-void mark(std::span<const std::byte> bits, const Slice& slice, std::span<std::byte> plane) {
-  const auto label = static_cast<Label>(slice.frame->segment);
-  for (std::size_t at = 0; at < bits.size(); ++at) {
-    if (bits[at] == std::byte{0}) continue;
-    Label found;
-    std::memcpy(&found, plane.data() + at * sizeof(Label), sizeof(Label));
-    if (found != 0) throw_overlap(slice, found);
-    std::memcpy(plane.data() + at * sizeof(Label), &label, sizeof(Label));
+std::uint32_t maximum_of(const DataSet& data) {
+  const auto maximum = data.unsigned_number(kMaximumFractionalValue);
+  if (maximum && *maximum > 0 && *maximum <= 0xFF) return *maximum;
+  throw_unusable("The fractional DICOM segmentation does not tell the largest value that its "
+                 "samples may have " +
+                 tag_name(kMaximumFractionalValue) + ".");
+}
+
+const Segmentation& segmentation_of(const Stack& stack) {
+  return *stack.slices.front().image->segmentation;
+}
+
+bool is_label_map(const Stack& stack) {
+  return segmentation_of(stack).kind == SegmentKind::kLabelMap;
+}
+
+std::uint32_t highest_segment(const Stack& stack) {
+  const auto segment = [](const Slice& slice) { return slice.frame->segment; };
+  return segment(std::ranges::max(stack.slices, {}, segment));
+}
+
+// Samples as they are stored.
+void copy_frames(const Stack& stack, SampleType type, const ReadSlice& read,
+                 std::span<std::byte> target) {
+  std::vector<std::byte> stored;
+  for (std::size_t i = 0; i < stack.slices.size(); ++i) {
+    const PixelLayout& layout = stack.slices[i].image->layout;
+    stored.resize(layout.frame_bytes());
+    read(i, stored);
+    const std::size_t bytes = layout.samples() * bytes_per_sample(type);
+    convert_frame(stored, layout, {}, type, target.subspan(stack.planes[i] * bytes, bytes));
   }
+}
+
+// The slices, those of a plane by their segments, as combinations want them.
+std::vector<std::size_t> by_plane_and_segment(const Stack& stack) {
+  std::vector<std::size_t> order(stack.slices.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, [&](std::size_t i) {
+    return std::pair(stack.planes[i], stack.slices[i].frame->segment);
+  });
+  return order;
+}
+
+// Of samples that are half of the maximum or more, which a set bit is.
+void add_segment(std::span<const std::byte> samples, const Slice& slice,
+                 std::span<Combinations::State> states, Combinations& combinations) {
+  const std::uint32_t maximum = slice.image->segmentation->maximum;
+  for (std::size_t at = 0; at < samples.size(); ++at) {
+    if (std::to_integer<std::uint32_t>(samples[at]) * 2 < maximum) continue;
+    states[at] = combinations.with(states[at], slice.frame->segment);
+  }
+}
+
+// False when a value does not fit into the type.
+bool write_combinations(const Stack& stack, SampleType type, const ReadSlice& read,
+                        std::span<std::byte> target, Combinations& combinations) {
+  const std::vector<std::size_t> order = by_plane_and_segment(stack);
+  std::vector<std::byte> stored;
+  std::vector<Combinations::State> states;
+  for (std::size_t at = 0; at < order.size(); ++at) {
+    const std::size_t i = order[at];
+    const PixelLayout& layout = stack.slices[i].image->layout;
+    const std::uint32_t plane = stack.planes[i];
+    if (at == 0 || plane != stack.planes[order[at - 1]]) {
+      states.assign(layout.samples(), Combinations::kNone);
+    }
+    stored.resize(layout.frame_bytes());
+    read(i, stored);
+    add_segment(stored, stack.slices[i], states, combinations);
+    if (at + 1 < order.size() && stack.planes[order[at + 1]] == plane) continue;
+    const std::size_t bytes = layout.samples() * bytes_per_sample(type);
+    if (!combinations.write(states, type, target.subspan(plane * bytes, bytes))) return false;
+  }
+  return true;
+}
+
+std::vector<LabelEntry> entries_of(const std::vector<Segment>& segments) {
+  std::vector<LabelEntry> entries;
+  for (const Segment& segment : segments) {
+    entries.push_back(
+        {.label = segment.number, .name = label_name(segment.label), .color = segment.color});
+  }
+  return label_table(std::move(entries));
+}
+
+// Those that have a frame.
+std::vector<Segment> segments_in(const Stack& stack) {
+  std::set<std::uint32_t> numbers;
+  for (const Slice& slice : stack.slices) numbers.insert(slice.frame->segment);
+  std::vector<Segment> segments = segmentation_of(stack).segments;
+  std::erase_if(segments, [&](const Segment& each) { return !numbers.contains(each.number); });
+  return segments;
 }
 
 }  // namespace
@@ -147,13 +230,10 @@ void mark(std::span<const std::byte> bits, const Slice& slice, std::span<std::by
 bool is_segmentation(const DataSet& data) { return !data.text(kSegmentationType).empty(); }
 
 Segmentation describe_segmentation(const DataSet& data) {
-  const std::string_view type = data.text(kSegmentationType);
-  if (type != "BINARY" && type != "LABELMAP") {
-    throw_unusable("The DICOM segmentation is " + in_quotes(type) +
-                   ", which gives samples no labels; binary ones and label maps are read.");
-  }
+  const SegmentKind kind = kind_of(data);
   return {.segments = segments_of(data),
-          .is_binary = type == "BINARY",
+          .kind = kind,
+          .maximum = kind == SegmentKind::kFractional ? maximum_of(data) : 1,
           .slice_distance = slice_distance(data)};
 }
 
@@ -190,35 +270,48 @@ Stack make_label_stack(std::vector<Slice> slices) {
   return stack;
 }
 
-SampleType label_type(std::span<const Slice> slices) {
-  const Image& image = *slices.front().image;
-  if (!image.segmentation->is_binary) {
-    return image.layout.bits_allocated == 8 ? SampleType::kUint8 : SampleType::kUint16;
-  }
-  const auto highest =
-      std::ranges::max(slices, {}, [](const Slice& slice) { return slice.frame->segment; });
-  return highest.frame->segment <= 0xFF ? SampleType::kUint8 : SampleType::kUint16;
+bool are_shares(const Stack& stack) {
+  const std::uint32_t segment = stack.slices.front().frame->segment;
+  return segmentation_of(stack).kind == SegmentKind::kFractional &&
+         std::ranges::all_of(stack.slices, [&](const Slice& slice) {
+           return slice.frame->segment == segment;
+         });
 }
 
-void write_labels(const Stack& stack, SampleType type, const ReadSlice& read,
-                  std::span<std::byte> target) {
-  std::ranges::fill(target, std::byte{0});
-  std::vector<std::byte> stored;
-  for (std::size_t i = 0; i < stack.slices.size(); ++i) {
-    const Slice& slice = stack.slices[i];
-    const PixelLayout& layout = slice.image->layout;
-    stored.resize(layout.frame_bytes());
-    read(i, stored);
-    const std::size_t bytes = layout.samples() * bytes_per_sample(type);
-    const std::span<std::byte> plane = target.subspan(stack.planes[i] * bytes, bytes);
-    if (!slice.image->segmentation->is_binary) {
-      convert_frame(stored, layout, {}, type, plane);
-    } else if (type == SampleType::kUint8) {
-      mark<std::uint8_t>(stored, slice, plane);
-    } else {
-      mark<std::uint16_t>(stored, slice, plane);
-    }
+std::vector<SampleType> label_types(const Stack& stack) {
+  if (are_shares(stack)) return {SampleType::kUint8};
+  if (is_label_map(stack)) {
+    const unsigned bits = stack.slices.front().image->layout.bits_allocated;
+    return {bits == 8 ? SampleType::kUint8 : SampleType::kUint16};
   }
+  if (highest_segment(stack) > 0xFF) return {SampleType::kUint16};
+  return {SampleType::kUint8, SampleType::kUint16};
 }
+
+bool write_labels(const Stack& stack, SampleType type, const ReadSlice& read,
+                  std::span<std::byte> target, Volume& volume) {
+  std::ranges::fill(target, std::byte{0});
+  if (are_shares(stack) || is_label_map(stack)) {
+    copy_frames(stack, type, read, target);
+    if (is_label_map(stack)) volume.labels = entries_of(segmentation_of(stack).segments);
+    return true;
+  }
+  Combinations combinations(highest_segment(stack));
+  if (!write_combinations(stack, type, read, target, combinations)) return false;
+  volume.labels = combinations.entries(entries_of(segments_in(stack)));
+  if (auto note = combinations.note()) volume.notes.push_back(std::move(*note));
+  return true;
+}
+
+std::optional<Note> note_on_shares(const Stack& stack) {
+  const Segmentation& segmentation = segmentation_of(stack);
+  if (segmentation.kind != SegmentKind::kFractional) return std::nullopt;
+  return note_of(NoteCode::kFractionalSegments,
+                 "A segment is where its samples are " + to_text(half_of(stack)) +
+                     " or more, half of their maximum" +
+                     (are_shares(stack) ? "; they are kept as they are." : "."));
+}
+
+double half_of(const Stack& stack) { return segmentation_of(stack).maximum / 2.0; }
 
 }  // namespace isomesh::import::dicom

@@ -9,6 +9,7 @@
 
 #include "base/text.h"
 #include "server/import/archives/gzip.h"
+#include "server/import/formats/nifti_extensions.h"
 #include "server/import/formats/nifti_header.h"
 
 namespace isomesh::import {
@@ -380,8 +381,10 @@ SourceVolume parse_nifti(const InputFile& file, const Companions& companions,
   // A pair's samples are looked for first: without them nothing else that is wrong can be helped.
   const std::string image = header.is_detached ? image_name(companions) : "";
   SourceVolume volume = describe(header, options);
+  const std::uint64_t end = header.is_detached ? file.size() : payload_offset(header);
+  volume.labels = nifti_labels(file, header, end, volume.chosen.index);
   if (!header.is_detached) {
-    volume.payload.offset = payload_offset(header);
+    volume.payload.offset = end;
     return volume;
   }
   const InputFile samples(companion(image, companions));

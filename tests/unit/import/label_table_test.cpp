@@ -67,7 +67,6 @@ TEST(Combinations, AreTheSameHoweverTheyAreMade) {
   EXPECT_EQ(combinations.value(both), 10U);
   EXPECT_EQ(combinations.value(combinations.with(Combinations::kNone, 9)), 9U);
   EXPECT_EQ(combinations.new_label(), 11U);
-  EXPECT_EQ(combinations.overlaps(), 1U);
   EXPECT_THAT(combinations.entries({{.label = 4, .name = "a"}, {.label = 5, .name = "b"}}),
               ElementsAre(LabelEntry{.label = 4, .name = "a", .values = {4, 10}},
                           LabelEntry{.label = 5, .name = "b"},
@@ -80,7 +79,6 @@ TEST(Combinations, OnTheWayToOthersTakeNoValue) {
   const auto two = combinations.with(combinations.with(Combinations::kNone, 1), 2);
   const auto three = combinations.with(two, 3);
   EXPECT_EQ(combinations.value(three), 4U);
-  EXPECT_EQ(combinations.overlaps(), 1U);
   EXPECT_THAT(combinations.entries({}), ElementsAre(LabelEntry{.label = 1, .values = {4}},
                                                     LabelEntry{.label = 2, .values = {4}},
                                                     LabelEntry{.label = 3, .values = {4}}));

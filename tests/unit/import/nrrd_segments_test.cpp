@@ -88,7 +88,7 @@ TEST(NrrdSegments, InLayersMayOverlap) {
               ElementsAre(entry(1, "liver", {1, 3}), entry(2, "tumour", {2, 3})));
   ASSERT_THAT(codes_of(outcome), ElementsAre("overlapping-segments", "looks-like-labels"));
   EXPECT_EQ(outcome.volume.notes[0].detail,
-            "1 samples are of several segments; 1 value stands for the combinations.");
+            "1 sample is of several segments; 1 value stands for their combinations.");
   EXPECT_EQ(outcome.volume.range, (std::array<double, 2>{0, 3}));
 
   const Outcome packed = import_bytes(with_segments(with(layers_first(), "encoding", "gzip"),

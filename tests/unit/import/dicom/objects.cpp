@@ -80,6 +80,14 @@ DicomObject& DicomObject::number(dicom::Tag tag, unsigned value) {
   return *this;
 }
 
+DicomObject& DicomObject::numbers(dicom::Tag tag, const std::array<unsigned, 3>& values) {
+  number(tag, values[0]);
+  for (const unsigned value : {values[1], values[2]}) {
+    values_[tag].bytes += test::number(value, 2, false);
+  }
+  return *this;
+}
+
 DicomObject& DicomObject::bytes(dicom::Tag tag, std::string_view vr, std::string value) {
   Value& element = values_[tag] = {};
   element.vr = vr;

@@ -1,6 +1,7 @@
 // DICOM files as scanners write them, and as nobody should.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -23,6 +24,7 @@ class DicomObject {
  public:
   DicomObject& text(dicom::Tag tag, std::string_view vr, std::string_view value);
   DicomObject& number(dicom::Tag tag, unsigned value);                         // US
+  DicomObject& numbers(dicom::Tag tag, const std::array<unsigned, 3>& values);  // US
   DicomObject& bytes(dicom::Tag tag, std::string_view vr, std::string value);  // as they are
   DicomObject& items(dicom::Tag tag, std::vector<DicomObject> items);
   // Native samples: little-endian words of `bytes_per_word`, turned around where the syntax asks.

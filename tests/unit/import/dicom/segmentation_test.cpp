@@ -46,23 +46,67 @@ TEST(DicomSegmentation, WithHighNumbersHasWiderLabels) {
   EXPECT_EQ(samples_of<std::uint16_t>(outcome)[kSegmentSamples + 3], 300);
 }
 
-TEST(DicomSegmentation, WithOverlapsOffersItsSegments) {
+LabelEntry entry(std::int64_t label, const std::string& name,
+                 std::vector<std::int64_t> values = {}) {
+  return {.label = label, .name = name, .color = {}, .values = std::move(values)};
+}
+
+TEST(DicomSegmentation, NamesItsLabels) {
   SegmentObject object = two_segments();
-  object.frames[2].labels = {14};
+  object.segments = {"liver", "spleen", "absent"};
+  // Red and blue of sRGB, by D50, and black.
+  object.colors = {{35580, 53665, 50857}, {19377, 50449, 4105}, {0, 32896, 32896}};
   const Outcome outcome = import_labels(object);
-  EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-  EXPECT_THAT(outcome.error, HasSubstr("overlap, 1 (\"liver\") and 2 (\"spleen\")"));
-  EXPECT_THAT(outcome.error, HasSubstr("one of its 2 segments"));
-  EXPECT_THAT(outcome.remedy.choices,
-              testing::ElementsAre(Choice{"volume", "0", "1 (\"liver\")"},
-                                   Choice{"volume", "1", "2 (\"spleen\")"}));
+  ASSERT_EQ(outcome.error, "");
+  LabelEntry liver = entry(1, "liver");
+  LabelEntry spleen = entry(2, "spleen");
+  liver.color = "#ff0000";
+  spleen.color = "#0000ff";
+  EXPECT_THAT(outcome.volume.labels, testing::ElementsAre(liver, spleen));
+  EXPECT_THAT(note_detail(outcome, NoteCode::kLooksLikeLabels), HasSubstr("2 labels"));
+  EXPECT_EQ(import_labels(object, {}, kBigEndian).volume.labels, outcome.volume.labels);
+}
+
+TEST(DicomSegmentation, WithOverlapsNumbersTheirCombinations) {
+  SegmentObject object = two_segments();
+  object.frames[2].labels = {3, 14};
+  const Outcome outcome = import_labels(object);
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(outcome.volume.type, SampleType::kUint8);
+  EXPECT_EQ(label_at(outcome, 14, 1), 3);
+  EXPECT_EQ(label_at(outcome, 3, 1), 2);
+  EXPECT_EQ(label_at(outcome, 7, 0), 1);
+  EXPECT_THAT(outcome.volume.labels,
+              testing::ElementsAre(entry(1, "liver", {1, 3}), entry(2, "spleen", {2, 3})));
+  EXPECT_THAT(note_detail(outcome, NoteCode::kOverlappingSegments),
+              HasSubstr("1 sample is of several segments"));
+  // Frames may come in any order.
+  std::swap(object.frames[1], object.frames[2]);
+  EXPECT_EQ(import_labels(object).canonical, outcome.canonical);
+
   const Outcome chosen = import_labels(object, {.volume = 1});
   ASSERT_EQ(chosen.error, "");
   EXPECT_EQ(chosen.volume.dims[2], 2);
   EXPECT_EQ(label_at(chosen, 14, 0), 2);
   EXPECT_EQ(label_at(chosen, 1, 1), 2);
   EXPECT_EQ(chosen.volume.geometry.origin[2], 2);
+  EXPECT_THAT(chosen.volume.labels, testing::ElementsAre(entry(2, "spleen")));
   EXPECT_THAT(import_labels(object, {.volume = 2}).error, HasSubstr("none of them is volume 2"));
+}
+
+TEST(DicomSegmentation, WithOverlapsBeyondEightBitsHasWiderValues) {
+  SegmentObject object = two_segments();
+  for (SegmentFrame& frame : object.frames) {
+    if (frame.segment == 2) frame.segment = 255;
+  }
+  object.frames[2].labels = {14};
+  const Outcome outcome = import_labels(object);
+  ASSERT_EQ(outcome.error, "");
+  const auto samples = samples_of<std::uint16_t>(outcome);
+  EXPECT_EQ(samples.at(kSegmentSamples + 14), 256);
+  EXPECT_EQ(samples.at(2 * kSegmentSamples + 1), 255);
+  EXPECT_THAT(outcome.volume.labels,
+              testing::ElementsAre(entry(1, "liver", {1, 256}), entry(255, "", {255, 256})));
 }
 
 TEST(DicomSegmentation, HasEmptyPlanesWhereFramesAreLeftOut) {
@@ -111,10 +155,50 @@ TEST(DicomSegmentation, TellsTheSegmentOfEachFrame) {
   EXPECT_THAT(import_labels(object).error, HasSubstr("which segment its frame 3 shows"));
 }
 
-TEST(DicomSegmentation, IsRefusedWhenItIsFractional) {
+TEST(DicomSegmentation, OfOneFractionalSegmentKeepsItsSamples) {
+  const SegmentObject object = {.frames = {{.z = 0, .segment = 1, .labels = {2}, .value = 200},
+                                           {.z = 1, .segment = 1, .labels = {3}, .value = 60}},
+                                .segments = {"liver"},
+                                .type = "FRACTIONAL",
+                                .maximum = 255};
+  const Outcome outcome = import_labels(object);
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(label_at(outcome, 2, 0), 200);
+  EXPECT_EQ(label_at(outcome, 3, 1), 60);
+  EXPECT_EQ(outcome.volume.suggested_iso, 127.5);
+  EXPECT_THAT(outcome.volume.presets, testing::ElementsAre(Preset{"segment", 127.5}));
+  EXPECT_THAT(note_detail(outcome, NoteCode::kFractionalSegments), HasSubstr("127.5 or more"));
+  EXPECT_THAT(outcome.volume.labels, testing::IsEmpty());
+}
+
+TEST(DicomSegmentation, OfFractionalSegmentsBeginsAtAHalf) {
   SegmentObject object = two_segments();
   object.type = "FRACTIONAL";
-  EXPECT_THAT(import_labels(object).error, HasSubstr("\"FRACTIONAL\""));
+  object.maximum = 101;
+  object.frames[0].value = 51;
+  object.frames[1].value = 101;
+  object.frames[2] = {.z = 2, .segment = 2, .labels = {3, 14}, .value = 255};
+  object.frames[3].value = 50;
+  const Outcome outcome = import_labels(object);
+  ASSERT_EQ(outcome.error, "");
+  EXPECT_EQ(label_at(outcome, 7, 0), 1);
+  EXPECT_EQ(label_at(outcome, 14, 1), 3);
+  EXPECT_EQ(label_at(outcome, 3, 1), 2);
+  EXPECT_EQ(label_at(outcome, 1, 2), 0);
+  EXPECT_THAT(note_detail(outcome, NoteCode::kFractionalSegments), HasSubstr("50.5 or more"));
+  EXPECT_THAT(outcome.volume.presets, testing::IsEmpty());
+  // One of them alone is as it is stored.
+  const Outcome chosen = import_labels(object, {.volume = 1});
+  ASSERT_EQ(chosen.error, "");
+  EXPECT_EQ(label_at(chosen, 1, 1), 50);
+}
+
+TEST(DicomSegmentation, OfAnUnknownKindIsRefused) {
+  SegmentObject object = two_segments();
+  object.type = "FRACTIONAL";
+  EXPECT_THAT(import_labels(object).error, HasSubstr("largest value"));
+  object.type = "SURFACE";
+  EXPECT_THAT(import_labels(object).error, HasSubstr("\"SURFACE\""));
 }
 
 TEST(DicomSegmentation, OfLabelsKeepsThem) {
@@ -128,6 +212,7 @@ TEST(DicomSegmentation, OfLabelsKeepsThem) {
   EXPECT_EQ(label_at(outcome, 2, 0), 7);
   EXPECT_EQ(label_at(outcome, 3, 2), 7);
   EXPECT_EQ(outcome.volume.range, (std::array<double, 2>{0, 7}));
+  EXPECT_THAT(outcome.volume.labels, testing::ElementsAre(entry(1, "liver"), entry(2, "spleen")));
   // Colours for the labels do not change them.
   const Outcome coloured = import_objects(
       {{"seg",

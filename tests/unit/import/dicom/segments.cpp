@@ -20,11 +20,13 @@ std::string packed(const std::vector<SegmentFrame>& frames) {
   return bytes;
 }
 
-// Each sample that has a label has the label 7.
+// Each sample that has a label has the frame's value.
 std::string unpacked(const std::vector<SegmentFrame>& frames) {
   std::string bytes(frames.size() * kSegmentSamples, '\0');
   for (std::size_t frame = 0; frame < frames.size(); ++frame) {
-    for (const unsigned place : frames[frame].labels) bytes[frame * kSegmentSamples + place] = 7;
+    for (const unsigned place : frames[frame].labels) {
+      bytes[frame * kSegmentSamples + place] = static_cast<char>(frames[frame].value);
+    }
   }
   return bytes;
 }
@@ -50,9 +52,13 @@ DicomObject segmentation(const SegmentObject& what) {
   }
   std::vector<DicomObject> segments;
   for (const std::string& label : what.segments) {
-    segments.push_back(DicomObject()
-                           .number(kSegmentNumber, static_cast<unsigned>(segments.size() + 1))
-                           .text(kSegmentLabel, "LO", label));
+    DicomObject segment;
+    segment.number(kSegmentNumber, static_cast<unsigned>(segments.size() + 1))
+        .text(kSegmentLabel, "LO", label);
+    if (segments.size() < what.colors.size()) {
+      segment.numbers(kRecommendedDisplayCieLabValue, what.colors[segments.size()]);
+    }
+    segments.push_back(segment);
   }
   DicomObject measures;
   measures.text(kPixelSpacing, "DS", "0.5\\0.75");
@@ -74,6 +80,7 @@ DicomObject segmentation(const SegmentObject& what) {
       .number(kBitsStored, is_binary ? 1 : 8)
       .number(kHighBit, is_binary ? 0 : 7)
       .pixels(is_binary ? packed(what.frames) : unpacked(what.frames), 1);
+  if (what.maximum > 0) object.number(kMaximumFractionalValue, what.maximum);
   return object;
 }
 

@@ -1,6 +1,7 @@
 // Segmentations of a few samples.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@ struct SegmentFrame {
   double z = 0;
   unsigned segment = 0;
   std::vector<unsigned> labels;  // of samples that have one, by their place
+  unsigned value = 7;            // what those are, where they are no bits
 };
 
 struct SegmentObject {
@@ -26,6 +28,8 @@ struct SegmentObject {
   std::string type = "BINARY";
   std::string slice_distance = {};
   std::string uid = "1.2.3.4";
+  unsigned maximum = 0;                               // of fractional samples; 0: not told
+  std::vector<std::array<unsigned, 3>> colors = {};  // of the first segments, as they are stored
 };
 
 DicomObject segmentation(const SegmentObject& what);
