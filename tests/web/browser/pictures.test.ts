@@ -4,12 +4,14 @@ import { execFileSync } from 'node:child_process';
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
+import { gunzipSync } from 'node:zlib';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { encodePng } from './png';
 import { brain, brainHull, contourPixels, Daemon, openPage, silhouette, startBrowser, still, surfaceLoaded } from './support';
 
 const skullProject = '/usr/share/doc/invesalius-examples/examples/Cranium.inv3';
+const atlas = '/usr/share/mricron/templates/aal.nii';
 const mostBytes = 150_000;
 
 const scratch = mkdtempSync(join(tmpdir(), 'isomesh-pictures-'));
@@ -52,6 +54,34 @@ async function uploadHead(): Promise<string> {
     body: new Blob([new Uint8Array(readFileSync(join(inside, 'matrix.dat')))]),
   });
   return id;
+}
+
+// Every second sample along each axis of the atlas of mricron-data, which software draws in bearable time,
+// and what its labels are called.
+async function uploadAtlas(): Promise<{ id: string; names: Record<string, string> }> {
+  const file = gunzipSync(readFileSync(`${atlas}.gz`));
+  const [x, y, z] = [42, 44, 46].map((at) => file.readInt16LE(at)) as [number, number, number];
+  const first = file.readFloatLE(108);
+  const dims = [x, y, z].map((count) => Math.floor(count / 2)) as [number, number, number];
+  const samples = new Uint8Array(dims[0] * dims[1] * dims[2]);
+  for (let i = 0; i < samples.length; i += 1) {
+    const [i0, rest] = [i % dims[0], Math.floor(i / dims[0])];
+    const [i1, i2] = [rest % dims[1], Math.floor(rest / dims[1])];
+    samples[i] = file[first + (2 * i2 * y + 2 * i1) * x + 2 * i0] ?? 0;
+  }
+  const query = new URLSearchParams({
+    dims: dims.join(','),
+    type: 'uint8',
+    spacing: '2,2,2',
+    direction: '-1,0,0,0,-1,0,0,0,1',
+  });
+  const { id } = await daemon.json<{ id: string }>(`/v1/volumes?${query.toString()}`, {
+    method: 'POST',
+    body: new Blob([samples]),
+  });
+  const lines = readFileSync(`${atlas}.txt`, 'latin1').split('\n');
+  const named = lines.map((line) => line.trim().split(/\s+/)).filter(([, name]) => name);
+  return { id, names: Object.fromEntries(named.map(([label, name]) => [label, name?.replaceAll('_', ' ')])) };
 }
 
 async function take(page: Page, name: string): Promise<void> {
@@ -107,6 +137,16 @@ describe('pictures', () => {
     await show(`jobs/${bone.id}`, 1);
     expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(0.1);
     await take(page, 'surface');
+
+    const { id: labelled, names } = await uploadAtlas();
+    const labels = await daemon.submit({ volume: labelled, labels: 'all', label_names: names, formats: ['glb', 'stl'] }, 30);
+    await show(`jobs/${labels.id}`, 1);
+    const view = await page.locator('.viewport').boundingBox();
+    if (!view) throw new Error('there is no viewport');
+    await page.mouse.click(view.x + view.width / 2, view.y + 0.55 * view.height);
+    await expect.poll(() => page.locator('.picked-label').isVisible()).toBe(true);
+    await still(page);
+    await take(page, 'labels');
 
     const cut = await daemon.submit({ volume, iso: brainHull, formats: ['glb'] }, 30);
     await page.emulateMedia({ colorScheme: 'dark' });

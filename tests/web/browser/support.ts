@@ -85,6 +85,7 @@ export interface JobAnswer {
     triangles: number;
     bounds: [[number, number, number], [number, number, number]];
     files: Record<string, { bytes: number; sha256: string }>;
+    labels?: { label: number; triangles: number; volume_mm3: number; area_mm2: number }[];
   } | null;
 }
 
@@ -194,6 +195,25 @@ export function ballNrrd(size: number, radius: number, seed = 0): Buffer {
   return Buffer.concat([Buffer.from(nrrdHeader(size)), samples]);
 }
 
+// A ball cut into two labels, 1 towards the patient's right and 2 towards the left, and a block of label 5
+// above it.
+export function labelsNrrd(size: number): Buffer {
+  const middle = (size - 1) / 2;
+  const samples = Buffer.alloc(size ** 3);
+  let at = 0;
+  for (let z = 0; z < size; z += 1) {
+    for (let y = 0; y < size; y += 1) {
+      for (let x = 0; x < size; x += 1) {
+        const isInBall = Math.hypot(x - middle, y - middle, z - middle + 2) < size / 3;
+        const isInBlock = z >= size - 4 && z < size - 2 && Math.abs(x - middle) < 5 && Math.abs(y - middle) < 5;
+        samples[at] = isInBall ? (x < middle ? 1 : 2) : isInBlock ? 5 : 0;
+        at += 1;
+      }
+    }
+  }
+  return Buffer.concat([Buffer.from(nrrdHeader(size)), samples]);
+}
+
 // Noise, whose surface takes long to smooth.
 export function noiseNrrd(size: number): Buffer {
   const samples = Buffer.alloc(size ** 3);
@@ -256,6 +276,39 @@ export interface Silhouette {
   filling: number;
   // Distinct colours in it: a flat patch has one.
   colours: number;
+}
+
+export interface Hues {
+  red: number;
+  green: number;
+  blue: number;
+}
+
+// Pixels of a view, without the tools over it, that are clearly of one of these hues.
+export async function hues(page: Page, element: Locator): Promise<Hues> {
+  await showTools(page, false);
+  const picture = (await element.screenshot()).toString('base64');
+  await showTools(page, true);
+  return page.evaluate(async (text) => {
+    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+    const canvas = document.createElement('canvas');
+    canvas.width = bitmap.width;
+    canvas.height = bitmap.height;
+    const context = canvas.getContext('2d');
+    if (!context) throw new Error('no canvas');
+    context.drawImage(bitmap, 0, 0);
+    const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+    const count = { red: 0, green: 0, blue: 0 };
+    const clear = 60;
+    for (let at = 0; at < data.length; at += 4) {
+      const [red = 0, green = 0, blue = 0] = data.subarray(at, at + 3);
+      if (red > Math.max(green, blue) + clear) count.red += 1;
+      if (green > Math.max(red, blue) + clear) count.green += 1;
+      if (blue > Math.max(red, green) + clear) count.blue += 1;
+    }
+    return count;
+  }, picture);
 }
 
 function showTools(page: Page, isShown: boolean): Promise<void> {

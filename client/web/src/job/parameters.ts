@@ -117,7 +117,9 @@ const alwaysSaid = ['volume', 'iso', 'labels', 'formats'];
 export function toSay(job: JobParameters): Parameter[] {
   return parameters.filter(
     (parameter) =>
-      applies(parameter, job) && (alwaysSaid.includes(parameter.name) || !isDefault(parameter, job)),
+      applies(parameter, job) &&
+      valueIn(job, parameter) !== undefined &&
+      (alwaysSaid.includes(parameter.name) || !isDefault(parameter, job)),
   );
 }
 

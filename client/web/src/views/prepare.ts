@@ -195,10 +195,10 @@ class Prepare {
   private kindChoice(): HTMLElement | null {
     if (!isInteger(this.volume)) return null;
     const choices = [
-      { value: 'iso', label: 'Iso-value', title: 'One surface around all samples of that value or more' },
-      { value: 'labels', label: 'Labels', title: 'One surface around each label of a segmentation' },
+      { value: 'iso', label: 'One surface', title: 'Around all samples of the iso-value or more' },
+      { value: 'labels', label: 'Each label', title: 'One surface around each label of a segmentation' },
     ] as const;
-    return segmented('Surface by', choices, isByLabels(this.parameters) ? 'labels' : 'iso', (kind) => this.setKind(kind));
+    return segmented('What to mesh', choices, isByLabels(this.parameters) ? 'labels' : 'iso', (kind) => this.setKind(kind));
   }
 
   private layout(common: Window): HTMLElement {

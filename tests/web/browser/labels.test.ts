@@ -1,0 +1,203 @@
+// A segmentation: its labels are chosen, meshed, looked at one by one, and downloaded.
+import { createHash } from 'node:crypto';
+import { readFileSync } from 'node:fs';
+import type { Locator, Page } from 'playwright-core';
+import { beforeAll, describe, expect, it } from 'vitest';
+import { hues, labelsNrrd, openedJob, setup, still, surfaceLoaded, type Hues, type JobAnswer } from './support';
+
+const at = setup();
+let volume: string;
+let made: JobAnswer;
+
+beforeAll(async () => {
+  volume = await at.daemon.upload(labelsNrrd(32));
+  made = await at.daemon.submit(
+    {
+      volume,
+      labels: 'all',
+      label_names: { 1: 'Right half', 2: 'Left half' },
+      label_colors: { 1: '#d02020', 2: '#2040e0' },
+      formats: ['glb', 'stl'],
+    },
+    30,
+  );
+});
+
+async function openForm(page: Page, query = ''): Promise<Locator> {
+  await page.goto('about:blank');
+  await page.goto(`${at.daemon.url}/#/volumes/${volume}${query}`);
+  await page.getByRole('radio', { name: 'Each label' }).check();
+  const rows = page.locator('.label-choice .labels li');
+  await expect.poll(() => rows.count()).toBe(3);
+  return rows;
+}
+
+async function estimated(page: Page): Promise<string> {
+  await expect.poll(() => page.locator('.estimate:not(.stale) dl').count()).toBe(1);
+  return page.locator('.estimate dd').first().innerText();
+}
+
+async function make(page: Page): Promise<JobAnswer> {
+  await page.getByRole('button', { name: 'Make the surface' }).click();
+  await page.waitForURL(/#\/jobs\//);
+  return openedJob(at);
+}
+
+describe('the labels of a volume', () => {
+  it('are all meshed unless some are picked', async () => {
+    const { page } = at;
+    const rows = await openForm(page);
+    expect(await rows.allInnerTexts()).toEqual([
+      expect.stringMatching(/label 1[^]*voxels/),
+      expect.stringMatching(/label 2[^]*voxels/),
+      expect.stringMatching(/label 5[^]*200 voxels/),
+    ]);
+    const all = await estimated(page);
+    expect(await page.locator('[data-parameter=interpolation]').count()).toBe(0);
+    expect(await page.getByRole('slider', { name: 'Iso-value' }).isVisible()).toBe(false);
+    const job = await make(page);
+    expect(job.parameters).toMatchObject({ labels: 'all', passes: 10 });
+    expect(job.parameters).not.toHaveProperty('iso');
+    await expect.poll(() => page.locator('h1').innerText()).toBe('Surfaces of all labels');
+    await surfaceLoaded(page);
+    expect(`${(await openedJob(at)).mesh?.triangles}`).toBe(all.replaceAll('\u202f', ''));
+  });
+
+  it('are found by their value, picked, and said in the address', async () => {
+    const { page } = at;
+    const rows = await openForm(page);
+    await page.getByLabel('Search the labels').fill('5');
+    await expect.poll(() => rows.count()).toBe(1);
+    await page.getByRole('button', { name: 'None', exact: true }).click();
+    await page.getByLabel('Search the labels').fill('');
+    expect(await rows.locator('input:checked').count()).toBe(2);
+    await expect.poll(() => page.url()).toMatch(/labels=1%2C2|labels=1,2/);
+    await page.reload();
+    await expect.poll(() => rows.locator('input:checked').count()).toBe(2);
+    expect((await make(page)).parameters).toMatchObject({ labels: [1, 2] });
+    await page.getByRole('link', { name: 'Change parameters' }).click();
+    await expect.poll(() => rows.locator('input:checked').count()).toBe(2);
+  });
+
+  it('make nothing while none is picked, and give way to an iso-value', async () => {
+    const { page } = at;
+    await openForm(page);
+    await page.getByRole('button', { name: 'None', exact: true }).click();
+    const run = page.getByRole('button', { name: 'Make the surface' });
+    expect(await run.isDisabled()).toBe(true);
+    expect(await page.locator('.estimate').innerText()).toContain('Choose a label');
+    await page.getByRole('radio', { name: 'One surface' }).check();
+    await expect.poll(() => run.isDisabled()).toBe(false);
+    const { parameters } = await make(page);
+    expect(parameters).toHaveProperty('iso');
+    expect(parameters).not.toHaveProperty('labels');
+  });
+});
+
+describe('the surfaces of labels', () => {
+  async function open(): Promise<Locator> {
+    const { page, daemon } = at;
+    await page.goto('about:blank');
+    await page.goto(`${daemon.url}/#/jobs/${made.id}`);
+    await surfaceLoaded(page);
+    await page.keyboard.press('a');
+    await still(page);
+    return page.locator('.viewport');
+  }
+
+  async function seen(view: Locator): Promise<Hues> {
+    await still(at.page);
+    return hues(at.page, view);
+  }
+
+  it('have their colours, and are hidden, isolated, coloured and shown again', async () => {
+    const { page } = at;
+    const view = await open();
+    const first = await seen(view);
+    expect(first.red).toBeGreaterThan(1000);
+    expect(first.blue).toBeGreaterThan(1000);
+
+    const box = page.getByRole('checkbox', { name: 'Show Right half' });
+    await box.uncheck();
+    let now = await seen(view);
+    expect(now.red).toBe(0);
+    expect(now.blue).toBeGreaterThan(1000);
+
+    await page.getByRole('button', { name: 'Show only Right half' }).click();
+    now = await seen(view);
+    expect(now.red).toBeGreaterThan(1000);
+    expect(now.blue).toBe(0);
+    expect(await page.getByRole('checkbox', { name: 'Show Left half' }).isChecked()).toBe(false);
+    expect(await page.getByRole('button', { name: 'Show only Right half' }).getAttribute('aria-pressed')).toBe('true');
+
+    await page.getByRole('button', { name: 'Hide all' }).click();
+    now = await seen(view);
+    expect([now.red, now.blue]).toEqual([0, 0]);
+    await page.getByRole('button', { name: 'Show all' }).click();
+    expect((await seen(view)).red).toBe(first.red);
+
+    await page.getByLabel('Colour of Left half').fill('#20c030');
+    now = await seen(view);
+    expect(now.blue).toBe(0);
+    expect(now.green).toBeGreaterThan(1000);
+  });
+
+  it('say what they are when they are clicked, and obey keys', async () => {
+    const { page } = at;
+    const view = await open();
+    const place = await view.boundingBox();
+    if (!place) throw new Error('there is no viewport');
+    // From the front the patient's right is on the left.
+    await page.mouse.click(place.x + 0.45 * place.width, place.y + 0.5 * place.height);
+    const picked = page.locator('.picked-label');
+    await expect.poll(() => picked.innerText()).toContain('Right half');
+    const label = made.mesh?.labels?.find((one) => one.label === 1);
+    const digits = (await picked.innerText()).replace(/[\u202f\s]/g, '');
+    expect(digits).toContain(`volume${Math.round(label?.volume_mm3 ?? 0)}mm`);
+    expect(digits).toContain(`area${Math.round(label?.area_mm2 ?? 0)}mm`);
+    expect(await page.locator('.label-list li[aria-current]').innerText()).toContain('Right half');
+
+    await page.keyboard.press('o');
+    expect((await seen(view)).blue).toBe(0);
+    await page.keyboard.press('e');
+    await page.keyboard.press('h');
+    const now = await seen(view);
+    expect([now.red, await picked.isVisible()]).toEqual([0, false]);
+    expect(now.blue).toBeGreaterThan(1000);
+    await page.mouse.click(place.x + 5, place.y + 0.8 * place.height);
+    expect(await picked.isVisible()).toBe(false);
+  });
+
+  it('are cut without flicker between the two sides of a wall', async () => {
+    const { page } = at;
+    const view = await open();
+    await page.keyboard.press('c');
+    await expect.poll(() => page.locator('.viewport[data-slice]').count()).toBe(1);
+    await page.getByLabel('Direction of the cut').selectOption({ label: 'Sagittal' });
+    await page.getByRole('checkbox', { name: 'Show Left half' }).uncheck();
+    await page.keyboard.press('l');
+    const alone = await seen(view);
+    expect(alone.blue).toBe(0);
+    expect(alone.red).toBeGreaterThan(500);
+  });
+
+  it('are found by name, and downloaded one by one and all together', async () => {
+    const { page } = at;
+    await open();
+    const rows = page.locator('.label-list li');
+    await page.getByLabel('Search the labels').fill('half right');
+    await expect.poll(() => rows.count()).toBe(1);
+    expect(await rows.innerText()).toMatch(/Right half/);
+    const label = made.mesh?.labels?.find((one) => one.label === 1);
+
+    const one = page.waitForEvent('download');
+    await page.getByRole('button', { name: 'Download Right half as STL' }).click();
+    const stl = readFileSync(await (await one).path());
+    expect(stl.length).toBe(84 + 50 * (label?.triangles ?? 0));
+
+    const whole = page.waitForEvent('download');
+    await page.locator('.downloads [data-format=zip]').click();
+    const zip = readFileSync(await (await whole).path());
+    expect(createHash('sha256').update(zip).digest('hex')).toBe(made.mesh?.files.zip?.sha256);
+  });
+});
