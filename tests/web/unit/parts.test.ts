@@ -1,0 +1,97 @@
+import { describe, expect, it } from 'vitest';
+import { Mesh, MeshPhongMaterial, Plane, Ray, Scene, Vector3, type BufferGeometry, type Side } from 'three';
+import { prepare, type Block } from '@/mesh/blocks';
+import { defaultStyle, Parts } from '@/scene/parts';
+import { wholeRay } from '@/scene/pick';
+
+// A square across z at that height.
+function square(z: number): Block {
+  const positions = Float32Array.from([0, 0, z, 4, 0, z, 4, 4, z, 0, 4, z]);
+  return prepare({ positions, index: Uint32Array.from([0, 1, 2, 0, 2, 3]) });
+}
+
+type Drawn = Mesh<BufferGeometry, MeshPhongMaterial>;
+
+function drawn(scene: Scene): Drawn[] {
+  return scene.children.filter((child): child is Drawn => child instanceof Mesh && child.visible);
+}
+
+function colours(scene: Scene): string[] {
+  return drawn(scene).map(({ material }) => material.color.getHexString());
+}
+
+function sides(scene: Scene): Side[] {
+  return [...new Set(drawn(scene).map(({ material }) => material.side))];
+}
+
+const up = new Ray(new Vector3(1, 2, -1), new Vector3(0, 0, 1));
+
+function labelled(): { parts: Parts; scene: Scene } {
+  const scene = new Scene();
+  const parts = new Parts(scene, () => undefined);
+  parts.add([square(0)], { label: 1, colour: '#d02020' });
+  parts.add([square(2), square(5)], { label: 2, colour: '#2040d0' });
+  return { parts, scene };
+}
+
+describe('the parts of a surface', () => {
+  it('are of one colour, and of no label, without labels', () => {
+    const scene = new Scene();
+    const parts = new Parts(scene, () => undefined);
+    parts.add([square(0), square(3)], null);
+    expect(new Set(colours(scene)).size).toBe(1);
+    expect(parts.triangles).toBe(4);
+    expect(parts.hit(up, wholeRay)).toEqual({ at: 1, label: null });
+    parts.setHidden(new Set([1]));
+    expect(drawn(scene).length).toBe(2);
+  });
+
+  it('have the colours of their labels, also where these are told before the surface comes', () => {
+    const { parts, scene } = labelled();
+    expect(colours(scene)).toEqual(['d02020', '2040d0', '2040d0']);
+    parts.setColour(2, '#00ff00');
+    parts.setColour(3, '#123456');
+    parts.add([square(7)], { label: 3, colour: '#ffffff' });
+    expect(colours(scene)).toEqual(['d02020', '00ff00', '00ff00', '123456']);
+  });
+
+  it('are not drawn and not hit while their label is hidden', () => {
+    const { parts, scene } = labelled();
+    expect(parts.hit(up, wholeRay)).toEqual({ at: 1, label: 1 });
+    parts.setHidden(new Set([1, 4]));
+    expect(colours(scene)).toEqual(['2040d0', '2040d0']);
+    expect(parts.hit(up, wholeRay)).toEqual({ at: 3, label: 2 });
+    expect(parts.hit(up, { from: 0, to: 2.5 })).toBe(null);
+    parts.add([square(8)], { label: 4, colour: '#ffffff' });
+    expect(drawn(scene).length).toBe(2);
+    parts.setHidden(new Set());
+    expect(drawn(scene).length).toBe(4);
+  });
+
+  it('show their backs only where these can be seen', () => {
+    const { parts, scene } = labelled();
+    expect(sides(scene).length).toBe(1);
+    parts.setCut([new Plane(new Vector3(0, 0, 1), 0)]);
+    expect([sides(scene).length, drawn(scene).length]).toEqual([2, 6]);
+    parts.setHidden(new Set([2]));
+    expect(drawn(scene).length).toBe(2);
+    parts.setHidden(new Set());
+    parts.setCut(null);
+    expect(drawn(scene).length).toBe(3);
+    parts.setStyle({ ...defaultStyle, opacity: 0.5 });
+    expect(drawn(scene).length).toBe(6);
+    parts.setStyle(defaultStyle);
+    expect(drawn(scene).length).toBe(3);
+  });
+
+  it('join their normals within a label and not across a wall that two share', () => {
+    const scene = new Scene();
+    const parts = new Parts(scene, () => undefined);
+    const front = square(0);
+    const back = prepare({ positions: front.positions.slice(), index: Uint32Array.from([0, 2, 1, 0, 3, 2]) });
+    parts.add([front], { label: 1, colour: '#d02020' });
+    parts.add([back], { label: 2, colour: '#2040d0' });
+    expect([parts.joinSeams(0), parts.joinSeams(1), parts.joinSeams(2)]).toEqual([true, true, false]);
+    expect([front.normals[2], back.normals[2]]).toEqual([32_767, -32_767]);
+  });
+});
