@@ -1,5 +1,5 @@
 // The labels of a job's mesh as a person looks at them: which are shown, and in which colours.
-import type { Job, LabelSummary } from '../api/types';
+import type { Estimate, Job, LabelSummary } from '../api/types';
 import { Signal } from '../ui/signal';
 
 interface Named {
@@ -23,6 +23,12 @@ export function matching<T extends Named>(labels: readonly T[], text: string): T
 
 export function labelsOfMesh({ mesh }: Job): readonly LabelSummary[] {
   return (mesh as { labels?: LabelSummary[] } | null | undefined)?.labels ?? [];
+}
+
+// Of each label's surface.
+export function trianglesOf(estimate: Estimate): ReadonlyMap<number, number> {
+  const { labels = [] } = estimate as { labels?: { label: number; triangles: number }[] };
+  return new Map(labels.map(({ label, triangles }) => [label, triangles]));
 }
 
 export class LabelState {

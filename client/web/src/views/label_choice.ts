@@ -13,6 +13,13 @@ export type Choice = Pick<JobParameters, 'labels' | 'background'>;
 // More rows than these a person searches.
 const mostRows = 500;
 
+interface Box {
+  element: HTMLElement;
+  input: HTMLInputElement;
+  size: HTMLElement;
+  voxels: number;
+}
+
 export class LabelChoice {
   readonly element: HTMLElement;
   private readonly body = h('div', { class: 'label-choice' });
@@ -20,7 +27,8 @@ export class LabelChoice {
   private asking: AbortController | null = null;
   private labels: readonly VolumeLabel[] = [];
   private readonly chosen = new Set<number>();
-  private readonly boxes = new Map<number, { element: HTMLElement; input: HTMLInputElement }>();
+  private readonly boxes = new Map<number, Box>();
+  private triangles: ReadonlyMap<number, number> = new Map();
   private readonly list = h('ul', { class: 'labels', 'aria-label': 'Labels' });
   private readonly count = h('p', { class: 'hint', role: 'status' });
   private text = '';
@@ -91,6 +99,12 @@ export class LabelChoice {
     this.fill();
   }
 
+  // Of each label's surface, as an estimate tells them.
+  showTriangles(triangles: ReadonlyMap<number, number>): void {
+    this.triangles = triangles;
+    this.update();
+  }
+
   // All that the search finds.
   private choose(isOn: boolean): void {
     for (const { label } of matching(this.labels, this.text)) {
@@ -106,7 +120,7 @@ export class LabelChoice {
     this.update();
   }
 
-  private boxOf(label: VolumeLabel): { element: HTMLElement; input: HTMLInputElement } {
+  private boxOf(label: VolumeLabel): Box {
     const known = this.boxes.get(label.label);
     if (known) return known;
     const check = checkbox(labelTitle(label), this.chosen.has(label.label), (isOn) => {
@@ -117,22 +131,30 @@ export class LabelChoice {
     const swatch = h('span', { class: 'swatch', 'aria-hidden': 'true' });
     // Not an attribute, which the content policy would not take.
     if (label.color) swatch.style.backgroundColor = label.color;
+    const size = h('span', { class: 'faint number' });
     const box = {
       element: h(
         'li',
         { 'data-label': label.label },
         swatch,
         check,
-        h('span', { class: 'faint number' }, `${formatCount(label.voxels)} voxels`),
+        size,
       ),
       input: check.querySelector('input') as HTMLInputElement,
+      size,
+      voxels: label.voxels,
     };
     this.boxes.set(label.label, box);
     return box;
   }
 
   private update(): void {
-    for (const [label, { input }] of this.boxes) input.checked = this.chosen.has(label);
+    for (const [label, { input, size, voxels }] of this.boxes) {
+      input.checked = this.chosen.has(label);
+      const triangles = input.checked ? this.triangles.get(label) : undefined;
+      size.textContent =
+        `${formatCount(voxels)} voxels` + (triangles === undefined ? '' : `, ${formatCount(triangles)} triangles`);
+    }
     this.count.textContent = `${formatCount(this.chosen.size)} of ${formatCount(this.labels.length)} labels`;
   }
 

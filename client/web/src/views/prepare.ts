@@ -12,6 +12,7 @@ import {
   queryOfParameters,
   surfaceInWords,
 } from '../job/parameters';
+import { trianglesOf } from '../job/labels';
 import { isByLabels, withLabels } from '../job/table';
 import { button, field, h, isTyping, segmented } from '../ui/dom';
 import {
@@ -335,6 +336,7 @@ class Prepare {
 
   private showEstimate(estimate: Estimate): void {
     this.estimate.classList.remove('stale');
+    this.labelChoice?.showTriangles(trianglesOf(estimate));
     const files = Object.entries(estimate.bytes).map(
       ([format, bytes]) => `${formatNames[format] ?? format} ${formatBytes(bytes)}`,
     );
