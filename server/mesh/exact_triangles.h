@@ -1,0 +1,16 @@
+// Whether two triangles of a surface intersect, decided exactly; private to this folder.
+#pragma once
+
+#include <span>
+
+#include "server/mesh/mesh.h"
+
+namespace isomesh::mesh {
+
+// Whether three positions are on one line, exactly.
+bool is_flat(std::span<const Vec3> positions, const Triangle& triangle);
+
+// As self_intersections.h has it; neither of them is flat. Thread safe.
+bool do_intersect(std::span<const Vec3> positions, const Triangle& a, const Triangle& b);
+
+}  // namespace isomesh::mesh
