@@ -13,6 +13,7 @@
 #include <CLI/CLI.hpp>
 
 #include "server/jobs/memory.h"
+#include "tests/bench/accuracy.h"
 #include "tests/bench/benchmarks.h"
 #include "tests/bench/label_stages.h"
 #include "tests/bench/labels.h"
@@ -127,6 +128,26 @@ int run_labels(const Options& options, std::uint32_t body_samples) {
   return 0;
 }
 
+// The real volume, or of none the synthetic field of the first size.
+int run_accuracy(const Options& options, AccuracyPlan plan, bool only_certify) {
+  Plan loaded;
+  load(options, loaded);
+  const Samples samples =
+      loaded.volume ? std::move(*loaded.volume) : synthetic_field(options.sizes.front());
+  plan.iso = loaded.volume ? loaded.iso : kFieldIso;
+  for (const int threads : options.threads > 0 ? std::vector{options.threads} : std::vector{1, 2}) {
+    plan.threads = threads;
+    if (only_certify) {
+      std::cout << to_text(measure_certify(samples, plan)) << std::flush;
+      continue;
+    }
+    if (threads < 2 && options.threads == 0) continue;  // each run takes minutes
+    std::cout << threads << (threads == 1 ? " thread\n" : " threads\n")
+              << to_table(measure_approximations(samples, plan)) << std::flush;
+  }
+  return 0;
+}
+
 std::string check_filter(const std::string& text) {
   try {
     const std::regex filter(text);
@@ -181,6 +202,18 @@ int run_program(int argc, char** argv) {
       ->check(CLI::Range(64, 1024));
   labels->fallthrough();
 
+  AccuracyPlan accuracy;
+  bool only_fast = false;
+  CLI::App* simplify = app.add_subcommand(
+      "simplify", "Simplify within errors, beside the peers at as many triangles");
+  simplify->add_option("--error", accuracy.errors_mm, "Millimetres; several are measured in turn")
+      ->check(CLI::PositiveNumber);
+  simplify->add_flag("--only-fast", only_fast, "Without the peers that take minutes");
+  simplify->fallthrough();
+  CLI::App* certify = app.add_subcommand(
+      "certify", "Measure how far the smoothed surface is from the extracted one");
+  certify->fallthrough();
+
   std::string stage;
   std::uint32_t size = 0;
   int threads = 1;
@@ -198,6 +231,8 @@ int run_program(int argc, char** argv) {
   if (*memory) return run_memory_command(stage, size, threads);
   warn_when_busy();
   if (*service) return run_service(options, daemon);
+  accuracy.with_peers = !only_fast;
+  if (*simplify || *certify) return run_accuracy(options, accuracy, bool(*certify));
   if (*labels) return run_labels(options, samples);
   return *report ? write_report(folder, daemon, options.surface_nets_root) : run(options);
 }

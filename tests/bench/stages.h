@@ -81,6 +81,7 @@ class Stages {
   mesh::Shapes shapes() const;
   std::span<const mesh::Vec3> positions() const { return mesh_.positions.span(); }
   std::span<const mesh::Triangle> triangles() const { return mesh_.triangles.span(); }
+  const mesh::Mesh& mesh() const { return mesh_; }
   // What the mesh alone takes.
   std::uint64_t mesh_bytes() const;
 

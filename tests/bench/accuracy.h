@@ -1,0 +1,52 @@
+// What simplification keeps of a surface and what it takes, beside others at as many triangles; and
+// what measuring that takes.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/mesh/distance.h"
+#include "tests/bench/samples.h"
+
+namespace isomesh::bench {
+
+// Which surface is measured, and how.
+struct AccuracyPlan {
+  double iso = 0;
+  int passes = 5;
+  int threads = 1;
+  std::vector<double> errors_mm = {0.02, 0.05, 0.1, 0.2, 0.5};
+  bool with_peers = true;  // the slow ones, where they were found
+};
+
+// One way to fewer triangles. Zero where a time was not measured.
+struct Approximation {
+  std::string name;
+  std::uint64_t triangles = 0;
+  mesh::Certificate certificate;
+  double simplify_ms = 0;
+  double certify_ms = 0;
+  double encode_ms = 0;  // to drc, with the parameters of a job that gives none
+  std::uint64_t bytes = 0;
+};
+
+// The smoothed surface as it is, then for each error ours, and behind each the others at as many
+// triangles. Each is run once: to be repeated by whoever wants to know how steady times are.
+std::vector<Approximation> measure_approximations(const Samples& samples, const AccuracyPlan& plan);
+
+// The smoothed surface against the extracted one and the other way round: milliseconds of both
+// ways together, the median of some runs, and what they find.
+struct CertifyTime {
+  int threads = 1;
+  std::uint64_t points = 0;
+  double ms = 0;
+  mesh::Certificate certificate;
+};
+CertifyTime measure_certify(const Samples& samples, const AccuracyPlan& plan);
+
+// As text for a terminal.
+std::string to_table(const std::vector<Approximation>& approximations);
+std::string to_text(const CertifyTime& time);
+
+}  // namespace isomesh::bench
