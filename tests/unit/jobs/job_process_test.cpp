@@ -103,7 +103,7 @@ TEST_F(JobProcessTest, AVolumeIsLetGoOfAfterItsJob) {
   order.work = JobOrder::Work::kCount;
   std::set<pid_t> processes;
   for (int n = 0; n < 100; ++n) {
-    EXPECT_GT(process_.count(order, {}).triangles, 0U);
+    EXPECT_GT(process_.count(order, {}).size.triangles, 0U);
     processes.merge(started());
   }
   EXPECT_EQ(processes.size(), 1U);

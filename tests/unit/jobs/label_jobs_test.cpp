@@ -18,7 +18,6 @@
 namespace isomesh::jobs {
 namespace {
 
-using testing::ElementsAre;
 using testing::HasSubstr;
 
 const Report kQuiet = [](Stage, double, const Timing&) {};
@@ -137,13 +136,13 @@ TEST_F(LabelJobsTest, AreSettledByWhatTheVolumeSays) {
   JobParameters parameters = label_parameters({});
   parameters.label_names = {{9, "Mine"}, {44, "Nobody"}};
   const JobParameters all = settled(volume, parameters);
-  EXPECT_THAT(all.label_names, ElementsAre(std::pair(5, "Both"), std::pair(9, "Mine")));
+  EXPECT_EQ(all.label_names, (LabelTexts{{5, "Both"}, {9, "Mine"}}));
   EXPECT_EQ(all.max_displacement_mm, 0.25);
-  EXPECT_THAT(all.label_values, ElementsAre(std::pair(5, ElementsAre(3, 7))));
+  EXPECT_EQ(all.label_values, (LabelValues{{5, {3, 7}}}));
 
   parameters.labels = LabelChoice{{9}};
   const JobParameters one = settled(volume, parameters);
-  EXPECT_THAT(one.label_names, ElementsAre(std::pair(9, "Mine")));
+  EXPECT_EQ(one.label_names, (LabelTexts{{9, "Mine"}}));
   EXPECT_TRUE(one.label_values.empty());
   EXPECT_TRUE(one.label_colors.empty());
 }
@@ -166,7 +165,7 @@ TEST_F(LabelJobsTest, ThatOverlapAreMadeWhole) {
 TEST_F(LabelJobsTest, AreRefusedWithTheReason) {
   const Volume volume = add_labels();
   const auto reason_of = [&](const Volume& of, const LabelChoice& labels) {
-    const auto error = test::caught([&] { settled(of, label_parameters(labels)); });
+    const auto error = test::thrown_by([&] { settled(of, label_parameters(labels)); });
     return error ? std::pair(error->code(), std::string(error->what()))
                  : std::pair(ErrorCode::kInternal, std::string("was taken"));
   };
@@ -180,14 +179,13 @@ TEST_F(LabelJobsTest, AreRefusedWithTheReason) {
   // The process finds the same for itself.
   JobParameters unsettled = label_parameters({{4}});
   unsettled.volume = volume.id;
-  const auto error = test::caught([&] { run(volume, unsettled); });
+  const auto error = test::thrown_by([&] { run(volume, unsettled); });
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), ErrorCode::kUnusableVolume);
 }
 
 TEST_F(LabelJobsTest, AreEstimatedExactly) {
   const Volume volume = add_labels();
-  volumes_.add("", volume, 0);
   Estimator estimator(volumes_, blobs_, jobs_, {}, job_program());
   JobParameters parameters = label_parameters({});
   parameters.close = true;
@@ -212,7 +210,7 @@ TEST_F(LabelJobsTest, AreEstimatedExactly) {
 
 TEST_F(LabelJobsTest, TakeNoMoreMemoryThanTheyMay) {
   const Volume volume = add_labels();
-  const auto error = test::caught([&] {
+  const auto error = test::thrown_by([&] {
     run_pipeline(volume, settled(volume, label_parameters({})), {.memory_bytes = 100'000}, blobs_,
                  process_, {}, kQuiet);
   });

@@ -114,7 +114,7 @@ TEST(LabelParts, RefusesMoreCombinationsThanItCanNumber) {
       if ((value >> (label - 1) & 1) != 0) values[label].push_back(value);
     }
   }
-  const auto error = test::caught([&] { const LabelParts parts(labels, values); });
+  const auto error = test::thrown_by([&] { const LabelParts parts(labels, values); });
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), ErrorCode::kUnusableVolume);
 }
