@@ -56,7 +56,7 @@ std::uint64_t default_job_memory(std::size_t workers) {
 }
 
 std::filesystem::path beside_this_program(const std::string& name) {
-  const auto program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
+  auto program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
   if (::access(program.c_str(), X_OK) == 0) return program;
   throw Error(ErrorCode::kInternal, "the program " + name + " is missing beside isomeshd");
 }

@@ -246,7 +246,7 @@ bool Sender::have_computed(Sending& sending) {
   Response& response = sending.response;
   // Tasks are copied, sources are not.
   const auto source = std::make_shared<std::unique_ptr<Source>>(std::move(response.source));
-  const auto bytes = std::make_shared<std::string>(std::move(response.bytes));
+  const auto bytes = std::make_shared<std::string>(std::exchange(response.bytes, {}));
   return computing_.try_enqueue(response.party, [this, id = sending.id, source, bytes] {
     compute(id, std::move(*source), std::move(*bytes));
   });

@@ -8,7 +8,7 @@
 #include "proto/error.h"
 #include "server/net/byte_stream.h"
 
-using SSL_CTX = struct ssl_ctx_st;
+using SSL_CTX = struct ssl_ctx_st;  // NOLINT: OpenSSL's name
 
 namespace isomesh::net {
 

@@ -196,11 +196,11 @@ class Reading {
 
  private:
   struct Count {
-    explicit Count(std::atomic<int>& readings) : readings_(readings) { ++readings_; }
-    ~Count() { --readings_; }
+    explicit Count(std::atomic<int>& all) : readings(all) { ++readings; }
+    ~Count() { --readings; }
     Count(const Count&) = delete;
     Count& operator=(const Count&) = delete;
-    std::atomic<int>& readings_;
+    std::atomic<int>& readings;
   };
 
   const Count count_;  // first, so that who waits is counted
