@@ -94,6 +94,62 @@ describe('the labels of a volume', () => {
   });
 });
 
+describe('a segmentation that names its labels', () => {
+  // As 3D Slicer writes it; the first name would run if the page took a text for HTML.
+  const hostile = '<img src=x onerror="document.title=1">';
+  const fields = [
+    `Segment0_Name:=${hostile}`,
+    'Segment0_LabelValue:=1',
+    'Segment0_Color:=1 0 0',
+    'Segment0_Layer:=0',
+    'Segment1_Name:=Left half',
+    'Segment1_LabelValue:=2',
+    'Segment1_Color:=0 0 1',
+    'Segment1_Layer:=0',
+  ];
+
+  it('is listed and shown by these names, in its colours', async () => {
+    const { page, daemon } = at;
+    const id = await daemon.upload(labelsNrrd(28, fields));
+    await page.goto('about:blank');
+    await page.goto(`${daemon.url}/#/volumes/${id}`);
+    const rows = page.locator('.label-choice .labels li');
+    await expect.poll(() => rows.count()).toBe(3);
+    expect(await page.getByRole('radio', { name: 'Each label' }).isChecked()).toBe(true);
+    expect((await rows.locator('label').allInnerTexts()).map((text) => text.trim())).toEqual([hostile, 'Left half', 'label 5']);
+    const swatches = await rows.locator('.swatch').evaluateAll((all) => all.map((one) => getComputedStyle(one).backgroundColor));
+    expect(swatches.slice(0, 2)).toEqual(['rgb(255, 0, 0)', 'rgb(0, 0, 255)']);
+    await expect.poll(() => rows.first().innerText()).toMatch(/voxels, .*triangles/);
+
+    const { id: job } = await make(page);
+    await surfaceLoaded(page);
+    await page.keyboard.press('a');
+    await still(page);
+    const seen = await hues(page, page.locator('.viewport'));
+    expect([seen.red > 1000, seen.blue > 1000]).toEqual([true, true]);
+    expect(await page.locator('.label-list .check').allTextContents()).toEqual([hostile, 'Left half', 'label 5']);
+    expect(await page.locator('img[src=x]').count()).toBe(0);
+    expect(await page.title()).not.toBe('1');
+
+    // By keyboard alone, and with a name for every control.
+    const controls = page.locator('.label-list').locator('input, button');
+    for (const control of await controls.all()) {
+      const name = await control.evaluate((one) => one.getAttribute('aria-label') ?? one.textContent ?? '');
+      expect(name.trim(), `a control of job ${job}`).not.toBe('');
+    }
+    await page.getByRole('checkbox', { name: 'Show Left half' }).focus();
+    await page.keyboard.press('Space');
+    await still(page);
+    expect((await hues(page, page.locator('.viewport'))).blue).toBe(0);
+    await page.keyboard.press('Tab');
+    expect(await page.evaluate(() => document.activeElement?.getAttribute('aria-label'))).toBe('Show only Left half');
+    await page.keyboard.press('Enter');
+    await still(page);
+    const alone = await hues(page, page.locator('.viewport'));
+    expect([alone.red, alone.blue > 1000]).toEqual([0, true]);
+  });
+});
+
 describe('the surfaces of labels', () => {
   async function open(): Promise<Locator> {
     const { page, daemon } = at;

@@ -81,7 +81,9 @@ async function uploadAtlas(): Promise<{ id: string; names: Record<string, string
   });
   const lines = readFileSync(`${atlas}.txt`, 'latin1').split('\n');
   const named = lines.map((line) => line.trim().split(/\s+/)).filter(([, name]) => name);
-  return { id, names: Object.fromEntries(named.map(([label, name]) => [label, name?.replaceAll('_', ' ')])) };
+  const names: Record<string, string> = {};
+  for (const [label = '', name = ''] of named) names[label] = name.replaceAll('_', ' ');
+  return { id, names };
 }
 
 async function take(page: Page, name: string): Promise<void> {

@@ -197,7 +197,7 @@ export function ballNrrd(size: number, radius: number, seed = 0): Buffer {
 
 // A ball cut into two labels, 1 towards the patient's right and 2 towards the left, and a block of label 5
 // above it.
-export function labelsNrrd(size: number): Buffer {
+export function labelsNrrd(size: number, fields: string[] = []): Buffer {
   const middle = (size - 1) / 2;
   const samples = Buffer.alloc(size ** 3);
   let at = 0;
@@ -211,7 +211,7 @@ export function labelsNrrd(size: number): Buffer {
       }
     }
   }
-  return Buffer.concat([Buffer.from(nrrdHeader(size)), samples]);
+  return Buffer.concat([Buffer.from(nrrdHeader(size, fields)), samples]);
 }
 
 // Noise, whose surface takes long to smooth.
@@ -225,7 +225,7 @@ export function noiseNrrd(size: number): Buffer {
   return Buffer.concat([Buffer.from(nrrdHeader(size)), samples]);
 }
 
-function nrrdHeader(size: number): string {
+function nrrdHeader(size: number, fields: string[] = []): string {
   return [
     'NRRD0004',
     'type: uint8',
@@ -235,6 +235,7 @@ function nrrdHeader(size: number): string {
     'space directions: (1,0,0) (0,1,0) (0,0,1)',
     'space origin: (0,0,0)',
     'encoding: raw',
+    ...fields,
     '',
     '',
   ].join('\n');
