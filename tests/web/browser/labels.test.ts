@@ -147,6 +147,7 @@ describe('a segmentation that names its labels', () => {
     await still(page);
     const alone = await hues(page, page.locator('.viewport'));
     expect([alone.red, alone.blue > 1000]).toEqual([0, true]);
+    expect(await page.getByRole('status').filter({ hasText: 'Left half' }).innerText()).toMatch(/volume .* area/);
   });
 });
 

@@ -86,7 +86,12 @@ export class LabelList {
     const shown = check.querySelector('input') as HTMLInputElement;
     const colour = h('input', { type: 'color', 'aria-label': `Colour of ${title}`, title: 'Colour' });
     colour.addEventListener('input', () => this.state.setColour(label.label, colour.value));
-    const alone = button('Only', () => this.state.isolate(label.label), {
+    const isolate = (): void => {
+      this.state.isolate(label.label);
+      // Says its area too, to whoever has no pointer.
+      this.state.pick(label.label);
+    };
+    const alone = button('Only', isolate, {
       class: 'quiet',
       'aria-label': `Show only ${title}`,
       'aria-pressed': 'false',
