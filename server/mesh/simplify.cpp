@@ -23,12 +23,15 @@ constexpr double kSeamWidth = 0.08;
 constexpr int kMostRounds = 6;
 constexpr int kMostRepairs = 12;  // of seams; the second half leaves blocks as they were
 constexpr std::uint32_t kNoBlock = ~std::uint32_t{0};
-constexpr double kMostCubesPerAxis = 256;
+constexpr double kMostCubesPerAxis = 64;
 
 // Cuts space into cubes. Those of the odd rounds are moved by half a side along each axis.
 class Cubes {
  public:
   Cubes(const Extent& extent, std::size_t triangles) : low_(extent.low) {
+    if (!std::isfinite(extent.area_mm2)) {
+      throw Error(ErrorCode::kUnusableVolume, "a position of the mesh is not a finite number");
+    }
     const double area_per_triangle = extent.area_mm2 / static_cast<double>(triangles);
     side_ = std::sqrt(kTrianglesPerBlock * area_per_triangle);
     double longest = 0;

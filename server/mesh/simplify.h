@@ -42,7 +42,7 @@ struct SimplificationEffect {
 // zero that had one before. The layers are joined into fewer, deeper ones: as few as let a triangle
 // name vertices of two at most, which is what the encoders walk along.
 //
-// Takes some 80 bytes a triangle beside the mesh, and what TriangleGrid takes. The same mesh for
+// Takes some 100 bytes a triangle beside the mesh, and what TriangleGrid takes. The same mesh for
 // any number of threads. Throws Error kUnusableVolume where a position is not a finite number,
 // kTooLarge where 32 bits cannot number the points that are measured, and kCancelled; the mesh is
 // as it was then.

@@ -16,6 +16,9 @@ constexpr int kAttempts = 8;
 // Of the bound, what is asked for: a quadric's error is a mean, and the bound holds everywhere.
 constexpr double kFirstError = 0.5;
 
+// Who measures again in single precision finds no more than the bound.
+constexpr double kWithin = 1 - 1e-6;
+
 // Attempts after which holding vertices is not enough, and less is asked for.
 constexpr int kFullAttempts = 4;
 constexpr double kLess = 0.6;
@@ -189,6 +192,7 @@ class BlockSimplifier {
                   const SurfaceBlock& block)
       : goal_(goal),
         block_(block),
+        squared_bound_(std::pow(kWithin * goal.max_error_mm, 2)),
         mesh_(goal.original, block.triangles),
         exempt_(mesh_.positions.size(), 0),
         is_flat_(mesh_.positions.size(), 0),
@@ -289,7 +293,6 @@ class BlockSimplifier {
 
   // From the original to the proposal.
   void measure_points() {
-    const double squared_bound = goal_.max_error_mm * goal_.max_error_mm;
     const SurfaceView view(mesh_.positions, proposed_);
     const TriangleGrid grid(view, {});
     homes_.resize(block_.points.size());
@@ -297,14 +300,13 @@ class BlockSimplifier {
     for (std::size_t n = 0; n < homes_.size(); ++n) {
       const Point point = measured_point(goal_.original, block_.points[n]);
       const TriangleGrid::Nearest nearest = grid.nearest(point, guess);
-      if (nearest.squared_mm > squared_bound) mark(mesh_.triangles[block_.homes[n]]);
+      if (nearest.squared_mm > squared_bound_) mark(mesh_.triangles[block_.homes[n]]);
       homes_[n] = guess = nearest.triangle;
     }
   }
 
   // From the proposal to the original. Its vertices are the original's.
   void measure_centres() {
-    const double squared_bound = goal_.max_error_mm * goal_.max_error_mm;
     Flags is_far(proposed_.size(), 0);
     std::uint32_t guess = TriangleGrid::kNone;
     for (std::size_t t = 0; t < proposed_.size(); ++t) {
@@ -312,7 +314,7 @@ class BlockSimplifier {
       const TriangleGrid::Nearest nearest =
           goal_.grid->nearest(measured_point(one, mesh_.positions.size()), guess);
       guess = nearest.triangle;
-      if (nearest.squared_mm <= squared_bound) continue;
+      if (nearest.squared_mm <= squared_bound_) continue;
       is_far[t] = 1;
       mark(proposed_[t]);
     }
@@ -333,6 +335,7 @@ class BlockSimplifier {
 
   const BlockGoal& goal_;
   const SurfaceBlock& block_;
+  const double squared_bound_;
   const LocalMesh mesh_;
   Shape before_;
   Flags exempt_;   // vertices whose fans were no manifold's
