@@ -47,7 +47,10 @@ double squared_distance(const Point& point, const Corners& triangle) {
     const double length = squared(normal);
     if (length > kLeastShape * squared(ab) * squared(ac)) return height * height / length;
   }
-  // An edge is nearest. Which one is not clear where the triangle is as good as a line.
+  if (vc <= 0 && d1 > 0 && d3 < 0) return to_segment(a, b);
+  if (vb <= 0 && d2 > 0 && d6 < 0) return to_segment(a, c);
+  if (va <= 0 && d4 > d3 && d5 > d6) return to_segment(b, c);
+  // Which edge is nearest is not clear where the triangle is as good as a line.
   return std::min({to_segment(a, b), to_segment(a, c), to_segment(b, c)});
 }
 

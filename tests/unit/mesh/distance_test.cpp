@@ -126,7 +126,7 @@ TEST(Distance, OfAPointAndATriangleIsToItsNearestPoint) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> place(-2, 2);
   const auto point = [&] { return Point{place(random), place(random), place(random)}; };
-  for (int i = 0; i < 40; ++i) {
+  for (int i = 0; i < 120; ++i) {
     const Corners triangle = {point(), point(), point()};
     const Point from = point();
     const double found = std::sqrt(squared_distance(from, triangle));
