@@ -1,0 +1,47 @@
+#include "tests/bench/accuracy.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/bench/decimation_peers.h"
+#include "tests/bench/samples.h"
+
+namespace isomesh::bench {
+namespace {
+
+constexpr std::uint32_t kSize = 24;
+
+AccuracyPlan small_plan() { return {.iso = kFieldIso, .threads = 2, .errors_mm = {0.05, 0.2}}; }
+
+TEST(Accuracy, OfOursIsWithinTheErrorAndOthersHaveAboutAsManyTriangles) {
+  const std::vector<Approximation> rows =
+      measure_approximations(synthetic_field(kSize), small_plan());
+  const std::size_t peers = 1 + decimation_peers().size();
+  ASSERT_EQ(rows.size(), 1 + 2 * (1 + peers));
+  EXPECT_GT(rows[0].bytes, 0U);
+  for (std::size_t n = 0; n < 2; ++n) {
+    const Approximation& ours = rows[1 + n * (1 + peers)];
+    EXPECT_LE(ours.certificate.max_mm(), small_plan().errors_mm[n]) << ours.name;
+    EXPECT_LT(ours.triangles, rows[0].triangles);
+    EXPECT_LT(ours.bytes, rows[0].bytes);
+    for (std::size_t p = 1; p <= peers; ++p) {
+      const Approximation& peer = rows[1 + n * (1 + peers) + p];
+      EXPECT_GT(peer.triangles, ours.triangles / 2) << peer.name;
+      EXPECT_LT(peer.triangles, rows[0].triangles) << peer.name;
+      EXPECT_GT(peer.certificate.max_mm(), 0) << peer.name;
+    }
+  }
+  const std::string table = to_table(rows);
+  EXPECT_NE(table.find("E = 0.05 mm"), std::string::npos);
+  EXPECT_NE(table.find("meshoptimizer alone"), std::string::npos);
+}
+
+TEST(Accuracy, OfSmoothingIsMeasuredBothWays) {
+  const CertifyTime time = measure_certify(synthetic_field(kSize), small_plan());
+  EXPECT_GT(time.points, 2000U);
+  EXPECT_GT(time.certificate.from_mesh.max_mm, 0);
+  EXPECT_GT(time.certificate.from_reference.max_mm, 0);
+  EXPECT_NE(to_text(time).find("2 threads"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace isomesh::bench
