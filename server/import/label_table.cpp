@@ -63,8 +63,8 @@ std::optional<std::string> label_color(const std::array<double, 3>& parts) {
 
 std::vector<LabelEntry> label_table(std::vector<LabelEntry> entries) {
   std::ranges::stable_sort(entries, {}, &LabelEntry::label);
-  const auto repeated = std::ranges::unique(entries, {}, &LabelEntry::label);
-  entries.erase(repeated.begin(), repeated.end());
+  const auto is_same = [](const LabelEntry& a, const LabelEntry& b) { return a.label == b.label; };
+  entries.erase(std::unique(entries.begin(), entries.end(), is_same), entries.end());
   check_size(entries);
   return entries;
 }

@@ -72,8 +72,10 @@ class LayerReader {
   std::uint32_t label_of(std::uint64_t layer, Sample value, Combinations& combinations) {
     const std::pair<std::uint64_t, std::int64_t> place = {layer, value};
     if (place != last_place_) {
-      const auto [found, is_new] = labels_.emplace(place, 0);
-      if (is_new) found->second = combinations.new_label();
+      auto found = labels_.find(place);
+      if (found == labels_.end()) {
+        found = labels_.emplace(place, combinations.new_label()).first;
+      }
       last_place_ = place;
       last_label_ = found->second;
     }

@@ -183,8 +183,7 @@ std::vector<std::int64_t> select_labels(std::span<const LabelVoxels> present,
   } else {
     labels = *wanted;
     std::ranges::sort(labels);
-    const auto repeated = std::ranges::unique(labels);
-    labels.erase(repeated.begin(), repeated.end());
+    labels.erase(std::unique(labels.begin(), labels.end()), labels.end());
     if (labels.empty()) throw invalid_parameter("labels", "must name one label at least");
     if (std::ranges::binary_search(labels, background)) {
       throw invalid_parameter("labels",

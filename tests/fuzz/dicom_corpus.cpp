@@ -13,9 +13,16 @@ std::vector<std::string> dicom_objects() {
   const SegmentObject labels = {.frames = {{.z = 0, .labels = {2}}, {.z = 5, .labels = {3}}},
                                 .type = "LABELMAP",
                                 .slice_distance = "2.5"};
+  SegmentObject overlapping = two_segments();
+  overlapping.frames[2].labels = {3, 14};
+  overlapping.colors = {{35580, 53665, 50857}};
+  SegmentObject fractional = overlapping;
+  fractional.type = "FRACTIONAL";
+  fractional.maximum = 10;
   for (const DicomObject& object :
        {siemens_mosaic(), siemens_mosaic(csa_fields({"0", "0", "-1"}), false),
         united_imaging_grid(), segmentation(two_segments()), segmentation(labels),
+        segmentation(overlapping), segmentation(fractional),
         DicomSeries{}.enhanced({0, 1, 2}), DicomSeries{}.enhanced({0, 1, 2, 0, 1, 2})}) {
     for (const std::string_view syntax : {kImplicit, kExplicit, kBigEndian}) {
       files.push_back(object.file(syntax));

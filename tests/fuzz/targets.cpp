@@ -17,6 +17,7 @@
 #include "server/import/readers.h"
 #include "server/process/import_message.h"
 #include "server/volume/canonical.h"
+#include "server/volume/labels.h"
 #include "tests/fuzz/draco_target.h"
 
 namespace isomesh::fuzz {
@@ -65,6 +66,7 @@ void expect_volume(const Volume& found, const fs::path& canonical) {
       file.samples().size() != found.bytes) {
     fail("the volume is not what its canonical file holds");
   }
+  if (!volume::is_label_table(found.labels)) fail("the volume's labels are no table");
 }
 
 void import_bytes(Bytes bytes, const process::ImportOptions& options) {
