@@ -18,9 +18,10 @@ Triple cie_lab(const std::vector<std::uint32_t>& stored) {
   return {stored[0] / kMost * 100, stored[1] / kMost * 255 - 128, stored[2] / kMost * 255 - 128};
 }
 
-// CIE 15, from the white of profiles' connection space, D50.
+// CIE 15, from D65: the standard has the white of profiles' connection space, D50, but dcmqi and what
+// descends from it write sRGB's own, and their colours are to come back as they were.
 Triple cie_xyz(const Triple& lab) {
-  constexpr Triple kWhite = {0.96422, 1, 0.82521};
+  constexpr Triple kWhite = {0.95047, 1, 1.08883};
   constexpr double kLinearBelow = 6.0 / 29;
   const auto inverse = [](double t) {
     return t > kLinearBelow ? t * t * t : 3 * kLinearBelow * kLinearBelow * (t - 4.0 / 29);
@@ -30,11 +31,11 @@ Triple cie_xyz(const Triple& lab) {
           kWhite[2] * inverse(y - lab[2] / 200)};
 }
 
-// IEC 61966-2-1, with Bradford's adaptation from D50 to D65 in the matrix.
+// IEC 61966-2-1.
 Triple srgb(const Triple& xyz) {
-  constexpr std::array<Triple, 3> kFromXyz = {{{3.1338561, -1.6168667, -0.4906146},
-                                               {-0.9787684, 1.9161415, 0.0334540},
-                                               {0.0719453, -0.2289914, 1.4052427}}};
+  constexpr std::array<Triple, 3> kFromXyz = {{{3.2404542, -1.5371385, -0.4985314},
+                                               {-0.9692660, 1.8760108, 0.0415560},
+                                               {0.0556434, -0.2040259, 1.0572252}}};
   Triple rgb = {};
   for (std::size_t at = 0; at < 3; ++at) {
     const Triple& row = kFromXyz[at];

@@ -54,14 +54,14 @@ LabelEntry entry(std::int64_t label, const std::string& name,
 TEST(DicomSegmentation, NamesItsLabels) {
   SegmentObject object = two_segments();
   object.segments = {"liver", "spleen", "absent"};
-  // Red and blue of sRGB, by D50, and black.
-  object.colors = {{35580, 53665, 50857}, {19377, 50449, 4105}, {0, 32896, 32896}};
+  // As dcmqi writes red, and the liver's colour of 3D Slicer.
+  object.colors = {{34891, 53480, 50167}, {41661, 41167, 40792}, {0, 32896, 32896}};
   const Outcome outcome = import_labels(object);
   ASSERT_EQ(outcome.error, "");
   LabelEntry liver = entry(1, "liver");
   LabelEntry spleen = entry(2, "spleen");
   liver.color = "#ff0000";
-  spleen.color = "#0000ff";
+  spleen.color = "#dd8265";
   EXPECT_THAT(outcome.volume.labels, testing::ElementsAre(liver, spleen));
   EXPECT_THAT(note_detail(outcome, NoteCode::kLooksLikeLabels), HasSubstr("2 labels"));
   EXPECT_EQ(import_labels(object, {}, kBigEndian).volume.labels, outcome.volume.labels);
