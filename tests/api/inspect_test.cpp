@@ -82,6 +82,29 @@ TEST_F(InspectTest, LabelsAreCountedAndKeptByTheClient) {
   EXPECT_NE(daemon_.get(path + "?background=3").header("etag"), etag);
 }
 
+// Of eight samples both segments have two, and one of these is of both.
+TEST_F(InspectTest, LabelsHaveTheNamesOfTheUpload) {
+  const std::string file =
+      "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 2 2 2 2\nkinds: list domain domain domain\n"
+      "encoding: raw\nspace: LPS\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\n"
+      "Segment0_Name:=liver\nSegment0_Layer:=0\nSegment0_Color:=1 0.5 0\n"
+      "Segment1_Name:=tumour\nSegment1_Layer:=1\n\n" +
+      std::string("\1\0\1\1\0\1\0\0\0\0\0\0\0\0\0\0", 16);
+  const Answer uploaded = daemon_.send("POST", "/v1/volumes", file);
+  ASSERT_EQ(uploaded.status, 201) << uploaded.body;
+  EXPECT_THAT(uploaded.body, testing::Not(testing::HasSubstr("tumour")));
+  const std::string id = volume_from_json(uploaded.body).id;
+  EXPECT_THAT(daemon_.get("/v1/volumes/" + id).body, testing::Not(testing::HasSubstr("tumour")));
+  EXPECT_THAT(daemon_.get("/v1/volumes").body, testing::Not(testing::HasSubstr("tumour")));
+  const VolumeLabels list = daemon_.client().labels(id);
+  ASSERT_EQ(list.labels.size(), 2U);
+  EXPECT_EQ(list.labels[0].name, "liver");
+  EXPECT_EQ(list.labels[0].color, "#ff8000");
+  EXPECT_EQ(list.labels[0].voxels, 2U);
+  EXPECT_EQ(list.labels[1].name, "tumour");
+  EXPECT_EQ(list.labels[1].voxels, 2U);
+}
+
 TEST_F(InspectTest, LabelsAreRefusedByName) {
   for (const std::string background : {"", "x", "1.5", "+1", "%2B1", "99999999999999999999"}) {
     EXPECT_TRUE(blames(daemon_.get(path_ + "/labels?background=" + background), "background"))

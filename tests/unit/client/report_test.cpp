@@ -99,6 +99,19 @@ TEST(VolumeReport, NamesWhatDicomTells) {
   EXPECT_THAT(report, Not(HasSubstr("Doe")));  // a terminal may be anybody's
 }
 
+TEST(LabelList, IsATable) {
+  EXPECT_EQ(label_list({.volume = "abc",
+                        .labels = {{.label = -1, .voxels = 12'345, .volume_mm3 = 1.25},
+                                   {.label = 7,
+                                    .voxels = 1,
+                                    .volume_mm3 = 2000,
+                                    .name = "liver",
+                                    .color = "#ff8000"}}}),
+            "  label  voxels      mm3  color    name\n"
+            "     -1  12,345      1.2\n"
+            "      7       1  2,000.0  #ff8000  liver\n");
+}
+
 TEST(JobReport, TellsAJobThatRunsFromOneThatFailed) {
   Job job = test::finished_job("7", "mesh");
   job.state = JobState::kRunning;
