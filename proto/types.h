@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "proto/error.h"
+#include "proto/labels.h"
 #include "proto/notes.h"
 
 namespace isomesh {
@@ -99,24 +100,6 @@ struct DicomIdentity {
   bool operator==(const DicomIdentity&) const = default;
 };
 
-// What a file says of one of its labels. Segments are named after organs, so that names may be
-// shown wherever the volume is.
-struct LabelEntry {
-  static constexpr std::size_t kMostNameBytes = 255;
-
-  std::int64_t label = 0;
-  std::string name = {};                  // UTF-8 without control characters; may be empty
-  std::optional<std::string> color = {};  // as is_color() has it
-  // The sample values that belong to it, ascending; empty: its own number alone. Where segments
-  // overlap, values number their combinations, and one value belongs to several labels.
-  std::vector<std::int64_t> values = {};
-
-  bool operator==(const LabelEntry&) const = default;
-};
-
-// Whether that is "#rrggbb", in lower case.
-bool is_color(std::string_view text);
-
 // The two ways in which a NIfTI header may say where its samples lie.
 enum class NiftiForm { kSform, kQform };
 
@@ -182,17 +165,6 @@ struct ComponentFilter {
   bool keeps_all() const { return !keep && !min_triangles; }
   bool operator==(const ComponentFilter&) const = default;
 };
-
-// Which labels of a segmentation a job separates.
-struct LabelChoice {
-  std::vector<std::int64_t> values;  // empty: all that the volume has
-
-  bool is_all() const { return values.empty(); }
-  bool operator==(const LabelChoice&) const = default;
-};
-
-using LabelTexts = std::map<std::int64_t, std::string>;
-using LabelValues = std::map<std::int64_t, std::vector<std::int64_t>>;
 
 // Whom to tell that a job has ended.
 struct Callback {
@@ -421,30 +393,6 @@ struct Histogram {
   std::vector<std::uint64_t> counts;     // of each bin
 
   bool operator==(const Histogram&) const = default;
-};
-
-// One label of a volume: what its samples say, and what its file did.
-struct VolumeLabel {
-  std::int64_t label = 0;
-  std::uint64_t voxels = 0;  // at least 1
-  double volume_mm3 = 0;     // of so many voxels
-  // The smallest and the largest sample along x, y and z that has it.
-  std::array<std::uint32_t, 3> low = {0, 0, 0};
-  std::array<std::uint32_t, 3> high = {0, 0, 0};
-  // The smallest and the largest corner, in millimetres (LPS), of the box of these voxels.
-  std::array<std::array<double, 3>, 2> bounds = {};
-  std::optional<std::string> name = {};
-  std::optional<std::string> color = {};  // as is_color() has it
-
-  bool operator==(const VolumeLabel&) const = default;
-};
-
-struct VolumeLabels {
-  std::string volume;
-  std::int64_t background = 0;
-  std::vector<VolumeLabel> labels;  // ascending, at most Volume::kMostLabels
-
-  bool operator==(const VolumeLabels&) const = default;
 };
 
 // What a job with these parameters would make and take.
