@@ -123,8 +123,8 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                           "surface of its own, or all of them.",
                   .more = "Neighbours share the wall between them. All other values, and those "
                           "that are not listed, are background. Vertices lie half-way between two "
-                          "samples. Unless the request says, there are 10 passes of half steps "
-                          "(lambda 0.5), and no vertex moves farther than half the smallest "
+                          "samples. Unless the request says, there are 10 passes with a lambda of "
+                          "0.33, and no vertex moves farther than half the smallest "
                           "spacing.",
                   .minimum = kLeast,
                   .maximum = kMost,

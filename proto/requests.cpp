@@ -213,7 +213,7 @@ class RequestReader {
     for (const Json& element : json) {
       const std::size_t before = errors_.size();
       read_member(element, path, parameter, values.emplace_back());
-      if (errors_.size() > before) return;
+      if (errors_.size() > before) return values.clear();
     }
     std::ranges::sort(values);
     const auto repeated = std::ranges::unique(values);

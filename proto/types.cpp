@@ -112,11 +112,12 @@ bool is_final(JobState state) {
 }
 
 double default_lambda(const MeshParameters& parameters) {
-  // Whole steps leave the steps between half-way vertices as they are, and take half a percent off
-  // the volume of an atlas in ten passes; half steps even them out, and take a third.
-  constexpr double kLabels = 0.5;
-  const bool is_whole = parameters.smoothing == Smoothing::kLaplacian;
-  return parameters.labels && is_whole ? kLabels : default_lambda(parameters.smoothing);
+  // Whole steps leave the steps between half-way vertices as they are, and take half a percent to
+  // one off the volume of labels in ten passes; thirds even them out, and take a third of a
+  // percent.
+  constexpr double kLabels = 0.33;
+  const bool is_laplacian = parameters.smoothing == Smoothing::kLaplacian;
+  return parameters.labels && is_laplacian ? kLabels : default_lambda(parameters.smoothing);
 }
 
 JobParameters label_parameters(LabelChoice labels) {

@@ -72,9 +72,9 @@ std::string labels_report(const std::vector<LabelSummary>& labels) {
                     grouped(static_cast<std::int64_t>(label.triangles)), fixed(label.volume_mm3, 1),
                     fixed(label.voxels_mm3, 1), topology});
   }
-  return in_columns({Align::kRight, Align::kLeft, Align::kRight, Align::kRight, Align::kRight,
-                     Align::kLeft},
-                    rows);
+  return in_columns(
+      {Align::kRight, Align::kLeft, Align::kRight, Align::kRight, Align::kRight, Align::kLeft},
+      rows);
 }
 
 }  // namespace
@@ -208,11 +208,10 @@ std::string job_report(const Job& job) {
         {"stage", std::string(to_string(job.stage)) + ", " + fixed(100 * job.progress, 0) + " %"});
   }
   rows.push_back({"volume", asked.volume});
-  rows.push_back({"parameters", subject_of(asked) + ", scheme " +
-                                    std::to_string(static_cast<int>(asked.scheme)) + ", " +
-                                    std::to_string(asked.passes) + " passes of " +
-                                    std::string(to_string(asked.smoothing)) +
-                                    (asked.close ? ", closed" : "")});
+  rows.push_back({"parameters",
+                  subject_of(asked) + ", scheme " + std::to_string(static_cast<int>(asked.scheme)) +
+                      ", " + std::to_string(asked.passes) + " passes of " +
+                      std::string(to_string(asked.smoothing)) + (asked.close ? ", closed" : "")});
   rows.push_back({"priority", std::string(to_string(asked.priority))});
   rows.push_back({"created", job.created});
   if (job.started) rows.push_back({"started", *job.started});

@@ -60,7 +60,7 @@ class Validator {
     } else if (keyword == "propertyNames") {
       for (const auto& [name, unused] : value.items()) check(name, says, where + '/' + name);
     } else if (keyword == "items") {
-      for (std::size_t i = 0; i < value.size(); ++i) {
+      for (std::size_t i = 0; value.is_array() && i < value.size(); ++i) {
         check(value[i], says, where + '/' + std::to_string(i));
       }
     } else if (keyword == "allOf") {

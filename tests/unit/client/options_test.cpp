@@ -210,5 +210,39 @@ TEST_F(OptionsTest, HelpsOnRequest) {
   EXPECT_THAT(ending_of({"--version"}).second, HasSubstr("isomesh "));
 }
 
+TEST_F(OptionsTest, ReadsWhatLabelsCanBeAskedFor) {
+  const std::string glb = (folder_ / "body.glb").string();
+  const Options options =
+      parse({"mesh", file_.c_str(), "--labels", "1,5", "--background", "9", "--label-name",
+             "1=Left lung", "--label-name", "5=Heart", "--label-color", "5=#ff0000",
+             "--label-values", "5=5,6", "-o", glb.c_str()});
+  const JobParameters& parameters = options.parameters;
+  EXPECT_EQ(parameters.labels, (LabelChoice{{1, 5}}));
+  EXPECT_EQ(parameters.background, 9);
+  EXPECT_EQ(parameters.passes, label_parameters({}).passes);
+  EXPECT_EQ(parameters.label_names, (LabelTexts{{1, "Left lung"}, {5, "Heart"}}));
+  EXPECT_EQ(parameters.label_colors, (LabelTexts{{5, "#ff0000"}}));
+  EXPECT_EQ(parameters.label_values, (LabelValues{{5, {5, 6}}}));
+  EXPECT_EQ(parse({"mesh", file_.c_str(), "--labels", "all", "--passes", "5", "-o", glb.c_str()})
+                .parameters.passes,
+            5);
+}
+
+TEST_F(OptionsTest, RefusesWhatIsForLabelsWithoutThem) {
+  const auto status_with = [&](std::vector<const char*> more) {
+    more.insert(more.begin(), {"mesh", file_.c_str(), "-o", drc_.c_str()});
+    return ending_of(more).first;
+  };
+  EXPECT_EQ(status_with({"--iso", "3"}), -1);
+  EXPECT_EQ(status_with({}), 2);
+  EXPECT_EQ(status_with({"--iso", "3", "--background", "1"}), 2);
+  EXPECT_EQ(status_with({"--iso", "3", "--labels", "1"}), 2);
+  EXPECT_EQ(status_with({"--labels", "all"}), 2);  // a .drc holds one label
+  EXPECT_EQ(status_with({"--labels", "1"}), -1);
+  EXPECT_EQ(status_with({"--labels", "one"}), 2);
+  EXPECT_EQ(status_with({"--labels", "1", "--label-name", "Liver"}), 2);
+  EXPECT_EQ(status_with({"--labels", "1", "--interpolation", "linear"}), 2);
+}
+
 }  // namespace
 }  // namespace isomesh::cli

@@ -7,11 +7,13 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include <archive.h>
 #include <archive_entry.h>
 #include <gtest/gtest.h>
+#include <locale.h>
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
@@ -119,6 +121,9 @@ std::map<std::string, std::string> unzipped(const std::string& bytes) {
   std::map<std::string, std::string> files;
   archive* reader = archive_read_new();
   archive_read_support_format_zip(reader);
+  const std::unique_ptr<std::remove_pointer_t<locale_t>, decltype(&freelocale)> utf8(
+      newlocale(LC_CTYPE_MASK, "C.UTF-8", nullptr), freelocale);
+  const locale_t before = uselocale(utf8.get());  // or names beyond ASCII are not told
   EXPECT_EQ(archive_read_open_memory(reader, bytes.data(), bytes.size()), ARCHIVE_OK);
   archive_entry* entry = nullptr;
   while (archive_read_next_header(reader, &entry) == ARCHIVE_OK) {
@@ -129,6 +134,7 @@ std::map<std::string, std::string> unzipped(const std::string& bytes) {
     files[name == nullptr ? "" : name] = content;
   }
   archive_read_free(reader);
+  uselocale(before);
   return files;
 }
 

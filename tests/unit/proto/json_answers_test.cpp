@@ -421,5 +421,40 @@ TEST(Record, KeepsTheParametersOfEarlierVersions) {
   EXPECT_EQ(job.parameters.callback, Callback{"https://receiver.example/?key=1"});
 }
 
+TEST(JobJson, TellsOfLabelsOnlyWhereThereAreSome) {
+  Job job = succeeded_job();
+  const std::string by_iso = to_json(job);
+  for (const char* member : {"labels", "background", "label_names"}) {
+    EXPECT_EQ(by_iso.find(member), std::string::npos) << member;
+  }
+  static_cast<MeshParameters&>(job.parameters) = label_parameters({{3}});
+  job.parameters.label_names = {{3, "Liver"}};
+  job.parameters.label_values = {{3, {3, 9}}};
+  job.mesh->labels = {
+      {.label = 3,
+       .name = "Liver",
+       .color = "#112233",
+       .voxels = 7,
+       .voxels_mm3 = 3.5,
+       .triangles = 40,
+       .vertices = 22,
+       .closed = true,
+       .manifold = true,
+       .oriented = true,
+       .components = 1,
+       .area_mm2 = 12.5,
+       .volume_mm3 = 3.25,
+       .files = {{MeshFormat::kStl, {.bytes = 9, .sha256 = "aa", .offset = 4, .href = "/x"}}}}};
+  const std::string text = to_json(job);
+  EXPECT_EQ(text.find("\"iso\""), std::string::npos);
+  EXPECT_EQ(text.find("interpolation"), std::string::npos);
+  Job read = job_from_json(text);
+  read.parameters.interpolation = job.parameters.interpolation;
+  EXPECT_EQ(read, job);
+  read = job_from_record(text);
+  read.parameters.interpolation = job.parameters.interpolation;
+  EXPECT_EQ(read, job);
+}
+
 }  // namespace
 }  // namespace isomesh

@@ -63,6 +63,62 @@ JobParameters unusual_parameters(const std::string& volume) {
 
 // --- Bodies --------------------------------------------------------------------------------------
 
+TEST(JobBody, MayNameLabelsInPlaceOfAnIso) {
+  const auto of_labels = [](const std::string& members) {
+    return parse_job_parameters(R"({"volume": "a", "labels": )" + members + "}");
+  };
+  JobParameters expected = label_parameters({});
+  expected.volume = "a";
+  expected.lambda = default_lambda(expected);
+  EXPECT_EQ(of_labels("\"all\""), expected);
+  EXPECT_EQ(expected.passes, 10);
+  EXPECT_EQ(of_labels("[7, 3, 7, -1]").labels->values, (std::vector<std::int64_t>{-1, 3, 7}));
+  EXPECT_EQ(of_labels(R"("all", "passes": 2, "smoothing": "taubin")").passes, 2);
+  EXPECT_EQ(of_labels(R"("all", "smoothing": "taubin")").lambda,
+            default_lambda(Smoothing::kTaubin));
+  EXPECT_EQ(of_labels(R"("all", "label_colors": {"3": "#AAbb00"})").label_colors.at(3), "#aabb00");
+  EXPECT_EQ(of_labels(R"("all", "label_values": {"3": [9, 4, 9]})").label_values,
+            (LabelValues{{3, {4, 9}}}));
+}
+
+TEST(JobBody, RefusesWhatLabelsCannotHave) {
+  const auto faults_of = [](const std::string& members) {
+    return faults_in(R"({"volume": "a", )" + members + "}");
+  };
+  EXPECT_THAT(faults_of(R"("labels": "all", "iso": 3)"), ElementsAre("iso"));
+  EXPECT_THAT(faults_of(R"("labels": null)"), ElementsAre("labels"));
+  EXPECT_THAT(faults_of(R"("labels": [])"), ElementsAre("labels"));
+  EXPECT_THAT(faults_of(R"("labels": [1, "2"])"), ElementsAre("labels"));
+  EXPECT_THAT(faults_of(R"("labels": [0])"), ElementsAre("labels"));
+  EXPECT_THAT(faults_of(R"("labels": [5], "background": 5)"), ElementsAre("labels"));
+  EXPECT_THAT(faults_of(R"("labels": "all", "interpolation": "linear")"),
+              ElementsAre("interpolation"));
+  EXPECT_THAT(faults_of(R"("labels": "all", "components": {"keep": 1})"),
+              ElementsAre("components"));
+  EXPECT_THAT(faults_of(R"("labels": "all", "label_names": {"3": ""})"),
+              ElementsAre("label_names.3"));
+  EXPECT_THAT(faults_of(R"("labels": "all", "label_names": {"03x": "a"})"),
+              ElementsAre("label_names.03x"));
+  EXPECT_THAT(faults_of(R"("labels": "all", "label_names": ["a"])"), ElementsAre("label_names"));
+  EXPECT_THAT(faults_of(R"("labels": "all", "label_values": {"3": []})"),
+              ElementsAre("label_values.3"));
+  EXPECT_THAT(faults_of(R"("iso": 3, "background": 1, "label_names": {}, "formats": ["zip"])"),
+              UnorderedElementsAre("background", "label_names", "formats"));
+}
+
+TEST(JobQuery, NamesLabels) {
+  EXPECT_TRUE(parse_job_parameters(Query{{"labels", "all"}}).labels->is_all());
+  const JobParameters some = parse_job_parameters(Query{{"labels", "5,3"}, {"background", "-1"}});
+  EXPECT_EQ(some.labels->values, (std::vector<std::int64_t>{3, 5}));
+  EXPECT_EQ(some.background, -1);
+  EXPECT_THAT(faults_in(Query{{"labels", "3,x"}}), ElementsAre("labels"));
+  EXPECT_THAT(faults_in(Query{{"labels", ""}}), ElementsAre("labels"));
+  JobParameters asked = label_parameters({{3, 5}});
+  asked.volume = "a";
+  asked.lambda = 0.25;
+  EXPECT_EQ(parse_job_parameters(to_query(asked), VolumeIn::kQuery), asked);
+}
+
 TEST(JobBody, NeedsAVolumeAndAnIsoOnly) {
   JobParameters expected;
   expected.volume = "a";

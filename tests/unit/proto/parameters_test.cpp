@@ -30,7 +30,13 @@ void for_every_parameter(const Each& each) {
 }
 
 json body_with(std::string path, const json& value) {
-  json body = {{"volume", "a"}, {"iso", 60}};
+  const bool is_of_labels = path == "background" || path.starts_with("label");
+  json body = {{"volume", "a"}};
+  if (is_of_labels) {
+    body["labels"] = "all";
+  } else {
+    body["iso"] = 60;
+  }
   std::ranges::replace(path, '.', '/');
   body[json::json_pointer('/' + path)] = value;
   return body;
@@ -94,9 +100,13 @@ TEST(Parameters, BoundsAreThoseOfTheTable) {
         std::is_same_v<Member, double> || std::is_same_v<Member, std::optional<double>>;
     const double step = kIsReal ? 1e-6 : 1;
     const auto takes = [&](double value) {
-      const std::string fault = fault_of(path, kIsReal ? json(value) : json(std::llround(value)));
+      json number = kIsReal ? json(value) : json(std::llround(value));
+      if (std::is_same_v<Member, std::optional<LabelChoice>>) number = json::array({number});
+      if (std::is_same_v<Member, LabelValues>) number = {{"1", json::array({number})}};
+      const std::string fault = fault_of(path, number);
       if (!fault.empty()) {
-        EXPECT_THAT(fault, HasSubstr(path + ": must be"));
+        const std::string place = std::is_same_v<Member, LabelValues> ? path + ".1" : path;
+        EXPECT_THAT(fault, HasSubstr(place + ": must be"));
         EXPECT_THAT(fault, HasSubstr(range_of(parameter)));
       }
       ++bounds;

@@ -22,23 +22,7 @@ export type JobParameters = Job['parameters'];
 export type JobState = Schemas['JobState'];
 
 export type MeshSummary = Schemas['MeshSummary'];
-// One label of a job by labels, with its own surface.
-export interface LabelSummary {
-  label: number;
-  name?: string | null;
-  color?: string | null;
-  voxels: number;
-  voxels_mm3: number;
-  triangles: number;
-  vertices: number;
-  closed: boolean;
-  manifold: boolean;
-  oriented: boolean;
-  components: number;
-  area_mm2: number;
-  volume_mm3: number;
-  files?: Record<string, MeshFile>;
-}
+export type LabelSummary = Schemas['LabelSummary'];
 export type VolumeLabels = Schemas['VolumeLabels'];
 export type VolumeLabel = Schemas['VolumeLabel'];
 export type MeshFile = Schemas['MeshFile'];

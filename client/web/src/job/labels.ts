@@ -22,13 +22,12 @@ export function matching<T extends Named>(labels: readonly T[], text: string): T
 }
 
 export function labelsOfMesh({ mesh }: Job): readonly LabelSummary[] {
-  return (mesh as { labels?: LabelSummary[] } | null | undefined)?.labels ?? [];
+  return mesh?.labels ?? [];
 }
 
 // Of each label's surface.
 export function trianglesOf(estimate: Estimate): ReadonlyMap<number, number> {
-  const { labels = [] } = estimate as { labels?: { label: number; triangles: number }[] };
-  return new Map(labels.map(({ label, triangles }) => [label, triangles]));
+  return new Map((estimate.labels ?? []).map(({ label, triangles }) => [label, triangles]));
 }
 
 export class LabelState {

@@ -65,5 +65,5 @@ function decode(primitive) {
   return [counts, points, normals, indices].map((array) => new Uint8Array(array.buffer));
 }
 
-const primitives = (gltf.meshes?.[0].primitives ?? []).flatMap(decode);
+const primitives = (gltf.meshes ?? []).flatMap((mesh) => mesh.primitives.flatMap(decode));
 writeFileSync(out, Buffer.concat(primitives));

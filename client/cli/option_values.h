@@ -1,0 +1,92 @@
+// Options that take values, and how their texts are read; private to this folder.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "proto/types.h"
+
+namespace isomesh::cli {
+
+[[noreturn]] inline void refuse(const std::string& option, const std::string& message) {
+  throw CLI::ValidationError(option, message);
+}
+
+template <class Number>
+std::optional<Number> number_from(std::string_view text) {
+  Number number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  if constexpr (std::is_floating_point_v<Number>) {
+    if (!std::isfinite(number)) return std::nullopt;
+  }
+  return number;
+}
+
+// Exactly as many numbers as the target has, separated by commas.
+template <class Number, std::size_t N>
+std::array<Number, N> numbers_from(const std::string& option, std::string_view text) {
+  std::array<Number, N> numbers{};
+  for (std::size_t n = 0; n < N; ++n) {
+    const std::size_t end = std::min(text.find(','), text.size());
+    const auto number = number_from<Number>(text.substr(0, end));
+    const bool last = n + 1 == N;
+    if (!number || last != (end == text.size())) {
+      refuse(option, "must be " + std::to_string(N) + " numbers separated by commas");
+    }
+    numbers[n] = *number;
+    text.remove_prefix(last ? end : end + 1);
+  }
+  return numbers;
+}
+
+template <class Enum>
+Enum name_from(const std::string& option, const std::string& text) {
+  const auto value = from_string<Enum>(text);
+  if (!value) refuse(option, "must be " + names_of<Enum>());
+  return *value;
+}
+
+template <class Enum>
+std::vector<std::string> names_from() {
+  std::vector<std::string> names;
+  for (const Enum value : values_of<Enum>()) names.emplace_back(to_string(value));
+  return names;
+}
+
+// `--option VALUE` that calls `take(VALUE)`.
+inline CLI::Option* add(CLI::App& app, const std::string& name, const std::string& value,
+                        const std::string& help,
+                        const std::function<void(const std::string&)>& take) {
+  return app.add_option_function<std::string>(name, take, help)->type_name(value);
+}
+
+template <class Number>
+CLI::Option* add_number(CLI::App& app, const std::string& name, const std::string& help,
+                        std::function<void(Number)> take) {
+  return add(app, name, "N", help, [name, take = std::move(take)](const std::string& text) {
+    const auto number = number_from<Number>(text);
+    if (!number) refuse(name, "\"" + text + "\" is not a number");
+    take(*number);
+  });
+}
+
+template <class Enum>
+CLI::Option* add_name(CLI::App& app, const std::string& name, const std::string& help,
+                      std::function<void(Enum)> take) {
+  return add(app, name, "NAME", help, [name, take = std::move(take)](const std::string& text) {
+    take(name_from<Enum>(name, text));
+  });
+}
+
+}  // namespace isomesh::cli

@@ -1,0 +1,215 @@
+#include "client/cli/parameter_options.h"
+
+#include <map>
+#include <sstream>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "base/text.h"
+#include "client/cli/option_values.h"
+#include "proto/parameters.h"
+
+namespace isomesh::cli {
+namespace {
+
+// What a parameter is by default, and what it may be where that are some words. Ranges are the
+// server's to check: it names the limits that it has.
+template <class T>
+std::string values_and_default(const Parameter& parameter, const T& standard) {
+  if constexpr (std::is_same_v<T, Scheme>) {
+    return ": 5 or 6 (default: " + std::to_string(static_cast<int>(standard)) + ")";
+  } else if constexpr (Enumeration<T>) {
+    return ": " + listed(names_from<T>()) + " (default: " + std::string(to_string(standard)) + ")";
+  } else if constexpr (std::is_same_v<T, std::vector<MeshFormat>>) {
+    return ", of " + listed(names_from<MeshFormat>()) +
+           " (default: " + std::string(to_string(standard.front())) + ")";
+  } else if constexpr (std::is_same_v<T, int> || std::is_same_v<T, std::int64_t> ||
+                       std::is_same_v<T, double>) {
+    return " (default: " + number_text(standard) + ")";
+  } else {
+    std::string defaults;
+    for (const auto& entry : parameter.cases) {
+      if (!entry || !entry->standard) continue;
+      defaults += (defaults.empty() ? " (default: " : ", ") + number_text(*entry->standard) +
+                  " for " + std::string(to_string(entry->smoothing));
+    }
+    return defaults.empty() ? "" : defaults + ")";
+  }
+}
+
+// One line of the table, as it reads on a terminal.
+template <class T>
+std::string help_of(const Parameter& parameter, const T& standard) {
+  std::string help = parameter.help;
+  std::erase(help, '`');
+  if (help.ends_with('.')) help.pop_back();
+  const std::string unit = parameter.unit;
+  return help + (unit.empty() ? "" : ", in " + unit) + values_and_default(parameter, standard);
+}
+
+// An option for each kind of parameter.
+class ParameterOptions {
+ public:
+  explicit ParameterOptions(CLI::App& app) : app_(app) {}
+
+  template <class T>
+  CLI::Option* add(const Parameter& parameter, T& value) {
+    const std::string name = "--" + option_name_of(parameter);
+    return add_kind(name, parameter, help_of(parameter, value), value);
+  }
+
+ private:
+  template <class Number>
+  requires std::is_arithmetic_v<Number> CLI::Option* add_kind(const std::string& name,
+                                                              const Parameter& /*parameter*/,
+                                                              const std::string& help,
+                                                              Number& value) {
+    return add_number<Number>(app_, name, help, [&value](Number given) { value = given; });
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, bool& value) {
+    return app_.add_flag(name, value, help);
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, Scheme& value) {
+    return add_number<int>(app_, name, help, [&value](int given) { value = Scheme{given}; });
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, Enumeration auto& value) {
+    using Enum = std::remove_reference_t<decltype(value)>;
+    return add_name<Enum>(app_, name, help, [&value](Enum given) { value = given; });
+  }
+
+  template <class Number>
+  requires std::is_arithmetic_v<Number> CLI::Option* add_kind(const std::string& name,
+                                                              const Parameter& parameter,
+                                                              const std::string& help,
+                                                              std::optional<Number>& value) {
+    if (parameter.when_empty == nullptr) {
+      return add_number<Number>(app_, name, help, [&value](Number given) { value = given; });
+    }
+    const std::string word = parameter.when_empty;
+    return isomesh::cli::add(app_, name, "N|" + word, help,
+                             [&value, name, word](const std::string& text) {
+                               value = number_from<Number>(text);
+                               if (!value && text != word) {
+                                 refuse(name, "must be a number or " + word);
+                               }
+                             });
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, std::vector<MeshFormat>& value) {
+    return isomesh::cli::add(app_, name, "NAME,..", help, [&value, name](const std::string& text) {
+      value.clear();
+      std::stringstream names(text);
+      for (std::string format; std::getline(names, format, ',');) {
+        value.push_back(name_from<MeshFormat>(name, format));
+      }
+    });
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, std::optional<LabelChoice>& value) {
+    return isomesh::cli::add(app_, name, "all|N,..", help, [&value, name](const std::string& text) {
+      value.emplace();
+      if (text != "all") value->values = labels_from(name, text);
+    });
+  }
+
+  // `--label-name 3=Liver`, once for each label.
+  template <class T>
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, std::map<std::int64_t, T>& value) {
+    constexpr bool kIsList = std::is_same_v<T, std::vector<std::int64_t>>;
+    return app_
+        .add_option_function<std::vector<std::string>>(
+            name,
+            [&value, name](const std::vector<std::string>& texts) {
+              for (const std::string& text : texts) {
+                const std::size_t sign = text.find('=');
+                const auto label =
+                    number_from<std::int64_t>(std::string_view(text).substr(0, sign));
+                if (sign == std::string::npos || !label) {
+                  refuse(name, "\"" + text + "\" must begin with a label and =");
+                }
+                const std::string own = text.substr(sign + 1);
+                if constexpr (kIsList) {
+                  value[*label] = labels_from(name, own);
+                } else {
+                  value[*label] = own;
+                }
+              }
+            },
+            help + ". May be repeated")
+        ->type_name(kIsList ? "LABEL=N,.." : "LABEL=TEXT")
+        ->expected(1)
+        ->take_all();
+  }
+
+  static std::vector<std::int64_t> labels_from(const std::string& name, const std::string& text) {
+    std::vector<std::int64_t> labels;
+    for (const std::string_view each : split(text, ',')) {
+      const auto label = number_from<std::int64_t>(each);
+      if (!label) refuse(name, "must be whole numbers separated by commas");
+      labels.push_back(*label);
+    }
+    return labels;
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, std::optional<Callback>& value) {
+    return isomesh::cli::add(app_, name, "URL", help,
+                             [&value](const std::string& text) { value = Callback{text}; });
+  }
+
+  CLI::App& app_;
+};
+
+// What is required, and what needs or excludes what.
+void relate(const Parameter& parameter, const std::map<std::string, CLI::Option*>& options) {
+  CLI::Option* const option = options.at(parameter.name);
+  if (parameter.needs != nullptr) option->needs(options.at(parameter.needs));
+  if (!parameter.is_required) {
+    option->group("Job");
+  } else if (parameter.unless == nullptr) {
+    option->required();
+  } else {
+    CLI::Option* const other = options.at(parameter.unless);
+    option->excludes(other);
+  }
+}
+
+}  // namespace
+
+void add_parameters(CLI::App& app, JobParameters& parameters, Formats formats) {
+  ParameterOptions all(app);
+  std::map<std::string, CLI::Option*> options;  // by the parameters' names
+  std::vector<Parameter> added;
+  visit_leaves(parameters,
+               [&](const std::string& /*path*/, const Parameter& parameter, auto& member) {
+                 using Member = std::remove_reference_t<decltype(member)>;
+                 const bool is_formats = std::is_same_v<Member, std::vector<MeshFormat>>;
+                 if (is_formats && formats == Formats::kByFiles) return;
+                 // The volume is the command's file or its first argument.
+                 if constexpr (!std::is_same_v<Member, std::string>) {
+                   options[parameter.name] = all.add(parameter, member);
+                   added.push_back(parameter);
+                 }
+               });
+  for (const Parameter& parameter : added) relate(parameter, options);
+  CLI::Option* const labels = options.at("labels");
+  options.at("interpolation")->excludes(labels);  // their vertices lie half-way
+  app.parse_complete_callback(
+      [&parameters, labels, iso = options.at("iso"), passes = options.at("passes")] {
+        if (labels->count() + iso->count() == 0) throw CLI::RequiredError("--iso or --labels");
+        const bool is_by_labels = labels->count() > 0;
+        if (is_by_labels && passes->count() == 0) parameters.passes = label_parameters({}).passes;
+      });
+}
+
+}  // namespace isomesh::cli

@@ -1,0 +1,220 @@
+// Jobs by labels over HTTP: from the list of a volume's labels to one label's own file.
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "base/sha256.h"
+#include "proto/json.h"
+#include "tests/api/daemon.h"
+#include "tests/api/problems.h"
+#include "tests/support/process.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+using nlohmann::json;
+using testing::HasSubstr;
+
+// Two balls that touch, of the labels 3 and 7.
+RawUpload two_balls() {
+  auto volume = constant<std::uint8_t>(0, {30, 20, 20});
+  for (std::uint32_t k = 0; k < 20; ++k) {
+    for (std::uint32_t j = 0; j < 20; ++j) {
+      for (std::uint32_t i = 0; i < 30; ++i) {
+        if (std::hypot(i - 9.0, j - 10.0, k - 10.0) < 6) volume.at(i, j, k) = 3;
+        if (std::hypot(i - 19.0, j - 10.0, k - 10.0) < 6) volume.at(i, j, k) = 7;
+      }
+    }
+  }
+  return raw_upload(volume);
+}
+
+class LabelsTest : public testing::Test {
+ protected:
+  Answer post(const std::string& members, const std::string& volume = {}) const {
+    return daemon_.send("POST", "/v1/jobs",
+                        R"({"volume": ")" + (volume.empty() ? volume_.id : volume) + "\"" +
+                            (members.empty() ? "" : ", " + members) + "}",
+                        {{"Content-Type", "application/json"}});
+  }
+
+  Job made(const std::string& members) const {
+    const Answer answer = post(members);
+    EXPECT_EQ(answer.status, 202) << answer.body;
+    const Job job = daemon_.client().wait(job_from_json(answer.body).id);
+    EXPECT_EQ(job.state, JobState::kSucceeded) << to_json(job);
+    return job;
+  }
+
+  Answer mesh(const Job& job, const std::string& name, const Headers& headers = {}) const {
+    return daemon_.get("/v1/jobs/" + job.id + "/mesh." + name, headers);
+  }
+
+  Daemon daemon_;
+  const RawUpload balls_ = two_balls();
+  const Volume volume_ = upload(daemon_, balls_);
+};
+
+TEST_F(LabelsTest, AJobSaysWhatEveryLabelIs) {
+  const Job job = made(R"("labels": "all", "close": true, "formats": ["glb", "stl"],
+                          "label_names": {"3": "Left"}, "label_colors": {"7": "#FF8000"})");
+  EXPECT_EQ(job.parameters.passes, 10);
+  EXPECT_EQ(job.parameters.lambda, 0.33);
+  EXPECT_EQ(job.parameters.max_displacement_mm, 0.5);
+  const json parameters = json::parse(to_json(job.parameters));
+  EXPECT_FALSE(parameters.contains("iso"));
+  EXPECT_FALSE(parameters.contains("interpolation"));
+  EXPECT_EQ(parameters["labels"], "all");
+  ASSERT_EQ(job.mesh->labels.size(), 2U);
+  const LabelSummary& left = job.mesh->labels[0];
+  EXPECT_EQ(left.label, 3);
+  EXPECT_EQ(left.name, "Left");
+  EXPECT_FALSE(left.color);
+  EXPECT_TRUE(left.closed && left.manifold && left.oriented);
+  EXPECT_EQ(job.mesh->labels[1].color, "#ff8000");
+  EXPECT_EQ(job.mesh->files.size(), 2U);
+
+  const json list = json::parse(daemon_.get("/v1/jobs").body);
+  EXPECT_FALSE(list["jobs"][0]["mesh"].contains("labels"));
+}
+
+TEST_F(LabelsTest, OneLabelsFileIsAFileOfItsOwn) {
+  const Job job = made(R"("labels": "all", "formats": ["stl", "ply"])");
+  const LabelSummary& label = job.mesh->labels[1];
+  const LabelFile& file = label.files.at(MeshFormat::kStl);
+  EXPECT_EQ(file.href, "/v1/jobs/" + job.id + "/mesh.stl?label=7");
+  const Answer answer = mesh(job, "stl?label=7");
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(answer.header("content-type"), "model/stl");
+  EXPECT_EQ(answer.header("etag"), '"' + file.sha256 + '"');
+  EXPECT_THAT(answer.header("content-disposition"), HasSubstr("mesh-7.stl"));
+  EXPECT_EQ(answer.body.size(), file.bytes);
+  EXPECT_EQ(sha256_of(answer.body), file.sha256);
+  std::uint32_t triangles = 0;
+  std::memcpy(&triangles, answer.body.data() + 80, sizeof triangles);
+  EXPECT_EQ(triangles, label.triangles);
+
+  const Answer part = mesh(job, "stl?label=7", {{"Range", "bytes=80-83"}});
+  EXPECT_EQ(part.status, 206);
+  EXPECT_EQ(part.body, answer.body.substr(80, 4));
+  EXPECT_EQ(part.header("content-range"), "bytes 80-83/" + std::to_string(file.bytes));
+  EXPECT_EQ(mesh(job, "stl?label=7", {{"If-None-Match", answer.header("etag")}}).status, 304);
+
+  EXPECT_EQ(mesh(job, "ply").status, 200);
+  EXPECT_EQ(mesh(job, "ply?label=3").status, 200);
+  const Answer zip = mesh(job, "zip");
+  EXPECT_EQ(zip.status, 200);
+  EXPECT_EQ(zip.header("content-type"), "application/zip");
+  EXPECT_EQ(zip.body.substr(file.offset, file.bytes), answer.body);
+}
+
+TEST_F(LabelsTest, WhatHoldsOneLabelHasToBeToldWhich) {
+  const Job job = made(R"("labels": "all", "formats": ["stl"], "label_names": {"7": "Right"})");
+  const Answer which = mesh(job, "stl");
+  EXPECT_EQ(which.status, 400);
+  EXPECT_THAT(which.body, HasSubstr("3, 7 (Right)"));
+  EXPECT_EQ(mesh(job, "stl?label=4").status, 400);
+  EXPECT_EQ(mesh(job, "stl?label=x").status, 400);
+  EXPECT_EQ(mesh(job, "drc?label=7").status, 404);
+  EXPECT_EQ(mesh(job, "glb").status, 404);
+  const Job one = made(R"("labels": [7], "formats": ["stl"])");
+  EXPECT_EQ(mesh(one, "stl").body.size(), one.mesh->labels[0].files.at(MeshFormat::kStl).bytes);
+  EXPECT_EQ(mesh(finished_job(daemon_), "drc?label=1").status, 400);
+}
+
+TEST_F(LabelsTest, AreRefusedByName) {
+  const auto fault = [&](const std::string& members) {
+    const Answer answer = post(members);
+    return std::to_string(answer.status) + ' ' + json::parse(answer.body).value("detail", "");
+  };
+  EXPECT_EQ(fault(""), "400 iso: is required, or labels");
+  EXPECT_THAT(fault(R"("iso": 3, "labels": "all")"), HasSubstr("400 iso: "));
+  EXPECT_THAT(fault(R"("labels": [3, 4, 9])"),
+              HasSubstr("422 the volume has no voxels of the labels 4, 9"));
+  EXPECT_THAT(fault(R"("labels": [0, 3])"), HasSubstr("400 labels: "));
+  EXPECT_THAT(fault(R"("labels": "some")"), HasSubstr("400 labels: "));
+  EXPECT_THAT(fault(R"("labels": [])"), HasSubstr("400 labels: "));
+  EXPECT_THAT(fault(R"("labels": [1.5])"), HasSubstr("400 labels: "));
+  EXPECT_THAT(fault(R"("labels": "all", "interpolation": "linear")"),
+              HasSubstr("400 interpolation: "));
+  EXPECT_THAT(fault(R"("labels": "all", "components": {"keep": 1})"),
+              HasSubstr("400 components: "));
+  EXPECT_THAT(fault(R"("labels": "all", "label_colors": {"3": "red"})"),
+              HasSubstr("400 label_colors.3: "));
+  EXPECT_THAT(fault(R"("labels": "all", "label_names": {"three": "red"})"),
+              HasSubstr("400 label_names.three: "));
+  EXPECT_THAT(fault(R"("iso": 3, "background": 1)"), HasSubstr("400 background: "));
+  EXPECT_THAT(fault(R"("iso": 3, "formats": ["zip"])"), HasSubstr("400 formats: "));
+
+  const Volume floats = upload(
+      daemon_,
+      {.bytes = std::string(4 * 27, '\0'), .query = "dims=3,3,3&type=float32", .options = {}});
+  const Answer answer = post(R"("labels": "all")", floats.id);
+  EXPECT_EQ(answer.status, 400);
+  EXPECT_THAT(answer.body, HasSubstr("float32"));
+}
+
+TEST_F(LabelsTest, AnotherBackgroundIsAnotherMesh) {
+  const Job job = made(R"("labels": "all", "background": 3, "formats": ["zip"])");
+  ASSERT_EQ(job.mesh->labels.size(), 2U);
+  EXPECT_EQ(job.mesh->labels[0].label, 0);
+  EXPECT_EQ(job.mesh->labels[1].label, 7);
+}
+
+TEST_F(LabelsTest, AnEstimateIsExact) {
+  const Answer answer =
+      daemon_.get("/v1/estimate?volume=" + volume_.id + "&labels=3,7&format=glb,stl");
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const Estimate estimate = estimate_from_json(answer.body);
+  const Job job = made(R"("labels": [3, 7], "formats": ["glb", "stl"])");
+  EXPECT_EQ(estimate.triangles, job.mesh->triangles);
+  ASSERT_EQ(estimate.labels.size(), 2U);
+  EXPECT_EQ(estimate.labels[1].triangles, job.mesh->labels[1].triangles);
+}
+
+TEST_F(LabelsTest, OneRequestMakesAFileOfAllLabels) {
+  const auto mesh_of = [&](const std::string& query) {
+    return daemon_.send("POST", "/v1/mesh?" + balls_.query + '&' + query, balls_.bytes,
+                        {{"Content-Type", "application/octet-stream"}});
+  };
+  EXPECT_EQ(mesh_of("labels=all&format=glb").body.substr(0, 4), "glTF");
+  EXPECT_EQ(mesh_of("labels=all&format=zip").body.substr(0, 2), "PK");
+  EXPECT_EQ(mesh_of("labels=7&format=stl").body.substr(0, 7), "isomesh");
+  EXPECT_EQ(mesh_of("labels=all&format=stl").status, 400);
+}
+
+TEST_F(LabelsTest, TheCommandWritesThem) {
+  const TemporaryFolder folder;
+  write_file(folder / "balls.raw", balls_.bytes);
+  std::vector<std::string> words = {"mesh", folder / "balls.raw"};
+  words.insert(words.end(), balls_.options.begin(), balls_.options.end());
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), words.begin(), words.end());
+    return daemon_.command(more);
+  };
+  const Finished all = with({"--labels", "all", "--label-name", "3=Left lung", "-o",
+                             folder / "body.glb", "-o", folder / "body.zip"});
+  EXPECT_EQ(all.status, 0) << all.errors;
+  EXPECT_THAT(all.output, HasSubstr("Left lung"));
+  EXPECT_EQ(read_file(folder / "body.zip").substr(0, 2), "PK");
+  EXPECT_THAT(read_file(folder / "body.zip"), HasSubstr("Left lung.stl"));
+  const Finished one = with({"--labels", "7", "-o", folder / "right.stl"});
+  EXPECT_EQ(one.status, 0) << one.errors;
+  EXPECT_EQ(read_file(folder / "right.stl").substr(0, 7), "isomesh");
+  EXPECT_EQ(with({"--labels", "all", "-o", folder / "all.stl"}).status, 2);
+  EXPECT_EQ(with({"--iso", "3", "-o", folder / "all.zip"}).status, 2);
+  EXPECT_EQ(with({"--iso", "3", "--labels", "all", "-o", folder / "all.glb"}).status, 2);
+  EXPECT_EQ(with({"-o", folder / "all.glb"}).status, 2);
+  const Finished missing = with({"--labels", "5", "-o", folder / "five.glb"});
+  EXPECT_EQ(missing.status, 1);
+  EXPECT_THAT(missing.errors, HasSubstr("5"));
+}
+
+}  // namespace
+}  // namespace isomesh
