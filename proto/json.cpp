@@ -157,10 +157,9 @@ void read(const Json& json, T& value) {
       using Member = std::remove_reference_t<decltype(member)>;
       constexpr bool kMayHaveNoList = std::is_same_v<T, Volume> || std::is_same_v<T, MeshSummary> ||
                                       std::is_same_v<T, Estimate>;
-      constexpr bool kMayBeMissing =
-          std::is_same_v<T, Problem> || kIsOptional<Member> ||
-          (kMayHaveNoList && !std::is_same_v<Member, std::string> &&
-           requires { member.emplace_back(); });
+      constexpr bool kMayBeMissing = std::is_same_v<T, Problem> || kIsOptional<Member> ||
+                                     (kMayHaveNoList && !std::is_same_v<Member, std::string> &&
+                                      requires { member.emplace_back(); });
       const char* const key = name;
       if (const auto found = json.find(key); found != json.end()) {
         read_field(*found, member);

@@ -51,8 +51,8 @@ std::vector<Job> jobs_from_json(std::string_view text);
 // A volume as a store keeps it and as an import tells it: to_json() with its labels.
 std::string to_record(const Volume& volume);
 
-// Reads what to_record(), or to_json() of a job, made in this version or an older one: members that it did not know yet have
-// their defaults. Throws Error kInternal.
+// Reads what to_record(), or to_json() of a job, made in this version or an older one: members that
+// it did not know yet have their defaults. Throws Error kInternal.
 Volume volume_from_record(std::string_view text);
 Job job_from_record(std::string_view text);
 

@@ -11,8 +11,8 @@
 
 namespace isomesh {
 
-// What a file says of one of its labels. Segments are named after organs, so that names may be shown
-// wherever the volume is.
+// What a file says of one of its labels. Segments are named after organs, so that names may be
+// shown wherever the volume is.
 struct LabelEntry {
   static constexpr std::size_t kMostNameBytes = 255;
 

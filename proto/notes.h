@@ -10,19 +10,19 @@
 namespace isomesh {
 
 enum class NoteCode {
-  kFormsDiffer,       // NIfTI: sform and qform place the samples differently
-  kPixdimDiffers,     // NIfTI: the voxel sizes are not the lengths of the sform's steps
-  kVolumeChosen,      // one of several volumes of the file
-  kSpaceAssumed,      // the file does not say how its axes lie in the patient
-  kUnitUnknown,       // the file's unit is no length; taken for millimetres
-  kNonFiniteSamples,  // some samples are no numbers or infinite; they are outside of any surface
-  kTrailingBytes,     // the data is longer than the header tells
-  kValuesRescaled,    // by a slope that other programs pass over
-  kDuplicateFile,     // a file came twice and was taken once
-  kLooksLikeLabels,   // told, or few whole values in flat regions: a job's `labels` suits it
-  kFrameOfReference,  // DICOM: slices do not share one frame of reference
-  kEmptyPlanes,       // DICOM: frames that a segmentation leaves out; they are planes of zeros
-  kDistanceAssumed,   // DICOM: the distance between slices is not told; taken from the thickness
+  kFormsDiffer,          // NIfTI: sform and qform place the samples differently
+  kPixdimDiffers,        // NIfTI: the voxel sizes are not the lengths of the sform's steps
+  kVolumeChosen,         // one of several volumes of the file
+  kSpaceAssumed,         // the file does not say how its axes lie in the patient
+  kUnitUnknown,          // the file's unit is no length; taken for millimetres
+  kNonFiniteSamples,     // some samples are no numbers or infinite; they are outside of any surface
+  kTrailingBytes,        // the data is longer than the header tells
+  kValuesRescaled,       // by a slope that other programs pass over
+  kDuplicateFile,        // a file came twice and was taken once
+  kLooksLikeLabels,      // told, or few whole values in flat regions: a job's `labels` suits it
+  kFrameOfReference,     // DICOM: slices do not share one frame of reference
+  kEmptyPlanes,          // DICOM: frames that a segmentation leaves out; they are planes of zeros
+  kDistanceAssumed,      // DICOM: the distance between slices is not told; taken from the thickness
   kOverlappingSegments,  // segments overlap; values number their combinations
   kFractionalSegments,   // DICOM: segments are shares or probabilities; they begin at a half
 };

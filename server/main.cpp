@@ -26,8 +26,8 @@
 #include "server/http/server.h"
 #include "server/jobs/estimate.h"
 #include "server/jobs/histograms.h"
-#include "server/jobs/label_lists.h"
 #include "server/jobs/housekeeper.h"
+#include "server/jobs/label_lists.h"
 #include "server/jobs/memory.h"
 #include "server/jobs/volume_library.h"
 #include "server/jobs/workers.h"
@@ -217,9 +217,9 @@ int run(const Options& options, const sigset_t& signals) {
   http::ServerOptions server_options = options.http;
   server_options.tls = files.tls.get();
   server_options.connections = net::connections_within(net::raise_descriptor_limit());
-  const http::Services services = {folder,     blobs,     volumes,           jobs,    library,
-                                   histograms, labels, estimator, retention,         metrics, outbox,
-                                   callbacks,  targets,   files.tokens.get()};
+  const http::Services services = {
+      folder,    blobs,     volumes, jobs,   library,   histograms, labels,
+      estimator, retention, metrics, outbox, callbacks, targets,    files.tokens.get()};
   http::Server server(services, server_options);
   // Declared after the server, so that the workers end before it and the end of their last job is
   // still logged and counted.

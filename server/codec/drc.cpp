@@ -14,8 +14,8 @@ std::optional<mesh::Topology> encode_drc(const mesh::Mesh& mesh, const DracoPara
   if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::kTooLarge, "the surface has more triangles than Draco can encode");
   }
-  const DracoOptions options = {
-      grid == nullptr ? grid_of(mesh, draco.position_bits) : *grid, draco.speed};
+  const DracoOptions options = {grid == nullptr ? grid_of(mesh, draco.position_bits) : *grid,
+                                draco.speed};
   auto encoder = Encoders::instance().take(mesh.triangles.size());
   DracoStream stream = encoder->encode_whole(mesh, options, {context.stop, nullptr});
   Encoders::instance().give_back(std::move(encoder));

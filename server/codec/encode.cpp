@@ -30,8 +30,8 @@ std::optional<mesh::Topology> without_topology(const mesh::Mesh& mesh, const Pro
   return std::nullopt;
 }
 
-std::optional<mesh::Topology> refuse_zip(const mesh::Mesh&, const Provenance&,
-                                         const mesh::Context&, const Sink&) {
+std::optional<mesh::Topology> refuse_zip(const mesh::Mesh&, const Provenance&, const mesh::Context&,
+                                         const Sink&) {
   throw Error(ErrorCode::kInternal, "a ZIP holds labels, not one surface");
 }
 

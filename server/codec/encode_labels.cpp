@@ -43,8 +43,7 @@ std::array<double, 3> series_color(std::int64_t label) {
   for (std::size_t channel = 0; channel < 3; ++channel) {
     // A. R. Smith's hexcone (1978), in the form that needs no cases.
     const double k = std::fmod(5 - 2 * static_cast<double>(channel) + hue, 6);
-    color[channel] =
-        kValue * (1 - kSaturation * std::max(0.0, std::min({k, 4 - k, 1.0})));
+    color[channel] = kValue * (1 - kSaturation * std::max(0.0, std::min({k, 4 - k, 1.0})));
   }
   return color;
 }
@@ -74,8 +73,8 @@ void encode_labels_ply(const LabelledSurface& surface, const mesh::Context& cont
   const std::size_t faces = faces_of(surface);
   const bool is_wide = !surface.labels.empty() &&
                        surface.labels.back().label > std::numeric_limits<std::int32_t>::max();
-  const std::string header = ply_header(
-      mesh.positions.size(), faces, is_wide ? "property uint label\n" : "property int label\n");
+  const std::string header = ply_header(mesh.positions.size(), faces,
+                                        is_wide ? "property uint label\n" : "property int label\n");
   sink(std::as_bytes(std::span(header)));
   BlockWriter writer(context, sink, mesh.positions.size() + faces);
   writer.write(mesh.positions.size(), kPlyVertexBytes, [&](std::size_t v, std::byte* out) {
@@ -104,7 +103,8 @@ void encode_labels_obj(const LabelledSurface& surface, const mesh::Context& cont
   for (std::size_t n = 1; n <= surface.labels.size(); ++n) {
     std::string group = "g " + title_of(surface.labels[n - 1]);
     // A blank would begin another group's name.
-    std::replace_if(group.begin() + 2, group.end(), [](char c) { return c == ' ' || c == '\t'; }, '_');
+    std::replace_if(
+        group.begin() + 2, group.end(), [](char c) { return c == ' ' || c == '\t'; }, '_');
     group += '\n';
     sink(std::as_bytes(std::span(group)));
     const auto own = surface.triangles.of(n);

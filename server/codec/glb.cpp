@@ -157,8 +157,7 @@ void add_part(Json& gltf, const Part& part, std::size_t& offset, bool normals, J
 }
 
 // Of one surface, which is the turned node's own; or of one for each label, in nodes below it.
-Json describe(std::span<const Part> parts, std::size_t binary_bytes,
-              const Provenance& provenance) {
+Json describe(std::span<const Part> parts, std::size_t binary_bytes, const Provenance& provenance) {
   Json gltf;
   gltf["asset"] = asset_of(provenance);
   gltf["scene"] = 0;

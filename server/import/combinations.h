@@ -25,8 +25,8 @@ class Combinations {
   // Labels are 1..highest_label, which is 65535 at most.
   explicit Combinations(std::uint32_t highest_label);
 
-  // What a sample of `state` has that is of `label`, too. Its labels come in ascending order. Throws
-  // Error kUnusableVolume when there are too many combinations.
+  // What a sample of `state` has that is of `label`, too. Its labels come in ascending order.
+  // Throws Error kUnusableVolume when there are too many combinations.
   State with(State state, std::uint32_t label);
 
   // A label above the others that nothing else has. Throws as value() does.

@@ -17,14 +17,15 @@ constexpr std::size_t kMostBytes = std::size_t{4} << 20;
 
 std::string valid_utf8(std::string_view text) {
   using Json = nlohmann::json;
-  const std::string quoted =
-      Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
+  const std::string quoted = Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
   return Json::parse(quoted).get<std::string>();
 }
 
 std::string_view cut(std::string_view text, std::size_t most) {
   if (text.size() <= most) return text;
-  const auto continues = [](char byte) { return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80; };
+  const auto continues = [](char byte) {
+    return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80;
+  };
   while (most > 0 && continues(text[most])) --most;
   return text.substr(0, most);
 }
@@ -40,8 +41,9 @@ void check_size(const std::vector<LabelEntry>& entries) {
     bytes += entry.name.size() + entry.values.size() * kBytesOfValue;
   }
   if (bytes <= kMostBytes) return;
-  throw_unusable("The names of the file's labels, or the ways in which they overlap, are more than "
-                 "can be kept.");
+  throw_unusable(
+      "The names of the file's labels, or the ways in which they overlap, are more than "
+      "can be kept.");
 }
 
 }  // namespace

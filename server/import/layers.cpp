@@ -35,8 +35,8 @@ class LayerReader {
   // The states of at most `most` samples from `first` on.
   void read(std::uint64_t first, std::vector<State>& states, Combinations& combinations) {
     const std::uint64_t layers = source_.chosen.count;
-    const auto count = static_cast<std::size_t>(
-        std::min<std::uint64_t>(at_once_, source_.sample_count() - first));
+    const auto count =
+        static_cast<std::size_t>(std::min<std::uint64_t>(at_once_, source_.sample_count() - first));
     values_.resize(count * layers);
     read_values(first, count);
     states.assign(count, Combinations::kNone);
@@ -115,8 +115,8 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
   for (const SampleType type : {SampleType::kUint8, SampleType::kUint16}) {
     volume.type = type;
     CanonicalWriter writer(target, {volume.dims, type, volume.geometry});
-    const auto combinations =
-        with_sample(canonical_type(samples.layout), [&](auto sample) -> std::optional<Combinations> {
+    const auto combinations = with_sample(
+        canonical_type(samples.layout), [&](auto sample) -> std::optional<Combinations> {
           using Sample = decltype(sample);
           if constexpr (std::is_integral_v<Sample>) {
             return write_states<Sample>(samples, source, type, writer.samples());

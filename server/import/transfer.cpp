@@ -50,7 +50,8 @@ void note_labels(std::span<const std::byte> samples, Volume& volume) {
                      " whole values in flat regions, as labels are";
   volume.notes.push_back(note_of(
       NoteCode::kLooksLikeLabels,
-      what + ": mesh it with \"labels\": \"all\"; an iso-value makes one surface of all above it."));
+      what +
+          ": mesh it with \"labels\": \"all\"; an iso-value makes one surface of all above it."));
 }
 
 }  // namespace
@@ -74,7 +75,9 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
   check_limits(source, task.limits);
   volume.notes = source.notes;
   std::ranges::copy(payload.notes(), std::back_inserter(volume.notes));
-  if (source.layers) return write_layers({payload.file(), payload.offset(), payload.layout()}, source, std::move(volume), task.target);
+  if (source.layers)
+    return write_layers({payload.file(), payload.offset(), payload.layout()}, source,
+                        std::move(volume), task.target);
   // Labels are whole numbers.
   if (is_integer(canonical_type(payload.layout()))) volume.labels = source.labels;
   return write_canonical({payload.file(), payload.offset(), payload.layout()}, std::move(volume),

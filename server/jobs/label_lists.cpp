@@ -167,7 +167,8 @@ VolumeLabels list_of(const std::vector<LabelVoxels>& counts, const Volume& volum
              .low = voxels.low,
              .high = voxels.high,
              .bounds = bounds_of(voxels, to_space)};
-    const auto entry = std::ranges::lower_bound(volume.labels, voxels.label, {}, &LabelEntry::label);
+    const auto entry =
+        std::ranges::lower_bound(volume.labels, voxels.label, {}, &LabelEntry::label);
     if (entry == volume.labels.end() || entry->label != voxels.label) continue;
     if (!entry->name.empty()) label.name = entry->name;
     label.color = entry->color;
@@ -186,7 +187,7 @@ LabelValues values_of(const Volume& volume) {
 }
 
 std::shared_ptr<const std::vector<LabelVoxels>> LabelLists::counts(const store::Viewer& viewer,
-                                                                  const Volume& volume) {
+                                                                   const Volume& volume) {
   return counts_.get({viewer, volume.id}, [&] {
     const store::LocalBlob file = stored_samples(blobs_, volume.id);
     return made_of_intact(blobs_, volume.id, {},

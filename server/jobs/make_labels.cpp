@@ -25,8 +25,9 @@ auto with_label(SampleType type, const Use& use) {
     if constexpr (std::is_integral_v<decltype(sample)>) {
       return use(sample);
     } else {
-      throw invalid_parameter("labels", "are for volumes of integers; this one has samples of type " +
-                                            std::string(to_string(type)));
+      throw invalid_parameter("labels",
+                              "are for volumes of integers; this one has samples of type " +
+                                  std::string(to_string(type)));
     }
   });
 }
@@ -127,11 +128,12 @@ std::vector<mesh::LabelVoxels> count_values(const SampleArray& samples,
 
 CountedSurface count_labels(const SampleArray& samples, const MeshParameters& parameters,
                             const mesh::Context& context) {
-  const auto options = separate_options(
-      mesh::chosen_labels(count_values(samples, context), parameters), parameters);
+  const auto options =
+      separate_options(mesh::chosen_labels(count_values(samples, context), parameters), parameters);
   return with_label(samples.type, [&](auto sample) {
     const auto lattice = lattice_of<decltype(sample)>(samples);
-    CountedSurface counted = {.size = size_of(count_walls(lattice, options, context)), .labels = {}};
+    CountedSurface counted = {.size = size_of(count_walls(lattice, options, context)),
+                              .labels = {}};
     const auto triangles = count_label_triangles(lattice, options, context);
     for (std::size_t n = 0; n < options.labels.size(); ++n) {
       counted.labels.push_back({options.labels[n], triangles[n + 1]});
@@ -146,7 +148,8 @@ MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
   const MeshParameters& parameters = request.parameters;
   MeshSummary summary;
   progress.enter(Stage::kExtract, kExtractShare, &Timing::extract);
-  const auto labels = mesh::chosen_labels(count_values(samples, progress.context(0, 0.2)), parameters);
+  const auto labels =
+      mesh::chosen_labels(count_values(samples, progress.context(0, 0.2)), parameters);
   separate(samples, separate_options(labels, parameters), request, progress, walls);
   summary.triangles = walls.mesh.triangles.size();
   summary.vertices = walls.mesh.positions.size();

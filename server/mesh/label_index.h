@@ -75,7 +75,7 @@ class LabelIndex {
   }
 
   std::vector<PartNumber> table_;  // by the bits of the value
-  std::vector<Entry> entries_;      // where there are too many values for a table, ascending
+  std::vector<Entry> entries_;     // where there are too many values for a table, ascending
 };
 
 }  // namespace isomesh::mesh

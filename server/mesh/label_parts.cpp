@@ -29,12 +29,13 @@ LabelParts::LabelParts(std::span<const std::int64_t> labels,
   std::map<std::vector<PartNumber>, PartNumber> parts;
   members_.emplace_back();  // the background's
   for (const auto& [value, numbers] : labels_of) {
-    const auto [part, is_new] = parts.try_emplace(numbers, static_cast<PartNumber>(members_.size()));
+    const auto [part, is_new] =
+        parts.try_emplace(numbers, static_cast<PartNumber>(members_.size()));
     if (is_new) {
       if (members_.size() > kMostLabels) {
-        throw Error(ErrorCode::kUnusableVolume, "the labels overlap in more than " +
-                                                    std::to_string(kMostLabels) +
-                                                    " different ways");
+        throw Error(
+            ErrorCode::kUnusableVolume,
+            "the labels overlap in more than " + std::to_string(kMostLabels) + " different ways");
       }
       members_.push_back(numbers);
     }

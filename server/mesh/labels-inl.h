@@ -403,9 +403,8 @@ void tally_slab_of(const Separation<T>& separation, const Slab& slab,
         if (!row.may_cross(w)) continue;
         row.describe(w, cells);
         row.visit_walls(w, cells, [&](PartNumber a, PartNumber b, unsigned count) {
-          separation.parts.visit_labels(a, b, [&](std::size_t label, bool) {
-            triangles[label] += count;
-          });
+          separation.parts.visit_labels(
+              a, b, [&](std::size_t label, bool) { triangles[label] += count; });
         });
       }
     }

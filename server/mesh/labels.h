@@ -41,9 +41,9 @@ void add_voxels(const LabelVoxels& part, LabelVoxels& whole);
 [[noreturn]] void throw_too_many_labels();
 
 // The labels that there are: those that are not the samples of their own value, `values`, and each
-// value of `present` that is neither the background nor in those. Ascending; those without voxels are left out. What is said of a label of
-// several values is what its values have together. Throws Error kUnusableVolume when there are more
-// than kMostLabels.
+// value of `present` that is neither the background nor in those. Ascending; those without voxels
+// are left out. What is said of a label of several values is what its values have together. Throws
+// Error kUnusableVolume when there are more than kMostLabels.
 std::vector<LabelVoxels> labels_of(std::span<const LabelVoxels> present, std::int64_t background,
                                    const LabelValues& values = {});
 

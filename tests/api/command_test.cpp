@@ -131,8 +131,7 @@ TEST_F(CommandTest, StepByStep) {
   const Finished labels = daemon_.command({"labels", volume, "--background", "-1"});
   EXPECT_EQ(labels.status, 0);
   EXPECT_THAT(labels.output, HasSubstr("voxels"));
-  const auto listed =
-      volume_labels_from_json(daemon_.command({"--json", "labels", volume}).output);
+  const auto listed = volume_labels_from_json(daemon_.command({"--json", "labels", volume}).output);
   EXPECT_EQ(listed.volume, volume);
   EXPECT_FALSE(listed.labels.empty());
   const Finished estimate =

@@ -133,10 +133,9 @@ std::string fractional_segmentation() {
       sequence(0x28, 0x9110, {element(0x28, 0x30, "DS", "1\\1")});
   return dicom(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.66.4") +
                element(8, 0x60, "CS", "SEG") + element(0x20, 0xe, "UI", "1.2.3.4") +
-               element(0x28, 8, "IS", "2") + square_image() +
-               element(0x62, 1, "CS", "FRACTIONAL") + number(0x62, 0xe, 255) +
-               sequence(0x5200, 0x9229, {shared}) + sequence(0x5200, 0x9230, frames) +
-               element(0x7fe0, 0x10, "OW", halves(2 * 64)));
+               element(0x28, 8, "IS", "2") + square_image() + element(0x62, 1, "CS", "FRACTIONAL") +
+               number(0x62, 0xe, 255) + sequence(0x5200, 0x9229, {shared}) +
+               sequence(0x5200, 0x9230, frames) + element(0x7fe0, 0x10, "OW", halves(2 * 64)));
 }
 
 std::string csa_field(std::string name, const std::vector<std::string>& values) {

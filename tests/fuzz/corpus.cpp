@@ -20,18 +20,18 @@ const std::string kSamples(kSmallSamples);
 
 // With a table of labels in an extension of 96 bytes.
 std::string labelled_nifti() {
-  std::string text = "<LabelTable><Label Key=\"1\" Red=\"1\" Green=\"0\" Blue=\"0\">liver</Label></LabelTable>";
+  std::string text =
+      "<LabelTable><Label Key=\"1\" Red=\"1\" Green=\"0\" Blue=\"0\">liver</Label></LabelTable>";
   text.resize(88, '\0');
   return nifti({.vox_offset = 448}, "").substr(0, 348) + std::string("\1\0\0\0", 4) +
          bytes_of(std::vector<std::int32_t>{96, 30}) + text + kSamples;
 }
 
 std::string layered_nrrd() {
-  std::string file =
-      nrrd(with(with(with(with(small_nrrd(), "dimension", "4"), "sizes", "2 3 2 2"), "kinds",
-                     "list domain domain domain"),
-                "space directions", "none (1,0,0) (0,1,0) (0,0,1)"),
-           kSamples);
+  std::string file = nrrd(with(with(with(with(small_nrrd(), "dimension", "4"), "sizes", "2 3 2 2"),
+                                    "kinds", "list domain domain domain"),
+                               "space directions", "none (1,0,0) (0,1,0) (0,0,1)"),
+                          kSamples);
   return file.insert(file.find("\n\n") + 1,
                      "Segment0_Name:=liver\nSegment0_LabelValue:=1\nSegment0_Layer:=0\n"
                      "Segment0_Color:=1 0.5 0\nSegment1_LabelValue:=1\nSegment1_Layer:=1\n");
@@ -40,7 +40,8 @@ std::string layered_nrrd() {
 std::vector<std::string> nifti_files() {
   return {
       labelled_nifti(),
-      nifti({}, kSamples), nifti({.version = 2, .big_endian = true}, kSamples),
+      nifti({}, kSamples),
+      nifti({.version = 2, .big_endian = true}, kSamples),
       gzip(nifti({.qform_code = 1, .sform_code = 0}, kSamples)),
       nifti({.dim = {3, 2, 3, 2, 1, 1, 1, 1}, .datatype = 512, .bitpix = 16, .slope = 2}, kSamples),
       nifti({.dim = {4, 2, 3, 2, 2, 1, 1, 1}}, kSamples)};

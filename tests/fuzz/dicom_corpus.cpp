@@ -22,8 +22,8 @@ std::vector<std::string> dicom_objects() {
   for (const DicomObject& object :
        {siemens_mosaic(), siemens_mosaic(csa_fields({"0", "0", "-1"}), false),
         united_imaging_grid(), segmentation(two_segments()), segmentation(labels),
-        segmentation(overlapping), segmentation(fractional),
-        DicomSeries{}.enhanced({0, 1, 2}), DicomSeries{}.enhanced({0, 1, 2, 0, 1, 2})}) {
+        segmentation(overlapping), segmentation(fractional), DicomSeries{}.enhanced({0, 1, 2}),
+        DicomSeries{}.enhanced({0, 1, 2, 0, 1, 2})}) {
     for (const std::string_view syntax : {kImplicit, kExplicit, kBigEndian}) {
       files.push_back(object.file(syntax));
     }

@@ -92,16 +92,16 @@ class FileNames {
   std::string of(const LabelSummary& label) {
     std::string name;
     for (const char c : title_of(label)) {
-      const bool is_plain =
-          static_cast<unsigned char>(c) >= ' ' && std::string_view("/\\:*?\"<>|").find(c) ==
-                                                      std::string_view::npos;
+      const bool is_plain = static_cast<unsigned char>(c) >= ' ' &&
+                            std::string_view("/\\:*?\"<>|").find(c) == std::string_view::npos;
       name += is_plain ? c : '_';
     }
     while (!name.empty() && (name.back() == '.' || name.back() == ' ')) name.pop_back();
     if (name.starts_with('.') || name.empty()) name.insert(name.begin(), '_');
     const std::string title = name;
     for (int more = 0; !taken_.insert(lowered(name)).second; ++more) {
-      name = title + '-' + std::to_string(label.label) + (more == 0 ? "" : '-' + std::to_string(more));
+      name =
+          title + '-' + std::to_string(label.label) + (more == 0 ? "" : '-' + std::to_string(more));
     }
     return name;
   }

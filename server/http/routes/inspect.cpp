@@ -89,9 +89,8 @@ void add_inspect_routes(App& app) {
   add_computed_get(app, volume + "/histogram", [&app](const auto& request, auto& response) {
     histogram(app, request, response);
   });
-  add_computed_get(app, volume + "/labels", [&app](const auto& request, auto& response) {
-    labels(app, request, response);
-  });
+  add_computed_get(app, volume + "/labels",
+                   [&app](const auto& request, auto& response) { labels(app, request, response); });
   add_computed_get(app, volume + "/slice.png",
                    [&app](const auto& request, auto& response) { slice(app, request, response); });
   add_computed_get(app, "/v1/estimate", [&app](const auto& request, auto& response) {

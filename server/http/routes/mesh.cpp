@@ -66,8 +66,9 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
   }
   const auto& labels = parameters.labels;
   if (labels && labels->values.size() != 1 && files_of(parameters) != parameters.formats) {
-    throw invalid_parameter("format", "must hold all labels, as glb, ply, obj and zip do: the "
-                                      "answer is one file");
+    throw invalid_parameter("format",
+                            "must hold all labels, as glb, ply, obj and zip do: the "
+                            "answer is one file");
   }
   const process::ImportOptions options = import_options_of(request);
   const std::string key = idempotency_key_of(request);

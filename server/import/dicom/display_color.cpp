@@ -18,8 +18,8 @@ Triple cie_lab(const std::vector<std::uint32_t>& stored) {
   return {stored[0] / kMost * 100, stored[1] / kMost * 255 - 128, stored[2] / kMost * 255 - 128};
 }
 
-// CIE 15, from D65: the standard has the white of profiles' connection space, D50, but dcmqi and what
-// descends from it write sRGB's own, and their colours are to come back as they were.
+// CIE 15, from D65: the standard has the white of profiles' connection space, D50, but dcmqi and
+// what descends from it write sRGB's own, and their colours are to come back as they were.
 Triple cie_xyz(const Triple& lab) {
   constexpr Triple kWhite = {0.95047, 1, 1.08883};
   constexpr double kLinearBelow = 6.0 / 29;

@@ -133,9 +133,10 @@ SegmentKind kind_of(const DataSet& data) {
 std::uint32_t maximum_of(const DataSet& data) {
   const auto maximum = data.unsigned_number(kMaximumFractionalValue);
   if (maximum && *maximum > 0 && *maximum <= 0xFF) return *maximum;
-  throw_unusable("The fractional DICOM segmentation does not tell the largest value that its "
-                 "samples may have " +
-                 tag_name(kMaximumFractionalValue) + ".");
+  throw_unusable(
+      "The fractional DICOM segmentation does not tell the largest value that its "
+      "samples may have " +
+      tag_name(kMaximumFractionalValue) + ".");
 }
 
 const Segmentation& segmentation_of(const Stack& stack) {
@@ -273,9 +274,8 @@ Stack make_label_stack(std::vector<Slice> slices) {
 bool are_shares(const Stack& stack) {
   const std::uint32_t segment = stack.slices.front().frame->segment;
   return segmentation_of(stack).kind == SegmentKind::kFractional &&
-         std::ranges::all_of(stack.slices, [&](const Slice& slice) {
-           return slice.frame->segment == segment;
-         });
+         std::ranges::all_of(stack.slices,
+                             [&](const Slice& slice) { return slice.frame->segment == segment; });
 }
 
 std::vector<SampleType> label_types(const Stack& stack) {

@@ -1,6 +1,6 @@
-// Segmentations (PS3.3, A.51): frames of single bits or of shares, one segment each; and label maps,
-// whose samples are the segments' numbers. Frames without a label are often left out. A share counts
-// from a half on; segments may overlap.
+// Segmentations (PS3.3, A.51): frames of single bits or of shares, one segment each; and label
+// maps, whose samples are the segments' numbers. Frames without a label are often left out. A share
+// counts from a half on; segments may overlap.
 #pragma once
 
 #include <functional>
@@ -47,9 +47,9 @@ std::vector<SampleType> label_types(const Stack& stack);
 using ReadSlice = std::function<void(std::size_t slice, std::span<std::byte> stored)>;
 
 // Writes the labels of all slices of the stack as `type`; samples of no segment, and planes without
-// a frame, are 0. Samples of several segments have the number of their combination (combinations.h).
-// False when the type does not hold all of them. Sets the volume's labels, and notes overlaps in it.
-// Throws Error kUnusableVolume when there are too many combinations.
+// a frame, are 0. Samples of several segments have the number of their combination
+// (combinations.h). False when the type does not hold all of them. Sets the volume's labels, and
+// notes overlaps in it. Throws Error kUnusableVolume when there are too many combinations.
 bool write_labels(const Stack& stack, SampleType type, const ReadSlice& read,
                   std::span<std::byte> target, Volume& volume);
 

@@ -58,8 +58,7 @@ std::vector<LabelEntry> afni_labels(std::string_view text) {
 // Exceptions cannot pass through the C library, so they are kept until parsing has stopped.
 class Parser {
  public:
-  explicit Parser(std::uint64_t volume)
-      : volume_(volume), parser_(::XML_ParserCreate(nullptr)) {
+  explicit Parser(std::uint64_t volume) : volume_(volume), parser_(::XML_ParserCreate(nullptr)) {
     if (!parser_) throw Error(ErrorCode::kInternal, "XML_ParserCreate failed.");
     ::XML_SetUserData(parser_.get(), this);
     ::XML_SetElementHandler(parser_.get(), &Parser::on_start, &Parser::on_end);

@@ -62,11 +62,10 @@ std::vector<Segment> segments_of(const NrrdFields& fields, std::uint64_t layers)
       throw_unusable("The NRRD header's segment " + std::to_string(at) + " lies in layer " +
                      std::to_string(layer) + " of " + std::to_string(layers) + ".");
     }
-    segments.push_back(
-        {.layer = static_cast<std::uint64_t>(layer),
-         .value = number_of(fields, at, "LabelValue", 1),
-         .entry = {.name = label_name(own_value(fields, at, "Name")),
-                   .color = color_of(own_value(fields, at, "Color"))}});
+    segments.push_back({.layer = static_cast<std::uint64_t>(layer),
+                        .value = number_of(fields, at, "LabelValue", 1),
+                        .entry = {.name = label_name(own_value(fields, at, "Name")),
+                                  .color = color_of(own_value(fields, at, "Color"))}});
   }
   return segments;
 }
@@ -97,7 +96,8 @@ void set_layers(std::vector<Segment> segments, bool is_interleaved, SourceVolume
     if (segment.value == 0 || layers.labels.contains({segment.layer, segment.value})) continue;
     const bool keeps = is_label(segment.value) && taken.insert(segment.value).second;
     const std::int64_t label = keeps ? segment.value : next++;
-    if (!is_label(label)) throw_unusable("The segmentation has more labels than 16 bits tell apart.");
+    if (!is_label(label))
+      throw_unusable("The segmentation has more labels than 16 bits tell apart.");
     layers.labels[{segment.layer, segment.value}] = static_cast<std::uint32_t>(label);
     segment.entry.label = label;
     entries.push_back(std::move(segment.entry));

@@ -10,8 +10,8 @@ namespace isomesh::import {
 // Whether the header tells of segments.
 bool has_segments(const NrrdFields& fields);
 
-// Sets `volume.labels`, and `volume.layers` where the file's volumes are layers of whole numbers and
-// `is_layer_chosen` is false. A layer that is chosen has its own segments alone. A label is a
+// Sets `volume.labels`, and `volume.layers` where the file's volumes are layers of whole numbers
+// and `is_layer_chosen` is false. A layer that is chosen has its own segments alone. A label is a
 // segment's value; where another layer has the same value, it is a free number above all. Throws
 // Error kUnusableVolume.
 void set_segments(const NrrdFields& fields, bool is_interleaved, bool is_layer_chosen,

@@ -64,8 +64,8 @@ class OpenApi : public testing::Test {
   store::SqliteOutbox outbox_{database_};
   const callbacks::CallbackTargets targets_{{}};
   callbacks::Callbacks callbacks_{outbox_, targets_, {}, {}};
-  App app_{Services{data_, blobs_, volumes_, jobs_, library_, histograms_, labels_, estimator_, retention_,
-                    metrics_, outbox_, callbacks_, targets_},
+  App app_{Services{data_, blobs_, volumes_, jobs_, library_, histograms_, labels_, estimator_,
+                    retention_, metrics_, outbox_, callbacks_, targets_},
            ServerOptions{}};
   const YAML::Node description_ = YAML::LoadFile(ISOMESH_OPENAPI);
 };

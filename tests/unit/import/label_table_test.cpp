@@ -16,7 +16,9 @@ using testing::ElementsAre;
 
 TEST(LabelName, IsShortUtf8WithoutControlCharacters) {
   EXPECT_EQ(label_name("  left kidney "), "left kidney");
-  EXPECT_EQ(label_name("a\nb\x7f"), "a\xef\xbf\xbd" "b\xef\xbf\xbd");
+  EXPECT_EQ(label_name("a\nb\x7f"),
+            "a\xef\xbf\xbd"
+            "b\xef\xbf\xbd");
   EXPECT_EQ(label_name("a\xff"), "a\xef\xbf\xbd");
   EXPECT_EQ(label_name(std::string(300, 'x')), std::string(255, 'x'));
   // Characters of two bytes are not cut in two, and what becomes longer is cut again.
@@ -35,7 +37,8 @@ TEST(LabelColor, IsClampedAndRounded) {
 }
 
 TEST(LabelTable, HasTheFirstOfSeveralEntries) {
-  const auto table = label_table({{.label = 7, .name = "a"}, {.label = -1}, {.label = 7, .name = "b"}});
+  const auto table =
+      label_table({{.label = 7, .name = "a"}, {.label = -1}, {.label = 7, .name = "b"}});
   EXPECT_THAT(table, ElementsAre(LabelEntry{.label = -1}, LabelEntry{.label = 7, .name = "a"}));
   EXPECT_EQ(code_thrown_by([] {
               std::vector<LabelEntry> many(70'000);
@@ -67,10 +70,10 @@ TEST(Combinations, AreTheSameHoweverTheyAreMade) {
   EXPECT_EQ(combinations.value(both), 10U);
   EXPECT_EQ(combinations.value(combinations.with(Combinations::kNone, 9)), 9U);
   EXPECT_EQ(combinations.new_label(), 11U);
-  EXPECT_THAT(combinations.entries({{.label = 4, .name = "a"}, {.label = 5, .name = "b"}}),
-              ElementsAre(LabelEntry{.label = 4, .name = "a", .values = {4, 10}},
-                          LabelEntry{.label = 5, .name = "b"},
-                          LabelEntry{.label = 9, .values = {9, 10}}));
+  EXPECT_THAT(
+      combinations.entries({{.label = 4, .name = "a"}, {.label = 5, .name = "b"}}),
+      ElementsAre(LabelEntry{.label = 4, .name = "a", .values = {4, 10}},
+                  LabelEntry{.label = 5, .name = "b"}, LabelEntry{.label = 9, .values = {9, 10}}));
 }
 
 // A state that no sample has in the end has no value.

@@ -42,16 +42,15 @@ const std::string kTwo = R"(<Label Key="1" Red="1" Green="0.5" Blue="0" Alpha="1
                          R"(<Label Key="7">left &amp; right</Label>)";
 
 std::vector<LabelEntry> two() {
-  return {{.label = 1, .name = "spleen", .color = "#ff8000"},
-          {.label = 7, .name = "left & right"}};
+  return {{.label = 1, .name = "spleen", .color = "#ff8000"}, {.label = 7, .name = "left & right"}};
 }
 
 TEST(NiftiLabels, AreThoseOfCaret) {
   for (const int version : {1, 2}) {
     for (const bool big_endian : {false, true}) {
       const NiftiFields fields = {.version = version, .big_endian = big_endian};
-      const std::string extensions = extension("a comment", 6, big_endian) +
-                                     extension(caret(kTwo), 30, big_endian);
+      const std::string extensions =
+          extension("a comment", 6, big_endian) + extension(caret(kTwo), 30, big_endian);
       const Outcome outcome = import_bytes(with_extensions(fields, extensions));
       ASSERT_EQ(outcome.error, "");
       EXPECT_EQ(outcome.volume.labels, two());
@@ -65,8 +64,8 @@ TEST(NiftiLabels, AreThoseOfCaret) {
 }
 
 TEST(NiftiLabels, AreThoseOfTheVolume) {
-  const std::string file = with_extensions(
-      {.dim = {4, 4, 3, 1, 2, 1, 1, 1}}, extension(caret(kTwo, "1"), 30, false));
+  const std::string file =
+      with_extensions({.dim = {4, 4, 3, 1, 2, 1, 1, 1}}, extension(caret(kTwo, "1"), 30, false));
   EXPECT_EQ(import_bytes(file, {}, {.volume = 1}).volume.labels, two());
   EXPECT_THAT(import_bytes(file, {}, {.volume = 0}).volume.labels, IsEmpty());
 }
@@ -104,9 +103,8 @@ TEST(NiftiLabels, OfDamagedExtensionsAreNone) {
 
 TEST(NiftiLabels, OfFractionsAreNone) {
   const NiftiFields fields = {.datatype = 16, .bitpix = 32};
-  const Outcome outcome =
-      import_bytes(with_extensions(fields, extension(caret(kTwo), 30, false),
-                                   bytes_of(some_samples<float>(24))));
+  const Outcome outcome = import_bytes(with_extensions(fields, extension(caret(kTwo), 30, false),
+                                                       bytes_of(some_samples<float>(24))));
   ASSERT_EQ(outcome.error, "");
   EXPECT_THAT(outcome.volume.labels, IsEmpty());
 }

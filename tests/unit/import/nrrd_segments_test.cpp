@@ -17,7 +17,8 @@ using testing::Not;
 // A key of a segment, without "Segment" before it.
 using Key = std::pair<std::string, std::string>;
 
-std::string with_segments(const Lines& lines, const std::vector<Key>& keys, std::string_view samples) {
+std::string with_segments(const Lines& lines, const std::vector<Key>& keys,
+                          std::string_view samples) {
   std::string file = nrrd(lines, samples);
   std::string text;
   for (const auto& [key, value] : keys) text += "Segment" + key + ":=" + value + '\n';
@@ -45,18 +46,22 @@ const std::vector<Key> kTwoLayers = {{"0_Name", "liver"},  {"0_LabelValue", "1"}
 
 TEST(NrrdSegments, HaveNamesAndColors) {
   const std::string samples(24, '\3');
-  const Outcome outcome = import_bytes(with_segments(
-      small_nrrd(),
-      {{"0_ID", "a"}, {"0_Name", "M\xc3\xbcller \x01"}, {"0_LabelValue", "7"},
-       {"0_Color", "1 0.5 0"}, {"0_Layer", "0"},
-       {"1_Name", "spleen"}, {"1_LabelValue", "3"}, {"1_Color", "red"}},
-      samples));
+  const Outcome outcome = import_bytes(with_segments(small_nrrd(),
+                                                     {{"0_ID", "a"},
+                                                      {"0_Name", "M\xc3\xbcller \x01"},
+                                                      {"0_LabelValue", "7"},
+                                                      {"0_Color", "1 0.5 0"},
+                                                      {"0_Layer", "0"},
+                                                      {"1_Name", "spleen"},
+                                                      {"1_LabelValue", "3"},
+                                                      {"1_Color", "red"}},
+                                                     samples));
   ASSERT_EQ(outcome.error, "");
   EXPECT_EQ(outcome.sample_bytes(), samples);
   EXPECT_THAT(outcome.volume.labels,
-              ElementsAre(entry(3, "spleen"),
-                          LabelEntry{.label = 7, .name = "M\xc3\xbcller \xef\xbf\xbd",
-                                     .color = "#ff8000"}));
+              ElementsAre(entry(3, "spleen"), LabelEntry{.label = 7,
+                                                         .name = "M\xc3\xbcller \xef\xbf\xbd",
+                                                         .color = "#ff8000"}));
   // Also where samples do not look as if.
   EXPECT_THAT(codes_of(outcome), Contains("looks-like-labels"));
   EXPECT_THAT(outcome.volume.notes.back().detail, HasSubstr("2 labels: mesh it with \"labels\""));
@@ -64,8 +69,8 @@ TEST(NrrdSegments, HaveNamesAndColors) {
 
 TEST(NrrdSegments, OfFractionsAreNoLabels) {
   const Outcome outcome =
-      import_bytes(with_segments(with(with(small_nrrd(), "type", "float"), "endian", "little"), {{"0_Name", "liver"}},
-                                 bytes_of(some_samples<float>(24))));
+      import_bytes(with_segments(with(with(small_nrrd(), "type", "float"), "endian", "little"),
+                                 {{"0_Name", "liver"}}, bytes_of(some_samples<float>(24))));
   ASSERT_EQ(outcome.error, "");
   EXPECT_THAT(outcome.volume.labels, IsEmpty());
   EXPECT_THAT(codes_of(outcome), Not(Contains("looks-like-labels")));
@@ -91,12 +96,12 @@ TEST(NrrdSegments, InLayersMayOverlap) {
             "1 sample is of several segments; 1 value stands for their combinations.");
   EXPECT_EQ(outcome.volume.range, (std::array<double, 2>{0, 3}));
 
-  const Outcome packed = import_bytes(with_segments(with(layers_first(), "encoding", "gzip"),
-                                                    kTwoLayers, gzip(interleaved)));
+  const Outcome packed = import_bytes(
+      with_segments(with(layers_first(), "encoding", "gzip"), kTwoLayers, gzip(interleaved)));
   EXPECT_EQ(packed.canonical, outcome.canonical);
-  const Outcome planar = import_bytes(with_segments(
-      layered("2 2 2 2", "domain domain domain list", "(1,0,0) (0,1,0) (0,0,1) none"), kTwoLayers,
-      first + second));
+  const Outcome planar = import_bytes(
+      with_segments(layered("2 2 2 2", "domain domain domain list", "(1,0,0) (0,1,0) (0,0,1) none"),
+                    kTwoLayers, first + second));
   EXPECT_EQ(planar.canonical, outcome.canonical);
   EXPECT_EQ(planar.volume.labels, outcome.volume.labels);
 
@@ -125,12 +130,11 @@ TEST(NrrdSegments, ThatDoNotOverlapKeepTheirNumbers) {
 TEST(NrrdSegments, OfOldVersionsAreALayerEach) {
   std::string samples(16, '\0');
   samples[0] = samples[1] = '\1';
-  const Outcome outcome = import_bytes(
-      with_segments(layered("2 2 2 2", "vector domain domain domain", "none (1,0,0) (0,1,0) (0,0,1)"),
-                    {{"0_Name", "liver"}, {"1_Name", "tumour"}}, samples));
+  const Outcome outcome = import_bytes(with_segments(
+      layered("2 2 2 2", "vector domain domain domain", "none (1,0,0) (0,1,0) (0,0,1)"),
+      {{"0_Name", "liver"}, {"1_Name", "tumour"}}, samples));
   ASSERT_EQ(outcome.error, "");
-  EXPECT_THAT(outcome.volume.labels,
-              ElementsAre(entry(1, "liver", {3}), entry(2, "tumour", {3})));
+  EXPECT_THAT(outcome.volume.labels, ElementsAre(entry(1, "liver", {3}), entry(2, "tumour", {3})));
 }
 
 TEST(NrrdSegments, ValuesOfNoSegmentAreLabelsWithoutAName) {

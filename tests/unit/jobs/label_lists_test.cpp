@@ -18,7 +18,8 @@ class LabelListsTest : public test::JobsFixture {
  protected:
   // Turned, mirrored and stretched, so that no axis is like another.
   static Geometry crooked() {
-    return {.origin = {10, -20, 30}, .spacing = {0.5, 2, 3}, .direction = {0, 1, 0, -1, 0, 0, 0, 0, 1}};
+    return {
+        .origin = {10, -20, 30}, .spacing = {0.5, 2, 3}, .direction = {0, 1, 0, -1, 0, 0, 0, 0, 1}};
   }
 
   template <class Sample>
@@ -32,7 +33,7 @@ class LabelListsTest : public test::JobsFixture {
   // 4 x 3 x 2 samples: a 7 and two 9s.
   Volume add_three_voxels() {
     std::vector<std::int16_t> samples(24);
-    samples[1] = 7;                // (1, 0, 0)
+    samples[1] = 7;                 // (1, 0, 0)
     samples[14] = samples[19] = 9;  // (2, 0, 1) and (3, 1, 1)
     return add_samples(samples, {4, 3, 2}, SampleType::kInt16);
   }
@@ -122,8 +123,7 @@ TEST_F(LabelListsTest, BlocksAreCountedAsOne) {
                           static_cast<std::uint32_t>(at / dims[0] % dims[1]),
                           static_cast<std::uint32_t>(at / dims[0] / dims[1])};
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        label.low[axis] =
-            label.voxels == 0 ? place[axis] : std::min(label.low[axis], place[axis]);
+        label.low[axis] = label.voxels == 0 ? place[axis] : std::min(label.low[axis], place[axis]);
         label.high[axis] = std::max(label.high[axis], place[axis]);
       }
       ++label.voxels;

@@ -23,9 +23,9 @@ inline constexpr std::string_view kBigEndian = "1.2.840.10008.1.2.2";
 class DicomObject {
  public:
   DicomObject& text(dicom::Tag tag, std::string_view vr, std::string_view value);
-  DicomObject& number(dicom::Tag tag, unsigned value);                         // US
+  DicomObject& number(dicom::Tag tag, unsigned value);                          // US
   DicomObject& numbers(dicom::Tag tag, const std::array<unsigned, 3>& values);  // US
-  DicomObject& bytes(dicom::Tag tag, std::string_view vr, std::string value);  // as they are
+  DicomObject& bytes(dicom::Tag tag, std::string_view vr, std::string value);   // as they are
   DicomObject& items(dicom::Tag tag, std::vector<DicomObject> items);
   // Native samples: little-endian words of `bytes_per_word`, turned around where the syntax asks.
   DicomObject& pixels(std::string bytes, unsigned bytes_per_word);
