@@ -82,6 +82,7 @@ TEST_F(LabelsTest, AJobSaysWhatEveryLabelIs) {
 
   const json list = json::parse(daemon_.get("/v1/jobs").body);
   EXPECT_FALSE(list["jobs"][0]["mesh"].contains("labels"));
+  EXPECT_TRUE(list["jobs"][0]["parameters"]["label_names"].empty());
 }
 
 TEST_F(LabelsTest, OneLabelsFileIsAFileOfItsOwn) {

@@ -54,10 +54,13 @@ std::optional<Continuation> get(App& app, const Request& request, Response& resp
                        });
 }
 
-// Without what a job says of each of its labels, which may be much.
+// Without what is said of each label, which may be much.
 std::vector<Job> rows_of(std::vector<Job> jobs) {
   for (Job& job : jobs) {
     if (job.mesh) job.mesh->labels.clear();
+    job.parameters.label_names.clear();
+    job.parameters.label_colors.clear();
+    job.parameters.label_values.clear();
   }
   return jobs;
 }
