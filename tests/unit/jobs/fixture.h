@@ -85,3 +85,10 @@ class CutBlobs : public store::FileBlobStore {
 };
 
 }  // namespace isomesh::test
+
+namespace isomesh::jobs {
+
+// For those who do not look at the progress.
+inline const Report kQuiet = [](Stage, double, const Timing&) {};
+
+}  // namespace isomesh::jobs

@@ -23,8 +23,6 @@ namespace {
 
 using testing::HasSubstr;
 
-const Report kQuiet = [](Stage, double, const Timing&) {};
-
 class JobProcessTest : public test::JobsFixture {
  protected:
   JobOrder order_of(const Volume& volume, double iso, int passes = 5) const {

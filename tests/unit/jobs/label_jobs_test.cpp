@@ -20,8 +20,6 @@ namespace {
 
 using testing::HasSubstr;
 
-const Report kQuiet = [](Stage, double, const Timing&) {};
-
 class LabelJobsTest : public test::JobsFixture {
  protected:
   // Two balls, 3 and 7, that touch, and a cube, 9, apart; spacing 0.5, 1, 2.

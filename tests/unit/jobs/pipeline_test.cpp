@@ -21,8 +21,6 @@
 namespace isomesh::jobs {
 namespace {
 
-const Report kQuiet = [](Stage, double, const Timing&) {};
-
 class PipelineTest : public test::JobsFixture {
  protected:
   PipelineResult run(const Volume& volume, const JobParameters& parameters,
