@@ -37,7 +37,8 @@ struct Parameter {
   const char* title = "";  // a short label
   const char* help = "";   // what it does, in one line
   const char* more = "";  // what else a reader of the API should know: sentences that follow `help`
-  const char* unit = "";  // which may end the name: max_displacement_mm
+  const char* by_labels = nullptr;  // the default of jobs by labels, where it is another one
+  const char* unit = "";            // which may end the name: max_displacement_mm
   // Of a number.
   std::optional<double> minimum = {};
   std::optional<double> above = {};
@@ -191,7 +192,8 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
   parameter(Parameter{.name = "passes",
                       .title = "Passes",
                       .help = "How often the surface is smoothed.",
-                      .more = "Vertices on its boundary stay.",
+                      .more = "Vertices on its boundary stay. By labels the default is 10.",
+                      .by_labels = "10",
                       .minimum = 0,
                       .maximum = 1000},
             self.passes);
@@ -214,6 +216,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
           .name = "lambda",
           .title = "Step of a pass",
           .help = "How far a pass moves a vertex; 1 moves it onto the mean of its neighbours.",
+          .by_labels = "0.33",
           .above = 0,
           .maximum = 1,
           .cases = {SmoothingCase{Smoothing::kLaplacian, default_lambda(Smoothing::kLaplacian)},

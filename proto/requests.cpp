@@ -216,8 +216,7 @@ class RequestReader {
       if (errors_.size() > before) return values.clear();
     }
     std::ranges::sort(values);
-    const auto repeated = std::ranges::unique(values);
-    values.erase(repeated.begin(), repeated.end());
+    values.erase(std::unique(values.begin(), values.end()), values.end());
   }
 
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
@@ -239,7 +238,8 @@ class RequestReader {
                            " members, which are named by labels");
     }
     for (const auto& [name, element] : json.items()) {
-      const Json label = Json::parse(name, nullptr, false);
+      const bool is_plain = name.find_first_not_of("-0123456789") == std::string::npos;
+      const Json label = is_plain ? Json::parse(name, nullptr, false) : Json();
       std::int64_t key = 0;
       const std::size_t before = errors_.size();
       const std::string place = path + '.' + name;
@@ -256,6 +256,7 @@ class RequestReader {
 
   void read_of_label(const Json& json, const std::string& path, const Parameter& parameter,
                      std::string& value) {
+    if (!json.is_string()) return add(path, "must be a string");
     read_member(json, path, parameter, value);
     if (std::string_view(parameter.name) == "label_colors") {
       std::ranges::transform(value, value.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -362,8 +363,15 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
   refuse_if(!parameters.components.keeps_all(), "components",
             "cannot stand beside labels: a part that is left out would leave a hole in its "
             "neighbours");
+  const std::string names_background =
+      "must not name the background, " + std::to_string(parameters.background);
   refuse_if(std::ranges::binary_search(parameters.labels->values, parameters.background), "labels",
-            "must not name the background, " + std::to_string(parameters.background));
+            names_background);
+  const bool has_background = std::ranges::any_of(parameters.label_values, [&](const auto& entry) {
+    return entry.first == parameters.background ||
+           std::ranges::binary_search(entry.second, parameters.background);
+  });
+  refuse_if(has_background, "label_values", names_background);
 }
 
 // The members that such a job has another default for than others.

@@ -227,6 +227,10 @@ class Parser {
       throw EarlyExit(status == 0 ? 0 : kWrongUsage, status == 0 ? out.str() : err.str());
     }
     if (options_.command == Command::kMesh) check_outputs();
+    if (options_.command == Command::kEstimate && !options_.parameters.label_values.empty()) {
+      throw EarlyExit(kWrongUsage,
+                      "--label-values: estimates go by the labels of the volume's file\n");
+    }
     return std::move(options_);
   }
 

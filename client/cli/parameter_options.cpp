@@ -45,7 +45,10 @@ std::string help_of(const Parameter& parameter, const T& standard) {
   std::erase(help, '`');
   if (help.ends_with('.')) help.pop_back();
   const std::string unit = parameter.unit;
-  return help + (unit.empty() ? "" : ", in " + unit) + values_and_default(parameter, standard);
+  const std::string by_labels =
+      parameter.by_labels == nullptr ? "" : std::string("; by labels ") + parameter.by_labels;
+  return help + (unit.empty() ? "" : ", in " + unit) + values_and_default(parameter, standard) +
+         by_labels;
 }
 
 // An option for each kind of parameter.

@@ -193,6 +193,12 @@ MeshFile file_of(const Job& job, MeshFormat format, std::optional<std::int64_t> 
     }
     return {found->second.bytes, found->second.sha256, found->second.href};
   }
+  const auto has = [&](const LabelSummary& each) { return each.files.contains(format); };
+  if (!label && std::ranges::any_of(job.mesh->labels, has)) {
+    throw Error(ErrorCode::kNotFound, "the job has a file of the format \"" +
+                                          std::string(to_string(format)) +
+                                          "\" for each label: say which, or take the zip");
+  }
   throw Error(ErrorCode::kNotFound, "the job has no file of the format \"" +
                                         std::string(to_string(format)) + '"' +
                                         (label ? " of the label " + std::to_string(*label) : ""));

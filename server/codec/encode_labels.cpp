@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -46,6 +47,19 @@ std::array<double, 3> series_color(std::int64_t label) {
     color[channel] = kValue * (1 - kSaturation * std::max(0.0, std::min({k, 4 - k, 1.0})));
   }
   return color;
+}
+
+// The title without blanks, which would begin another group's name, and unlike those before.
+std::string group_of(const LabelSummary& label, std::set<std::string>& taken) {
+  std::string title = title_of(label);
+  std::ranges::replace_if(
+      title, [](char c) { return c == ' ' || c == '\t'; }, '_');
+  std::string group = title;
+  for (int more = 0; !taken.insert(group).second; ++more) {
+    group =
+        title + '-' + std::to_string(label.label) + (more == 0 ? "" : '-' + std::to_string(more));
+  }
+  return group;
 }
 
 }  // namespace
@@ -100,13 +114,10 @@ void encode_labels_obj(const LabelledSurface& surface, const mesh::Context& cont
   writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
     return write_obj_vertex(mesh.positions[v], out);
   });
+  std::set<std::string> groups;
   for (std::size_t n = 1; n <= surface.labels.size(); ++n) {
-    std::string group = "g " + title_of(surface.labels[n - 1]);
-    // A blank would begin another group's name.
-    std::replace_if(
-        group.begin() + 2, group.end(), [](char c) { return c == ' ' || c == '\t'; }, '_');
-    group += '\n';
-    sink(std::as_bytes(std::span(group)));
+    const std::string line = "g " + group_of(surface.labels[n - 1], groups) + '\n';
+    sink(std::as_bytes(std::span(line)));
     const auto own = surface.triangles.of(n);
     writer.write(own.size(), kMostObjFaceBytes, [&](std::size_t t, std::byte* out) {
       return write_obj_face(face_of(surface, n, own[t]), out);

@@ -42,7 +42,8 @@ void encode_labels_ply(const LabelledSurface& surface, const mesh::Context& cont
                        const Sink& sink);
 
 // OBJ as encode_obj makes it, with a group of faces for each label, which has its title, blanks
-// replaced. As in PLY every label's surface is there whole. Throws Error kCancelled.
+// replaced; where titles are alike, with its value behind it. As in PLY every label's surface is
+// there whole. Throws Error kCancelled.
 void encode_labels_obj(const LabelledSurface& surface, const mesh::Context& context,
                        const Sink& sink);
 

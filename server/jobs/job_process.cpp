@@ -22,8 +22,10 @@ constexpr milliseconds kGone{2000};
 // How long one that was asked to stop may go on: kernels look once per slab, but a stream of
 // libdraco's is encoded as a whole.
 constexpr milliseconds kPatience{300};
-// More than the longest line, and enough at once for what is of a file.
+// More than most lines, and enough at once for what is of a file.
 constexpr std::size_t kHeardBytes = std::size_t{256} << 10;
+// What is told of 65 535 labels with a file of each in every format takes some 70 MB.
+constexpr std::size_t kLongestLine = std::size_t{128} << 20;
 // More than one process that ends before it begins is no accident.
 constexpr int kMostEarlyEnds = 3;
 
@@ -54,6 +56,11 @@ CountedSurface JobProcess::count(const JobOrder& order, const std::stop_token& s
 
 JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink> sinks,
                              const std::stop_token& stop, const Report& report) {
+  if (begin_ == end_ && heard_.size() > kHeardBytes) {  // one long line is no reason to keep it
+    heard_.resize(kHeardBytes);
+    heard_.shrink_to_fit();
+    begin_ = end_ = 0;
+  }
   const InputFile file(order.file);
   for (int tries = 0; tries < kMostEarlyEnds; ++tries) {
     start();
@@ -151,9 +158,10 @@ std::optional<std::string_view> JobProcess::next_line(Talk& talk) {
       return line;
     }
     const std::size_t known = end_ - begin_;
-    if (known == heard_.size()) {
+    if (known >= kLongestLine) {
       throw Error(ErrorCode::kInternal, "A job's process has more to say than it should.");
     }
+    if (known == heard_.size()) heard_.resize(2 * heard_.size());
     if (!hear(talk)) return std::nullopt;
     looked_at = begin_ + known;
   }

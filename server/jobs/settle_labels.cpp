@@ -22,6 +22,13 @@ JobParameters settle_labels(JobParameters parameters, const store::Viewer& viewe
     throw invalid_parameter("labels", "are for volumes of integers; this one has samples of type " +
                                           std::string(to_string(volume.type)));
   }
+  if (std::ranges::min(volume.dims) < 2) {
+    throw Error(
+        ErrorCode::kUnusableVolume,
+        "labels have surfaces in volumes of two samples or more along each axis; this one is " +
+            std::to_string(volume.dims[0]) + " x " + std::to_string(volume.dims[1]) + " x " +
+            std::to_string(volume.dims[2]));
+  }
   for (const auto& [label, values] : values_of(volume)) {
     parameters.label_values.try_emplace(label, values);
   }

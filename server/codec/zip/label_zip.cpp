@@ -96,6 +96,7 @@ class FileNames {
                             std::string_view("/\\:*?\"<>|").find(c) == std::string_view::npos;
       name += is_plain ? c : '_';
     }
+    cut(name);
     while (!name.empty() && (name.back() == '.' || name.back() == ' ')) name.pop_back();
     if (name.starts_with('.') || name.empty()) name.insert(name.begin(), '_');
     const std::string title = name;
@@ -107,6 +108,17 @@ class FileNames {
   }
 
  private:
+  // So that no file's name, with its suffix and what tells it from others, is too long for a
+  // system.
+  static void cut(std::string& name) {
+    constexpr std::size_t kMost = 200;
+    if (name.size() <= kMost) return;
+    std::size_t end = kMost;
+    while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80)
+      --end;  // within UTF-8
+    name.resize(end);
+  }
+
   static std::string lowered(std::string name) {
     for (char& c : name) {
       if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');

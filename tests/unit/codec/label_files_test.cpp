@@ -196,6 +196,25 @@ TEST_F(LabelFilesTest, TitlesThatAreAlikeOrNoFileNamesMakeNoTwoFilesOne) {
                                              "same-3.stl"}));
 }
 
+TEST_F(LabelFilesTest, NamesInAZipAreNoLongerThanSystemsTake) {
+  labels_[0].name = std::string(254, 'x');
+  labels_[1].name = std::string(254, 'x') + 'y';
+  labels_[2].name.emplace();
+  for (int n = 0; n < 127; ++n) *labels_[2].name += "\u00e9";
+  for (const auto& [name, bytes] : unzipped(zipped({MeshFormat::kStl}).bytes)) {
+    EXPECT_LE(name.size(), 255U);
+    EXPECT_TRUE(name.ends_with(".stl")) << name;
+  }
+}
+
+TEST_F(LabelFilesTest, GroupsOfLabelsThatAreNamedAlikeAreTold) {
+  labels_[0].name = "a b";
+  labels_[3].name = "a_b";
+  const std::string obj = encoded(MeshFormat::kObj);
+  EXPECT_NE(obj.find("g a_b\n"), std::string::npos);
+  EXPECT_NE(obj.find("g a_b-4\n"), std::string::npos);
+}
+
 TEST_F(LabelFilesTest, ZipIsTheSameOnAnyNumberOfThreads) {
   const int before = mesh::thread_count();
   mesh::set_thread_count(1);

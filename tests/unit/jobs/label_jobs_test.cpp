@@ -206,6 +206,29 @@ TEST_F(LabelJobsTest, AreEstimatedExactly) {
   EXPECT_EQ(estimator.estimate("", parameters).triangles, mesh.labels[2].triangles);
 }
 
+// Their summary is longer than anything else that a process tells.
+TEST_F(LabelJobsTest, MayBeThousands) {
+  auto samples = test::constant<std::uint16_t>(0, {14, 14, 14});
+  for (std::size_t n = 0; n < samples.samples.size(); ++n) {
+    samples.samples[n] = static_cast<std::uint16_t>(n % 2500);
+  }
+  const Volume volume = add(samples, SampleType::kUint16);
+  JobParameters parameters = label_parameters({});
+  parameters.formats = {MeshFormat::kStl, MeshFormat::kPly};
+  const MeshSummary mesh = run(volume, settled(volume, parameters)).mesh;
+  EXPECT_EQ(mesh.labels.size(), 2499U);
+  EXPECT_EQ(mesh.labels.back().files.size(), 2U);
+  EXPECT_GT(run(add_sphere(), parameters_of(add_sphere(), 0)).mesh.triangles, 0U);  // as ever
+}
+
+TEST_F(LabelJobsTest, OfASingleSliceAreRefused) {
+  const Volume slice = add(test::constant<std::uint8_t>(1, {10, 10, 1}), SampleType::kUint8);
+  const auto error = test::thrown_by([&] { settled(slice, label_parameters({})); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kUnusableVolume);
+  EXPECT_THAT(error->what(), HasSubstr("10 x 10 x 1"));
+}
+
 TEST_F(LabelJobsTest, TakeNoMoreMemoryThanTheyMay) {
   const Volume volume = add_labels();
   const auto error = test::thrown_by([&] {

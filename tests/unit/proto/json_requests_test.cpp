@@ -102,6 +102,14 @@ TEST(JobBody, RefusesWhatLabelsCannotHave) {
   EXPECT_THAT(faults_of(R"("labels": "all", "label_names": ["a"])"), ElementsAre("label_names"));
   EXPECT_THAT(faults_of(R"("labels": "all", "label_values": {"3": []})"),
               ElementsAre("label_values.3"));
+  EXPECT_THAT(faults_of(R"("labels": "all", "label_names": {" 1": "a"})"),
+              ElementsAre("label_names. 1"));
+  EXPECT_THAT(faults_of(R"("labels": "all", "label_names": {"1": 3})"),
+              ElementsAre("label_names.1"));
+  EXPECT_THAT(faults_of(R"("labels": "all", "label_values": {"3": [0]})"),
+              ElementsAre("label_values"));
+  EXPECT_THAT(faults_of(R"("labels": "all", "label_values": {"0": [3]})"),
+              ElementsAre("label_values"));
   EXPECT_THAT(faults_of(R"("iso": 3, "background": 1, "label_names": {}, "formats": ["zip"])"),
               UnorderedElementsAre("background", "label_names", "formats"));
 }
