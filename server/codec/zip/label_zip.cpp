@@ -57,15 +57,16 @@ class ZipWriter {
     void operator()(archive_entry* entry) const { archive_entry_free(entry); }
   };
 
-  // An exception may not pass through the library.
+  // An exception may not pass through the library; told of a failure, the library would leak what
+  // it writes with.
   static la_ssize_t write(archive* /*all*/, void* self, const void* bytes, std::size_t count) {
     auto& writer = *static_cast<ZipWriter*>(self);
-    if (writer.failure_) return -1;
     try {
-      writer.sink_(std::span(static_cast<const std::byte*>(bytes), count));
+      if (!writer.failure_) {
+        writer.sink_(std::span(static_cast<const std::byte*>(bytes), count));
+      }
     } catch (...) {
       writer.failure_ = std::current_exception();
-      return -1;
     }
     writer.written_ += count;
     return static_cast<la_ssize_t>(count);

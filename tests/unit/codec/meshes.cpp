@@ -100,4 +100,10 @@ std::string encoded(const mesh::Mesh& mesh, MeshFormat format,
   return bytes;
 }
 
+std::vector<MeshFormat> formats_of_a_surface() {
+  std::vector<MeshFormat> formats = values_of<MeshFormat>();
+  std::erase(formats, MeshFormat::kZip);
+  return formats;
+}
+
 }  // namespace isomesh::test

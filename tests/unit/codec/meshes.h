@@ -25,6 +25,9 @@ mesh::Mesh large_mesh();
 // grid.
 mesh::Mesh several_blocks();
 
+// All but ZIP, which holds labels.
+std::vector<MeshFormat> formats_of_a_surface();
+
 // All bytes that an encoder hands to its sink.
 std::string encoded(const mesh::Mesh& mesh, MeshFormat format, const DracoParameters& draco = {});
 std::string encoded(const mesh::Mesh& mesh, MeshFormat format, const codec::Provenance& provenance);
