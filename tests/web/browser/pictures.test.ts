@@ -172,8 +172,8 @@ describe('pictures', () => {
     await take(page, 'compare');
 
     await page.goto(daemon.url);
-    await expect.poll(() => page.locator('.card').count()).toBe(2);
-    await expect.poll(() => page.locator('.thumbnail[data-painted]').count()).toBe(2);
+    await expect.poll(() => page.locator('.card').count()).toBe(3);
+    await expect.poll(() => page.locator('.thumbnail[data-painted]').count()).toBe(3);
     await take(page, 'volumes');
     expect(faults).toEqual([]);
   }, 400_000);
