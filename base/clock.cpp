@@ -7,8 +7,9 @@
 
 namespace isomesh {
 
-std::string timestamp() {
-  const auto now = std::chrono::system_clock::now();
+std::string timestamp() { return timestamp_of(std::chrono::system_clock::now()); }
+
+std::string timestamp_of(std::chrono::system_clock::time_point now) {
   const std::time_t seconds =
       std::chrono::system_clock::to_time_t(std::chrono::floor<std::chrono::seconds>(now));
   const auto fraction = std::chrono::duration_cast<std::chrono::milliseconds>(
@@ -21,6 +22,21 @@ std::string timestamp() {
   std::array<char, 16> tail = {};
   std::snprintf(tail.data(), tail.size(), ".%03dZ", static_cast<int>(fraction % 1000));
   return std::string(text.data()) + tail.data();
+}
+
+std::chrono::system_clock::time_point time_of(std::string_view timestamp) {
+  std::tm parts = {};
+  int milliseconds = 0;
+  const std::string copy(timestamp);
+  if (std::sscanf(copy.c_str(), "%d-%d-%dT%d:%d:%d.%dZ", &parts.tm_year, &parts.tm_mon,
+                  &parts.tm_mday, &parts.tm_hour, &parts.tm_min, &parts.tm_sec,
+                  &milliseconds) != 7) {
+    return {};
+  }
+  parts.tm_year -= 1900;
+  parts.tm_mon -= 1;
+  return std::chrono::system_clock::from_time_t(::timegm(&parts)) +
+         std::chrono::milliseconds(milliseconds);
 }
 
 }  // namespace isomesh

@@ -35,6 +35,9 @@ enum class ErrorCode {
   kRequestTimeout,       // 408: a request or a body that came too slowly
   kPreconditionFailed,   // 412: what If-Match names is not what is there
   kHeadersTooLarge,      // 431
+  kPacsUnreachable,      // 503: a PACS gave no answer, or one that may be another next time
+  kPacsRefused,          // 502: a PACS has refused what it was asked for
+  kSeriesIncomplete,     // 503: a PACS has not sent all of a series (yet)
   kUnreachable,          // client side only: no answer from the server
 };
 

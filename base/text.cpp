@@ -53,6 +53,15 @@ std::string printable(std::string_view text) {
   return result;
 }
 
+std::string_view beginning(std::string_view text, std::size_t most_bytes) {
+  if (text.size() <= most_bytes) return text;
+  const auto continues = [](char byte) {
+    return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80;
+  };
+  while (most_bytes > 0 && continues(text[most_bytes])) --most_bytes;
+  return text.substr(0, most_bytes);
+}
+
 std::vector<std::string_view> split(std::string_view text, char separator) {
   std::vector<std::string_view> parts;
   for (std::size_t begin = 0; begin <= text.size();) {

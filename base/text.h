@@ -2,6 +2,7 @@
 // views that are returned are views of the argument.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -18,6 +19,9 @@ bool has_control_characters(std::string_view text);  // other than tabs
 
 // A text that is UTF-8, or should be, with U+FFFD for each control character.
 std::string printable(std::string_view text);
+
+// The beginning of a text that is UTF-8, of at most so many bytes, without half a character.
+std::string_view beginning(std::string_view text, std::size_t most_bytes);
 
 // The parts between separators, each without the white space around it; one more than there are
 // separators.

@@ -40,6 +40,11 @@ constexpr std::array kDescriptions = {
                      "Precondition failed"},
     ErrorDescription{ErrorCode::kHeadersTooLarge, 431, "headers-too-large", "Headers too large"},
     ErrorDescription{ErrorCode::kUnreachable, 503, "unreachable", "The server is not reachable"},
+    ErrorDescription{ErrorCode::kPacsUnreachable, 503, "pacs-unreachable",
+                     "The PACS is not reachable"},
+    ErrorDescription{ErrorCode::kPacsRefused, 502, "pacs-refused", "The PACS has refused this"},
+    ErrorDescription{ErrorCode::kSeriesIncomplete, 503, "series-incomplete",
+                     "The series has not come whole"},
 };
 
 }  // namespace

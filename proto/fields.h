@@ -45,6 +45,27 @@ void visit(Is<DicomInstance> auto& self, auto&& field) {
   field("sop_instance_uid", self.sop_instance_uid);
 }
 
+void visit(Is<DicomCode> auto& self, auto&& field) {
+  field("value", self.value);
+  field("scheme", self.scheme);
+  field("meaning", self.meaning);
+}
+
+void visit(Is<DicomSegment> auto& self, auto&& field) {
+  field("label", self.label);
+  field("category", self.category);
+  field("type", self.type);
+  field("region", self.region);
+}
+
+void visit(Is<DicomEquipment> auto& self, auto&& field) {
+  field("manufacturer", self.manufacturer);
+  field("model_name", self.model_name);
+  field("station_name", self.station_name);
+  field("device_serial_number", self.device_serial_number);
+  field("software_versions", self.software_versions);
+}
+
 void visit(Is<DicomIdentity> auto& self, auto&& field) {
   field("patient_name", self.patient_name);
   field("patient_id", self.patient_id);
@@ -62,6 +83,15 @@ void visit(Is<DicomIdentity> auto& self, auto&& field) {
   field("modality", self.modality);
   field("frame_of_reference_uid", self.frame_of_reference_uid);
   field("instances", self.instances);
+  field("issuer_of_patient_id", self.issuer_of_patient_id);
+  field("patient_identity_removed", self.patient_identity_removed);
+  field("deidentification_method", self.deidentification_method);
+  field("acquisition_datetime", self.acquisition_datetime);
+  field("position_reference_indicator", self.position_reference_indicator);
+  field("equipment", self.equipment);
+  if (is_told(self, !self.segments.empty())) {
+    field("segments", self.segments);
+  }
 }
 
 void visit(Is<Volume> auto& self, auto&& field) {
@@ -96,7 +126,9 @@ void visit(Is<Timing> auto& self, auto&& field) {
   field("load", self.load);
   field("extract", self.extract);
   field("smooth", self.smooth);
+  field("simplify", self.simplify);
   field("encode", self.encode);
+  field("certify", self.certify);
   field("total", self.total);
 }
 
@@ -127,6 +159,12 @@ void visit(Is<MeshQuality::Stages> auto& self, auto&& field) {
   field("smoothed", self.smoothed);
 }
 
+void visit(Is<SelfIntersections> auto& self, auto&& field) {
+  field("pairs", self.pairs);
+  field("triangles", self.triangles);
+  field("places", self.places);
+}
+
 void visit(Is<MeshQuality> auto& self, auto&& field) {
   field("closed", self.closed);
   field("manifold", self.manifold);
@@ -135,6 +173,40 @@ void visit(Is<MeshQuality> auto& self, auto&& field) {
   field("genus", self.genus);
   field("aspect_ratio", self.aspect_ratio);
   field("smallest_angle_deg", self.smallest_angle_deg);
+  field("encloses_volume", self.encloses_volume);
+  if (is_told(self, self.self_intersections.has_value())) {
+    field("self_intersections", self.self_intersections);
+  }
+}
+
+void visit(Is<DistanceSummary> auto& self, auto&& field) {
+  field("points", self.points);
+  field("max_mm", self.max_mm);
+  field("mean_mm", self.mean_mm);
+  field("rms_mm", self.rms_mm);
+  field("p99_mm", self.p99_mm);
+  field("histogram", self.histogram);
+}
+
+void visit(Is<MeshCertificate::Budget> auto& self, auto&& field) {
+  field("smoothing", self.smoothing);
+  field("simplification", self.simplification);
+  field("quantisation", self.quantisation);
+}
+
+void visit(Is<MeshCertificate> auto& self, auto&& field) {
+  field("file", self.file);
+  field("max_mm", self.max_mm);
+  field("from_mesh", self.from_mesh);
+  field("from_extracted", self.from_extracted);
+  if (is_told(self, self.budget_mm.has_value())) {
+    field("budget_mm", self.budget_mm);
+  }
+}
+
+void visit(Is<Simplification> auto& self, auto&& field) {
+  field("triangles_before", self.triangles_before);
+  field("bound_by", self.bound_by);
 }
 
 void visit(Is<MeshSummary::Displacement> auto& self, auto&& field) {
@@ -167,12 +239,19 @@ void visit(Is<LabelSummary> auto& self, auto&& field) {
 }
 
 void visit(Is<MeshSummary> auto& self, auto&& field) {
+  if (is_told(self, self.iso.has_value())) {
+    field("iso", self.iso);
+  }
+  field("empty", self.empty);
   field("triangles", self.triangles);
   field("vertices", self.vertices);
   field("boundary_edges", self.boundary_edges);
   field("components", self.components);
   field("euler", self.euler);
   field("dropped", self.dropped);
+  if (is_told(self, self.simplified.has_value())) {
+    field("simplified", self.simplified);
+  }
   field("quality", self.quality);
   field("area_mm2", self.area_mm2);
   field("area_extracted_mm2", self.area_extracted_mm2);
@@ -182,6 +261,9 @@ void visit(Is<MeshSummary> auto& self, auto&& field) {
   field("files", self.files);
   if (is_told(self, !self.labels.empty())) {
     field("labels", self.labels);
+  }
+  if (is_told(self, self.certificate.has_value())) {
+    field("certificate", self.certificate);
   }
 }
 
@@ -288,6 +370,9 @@ void visit(Is<Estimate> auto& self, auto&& field) {
   field("scheme", self.scheme);
   field("triangles", self.triangles);
   field("vertices", self.vertices);
+  if (is_told(self, self.simplified_triangles.has_value())) {
+    field("simplified_triangles", self.simplified_triangles);
+  }
   field("bytes", self.bytes);
   field("memory_bytes", self.memory_bytes);
   field("fits", self.fits);

@@ -11,8 +11,9 @@
 
 namespace isomesh {
 
-// kZip: one file for each label, in the other formats that are asked for, but glb; else in STL.
-enum class MeshFormat { kDrc, kGlb, kStl, kPly, kObj, kZip };
+// kZip: one file for each label, in the other formats that are asked for, but glb and 3mf; else in
+// STL.
+enum class MeshFormat { kDrc, kGlb, kStl, kPly, kObj, k3mf, kZip };
 
 struct MeshFile {
   std::uint64_t bytes = 0;
@@ -64,6 +65,15 @@ struct Distribution {
   bool operator==(const Distribution&) const = default;
 };
 
+// Where a surface runs through itself.
+struct SelfIntersections {
+  std::uint64_t pairs = 0;                         // of triangles that intersect
+  std::uint64_t triangles = 0;                     // that intersect any other
+  std::vector<std::array<double, 3>> places = {};  // of the first pairs, in mm, LPS; 100 at most
+
+  bool operator==(const SelfIntersections&) const = default;
+};
+
 // How good a mesh is.
 struct MeshQuality {
   struct Stages {
@@ -80,8 +90,58 @@ struct MeshQuality {
   std::optional<std::int64_t> genus;  // handles, all components together; of a closed manifold
   Stages aspect_ratio;                // 2 * inradius / circumradius: 1 is equilateral; bins of 0.05
   Stages smallest_angle_deg;          // of each triangle: 60 is equilateral; bins of 3 degrees
+  // Whether the volumes are what the surface encloses. Those of an open surface depend on the point
+  // that they are summed from, and mean nothing by themselves.
+  bool encloses_volume = false;
+  std::optional<SelfIntersections> self_intersections = {};  // of a job that is certified
 
   bool operator==(const MeshQuality&) const = default;
+};
+
+// Distances from points of one surface, its vertices and the centres of its triangles, to the
+// nearest points of another one's triangles. Exact, in double precision, but kept in single.
+struct DistanceSummary {
+  static constexpr std::size_t kBins = 20;
+
+  std::uint64_t points = 0;
+  double max_mm = 0;
+  double mean_mm = 0;
+  double rms_mm = 0;
+  double p99_mm = 0;  // 99 of 100 points are this near: the smallest distance that is one of them
+  std::array<std::uint64_t, kBins> histogram = {};  // points, in equal bins from zero to max_mm
+
+  bool operator==(const DistanceSummary&) const = default;
+};
+
+// How far the files are from the surface as it was extracted, before it was smoothed.
+struct MeshCertificate {
+  // How max_error_mm was shared out; the three make it up.
+  struct Budget {
+    double smoothing = 0;       // the farthest that it moved a vertex
+    double quantisation = 0;    // the most that rounding a file's coordinates moves one
+    double simplification = 0;  // the rest
+
+    bool operator==(const Budget&) const = default;
+  };
+
+  MeshFormat file = MeshFormat::kDrc;    // of several the one that is farthest
+  double max_mm = 0;                     // both ways
+  DistanceSummary from_mesh;             // shows what has been added
+  DistanceSummary from_extracted;        // shows what has been left out
+  std::optional<Budget> budget_mm = {};  // where max_error_mm is given
+
+  bool operator==(const MeshCertificate&) const = default;
+};
+
+// What simplification did.
+struct Simplification {
+  enum class Bound { kError, kTriangles };
+
+  std::uint64_t triangles_before = 0;
+  // What kept it from going on: the error or the number of triangles that it was to reach.
+  Bound bound_by = Bound::kError;
+
+  bool operator==(const Simplification&) const = default;
 };
 
 // What a finished job says about its mesh. Lengths in millimetres, after smoothing unless named
@@ -112,12 +172,15 @@ struct MeshSummary {
     bool operator==(const Displacement&) const = default;
   };
 
+  std::optional<double> iso = {};  // the value that was used; none by labels
+  bool empty = false;              // there is no surface
   std::uint64_t triangles = 0;
   std::uint64_t vertices = 0;
   std::uint64_t boundary_edges = 0;
   std::uint64_t components = 0;
   std::int64_t euler = 0;
   Dropped dropped;
+  std::optional<Simplification> simplified = {};  // of a job that asks for fewer triangles
   MeshQuality quality;
   double area_mm2 = 0;
   double area_extracted_mm2 = 0;
@@ -126,6 +189,7 @@ struct MeshSummary {
   std::array<std::array<double, 3>, 2> bounds = {};  // smallest and largest corner; 0 when empty
   std::map<MeshFormat, MeshFile> files;
   std::vector<LabelSummary> labels = {};  // ascending; of a job by labels
+  std::optional<MeshCertificate> certificate = {};
 
   bool operator==(const MeshSummary&) const = default;
 };

@@ -32,13 +32,15 @@ struct SmoothingCase {
   std::optional<double> maximum = {};
 };
 
+// Which jobs a parameter is for.
+enum class JobKind { kAny, kAtIso, kByLabels };
+
 struct Parameter {
   const char* name;        // of the member in JSON
   const char* title = "";  // a short label
   const char* help = "";   // what it does, in one line
   const char* more = "";  // what else a reader of the API should know: sentences that follow `help`
-  const char* by_labels = nullptr;  // the default of jobs by labels, where it is another one
-  const char* unit = "";            // which may end the name: max_displacement_mm
+  const char* unit = "";  // which may end the name: max_displacement_mm
   // Of a number.
   std::optional<double> minimum = {};
   std::optional<double> above = {};
@@ -48,8 +50,9 @@ struct Parameter {
   std::array<std::optional<SmoothingCase>, 2> cases = {};  // none: for every kind of smoothing
   bool is_required = false;
   const char* unless = nullptr;  // of one that is required: which other one may stand in its place
-  const char* needs = nullptr;   // the one without which it means nothing
-  bool may_be_absent = false;    // from the parameters of a job that it does not concern
+  JobKind jobs = JobKind::kAny;
+  std::optional<double> by_labels = {};  // the default of jobs by labels, where it is another one
+  bool may_be_absent = false;            // from the parameters of a job that it does not concern
   bool in_query = true;
   const char* query = nullptr;   // what a query calls it, unless `name`
   const char* option = nullptr;  // what the command calls it, unless as a query, without the unit
@@ -70,14 +73,28 @@ void visit(Is<ComponentFilter> auto& self, auto&& parameter) {
                       .help = "Of the parts, so many of the largest are kept.",
                       .minimum = 1,
                       .maximum = kMost,
+                      .jobs = JobKind::kAtIso,
                       .option = "keep-components"},
             self.keep);
   parameter(Parameter{.name = "min_triangles",
                       .title = "Fewest triangles of a part",
                       .help = "Of the parts, those of so many triangles are kept.",
                       .minimum = 1,
-                      .maximum = kMost},
+                      .maximum = kMost,
+                      .jobs = JobKind::kAtIso},
             self.min_triangles);
+  if (is_told(self, !self.nearest_to.empty())) {
+    parameter(
+        Parameter{.name = "nearest_to",
+                  .title = "Keep the parts at",
+                  .help = "Of the parts, those nearest to these places are kept.",
+                  .more = "Places are x, y and z in millimetres, LPS, one after the other; the "
+                          "part of the nearest vertex is meant.",
+                  .jobs = JobKind::kAtIso,
+                  .may_be_absent = true,
+                  .option = "keep-nearest-to"},
+        self.nearest_to);
+  }
 }
 
 void visit(Is<DracoParameters> auto& self, auto&& parameter) {
@@ -111,6 +128,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                         .when_empty = "otsu",
                         .is_required = true,
                         .unless = "labels",
+                        .jobs = JobKind::kAtIso,
                         .may_be_absent = true},
               self.iso);
   }
@@ -129,6 +147,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                           "spacing.",
                   .minimum = kLeast,
                   .maximum = kMost,
+                  .jobs = JobKind::kByLabels,
                   .may_be_absent = true},
         self.labels);
     parameter(Parameter{.name = "background",
@@ -136,14 +155,14 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                         .help = "The value of samples without a label.",
                         .minimum = kLeast,
                         .maximum = kMost,
-                        .needs = "labels",
+                        .jobs = JobKind::kByLabels,
                         .may_be_absent = true},
               self.background);
     parameter(Parameter{.name = "label_names",
                         .title = "Names of labels",
                         .help = "What labels are called, by their values.",
                         .more = "Those that are left out are called as the volume's file says.",
-                        .needs = "labels",
+                        .jobs = JobKind::kByLabels,
                         .may_be_absent = true,
                         .in_query = false,
                         .option = "label-name"},
@@ -153,7 +172,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                         .help = "The colours of labels, as #rrggbb, by their values.",
                         .more = "Those that are left out have the colour that the volume's file "
                                 "says, or one of a fixed series.",
-                        .needs = "labels",
+                        .jobs = JobKind::kByLabels,
                         .may_be_absent = true,
                         .in_query = false,
                         .option = "label-color"},
@@ -166,7 +185,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                                 "Those that are left out are as the volume's file says.",
                         .minimum = kLeast,
                         .maximum = kMost,
-                        .needs = "labels",
+                        .jobs = JobKind::kByLabels,
                         .may_be_absent = true,
                         .in_query = false,
                         .option = "label-values"},
@@ -186,6 +205,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                         .more = "`midpoint` puts all half-way.",
                         .values = {"Where the iso-value lies between two samples",
                                    "Half-way between two samples"},
+                        .jobs = JobKind::kAtIso,
                         .may_be_absent = true},
               self.interpolation);
   }
@@ -193,9 +213,9 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                       .title = "Passes",
                       .help = "How often the surface is smoothed.",
                       .more = "Vertices on its boundary stay. By labels the default is 10.",
-                      .by_labels = "10",
                       .minimum = 0,
-                      .maximum = 1000},
+                      .maximum = 1000,
+                      .by_labels = label_parameters({}).passes},
             self.passes);
   parameter(
       Parameter{
@@ -216,11 +236,11 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
           .name = "lambda",
           .title = "Step of a pass",
           .help = "How far a pass moves a vertex; 1 moves it onto the mean of its neighbours.",
-          .by_labels = "0.33",
           .above = 0,
           .maximum = 1,
           .cases = {SmoothingCase{Smoothing::kLaplacian, default_lambda(Smoothing::kLaplacian)},
-                    SmoothingCase{Smoothing::kTaubin, default_lambda(Smoothing::kTaubin), 0.66}}},
+                    SmoothingCase{Smoothing::kTaubin, default_lambda(Smoothing::kTaubin), 0.66}},
+          .by_labels = default_lambda(label_parameters({}))},
       self.lambda);
   parameter(
       Parameter{.name = "pass_band",
@@ -255,10 +275,57 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
       Parameter{.name = "components",
                 .help = "Which parts of the surface are kept; the others are dropped before "
                         "smoothing.",
-                .more = "With both members, the largest of those that are large enough. Parts "
+                .more = "With several members, the largest of those that are large enough. Parts "
                         "are compared by their triangles, equal ones by their first vertex. "
                         "Without members all are kept. Not for labels."},
       self.components);
+  if (is_told(self, self.fill_cavities)) {
+    parameter(Parameter{.name = "fill_cavities",
+                        .title = "Fill cavities",
+                        .help = "Leave out the walls of cavities, which no opening leads to, and "
+                                "what floats in them.",
+                        .jobs = JobKind::kAtIso,
+                        .may_be_absent = true},
+              self.fill_cavities);
+  }
+  if (is_told(self, self.crop.has_value())) {
+    parameter(Parameter{.name = "crop",
+                        .title = "Crop to a box",
+                        .help = "Only what is in this box: its smallest and its largest corner, in "
+                                "millimetres, LPS.",
+                        .more = "The volume's samples within the box are taken as if they were "
+                                "all; of one that lies askew, those between the box's extents "
+                                "along its axes. The surface is closed by caps: `close` is true.",
+                        .may_be_absent = true},
+              self.crop);
+  }
+  if (is_told(self, self.max_error_mm.has_value())) {
+    parameter(Parameter{.name = "max_error_mm",
+                        .title = "Largest error",
+                        .help = "No part of a file is farther than this from the surface as it was "
+                                "extracted, nor that from it.",
+                        .more = "Millimetres. Half of it is what smoothing may take; then the "
+                                "surface gets as few triangles as the rest allows, and Draco's "
+                                "coordinates as many bits as it takes. It is measured on the "
+                                "files' own bytes: see `certify`, which comes with it.",
+                        .unit = "mm",
+                        .minimum = 0.001,
+                        .maximum = 1000,
+                        .may_be_absent = true},
+              self.max_error_mm);
+  }
+  if (is_told(self, self.triangles.has_value())) {
+    parameter(Parameter{.name = "triangles",
+                        .title = "Most triangles",
+                        .help = "Simplify the surface to so many triangles, or fewer.",
+                        .more = "With `max_error_mm`, what binds first; the answer says which. "
+                                "What it costs is measured: see `certify`, which comes with it "
+                                "unless it is false.",
+                        .minimum = 4,
+                        .maximum = std::numeric_limits<std::uint32_t>::max(),
+                        .may_be_absent = true},
+              self.triangles);
+  }
   parameter(Parameter{.name = "formats",
                       .title = "Files to make",
                       .help = "The files to make, each named once.",
@@ -272,6 +339,30 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                       .help = "Put the vertices' normals, weighted by the areas around them, into "
                               "`glb`."},
             self.normals);
+  if (is_told(self, self.distances)) {
+    parameter(
+        Parameter{.name = "distances",
+                  .title = "Put the vertices' distances into GLB",
+                  .help = "Put each vertex's distance to the surface as it was extracted into "
+                          "`glb`, in millimetres.",
+                  .more = "As the vertex attribute `_DISTANCE_MM`, of all levels of detail; "
+                          "rounded to a four thousandth of the largest. The page shows it as "
+                          "colour.",
+                  .may_be_absent = true},
+        self.distances);
+  }
+  if (is_told(self, !self.lods.empty())) {
+    parameter(Parameter{.name = "lods",
+                        .title = "Levels of detail",
+                        .help = "Levels of detail for `glb`, as shares of the triangles from 1 "
+                                "downwards.",
+                        .more = "By the extension MSFT_lod, which readers that do not know it pass "
+                                "over. At most 8.",
+                        .above = 0,
+                        .maximum = 1,
+                        .may_be_absent = true},
+              self.lods);
+  }
 }
 
 inline MeshParameters& mesh_parameters(JobParameters& parameters) { return parameters; }
@@ -289,6 +380,15 @@ void visit(Is<JobParameters> auto& self, auto&& parameter) {
                       .values = {"Before all others", "After all that are stat",
                                  "When nothing else waits"}},
             self.priority);
+  if (is_told(self, self.certify)) {
+    parameter(
+        Parameter{.name = "certify",
+                  .title = "Measure the error",
+                  .help = "Measure how far the files are from the surface as it was extracted, "
+                          "and where they run through themselves.",
+                  .may_be_absent = true},
+        self.certify);
+  }
   if (is_told(self, self.callback.has_value())) {
     parameter(Parameter{.name = "callback",
                         .help = "Have the server tell this address when the job has ended.",

@@ -1,6 +1,5 @@
 #include <algorithm>
-#include <cctype>
-#include <cmath>
+#include <functional>
 #include <map>
 #include <set>
 
@@ -9,13 +8,15 @@
 #include "base/text.h"
 #include "proto/fields.h"
 #include "proto/json.h"
+#include "proto/request_reader.h"
 
 namespace isomesh {
 namespace {
 
 // What a query calls a parameter, where it stands in a body and how its text is read.
 struct QueryName {
-  enum class Kind { kValue, kText, kTexts, kLabels };
+  // kPlaces: numbers, of which each three are one.
+  enum class Kind { kValue, kText, kTexts, kLabels, kNumbers, kPlaces };
 
   std::string path;
   Kind kind = Kind::kValue;
@@ -26,6 +27,11 @@ constexpr QueryName::Kind kind_of() {
   if (std::is_same_v<Member, std::string>) return QueryName::Kind::kText;
   if (std::is_same_v<Member, std::vector<MeshFormat>>) return QueryName::Kind::kTexts;
   if (std::is_same_v<Member, std::optional<LabelChoice>>) return QueryName::Kind::kLabels;
+  if (std::is_same_v<Member, std::vector<double>>) return QueryName::Kind::kNumbers;
+  if (std::is_same_v<Member, std::vector<std::array<double, 3>>> ||
+      std::is_same_v<Member, std::optional<Box>>) {
+    return QueryName::Kind::kPlaces;
+  }
   return QueryName::Kind::kValue;
 }
 
@@ -56,247 +62,6 @@ Json::json_pointer pointer_to(std::string path) {
   std::ranges::replace(path, '.', '/');
   return Json::json_pointer('/' + path);
 }
-
-// Collects what is wrong with every member, so that one answer names all of it.
-class RequestReader {
- public:
-  // Faults are named as a query spells them: `format` for `formats`, no `draco.` or `components.`
-  // before their members.
-  void name_as_in_query() { as_in_query_ = true; }
-
-  // Reads `json` into `value`, whose parameters are those of `visit`, and refuses any other member.
-  template <class T>
-  void read_object(const Json& json, T& value, const std::string& prefix) {
-    std::vector<std::string> known;
-    visit(value, [&](const Parameter& parameter, auto& member) {
-      known.emplace_back(parameter.name);
-      if (const auto found = json.find(parameter.name); found != json.end()) {
-        read_member(*found, prefix + parameter.name, parameter, member);
-      }
-    });
-    for (const auto& [name, unused] : json.items()) {
-      if (std::ranges::find(known, name) == known.end()) {
-        add(prefix + name, "is not a known member");
-      }
-    }
-  }
-
-  void add(const std::string& field, const std::string& message) {
-    if (errors_.size() >= kMostErrors) return;
-    errors_.push_back({spelled(field.substr(0, kLongestName)), message});
-  }
-
-  void throw_if_any() {
-    if (!errors_.empty()) throw invalid_parameters(std::move(errors_));
-  }
-
- private:
-  std::string spelled(const std::string& field) const {
-    return as_in_query_ ? spelled_in_query(field) : field;
-  }
-
-  static constexpr std::size_t kMostErrors = 20;
-  static constexpr std::size_t kLongestName = 64;
-
-  static bool fits(const Parameter& parameter, double number) {
-    return std::isfinite(number) && !(parameter.minimum && number < *parameter.minimum) &&
-           !(parameter.above && number <= *parameter.above) &&
-           !(parameter.maximum && number > *parameter.maximum);
-  }
-
-  // `kind` of number, and what the table says that it may be.
-  void refuse(const std::string& path, const std::string& kind, const Parameter& parameter) {
-    const std::string range = range_of(parameter);
-    std::string message = "must be a " + kind + (range.empty() ? "" : ' ' + range);
-    if (parameter.when_empty != nullptr)
-      message += " or \"" + std::string(parameter.when_empty) + '"';
-    add(path, message);
-  }
-
-  template <class Whole>
-  void read_whole(const Json& json, const std::string& path, const Parameter& parameter,
-                  Whole& value) {
-    const double number = json.is_number() ? json.get<double>() : std::nan("");
-    if (std::floor(number) != number || !fits(parameter, number)) {
-      return refuse(path, "whole number", parameter);
-    }
-    value = static_cast<Whole>(number);
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
-                   std::string& value) {
-    if (!json.is_string()) return add(path, "must be a string");
-    value = json.get<std::string>();
-  }
-
-  template <class Number>
-  requires std::is_arithmetic_v<Number>
-  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
-                   std::optional<Number>& value) {
-    const Json empty = parameter.when_empty == nullptr ? Json(nullptr) : Json(parameter.when_empty);
-    if (json == empty) return value.reset();
-    read_member(json, path, parameter, value.emplace());
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
-                   Scheme& value) {
-    if (json == 5) {
-      value = Scheme::kFive;
-    } else if (json == 6) {
-      value = Scheme::kSix;
-    } else {
-      add(path, "must be 5 or 6");
-    }
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
-                   Enumeration auto& value) {
-    using Enum = std::remove_reference_t<decltype(value)>;
-    const auto known = json.is_string() ? from_string<Enum>(json.get<std::string>()) : std::nullopt;
-    if (!known) return add(path, "must be " + names_of<Enum>());
-    value = *known;
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
-                   int& value) {
-    read_whole(json, path, parameter, value);
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
-                   std::uint32_t& value) {
-    read_whole(json, path, parameter, value);
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
-                   double& value) {
-    const double number = json.is_number() ? json.get<double>() : std::nan("");
-    // Without an upper bound "a number" would take in the infinite ones.
-    if (!fits(parameter, number)) {
-      return refuse(path, parameter.maximum ? "number" : "finite number", parameter);
-    }
-    value = number;
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
-                   bool& value) {
-    if (!json.is_boolean()) return add(path, "must be true or false");
-    value = json.get<bool>();
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
-                   std::vector<MeshFormat>& formats) {
-    if (!json.is_array() || json.empty()) {
-      return add(path, "must be a list of at least one of " + names_of<MeshFormat>());
-    }
-    formats.clear();
-    for (const Json& element : json) {
-      MeshFormat format{};
-      const std::size_t before = errors_.size();
-      read_member(element, path, parameter, format);
-      if (errors_.size() > before) return;
-      if (std::ranges::find(formats, format) == formats.end()) formats.push_back(format);
-    }
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
-                   std::int64_t& value) {
-    read_whole(json, path, parameter, value);
-  }
-
-  // Ascending, each once.
-  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
-                   std::vector<std::int64_t>& values) {
-    if (!json.is_array() || json.empty() || json.size() > Volume::kMostLabels) {
-      return add(
-          path, "must be a list of 1 to " + std::to_string(Volume::kMostLabels) + " whole numbers");
-    }
-    for (const Json& element : json) {
-      const std::size_t before = errors_.size();
-      read_member(element, path, parameter, values.emplace_back());
-      if (errors_.size() > before) return values.clear();
-    }
-    std::ranges::sort(values);
-    values.erase(std::unique(values.begin(), values.end()), values.end());
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
-                   std::optional<LabelChoice>& value) {
-    value.emplace();
-    if (json == kAllLabels) return;
-    if (!json.is_array()) {
-      return add(path, "must be \"all\" or a list of labels, which are whole numbers");
-    }
-    read_member(json, path, parameter, value->values);
-  }
-
-  // By the labels' own values.
-  template <class T>
-  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
-                   std::map<std::int64_t, T>& value) {
-    if (!json.is_object() || json.size() > Volume::kMostLabels) {
-      return add(path, "must be an object with at most " + std::to_string(Volume::kMostLabels) +
-                           " members, which are named by labels");
-    }
-    for (const auto& [name, element] : json.items()) {
-      const bool is_plain = name.find_first_not_of("-0123456789") == std::string::npos;
-      const Json label = is_plain ? Json::parse(name, nullptr, false) : Json();
-      std::int64_t key = 0;
-      const std::size_t before = errors_.size();
-      const std::string place = path + '.' + name;
-      read_member(label, place, label_range(), key);
-      if (errors_.size() == before) read_of_label(element, place, parameter, value[key]);
-      if (errors_.size() > before) return;
-    }
-  }
-
-  void read_of_label(const Json& json, const std::string& path, const Parameter& parameter,
-                     std::vector<std::int64_t>& values) {
-    read_member(json, path, parameter, values);
-  }
-
-  void read_of_label(const Json& json, const std::string& path, const Parameter& parameter,
-                     std::string& value) {
-    if (!json.is_string()) return add(path, "must be a string");
-    read_member(json, path, parameter, value);
-    if (std::string_view(parameter.name) == "label_colors") {
-      std::ranges::transform(value, value.begin(), [](unsigned char c) { return std::tolower(c); });
-      if (!is_color(value)) add(path, "must be a colour such as \"#d8654f\"");
-    } else if (trimmed(value).empty() || value.size() > LabelEntry::kMostNameBytes ||
-               has_control_characters(value)) {
-      add(path, "must be a text of 1 to 255 bytes on one line");
-    }
-  }
-
-  // What a label may be, as the table has it.
-  static const Parameter& label_range() {
-    static const Parameter range = [] {
-      MeshParameters parameters;  // not constant, for those members that may be absent
-      Parameter found;
-      visit(parameters, [&](const Parameter& parameter, const auto& /*member*/) {
-        if (std::string_view(parameter.name) == "background") found = parameter;
-      });
-      return found;
-    }();
-    return range;
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
-                   ParameterGroup auto& value) {
-    if (!json.is_object()) return add(path, "must be an object");
-    read_object(json, value, path + ".");
-  }
-
-  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
-                   std::optional<Callback>& value) {
-    if (json.is_null()) return value.reset();
-    if (!json.is_object()) return add(path, "must be an object");
-    read_object(json, value.emplace(), path + ".");
-    if (!json.contains("url")) add(path + ".url", "is required");
-  }
-
-  bool as_in_query_ = false;
-  std::vector<FieldError> errors_;
-};
 
 // Members that an object has twice: readers differ in which one they take.
 class Repetitions {
@@ -336,6 +101,12 @@ Json list_of(const std::string& text) {
   return list;
 }
 
+Json values_of(const std::string& text) {
+  Json values = list_of(text);
+  for (Json& value : values) value = value_of(value.get<std::string>());
+  return values;
+}
+
 // What the table says of the chosen kind of smoothing alone.
 void check_case(const std::string& path, const Parameter& parameter, Smoothing smoothing,
                 const std::optional<double>& value, RequestReader& reader) {
@@ -352,12 +123,22 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
   const auto refuse_if = [&](bool is_wrong, const char* name, const std::string& message) {
     if (is_wrong) reader.add(name, message);
   };
+  const auto has = [&](MeshFormat format) {
+    return std::ranges::find(parameters.formats, format) != parameters.formats.end();
+  };
   if (!parameters.labels) {
-    const bool zips =
-        std::ranges::find(parameters.formats, MeshFormat::kZip) != parameters.formats.end();
-    return refuse_if(zips, "formats", "\"zip\" holds a file of each label, so it needs labels");
+    JobParameters all;  // not constant, for those members that may be absent
+    visit(all, [&](const Parameter& parameter, const auto& /*member*/) {
+      const bool is_wrong = parameter.jobs == JobKind::kByLabels;
+      refuse_if(is_wrong && json.contains(parameter.name), parameter.name,
+                "is only for jobs with labels");
+    });
+    return refuse_if(has(MeshFormat::kZip), "formats",
+                     "\"zip\" holds a file of each label, so it needs labels");
   }
   refuse_if(json.contains("iso"), "iso", "cannot stand beside labels");
+  refuse_if(parameters.fill_cavities, "fill_cavities",
+            "cannot stand beside labels, which have others in their cavities");
   refuse_if(json.contains("interpolation") && parameters.interpolation == Interpolation::kLinear,
             "interpolation", "must be \"midpoint\" for labels, which have no values between them");
   refuse_if(!parameters.components.keeps_all(), "components",
@@ -372,6 +153,29 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
            std::ranges::binary_search(entry.second, parameters.background);
   });
   refuse_if(has_background, "label_values", names_background);
+}
+
+// What one parameter says of another.
+void settle(const Json& json, JobParameters& parameters, RequestReader& reader) {
+  // Clients that send every member say `close` too, by its default.
+  if (parameters.crop) parameters.close = true;
+  // What fewer triangles cost is told unless it is not asked for.
+  if (parameters.triangles && !json.contains("certify")) parameters.certify = true;
+  if (parameters.max_error_mm) {
+    if (json.contains("certify") && !parameters.certify) {
+      reader.add("certify", "must be true beside max_error_mm, which is measured");
+    }
+    parameters.certify = true;
+  }
+  const std::vector<double>& lods = parameters.lods;
+  const bool is_falling = std::ranges::is_sorted(lods, std::ranges::greater_equal{});
+  if (!lods.empty() && (lods.front() != 1 || !is_falling)) {
+    reader.add("lods", "must begin with 1 and go down from each to the next");
+  }
+  if (std::ranges::find(parameters.formats, MeshFormat::kGlb) != parameters.formats.end()) return;
+  constexpr const char* kNeedsGlb = "are for \"glb\", which is not among the formats";
+  if (!lods.empty()) reader.add("lods", kNeedsGlb);
+  if (parameters.distances) reader.add("distances", kNeedsGlb);
 }
 
 // The members that such a job has another default for than others.
@@ -394,14 +198,8 @@ JobParameters read_parameters(const Json& json, bool with_volume, RequestReader&
           check_case(path, parameter, parameters.smoothing, member, reader);
         }
       });
-  JobParameters all;  // not constant, for those members that may be absent
-  visit(all, [&](const Parameter& parameter, const auto& /*member*/) {
-    if (parameter.needs == nullptr || json.contains(parameter.needs)) return;
-    if (json.contains(parameter.name)) {
-      reader.add(parameter.name, std::string("is only for jobs with ") + parameter.needs);
-    }
-  });
   check_labels(json, parameters, reader);
+  settle(json, parameters, reader);
   reader.throw_if_any();
   if (!parameters.lambda) parameters.lambda = default_lambda(parameters);
   return parameters;
@@ -424,11 +222,17 @@ Json value_of(const std::string& text, const QueryName& name) {
       return text;
     case QueryName::Kind::kTexts:
       return list_of(text);
-    case QueryName::Kind::kLabels: {
-      if (text == kAllLabels) return text;
-      Json labels = list_of(text);
-      for (Json& label : labels) label = value_of(label.get<std::string>());
-      return labels;
+    case QueryName::Kind::kLabels:
+      return text == kAllLabels ? Json(text) : values_of(text);
+    case QueryName::Kind::kNumbers:
+      return values_of(text);
+    case QueryName::Kind::kPlaces: {
+      Json places = Json::array();
+      for (const Json& number : values_of(text)) {
+        if (places.empty() || places.back().size() == 3) places.push_back(Json::array());
+        places.back().push_back(number);
+      }
+      return places;
     }
     case QueryName::Kind::kValue:
       break;
@@ -441,7 +245,7 @@ std::string text_of(const Json& value) {
   std::string list;
   for (const Json& item : value) {
     if (!list.empty()) list += ',';
-    list += text_of(item);
+    list += text_of(item);  // of places, all their numbers
   }
   return list;
 }
@@ -498,7 +302,7 @@ JobParameters parse_job_parameters(const QueryParameters& query, VolumeIn volume
       json[place] = value_of(text, known->second);
     }
   }
-  reader.name_as_in_query();
+  reader.spell_by(spelled_in_query);
   return read_parameters(json, volume_in == VolumeIn::kQuery, reader);
 }
 

@@ -45,7 +45,8 @@ struct Names<MeshFormat> {
   static constexpr std::array kTable = {
       std::pair{MeshFormat::kDrc, "drc"}, std::pair{MeshFormat::kGlb, "glb"},
       std::pair{MeshFormat::kStl, "stl"}, std::pair{MeshFormat::kPly, "ply"},
-      std::pair{MeshFormat::kObj, "obj"}, std::pair{MeshFormat::kZip, "zip"}};
+      std::pair{MeshFormat::kObj, "obj"}, std::pair{MeshFormat::k3mf, "3mf"},
+      std::pair{MeshFormat::kZip, "zip"}};
 };
 
 template <>
@@ -66,14 +67,21 @@ struct Names<JobState> {
 template <>
 struct Names<Stage> {
   static constexpr std::array kTable = {
-      std::pair{Stage::kQueue, "queue"},     std::pair{Stage::kLoad, "load"},
-      std::pair{Stage::kExtract, "extract"}, std::pair{Stage::kSmooth, "smooth"},
-      std::pair{Stage::kEncode, "encode"},   std::pair{Stage::kDone, "done"}};
+      std::pair{Stage::kQueue, "queue"},       std::pair{Stage::kLoad, "load"},
+      std::pair{Stage::kExtract, "extract"},   std::pair{Stage::kSmooth, "smooth"},
+      std::pair{Stage::kSimplify, "simplify"}, std::pair{Stage::kEncode, "encode"},
+      std::pair{Stage::kCertify, "certify"},   std::pair{Stage::kDone, "done"}};
 };
 
 template <>
 struct Names<WaitingFor> {
   static constexpr std::array kTable = {std::pair{WaitingFor::kDisk, "disk"}};
+};
+
+template <>
+struct Names<Simplification::Bound> {
+  static constexpr std::array kTable = {std::pair{Simplification::Bound::kError, "error"},
+                                        std::pair{Simplification::Bound::kTriangles, "triangles"}};
 };
 
 template <class Enum>
@@ -134,6 +142,7 @@ bool holds_all_labels(MeshFormat format) {
     case MeshFormat::kGlb:
     case MeshFormat::kPly:
     case MeshFormat::kObj:
+    case MeshFormat::k3mf:
       return true;
     case MeshFormat::kDrc:
     case MeshFormat::kStl:
@@ -154,7 +163,8 @@ std::vector<MeshFormat> files_of(const MeshParameters& parameters) {
 std::vector<MeshFormat> zipped_formats(const MeshParameters& parameters) {
   std::vector<MeshFormat> zipped;
   for (const MeshFormat format : parameters.formats) {
-    if (format != MeshFormat::kGlb && format != MeshFormat::kZip) zipped.push_back(format);
+    const bool is_whole = format == MeshFormat::kGlb || format == MeshFormat::k3mf;
+    if (!is_whole && format != MeshFormat::kZip) zipped.push_back(format);
   }
   const bool is_asked =
       std::ranges::find(parameters.formats, MeshFormat::kZip) != parameters.formats.end();
@@ -177,6 +187,7 @@ std::string_view to_string(Priority value) { return name_of(value); }
 std::string_view to_string(JobState value) { return name_of(value); }
 std::string_view to_string(Stage value) { return name_of(value); }
 std::string_view to_string(WaitingFor value) { return name_of(value); }
+std::string_view to_string(Simplification::Bound value) { return name_of(value); }
 
 template <class Enum>
 std::optional<Enum> from_string(std::string_view name) {
@@ -195,6 +206,7 @@ template std::optional<Priority> from_string(std::string_view);
 template std::optional<JobState> from_string(std::string_view);
 template std::optional<Stage> from_string(std::string_view);
 template std::optional<WaitingFor> from_string(std::string_view);
+template std::optional<Simplification::Bound> from_string(std::string_view);
 
 template <class Enum>
 std::vector<Enum> values_of() {

@@ -77,6 +77,36 @@ struct DicomInstance {
   bool operator==(const DicomInstance&) const = default;
 };
 
+// An entry of a coding scheme (PS3.3, 8.8); empty where nothing was coded.
+struct DicomCode {
+  std::string value;
+  std::string scheme;
+  std::string meaning;
+
+  bool operator==(const DicomCode&) const = default;
+};
+
+// What a segment of a segmentation is, by its codes.
+struct DicomSegment {
+  std::int64_t label = 0;  // the volume's label that it became: its number
+  DicomCode category;      // such as "Anatomical Structure"
+  DicomCode type;          // such as "Liver"
+  DicomCode region;        // where it lies, where that is told besides
+
+  bool operator==(const DicomSegment&) const = default;
+};
+
+// The device that made the images.
+struct DicomEquipment {
+  std::string manufacturer;
+  std::string model_name;
+  std::string station_name;
+  std::string device_serial_number;
+  std::string software_versions;
+
+  bool operator==(const DicomEquipment&) const = default;
+};
+
 // Whose volume it is and what it was made from, as DICOM tells it, in UTF-8; empty where it does
 // not tell. What a mesh needs to be sent back with. Only for the volume's owner, and never in a
 // log.
@@ -97,6 +127,13 @@ struct DicomIdentity {
   std::string modality;
   std::string frame_of_reference_uid;
   std::vector<DicomInstance> instances;  // in the order of the slices
+  std::string issuer_of_patient_id;
+  std::string patient_identity_removed;  // "YES" or "NO" where it is told
+  std::string deidentification_method;
+  std::string acquisition_datetime;
+  std::string position_reference_indicator;
+  DicomEquipment equipment;
+  std::vector<DicomSegment> segments;  // of a segmentation, ascending
 
   bool operator==(const DicomIdentity&) const = default;
 };
@@ -155,15 +192,20 @@ struct DracoParameters {
   bool operator==(const DracoParameters&) const = default;
 };
 
-// Which parts of the surface a job keeps. All when empty; with both, the largest of those that are
-// large enough.
+// Which parts of the surface a job keeps. All when empty; with several members, those nearest to
+// the places that are large enough, and the largest of them.
 struct ComponentFilter {
-  std::optional<std::uint32_t> keep;           // so many of the largest; at least 1
-  std::optional<std::uint32_t> min_triangles;  // those of so many triangles; at least 1
+  std::optional<std::uint32_t> keep;              // so many of the largest; at least 1
+  std::optional<std::uint32_t> min_triangles;     // those of so many triangles; at least 1
+  std::vector<std::array<double, 3>> nearest_to;  // those at these places, in mm, LPS
+  static constexpr std::size_t kMostPlaces = 1000;
 
-  bool keeps_all() const { return !keep && !min_triangles; }
+  bool keeps_all() const { return !keep && !min_triangles && nearest_to.empty(); }
   bool operator==(const ComponentFilter&) const = default;
 };
+
+// A box along the axes of LPS: its smallest and its largest corner, in millimetres.
+using Box = std::array<std::array<double, 3>, 2>;
 
 // Whom to tell that a job has ended.
 struct Callback {
@@ -187,7 +229,16 @@ struct MeshParameters {
   ComponentFilter components;
   std::vector<MeshFormat> formats = {MeshFormat::kDrc};
   DracoParameters draco;
-  bool normals = false;  // in glb
+  bool normals = false;    // in glb
+  bool distances = false;  // in glb: each vertex's to the surface as it was extracted
+  // How far the files may be from the surface as it was extracted; empty: as far as the other
+  // parameters let them.
+  std::optional<double> max_error_mm = {};
+  std::optional<std::uint32_t> triangles = {};  // at most so many; empty: all
+  std::vector<double> lods = {};  // in glb: levels of detail, as shares of the triangles
+  static constexpr std::size_t kMostLods = 8;
+  std::optional<Box> crop = {};  // empty: the whole volume
+  bool fill_cavities = false;
   // Of a job by labels, which has no iso-value and no interpolation: its vertices lie half-way.
   // label_parameters() has its defaults.
   std::optional<LabelChoice> labels = {};
@@ -204,6 +255,7 @@ struct JobParameters : MeshParameters {
   std::string volume;
   Priority priority = Priority::kRoutine;
   std::optional<Callback> callback = {};
+  bool certify = false;  // measures how far the files are from the surface as it was extracted
 
   bool operator==(const JobParameters&) const = default;
 };
@@ -227,7 +279,7 @@ double default_lambda(Smoothing smoothing);
 double default_lambda(const MeshParameters& parameters);  // which labels have a say in
 
 enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };
-enum class Stage { kQueue, kLoad, kExtract, kSmooth, kEncode, kDone };
+enum class Stage { kQueue, kLoad, kExtract, kSmooth, kSimplify, kEncode, kCertify, kDone };
 
 // What a queued job waits for besides a worker.
 enum class WaitingFor { kDisk };  // room for its files
@@ -245,7 +297,9 @@ struct Timing {
   double load = 0;
   double extract = 0;
   double smooth = 0;
+  double simplify = 0;
   double encode = 0;
+  double certify = 0;
   double total = 0;  // from acceptance to the end
 
   bool operator==(const Timing&) const = default;
@@ -298,8 +352,10 @@ struct Estimate {
   std::string volume;
   std::optional<double> iso = {};  // Otsu's threshold where that was asked for; none by labels
   Scheme scheme = Scheme::kSix;
-  std::uint64_t triangles = 0;  // exact, as `vertices`
+  std::uint64_t triangles = 0;  // exact, as `vertices`, of the surface as it is extracted
   std::uint64_t vertices = 0;
+  // About how many are left where the job asks for fewer, by an error or a number.
+  std::optional<std::uint64_t> simplified_triangles = {};
   std::map<MeshFormat, std::uint64_t> bytes;  // of each file
   std::uint64_t memory_bytes = 0;             // at the job's peak, beside its mapped volume
   bool fits = false;                          // whether one job may take that much
@@ -329,6 +385,7 @@ std::string_view to_string(Priority value);
 std::string_view to_string(JobState value);
 std::string_view to_string(Stage value);
 std::string_view to_string(WaitingFor value);
+std::string_view to_string(Simplification::Bound value);
 
 // The inverse: empty for a name that is none of them.
 template <class Enum>
@@ -343,6 +400,7 @@ extern template std::optional<Priority> from_string(std::string_view);
 extern template std::optional<JobState> from_string(std::string_view);
 extern template std::optional<Stage> from_string(std::string_view);
 extern template std::optional<WaitingFor> from_string(std::string_view);
+extern template std::optional<Simplification::Bound> from_string(std::string_view);
 
 // All values that have a name, in the order of the contract.
 template <class Enum>

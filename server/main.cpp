@@ -20,6 +20,8 @@
 #include "server/callbacks/callbacks.h"
 #include "server/callbacks/signature.h"
 #include "server/callbacks/targets.h"
+#include "server/commands.h"
+#include "server/dicomweb/dicomweb.h"
 #include "server/http/guards/auth.h"
 #include "server/http/observe/metrics.h"
 #include "server/http/observe/outcomes.h"
@@ -36,15 +38,18 @@
 #include "server/net/descriptors.h"
 #include "server/net/tls.h"
 #include "server/options.h"
+#include "server/orders/hospital.h"
+#include "server/orders/orders.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/retention.h"
+#include "server/store/sqlite/audit_trail.h"
 #include "server/store/sqlite/database.h"
 #include "server/store/sqlite/identity.h"
 #include "server/store/sqlite/job_store.h"
+#include "server/store/sqlite/order_store.h"
 #include "server/store/sqlite/outbox.h"
 #include "server/store/sqlite/volume_store.h"
-#include "server/token_command.h"
 
 namespace {
 
@@ -55,10 +60,15 @@ std::uint64_t default_job_memory(std::size_t workers) {
   return jobs::usable_memory() / 4 * 3 / workers;
 }
 
-std::filesystem::path beside_this_program(const std::string& name) {
-  auto program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
-  if (::access(program.c_str(), X_OK) == 0) return program;
-  throw Error(ErrorCode::kInternal, "the program " + name + " is missing beside isomeshd");
+// Where a build puts it, or where an installation does.
+std::filesystem::path program_of_ours(const std::string& name) {
+  const auto folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+  for (const auto& program :
+       {folder / name, (folder / ISOMESH_LIBEXEC / name).lexically_normal()}) {
+    if (::access(program.c_str(), X_OK) == 0) return program;
+  }
+  throw Error(ErrorCode::kInternal, "the program " + name + " is missing beside isomeshd and in " +
+                                        ISOMESH_LIBEXEC + " from there");
 }
 
 // A quarter of the time that things are kept, within bounds: what expired goes soon, and the disk
@@ -73,19 +83,6 @@ std::chrono::milliseconds housekeeping_interval(std::chrono::milliseconds keep) 
 std::chrono::milliseconds clock_tolerance(std::chrono::milliseconds keep) {
   return std::clamp<std::chrono::milliseconds>(keep / 4, std::chrono::hours(1),
                                                std::chrono::days(7));
-}
-
-CLI::App& add_token_command(CLI::App& cli, TokenRequest& request) {
-  CLI::App& command = *cli.add_subcommand("token", "Make a token and print it, once");
-  command.add_option("NAME", request.name, "Whose it is, as jobs and the log name it")->required();
-  command
-      .add_option("--role", request.role,
-                  "user: its own volumes and jobs; admin: everybody's, and /metrics; monitor: "
-                  "/metrics alone")
-      ->capture_default_str();
-  command.add_option("--into", request.file,
-                     "Append the token's hash to this file, instead of printing its line");
-  return command;
 }
 
 sigset_t block_signals() {
@@ -167,8 +164,37 @@ int tell_configuration(const Options& options, const CLI::App& cli) {
   check_reach(options, address, open_files(options, address));
   const callbacks::CallbackTargets targets(options.callback_targets);
   callback_secrets(options);
-  std::cout << as_config(cli);
+  if (!options.hospital.empty()) orders::read_hospital(options.hospital);
+  std::cout << as_config(cli, Remarks::kNo);
   return 0;
+}
+
+// Who is spoken to, and where their answers are read.
+struct OpenHospital {
+  OpenHospital(orders::Hospital the_settings, const jobs::RunnerOptions& runner)
+      : settings(std::move(the_settings)), answers(runner) {}
+
+  orders::PacsByName peers(const std::filesystem::path& scratch, const Options& options) {
+    orders::PacsByName all;
+    for (const orders::PacsSettings& pacs : settings.pacs) {
+      all[pacs.name] = std::make_unique<dicomweb::DicomWeb>(
+          pacs, scratch, options.http.upload.max_bytes,
+          [this](const std::filesystem::path& file) { return answers.read_answer(file); });
+    }
+    return all;
+  }
+
+  const orders::Hospital settings;
+  jobs::ImportRunner answers;
+};
+
+std::unique_ptr<OpenHospital> open_hospital(const Options& options,
+                                            const std::filesystem::path& import_program) {
+  if (options.hospital.empty()) return nullptr;
+  jobs::RunnerOptions runner;
+  runner.program = import_program;
+  runner.bounds = {.memory_bytes = std::uint64_t{1} << 30, .time = std::chrono::minutes(1)};
+  return std::make_unique<OpenHospital>(orders::read_hospital(options.hospital), runner);
 }
 
 int run(const Options& options, const sigset_t& signals) {
@@ -200,13 +226,13 @@ int run(const Options& options, const sigset_t& signals) {
                    [&retention](std::uint64_t bytes) { retention.make_room(bytes); });
   jobs::RunnerOptions runner = options.runner;
   runner.bounds.time = std::chrono::seconds(options.import_seconds);
-  runner.program = beside_this_program("isomesh-import");
+  runner.program = program_of_ours("isomesh-import");
   jobs::VolumeLibrary library(folder, blobs, volumes, retention, options.import, runner);
   http::Metrics metrics;
   store::SqliteOutbox outbox(database);
   callbacks::Callbacks callbacks(outbox, targets, callback_options(options),
                                  http::callback_reporter(metrics));
-  const jobs::JobProgram job_program = {.file = beside_this_program("isomesh-job"),
+  const jobs::JobProgram job_program = {.file = program_of_ours("isomesh-job"),
                                         .setup = {.threads = mesh::thread_count()}};
   const jobs::PipelineLimits limits = {
       options.job_memory > 0 ? options.job_memory : default_job_memory(options.workers)};
@@ -217,9 +243,26 @@ int run(const Options& options, const sigset_t& signals) {
   http::ServerOptions server_options = options.http;
   server_options.tls = files.tls.get();
   server_options.connections = net::connections_within(net::raise_descriptor_limit());
+  const auto hospital = open_hospital(options, runner.program);
+  store::SqliteOrderStore order_store(database);
+  store::SqliteAuditTrail audit(database);
+  const orders::PacsByName peers =
+      hospital ? hospital->peers(folder.scratch(), options) : orders::PacsByName();
+  std::unique_ptr<orders::Orders> orders;
+  if (hospital) {
+    orders = std::make_unique<orders::Orders>(
+        orders::OrderServices{folder, blobs, volumes, jobs, library, labels, order_store, audit,
+                              peers},
+        hospital->settings,
+        orders::OrderOptions{.keep = std::chrono::duration_cast<std::chrono::hours>(keep),
+                             .cut_off = [&] {
+                               hospital->answers.stop();
+                               library.stop_imports();
+                             }});
+  }
   const http::Services services = {
-      folder,    blobs,     volumes, jobs,   library,   histograms, labels,
-      estimator, retention, metrics, outbox, callbacks, targets,    files.tokens.get()};
+      folder,    blobs,   volumes, jobs,      library, histograms,         labels,      estimator,
+      retention, metrics, outbox,  callbacks, targets, files.tokens.get(), orders.get()};
   http::Server server(services, server_options);
   // Declared after the server, so that the workers end before it and the end of their last job is
   // still logged and counted.
@@ -242,6 +285,7 @@ int run(const Options& options, const sigset_t& signals) {
   if (!workers.drain(std::chrono::seconds(options.drain_seconds))) {
     spdlog::warn("jobs still run after {} s; they are stopped", options.drain_seconds);
   }
+  if (orders) orders->stop();
   server.stop();
   return 0;
 }
@@ -255,10 +299,9 @@ int main(int argc, char** argv) {
     jobs::keep_freed_memory();
     start_log(LogFormat::kText, LogLevel::kInfo);
     Options options;
-    TokenRequest token;
-    CLI::App cli("isomeshd turns medical volumes into surface meshes over HTTP");
+    CLI::App cli("isomeshd turns medical volumes into surface meshes over HTTP", "isomeshd");
     add_options(cli, options);
-    CLI::App& token_command = add_token_command(cli, token);
+    Commands commands(cli, options);
     try {
       cli.parse(argc, argv);
     } catch (const CLI::ConfigError& error) {
@@ -267,8 +310,8 @@ int main(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
       return cli.exit(error) == 0 ? 0 : kWrongUsage;  // 0 for --help and --version
     }
-    if (token_command.parsed()) {
-      make_token(token);
+    if (commands.asked()) {
+      commands.run();
       return 0;
     }
     start_log(options.log_format, options.log_level);

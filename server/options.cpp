@@ -65,7 +65,7 @@ void add_log_options(CLI::App& cli, Options& options) {
 
 void add_security_options(CLI::App& cli, Options& options) {
   cli.add_option("--tokens", options.tokens,
-                 "File of tokens that requests must have; `isomeshd token` makes them. SIGHUP "
+                 "File of tokens that requests must have; `isomeshd token add` makes them. SIGHUP "
                  "reads it again")
       ->envname("ISOMESH_TOKENS");
   auto* certificate =
@@ -226,6 +226,10 @@ void add_options(CLI::App& cli, Options& options) {
   cli.add_flag("--open-network", options.open_network,
                "Listen beyond loopback although requests are not authenticated")
       ->envname("ISOMESH_OPEN_NETWORK");
+  cli.add_option("--hospital", options.hospital,
+                 "File of PACS and rules (TOML), from which orders take images and to which they "
+                 "send meshes")
+      ->envname("ISOMESH_HOSPITAL");
   add_log_options(cli, options);
   add_security_options(cli, options);
   add_callback_options(cli, options);
@@ -233,14 +237,23 @@ void add_options(CLI::App& cli, Options& options) {
   add_check(cli, options);
 }
 
-std::string as_config(const CLI::App& cli) {
+std::string as_config(const CLI::App& cli, Remarks remarks) {
   std::string text;
+  if (remarks == Remarks::kYes) {
+    text =
+        "# Options of isomeshd, with their defaults; see isomeshd(8). Options of the command line "
+        "and of the\n"
+        "# environment go before these. `isomeshd check --config FILE` tells what would be "
+        "used.\n\n";
+  }
   for (const CLI::Option* option : cli.get_options()) {
     const bool is_set = option->count() > 0;
     if (!option->get_configurable() || option->get_lnames().empty()) continue;
     const std::string value = value_of(*option);
+    if (remarks == Remarks::kYes) text += "# " + option->get_description() + ".\n";
     text += (is_set ? "" : "# ") + option->get_lnames().front();
     text += (value.empty() ? "" : " = " + quoted(value)) + '\n';
+    if (remarks == Remarks::kYes) text += '\n';
   }
   return text;
 }

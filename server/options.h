@@ -34,6 +34,7 @@ struct Options {
   std::filesystem::path tokens;  // empty: requests are not authenticated
   std::filesystem::path tls_certificate;
   std::filesystem::path tls_key;
+  std::filesystem::path hospital;  // empty: no PACS is known
   std::vector<std::string> callback_targets;
   std::filesystem::path callback_secrets;
   std::filesystem::path callback_authorities;
@@ -56,9 +57,11 @@ struct Options {
 // which may hold nothing else. `options` is filled in when `cli` parses.
 void add_options(CLI::App& cli, Options& options);
 
+enum class Remarks { kNo, kYes };
+
 // What `cli` has parsed as the lines of a file of --config that says all of it; those that nobody
-// has set are comments.
-std::string as_config(const CLI::App& cli);
+// has set are comments. With remarks on what each option means.
+std::string as_config(const CLI::App& cli, Remarks remarks);
 
 // What a person is told of a mistake in the file of --config.
 std::string describe_config_error(const std::string& library_text);

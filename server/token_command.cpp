@@ -1,41 +1,161 @@
 #include "server/token_command.h"
 
-#include <cerrno>
-#include <fstream>
 #include <iostream>
+#include <sstream>
+#include <string_view>
+#include <vector>
 
 #include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/descriptor.h"
+#include "base/files.h"
 #include "server/http/guards/auth.h"
 
 namespace isomesh {
 namespace {
 
-// In one write at the file's end, so that lines of two such commands do not mix.
-void append(const std::filesystem::path& file, const std::string& line) {
+namespace fs = std::filesystem;
+
+constexpr std::size_t kShownDigits = 12;  // of a hash: enough to tell tokens apart
+
+[[noreturn]] void cannot_write() {
+  throw Error(ErrorCode::kInternal, "cannot write to the file of tokens");
+}
+
+void check_is_given(const fs::path& file) {
+  if (file.empty()) throw invalid_parameter("tokens", "say which file: --tokens FILE");
+}
+
+// Held while the file is read and written, so that two commands do not lose each other's lines. Of
+// the folder, because the file is replaced.
+Descriptor lock_folder_of(const fs::path& file) {
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  Descriptor lock(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (lock.number() < 0) {
+    throw invalid_parameter("tokens", "the folder of " + file.string() + " is not there");
+  }
+  if (::flock(lock.number(), LOCK_EX) != 0) cannot_write();
+  return lock;
+}
+
+std::vector<std::string> lines_of(const fs::path& file) {
+  std::vector<std::string> lines;
+  std::istringstream text(read_whole(file));
+  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  return lines;
+}
+
+// In place of the file that is there: with its owner and mode, and never half.
+void replace(const fs::path& file, const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += line + '\n';
+  struct stat before = {};
+  const bool is_there = ::stat(file.c_str(), &before) == 0;
   constexpr mode_t kOwnerOnly = 0600;
-  const int descriptor =
-      ::open(file.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, kOwnerOnly);
-  const bool written =
-      descriptor >= 0 &&
-      ::write(descriptor, line.data(), line.size()) == static_cast<ssize_t>(line.size()) &&
-      ::fsync(descriptor) == 0;
-  if (descriptor >= 0) ::close(descriptor);
-  if (!written) throw Error(ErrorCode::kInternal, "cannot write to the file of tokens");
+  const fs::path part = file.string() + ".part";
+  {
+    const Descriptor written(
+        ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kOwnerOnly));
+    const int number = written.number();
+    const bool is_whole = number >= 0 && ::write(number, text.data(), text.size()) ==
+                                             static_cast<ssize_t>(text.size());
+    const bool looks_the_same =
+        is_whole && (!is_there || (::fchown(number, before.st_uid, before.st_gid) == 0 &&
+                                   ::fchmod(number, before.st_mode & ALLPERMS) == 0));
+    if (!looks_the_same || ::fsync(number) != 0) {
+      ::unlink(part.c_str());
+      cannot_write();
+    }
+  }
+  if (::rename(part.c_str(), file.c_str()) != 0) cannot_write();
+}
+
+struct TokenLine {
+  std::string name;
+  std::string role;
+  std::string hash;
+};
+
+// The names are empty where the line is a comment or blank.
+TokenLine parsed(const std::string& line) {
+  TokenLine token;
+  std::istringstream words(line);
+  words >> token.name >> token.role >> token.hash;
+  return token.name.starts_with('#') ? TokenLine{} : token;
 }
 
 }  // namespace
 
-void make_token(const TokenRequest& request) {
+void add_token(const TokenRequest& request) {
   const auto role = http::role_from(request.role);
   if (!role) throw invalid_parameter("role", "must be user, admin or monitor");
   const std::string token = http::make_token();
   const std::string line = http::token_line(request.name, *role, token);
-  if (!request.file.empty()) append(request.file, line + '\n');
+  if (!request.file.empty()) {
+    const Descriptor lock = lock_folder_of(request.file);
+    std::vector<std::string> lines;
+    if (fs::exists(request.file)) {
+      const http::Tokens readable(request.file);  // the next start would refuse it otherwise
+      lines = lines_of(request.file);
+    }
+    for (const std::string& each : lines) {
+      const TokenLine other = parsed(each);
+      if (other.name == request.name && other.role != request.role) {
+        throw invalid_parameter(
+            "role", request.name + " is " + other.role + " already; a name has one role");
+      }
+    }
+    lines.push_back(line);
+    replace(request.file, lines);
+  }
   std::cout << token << '\n';
   if (request.file.empty()) std::cout << line << '\n';
   std::cout.flush();
+}
+
+void list_tokens(const TokenRequest& request) {
+  check_is_given(request.file);
+  const http::Tokens readable(request.file);
+  for (const std::string& line : lines_of(request.file)) {
+    const TokenLine token = parsed(line);
+    if (token.name.empty()) continue;
+    std::cout << token.name << ' ' << token.role << ' ' << token.hash.substr(0, kShownDigits)
+              << '\n';
+  }
+  std::cout.flush();
+}
+
+void revoke_tokens(const TokenRequest& request) {
+  check_is_given(request.file);
+  const Descriptor lock = lock_folder_of(request.file);
+  const http::Tokens readable(request.file);
+  std::vector<std::string> kept;
+  std::size_t revoked = 0;
+  std::size_t left = 0;
+  for (const std::string& line : lines_of(request.file)) {
+    const TokenLine token = parsed(line);
+    if (token.name == request.name && token.hash.starts_with(request.hash)) {
+      ++revoked;
+      continue;
+    }
+    if (!token.name.empty()) ++left;
+    kept.push_back(line);
+  }
+  if (revoked == 0) {
+    throw invalid_parameter("name",
+                            request.name + " has no such token; `isomeshd token list` has all");
+  }
+  if (left == 0) {
+    throw invalid_parameter("name",
+                            "no token would be left, and a daemon does not take such a file: "
+                            "add another one first, or stop the daemon");
+  }
+  replace(request.file, kept);
+  std::cout << "revoked " << revoked << (revoked == 1 ? " token" : " tokens")
+            << "; a running daemon knows after SIGHUP" << std::endl;
 }
 
 }  // namespace isomesh

@@ -81,12 +81,26 @@ CLI::Option* add_number(CLI::App& app, const std::string& name, const std::strin
   });
 }
 
+// "linear|midpoint", by which completions know them too.
+template <class Enum>
+std::string type_of_names() {
+  std::string names = names_of<Enum>();  // "linear" or "midpoint"
+  std::string type;
+  for (std::size_t begin = names.find('"'); begin != std::string::npos;) {
+    const std::size_t end = names.find('"', begin + 1);
+    type += (type.empty() ? "" : "|") + names.substr(begin + 1, end - begin - 1);
+    begin = names.find('"', end + 1);
+  }
+  return type;
+}
+
 template <class Enum>
 CLI::Option* add_name(CLI::App& app, const std::string& name, const std::string& help,
                       std::function<void(Enum)> take) {
-  return add(app, name, "NAME", help, [name, take = std::move(take)](const std::string& text) {
-    take(name_from<Enum>(name, text));
-  });
+  return add(app, name, type_of_names<Enum>(), help,
+             [name, take = std::move(take)](const std::string& text) {
+               take(name_from<Enum>(name, text));
+             });
 }
 
 }  // namespace isomesh::cli

@@ -1,14 +1,20 @@
 #include "client/cli/options.h"
 
+#include <algorithm>
 #include <sstream>
 #include <string_view>
 #include <utility>
 
 #include <CLI/CLI.hpp>
 
+#include "base/command_line/completion.h"
+#include "base/command_line/manual.h"
 #include "base/text.h"
 #include "client/cli/option_values.h"
+#include "client/cli/orders.h"
+#include "client/cli/output_options.h"
 #include "client/cli/parameter_options.h"
+#include "proto/json.h"
 #include "proto/parameters.h"
 
 namespace isomesh::cli {
@@ -17,16 +23,27 @@ namespace {
 constexpr const char* kDescription = "Turns volumes into surface meshes on an isomesh server.";
 
 constexpr const char* kExamples = R"(
-Examples:
   isomesh mesh head.nii.gz --iso 60 -o head.drc
-  isomesh mesh ct.nrrd --iso otsu --passes 10 -o bone.glb -o bone.stl
+  isomesh mesh ct-series/ --iso bone --passes 10 -o bone.glb -o bone.stl
+  isomesh mesh scans/*.nii.gz --iso otsu -o meshes/ --format glb --jobs 4
+  zcat head.nii.gz | isomesh local - --iso 60 -o - --format stl >head.stl
   isomesh mesh ct.raw --dims 512,512,300 --type int16 --spacing 0.7,0.7,1 --iso 300 -o ct.stl
   isomesh mesh organs.seg.nrrd --labels all -o body.glb -o organs.zip
   isomesh submit $(isomesh upload head.nii.gz) --iso 60 --format drc,stl
   isomesh --server https://meshes.example.org --json list
+)";
 
-Exit status: 0 done, 1 the job failed or was refused, 2 wrong usage, 3 the server could not be
-reached.)";
+constexpr const char* kExitStatus =
+    "0 done, 1 the job failed or was refused, 2 wrong usage, 3 the server could not be reached.";
+
+command_line::Manual manual() {
+  return {
+      .number = 1,
+      .version = ISOMESH_VERSION,
+      .name = "turn medical volumes into surface meshes on an isomesh server",
+      .sections = {
+          {"Examples", kExamples + 1}, {"Exit status", kExitStatus}, {"See also", "isomeshd(8)"}}};
+}
 
 void add_file(CLI::App& app, Options& options) {
   app.add_option_function<std::vector<std::string>>(
@@ -34,12 +51,18 @@ void add_file(CLI::App& app, Options& options) {
          [&](const std::vector<std::string>& paths) {
            for (const std::string& path : paths) {
              std::error_code error;
-             if (!std::filesystem::exists(path, error)) refuse("FILE", path + " is not there");
+             if (path != "-" && !std::filesystem::exists(path, error)) {
+               refuse("FILE", path + " is not there");
+             }
+             if (path == "-" && std::ranges::count(paths, "-") > 1) {
+               refuse("FILE", "standard input, -, can be read once");
+             }
              options.files.emplace_back(path);
            }
          },
          "NIfTI, NRRD, MetaImage, VTI, DICOM, a folder or archive of one, or raw samples with "
-         "--dims and --type; several files that belong together, such as .hdr and .img")
+         "--dims and --type; several files that belong together, such as .hdr and .img; - for "
+         "standard input")
       ->type_name("FILE")
       ->required();
   add(app, "--series", "UID", "The DICOM series to take, where there are several",
@@ -103,42 +126,13 @@ void add_raw(CLI::App& app, Options& options) {
   type->group("Raw samples");
 }
 
-// ".drc, .glb or .stl": what a file's name may end in.
-std::string suffixes() {
-  std::vector<std::string> all;
-  for (const std::string& name : names_from<MeshFormat>()) all.push_back('.' + name);
-  return listed(all);
-}
-
-MeshFormat format_of(const std::filesystem::path& path) {
-  const std::string suffix = path.extension().string();
-  const auto format = from_string<MeshFormat>(suffix.empty() ? suffix : suffix.substr(1));
-  if (!format) refuse("-o", path.string() + " must end in " + suffixes());
-  return *format;
-}
-
-void add_outputs(CLI::App& app, Options& options) {
-  app.add_option_function<std::vector<std::string>>(
-         "-o,--output",
-         [&](const std::vector<std::string>& paths) {
-           for (const std::filesystem::path path : paths) {
-             const auto folder = path.has_parent_path() ? path.parent_path() : ".";
-             std::error_code error;
-             if (!std::filesystem::is_directory(folder, error)) {
-               refuse("-o", "the folder of " + path.string() + " is not there");
-             }
-             options.outputs.push_back({path, format_of(path)});
-           }
-         },
-         "Where the mesh goes; the suffix (" + suffixes() + ") says the format. May be repeated")
-      ->type_name("OUT")
-      ->expected(1)
-      ->take_all()
-      ->required();
-}
-
 void add_id(CLI::App& app, Options& options, const std::string& name) {
   app.add_option(name, options.id, "Its id")->required();
+}
+
+void add_allow_empty(CLI::App& app, Options& options) {
+  app.add_flag("--allow-empty", options.allow_empty,
+               "Exit with 0 also where the surface is empty, which else is 1");
 }
 
 class Parser {
@@ -147,7 +141,7 @@ class Parser {
     app_.set_version_flag("--version", "isomesh " ISOMESH_VERSION);
     app_.require_subcommand(1);
     app_.fallthrough();
-    app_.footer(kExamples);
+    app_.footer(std::string("\nExamples:") + kExamples + "\nExit status: " + kExitStatus);
     app_.add_option("--server", options_.server, "http://HOST:PORT, https://HOST:PORT or unix:PATH")
         ->envname("ISOMESH_SERVER")
         ->type_name("URL")
@@ -161,12 +155,10 @@ class Parser {
         ->type_name("FILE")
         ->check(CLI::ExistingFile);
     app_.add_flag("--json", options_.json, "JSON on standard output");
+    app_.add_flag("-q,--quiet", options_.quiet, "Say nothing but what went wrong");
 
-    CLI::App& mesh = command(Command::kMesh, "mesh", "Upload a volume, mesh it, download the mesh");
-    add_file(mesh, options_);
-    add_outputs(mesh, options_);
-    add_parameters(mesh, options_.parameters, Formats::kByFiles);
-    add_raw(mesh, options_);
+    add_mesh(command(Command::kMesh, "mesh", "Upload volumes, mesh them, download the meshes"));
+    add_local();
 
     CLI::App& upload = command(Command::kUpload, "upload", "Upload a volume and print its id");
     add_file(upload, options_);
@@ -174,7 +166,7 @@ class Parser {
 
     CLI::App& submit = command(Command::kSubmit, "submit", "Start a job and print its id");
     add_id(submit, options_, "VOLUME");
-    add_parameters(submit, options_.parameters, Formats::kAsOption);
+    add_parameters(submit, options_.parameters, options_.preset, Formats::kAsOption);
     submit
         .add_option("--key", options_.key,
                     "Idempotency key: the same one gives the same job again (default: a new one)")
@@ -183,14 +175,17 @@ class Parser {
     CLI::App& estimate =
         command(Command::kEstimate, "estimate", "Say what a job would make and take");
     add_id(estimate, options_, "VOLUME");
-    add_parameters(estimate, options_.parameters, Formats::kAsOption);
+    add_parameters(estimate, options_.parameters, options_.preset, Formats::kAsOption,
+                   Carrier::kQuery);
 
     add_id(command(Command::kStatus, "status", "Show a job"), options_, "JOB");
-    add_id(command(Command::kWait, "wait", "Wait for a job and show it"), options_, "JOB");
+    CLI::App& wait = command(Command::kWait, "wait", "Wait for a job and show it");
+    add_id(wait, options_, "JOB");
+    add_allow_empty(wait, options_);
 
     CLI::App& fetch = command(Command::kFetch, "fetch", "Download the mesh of a finished job");
     add_id(fetch, options_, "JOB");
-    add_outputs(fetch, options_);
+    add_outputs(fetch, outputs_);
     add_number<std::int64_t>(fetch, "--label", "Of a job by labels: this label's own surface",
                              [&](std::int64_t label) { options_.label = label; });
 
@@ -199,6 +194,10 @@ class Parser {
     CLI::App& rename = command(Command::kRename, "rename", "Give a volume another name");
     add_id(rename, options_, "VOLUME");
     rename.add_option("NAME", options_.name, "What it is called; empty for no name")->required();
+
+    command(Command::kErase, "erase", "Erase volumes and their samples")
+        .add_option("VOLUME", options_.ids, "Their ids")
+        ->required();
 
     CLI::App& list = command(Command::kList, "list", "List jobs, or volumes");
     add_name<JobState>(list, "--state", "Only jobs in this state",
@@ -215,6 +214,17 @@ class Parser {
     add_number<std::int64_t>(labels, "--background",
                              "The value that belongs to no label (default: 0)",
                              [&](std::int64_t value) { options_.background = value; });
+    add_order_commands();
+    add_descriptions();
+  }
+
+  // What is about a PACS.
+  void add_order_commands() {
+    add_order_options(command(Command::kOrder, "order",
+                              "Order a mesh of a series in a PACS, back into a PACS, and wait"),
+                      options_);
+    add_orders_options(command(Command::kOrders, "orders", "List orders, or act on one"), options_);
+    command(Command::kPacs, "pacs", "List the PACS that the server knows, and how they are");
   }
 
   Options parse(int argc, const char* const* argv) {
@@ -226,11 +236,17 @@ class Parser {
       const int status = app_.exit(error, out, err);
       throw EarlyExit(status == 0 ? 0 : kWrongUsage, status == 0 ? out.str() : err.str());
     }
-    if (options_.command == Command::kMesh) check_outputs();
-    if (options_.command == Command::kEstimate && !options_.parameters.label_values.empty()) {
-      throw EarlyExit(kWrongUsage,
-                      "--label-values: estimates go by the labels of the volume's file\n");
+    describe_itself();
+    options_.outputs = outputs_from(outputs_);
+    // Of a dry run, which may name no files.
+    if (options_.outputs.empty() && !outputs_.formats.empty()) {
+      options_.parameters.formats = outputs_.formats;
     }
+    if (options_.command == Command::kMesh) check_mesh();
+    if (options_.command == Command::kFetch && options_.outputs.empty()) {
+      throw EarlyExit(kWrongUsage, "-o is required\n");
+    }
+    check_parameters();
     return std::move(options_);
   }
 
@@ -239,6 +255,86 @@ class Parser {
     CLI::App* app = app_.add_subcommand(name, help);
     app->callback([this, value] { options_.command = value; });
     return *app;
+  }
+
+  void add_descriptions() {
+    completion_ = app_.add_subcommand("completion", "Print what a shell completes arguments with");
+    completion_->add_option("SHELL", shell_, "bash, zsh or fish")->required();
+    manual_ = app_.add_subcommand("manual", "Print the manual page");
+    manual_->group("");
+  }
+
+  // Ends the program where that was asked for.
+  void describe_itself() const {
+    if (manual_->parsed()) throw EarlyExit(0, command_line::manual_page(app_, manual()));
+    if (!completion_->parsed()) return;
+    const auto shell = command_line::shell_from(shell_);
+    if (!shell) throw EarlyExit(kWrongUsage, "SHELL must be bash, zsh or fish\n");
+    throw EarlyExit(0, command_line::completion(app_, *shell));
+  }
+
+  void add_mesh(CLI::App& app) {
+    add_file(app, options_);
+    add_outputs(app, outputs_);
+    add_number<int>(app, "--jobs",
+                    "How many FILEs at a time, of those that are meshed each (default: 1)",
+                    [&](int jobs) {
+                      if (jobs < 1 || jobs > kMostJobs) refuse("--jobs", "must be from 1 to 64");
+                      options_.jobs = jobs;
+                    });
+    app.add_flag(
+        "--dry-run", options_.dry_run,
+        "Upload, print what the job would make and take, and erase what was not there before");
+    add_allow_empty(app, options_);
+    add_parameters(app, options_.parameters, options_.preset, Formats::kByFiles);
+    add_raw(app, options_);
+  }
+
+  void add_local() {
+    CLI::App& local =
+        command(Command::kMesh, "local",
+                "Mesh without a server: on an isomeshd of its own, which ends with it");
+    local.callback([this] {
+      options_.command = Command::kMesh;
+      options_.is_local = true;
+    });
+    add_mesh(local);
+    local
+        .add_option("--daemon", options_.daemon,
+                    "The program isomeshd, where it is not beside this one or in PATH")
+        ->envname("ISOMESHD")
+        ->type_name("FILE");
+  }
+
+  void check_mesh() const {
+    if (options_.outputs.empty() && !options_.dry_run)
+      throw EarlyExit(kWrongUsage, "-o is required\n");
+    const bool is_piped = std::ranges::any_of(options_.outputs, &Output::is_stdout);
+    if (is_piped && (options_.json || options_.outputs.size() > 1)) {
+      throw EarlyExit(kWrongUsage, "-o: standard output takes one mesh and nothing else\n");
+    }
+    if (options_.dry_run && !options_.parameters.label_values.empty()) {
+      throw EarlyExit(
+          kWrongUsage,
+          "--dry-run: estimates go by the labels of the volume's file, not by --label-values\n");
+    }
+    check_outputs();
+  }
+
+  // What the server would refuse is refused before anything is sent to it.
+  void check_parameters() const {
+    const bool is_job = options_.command == Command::kMesh ||
+                        options_.command == Command::kSubmit ||
+                        options_.command == Command::kEstimate;
+    if (!is_job) return;
+    JobParameters parameters = options_.parameters;
+    parameters.volume = "any";
+    if (!options_.preset.empty()) parameters.iso = 0;
+    try {
+      parse_job_parameters(to_json(parameters));
+    } catch (const Error& error) {
+      throw EarlyExit(kWrongUsage, std::string("isomesh: ") + error.what() + '\n');
+    }
   }
 
   // Some files hold one label only, and others only labels.
@@ -258,8 +354,14 @@ class Parser {
     }
   }
 
+  static constexpr int kMostJobs = 64;
+
   Options options_;
+  GivenOutputs outputs_;
   CLI::App app_;
+  CLI::App* completion_ = nullptr;
+  CLI::App* manual_ = nullptr;
+  std::string shell_;
 };
 
 }  // namespace

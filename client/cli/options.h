@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/isomesh/client.h"
+#include "proto/orders.h"
 #include "proto/types.h"
 
 namespace isomesh::cli {
@@ -22,15 +23,39 @@ enum class Command {
   kFetch,
   kCancel,
   kRename,
+  kErase,
   kList,
   kInfo,
   kLabels,
+  kOrder,
+  kOrders,
+  kPacs,
 };
 
-// A file to write a mesh to, in the format that its suffix names.
+// What is said of orders.
+struct OrderOptions {
+  std::string pacs;
+  std::string study;
+  std::string series;
+  std::string rule;
+  std::string parameters;  // JSON
+  std::vector<std::string> send;
+  bool sends_nothing = false;
+  std::optional<Priority> priority = {};
+  bool does_not_wait = false;
+  std::optional<OrderState> state = {};
+  bool cancels = false;
+  bool retries = false;
+};
+
+// A file to write a mesh to, in the format that its suffix names; "-" is standard output, and
+// "{name}" in its name stands for the input's.
 struct Output {
   std::filesystem::path path;
   MeshFormat format = MeshFormat::kDrc;
+
+  bool is_stdout() const { return path == "-"; }
+  bool operator==(const Output&) const = default;
 };
 
 struct Options {
@@ -39,19 +64,28 @@ struct Options {
   std::string token;
   std::filesystem::path authorities;  // of an https server; empty: the system's
   bool json = false;
+  bool allow_empty = false;  // a surface without triangles is no failure
+  bool quiet = false;
 
-  std::vector<std::filesystem::path> files;  // mesh, upload; several are sent together
+  std::vector<std::filesystem::path> files;  // mesh, upload; "-" is standard input
   UploadOptions upload;                      // mesh, upload; without progress
   std::string id;                            // of a job or, for submit and info, of a volume
   JobParameters parameters;                  // mesh, submit, estimate
+  std::string preset;                        // the iso-value by its name; empty: in parameters
+  bool dry_run = false;                      // mesh: an estimate in its place
+  int jobs = 1;                              // mesh: inputs at a time
+  bool is_local = false;                     // mesh: on a daemon of its own
+  std::filesystem::path daemon;              // of that; empty: looked for
   std::string key;                           // submit
   std::vector<Output> outputs;               // mesh, fetch
   std::optional<JobState> state;             // list
   std::string cursor;                        // list
   bool volumes = false;                      // list
   std::string name;                          // rename
+  std::vector<std::string> ids;              // erase
   std::optional<std::int64_t> label;         // fetch
   std::int64_t background = 0;               // labels
+  OrderOptions order;                        // order, orders
 };
 
 // Ends the program before any command runs: help, the version, or wrong usage. `text` belongs on

@@ -1,14 +1,18 @@
 #include "client/cli/parameter_options.h"
 
+#include <algorithm>
 #include <map>
+#include <memory>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
 #include "base/text.h"
 #include "client/cli/option_values.h"
 #include "proto/parameters.h"
+#include "proto/presets.h"
 
 namespace isomesh::cli {
 namespace {
@@ -46,7 +50,7 @@ std::string help_of(const Parameter& parameter, const T& standard) {
   if (help.ends_with('.')) help.pop_back();
   const std::string unit = parameter.unit;
   const std::string by_labels =
-      parameter.by_labels == nullptr ? "" : std::string("; by labels ") + parameter.by_labels;
+      parameter.by_labels ? "; by labels " + number_text(*parameter.by_labels) : "";
   return help + (unit.empty() ? "" : ", in " + unit) + values_and_default(parameter, standard) +
          by_labels;
 }
@@ -54,7 +58,7 @@ std::string help_of(const Parameter& parameter, const T& standard) {
 // An option for each kind of parameter.
 class ParameterOptions {
  public:
-  explicit ParameterOptions(CLI::App& app) : app_(app) {}
+  ParameterOptions(CLI::App& app, std::string& preset) : app_(app), preset_(preset) {}
 
   template <class T>
   CLI::Option* add(const Parameter& parameter, T& value) {
@@ -78,7 +82,8 @@ class ParameterOptions {
 
   CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
                         const std::string& help, Scheme& value) {
-    return add_number<int>(app_, name, help, [&value](int given) { value = Scheme{given}; });
+    return add_number<int>(app_, name, help, [&value](int given) { value = Scheme{given}; })
+        ->type_name("5|6");
   }
 
   CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
@@ -96,12 +101,26 @@ class ParameterOptions {
       return add_number<Number>(app_, name, help, [&value](Number given) { value = given; });
     }
     const std::string word = parameter.when_empty;
-    return isomesh::cli::add(app_, name, "N|" + word, help,
-                             [&value, name, word](const std::string& text) {
+    const bool is_iso = std::string_view(parameter) == "iso";
+    std::vector<std::string> words = {word};
+    if (is_iso) words.insert(words.end(), kPresetNames.begin(), kPresetNames.end());
+    std::string type = "N";
+    for (std::string each : words) {
+      std::ranges::replace(each, ' ', '-');
+      type += '|' + each;
+    }
+    const std::string more = is_iso ? "; or a preset, where the volume has one" : "";
+    return isomesh::cli::add(app_, name, type, help + more,
+                             [this, &value, name, word, words](const std::string& text) {
                                value = number_from<Number>(text);
-                               if (!value && text != word) {
-                                 refuse(name, "must be a number or " + word);
+                               preset_.clear();
+                               if (value || text == word) return;
+                               std::string plain = lower(text);
+                               std::ranges::replace(plain, '-', ' ');
+                               if (std::ranges::find(words, plain) == words.end()) {
+                                 refuse(name, "must be a number, " + listed(words));
                                }
+                               preset_ = plain;
                              });
   }
 
@@ -122,6 +141,42 @@ class ParameterOptions {
       value.emplace();
       if (text != "all") value->values = labels_from(name, text);
     });
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, std::vector<double>& value) {
+    return isomesh::cli::add(app_, name, "N,..", help, [&value, name](const std::string& text) {
+      value.clear();
+      for (const std::string_view each : split(text, ',')) {
+        const auto number = number_from<double>(each);
+        if (!number) refuse(name, "must be numbers separated by commas");
+        value.push_back(*number);
+      }
+    });
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, std::optional<Box>& value) {
+    return isomesh::cli::add(
+        app_, name, "X,Y,Z,X,Y,Z", help, [&value, name](const std::string& text) {
+          const auto numbers = numbers_from<double, 6>(name, text);
+          value = {{{numbers[0], numbers[1], numbers[2]}, {numbers[3], numbers[4], numbers[5]}}};
+        });
+  }
+
+  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+                        const std::string& help, std::vector<std::array<double, 3>>& value) {
+    return app_
+        .add_option_function<std::vector<std::string>>(
+            name,
+            [&value, name](const std::vector<std::string>& texts) {
+              value.clear();
+              for (const auto& text : texts) value.push_back(numbers_from<double, 3>(name, text));
+            },
+            help + ". May be repeated")
+        ->type_name("X,Y,Z")
+        ->expected(1)
+        ->take_all();
   }
 
   // `--label-name 3=Liver`, once for each label.
@@ -171,12 +226,16 @@ class ParameterOptions {
   }
 
   CLI::App& app_;
+  std::string& preset_;
 };
 
 // What is required, and what needs or excludes what.
 void relate(const Parameter& parameter, const std::map<std::string, CLI::Option*>& options) {
   CLI::Option* const option = options.at(parameter.name);
-  if (parameter.needs != nullptr) option->needs(options.at(parameter.needs));
+  if (parameter.jobs == JobKind::kByLabels && !parameter.is_required) {
+    CLI::Option* const labels = options.at("labels");
+    if (option != labels) option->needs(labels);
+  }
   if (!parameter.is_required) {
     option->group("Job");
   } else if (parameter.unless == nullptr) {
@@ -189,8 +248,11 @@ void relate(const Parameter& parameter, const std::map<std::string, CLI::Option*
 
 }  // namespace
 
-void add_parameters(CLI::App& app, JobParameters& parameters, Formats formats) {
-  ParameterOptions all(app);
+void add_parameters(CLI::App& app, JobParameters& parameters, std::string& preset, Formats formats,
+                    Carrier carrier) {
+  // The options' callbacks use it, as long as the command's table is there.
+  const auto kept = std::make_shared<ParameterOptions>(app, preset);
+  ParameterOptions& all = *kept;
   std::map<std::string, CLI::Option*> options;  // by the parameters' names
   std::vector<Parameter> added;
   visit_leaves(parameters,
@@ -198,6 +260,7 @@ void add_parameters(CLI::App& app, JobParameters& parameters, Formats formats) {
                  using Member = std::remove_reference_t<decltype(member)>;
                  const bool is_formats = std::is_same_v<Member, std::vector<MeshFormat>>;
                  if (is_formats && formats == Formats::kByFiles) return;
+                 if (carrier == Carrier::kQuery && !parameter.in_query) return;
                  // The volume is the command's file or its first argument.
                  if constexpr (!std::is_same_v<Member, std::string>) {
                    options[parameter.name] = all.add(parameter, member);
@@ -208,7 +271,7 @@ void add_parameters(CLI::App& app, JobParameters& parameters, Formats formats) {
   CLI::Option* const labels = options.at("labels");
   options.at("interpolation")->excludes(labels);  // their vertices lie half-way
   app.parse_complete_callback(
-      [&parameters, labels, iso = options.at("iso"), passes = options.at("passes")] {
+      [&parameters, kept, labels, iso = options.at("iso"), passes = options.at("passes")] {
         if (labels->count() + iso->count() == 0) throw CLI::RequiredError("--iso or --labels");
         const bool is_by_labels = labels->count() > 0;
         if (is_by_labels && passes->count() == 0) parameters.passes = label_parameters({}).passes;

@@ -47,7 +47,7 @@ std::string note_of(const Job& job) {
              : "waiting for a worker";
 }
 
-ProgressBar::ProgressBar() : visible_(::isatty(STDERR_FILENO) == 1) {}
+ProgressBar::ProgressBar(bool is_wanted) : visible_(is_wanted && ::isatty(STDERR_FILENO) == 1) {}
 
 ProgressBar::~ProgressBar() { clear(); }
 

@@ -17,11 +17,11 @@ std::string bar_line(const std::string& label, double share, const std::string& 
 // What a job waits for; empty once it runs. Pure.
 std::string note_of(const Job& job);
 
-// Draws on standard error when that is a terminal, and does nothing otherwise. One thread at a
-// time.
+// Draws on standard error when that is wanted and a terminal, and does nothing otherwise. One
+// thread at a time.
 class ProgressBar {
  public:
-  ProgressBar();
+  explicit ProgressBar(bool is_wanted = true);
   ~ProgressBar();  // clears the line
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;

@@ -62,6 +62,51 @@ std::string size_of(const MeshFile& file) {
   return file.bytes < 1000 ? exact : human_bytes(file.bytes) + " (" + exact + ")";
 }
 
+// What an iso-value of a job is: the one that was used, also where Otsu's was asked for.
+void tell_iso(const MeshSummary& mesh, Rows& rows) {
+  if (mesh.iso) rows.push_back({"iso-value", human_number(*mesh.iso)});
+}
+
+// An open surface encloses nothing, and the number that its triangles sum up to is no volume.
+void tell_volume(const MeshSummary& mesh, Rows& rows) {
+  if (mesh.empty) return;
+  if (!mesh.quality.encloses_volume) {
+    rows.push_back({"volume", "none: the surface is open; --close caps it at the volume's border"});
+    return;
+  }
+  const std::string after = mesh.simplified ? " mm³ simplified" : " mm³ smoothed";
+  rows.push_back({"volume", fixed(mesh.volume_mm3.extracted, 1) + " mm³ extracted"});
+  rows.push_back({"", fixed(mesh.volume_mm3.smoothed, 1) + after});
+}
+
+std::string way_of(const DistanceSummary& distances) {
+  return fixed(distances.max_mm, 4) + " mm at most, " + fixed(distances.p99_mm, 4) +
+         " mm for 99 of 100, " + fixed(distances.mean_mm, 4) + " mm on average";
+}
+
+void tell_error(const MeshSummary& mesh, Rows& rows) {
+  if (mesh.simplified) {
+    const bool is_error = mesh.simplified->bound_by == Simplification::Bound::kError;
+    rows.push_back(
+        {"simplified",
+         "from " + grouped(static_cast<std::int64_t>(mesh.simplified->triangles_before)) +
+             " triangles, bound by the " + (is_error ? "error" : "number of triangles")});
+  }
+  if (!mesh.certificate) return;
+  const MeshCertificate& certificate = *mesh.certificate;
+  rows.push_back({"certified", fixed(certificate.max_mm, 4) + " mm from the extracted surface, " +
+                                   "measured on the " + std::string(to_string(certificate.file)) +
+                                   " file"});
+  rows.push_back({"  mesh to scan", way_of(certificate.from_mesh)});
+  rows.push_back({"  scan to mesh", way_of(certificate.from_extracted)});
+  if (certificate.budget_mm) {
+    const MeshCertificate::Budget& budget = *certificate.budget_mm;
+    rows.push_back({"  shared out", fixed(budget.smoothing, 4) + " mm smoothing, " +
+                                        fixed(budget.simplification, 4) + " mm simplification, " +
+                                        fixed(budget.quantisation, 4) + " mm rounding"});
+  }
+}
+
 std::string labels_report(const std::vector<LabelSummary>& labels) {
   Rows rows = {{"label", "name", "triangles", "mm³", "mm³ of voxels", "topology"}};
   for (const LabelSummary& label : labels) {
@@ -89,7 +134,9 @@ std::string timing_report(const Timing& timing, const ClientTiming& client) {
   stage("load", timing.load);
   stage("extract", timing.extract);
   stage("smooth", timing.smooth);
+  if (timing.simplify > 0) stage("simplify", timing.simplify);
   stage("encode", timing.encode);
+  if (timing.certify > 0) stage("certify", timing.certify);
   stage("total", timing.total);
   if (client.download) rows.push_back({"download", human_duration(*client.download)});
   return in_columns({Align::kLeft, Align::kRight, Align::kRight}, rows);
@@ -97,26 +144,35 @@ std::string timing_report(const Timing& timing, const ClientTiming& client) {
 
 std::string mesh_report(const MeshSummary& mesh) {
   const auto count = [](auto value) { return grouped(static_cast<std::int64_t>(value)); };
-  Rows rows = {{"triangles", count(mesh.triangles)},
-               {"vertices", count(mesh.vertices)},
-               {"boundary edges", count(mesh.boundary_edges)},
-               {"components", count(mesh.components)},
-               {"Euler number", count(mesh.euler)},
-               {"area", fixed(mesh.area_extracted_mm2, 1) + " mm² extracted"},
-               {"", fixed(mesh.area_mm2, 1) + " mm² smoothed"},
-               {"volume", fixed(mesh.volume_mm3.extracted, 1) + " mm³ extracted"},
-               {"", fixed(mesh.volume_mm3.smoothed, 1) + " mm³ smoothed"},
-               {"displacement", fixed(mesh.displacement_mm.mean, 3) + " mm on average, " +
-                                    fixed(mesh.displacement_mm.max, 3) + " mm at most"},
-               {"x (LPS)", extent(mesh, 0)},
-               {"y", extent(mesh, 1)},
-               {"z", extent(mesh, 2)}};
+  Rows rows;
+  tell_iso(mesh, rows);
+  const Rows sizes = {
+      {"triangles", count(mesh.triangles)},
+      {"vertices", count(mesh.vertices)},
+      {"boundary edges", count(mesh.boundary_edges)},
+      {"components", count(mesh.components)},
+      {"Euler number", count(mesh.euler)},
+      {"area", fixed(mesh.area_extracted_mm2, 1) + " mm² extracted"},
+      {"", fixed(mesh.area_mm2, 1) + (mesh.simplified ? " mm² simplified" : " mm² smoothed")}};
+  rows.insert(rows.end(), sizes.begin(), sizes.end());
+  tell_volume(mesh, rows);
+  const Rows places = {{"displacement", fixed(mesh.displacement_mm.mean, 3) + " mm on average, " +
+                                            fixed(mesh.displacement_mm.max, 3) + " mm at most"},
+                       {"x (LPS)", extent(mesh, 0)},
+                       {"y", extent(mesh, 1)},
+                       {"z", extent(mesh, 2)}};
+  rows.insert(rows.end(), places.begin(), places.end());
+  tell_error(mesh, rows);
   if (mesh.dropped.components > 0) {
     rows.push_back({"dropped", count(mesh.dropped.components) + " components of " +
                                    count(mesh.dropped.triangles) + " triangles"});
   }
   const MeshQuality& quality = mesh.quality;
   rows.push_back({"topology", topology_of(quality)});
+  if (const auto& found = quality.self_intersections) {
+    const std::string pairs = count(found->pairs) + " pairs of triangles";
+    rows.push_back({"runs through itself", found->pairs == 0 ? "nowhere" : "at " + pairs});
+  }
   rows.push_back({"aspect ratio", fixed(quality.aspect_ratio.extracted.mean, 3) + " extracted, " +
                                       fixed(quality.aspect_ratio.smoothed.mean, 3) + " smoothed"});
   rows.push_back({"smallest angle", fixed(quality.smallest_angle_deg.extracted.mean, 1) +
@@ -189,6 +245,11 @@ std::string histogram_report(const Histogram& histogram) {
 std::string estimate_report(const Estimate& estimate) {
   Rows rows = {{"triangles", grouped(static_cast<std::int64_t>(estimate.triangles))},
                {"vertices", grouped(static_cast<std::int64_t>(estimate.vertices))}};
+  if (estimate.simplified_triangles) {
+    rows.push_back({"simplified",
+                    "about " + grouped(static_cast<std::int64_t>(*estimate.simplified_triangles)) +
+                        " triangles"});
+  }
   for (const auto& [format, bytes] : estimate.bytes) {
     rows.push_back({std::string(to_string(format)), "about " + human_bytes(bytes)});
   }

@@ -1,9 +1,7 @@
 #include "client/isomesh/client.h"
 
 #include <algorithm>
-#include <condition_variable>
 #include <iterator>
-#include <mutex>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -13,8 +11,10 @@
 #include "base/ids.h"
 #include "base/sha256.h"
 #include "base/text.h"
+#include "client/isomesh/download.h"
 #include "client/isomesh/event_reader.h"
 #include "client/isomesh/file.h"
+#include "client/isomesh/impl.h"
 #include "client/isomesh/package.h"
 #include "client/isomesh/transport.h"
 #include "client/isomesh/url.h"
@@ -26,91 +26,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr int kTries = 4;
-constexpr milliseconds kFirstPause{100};
-constexpr seconds kLongestWait{30};
-// The least time between two looks at a job, for a server that answers a long poll at once.
-constexpr milliseconds kShortestLook{200};
 constexpr std::size_t kDigestBytes = 1024 * 1024;
-constexpr std::size_t kKeyBytes = 16;
-
-TransportOptions transport_options(ClientOptions&& options) {
-  const bool sendable =
-      std::ranges::all_of(options.token, [](char c) { return c > ' ' && c < '\x7f'; });
-  if (!sendable) throw invalid_parameter("token", "must be letters, digits and signs of ASCII");
-  return {.server = parse_server_address(options.server),
-          .server_url = options.server,
-          .token = std::move(options.token),
-          .authorities = std::move(options.authorities),
-          .connect_timeout = options.connect_timeout,
-          .silence_timeout = options.silence_timeout,
-          .stop = std::move(options.stop)};
-}
-
-// For refusals by something in front of the daemon, which does not send our problem documents.
-ErrorCode code_of_status(int status) {
-  switch (status) {
-    case 400:
-      return ErrorCode::kInvalidParameter;
-    case 401:
-      return ErrorCode::kUnauthorized;
-    case 403:
-      return ErrorCode::kForbidden;
-    case 404:
-      return ErrorCode::kNotFound;
-    case 405:
-      return ErrorCode::kMethodNotAllowed;
-    case 409:
-      return ErrorCode::kNotReady;
-    case 410:
-      return ErrorCode::kGone;
-    case 408:
-      return ErrorCode::kRequestTimeout;
-    case 411:
-      return ErrorCode::kLengthRequired;
-    case 412:
-      return ErrorCode::kPreconditionFailed;
-    case 413:
-      return ErrorCode::kTooLarge;
-    case 414:
-      return ErrorCode::kUriTooLong;
-    case 415:
-      return ErrorCode::kUnsupportedMedia;
-    case 422:
-      return ErrorCode::kUnusableVolume;
-    case 429:
-      return ErrorCode::kTooManyRequests;
-    case 431:
-      return ErrorCode::kHeadersTooLarge;
-    case 502:
-    case 504:
-      return ErrorCode::kUnreachable;
-    case 503:
-      return ErrorCode::kUnavailable;
-    case 507:
-      return ErrorCode::kOutOfSpace;
-    default:
-      return ErrorCode::kInternal;
-  }
-}
-
-Error refusal(const HttpAnswer& answer) {
-  const std::string status = "the server answered with status " + std::to_string(answer.status);
-  if (!answer.content_type.starts_with("application/problem+json")) {
-    return {code_of_status(answer.status), status};
-  }
-  Problem problem;
-  try {
-    problem = problem_from_json(answer.body);
-  } catch (const Error&) {
-    return {code_of_status(answer.status), status};
-  }
-  Error error = to_error(problem);
-  if (error.code() != ErrorCode::kInternal || answer.status == 500) return error;
-  return Error(code_of_status(answer.status), problem.detail.empty() ? status : problem.detail,
-               problem.errors)
-      .with_remedy(problem.remedy);
-}
 
 template <std::size_t N>
 std::string joined(const std::array<double, N>& values) {
@@ -173,120 +89,7 @@ std::string next_of(const std::string& page) {
   return next != json.end() && next->is_string() ? next->get<std::string>() : std::string();
 }
 
-MeshFile file_of(const Job& job, MeshFormat format, std::optional<std::int64_t> label) {
-  if (job.state == JobState::kCancelled)
-    throw Error(ErrorCode::kCancelled, "the job was cancelled");
-  if (job.state == JobState::kFailed) {
-    throw job.error ? to_error(*job.error) : Error(ErrorCode::kInternal, "the job failed");
-  }
-  if (job.state != JobState::kSucceeded || !job.mesh) {
-    throw Error(ErrorCode::kNotReady,
-                "the job is " + std::string(to_string(job.state)) + ", its mesh is not ready");
-  }
-  if (const auto found = job.mesh->files.find(format); !label && found != job.mesh->files.end()) {
-    return found->second;
-  }
-  for (const LabelSummary& each : job.mesh->labels) {
-    const auto found = each.files.find(format);
-    if (found == each.files.end() || (label ? *label != each.label : job.mesh->labels.size() > 1)) {
-      continue;
-    }
-    return {found->second.bytes, found->second.sha256, found->second.href};
-  }
-  const auto has = [&](const LabelSummary& each) { return each.files.contains(format); };
-  if (!label && std::ranges::any_of(job.mesh->labels, has)) {
-    throw Error(ErrorCode::kNotFound, "the job has a file of the format \"" +
-                                          std::string(to_string(format)) +
-                                          "\" for each label: say which, or take the zip");
-  }
-  throw Error(ErrorCode::kNotFound, "the job has no file of the format \"" +
-                                        std::string(to_string(format)) + '"' +
-                                        (label ? " of the label " + std::to_string(*label) : ""));
-}
-
-// Writes a mesh as it arrives and compares it with the size and digest that the job announced.
-class Download {
- public:
-  Download(MeshFile announced, const std::filesystem::path& target,
-           const TransferProgress& progress)
-      : announced_(std::move(announced)), file_(target), progress_(progress) {}
-
-  void restart() {
-    if (received_ == 0) return;
-    file_.restart();
-    sha256_.emplace();
-    received_ = 0;
-  }
-
-  void take(std::string_view piece) {
-    received_ += piece.size();
-    if (received_ > announced_.bytes) refuse();
-    file_.write(piece);
-    sha256_->update(piece);
-    if (progress_) progress_(received_, announced_.bytes);
-  }
-
-  void publish() {
-    if (received_ != announced_.bytes || to_hex(sha256_->finish()) != announced_.sha256) refuse();
-    file_.publish();
-  }
-
- private:
-  [[noreturn]] static void refuse() {
-    throw Error(ErrorCode::kDigestMismatch,
-                "the mesh that arrived is not the one that the job describes");
-  }
-
-  const MeshFile announced_;
-  PartFile file_;
-  const TransferProgress& progress_;
-  std::optional<Sha256> sha256_{std::in_place};
-  std::uint64_t received_ = 0;
-};
-
 }  // namespace
-
-class Client::Impl {
- public:
-  explicit Impl(ClientOptions&& options)
-      : stop_(options.stop), transport_(transport_options(std::move(options))) {}
-
-  // Returns a successful answer; every other answer is thrown as an Error.
-  HttpAnswer answer(const HttpRequest& request) const {
-    HttpAnswer answer = transport_.send(request);
-    if (answer.status < 200 || answer.status >= 300) throw refusal(answer);
-    return answer;
-  }
-
-  std::string send(const HttpRequest& request) const { return answer(request).body; }
-
-  // Sends a request that may be repeated when its connection breaks. `before` runs ahead of each
-  // try.
-  std::string repeat(const HttpRequest& request, const std::function<void()>& before = {}) const {
-    for (int attempt = 1;; ++attempt) {
-      try {
-        if (before) before();
-        return send(request);
-      } catch (const NoAnswer& lost) {
-        if (!lost.broken() || attempt == kTries) throw;
-      }
-      pause(kFirstPause * (1 << (attempt - 1)));
-    }
-  }
-
-  // Ends at once with Error kCancelled when asked to stop.
-  void pause(milliseconds duration) const {
-    std::mutex mutex;
-    std::unique_lock lock(mutex);
-    const auto never = [] { return false; };
-    std::condition_variable_any().wait_for(lock, stop_, duration, never);
-    if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
-  }
-
- private:
-  std::stop_token stop_;
-  Transport transport_;
-};
 
 Client::Client(ClientOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
 Client::~Client() = default;
@@ -451,7 +254,8 @@ void Client::fetch(const std::string& id, MeshFormat format, const std::filesyst
   Download download(file_of(done, format, label), target, progress);
   HttpRequest request{.target = mesh_path(path_segment(id), format, label)};
   request.sink = [&](std::string_view piece) { download.take(piece); };
-  impl_->repeat(request, [&] { download.restart(); });
+  request.before_sink = [&](int status) { download.begin(status); };
+  impl_->repeat(request, [&] { request.headers = download.headers(); });
   download.publish();
 }
 

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "proto/error.h"
+#include "proto/orders.h"
 #include "proto/types.h"
 
 namespace isomesh {
@@ -77,6 +78,14 @@ Error several_volumes(const std::vector<UploadedVolume>& volumes);
 
 // What happens to a job, as it happens.
 using JobListener = std::function<void(const JobEvent& event)>;
+
+// The order as it was last seen.
+using OrderProgress = std::function<void(const Order& order)>;
+
+struct OrderPage {
+  std::vector<Order> orders;
+  std::string next;  // as of a JobPage
+};
 
 struct JobPage {
   std::vector<Job> jobs;
@@ -147,13 +156,29 @@ class Client {
   Job follow(const std::string& id, const JobListener& listener);
 
   // Writes the mesh of a finished job to `target`, which appears only when all of its bytes have
-  // come and have the SHA-256 that the job states. Throws kNotReady when the job is not done, the
+  // come and have the SHA-256 that the job states; a connection that breaks is taken up where it
+  // broke. Throws kNotReady when the job is not done, the
   // job's own error when it failed, kCancelled when it was cancelled, kNotFound when it was not
   // asked for that format, kDigestMismatch when other bytes came. Of a job by labels, with `label`,
   // one label's own surface.
   void fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,
              const TransferProgress& progress = {},
              std::optional<std::int64_t> label = std::nullopt);
+
+  // Orders meshes of a series that is in a PACS. The same key gives the same order again.
+  Order submit_order(const OrderRequest& request, const std::string& idempotency_key = {});
+  // The order when it has ended, or as it is after `wait` (whole seconds, the server allows 30).
+  Order order(const std::string& id, std::chrono::seconds wait = std::chrono::seconds(0));
+  // Returns the order in its final state. With a callback it is looked at often at first, so that
+  // short steps are seen, and later once a second.
+  Order wait_for_order(const std::string& id, const OrderProgress& progress = {});
+  // One page, of the orders in that state and of that rule where they are given.
+  OrderPage orders(std::optional<OrderState> state = std::nullopt, const std::string& rule = {},
+                   const std::string& cursor = {});
+  Order cancel_order(const std::string& id);
+  // Tries a failed order anew. Throws kNotReady for one that has not failed.
+  Order retry_order(const std::string& id);
+  std::vector<PacsStatus> pacs();
 
  private:
   class Impl;

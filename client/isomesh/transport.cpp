@@ -10,6 +10,7 @@
 #include <curl/curl.h>
 #include <poll.h>
 
+#include "base/curl.h"
 #include "base/text.h"
 
 namespace isomesh {
@@ -25,36 +26,14 @@ constexpr std::size_t kLongestBody = 64 * 1024 * 1024;
 constexpr long kPieceBytes = 256 * 1024;
 constexpr milliseconds kLongestSleep{60'000};
 
-struct EasyCleanup {
-  void operator()(CURL* easy) const { curl_easy_cleanup(easy); }
-};
-struct MultiCleanup {
-  void operator()(CURLM* multi) const { curl_multi_cleanup(multi); }
-};
-struct ListCleanup {
-  void operator()(curl_slist* list) const { curl_slist_free_all(list); }
-};
-using Easy = std::unique_ptr<CURL, EasyCleanup>;
-using Multi = std::unique_ptr<CURLM, MultiCleanup>;
-using Headers = std::unique_ptr<curl_slist, ListCleanup>;
+using curl::Easy;
+using curl::Headers;
+using curl::make_easy;
+using curl::make_multi;
+using curl::Multi;
 
 void check(bool done) {
   if (!done) throw Error(ErrorCode::kInternal, "libcurl cannot be used");
-}
-
-Multi make_multi() {
-  // The call need not be thread safe, so it is made once.
-  static const CURLcode ready = curl_global_init(CURL_GLOBAL_DEFAULT);
-  check(ready == CURLE_OK);
-  Multi multi(curl_multi_init());
-  check(multi != nullptr);
-  return multi;
-}
-
-Easy make_easy() {
-  Easy easy(curl_easy_init());
-  check(easy != nullptr);
-  return easy;
 }
 
 void append(Headers& headers, const std::string& name, const std::string& value) {
@@ -62,10 +41,7 @@ void append(Headers& headers, const std::string& name, const std::string& value)
   if (has_control_characters(value)) {
     throw invalid_parameter(name, "must not hold control characters");
   }
-  curl_slist* longer = curl_slist_append(headers.get(), (name + ": " + value).c_str());
-  if (longer == nullptr) throw std::bad_alloc();
-  static_cast<void>(headers.release());
-  headers.reset(longer);
+  curl::append(headers, name + ": " + value);
 }
 
 Headers headers_of(const HttpRequest& request, const TransportOptions& options) {
@@ -262,7 +238,11 @@ class Transfer {
 
   void take(std::string_view piece) {
     const long status = info<long>(CURLINFO_RESPONSE_CODE);
-    if (request_.sink && status >= 200 && status < 300) return request_.sink(piece);
+    if (request_.sink && status >= 200 && status < 300) {
+      const bool is_first = !std::exchange(sink_has_begun_, true);
+      if (is_first && request_.before_sink) request_.before_sink(static_cast<int>(status));
+      return request_.sink(piece);
+    }
     if (answer_.body.size() + piece.size() > kLongestBody) {
       throw Error(ErrorCode::kInternal, "the server's answer is not what the API describes");
     }
@@ -297,7 +277,8 @@ class Transfer {
   HttpAnswer answer_;
   std::exception_ptr failure_;
   std::uint64_t provided_ = 0;  // of the source
-  bool is_paused_ = false;      // the source waits until what the server says is read
+  bool sink_has_begun_ = false;
+  bool is_paused_ = false;  // the source waits until what the server says is read
   std::size_t head_bytes_ = 0;
   bool head_is_whole_ = false;
   curl_off_t moved_ = 0;  // bytes, in both directions

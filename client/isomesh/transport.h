@@ -31,6 +31,8 @@ struct HttpRequest {
   // Takes the body of a successful answer. Without it, and for refusals, the body is in the
   // HttpAnswer.
   std::function<void(std::string_view piece)> sink = {};
+  // Is told the status ahead of the sink's first piece.
+  std::function<void(int status)> before_sink = {};
 
   // How much longer than usual the server may be silent.
   std::chrono::milliseconds patience{0};

@@ -20,6 +20,7 @@ function kindOf(name, { type, enum: values, items, oneOf = [], additionalPropert
   if (oneOf.some((one) => one.const === 'all')) return 'labels';
   if (types.includes('object') && typeof additionalProperties === 'object') return 'by label';
   if (types.includes('array') && items && resolved(items).enum) return 'choices';
+  if (types.includes('array') && items) return items.type === 'array' ? 'places' : 'numbers';
   for (const [known, kind] of Object.entries({ boolean: 'switch', integer: 'integer', number: 'number', string: 'text' })) {
     if (types.includes(known)) return kind;
   }
@@ -56,6 +57,8 @@ function parameterOf(name, schema) {
     minimum: all.minimum,
     above: all.exclusiveMinimum,
     maximum: all.maximum,
+    jobs: all['x-jobs'] ?? 'any',
+    byLabels: all['x-default-by-labels'],
     by: differencesOf(all),
   };
 }
@@ -80,9 +83,13 @@ function write(name, text) {
 const made = '// Made by generate.mjs of proto/openapi.yaml.\n';
 const types = await openapiTS(source, { arrayLength: true, defaultNonNullable: false });
 const table = JSON.stringify(parametersOf(components.schemas.JobParameters), null, 2);
+const whole = JSON.stringify(components.schemas.MeshFormat['x-hold-all-labels']);
 mkdirSync(folder, { recursive: true });
 write('api.d.ts', made + astToString(types));
 write(
   'parameters.ts',
-  `${made}import type { Parameter } from '../src/job/table';\n\nexport const parameters: readonly Parameter[] = ${table};\n`,
+  `${made}import type { Parameter } from '../src/job/table';\n\nexport const parameters: readonly Parameter[] = ${table};
+
+// One file of these holds all labels.
+export const wholeFormats: readonly string[] = ${whole};\n`,
 );

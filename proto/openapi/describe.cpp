@@ -1,70 +1,16 @@
 #include "proto/openapi/describe.h"
 
 #include <cctype>
-#include <functional>
 #include <map>
-#include <sstream>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "proto/openapi/yaml.h"
 #include "proto/parameters.h"
 
 namespace isomesh {
 namespace {
-
-constexpr std::size_t kWidth = 104;
-
-// --- YAML ----------------------------------------------------------------------------------------
-
-// Lines of YAML, each indented as deep as the mapping that it stands in.
-class Yaml {
- public:
-  explicit Yaml(std::size_t depth) : depth_(depth) {}
-
-  void line(const std::string& text) { text_ += std::string(2 * depth_, ' ') + text + '\n'; }
-
-  // `name:` and what `inner` writes below it.
-  void under(const std::string& name, const std::function<void()>& inner) {
-    line(name + ':');
-    ++depth_;
-    inner();
-    --depth_;
-  }
-
-  // A text of any length, on the name's own line where it is short and nothing in it means
-  // something to YAML.
-  void text(const std::string& name, const std::string& value) {
-    const bool is_plain = std::isalpha(static_cast<unsigned char>(value.front())) != 0 &&
-                          value.find(": ") == std::string::npos &&
-                          value.find(" #") == std::string::npos;
-    if (is_plain && 2 * depth_ + name.size() + 2 + value.size() <= kWidth) {
-      return line(name + ": " + value);
-    }
-    line(name + ": |");
-    ++depth_;
-    wrapped(value);
-    --depth_;
-  }
-
-  const std::string& str() const { return text_; }
-
- private:
-  void wrapped(const std::string& value) {
-    std::istringstream words(value);
-    std::string row;
-    for (std::string word; words >> word;) {
-      if (!row.empty() && 2 * depth_ + row.size() + 1 + word.size() > kWidth) {
-        line(std::exchange(row, {}));
-      }
-      row += (row.empty() ? "" : " ") + word;
-    }
-    line(row);
-  }
-
-  std::size_t depth_;
-  std::string text_;
-};
 
 std::string with_commas(const std::vector<std::string>& items) {
   std::string text;
@@ -223,10 +169,20 @@ void write_choice(Yaml& yaml, const Parameter& parameter) {
   });
 }
 
+void write_jobs(Yaml& yaml, const Parameter& parameter) {
+  if (parameter.jobs == JobKind::kAtIso) yaml.line("x-jobs: iso");
+  if (parameter.jobs == JobKind::kByLabels) yaml.line("x-jobs: labels");
+  if (parameter.by_labels) {
+    yaml.line("x-default-by-labels: " + number_text(*parameter.by_labels));
+  }
+}
+
 std::string label_list(const Parameter& parameter) {
   return "{ type: array, minItems: 1, items: { type: integer, minimum: " +
          number_text(*parameter.minimum) + ", maximum: " + number_text(*parameter.maximum) + " } }";
 }
+
+constexpr const char* kPlace = "{ type: array, minItems: 3, maxItems: 3, items: { type: number } }";
 
 // Its type, and whatever else it may be.
 template <class T>
@@ -236,17 +192,36 @@ void write_type(Yaml& yaml, const Parameter& parameter, const T& standard) {
     yaml.line("items: { " + reference("schemas", "MeshFormat") + " }");
     yaml.line("minItems: 1");
     yaml.line("default: " + in_brackets({name_of(standard.front())}));
-    yaml.line("x-query: " + query_name_of(parameter));
   } else if constexpr (std::is_same_v<T, std::optional<LabelChoice>>) {
     yaml.under("oneOf", [&] {
       yaml.line("- const: all");
       yaml.line("- " + label_list(parameter));
     });
+  } else if constexpr (std::is_same_v<T, std::vector<double>>) {
+    yaml.line("type: array");
+    yaml.line("items: { type: number, exclusiveMinimum: " + number_text(*parameter.above) +
+              ", maximum: " + number_text(*parameter.maximum) + " }");
+    yaml.line("minItems: 1");
+    yaml.line("maxItems: " + std::to_string(MeshParameters::kMostLods));
+  } else if constexpr (std::is_same_v<T, std::optional<Box>>) {
+    yaml.line("type: [array, 'null']");
+    yaml.line(std::string("items: ") + kPlace);
+    yaml.line("minItems: 2");
+    yaml.line("maxItems: 2");
+  } else if constexpr (std::is_same_v<T, std::vector<std::array<double, 3>>>) {
+    yaml.line("type: array");
+    yaml.line(std::string("items: ") + kPlace);
+    yaml.line("minItems: 1");
+    yaml.line("maxItems: " + std::to_string(ComponentFilter::kMostPlaces));
   } else if constexpr (kIsOfLabels<T>) {
     yaml.line("type: object");
     yaml.line("propertyNames: { pattern: '^-?[0-9]+$' }");
     const bool is_list = std::is_same_v<T, LabelValues>;
-    yaml.line("additionalProperties: " + (is_list ? label_list(parameter) : "{ type: string }"));
+    const bool is_color = std::string_view(parameter.name) == "label_colors";
+    const std::string text = is_color ? "{ type: string, pattern: '^#[0-9a-fA-F]{6}$' }"
+                                      : "{ type: string, minLength: 1, maxLength: " +
+                                            std::to_string(LabelEntry::kMostNameBytes) + " }";
+    yaml.line("additionalProperties: " + (is_list ? label_list(parameter) : text));
     yaml.line("default: {}");
   } else if (parameter.when_empty != nullptr) {
     yaml.under("oneOf", [&] {
@@ -267,6 +242,8 @@ void write_schema(Yaml& yaml, const Parameter& parameter, const T& standard) {
   yaml.text("description", description_of(parameter));
   write_type(yaml, parameter, standard);
   write_cases(yaml, parameter);
+  write_jobs(yaml, parameter);
+  if (parameter.query != nullptr) yaml.line(std::string("x-query: ") + parameter.query);
   if (*parameter.unit != '\0') yaml.line(std::string("x-unit: ") + parameter.unit);
   if (parameter.option != nullptr) yaml.line(std::string("x-option: ") + parameter.option);
 }
@@ -397,9 +374,14 @@ std::string formats() {
     yaml.text("description",
               "A mesh file's format and suffix. STL and PLY are binary. `zip` is for labels: it "
               "holds one file of each label, in the other formats that are asked for, `glb` "
-              "aside, or in STL.");
+              "and `3mf` aside, or in STL.");
     yaml.line("type: string");
     yaml.line("enum: " + in_brackets(value_names<MeshFormat>()));
+    std::vector<std::string> whole;
+    for (const MeshFormat format : values_of<MeshFormat>()) {
+      if (holds_all_labels(format)) whole.push_back(name_of(format));
+    }
+    yaml.line("x-hold-all-labels: " + in_brackets(whole));
   });
   return yaml.str();
 }

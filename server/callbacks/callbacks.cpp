@@ -10,6 +10,7 @@
 #include <curl/curl.h>
 #include <spdlog/spdlog.h>
 
+#include "base/curl.h"
 #include "base/mutex.h"
 #include "server/callbacks/signature.h"
 
@@ -24,33 +25,11 @@ constexpr milliseconds kLongestSleep{5'000};
 // After the database could not be read or written.
 constexpr milliseconds kPause{1'000};
 
-struct EasyCleanup {
-  void operator()(CURL* easy) const { curl_easy_cleanup(easy); }
-};
-struct MultiCleanup {
-  void operator()(CURLM* multi) const { curl_multi_cleanup(multi); }
-};
-struct ListCleanup {
-  void operator()(curl_slist* list) const { curl_slist_free_all(list); }
-};
-using Easy = std::unique_ptr<CURL, EasyCleanup>;
-using Multi = std::unique_ptr<CURLM, MultiCleanup>;
-using Headers = std::unique_ptr<curl_slist, ListCleanup>;
-
-Multi make_multi() {
-  // Not thread safe in itself, so once.
-  static const CURLcode ready = curl_global_init(CURL_GLOBAL_DEFAULT);
-  Multi multi(ready == CURLE_OK ? curl_multi_init() : nullptr);
-  if (!multi) throw Error(ErrorCode::kInternal, "libcurl cannot be used");
-  return multi;
-}
-
-void append(Headers& headers, const std::string& line) {
-  curl_slist* longer = curl_slist_append(headers.get(), line.c_str());
-  if (longer == nullptr) throw std::bad_alloc();
-  static_cast<void>(headers.release());
-  headers.reset(longer);
-}
+using curl::append;
+using curl::Easy;
+using curl::Headers;
+using curl::make_multi;
+using curl::Multi;
 
 // An attempt under way; what the transfer points to lives here.
 struct Attempt {
@@ -142,8 +121,7 @@ class Callbacks::Sender {
     auto attempt = std::make_unique<Attempt>();
     attempt->delivery = std::move(delivery);
     attempt->reach = *reach;
-    attempt->easy.reset(curl_easy_init());
-    if (!attempt->easy) throw std::bad_alloc();
+    attempt->easy = curl::make_easy();
     set_up(*attempt);
     if (curl_multi_add_handle(multi_.get(), attempt->easy.get()) != CURLM_OK) {
       throw Error(ErrorCode::kInternal, "a transfer cannot be started");

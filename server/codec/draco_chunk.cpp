@@ -84,12 +84,14 @@ std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_
 }
 
 DracoStream DracoEncoder::encode_block(const mesh::Mesh& mesh, const Block& block,
-                                       const DracoOptions& options,
-                                       std::span<const mesh::Vec3> normals,
+                                       const DracoOptions& options, const VertexData& data,
                                        const mesh::Context& context) {
-  take(mesh, block, normals);
-  DracoStream stream = encode({part_.positions, part_.normals, part_.triangles,
-                               part_.layer_vertices, part_.layer_triangles},
+  take(mesh, block, data);
+  DracoStream stream = encode({part_.positions,
+                               {part_.normals, part_.distances, data.most_distance},
+                               part_.triangles,
+                               part_.layer_vertices,
+                               part_.layer_triangles},
                               options, edgebreaker::Threads::kOne, context);
   set_bounds(part_.positions, options.grid, stream);
   if (stream.topology) stream.topology = in_mesh(*std::move(stream.topology));
@@ -107,7 +109,7 @@ DracoStream DracoEncoder::encode_whole(const mesh::Mesh& mesh, const DracoOption
 DracoStream DracoEncoder::encode(const Part& part, const DracoOptions& options,
                                  edgebreaker::Threads threads, const mesh::Context& context) {
   most_triangles_ = std::max(most_triangles_, part.triangles.size());
-  if (is_own_draco({options.grid.bits, options.speed}) && part.normals.empty()) {
+  if (is_own_draco({options.grid.bits, options.speed}) && part.data.empty()) {
     auto encoded =
         encoder_.encode({part.positions, part.triangles, part.layer_vertices, part.layer_triangles},
                         options.grid, threads, context);
@@ -118,7 +120,7 @@ DracoStream DracoEncoder::encode(const Part& part, const DracoOptions& options,
               .topology = std::move(encoded->topology)};
     }
   }
-  return encode_with_libdraco({part.positions, part.normals, part.triangles}, options.grid,
+  return encode_with_libdraco({part.positions, part.data, part.triangles}, options.grid,
                               options.speed);
 }
 
@@ -145,8 +147,7 @@ mesh::PartTopology DracoEncoder::in_mesh(mesh::PartTopology part) const {
 // Numbers the block's vertices anew, in the order in which its triangles name them. Those that a
 // run is the first to name are a layer above it, since the next run may name them too, and no
 // other.
-void DracoEncoder::take(const mesh::Mesh& mesh, const Block& block,
-                        std::span<const mesh::Vec3> normals) {
+void DracoEncoder::take(const mesh::Mesh& mesh, const Block& block, const VertexData& data) {
   constexpr std::uint32_t kUnnamed = std::numeric_limits<std::uint32_t>::max();
   std::uint32_t low = kUnnamed;
   std::uint32_t high = 0;
@@ -162,6 +163,7 @@ void DracoEncoder::take(const mesh::Mesh& mesh, const Block& block,
   part_.origin.clear();
   part_.positions.clear();
   part_.normals.clear();
+  part_.distances.clear();
   part_.triangles.clear();
   part_.layer_vertices.assign(2, 0);
   part_.layer_triangles.assign(1, 0);
@@ -174,7 +176,10 @@ void DracoEncoder::take(const mesh::Mesh& mesh, const Block& block,
           vertex = static_cast<std::uint32_t>(part_.positions.size());
           part_.origin.push_back(triangle[corner]);
           part_.positions.push_back(mesh.positions[triangle[corner]]);
-          if (!normals.empty()) part_.normals.push_back(normals[triangle[corner]]);
+          if (!data.normals.empty()) part_.normals.push_back(data.normals[triangle[corner]]);
+          if (!data.distances.empty()) {
+            part_.distances.push_back(data.distances[triangle[corner]]);
+          }
         }
         renumbered[corner] = vertex;
       }

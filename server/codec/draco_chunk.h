@@ -22,6 +22,7 @@ struct DracoStream {
   std::uint32_t triangles = 0;
   std::uint32_t position_id = 0;  // the attributes' ids within the stream
   std::uint32_t normal_id = 0;
+  std::uint32_t distance_id = 0;
   mesh::Vec3 low = {0, 0, 0};  // bounds of the decoded positions
   mesh::Vec3 high = {0, 0, 0};
   // What encoding it has shown of the triangles, in the mesh's numbers of vertices; libdraco shows
@@ -49,6 +50,15 @@ using Block = std::vector<Run>;
 // one block. No empty blocks.
 std::vector<Block> cut_blocks(const mesh::Mesh& mesh, std::size_t triangles_per_block);
 
+// What vertices have beside their positions; of each as many as positions, or none.
+struct VertexData {
+  std::span<const mesh::Vec3> normals = {};
+  std::span<const float> distances = {};  // millimetres
+  float most_distance = 0;                // of all that share a grid; finite
+
+  bool empty() const { return normals.empty() && distances.empty(); }
+};
+
 struct DracoOptions {
   Grid grid;
   int speed = 7;
@@ -56,15 +66,15 @@ struct DracoOptions {
 
 // Encodes blocks of a mesh, or all of it, one after the other in memory that it keeps. Our own
 // encoder takes what it covers at the speeds 5 to 9: see draco/encoder.h. libdraco takes the rest:
-// the slower speeds, whose streams are smaller, speed 10, which is sequential, normals, finer
-// grids, and surfaces that are no oriented manifolds. Not thread safe. Throws Error kInternal when
-// libdraco refuses, and kCancelled, which libdraco does not look at.
+// the slower speeds, whose streams are smaller, speed 10, which is sequential, normals and
+// distances, finer grids, and surfaces that are no oriented manifolds. Not thread safe. Throws
+// Error kInternal when libdraco refuses, and kCancelled, which libdraco does not look at.
 class DracoEncoder {
  public:
-  // The block's triangles with the vertices they name, on one thread. `normals` are those of the
-  // mesh's vertices, or none; a normal decodes to the same bits in every stream.
+  // The block's triangles with the vertices they name, on one thread. `data` is of the mesh's
+  // vertices; it decodes to the same bits in every stream.
   DracoStream encode_block(const mesh::Mesh& mesh, const Block& block, const DracoOptions& options,
-                           std::span<const mesh::Vec3> normals, const mesh::Context& context);
+                           const VertexData& data, const mesh::Context& context);
 
   // All triangles with the vertices they name. The stream's bounds are left out. Our own encoder
   // takes several threads, and gives the same bytes on any number.
@@ -78,7 +88,7 @@ class DracoEncoder {
   // What is encoded, as arrays; layers as mesh::Mesh has them.
   struct Part {
     std::span<const mesh::Vec3> positions;
-    std::span<const mesh::Vec3> normals;  // as many, or none
+    VertexData data;
     std::span<const mesh::Triangle> triangles;
     std::span<const std::uint64_t> layer_vertices;
     std::span<const std::uint64_t> layer_triangles;
@@ -87,6 +97,7 @@ class DracoEncoder {
   struct PartMemory {
     std::vector<mesh::Vec3> positions;
     std::vector<mesh::Vec3> normals;
+    std::vector<float> distances;
     std::vector<mesh::Triangle> triangles;
     std::vector<std::uint64_t> layer_vertices;
     std::vector<std::uint64_t> layer_triangles;
@@ -96,7 +107,7 @@ class DracoEncoder {
   };
 
   mesh::PartTopology in_mesh(mesh::PartTopology part) const;
-  void take(const mesh::Mesh& mesh, const Block& block, std::span<const mesh::Vec3> normals);
+  void take(const mesh::Mesh& mesh, const Block& block, const VertexData& data);
   DracoStream encode(const Part& part, const DracoOptions& options, edgebreaker::Threads threads,
                      const mesh::Context& context);
 

@@ -1,6 +1,7 @@
 #include "server/codec/encode.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace isomesh::codec {
 namespace {
@@ -19,23 +20,20 @@ double draco_bytes_per_vertex(double usual, const MeshParameters& parameters) {
   return std::max(kSmallest, usual + 3 * more_bits / 8);
 }
 
+// How many times the finest level's triangles all levels of detail have together.
+double levels_of(const MeshParameters& parameters) {
+  return parameters.lods.empty()
+             ? 1
+             : std::accumulate(parameters.lods.begin(), parameters.lods.end(), 0.0);
+}
+
 std::uint64_t no_memory(const SurfaceSize& /*surface*/, const MeshParameters& /*parameters*/) {
   return 0;
 }
 
-template <auto kEncode>
-std::optional<mesh::Topology> without_topology(const mesh::Mesh& mesh, const Provenance&,
-                                               const mesh::Context& context, const Sink& sink) {
-  kEncode(mesh, context, sink);
-  return std::nullopt;
-}
-
-std::optional<mesh::Topology> refuse_zip(const mesh::Mesh&, const Provenance&, const mesh::Context&,
-                                         const Sink&) {
-  throw Error(ErrorCode::kInternal, "a ZIP holds labels, not one surface");
-}
-
 bool never(const MeshParameters& /*parameters*/) { return false; }
+
+bool always(const MeshParameters& /*parameters*/) { return true; }
 
 bool if_ours(const MeshParameters& parameters) { return is_own_draco(parameters.draco); }
 
@@ -56,43 +54,48 @@ constexpr std::array kFormats = {
                  return surface.triangles *
                         (is_own_draco(parameters.draco) ? kOwnPerTriangle : kLibdracoPerTriangle);
                },
-           .shows_topology = if_ours,
-           .encode =
-               [](const mesh::Mesh& mesh, const Provenance& provenance,
-                  const mesh::Context& context, const Sink& sink) {
-                 return encode_drc(mesh, provenance.parameters.draco, context, sink);
-               }},
+           .shows_topology = if_ours},
     Format{.format = MeshFormat::kGlb,
            .media_type = "model/gltf-binary",
            .milliseconds_per_triangle = 4.0e-5,
            .bytes =
                [](const SurfaceSize& surface, const MeshParameters& parameters) {
-                 const double normal = parameters.normals ? 1.5 : 0;
-                 return 2000 + as_double(surface.vertices) *
-                                   (draco_bytes_per_vertex(2.7, parameters) + normal);
+                 // Of a vertex; measured.
+                 constexpr double kNormalBytes = 1.5;
+                 constexpr double kDistanceBytes = 1.5;
+                 double more = 0;
+                 if (parameters.normals) more += kNormalBytes;
+                 if (parameters.distances) more += kDistanceBytes;
+                 return 2000 + as_double(surface.vertices) * levels_of(parameters) *
+                                   (draco_bytes_per_vertex(2.7, parameters) + more);
                },
            .memory_bytes =
                [](const SurfaceSize& surface, const MeshParameters& parameters) {
                  // Measured: its parts and their bytes.
                  constexpr std::uint64_t kPerTriangle = 15;
                  constexpr std::uint64_t kNormalsPerTriangle = 8;
-                 if (!parameters.normals) return surface.triangles * kPerTriangle;
-                 return surface.vertices * sizeof(mesh::Vec3) +
-                        surface.triangles * (kPerTriangle + kNormalsPerTriangle);
+                 // A copy of the surface, and its simplification.
+                 constexpr std::uint64_t kLevelsPerTriangle = 130;
+                 std::uint64_t bytes = surface.triangles * kPerTriangle;
+                 if (parameters.normals) {
+                   bytes += surface.vertices * sizeof(mesh::Vec3) +
+                            surface.triangles * kNormalsPerTriangle;
+                 }
+                 if (parameters.distances) bytes += surface.vertices * 2 * sizeof(float);
+                 if (parameters.lods.size() > 1) bytes += surface.triangles * kLevelsPerTriangle;
+                 return bytes;
                },
            .shows_topology =
                [](const MeshParameters& parameters) {
-                 return if_ours(parameters) && !parameters.normals;
-               },
-           .encode = encode_glb},
+                 return if_ours(parameters) && !parameters.normals && !parameters.distances;
+               }},
     Format{.format = MeshFormat::kStl,
            .media_type = "model/stl",
            .milliseconds_per_triangle = 3.0e-5,
            .bytes = [](const SurfaceSize& surface,
                        const MeshParameters&) { return 84 + 50 * as_double(surface.triangles); },
            .memory_bytes = no_memory,
-           .shows_topology = never,
-           .encode = without_topology<encode_stl>},
+           .shows_topology = never},
     Format{.format = MeshFormat::kPly,
            .media_type = kUnregistered,
            .milliseconds_per_triangle = 3.0e-5,
@@ -101,8 +104,7 @@ constexpr std::array kFormats = {
                  return 300 + 12 * as_double(surface.vertices) + 13 * as_double(surface.triangles);
                },
            .memory_bytes = no_memory,
-           .shows_topology = never,
-           .encode = without_topology<encode_ply>},
+           .shows_topology = never},
     Format{.format = MeshFormat::kObj,
            .media_type = "model/obj",
            .milliseconds_per_triangle = 2.0e-4,
@@ -111,8 +113,21 @@ constexpr std::array kFormats = {
                  return 100 + 30 * as_double(surface.vertices) + 24 * as_double(surface.triangles);
                },
            .memory_bytes = no_memory,
-           .shows_topology = never,
-           .encode = without_topology<encode_obj>},
+           .shows_topology = never},
+    Format{.format = MeshFormat::k3mf,
+           .media_type = "model/3mf",
+           .milliseconds_per_triangle = 6.5e-4,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters&) {
+                 return 2000 + 18 * as_double(surface.vertices) + 7 * as_double(surface.triangles);
+               },
+           .memory_bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 // A label's surface, which may be nearly all.
+                 constexpr std::uint64_t kLabelPerTriangle = 30;
+                 return parameters.labels ? surface.triangles * kLabelPerTriangle : 0;
+               },
+           .shows_topology = always},
     Format{.format = MeshFormat::kZip,
            .media_type = "application/zip",
            .milliseconds_per_triangle = 3.0e-5,
@@ -135,8 +150,7 @@ constexpr std::array kFormats = {
                  }
                  return bytes;
                },
-           .shows_topology = never,
-           .encode = refuse_zip},
+           .shows_topology = never},
 };
 
 }  // namespace
@@ -145,12 +159,6 @@ const Format& describe(MeshFormat format) {
   const auto found = std::ranges::find(kFormats, format, &Format::format);
   if (found == kFormats.end()) throw Error(ErrorCode::kInternal, "a format has no encoder");
   return *found;
-}
-
-std::optional<mesh::Topology> encode(const mesh::Mesh& mesh, MeshFormat format,
-                                     const Provenance& provenance, const mesh::Context& context,
-                                     const Sink& sink) {
-  return describe(format).encode(mesh, provenance, context, sink);
 }
 
 }  // namespace isomesh::codec

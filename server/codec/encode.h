@@ -16,6 +16,7 @@
 #include "server/mesh/extract.h"
 #include "server/mesh/mesh.h"
 #include "server/mesh/topology.h"
+#include "server/mesh/triangle_grid.h"
 
 namespace isomesh::codec {
 
@@ -72,11 +73,16 @@ struct Provenance {
 // stream of its own (KHR_draco_mesh_compression), encoded side by side. All share one quantisation
 // grid, so vertices on a seam between blocks decode to the same bits, and so do their normals,
 // which are there when the parameters ask for them. Positions are LPS millimetres under a node that
-// turns them into glTF's metres with Y up. The bytes do not depend on the number of threads. Throws
-// Error kTooLarge beyond the 4 GiB that GLB can hold, kInternal when Draco refuses, and kCancelled,
-// looked at before each block.
+// turns them into glTF's metres with Y up. With parameters.lods, coarser levels (MSFT_lod) are
+// nodes like that one outside the scene, each simplified from the mesh without a bound of its error
+// and on the same grid, one that has no fewer triangles than the level before left out; in the file
+// the coarsest comes first. With parameters.distances, `extracted` is the surface that they are
+// measured to, before coordinates are rounded: the attribute _DISTANCE_MM of every level. The bytes
+// do not depend on the number of threads. Throws Error kTooLarge beyond the 4 GiB that GLB can
+// hold, kInternal when Draco refuses, and kCancelled, looked at before each block.
 std::optional<mesh::Topology> encode_glb(const mesh::Mesh& mesh, const Provenance& provenance,
-                                         const mesh::Context& context, const Sink& sink);
+                                         const mesh::Context& context, const Sink& sink,
+                                         const mesh::TriangleGrid* extracted = nullptr);
 
 // What the server knows of a format. Its name, which is a file's suffix as well, is in proto. Times
 // and sizes are first guesses, from a head of five million triangles on two cores.
@@ -90,16 +96,17 @@ struct Format {
   std::uint64_t (*memory_bytes)(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
   // Whether encoding nearly always shows the mesh's topology on its way.
   bool (*shows_topology)(const MeshParameters& parameters);
-  std::optional<mesh::Topology> (*encode)(const mesh::Mesh& mesh, const Provenance& provenance,
-                                          const mesh::Context& context, const Sink& sink);
 };
 
 // The format's row in the one table of them; constant time.
 const Format& describe(MeshFormat format);
 
-// As the format's encoder does. Returns the mesh's topology where encoding it has shown that.
+// As the format's encoder does; `extracted` is for GLB with distances alone. 3MF's is in
+// zip/threemf.h. Returns the mesh's topology where encoding it has shown that. A part of the target
+// isomesh_zip.
 std::optional<mesh::Topology> encode(const mesh::Mesh& mesh, MeshFormat format,
                                      const Provenance& provenance, const mesh::Context& context,
-                                     const Sink& sink);
+                                     const Sink& sink,
+                                     const mesh::TriangleGrid* extracted = nullptr);
 
 }  // namespace isomesh::codec

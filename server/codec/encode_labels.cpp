@@ -10,7 +10,6 @@
 #include <string>
 #include <string_view>
 
-#include "proto/error.h"
 #include "server/codec/block_writer.h"
 #include "server/codec/records.h"
 
@@ -123,23 +122,6 @@ void encode_labels_obj(const LabelledSurface& surface, const mesh::Context& cont
       return write_obj_face(face_of(surface, n, own[t]), out);
     });
   }
-}
-
-void encode_labels(const LabelledSurface& surface, MeshFormat format, const Provenance& provenance,
-                   const mesh::Context& context, const Sink& sink) {
-  switch (format) {
-    case MeshFormat::kGlb:
-      return encode_labels_glb(surface, provenance, context, sink);
-    case MeshFormat::kPly:
-      return encode_labels_ply(surface, context, sink);
-    case MeshFormat::kObj:
-      return encode_labels_obj(surface, context, sink);
-    case MeshFormat::kDrc:
-    case MeshFormat::kStl:
-    case MeshFormat::kZip:
-      break;
-  }
-  throw Error(ErrorCode::kInternal, "a file of that format does not hold all labels");
 }
 
 }  // namespace isomesh::codec

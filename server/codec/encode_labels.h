@@ -11,6 +11,7 @@
 #include "server/mesh/context.h"
 #include "server/mesh/label_surface.h"
 #include "server/mesh/separate.h"
+#include "server/mesh/triangle_grid.h"
 
 namespace isomesh::codec {
 
@@ -19,6 +20,8 @@ struct LabelledSurface {
   const mesh::SeparatingSurface& walls;
   const mesh::LabelTriangles& triangles;  // of the walls
   std::span<const LabelSummary> labels;   // in the order of the walls' own
+  // The walls as they were extracted; for files that ask for the distances to them.
+  const mesh::TriangleGrid* extracted = nullptr;
 };
 
 // What a label is called in files: its name, or "label 3" where it has none.
@@ -31,7 +34,9 @@ std::array<double, 3> color_of(const LabelSummary& label);
 // Binary glTF 2.0: as encode_glb (encode.h), with a node, a mesh and a material for each label
 // under the one that turns LPS millimetres into glTF's metres. A node has the label's title, and
 // label, voxels, volume_mm3 and area_mm2 as extras. All labels share one quantisation grid: what
-// two of them have in common decodes to the same bits. Throws as encode_glb does.
+// two of them have in common decodes to the same bits. Coarser levels are of each label's node; the
+// walls are simplified together, so labels have them in common there too. Throws as encode_glb
+// does.
 void encode_labels_glb(const LabelledSurface& surface, const Provenance& provenance,
                        const mesh::Context& context, const Sink& sink);
 
@@ -48,7 +53,7 @@ void encode_labels_obj(const LabelledSurface& surface, const mesh::Context& cont
                        const Sink& sink);
 
 // A format's encoder of all labels, for those of which one file holds them. Throws Error kInternal
-// for others, and as that encoder does.
+// for others, and as that encoder does. A part of the target isomesh_zip.
 void encode_labels(const LabelledSurface& surface, MeshFormat format, const Provenance& provenance,
                    const mesh::Context& context, const Sink& sink);
 

@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kSequentialSpeed = 10;
 constexpr int kNormalBits = 10;  // of each octahedral coordinate: a tenth of a degree
+constexpr int kDistanceBits = 12;
 
 // Draco's entropy coder counts values in an array of all that there could be, four bytes each: 4
 // GiB at 30 bits. Finer grids than this are stored without it, in up to four bytes a coordinate.
@@ -25,15 +26,17 @@ constexpr int kMostEntropyCodedBits = 24;
 constexpr std::size_t kLeastPerTriangle = 3;
 constexpr std::size_t kHeadBytes = 32;
 
-// Adds one vector a point. Returns the attribute's id within the stream.
+// Adds one vector, or one number, a point. Returns the attribute's id within the stream.
+template <class T>
 std::uint32_t add_attribute(draco::Mesh& mesh, draco::GeometryAttribute::Type type,
-                            std::span<const mesh::Vec3> vectors) {
+                            std::span<const T> values) {
   draco::GeometryAttribute description;
-  description.Init(type, nullptr, 3, draco::DT_FLOAT32, false, sizeof(mesh::Vec3), 0);
+  description.Init(type, nullptr, sizeof(T) / sizeof(float), draco::DT_FLOAT32, false, sizeof(T),
+                   0);
   draco::PointAttribute* attribute = mesh.attribute(
-      mesh.AddAttribute(description, true, static_cast<std::uint32_t>(vectors.size())));
-  // One write for all: the attribute's buffer has the layout of our vectors.
-  if (!vectors.empty()) attribute->buffer()->Write(0, vectors.data(), vectors.size_bytes());
+      mesh.AddAttribute(description, true, static_cast<std::uint32_t>(values.size())));
+  // One write for all: the attribute's buffer has the layout of our arrays.
+  if (!values.empty()) attribute->buffer()->Write(0, values.data(), values.size_bytes());
   return attribute->unique_id();
 }
 
@@ -54,7 +57,7 @@ std::unique_ptr<draco::Mesh> to_draco(std::size_t vertices,
 // The same triangles with the vertices that they name. Draco's own decoder refuses sequential
 // streams of more vertices than corners.
 struct Named {
-  explicit Named(const Arrays& arrays) {
+  explicit Named(const Arrays& arrays) : most_distance(arrays.data.most_distance) {
     constexpr std::uint32_t kUnnamed = ~std::uint32_t{0};
     std::vector<std::uint32_t> number(arrays.positions.size(), kUnnamed);
     for (const mesh::Triangle& triangle : arrays.triangles) {
@@ -64,17 +67,21 @@ struct Named {
         if (vertex == kUnnamed) {
           vertex = static_cast<std::uint32_t>(positions.size());
           positions.push_back(arrays.positions[triangle[corner]]);
-          if (!arrays.normals.empty()) normals.push_back(arrays.normals[triangle[corner]]);
+          const VertexData& data = arrays.data;
+          if (!data.normals.empty()) normals.push_back(data.normals[triangle[corner]]);
+          if (!data.distances.empty()) distances.push_back(data.distances[triangle[corner]]);
         }
         renumbered[corner] = vertex;
       }
     }
   }
 
-  Arrays arrays() const { return {positions, normals, triangles}; }
+  Arrays arrays() const { return {positions, {normals, distances, most_distance}, triangles}; }
 
   std::vector<mesh::Vec3> positions;
   std::vector<mesh::Vec3> normals;
+  std::vector<float> distances;
+  float most_distance;
   std::vector<mesh::Triangle> triangles;
 };
 
@@ -100,9 +107,19 @@ DracoStream encode_with_libdraco(const Arrays& arrays, const Grid& grid, int spe
       add_attribute(*draco_mesh, draco::GeometryAttribute::POSITION, arrays.positions);
   const bool sequential = is_sequential(arrays.triangles, speed);
   draco::Encoder encoder;
-  if (!arrays.normals.empty()) {
-    stream.normal_id = add_attribute(*draco_mesh, draco::GeometryAttribute::NORMAL, arrays.normals);
+  const VertexData& data = arrays.data;
+  if (!data.normals.empty()) {
+    stream.normal_id = add_attribute(*draco_mesh, draco::GeometryAttribute::NORMAL, data.normals);
     encoder.SetAttributeQuantization(draco::GeometryAttribute::NORMAL, kNormalBits);
+  }
+  if (!data.distances.empty()) {
+    stream.distance_id =
+        add_attribute(*draco_mesh, draco::GeometryAttribute::GENERIC, data.distances);
+    // One scale for all streams, by which a vertex on a seam has the same number on both sides.
+    const float nearest = 0;
+    const float range = data.most_distance > 0 ? data.most_distance : 1;
+    encoder.SetAttributeExplicitQuantization(draco::GeometryAttribute::GENERIC, kDistanceBits, 1,
+                                             &nearest, range);
   }
   encoder.SetSpeedOptions(speed, speed);
   if (grid.bits > kMostEntropyCodedBits) {

@@ -1,27 +1,15 @@
-#include <charconv>
-
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
 #include "server/codec/records.h"
 
 namespace isomesh::codec {
-namespace {
-
-// Space for `most` more bytes is there.
-template <class... Format>
-char* append_number(char* out, std::size_t most, Format... number) {
-  *out++ = ' ';
-  return std::to_chars(out, out + most, number...).ptr;
-}
-
-}  // namespace
 
 std::byte* write_obj_vertex(const mesh::Vec3& position, std::byte* begin) {
   char* out = reinterpret_cast<char*>(begin);
   *out++ = 'v';
   for (const float coordinate : position) {
-    // The shortest text that reads as the same number.
-    out = append_number(out, kMostFloatBytes, coordinate, std::chars_format::fixed);
+    *out++ = ' ';
+    out = write_number(coordinate, out);
   }
   *out++ = '\n';
   return reinterpret_cast<std::byte*>(out);
@@ -31,7 +19,8 @@ std::byte* write_obj_face(const mesh::Triangle& triangle, std::byte* begin) {
   char* out = reinterpret_cast<char*>(begin);
   *out++ = 'f';
   for (const std::uint32_t vertex : triangle) {
-    out = append_number(out, kMostIndexBytes, std::uint64_t{vertex} + 1);  // OBJ counts from 1
+    *out++ = ' ';
+    out = write_number(std::uint64_t{vertex} + 1, out);  // OBJ counts from 1
   }
   *out++ = '\n';
   return reinterpret_cast<std::byte*>(out);

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "server/codec/number_text.h"
 #include "server/mesh/mesh.h"
 
 namespace isomesh::codec {
@@ -19,10 +20,6 @@ std::byte* write_ply_vertex(const mesh::Vec3& position, std::byte* out);
 std::byte* write_ply_face(const mesh::Triangle& triangle, std::byte* out);
 
 inline constexpr std::string_view kObjHeader = "# isomesh, millimetres, LPS\n";
-// Without an exponent, which some readers do not know: a sign, up to 39 digits before the point, or
-// a point and up to 54 digits behind it.
-inline constexpr std::size_t kMostFloatBytes = 64;
-inline constexpr std::size_t kMostIndexBytes = 10;
 inline constexpr std::size_t kMostObjVertexBytes = 2 + 3 * (1 + kMostFloatBytes);
 inline constexpr std::size_t kMostObjFaceBytes = 2 + 3 * (1 + kMostIndexBytes);
 std::byte* write_obj_vertex(const mesh::Vec3& position, std::byte* out);

@@ -49,7 +49,7 @@ void encode_stl(const mesh::Mesh& mesh, const mesh::Context& context, const Sink
     throw Error(ErrorCode::kTooLarge, "the surface has more triangles than an STL file can hold");
   }
   // The header must not start with "solid", or readers take the file for text.
-  constexpr std::string_view kTitle = "isomesh binary STL, millimetres, LPS";
+  constexpr std::string_view kTitle = "isomesh binary STL, millimetres, SPACE=LPS";
   std::array<std::byte, kHeaderBytes + 4> header = {};
   std::memcpy(header.data(), kTitle.data(), kTitle.size());
   const auto count = static_cast<std::uint32_t>(triangles);

@@ -16,6 +16,7 @@
 #include "server/jobs/volume_library.h"
 #include "server/net/address.h"
 #include "server/net/tls.h"
+#include "server/orders/orders.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
 #include "server/store/outbox.h"
@@ -54,7 +55,8 @@ struct Services {
   const store::Outbox& outbox;
   callbacks::Callbacks& callbacks;
   const callbacks::CallbackTargets& callback_targets;
-  const Tokens* tokens = nullptr;  // null: requests are not authenticated
+  const Tokens* tokens = nullptr;    // null: requests are not authenticated
+  orders::Orders* orders = nullptr;  // null: no PACS is configured
 };
 
 // Thread safe where said.
@@ -76,8 +78,8 @@ class Server {
   // accepted. Thread safe.
   void begin_drain();
 
-  // Ends serve(): no connection is accepted any more, nobody waits for a job, uploads and imports
-  // are cut off. Thread safe.
+  // Ends serve(), after the orders have ended: no connection is accepted any more, nobody waits for
+  // a job, uploads and imports are cut off. Thread safe.
   void stop();
 
  private:

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "proto/error.h"
+#include "server/import/peers/series.h"
 #include "server/import/readers.h"
 
 namespace isomesh::import {
@@ -24,6 +25,7 @@ namespace {
 Volume import_volume(const ImportTask& task, const FormatListener& listener) {
   const Input input = {.path = task.source, .companions = {}, .task = task, .listener = listener};
   if (task.options.raw) return read_raw_input(input);
+  if (task.options.peers) return read_peers_series(task, listener);
   const Reader* reader = sniff(InputFile(task.source));
   if (reader == nullptr) throw_unknown_format();
   if (!task.options.member.empty() && reader->content != Content::kFiles) {

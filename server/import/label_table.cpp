@@ -21,15 +21,6 @@ std::string valid_utf8(std::string_view text) {
   return Json::parse(quoted).get<std::string>();
 }
 
-std::string_view cut(std::string_view text, std::size_t most) {
-  if (text.size() <= most) return text;
-  const auto continues = [](char byte) {
-    return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80;
-  };
-  while (most > 0 && continues(text[most])) --most;
-  return text.substr(0, most);
-}
-
 void check_size(const std::vector<LabelEntry>& entries) {
   if (entries.size() > Volume::kMostLabels) {
     throw_unusable("The file has " + std::to_string(entries.size()) + " labels, and " +
@@ -50,8 +41,8 @@ void check_size(const std::vector<LabelEntry>& entries) {
 
 std::string label_name(std::string_view text) {
   // More than the bytes that can remain, before others are replaced by longer ones.
-  const std::string_view beginning = cut(trimmed(text), LabelEntry::kMostNameBytes);
-  return std::string(cut(printable(valid_utf8(beginning)), LabelEntry::kMostNameBytes));
+  const std::string_view first = beginning(trimmed(text), LabelEntry::kMostNameBytes);
+  return std::string(beginning(printable(valid_utf8(first)), LabelEntry::kMostNameBytes));
 }
 
 std::optional<std::string> label_color(const std::array<double, 3>& parts) {

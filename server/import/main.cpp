@@ -2,17 +2,21 @@
 // made ahead. A copy gives up what no import needs, reads its order from kChildDescriptor, gives up
 // what the order does not need, and writes its answer to the same descriptor.
 #include <array>
+#include <cstdint>
 #include <cstdlib>
 #include <new>
 #include <string>
 #include <string_view>
 #include <typeinfo>
+#include <variant>
 
 #include <unistd.h>
 
 #include "base/error.h"
 #include "proto/error.h"
+#include "server/import/dicom/text.h"
 #include "server/import/import.h"
+#include "server/import/peers/answer.h"
 #include "server/process/fork_server.h"
 #include "server/process/import_message.h"
 #include "server/process/sandbox.h"
@@ -43,6 +47,14 @@ void say(std::string_view message) {
   }
 }
 
+Confinement confinement_of(const AnswerOrder& order) {
+  return {.readable = order.task.source,
+          .writable = {},
+          .memory_bytes = order.bounds.memory_bytes,
+          .file_bytes = 0,
+          .time = order.bounds.time};
+}
+
 Confinement confinement_of(const ImportOrder& order) {
   // For headers, and for what an archive holds beside the samples.
   constexpr std::uint64_t kHeadroom = std::uint64_t{64} << 20;
@@ -53,22 +65,34 @@ Confinement confinement_of(const ImportOrder& order) {
           .time = order.bounds.time};
 }
 
+std::string read(const ImportOrder& order) {
+  return volume_message(import::import_volume(
+      order.task, [](std::string_view format) { say(reading_message(format)); }));
+}
+
+std::string read(const AnswerOrder& order) {
+  return answer_message(import::read_answer(order.task.source));
+}
+
 // Every exception becomes a message here, because nothing else leaves this process.
-std::string import_as_ordered(const std::string& message) {
-  ImportOrder order;
+std::string read_as_ordered(const std::string& message) {
+  std::uint64_t memory_bytes = 0;
   try {
-    order = order_from(message);
-    confine_to(confinement_of(order));
-    say(begun_message());
-    return volume_message(import::import_volume(
-        order.task, [](std::string_view format) { say(reading_message(format)); }));
+    const auto any_order = order_from(message);
+    return std::visit(
+        [&](const auto& order) {
+          memory_bytes = order.bounds.memory_bytes;
+          confine_to(confinement_of(order));
+          say(begun_message());
+          return read(order);
+        },
+        any_order);
   } catch (const Error& error) {
     return error_message(error);
   } catch (const std::bad_alloc&) {
-    return error_message(
-        {ErrorCode::kUnusableVolume, "Reading it takes more memory than the " +
-                                         std::to_string(order.bounds.memory_bytes) +
-                                         " bytes that an import may have."});
+    return error_message({ErrorCode::kUnusableVolume, "Reading it takes more memory than the " +
+                                                          std::to_string(memory_bytes) +
+                                                          " bytes that an import may have."});
   } catch (const std::exception& error) {
     // Its text comes from a library and may repeat what the file holds, so it must not reach a log.
     return error_message({ErrorCode::kInternal, std::string("An import ended with an exception: ") +
@@ -81,9 +105,12 @@ void import_one() {
   const std::string order = read_order();
   // The daemon has no use for this process any more.
   if (order.empty()) return;
-  say(import_as_ordered(order));
+  say(read_as_ordered(order));
 }
 
 }  // namespace
 
-int main() { serve_copies(import_one); }
+int main() {
+  import::dicom::load_character_sets();
+  serve_copies(import_one);
+}

@@ -20,6 +20,9 @@ constexpr double kExtractPerTriangle = 1.6e-5;
 constexpr double kConnectivityPerTriangle = 1.0e-5;
 constexpr double kSmoothPerTriangleAndPass = 3.0e-6;
 constexpr double kMeasurePerTriangle = 3.0e-5;
+constexpr double kSimplifyPerTriangle = 5.0e-4;
+constexpr double kSimplifyWithinPerTriangle = 4.0e-3;
+constexpr double kCertifyPerTriangle = 1.0e-3;
 
 // Calibrating looks at these many finished jobs, the youngest.
 constexpr std::size_t kJobsLookedAt = 50;
@@ -37,6 +40,27 @@ double smooth_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
   if (parameters.passes == 0) return 0;
   return as_double(surface.triangles) *
          (kConnectivityPerTriangle + kSmoothPerTriangleAndPass * parameters.passes);
+}
+
+// What share of the triangles is left within an error: few of them where it is much of a sample's
+// spacing. A curve through what was seen on heads of 1 mm; jobs that have finished correct it.
+double share_within(double error_mm, double spacing_mm) {
+  constexpr double kHalf = 0.07;  // of the spacing, the error that leaves half of the triangles
+  constexpr double kSteepness = 1.2;
+  return 1 / (1 + std::pow(error_mm / spacing_mm / kHalf, kSteepness));
+}
+
+double simplify_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
+  if (!parameters.max_error_mm && !parameters.triangles) return 0;
+  return as_double(surface.triangles) *
+         (parameters.max_error_mm ? kSimplifyWithinPerTriangle : kSimplifyPerTriangle);
+}
+
+double certify_ms(const SurfaceSize& surface, const SurfaceSize& written,
+                  const JobParameters& parameters) {
+  if (!parameters.certify) return 0;
+  const auto files = static_cast<double>(files_of(parameters).size());
+  return files * kCertifyPerTriangle * as_double(surface.triangles + written.triangles);
 }
 
 // Formats are written side by side, so the slowest counts whole and the others by half.
@@ -68,28 +92,40 @@ SurfaceSize surface_in_files(const MeshSummary& mesh) {
   return surface_in_files(counted);
 }
 
-// What tells the surfaces of labels of a volume apart.
-std::string key_of_labels(const MeshParameters& parameters) {
-  if (!parameters.labels) return {};
-  MeshParameters labels;
-  labels.labels = parameters.labels;
-  labels.background = parameters.background;
-  labels.label_values = parameters.label_values;
-  return to_json(labels);
+// What tells surfaces of a volume apart beside iso-value, scheme and whether they are closed.
+std::string key_of_part(const MeshParameters& parameters) {
+  if (!parameters.labels && !parameters.crop) return {};
+  MeshParameters part;
+  part.crop = parameters.crop;
+  part.labels = parameters.labels;
+  part.background = parameters.background;
+  part.label_values = parameters.label_values;
+  return to_json(part);
 }
 
 }  // namespace
 
-void CostModel::learn(const Job& job, std::uint64_t samples) {
+void CostModel::learn(const Job& job, std::uint64_t samples, double spacing_mm) {
   if (!job.mesh || job.timing.encode <= 0) return;
   const SurfaceSize surface = {job.mesh->triangles, job.mesh->vertices};
   const auto add = [](Correction& correction, double seen, double guessed) {
     correction.seen += seen;
     correction.guessed += guessed;
   };
-  add(extract_, job.timing.extract, extract_ms(surface, samples));
-  add(smooth_, job.timing.smooth, smooth_ms(surface, job.parameters));
+  SurfaceSize extracted = surface;
+  if (job.mesh->simplified) {
+    extracted.triangles = job.mesh->simplified->triangles_before;
+    extracted.vertices = extracted.triangles / 2;
+  }
+  add(extract_, job.timing.extract, extract_ms(extracted, samples));
+  add(smooth_, job.timing.smooth, smooth_ms(extracted, job.parameters));
+  add(simplify_, job.timing.simplify, simplify_ms(extracted, job.parameters));
   add(encode_, job.timing.encode, encode_ms(surface, job.parameters));
+  add(certify_, job.timing.certify, certify_ms(extracted, surface, job.parameters));
+  if (job.mesh->simplified && job.mesh->simplified->bound_by == Simplification::Bound::kError) {
+    add(share_, as_double(surface.triangles),
+        as_double(extracted.triangles) * share_within(*job.parameters.max_error_mm, spacing_mm));
+  }
   const SurfaceSize in_files = surface_in_files(*job.mesh);
   for (const auto& [format, file] : job.mesh->files) {
     add(files_.try_emplace(format, kFewBytes).first->second, as_double(file.bytes),
@@ -97,11 +133,27 @@ void CostModel::learn(const Job& job, std::uint64_t samples) {
   }
 }
 
-double CostModel::milliseconds(const SurfaceSize& surface, std::uint64_t samples,
-                               const MeshParameters& parameters) const {
+double CostModel::milliseconds(const SurfaceSize& surface, const SurfaceSize& written,
+                               std::uint64_t samples, const JobParameters& parameters) const {
   return kMillisecondsPerJob + load_ms(samples) + extract_.factor() * extract_ms(surface, samples) +
          smooth_.factor() * smooth_ms(surface, parameters) +
-         encode_.factor() * encode_ms(surface, parameters);
+         simplify_.factor() * simplify_ms(surface, parameters) +
+         encode_.factor() * encode_ms(written, parameters) +
+         certify_.factor() * certify_ms(surface, written, parameters);
+}
+
+SurfaceSize CostModel::simplified(const SurfaceSize& surface, const MeshParameters& parameters,
+                                  double spacing_mm) const {
+  double share = 1;
+  if (parameters.max_error_mm) {
+    share = std::min(1.0, share_.factor() * share_within(*parameters.max_error_mm, spacing_mm));
+  }
+  double triangles = share * as_double(surface.triangles);
+  if (parameters.triangles) triangles = std::min<double>(triangles, *parameters.triangles);
+  SurfaceSize result = surface;
+  result.triangles = static_cast<std::uint64_t>(std::llround(triangles));
+  result.vertices = std::min(surface.vertices, result.triangles / 2);
+  return result;
 }
 
 std::uint64_t CostModel::file_bytes(MeshFormat format, const SurfaceSize& surface,
@@ -124,11 +176,17 @@ Estimate Estimator::estimate(const store::Viewer& viewer, const JobParameters& p
   estimate.labels = counted.labels;
   estimate.triangles = surface.triangles;
   estimate.vertices = surface.vertices;
-  estimate.memory_bytes = estimate_memory(surface, parameters);
+  estimate.memory_bytes = estimate_memory(surface, parameters, parameters.certify);
   estimate.fits = estimate.memory_bytes <= limits_.memory_bytes;
   const CostModel costs = model(viewer);
-  estimate.milliseconds = costs.milliseconds(surface, volume.sample_count(), parameters);
-  const SurfaceSize in_files = surface_in_files(counted);
+  const double spacing_mm = std::ranges::min(volume.geometry.spacing);
+  const bool is_simplified = parameters.max_error_mm || parameters.triangles;
+  const SurfaceSize written =
+      is_simplified ? costs.simplified(surface, parameters, spacing_mm) : surface;
+  if (is_simplified) estimate.simplified_triangles = written.triangles;
+  estimate.milliseconds = costs.milliseconds(surface, written, volume.sample_count(), parameters);
+  SurfaceSize in_files = surface_in_files(counted);
+  if (is_simplified) in_files = costs.simplified(in_files, parameters, spacing_mm);
   for (const MeshFormat format : files_of(parameters)) {
     estimate.bytes[format] = costs.file_bytes(format, in_files, parameters);
   }
@@ -154,19 +212,25 @@ CountedSurface Estimator::count(const store::Viewer& viewer, const Volume& volum
     });
   };
   return *counts_.get(
-      {viewer, volume.id, iso, key_of_labels(parameters), parameters.scheme, parameters.close},
-      find);
+      {viewer, volume.id, iso, key_of_part(parameters), parameters.scheme, parameters.close}, find);
 }
 
 CostModel Estimator::model(const store::Viewer& viewer) const {
   CostModel costs;
-  std::map<std::string, std::uint64_t> samples;
+  struct Known {
+    std::uint64_t samples = 0;
+    double spacing_mm = 1;
+  };
+  std::map<std::string, Known> samples;
   for (const Job& job : jobs_.list(viewer, JobState::kSucceeded, "", kJobsLookedAt)) {
     const std::string& id = job.parameters.volume;
     if (!volumes_.contains(viewer, id)) continue;
     const auto [known, is_new] = samples.try_emplace(id);
-    if (is_new) known->second = volumes_.get(viewer, id).sample_count();
-    costs.learn(job, known->second);
+    if (is_new) {
+      const Volume volume = volumes_.get(viewer, id);
+      known->second = {volume.sample_count(), std::ranges::min(volume.geometry.spacing)};
+    }
+    costs.learn(job, known->second.samples, known->second.spacing_mm);
   }
   return costs;
 }

@@ -23,13 +23,18 @@ using mesh::SurfaceSize;
 // have finished. Plain values.
 class CostModel {
  public:
-  // Takes a job that succeeded into account; `samples` is the size of its volume. Jobs without a
-  // run of their own, whose stages took no time, change nothing.
-  void learn(const Job& job, std::uint64_t samples);
+  // Takes a job that succeeded into account; `samples` is the size of its volume, and the spacing
+  // its smallest. Jobs without a run of their own, whose stages took no time, change nothing.
+  void learn(const Job& job, std::uint64_t samples, double spacing_mm);
 
-  // Load to encode, in milliseconds, without the queue.
-  double milliseconds(const SurfaceSize& surface, std::uint64_t samples,
-                      const MeshParameters& parameters) const;
+  // What is left of a surface of which fewer triangles are asked for. A guess.
+  SurfaceSize simplified(const SurfaceSize& surface, const MeshParameters& parameters,
+                         double spacing_mm) const;
+
+  // Load to certify, in milliseconds, without the queue: of a surface as it is extracted and as it
+  // is written.
+  double milliseconds(const SurfaceSize& surface, const SurfaceSize& written, std::uint64_t samples,
+                      const JobParameters& parameters) const;
 
   // Of one file. Exact for STL.
   std::uint64_t file_bytes(MeshFormat format, const SurfaceSize& surface,
@@ -47,11 +52,15 @@ class CostModel {
   };
 
   static constexpr Correction kFewMilliseconds = {20, 20};
+  static constexpr Correction kFewTriangles = {100'000, 100'000};
   static constexpr Correction kFewBytes = {100'000, 100'000};
 
   Correction extract_ = kFewMilliseconds;
   Correction smooth_ = kFewMilliseconds;
+  Correction simplify_ = kFewMilliseconds;
   Correction encode_ = kFewMilliseconds;
+  Correction certify_ = kFewMilliseconds;
+  Correction share_ = kFewTriangles;        // that simplification leaves
   std::map<MeshFormat, Correction> files_;  // kFewBytes for those that are not here
 };
 

@@ -62,6 +62,7 @@ Volume volume_of(process::ImportReport report, const process::ImportTask& task) 
                  describe(report.error->code()).name);
     throw *report.error;
   }
+  if (!report.volume) throw_lying();
   check(*report.volume, task);
   report.volume->id.clear();
   report.volume->created.clear();
@@ -97,6 +98,25 @@ ImportRunner::ImportRunner(const RunnerOptions& options)
 Volume ImportRunner::run(const process::ImportTask& task) {
   // Checked here, because a message of JSON cannot carry numbers that are not finite.
   if (task.options.raw) volume::check_raw(*task.options.raw, task.limits);
+  const process::ImportBounds bounds = bounds_for(size_of(task.source), options_.bounds);
+  return volume_of(report_of(process::to_message(process::ImportOrder{task, bounds})), task);
+}
+
+process::PeersAnswer ImportRunner::read_answer(const std::filesystem::path& file) {
+  const process::ImportBounds bounds = bounds_for(size_of(file), options_.bounds);
+  try {
+    process::ImportReport report =
+        report_of(process::to_message(process::AnswerOrder{{file}, bounds}));
+    if (report.error) throw *report.error;
+    if (!report.answer) throw_lying();
+    return *std::move(report.answer);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kUnusableVolume) throw;
+    throw Error(ErrorCode::kPacsUnreachable, "the answer of the PACS cannot be read");
+  }
+}
+
+process::ImportReport ImportRunner::report_of(const std::string& message) {
   take_place();
   const struct Leave {
     ImportRunner& runner;
@@ -106,15 +126,16 @@ Volume ImportRunner::run(const process::ImportTask& task) {
   // One that has died while it waited has not touched the file. More than one is no accident.
   constexpr int kMostIdleDeaths = 3;
   for (int tries = 0; tries < kMostIdleDeaths; ++tries) {
-    if (auto volume = run_in(prepared_.take(), task)) return *std::move(volume);
+    if (auto report = run_in(prepared_.take(), message)) return *std::move(report);
     spdlog::warn("a prepared process had ended before its import began");
   }
   throw Error(ErrorCode::kInternal, "The importing processes end before their imports begin.");
 }
 
-std::optional<Volume> ImportRunner::run_in(process::Child child, const process::ImportTask& task) {
+std::optional<process::ImportReport> ImportRunner::run_in(process::Child child,
+                                                          const std::string& message) {
   using Ending = process::Heard::Ending;
-  child.tell(process::to_message({task, bounds_for(size_of(task.source), options_.bounds)}));
+  child.tell(message);
   const auto deadline = Clock::now() + options_.bounds.time;
   const process::Heard heard = child.listen(kMostAnswerBytes, deadline, stop_.get_token());
   if (heard.ending == Ending::kStopped) {
@@ -124,7 +145,8 @@ std::optional<Volume> ImportRunner::run_in(process::Child child, const process::
   if (heard.ending == Ending::kTooLong) {
     refuse_dead("after " + std::to_string(options_.bounds.time.count()) + " seconds", report);
   }
-  if (heard.ending == Ending::kTooMuch || (!report.volume && !report.error)) {
+  const bool is_answered = report.volume || report.answer || report.error;
+  if (heard.ending == Ending::kTooMuch || !is_answered) {
     const auto status = child.ended_within(kEnd);
     if (heard.ending == Ending::kClosed && !report.begun) return std::nullopt;
     prepared_.renew();
@@ -132,7 +154,7 @@ std::optional<Volume> ImportRunner::run_in(process::Child child, const process::
   }
   // Ended before the file is checked, so that nothing can change it afterwards.
   child.end();
-  return volume_of(std::move(report), task);
+  return report;
 }
 
 void ImportRunner::stop() {

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string>
 
 #include "server/process/import_message.h"
 #include "server/process/prepared.h"
@@ -34,12 +35,19 @@ class ImportRunner {
   // bounds, kUnavailable once stopped. The volume has been compared with the canonical file.
   Volume run(const process::ImportTask& task);
 
+  // Reads what a PACS has answered, in such a process. Throws Error kPacsUnreachable when it cannot
+  // be read, also when the process crashes or exceeds its bounds, kUnavailable once stopped.
+  process::PeersAnswer read_answer(const std::filesystem::path& file);
+
   // Ends the imports that run or wait, and refuses further ones.
   void stop();
 
  private:
+  // What a process says that is told so; it has ended when this returns. Throws as run() does,
+  // when it says neither what was asked for nor why there is nothing.
+  process::ImportReport report_of(const std::string& message);
   // Empty when the process had ended before it began.
-  std::optional<Volume> run_in(process::Child child, const process::ImportTask& task);
+  std::optional<process::ImportReport> run_in(process::Child child, const std::string& message);
   void take_place();
   void give_place_back();
 

@@ -73,7 +73,8 @@ Job job_with(const MeshSummary& summary) {
 }
 
 Json json_of(const Timing& timing) {
-  return {timing.queue, timing.load, timing.extract, timing.smooth, timing.encode, timing.total};
+  return {timing.queue,    timing.load,   timing.extract, timing.smooth,
+          timing.simplify, timing.encode, timing.certify, timing.total};
 }
 
 Timing timing_from(const Json& json) {
@@ -81,8 +82,10 @@ Timing timing_from(const Json& json) {
           .load = json.at(1),
           .extract = json.at(2),
           .smooth = json.at(3),
-          .encode = json.at(4),
-          .total = json.at(5)};
+          .simplify = json.at(4),
+          .encode = json.at(5),
+          .certify = json.at(6),
+          .total = json.at(7)};
 }
 
 Json json_of(const JobProgress& progress) {
@@ -145,6 +148,7 @@ std::string to_line(const JobOrder& order) {
                   {"volume", order.volume.id},
                   {"notes", json_of(order.volume.notes)},
                   {"iso", order.iso},
+                  {"certify", order.certify},
                   {"memory_bytes", order.memory_bytes},
                   {"disk_bytes", order.disk_bytes}},
                  job_with(order.parameters));
@@ -167,6 +171,7 @@ std::optional<JobOrder> order_from(std::string_view line) {
                       .volume = {},
                       .parameters = record_of(line).parameters,
                       .iso = json.at("iso").get<double>(),
+                      .certify = json.at("certify").get<bool>(),
                       .memory_bytes = json.at("memory_bytes").get<std::uint64_t>(),
                       .disk_bytes = json.at("disk_bytes").get<std::uint64_t>()};
     order.volume.id = json.at("volume").get<std::string>();

@@ -37,6 +37,7 @@ struct JobOrder {
   Volume volume;  // its id and notes
   MeshParameters parameters;
   double iso = 0;  // whatever the parameters say of it
+  bool certify = false;
   std::uint64_t memory_bytes = 0;
   std::uint64_t disk_bytes = 0;  // of all files together
 };

@@ -21,6 +21,7 @@
 #include "base/files.h"
 #include "base/mutex.h"
 #include "base/niceness.h"
+#include "server/jobs/crop.h"
 #include "server/jobs/job_message.h"
 #include "server/jobs/make_labels.h"
 #include "server/jobs/make_mesh.h"
@@ -179,9 +180,14 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspac
   std::optional<mesh::OneThread> alone;
   if (canonical.header().sample_bytes() <= kFewSampleBytes) alone.emplace();
   MadeMesh made;
-  const MeshRequest request = {order.volume, order.parameters, order.iso, order.memory_bytes,
-                               order.disk_bytes};
-  const SampleArray samples = array_of(canonical);
+  const MeshRequest request = {.volume = order.volume,
+                               .parameters = order.parameters,
+                               .iso = order.iso,
+                               .certify = order.certify,
+                               .memory_bytes = order.memory_bytes,
+                               .disk_bytes = order.disk_bytes};
+  const CroppedSamples cropped(array_of(canonical), order.parameters);
+  const SampleArray& samples = cropped.array();
   made.summary = order.parameters.labels
                      ? make_labels(samples, request, sinks, progress, workspace.walls)
                      : make_mesh(samples, request, sinks, progress, workspace.mesh);
@@ -193,8 +199,9 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspac
 CountedSurface count(Task task, const std::stop_token& stop, Speaker& speaker) {
   speaker.say(JobProgress{});  // it has begun
   const volume::CanonicalVolume canonical(InputFile(std::move(task.file)));
-  const SampleArray samples = array_of(canonical);
   const MeshParameters& parameters = task.order.parameters;
+  const CroppedSamples cropped(array_of(canonical), parameters);
+  const SampleArray& samples = cropped.array();
   if (parameters.labels) return count_labels(samples, parameters, {stop, nullptr});
   return {count_surface(samples, parameters, task.order.iso, {stop, nullptr})};
 }

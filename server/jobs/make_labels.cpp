@@ -8,8 +8,11 @@
 #include "proto/samples.h"
 #include "server/codec/encode_labels.h"
 #include "server/codec/zip/label_zip.h"
+#include "server/jobs/certify_stage.h"
+#include "server/jobs/error_budget.h"
 #include "server/jobs/mesh_cost.h"
 #include "server/jobs/mesh_stages.h"
+#include "server/jobs/settle_labels.h"
 #include "server/mesh/label_surface.h"
 #include "server/mesh/parallel.h"
 
@@ -25,9 +28,7 @@ auto with_label(SampleType type, const Use& use) {
     if constexpr (std::is_integral_v<decltype(sample)>) {
       return use(sample);
     } else {
-      throw invalid_parameter("labels",
-                              "are for volumes of integers; this one has samples of type " +
-                                  std::string(to_string(type)));
+      throw_no_labels(type);
     }
   });
 }
@@ -50,7 +51,7 @@ void separate(const SampleArray& samples, const mesh::SeparateOptions& options,
   with_label(samples.type, [&](auto sample) {
     const auto lattice = lattice_of<decltype(sample)>(samples);
     const mesh::SurfaceCount count = count_walls(lattice, options, progress.context(0.2, 0.4));
-    check_memory(size_of(count), request.parameters, request.memory_bytes);
+    check_memory(size_of(count), request);
     extract_walls(lattice, options, count, progress.context(0.4, 1), walls);
   });
 }
@@ -89,11 +90,7 @@ void set_quality(const std::vector<mesh::LabelMeasure>& measures, MeshSummary& s
     quality.manifold = quality.manifold && measure.topology.manifold;
     quality.oriented = quality.oriented && measure.topology.oriented;
   }
-  quality.closed = summary.boundary_edges == 0;
-  quality.components = summary.components;
-  if (quality.closed && quality.manifold && quality.oriented) {
-    quality.genus = static_cast<std::int64_t>(summary.components) - summary.euler / 2;
-  }
+  conclude_quality(summary);
 }
 
 void encode_all(const codec::LabelledSurface& surface, const codec::Provenance& provenance,
@@ -112,7 +109,7 @@ void encode_all(const codec::LabelledSurface& surface, const codec::Provenance& 
   };
   mesh::parallel_for(progress.quiet(), files.size() + 1, [&](std::size_t task) {
     if (task < files.size()) return encode(task);
-    measure_smoothed_shapes(parameters, progress, surface.walls.mesh, summary.quality);
+    measure_final_shapes(parameters, progress, surface.walls.mesh, summary.quality);
   });
   for (std::size_t n = 0; n < zipped.size(); ++n) summary.labels[n].files = std::move(zipped[n]);
 }
@@ -146,29 +143,38 @@ MeshSummary make_labels(const SampleArray& samples, const MeshRequest& request,
                         std::span<const codec::Sink> sinks, Progress& progress,
                         mesh::SeparatingSurface& walls) {
   const MeshParameters& parameters = request.parameters;
+  const StageShares shares = shares_of(request);
   MeshSummary summary;
-  progress.enter(Stage::kExtract, kExtractShare, &Timing::extract);
+  progress.enter(Stage::kExtract, shares.extract, &Timing::extract);
   const auto labels =
       mesh::chosen_labels(count_values(samples, progress.context(0, 0.2)), parameters);
   separate(samples, separate_options(labels, parameters), request, progress, walls);
-  summary.triangles = walls.mesh.triangles.size();
-  summary.vertices = walls.mesh.positions.size();
-  check_disk({summary.triangles, summary.vertices}, parameters, request.disk_bytes);
+  if (!is_simplified(parameters)) check_disk(walls.mesh, request);
   const double extracted_mm3 = enclosed_by_all(walls, progress.quiet());
+  const ExtractedSurface extracted(request, walls.mesh);
 
-  smooth_stage(parameters, progress, walls.mesh, summary);
+  smooth_stage(samples, request, progress, walls.mesh, summary);
+  const MeshParameters as_written = with_bits_for(parameters, walls.mesh);
+  const MeshRequest written = request.with(as_written);
+  simplify_stage(written, extracted, progress, walls.mesh, &walls, summary);
+  set_size(walls.mesh, summary);
+  if (is_simplified(parameters)) check_disk(walls.mesh, request);
   summary.volume_mm3 = {extracted_mm3, enclosed_by_all(walls, progress.quiet())};
 
-  progress.enter(Stage::kEncode, kEncodeShare, &Timing::encode);
+  progress.enter(Stage::kEncode, shares.encode, &Timing::encode);
   const mesh::LabelTriangles triangles(walls);
   const auto measures = measure_labels(walls, triangles, progress.quiet());
   set_quality(measures, summary);
   for (std::size_t n = 0; n < labels.size(); ++n) {
     summary.labels.push_back(summary_of(labels[n], measures[n], parameters));
   }
-  // The encoders see the labels as they are now; the files' places are added when they are known.
-  const std::vector<LabelSummary> seen = summary.labels;
-  encode_all({walls, triangles, seen}, provenance_of(samples, request), sinks, progress, summary);
+  const KeptFiles files(written, sinks);
+  {
+    const auto grid = grid_for_distances(parameters, extracted, progress);
+    encode_all({walls, triangles, summary.labels, grid ? &*grid : nullptr},
+               provenance_of(samples, written), files.sinks(), progress, summary);
+  }
+  certify_stage(written, extracted, files, progress, walls.mesh, summary);
   return summary;
 }
 

@@ -6,8 +6,11 @@
 #include <vector>
 
 #include "proto/samples.h"
+#include "server/jobs/certify_stage.h"
+#include "server/jobs/error_budget.h"
 #include "server/jobs/mesh_cost.h"
 #include "server/jobs/mesh_stages.h"
+#include "server/mesh/cavities.h"
 #include "server/mesh/components.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/topology.h"
@@ -30,7 +33,7 @@ void extract_as(const SampleArray& samples, const MeshRequest& request, const Pr
   const mesh::Lattice<T> lattice = lattice_of<T>(samples);
   const mesh::ExtractOptions options = extract_options(request.parameters, request.iso);
   const mesh::SurfaceCount count = count_surface(lattice, options, progress.context(0, 0.2));
-  check_memory(size_of(count), request.parameters, request.memory_bytes);
+  check_memory(size_of(count), request);
   extract_surface(lattice, options, count, progress.context(0.2, 1), mesh);
 }
 
@@ -44,14 +47,9 @@ void set_topology(const mesh::Topology& topology, MeshSummary& summary) {
   summary.boundary_edges = topology.boundary_edges;
   summary.components = topology.components;
   summary.euler = topology.euler;
-  MeshQuality& quality = summary.quality;
-  quality.closed = topology.boundary_edges == 0;
-  quality.manifold = topology.manifold;
-  quality.oriented = topology.oriented;
-  quality.components = topology.components;
-  if (quality.closed && quality.manifold && quality.oriented) {
-    quality.genus = static_cast<std::int64_t>(topology.components) - topology.euler / 2;
-  }
+  summary.quality.manifold = topology.manifold;
+  summary.quality.oriented = topology.oriented;
+  conclude_quality(summary);
 }
 
 bool shows_topology(const MeshParameters& parameters) {
@@ -63,16 +61,19 @@ bool shows_topology(const MeshParameters& parameters) {
 // Encodes every format and measures the mesh, all side by side: few of them have work for every
 // thread all the time. The topology is measured where no encoder shows it.
 void encode_and_measure(const codec::Provenance& provenance, std::span<const codec::Sink> sinks,
-                        const Progress& progress, const mesh::Mesh& mesh, MeshSummary& summary) {
+                        const ExtractedSurface& extracted, const Progress& progress,
+                        const mesh::Mesh& mesh, MeshSummary& summary) {
   const MeshParameters& parameters = provenance.parameters;
+  const auto grid = grid_for_distances(parameters, extracted, progress);
   const std::vector<MeshFormat>& formats = parameters.formats;
   std::vector<std::optional<mesh::Topology>> shown(formats.size() + 1);
   SharedProgress shared(progress, formats.size());
   const auto encode = [&](std::size_t i) {
-    shown[i] = codec::encode(mesh, formats[i], provenance, shared.context(i), sinks[i]);
+    shown[i] = codec::encode(mesh, formats[i], provenance, shared.context(i), sinks[i],
+                             grid ? &*grid : nullptr);
   };
   const auto measure = [&] {
-    measure_smoothed_shapes(parameters, progress, mesh, summary.quality);
+    measure_final_shapes(parameters, progress, mesh, summary.quality);
     if (!shows_topology(parameters)) shown.back() = measure_topology(mesh, progress.quiet());
   };
   mesh::parallel_for(progress.quiet(), formats.size() + 1, [&](std::size_t task) {
@@ -81,6 +82,19 @@ void encode_and_measure(const codec::Provenance& provenance, std::span<const cod
   });
   const auto found = std::ranges::find_if(shown, [](const auto& one) { return one.has_value(); });
   set_topology(found != shown.end() ? **found : measure_topology(mesh, progress.quiet()), summary);
+}
+
+// What the parameters do not keep of the surface's parts.
+void leave_out_parts(const MeshParameters& parameters, const Progress& progress, mesh::Mesh& mesh,
+                     MeshSummary::Dropped& dropped) {
+  const auto add = [&](const mesh::Dropped& more) {
+    dropped.components += more.components;
+    dropped.triangles += more.triangles;
+  };
+  if (parameters.fill_cavities) add(fill_cavities(progress.quiet(), mesh));
+  if (!parameters.components.keeps_all()) {
+    add(keep_components(parameters.components, progress.quiet(), mesh));
+  }
 }
 
 }  // namespace
@@ -119,21 +133,27 @@ void Workspace::trim(std::size_t budget_bytes) {
 MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
                       std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh) {
   const MeshParameters& parameters = request.parameters;
+  const StageShares shares = shares_of(request);
   MeshSummary summary;
-  progress.enter(Stage::kExtract, kExtractShare, &Timing::extract);
+  summary.iso = request.iso;
+  progress.enter(Stage::kExtract, shares.extract, &Timing::extract);
   extract(samples, request, progress, mesh);
-  if (!parameters.components.keeps_all()) {
-    const mesh::Dropped dropped = keep_components(parameters.components, progress.quiet(), mesh);
-    summary.dropped = {dropped.components, dropped.triangles};
-  }
-  summary.triangles = mesh.triangles.size();
-  summary.vertices = mesh.positions.size();
-  check_disk({summary.triangles, summary.vertices}, parameters, request.disk_bytes);
+  leave_out_parts(parameters, progress, mesh, summary.dropped);
+  if (!is_simplified(parameters)) check_disk(mesh, request);
+  const ExtractedSurface extracted(request, mesh);
 
-  smooth_stage(parameters, progress, mesh, summary);
+  smooth_stage(samples, request, progress, mesh, summary);
+  const MeshParameters as_written = with_bits_for(parameters, mesh);
+  const MeshRequest written = request.with(as_written);
+  simplify_stage(written, extracted, progress, mesh, nullptr, summary);
+  set_size(mesh, summary);
+  if (is_simplified(parameters)) check_disk(mesh, request);
 
-  progress.enter(Stage::kEncode, kEncodeShare, &Timing::encode);
-  encode_and_measure(provenance_of(samples, request), sinks, progress, mesh, summary);
+  progress.enter(Stage::kEncode, shares.encode, &Timing::encode);
+  const KeptFiles files(written, sinks);
+  encode_and_measure(provenance_of(samples, written), files.sinks(), extracted, progress, mesh,
+                     summary);
+  certify_stage(written, extracted, files, progress, mesh, summary);
   return summary;
 }
 

@@ -82,9 +82,15 @@ struct MeshRequest {
   const Volume& volume;  // its id and notes, for the files to name
   const MeshParameters& parameters;
   double iso;  // whatever the parameters say of it
+  bool certify;
   std::uint64_t memory_bytes;
   // Of all files together; the disk may hold other things now, but never more than that.
   std::uint64_t disk_bytes = std::numeric_limits<std::uint64_t>::max();
+
+  // The same with other parameters, which must outlive it.
+  MeshRequest with(const MeshParameters& others) const {
+    return {volume, others, iso, certify, memory_bytes, disk_bytes};
+  }
 };
 
 // How large a surface would be.
@@ -97,12 +103,12 @@ struct CountedSurface {
 mesh::SurfaceSize count_surface(const SampleArray& samples, const MeshParameters& parameters,
                                 double iso, const mesh::Context& context);
 
-// Extracts, smooths, measures and encodes; `sinks` has one for each of the parameters' formats, in
-// their order. The files of the summary are empty. `mesh` is worked in, and left as it was encoded.
-// `progress` enters the stages; the caller ends the last one, when the bytes are where they belong.
-// The parameters have no labels: see make_labels.h. Throws Error kCancelled, kTooLarge with the
-// estimate when the job would take more than it may (told before memory is taken) or than the disk
-// could ever hold, and kInternal.
+// Extracts, smooths, simplifies, encodes, measures and certifies; `sinks` has one for each of the
+// parameters' formats, in their order. The files of the summary are empty. `mesh` is worked in, and
+// left as it was encoded. `progress` enters the stages; the caller ends the last one, when the
+// bytes are where they belong. The parameters have no labels: see make_labels.h. Throws Error
+// kCancelled, kTooLarge with the estimate when the job would take more than it may (told before
+// memory is taken) or than the disk could ever hold, and kInternal.
 MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
                       std::span<const codec::Sink> sinks, Progress& progress, mesh::Mesh& mesh);
 

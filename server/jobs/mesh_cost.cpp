@@ -1,11 +1,11 @@
 #include "server/jobs/mesh_cost.h"
 
 #include <algorithm>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "server/codec/encode.h"
+#include "server/jobs/error_budget.h"
 #include "server/mesh/label_parts.h"
 #include "server/mesh/separate.h"
 
@@ -21,6 +21,30 @@ std::uint64_t mesh_bytes(const mesh::SurfaceSize& surface) {
 std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
   return surface.triangles * (sizeof(mesh::WallSides) + 2 * sizeof(std::uint32_t)) +
          2 * mesh_bytes(surface);
+}
+
+// What simplifying and certifying take, one after the other, beside what the job has anyway: the
+// surface as it was extracted, grids of triangles, and files as bytes and as what they decode to.
+std::uint64_t error_bytes(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
+                          bool certify) {
+  // Measured: on ch2 at 60, of 1.6 million triangles.
+  constexpr std::uint64_t kSimplifyPerTriangle = 200;
+  constexpr std::uint64_t kGridsPerTriangle = 130;
+  std::uint64_t simplifying = 0;
+  if (parameters.max_error_mm || parameters.triangles) {
+    simplifying = surface.triangles * kSimplifyPerTriangle;
+  }
+  const bool keeps_extracted = parameters.max_error_mm || parameters.distances;
+  // While files are encoded.
+  const std::uint64_t grid = parameters.distances ? surface.triangles * kGridsPerTriangle : 0;
+  if (!certify) return std::max(simplifying, grid) + (keeps_extracted ? mesh_bytes(surface) : 0);
+  double files = 0;
+  for (const MeshFormat format : files_of(parameters)) {
+    files += 2 * codec::describe(format).bytes(surface, parameters);  // a vector that grows
+  }
+  const std::uint64_t certifying = static_cast<std::uint64_t>(files) + 3 * mesh_bytes(surface) +
+                                   surface.triangles * kGridsPerTriangle;
+  return mesh_bytes(surface) + std::max({simplifying, certifying, grid});
 }
 
 // What the files take at least.
@@ -41,23 +65,24 @@ mesh::SmoothOptions smooth_options(const MeshParameters& parameters) {
   return {.passes = parameters.passes,
           .lambda = lambda,
           .mu = is_taubin ? mesh::taubin_mu(lambda, parameters.pass_band) : 0,
-          .max_displacement_mm =
-              parameters.max_displacement_mm.value_or(std::numeric_limits<double>::infinity())};
+          .max_displacement_mm = most_displacement(parameters)};
 }
 
-std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters) {
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
+                              bool certify) {
   std::uint64_t encoding = surface.vertices * 2 * sizeof(std::uint32_t);  // measured meanwhile
   for (const MeshFormat format : files_of(parameters)) {
     encoding += codec::describe(format).memory_bytes(surface, parameters);
   }
   const std::uint64_t smoothing = smoothing_memory(smooth_options(parameters), surface);
   return mesh_bytes(surface) + smoothing +
-         (parameters.labels ? 2 * encoding + label_bytes(surface) : encoding);
+         (parameters.labels ? 2 * encoding + label_bytes(surface) : encoding) +
+         error_bytes(surface, parameters, certify);
 }
 
-void check_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
-                  std::uint64_t allowed_bytes) {
-  const std::uint64_t needed = estimate_memory(surface, parameters);
+void check_memory(const mesh::SurfaceSize& surface, const MeshRequest& request) {
+  const std::uint64_t needed = estimate_memory(surface, request.parameters, request.certify);
+  const std::uint64_t allowed_bytes = request.memory_bytes;
   if (needed <= allowed_bytes) return;
   constexpr std::uint64_t kMebibyte = 1 << 20;
   throw Error(ErrorCode::kTooLarge,
@@ -67,9 +92,10 @@ void check_memory(const mesh::SurfaceSize& surface, const MeshParameters& parame
                   std::to_string(allowed_bytes / kMebibyte) + " MiB are allowed");
 }
 
-void check_disk(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
-                std::uint64_t allowed_bytes) {
-  const std::uint64_t needed = least_file_bytes(surface, parameters);
+void check_disk(const mesh::Mesh& mesh, const MeshRequest& request) {
+  const mesh::SurfaceSize surface = {mesh.triangles.size(), mesh.positions.size()};
+  const std::uint64_t needed = least_file_bytes(surface, request.parameters);
+  const std::uint64_t allowed_bytes = request.disk_bytes;
   if (needed <= allowed_bytes) return;
   constexpr std::uint64_t kKibibyte = 1 << 10;
   throw Error(ErrorCode::kTooLarge, "the surface has " + std::to_string(surface.triangles) +

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "proto/types.h"
+#include "server/jobs/make_mesh.h"
 #include "server/mesh/extract.h"
 #include "server/mesh/smooth.h"
 
@@ -13,15 +14,15 @@ mesh::SmoothOptions smooth_options(const MeshParameters& parameters);
 
 // How much memory a job with a surface of that size takes at its peak, beside its mapped volume:
 // mesh, smoothing, encoders. An upper estimate.
-std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters);
+// Simplifying and certifying take the most, where the job does so.
+std::uint64_t estimate_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
+                              bool certify);
 
 // Throws Error kTooLarge with the estimate when that is more than is allowed.
-void check_memory(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
-                  std::uint64_t allowed_bytes);
+void check_memory(const mesh::SurfaceSize& surface, const MeshRequest& request);
 
-// Throws Error kTooLarge when the files of a surface of that size could never have room. STL's size
-// is known; of the others', which are guesses, half counts.
-void check_disk(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
-                std::uint64_t allowed_bytes);
+// Throws Error kTooLarge when the files of a mesh could never have room. STL's size is known; of
+// the others', which are guesses, half counts. To be asked of the mesh as it is written.
+void check_disk(const mesh::Mesh& mesh, const MeshRequest& request);
 
 }  // namespace isomesh::jobs

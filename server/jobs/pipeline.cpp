@@ -25,7 +25,7 @@ std::uint64_t disk_for_files(const store::BlobStore& blobs, const Volume& volume
 
 }  // namespace
 
-PipelineResult run_pipeline(const Volume& volume, const MeshParameters& parameters,
+PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
                             const PipelineLimits& limits, const store::BlobStore& blobs,
                             JobProcess& process, std::stop_token stop, const Report& report) {
   const auto began = Clock::now();
@@ -52,6 +52,7 @@ PipelineResult run_pipeline(const Volume& volume, const MeshParameters& paramete
                           .volume = volume,
                           .parameters = parameters,
                           .iso = parameters.iso.value_or(volume.suggested_iso),
+                          .certify = parameters.certify,
                           .memory_bytes = limits.memory_bytes,
                           .disk_bytes = disk_for_files(blobs, volume)};
   MadeMesh made = made_of_intact(blobs, volume.id, stop,

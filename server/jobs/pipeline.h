@@ -22,14 +22,14 @@ struct PipelineLimits {
 };
 
 // Changes whenever the same volume and parameters would give other bytes than before.
-inline constexpr const char* kMesherVersion = "2";
+inline constexpr const char* kMesherVersion = "3";
 
 // Has `process` load the volume's samples, extract, smooth and encode in every format, and stores
 // the results. The mesh is the same to the byte for the same volume and parameters. Throws Error
 // kCancelled when `stop` is requested, kTooLarge with the estimate when the job would exceed the
 // limits (told before memory is taken), kUnusableVolume when the stored samples are not those of
 // the volume, kOutOfSpace or kInternal, and ProcessEnded.
-PipelineResult run_pipeline(const Volume& volume, const MeshParameters& parameters,
+PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameters,
                             const PipelineLimits& limits, const store::BlobStore& blobs,
                             JobProcess& process, std::stop_token stop, const Report& report);
 

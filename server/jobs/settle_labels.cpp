@@ -16,11 +16,15 @@ void keep_chosen(const std::vector<std::int64_t>& chosen, std::map<std::int64_t,
 
 }  // namespace
 
+void throw_no_labels(SampleType type) {
+  throw invalid_parameter("labels", "are for volumes of integers; this one has samples of type " +
+                                        std::string(to_string(type)));
+}
+
 JobParameters settle_labels(JobParameters parameters, const store::Viewer& viewer,
                             const Volume& volume, LabelLists& lists) {
   if (!is_integer(volume.type)) {
-    throw invalid_parameter("labels", "are for volumes of integers; this one has samples of type " +
-                                          std::string(to_string(volume.type)));
+    throw_no_labels(volume.type);
   }
   if (std::ranges::min(volume.dims) < 2) {
     throw Error(
@@ -45,7 +49,7 @@ JobParameters settle_labels(JobParameters parameters, const store::Viewer& viewe
   // Of all labels, a value that is one's is none of its own; of some, the others' do not matter.
   if (!parameters.labels->is_all()) keep_chosen(labels, parameters.label_values);
   if (!parameters.max_displacement_mm) {
-    parameters.max_displacement_mm = *std::ranges::min_element(volume.geometry.spacing) / 2;
+    parameters.max_displacement_mm = std::ranges::min(volume.geometry.spacing) / 2;
   }
   return parameters;
 }

@@ -7,6 +7,9 @@
 
 namespace isomesh::jobs {
 
+// Says that samples of that type, which is no integer, are no labels.
+[[noreturn]] void throw_no_labels(SampleType type);
+
 // The parameters, which have labels, with all that the volume says where they say nothing: the
 // names, colours and values of the labels that are chosen, and how far smoothing may move a vertex,
 // half the smallest spacing. Whoever asks for the same in other words asks for the same mesh.

@@ -12,6 +12,10 @@ bool leaves_members_open(const Error& error, const process::ImportOptions& optio
   return options.member.empty() && !choices.empty() && choices.front().parameter == "member";
 }
 
+std::filesystem::path canonical_in(const store::ScratchFolder& scratch) {
+  return scratch.path() / "canonical";
+}
+
 }  // namespace
 
 std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
@@ -19,20 +23,40 @@ std::pair<Volume, bool> VolumeLibrary::add(const std::string& owner,
                                            const process::ImportOptions& options,
                                            const std::string& name) {
   const store::ScratchFolder scratch(folder_.scratch());
-  const std::filesystem::path canonical = scratch.path() / "canonical";
-  Volume volume = runner_.run({.source = upload,
-                               .scratch = scratch.path(),
-                               .target = canonical,
-                               .options = options,
-                               .limits = limits_});
-  const store::Blob blob = store::digest_of(canonical);
+  Volume volume = import_file(upload, options, scratch);
+  if (!volume.name && !name.empty()) volume.name = name;
+  return keep(owner, std::move(volume), scratch);
+}
+
+std::pair<Volume, DicomIdentity> VolumeLibrary::add_peers(const std::string& owner,
+                                                          const std::filesystem::path& answer,
+                                                          const process::PeersSeries& series) {
+  const store::ScratchFolder scratch(folder_.scratch());
+  Volume volume = import_file(answer, {.peers = series}, scratch);
+  if (!volume.dicom) throw Error(ErrorCode::kInternal, "images of a PACS have no identity");
+  DicomIdentity identity = *volume.dicom;
+  return {keep(owner, std::move(volume), scratch).first, std::move(identity)};
+}
+
+Volume VolumeLibrary::import_file(const std::filesystem::path& upload,
+                                  const process::ImportOptions& options,
+                                  const store::ScratchFolder& scratch) {
+  return runner_.run({.source = upload,
+                      .scratch = scratch.path(),
+                      .target = canonical_in(scratch),
+                      .options = options,
+                      .limits = limits_});
+}
+
+std::pair<Volume, bool> VolumeLibrary::keep(const std::string& owner, Volume volume,
+                                            const store::ScratchFolder& scratch) {
+  const store::Blob blob = store::digest_of(canonical_in(scratch));
   const std::shared_lock lock(mutex_);
   // Also for what another owner has: whether there was room for it would tell.
   if (!volumes_.contains(owner, blob.key)) retention_.make_room(blob.bytes);
-  blobs_.adopt(canonical, blob);
+  blobs_.adopt(canonical_in(scratch), blob);
   volume.id = blob.key;
   volume.created = timestamp();
-  if (!volume.name && !name.empty()) volume.name = name;
   auto [stored, is_new] = volumes_.add(owner, volume);
   blobs_.settle(blob.key);
   // They are of the file that has been read, which may be another one than the first.

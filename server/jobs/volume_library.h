@@ -40,6 +40,12 @@ class VolumeLibrary {
                               const process::ImportOptions& options = {},
                               const std::string& name = {});
 
+  // The same for what a PACS has sent of a series. Second: whose images these are, as they say
+  // themselves. The record may be of another upload of the same samples, with other names.
+  std::pair<Volume, DicomIdentity> add_peers(const std::string& owner,
+                                             const std::filesystem::path& answer,
+                                             const process::PeersSeries& series);
+
   // The same for an upload that may hold several volumes: each is imported by a process of its own,
   // one after the other, and answered for. One that the options choose or that is alone is the only
   // element, with an empty member; its error is thrown.
@@ -64,6 +70,13 @@ class VolumeLibrary {
   void finish_erasing() { eraser_.finish(); }
 
  private:
+  // Writes the upload's canonical file into the scratch folder.
+  Volume import_file(const std::filesystem::path& upload, const process::ImportOptions& options,
+                     const store::ScratchFolder& scratch);
+  // Makes that file a blob, and the volume a record of the owner's.
+  std::pair<Volume, bool> keep(const std::string& owner, Volume volume,
+                               const store::ScratchFolder& scratch);
+
   const store::DataFolder& folder_;
   const store::BlobStore& blobs_;
   store::VolumeStore& volumes_;

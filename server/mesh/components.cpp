@@ -1,11 +1,14 @@
 #include "server/mesh/components.h"
 
 #include <algorithm>
+#include <array>
+#include <limits>
 #include <numeric>
 #include <span>
 #include <vector>
 
 #include "server/mesh/parallel.h"
+#include "server/mesh/points.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -76,13 +79,49 @@ std::uint64_t join_vertices(const Mesh& mesh, const Context& context,
   return components;
 }
 
-// Which components stay.
-std::vector<bool> kept_by(const ComponentFilter& filter,
+// The vertex nearest to each place, of several the first; none where there are no vertices.
+std::vector<std::uint32_t> nearest_vertices(std::span<const std::array<double, 3>> places,
+                                            const Context& context, const Mesh& mesh) {
+  constexpr std::size_t kPerTask = 1 << 16;
+  const std::size_t count = mesh.positions.size();
+  if (places.empty() || count == 0) return {};
+  struct Nearest {
+    double squared_mm = std::numeric_limits<double>::infinity();
+    std::uint32_t vertex = 0;
+  };
+  const std::size_t tasks = (count + kPerTask - 1) / kPerTask;
+  std::vector<Nearest> found(tasks * places.size());
+  parallel_for({context.stop, nullptr}, tasks, [&](std::size_t task) {
+    const std::size_t end = std::min(count, (task + 1) * kPerTask);
+    for (std::size_t n = 0; n < places.size(); ++n) {
+      Nearest& nearest = found[task * places.size() + n];
+      for (std::size_t v = task * kPerTask; v < end; ++v) {
+        const Point way = minus(to_point(mesh.positions[v]), places[n]);
+        const double squared_mm = dot(way, way);
+        if (squared_mm < nearest.squared_mm) nearest = {squared_mm, static_cast<std::uint32_t>(v)};
+      }
+    }
+  });
+  std::vector<std::uint32_t> vertices;
+  for (std::size_t n = 0; n < places.size(); ++n) {
+    Nearest nearest;
+    for (std::size_t task = 0; task < tasks; ++task) {
+      const Nearest& here = found[task * places.size() + n];
+      if (here.squared_mm < nearest.squared_mm) nearest = here;
+    }
+    vertices.push_back(nearest.vertex);
+  }
+  return vertices;
+}
+
+// Which of the candidates stay.
+std::vector<bool> kept_by(const ComponentFilter& filter, const std::vector<bool>& is_candidate,
                           const std::vector<std::uint64_t>& triangles) {
   std::vector<std::uint32_t> order(triangles.size());
   std::iota(order.begin(), order.end(), 0U);
-  std::erase_if(order,
-                [&](std::uint32_t n) { return triangles[n] < filter.min_triangles.value_or(0); });
+  std::erase_if(order, [&](std::uint32_t n) {
+    return !is_candidate[n] || triangles[n] < filter.min_triangles.value_or(0);
+  });
   if (filter.keep && order.size() > *filter.keep) {
     const auto larger = [&](std::uint32_t a, std::uint32_t b) {
       return triangles[a] != triangles[b] ? triangles[a] > triangles[b] : a < b;
@@ -141,14 +180,14 @@ void find_components(const Mesh& mesh, const Context& context, Components& compo
   }
 }
 
-Dropped keep_components(const ComponentFilter& filter, const Context& context, Mesh& mesh) {
-  Components components;
-  find_components(mesh, context, components);
+std::vector<std::uint64_t> triangles_of(const Components& components, const Mesh& mesh) {
   std::vector<std::uint64_t> triangles(components.count, 0);
   for (const Triangle& triangle : mesh.triangles) ++triangles[components.of_vertex[triangle[0]]];
-  const std::vector<bool> kept = kept_by(filter, triangles);
-  context.throw_if_stopped();
+  return triangles;
+}
 
+Dropped leave_out(const std::vector<bool>& kept, const std::vector<std::uint64_t>& triangles,
+                  Components& components, Mesh& mesh) {
   Dropped dropped;
   for (std::size_t n = 0; n < kept.size(); ++n) {
     if (kept[n]) continue;
@@ -173,6 +212,19 @@ Dropped keep_components(const ComponentFilter& filter, const Context& context, M
     for (std::uint32_t& vertex : triangle) vertex = components.of_vertex[vertex];
   }
   return dropped;
+}
+
+Dropped keep_components(const ComponentFilter& filter, const Context& context, Mesh& mesh) {
+  Components components;
+  find_components(mesh, context, components);
+  const std::vector<std::uint64_t> triangles = triangles_of(components, mesh);
+  std::vector<bool> is_candidate(triangles.size(), filter.nearest_to.empty());
+  for (const std::uint32_t vertex : nearest_vertices(filter.nearest_to, context, mesh)) {
+    is_candidate[components.of_vertex[vertex]] = true;
+  }
+  const std::vector<bool> kept = kept_by(filter, is_candidate, triangles);
+  context.throw_if_stopped();
+  return leave_out(kept, triangles, components, mesh);
 }
 
 }  // namespace isomesh::mesh

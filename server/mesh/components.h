@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "proto/types.h"
 #include "server/mesh/buffer.h"
@@ -28,10 +29,19 @@ struct Dropped {
   std::uint64_t triangles = 0;
 };
 
-// Leaves only the components that the filter keeps, in place: those of at least
-// `filter.min_triangles`, and of these the `filter.keep` with the most triangles, of equal ones the
-// first. Vertices and triangles keep their order and their layers. The same for any number of
-// threads. Throws Error kCancelled before anything is changed.
+// How many triangles each component has.
+std::vector<std::uint64_t> triangles_of(const Components& components, const Mesh& mesh);
+
+// Leaves out the components that are not kept, in place. Vertices and triangles keep their order
+// and their layers. `components` are the mesh's, and indeterminate then.
+Dropped leave_out(const std::vector<bool>& kept, const std::vector<std::uint64_t>& triangles,
+                  Components& components, Mesh& mesh);
+
+// Leaves only the components that the filter keeps, in place: those of the vertices nearest to
+// `filter.nearest_to`, if that is not empty; of these those of at least `filter.min_triangles`, and
+// of these the `filter.keep` with the most triangles, of equal ones the first. Vertices and
+// triangles keep their order and their layers. The same for any number of threads. Throws Error
+// kCancelled before anything is changed.
 Dropped keep_components(const ComponentFilter& filter, const Context& context, Mesh& mesh);
 
 }  // namespace isomesh::mesh

@@ -2,30 +2,14 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
-#include <cstdint>
 
+#include "proto/mesh_summary.h"
 #include "server/mesh/buffer.h"
 #include "server/mesh/context.h"
 #include "server/mesh/surface_view.h"
 #include "server/mesh/triangle_grid.h"
 
 namespace isomesh::mesh {
-
-// Distances from points of one surface, its vertices and the centres of its triangles, to the
-// nearest points of another one's triangles. Exact, in double precision, but kept in single.
-struct DistanceSummary {
-  static constexpr std::size_t kBins = 20;
-
-  std::uint64_t points = 0;
-  double max_mm = 0;
-  double mean_mm = 0;
-  double rms_mm = 0;
-  double p99_mm = 0;  // 99 of 100 points are this near: the smallest distance that is one of them
-  std::array<std::uint64_t, kBins> histogram = {};  // points, in equal bins from zero to max_mm
-
-  bool operator==(const DistanceSummary&) const = default;
-};
 
 // Of each vertex, in the order of the positions, in millimetres; infinite where the other surface
 // has no triangles. Same for any number of threads. Throws Error kUnusableVolume where a position

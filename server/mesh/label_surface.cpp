@@ -149,6 +149,14 @@ void extract_label(const SeparatingSurface& surface, const LabelTriangles& trian
   }
 }
 
+std::vector<std::uint32_t> vertices_of_label(const SeparatingSurface& surface,
+                                             const LabelTriangles& triangles, std::size_t number) {
+  std::vector<std::uint32_t> vertices;
+  const VertexChoice choice(surface.mesh.triangles.span(), triangles.of(number));
+  choice.visit([&](std::uint64_t v) { vertices.push_back(static_cast<std::uint32_t>(v)); });
+  return vertices;
+}
+
 std::vector<LabelMeasure> measure_labels(const SeparatingSurface& surface,
                                          const LabelTriangles& triangles, const Context& context) {
   std::vector<LabelMeasure> measures(surface.labels.size());

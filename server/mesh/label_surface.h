@@ -37,6 +37,10 @@ class LabelTriangles {
 void extract_label(const SeparatingSurface& surface, const LabelTriangles& triangles,
                    std::size_t number, Mesh& mesh);
 
+// Which of the walls' vertices extract_label takes for that label, in the order of its surface.
+std::vector<std::uint32_t> vertices_of_label(const SeparatingSurface& surface,
+                                             const LabelTriangles& triangles, std::size_t number);
+
 // What one label's own surface is.
 struct LabelMeasure {
   std::int64_t label = 0;

@@ -32,6 +32,10 @@ struct LatticeToSpace {
 
 LatticeToSpace lattice_to_space(const Geometry& geometry);
 
+// Where the point is among the samples: the numbers i, j and k, which need not be whole. The steps
+// are not in one plane.
+std::array<double, 3> index_of(const LatticeToSpace& to_space, const std::array<double, 3>& point);
+
 // Samples in x-fastest order, dims.samples() of them, finite. Does not own them.
 template <class T>
 struct Lattice {

@@ -101,15 +101,21 @@ struct Groups {
 
 class Simplifier {
  public:
-  Simplifier(const SimplifyOptions& options, const Context& context, const Mesh& mesh)
+  // `walls` are whose mesh it is, if any.
+  Simplifier(const SimplifyOptions& options, const Context& context, const Mesh& mesh,
+             const SeparatingSurface* walls)
       : options_(options),
         context_(context),
         quiet_{context.stop, nullptr},
         mesh_(mesh),
+        walls_(walls),
+        original_(options.before.empty() ? mesh.positions.span() : options.before,
+                  mesh.triangles.span()),
         cubes_(measure_extent(mesh, quiet_), mesh.triangles.size()),
         current_(mesh.triangles.begin(), mesh.triangles.end()) {
+    if (walls != nullptr) sides_.assign(walls->sides.begin(), walls->sides.end());
     if (!std::isfinite(options.max_error_mm)) return;
-    grid_.emplace(mesh, quiet_);
+    grid_.emplace(original_, quiet_);
     const std::size_t vertices = mesh.positions.size();
     homes_.assign(vertices + current_.size(), TriangleGrid::kNone);
     for (std::size_t t = current_.size(); t-- > 0;) {
@@ -135,12 +141,14 @@ class Simplifier {
     return effect_;
   }
 
+  // What is left, and its sides.
   std::vector<Triangle>& triangles() { return current_; }
+  std::vector<WallSides>& sides() { return sides_; }
 
  private:
   bool is_enough() const { return options_.triangles > 0 && current_.size() <= options_.triangles; }
 
-  std::uint32_t block_of(std::size_t triangle, int round) const {
+  std::uint32_t cube_of(std::size_t triangle, int round) const {
     const SurfaceView view(mesh_.positions.span(), {&current_[triangle], 1});
     const Point centre = measured_point(view, mesh_.positions.size());
     const bool is_left_out =
@@ -149,19 +157,20 @@ class Simplifier {
   }
 
   void run_round(int round) {
-    std::vector<std::uint32_t> blocks(current_.size());
+    std::vector<std::uint32_t> blocks(current_.size());  // of each triangle
     constexpr std::size_t kPerTask = 1 << 15;
     parallel_for(quiet_, (blocks.size() + kPerTask - 1) / kPerTask, [&](std::size_t task) {
       const std::size_t end = std::min(blocks.size(), (task + 1) * kPerTask);
-      for (std::size_t t = task * kPerTask; t < end; ++t) blocks[t] = block_of(t, round);
+      for (std::size_t t = task * kPerTask; t < end; ++t) blocks[t] = cube_of(t, round);
     });
-    const Groups triangles(cubes_.count(), current_.size(),
-                           [&](std::size_t t) { return blocks[t]; });
-    const Groups points(cubes_.count(), homes_.size(), [&](std::size_t n) {
+    std::size_t count = cubes_.count();
+    if (walls_ != nullptr) count = split_by_sides(blocks);
+    const Groups triangles(count, current_.size(), [&](std::size_t t) { return blocks[t]; });
+    const Groups points(count, homes_.size(), [&](std::size_t n) {
       return homes_[n] == TriangleGrid::kNone ? kNoBlock : blocks[homes_[n]];
     });
     std::vector<std::uint32_t> place(current_.size());  // of a triangle within its block
-    for (std::size_t b = 0; b < cubes_.count(); ++b) {
+    for (std::size_t b = 0; b < count; ++b) {
       const auto members = triangles.of(b);
       for (std::size_t n = 0; n < members.size(); ++n) {
         place[members[n]] = static_cast<std::uint32_t>(n);
@@ -170,16 +179,39 @@ class Simplifier {
     const auto block_from = [&](std::size_t b) {
       SurfaceBlock block;
       for (const std::uint32_t t : triangles.of(b)) block.triangles.push_back(current_[t]);
+      if (walls_ != nullptr && !block.triangles.empty()) block.sides = sides_[triangles.of(b)[0]];
       for (const std::uint32_t point : points.of(b)) {
         block.points.push_back(point);
         block.homes.push_back(place[homes_[point]]);
       }
       return block;
     };
-    std::vector<SurfaceBlock> results(cubes_.count());
+    std::vector<SurfaceBlock> results(count);
     simplify_blocks(round, block_from, results);
-    settle_seams(block_from, results);
+    settle_seams(block_from, edges_beside(blocks), results);
     take(blocks, results);
+  }
+
+  // Makes a block of each wall in each cube, so that a block has two sides; returns their number.
+  // Lines are boundaries of blocks then, which stay.
+  std::size_t split_by_sides(std::vector<std::uint32_t>& blocks) const {
+    const Groups cubes(cubes_.count(), blocks.size(), [&](std::size_t t) { return blocks[t]; });
+    const auto key = [&](std::uint32_t t) {
+      return std::uint32_t{sides_[t].front} << 16 | sides_[t].back;
+    };
+    std::uint32_t next = 0;
+    std::vector<std::uint32_t> members;
+    for (std::size_t cube = 0; cube < cubes_.count(); ++cube) {
+      const auto all = cubes.of(cube);
+      members.assign(all.begin(), all.end());
+      std::ranges::stable_sort(members, {}, key);
+      for (std::size_t n = 0; n < members.size(); ++n) {
+        if (n > 0 && key(members[n]) != key(members[n - 1])) ++next;
+        blocks[members[n]] = next;
+      }
+      if (!members.empty()) ++next;
+    }
+    return next;
   }
 
   BlockGoal goal() const {
@@ -187,7 +219,7 @@ class Simplifier {
                              ? 0
                              : static_cast<double>(options_.triangles) /
                                    static_cast<double>(std::max<std::size_t>(1, current_.size()));
-    return {mesh_, grid_ ? &*grid_ : nullptr, options_.max_error_mm, share};
+    return {mesh_, original_, grid_ ? &*grid_ : nullptr, options_.max_error_mm, share};
   }
 
   template <class BlockFrom>
@@ -214,37 +246,67 @@ class Simplifier {
     effect_.taken_back += taken_back;
   }
 
+  // An edge of one label's own surface, and the block that has triangles there.
   struct BlockEdge {
     SeamEdge edge;
     std::uint32_t block = 0;
+    std::uint32_t label = 0;
+
+    std::array<std::uint32_t, 3> key() const { return {edge.low, edge.high, label}; }
   };
 
+  // Once for each label whose surface has it.
+  void add_edge(const SeamEdge& edge, std::uint32_t block, const WallSides& sides,
+                std::vector<BlockEdge>& edges) const {
+    if (walls_ == nullptr) return edges.push_back({edge, block, 0});
+    walls_->parts.visit_labels(sides.front, sides.back, [&](std::size_t label, bool) {
+      edges.push_back({edge, block, static_cast<std::uint32_t>(label)});
+    });
+  }
+
+  // The edges of triangles in no block, between vertices that blocks have too: an earlier round may
+  // have made them.
+  std::vector<BlockEdge> edges_beside(std::span<const std::uint32_t> blocks) const {
+    std::vector<bool> is_of_block(mesh_.positions.size(), false);
+    for (std::size_t t = 0; t < current_.size(); ++t) {
+      if (blocks[t] == kNoBlock) continue;
+      for (const std::uint32_t vertex : current_[t]) is_of_block[vertex] = true;
+    }
+    std::vector<BlockEdge> edges;
+    for (std::size_t t = 0; t < current_.size(); ++t) {
+      if (blocks[t] != kNoBlock) continue;
+      const auto& [a, b, c] = current_[t];
+      for (const auto& [from, to] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) {
+        if (!is_of_block[from] || !is_of_block[to]) continue;
+        const WallSides sides = walls_ == nullptr ? WallSides{} : sides_[t];
+        add_edge({std::min(from, to), std::max(from, to), 1}, kNoBlock, sides, edges);
+      }
+    }
+    return edges;
+  }
+
   // Edges between seam vertices that have more than two triangles although none had before: two
-  // blocks have each made the same edge. Those of the blocks that made them.
-  std::vector<BlockEdge> crowded_edges(const std::vector<SurfaceBlock>& results) const {
+  // blocks, or a block and an earlier round, have each made the same edge. Those of the blocks that
+  // made them. `beside` are what edges_beside gives.
+  std::vector<BlockEdge> crowded_edges(const std::vector<BlockEdge>& beside,
+                                       const std::vector<SurfaceBlock>& results) const {
     std::vector<std::vector<SeamEdge>> of_blocks(results.size());
     parallel_for(quiet_, results.size(),
                  [&](std::size_t b) { of_blocks[b] = seam_edges(results[b].triangles); });
-    std::vector<BlockEdge> edges;
+    std::vector<BlockEdge> edges = beside;
     for (std::uint32_t b = 0; b < of_blocks.size(); ++b) {
-      for (const SeamEdge& edge : of_blocks[b]) edges.push_back({edge, b});
+      for (const SeamEdge& edge : of_blocks[b]) add_edge(edge, b, results[b].sides, edges);
     }
-    std::ranges::stable_sort(edges, {}, [](const BlockEdge& e) {
-      return std::uint64_t{e.edge.low} << 32 | e.edge.high;
-    });
+    std::ranges::stable_sort(edges, {}, &BlockEdge::key);
     std::vector<BlockEdge> crowded;
     for (std::size_t begin = 0; begin < edges.size();) {
       std::size_t end = begin;
       std::uint32_t all = 0;
-      for (; end < edges.size() && edges[end].edge.low == edges[begin].edge.low &&
-             edges[end].edge.high == edges[begin].edge.high;
-           ++end) {
+      for (; end < edges.size() && edges[end].key() == edges[begin].key(); ++end) {
         all += edges[end].edge.triangles;
       }
-      const bool is_wall =
-          mesh_.is_on_line(edges[begin].edge.low) && mesh_.is_on_line(edges[begin].edge.high);
       for (; begin < end; ++begin) {
-        if (all > 2 && !is_wall && edges[begin].edge.triangles > 1) crowded.push_back(edges[begin]);
+        if (all > 2 && edges[begin].edge.triangles > 1) crowded.push_back(edges[begin]);
       }
     }
     return crowded;
@@ -253,13 +315,14 @@ class Simplifier {
   // Simplifies the blocks again that made such edges, without them; in the end leaves them as they
   // were, which had none.
   template <class BlockFrom>
-  void settle_seams(const BlockFrom& block_from, std::vector<SurfaceBlock>& results) {
+  void settle_seams(const BlockFrom& block_from, const std::vector<BlockEdge>& beside,
+                    std::vector<SurfaceBlock>& results) {
     std::vector<std::vector<std::uint32_t>> held(results.size());
     for (int attempt = 0; attempt < kMostRepairs; ++attempt) {
-      const std::vector<BlockEdge> crowded = crowded_edges(results);
+      const std::vector<BlockEdge> crowded = crowded_edges(beside, results);
       if (crowded.empty()) return;
       std::vector<std::uint32_t> blocks;
-      for (const auto& [edge, block] : crowded) {
+      for (const auto& [edge, block, label] : crowded) {
         if (held[block].empty() || blocks.empty() || blocks.back() != block)
           blocks.push_back(block);
         held[block].insert(held[block].end(), {edge.low, edge.high});
@@ -280,11 +343,13 @@ class Simplifier {
   // Puts what the blocks have become behind what is in none.
   void take(std::span<const std::uint32_t> blocks, const std::vector<SurfaceBlock>& results) {
     std::vector<Triangle> next;
+    std::vector<WallSides> next_sides;
     std::vector<std::uint32_t> number(current_.size(), TriangleGrid::kNone);
     for (std::size_t t = 0; t < current_.size(); ++t) {
       if (blocks[t] != kNoBlock) continue;
       number[t] = static_cast<std::uint32_t>(next.size());
       next.push_back(current_[t]);
+      if (walls_ != nullptr) next_sides.push_back(sides_[t]);
     }
     for (std::uint32_t& home : homes_) {
       if (home != TriangleGrid::kNone && blocks[home] == kNoBlock) home = number[home];
@@ -292,29 +357,33 @@ class Simplifier {
     for (const SurfaceBlock& block : results) {
       const auto first = static_cast<std::uint32_t>(next.size());
       next.insert(next.end(), block.triangles.begin(), block.triangles.end());
+      if (walls_ != nullptr) next_sides.resize(next.size(), block.sides);
       for (std::size_t n = 0; n < block.points.size(); ++n) {
         homes_[block.points[n]] = first + block.homes[n];
       }
     }
     current_ = std::move(next);
+    sides_ = std::move(next_sides);
   }
 
   const SimplifyOptions& options_;
   const Context& context_;
   const Context quiet_;
   const Mesh& mesh_;
+  const SeparatingSurface* walls_;
+  const SurfaceView original_;  // what the error is measured from
   const Cubes cubes_;
   std::optional<TriangleGrid> grid_;
   std::vector<Triangle> current_;
+  std::vector<WallSides> sides_;  // of each triangle, where they are walls
   // Of each measured point of the mesh the triangle that is near it; none where nothing is
   // measured.
   std::vector<std::uint32_t> homes_;
   SimplificationEffect effect_;
 };
 
-}  // namespace
-
-SimplificationEffect simplify(const SimplifyOptions& options, const Context& context, Mesh& mesh) {
+SimplificationEffect simplify(const SimplifyOptions& options, const Context& context, Mesh& mesh,
+                              SeparatingSurface* walls) {
   const std::uint64_t points = std::uint64_t{mesh.positions.size()} + mesh.triangles.size();
   if (points >= TriangleGrid::kNone) {
     throw Error(ErrorCode::kTooLarge, "the surface has " + std::to_string(points) +
@@ -322,11 +391,26 @@ SimplificationEffect simplify(const SimplifyOptions& options, const Context& con
   }
   context.throw_if_stopped();
   if (mesh.triangles.size() == 0) return {};
-  Simplifier simplifier(options, context, mesh);
+  Simplifier simplifier(options, context, mesh, walls);
   const SimplificationEffect effect = simplifier.run();
   context.throw_if_stopped();
-  replace_triangles(simplifier.triangles(), mesh);
+  replace_triangles(simplifier.triangles(), simplifier.sides(), mesh);
+  if (walls != nullptr) {
+    walls->sides.shrink(mesh.triangles.size());
+    std::ranges::copy(simplifier.sides(), walls->sides.begin());
+  }
   return effect;
+}
+
+}  // namespace
+
+SimplificationEffect simplify(const SimplifyOptions& options, const Context& context, Mesh& mesh) {
+  return simplify(options, context, mesh, nullptr);
+}
+
+SimplificationEffect simplify(const SimplifyOptions& options, const Context& context,
+                              SeparatingSurface& walls) {
+  return simplify(options, context, walls.mesh, &walls);
 }
 
 }  // namespace isomesh::mesh

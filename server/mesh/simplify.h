@@ -9,9 +9,11 @@
 
 #include <cstdint>
 #include <limits>
+#include <span>
 
 #include "server/mesh/context.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/separate.h"
 
 namespace isomesh::mesh {
 
@@ -19,6 +21,9 @@ struct SimplifyOptions {
   // No vertex and no centre of a triangle, of the surface as it was and as it becomes, is farther
   // than this from the other. Millimetres, more than 0. Infinite: nothing is measured.
   double max_error_mm = std::numeric_limits<double>::infinity();
+  // Where the mesh's vertices were before they were moved, in their order: the surface that the
+  // error is measured from. Empty: where they are. No vertex may have moved farther than the error.
+  std::span<const Vec3> before = {};
   // What is aimed at; blocks give up about equal shares. 0: as few as the error allows.
   std::uint64_t triangles = 0;
 };
@@ -37,15 +42,20 @@ struct SimplificationEffect {
 
 // Simplifies the mesh in place. Its vertices are some of those that it had, in the same order and
 // at the same places; those on a boundary and those of Mesh::on_line are all kept. What is an
-// oriented manifold stays one, of the same boundary, Euler characteristic and orientation; of walls
-// between labels that is held for the vertices that are not on a line. No triangle has an area of
-// zero that had one before. The layers are joined into fewer, deeper ones: as few as let a triangle
-// name vertices of two at most, which is what the encoders walk along.
+// oriented manifold stays one, of the same boundary, Euler characteristic and orientation. No
+// triangle has an area of zero that had one before. The layers are joined into fewer, deeper ones:
+// as few as let a triangle name vertices of two at most, which is what the encoders walk along.
 //
 // Takes some 100 bytes a triangle beside the mesh, and what TriangleGrid takes. The same mesh for
 // any number of threads. Throws Error kUnusableVolume where a position is not a finite number,
 // kTooLarge where 32 bits cannot number the points that are measured, and kCancelled; the mesh is
 // as it was then.
 SimplificationEffect simplify(const SimplifyOptions& options, const Context& context, Mesh& mesh);
+
+// As above, for the walls between labels: each is simplified once, for both its sides, and keeps
+// them; the lines where walls meet stay as they are. What holds of the mesh above holds of each
+// label's own surface.
+SimplificationEffect simplify(const SimplifyOptions& options, const Context& context,
+                              SeparatingSurface& walls);
 
 }  // namespace isomesh::mesh

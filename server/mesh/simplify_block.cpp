@@ -193,12 +193,12 @@ class BlockSimplifier {
       : goal_(goal),
         block_(block),
         squared_bound_(std::pow(kWithin * goal.max_error_mm, 2)),
-        mesh_(goal.original, block.triangles),
+        mesh_(goal.mesh, block.triangles),
         exempt_(mesh_.positions.size(), 0),
         is_flat_(mesh_.positions.size(), 0),
         held_(mesh_.positions.size(), 0) {
     for (std::size_t v = 0; v < exempt_.size(); ++v) {
-      exempt_[v] = goal.original.is_on_line(mesh_.origin[v]) ? 1 : 0;
+      exempt_[v] = goal.mesh.is_on_line(mesh_.origin[v]) ? 1 : 0;
     }
     held_ = exempt_;
     // What was no manifold before need not become one.

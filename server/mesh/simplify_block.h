@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/mesh/mesh.h"
+#include "server/mesh/separate.h"
 #include "server/mesh/triangle_grid.h"
 
 namespace isomesh::mesh {
@@ -26,13 +27,16 @@ inline Point measured_point(const SurfaceView& surface, std::size_t number) {
 // Some triangles of a mesh on its way to fewer, and what has to stay near them.
 struct SurfaceBlock {
   std::vector<Triangle> triangles;  // vertices of the mesh
+  WallSides sides = {};             // of all of them, where they are walls
   // The original's points whose nearest triangles these are, and which of them each.
   std::vector<std::uint32_t> points;
   std::vector<std::uint32_t> homes;
 };
 
 struct BlockGoal {
-  const Mesh& original;
+  const Mesh& mesh;  // whose vertices are taken
+  // What the distances are from: the mesh's triangles, with its vertices as they were before.
+  SurfaceView original;
   const TriangleGrid* grid = nullptr;  // of the original; none where nothing is measured
   double max_error_mm = 0;
   double share = 0;  // of the triangles, that is aimed at

@@ -46,22 +46,28 @@ std::vector<std::uint64_t> cut_layers(std::span<const std::uint64_t> layers,
 }
 
 // By their lowest vertices; those of the same one in the order that they had.
-std::vector<std::uint64_t> order(std::vector<Triangle>& triangles, std::size_t vertices) {
+std::vector<std::uint64_t> order(std::vector<Triangle>& triangles, std::vector<WallSides>& sides,
+                                 std::size_t vertices) {
   std::vector<std::uint64_t> begins(vertices + 2, 0);
   for (const Triangle& triangle : triangles) ++begins[std::ranges::min(triangle) + 2];
   std::partial_sum(begins.begin(), begins.end(), begins.begin());
   std::vector<Triangle> ordered(triangles.size());
-  for (const Triangle& triangle : triangles) {
-    ordered[begins[std::ranges::min(triangle) + 1]++] = triangle;
+  std::vector<WallSides> ordered_sides(sides.size());
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    const std::uint64_t to = begins[std::ranges::min(triangles[t]) + 1]++;
+    ordered[to] = triangles[t];
+    if (!sides.empty()) ordered_sides[to] = sides[t];
   }
   triangles = std::move(ordered);
+  sides = std::move(ordered_sides);
   begins.pop_back();
   return begins;
 }
 
 }  // namespace
 
-void replace_triangles(std::vector<Triangle>& triangles, Mesh& mesh) {
+void replace_triangles(std::vector<Triangle>& triangles, std::vector<WallSides>& sides,
+                       Mesh& mesh) {
   std::vector<std::uint32_t> numbers(mesh.positions.size(), kUnnamed);
   for (const Triangle& triangle : triangles) {
     for (const std::uint32_t vertex : triangle) numbers[vertex] = 0;
@@ -82,7 +88,7 @@ void replace_triangles(std::vector<Triangle>& triangles, Mesh& mesh) {
   for (Triangle& triangle : triangles) {
     for (std::uint32_t& vertex : triangle) vertex = numbers[vertex];
   }
-  const std::vector<std::uint64_t> begins = order(triangles, count);
+  const std::vector<std::uint64_t> begins = order(triangles, sides, count);
   mesh.layer_vertices = cut_layers(layers, triangles, count);
   mesh.layer_triangles.clear();
   for (const std::uint64_t vertex : mesh.layer_vertices) {

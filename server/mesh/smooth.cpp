@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/mesh/parallel.h"
+#include "server/mesh/points.h"
 #include "server/mesh/sweep.h"
 
 namespace isomesh::mesh {
@@ -130,6 +131,7 @@ class Smoother {
     const Round round = {.mesh = mesh_,
                          .shares = std::span(shares_).subspan(first, last - first),
                          .max_displacement_mm = options_.max_displacement_mm,
+                         .within = options_.within,
                          .extracted = plan_.rounds > 1 ? extracted_.data() : nullptr,
                          .before = number == 0 ? before_.data() : nullptr,
                          .after = is_last ? after_.data() : nullptr,
@@ -193,6 +195,24 @@ class Smoother {
 }  // namespace
 
 double taubin_mu(double lambda, double pass_band) { return 1 / (pass_band - 1 / lambda); }
+
+std::vector<HalfSpace> box_around(const LatticeToSpace& to_space, const Dims& dims, double wider) {
+  const std::array<Point, 3> steps = {to_space.step_x, to_space.step_y, to_space.step_z};
+  const std::array<std::uint32_t, 3> counts = {dims.x, dims.y, dims.z};
+  std::vector<HalfSpace> box;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Point normal = cross(steps[(axis + 1) % 3], steps[(axis + 2) % 3]);
+    const double length = std::sqrt(dot(normal, normal));
+    for (double& coordinate : normal) coordinate /= length;
+    const double step = dot(normal, steps[axis]);  // negative of a left-handed lattice
+    const double first = dot(normal, to_space.origin) - wider * step;
+    const double last = first + (counts[axis] - 1 + 2 * wider) * step;
+    box.push_back({normal, std::max(first, last)});
+    for (double& coordinate : normal) coordinate = -coordinate;
+    box.push_back({normal, -std::min(first, last)});
+  }
+  return box;
+}
 
 SmoothingEffect smooth(const SmoothOptions& options, const Context& context, Mesh& mesh) {
   if (steps_of(options) == 0 || mesh.positions.size() == 0) {

@@ -9,15 +9,24 @@
 // what is between the first and the last is held beside the mesh.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "server/mesh/context.h"
 #include "server/mesh/extract.h"
+#include "server/mesh/lattice.h"
 #include "server/mesh/measure.h"
 #include "server/mesh/mesh.h"
 
 namespace isomesh::mesh {
+
+// The points p with normal . p <= offset, in millimetres; the normal has length 1.
+struct HalfSpace {
+  std::array<double, 3> normal = {0, 0, 0};
+  double offset = 0;
+};
 
 struct SmoothOptions {
   int passes = 5;
@@ -26,12 +35,17 @@ struct SmoothOptions {
   double mu = 0;
   // No vertex is ever farther than this from where it was extracted. Millimetres, 0 or more.
   double max_displacement_mm = std::numeric_limits<double>::infinity();
+  // No free vertex leaves them. Steps away from the mean would, next to caps: their side of them.
+  std::vector<HalfSpace> within = {};
 };
 
 // The second step's share for a first step of `lambda` and a pass-band frequency: what varies more
 // slowly along the surface than `pass_band` is kept, what varies faster is smoothed away. 1/lambda
 // + 1/mu = pass_band, as in Taubin's paper. For 0 < pass_band < 1/lambda.
 double taubin_mu(double lambda, double pass_band);
+
+// The box of a lattice's samples, wider by that share of a step on each side.
+std::vector<HalfSpace> box_around(const LatticeToSpace& to_space, const Dims& dims, double wider);
 
 // What smoothing did to a surface.
 struct SmoothingEffect {

@@ -303,6 +303,7 @@ class Sweep {
     const bool is_last = step == steps_;
     Float4* to = is_last ? moved_.data() : positions(step, layer);
     move(step, layer, to);
+    if (!round_.within.empty()) hold_within(layer, to);
     if (std::isfinite(round_.max_displacement_mm)) pull_back(layer, to);
     if (!is_last) return;
     finish(layer);
@@ -323,6 +324,22 @@ class Sweep {
       const Float4 mean = sum * link[v].weight();
       const Float4 moved = share == 1 ? mean : from[v] + (mean - from[v]) * share;
       to[v] = link[v].weight() == 0 ? from[v] : moved;
+    }
+  }
+
+  void hold_within(std::ptrdiff_t layer, Float4* to) {
+    const Links* link = links(layer);
+    const std::size_t count = vertices(layer);
+    for (std::size_t v = 0; v < count; ++v) {
+      if (link[v].weight() == 0) continue;
+      for (const HalfSpace& half : round_.within) {
+        const double outside = half.normal[0] * to[v][0] + half.normal[1] * to[v][1] +
+                               half.normal[2] * to[v][2] - half.offset;
+        if (outside <= 0) continue;
+        for (int axis = 0; axis < 3; ++axis) {
+          to[v][axis] = static_cast<float>(to[v][axis] - outside * half.normal[axis]);
+        }
+      }
     }
   }
 

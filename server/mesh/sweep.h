@@ -9,6 +9,7 @@
 
 #include "server/mesh/extent-inl.h"
 #include "server/mesh/mesh.h"
+#include "server/mesh/smooth.h"
 
 namespace isomesh::mesh {
 
@@ -37,6 +38,7 @@ struct Round {
   Mesh& mesh;
   std::span<const float> shares;  // of the way to the mean of the neighbours: one for each step
   double max_displacement_mm;
+  std::span<const HalfSpace> within;  // that free vertices stay in
   // Where the vertices were extracted; null: where the round finds them.
   const Vec3* extracted;
   // By layer, to be added to: null where the round is not the first or not the last. Triangles that

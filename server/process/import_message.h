@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "proto/error.h"
@@ -17,6 +18,14 @@
 #include "server/volume/size.h"
 
 namespace isomesh::process {
+
+// What a file has to be that a PACS has sent: the answer to a request for one series.
+struct PeersSeries {
+  std::string content_type;  // of the answer, as it came
+  std::string study;         // UIDs
+  std::string series;
+  std::vector<std::string> instances;  // all of them, ascending, each once
+};
 
 // What a request says about the uploaded file.
 struct ImportOptions {
@@ -29,6 +38,7 @@ struct ImportOptions {
   std::string member = {};
   std::vector<std::string> accept = {};      // names of notes for which nothing is refused
   std::optional<NiftiForm> nifti_form = {};  // empty: the sform, where there is one
+  std::optional<PeersSeries> peers = {};     // empty: a client's upload
 
   bool accepts(NoteCode code) const {
     return std::ranges::find(accept, describe(code).name) != accept.end();
@@ -57,14 +67,51 @@ struct ImportOrder {
   ImportBounds bounds;
 };
 
+// A file to be read that holds what a PACS has answered, in DICOM JSON (PS3.18, F).
+struct AnswerTask {
+  std::filesystem::path source;
+};
+
+struct AnswerOrder {
+  AnswerTask task;
+  ImportBounds bounds;
+};
+
+// One of the objects that a PACS told of; what it did not tell is empty. UIDs are UIDs (is_uid).
+struct PeersObject {
+  std::string study = {};
+  std::string series = {};
+  std::string instance = {};
+  std::string patient_id = {};
+  std::string modality = {};
+  std::string series_description = {};
+  std::optional<std::uint32_t> instances = {};  // of the series
+  // Of an instance that was to be stored: the PACS has not, for that reason (PS3.18, I.2.2).
+  std::optional<std::uint16_t> failure = {};
+
+  bool operator==(const PeersObject&) const = default;
+};
+
+// What a PACS has answered.
+struct PeersAnswer {
+  std::vector<PeersObject> objects;  // that it found
+  std::vector<PeersObject> stored;   // that it says it has stored
+  std::vector<PeersObject> failed;   // that it has not
+
+  bool operator==(const PeersAnswer&) const = default;
+};
+
 std::string to_message(const ImportOrder& order);
-// Throws Error kInternal when the message is no order.
-ImportOrder order_from(std::string_view message);
+std::string to_message(const AnswerOrder& order);
+
+// Which of the two it is; Throws Error kInternal when the message is none.
+std::variant<ImportOrder, AnswerOrder> order_from(std::string_view message);
 
 // Each makes one line, with its line break.
 std::string begun_message();
 std::string reading_message(std::string_view format);
 std::string volume_message(const Volume& volume);
+std::string answer_message(const PeersAnswer& answer);
 std::string error_message(const Error& error);
 
 // What an importing process has said so far.
@@ -72,6 +119,7 @@ struct ImportReport {
   bool begun = false;   // it has its order and is about to open the file
   std::string reading;  // the last format that it named; printable
   std::optional<Volume> volume;
+  std::optional<PeersAnswer> answer;
   std::optional<Error> error;
 };
 

@@ -15,6 +15,9 @@
 
 namespace isomesh::store {
 
+// Of what is listed, by the time when it was stored.
+enum class ListOrder { kOldestFirst, kNewestFirst };
+
 // Records by owner and id: the same samples may belong to several owners, each with a record of its
 // own, while the blob that the id names is shared. A record is added after its blob and erased
 // before it, so it never names one that is missing. Thread safe; all may throw Error kOutOfSpace or
@@ -35,11 +38,11 @@ class VolumeStore {
 
   virtual bool contains(const Viewer& viewer, const std::string& id) const = 0;
 
-  // Oldest first, without their labels; at most `limit` that come after the one that `after` is the
-  // cursor of.
-  virtual std::vector<Volume> list(
-      const Viewer& viewer, const std::string& after = {},
-      std::size_t limit = std::numeric_limits<std::size_t>::max()) const = 0;
+  // In that order, without their labels; at most `limit` that come after the one that `after` is
+  // the cursor of.
+  virtual std::vector<Volume> list(const Viewer& viewer, const std::string& after = {},
+                                   std::size_t limit = std::numeric_limits<std::size_t>::max(),
+                                   ListOrder order = ListOrder::kOldestFirst) const = 0;
 
   // Every record of that id that the viewer sees. Throws Error kNotFound, kGone, and kNotReady
   // while a queued or running job of one of their owners needs the volume.

@@ -28,7 +28,7 @@ std::array<double, Size> without_negative_zeros(std::array<double, Size> values)
   return values;
 }
 
-std::string to_text(const CanonicalHeader& header) {
+std::string header_text(const CanonicalHeader& header) {
   nlohmann::ordered_json json;
   json["version"] = kVersion;
   json["dims"] = header.dims;
@@ -61,7 +61,7 @@ CanonicalHeader from_text(const std::string& text) {
   }
   // The comparison refuses other versions, further members, another order of members, and sizes
   // that do not fit into 32 bits.
-  if (to_text(header) != text) throw_not_canonical("its header is not in canonical form");
+  if (header_text(header) != text) throw_not_canonical("its header is not in canonical form");
   return header;
 }
 
@@ -91,7 +91,7 @@ CanonicalWriter::CanonicalWriter(const std::filesystem::path& path, const Canoni
   data_ = static_cast<std::byte*>(data);
   size_ = *size;
   file_ = file.release();
-  const std::string text = to_text(header);
+  const std::string text = header_text(header);
   std::copy_n(std::as_bytes(std::span(text)).begin(), kHeaderBytes, data_);
 }
 

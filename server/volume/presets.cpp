@@ -1,5 +1,7 @@
 #include "server/volume/presets.h"
 
+#include "proto/presets.h"
+
 namespace isomesh::volume {
 namespace {
 
@@ -11,7 +13,7 @@ struct Row {
 // Air is -1000 and water 0. Skin lies where air ends. Soft tissue lies midway between fat (about
 // -100) and muscle and organs (about 50), so fat is left out. Bone begins above what contrast agent
 // and calcified tissue commonly reach.
-constexpr Row kPresets[] = {{"skin", -300}, {"soft tissue", -25}, {"bone", 250}};
+constexpr Row kPresets[] = {{kSkinPreset, -300}, {kSoftTissuePreset, -25}, {kBonePreset, 250}};
 
 }  // namespace
 

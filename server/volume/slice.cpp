@@ -9,6 +9,7 @@
 
 #include "proto/error.h"
 #include "proto/samples.h"
+#include "server/volume/grey.h"
 
 namespace isomesh::volume {
 namespace {
@@ -36,14 +37,6 @@ Plane plane_of(Axis axis) {
       break;
   }
   return {2, 0, 1};
-}
-
-std::uint8_t grey(double value, const std::array<double, 2>& window) {
-  if (!(value > window[0])) return 0;
-  if (value >= window[1]) return 255;
-  // Halves, because the difference of two doubles may be beyond the largest double.
-  const double half_width = window[1] / 2 - window[0] / 2;
-  return static_cast<std::uint8_t>(std::lround((value / 2 - window[0] / 2) / half_width * 255));
 }
 
 void append(png_struct* png, png_byte* data, std::size_t size) {

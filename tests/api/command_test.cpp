@@ -1,4 +1,6 @@
 // The real command against the real daemon.
+#include <csignal>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -20,6 +22,17 @@ using testing::HasSubstr;
 // A line without its end.
 std::string line_of(const Finished& result) {
   return result.output.substr(0, result.output.find('\n'));
+}
+
+// So many samples along each axis, of which no two neighbours are like each other.
+std::string noise(std::size_t size) {
+  std::string bytes(size * size * size, '\0');
+  std::uint32_t state = 1;
+  for (char& byte : bytes) {
+    state = state * 1664525 + 1013904223;
+    byte = static_cast<char>(state >> 24);
+  }
+  return bytes;
 }
 
 class CommandTest : public testing::Test {
@@ -195,7 +208,7 @@ TEST_F(CommandTest, WhatTheServerRefusesIsStatus1WithItsReason) {
   refused({"fetch", "0123", "-o", folder_ / "out.drc"}, "no job");
   refused({"info", "0123"}, "no volume");
   refused({"submit", "0123", "--iso", "1"}, "no volume");
-  refused({"submit", upload(), "--iso", "1", "--passes", "1001"}, "passes");
+  refused({"submit", upload(), "--iso", "bone"}, "no preset");
   refused({"fetch", submit(), "-o", folder_ / "out.stl"}, "");
 }
 
@@ -209,10 +222,123 @@ TEST_F(CommandTest, WrongUsageIsStatus2) {
            {"mesh", folder_ / "sphere.raw", "--iso", "1", "-o", folder_ / "out.exe"},
            {"mesh", folder_ / "sphere.raw", "--iso", "x", "-o", folder_ / "out.drc"},
            {"submit", "0123"},
+           {"submit", "0123", "--iso", "1", "--passes", "1001"},
            {"list", "--state", "melted"},
            {"status"}}) {
     EXPECT_EQ(daemon_.command(words).status, 2) << testing::PrintToString(words);
   }
+}
+
+TEST_F(CommandTest, ABatchGoesOnWhenOneFails) {
+  std::filesystem::create_directory(folder_ / "in");
+  std::filesystem::create_directory(folder_ / "out");
+  write_file(folder_ / "in/a.raw", sphere_.bytes);
+  write_file(folder_ / "in/b.raw", "too short");
+  write_file(folder_ / "in/c.raw", sphere_.bytes);
+  const Finished result = daemon_.command(
+      raw({"mesh", folder_ / "in/a.raw", folder_ / "in/b.raw", folder_ / "in/c.raw", "--iso", "100",
+           "-o", folder_ / "out/", "--format", "stl,obj", "--jobs", "2"}));
+  EXPECT_EQ(result.status, 1);
+  EXPECT_THAT(result.errors, HasSubstr("isomesh: b: "));
+  EXPECT_THAT(result.errors, HasSubstr("1 of 3 inputs failed"));
+  EXPECT_THAT(files_below(folder_.path() / "out"),
+              testing::ElementsAre("a.obj", "a.stl", "c.obj", "c.stl"));
+}
+
+TEST_F(CommandTest, AnArchiveOfSeveralMakesAMeshOfEachUnderItsName) {
+  const std::filesystem::path folder = folder_ / "study";
+  std::filesystem::create_directory(folder);
+  const std::string header =
+      "ObjectType = Image\nNDims = 3\nDimSize = 21 20 19\nElementType = MET_UCHAR\nElementDataFile "
+      "= ";
+  for (const std::string name : {"x", "y"}) {
+    write_file(folder / (name + ".mhd"), header + name + ".raw\n");
+    std::string bytes = sphere_.bytes.substr(0, 21 * 20 * 19);
+    bytes.front() = name.front();
+    write_file(folder / (name + ".raw"), bytes);
+  }
+  const Finished result =
+      daemon_.command({"mesh", folder, "--iso", "100", "-o", folder_ / "{name}.stl"});
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "study-x.stl"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "study-y.stl"));
+}
+
+TEST_F(CommandTest, ADryRunLeavesNothingBehind) {
+  const Finished dry = daemon_.command(
+      raw({"mesh", folder_ / "sphere.raw", "--iso", "100", "--dry-run", "--format", "stl"}));
+  EXPECT_EQ(dry.status, 0) << dry.errors;
+  EXPECT_THAT(dry.output, HasSubstr("triangles"));
+  EXPECT_TRUE(daemon_.client().volumes().empty());
+  EXPECT_TRUE(daemon_.client().jobs().jobs.empty());
+  const std::string kept = upload();
+  daemon_.command(raw({"mesh", folder_ / "sphere.raw", "--iso", "100", "--dry-run"}));
+  EXPECT_EQ(daemon_.client().volumes().size(), 1U) << "it was there before";
+}
+
+TEST_F(CommandTest, EraseTakesVolumesAndTellsOfThoseThatAreNone) {
+  const std::string volume = upload();
+  const Finished erased = daemon_.command({"erase", "0123", volume});
+  EXPECT_EQ(erased.status, 1);
+  EXPECT_THAT(erased.errors, HasSubstr("0123: "));
+  EXPECT_TRUE(daemon_.client().volumes().empty());
+}
+
+TEST_F(CommandTest, ReadsAndWritesPipes) {
+  const std::string options = " --dims 21,20,19 --type uint8 --iso 100";
+  ASSERT_EQ(daemon_
+                .command({"mesh", folder_ / "sphere.raw", "--dims", "21,20,19", "--type", "uint8",
+                          "--iso", "100", "-q", "-o", folder_ / "file.stl"})
+                .status,
+            0);
+  const Finished piped =
+      run({"sh", "-c",
+           "cat '" + (folder_ / "sphere.raw").string() + "' | " + ISOMESH + " --server " +
+               daemon_.url() + " mesh -" + options + " -o - --format stl"});
+  EXPECT_EQ(piped.status, 0) << piped.errors;
+  EXPECT_EQ(piped.output, read_file(folder_ / "file.stl"));
+  EXPECT_EQ(daemon_.client().volumes().back().name, "sphere.raw");
+}
+
+TEST(CommandOnItsOwn, MeshesWithoutAServerAndLeavesNothing) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "tmp");
+  const RawUpload sphere = sphere_upload();
+  write_file(folder / "sphere.raw", sphere.bytes);
+  std::vector<std::string> words = {ISOMESH, "local", folder / "sphere.raw", "--iso",
+                                    "100",   "-o",    folder / "out.stl"};
+  words.insert(words.end(), sphere.options.begin(), sphere.options.end());
+  const std::vector<std::string> environment = {"TMPDIR=" + (folder / "tmp").string(),
+                                                "ISOMESH_SERVER=http://127.0.0.1:1",
+                                                "ISOMESH_LISTEN=nonsense"};
+  const Finished result = run(words, environment);
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_GT(read_file(folder / "out.stl").size(), 1000U);
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "tmp"));
+
+  words.insert(words.end(), {"--daemon", "/bin/false"});
+  const Finished broken = run(words, environment);
+  EXPECT_EQ(broken.status, 3);
+  EXPECT_THAT(broken.errors, HasSubstr("/bin/false did not start"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "tmp"));
+}
+
+TEST(CommandOnItsOwn, EndsItsDaemonHoweverItEnds) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "tmp");
+  write_file(folder / "noise.raw", noise(96));
+  for (const int signal : {SIGINT, SIGKILL}) {
+    Process command({ISOMESH, "local", folder / "noise.raw", "--dims", "96,96,96", "--type",
+                     "uint8", "--iso", "128", "--passes", "1000", "-o", folder / "out.drc"},
+                    {"TMPDIR=" + (folder / "tmp").string()});
+    ASSERT_TRUE(eventually([&] { return children_of(command.pid()).size() == 1; }));
+    const pid_t daemon = *children_of(command.pid()).begin();
+    ASSERT_TRUE(eventually([&] { return program_of(daemon) == "isomeshd"; }));
+    command.send_signal(signal);
+    EXPECT_NE(command.wait(), 0);
+    EXPECT_TRUE(eventually([&] { return program_of(daemon).empty(); })) << "signal " << signal;
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "out.drc"));
 }
 
 TEST(CommandWithoutServer, IsStatus3) {

@@ -132,6 +132,29 @@ TEST_F(EventsTest, TheEndIsToldInAnyCase) {
   EXPECT_THAT(heard, HasSubstr("event: done"));
 }
 
+// One stream for all jobs, so that a page needs one connection for them.
+TEST_F(EventsTest, OfAllJobsComeInOneStream) {
+  const Volume volume = upload(daemon_, sphere_upload());
+  const Connection connection(daemon_.url());
+  connection.send(request("GET", "/v1/events"));
+  std::string heard = connection.receive_some();
+  EXPECT_THAT(heard, HasSubstr("200 OK"));
+  EXPECT_THAT(heard, HasSubstr("text/event-stream"));
+  const Job first = submit(daemon_, volume, 100);
+  const Job second = submit(daemon_, volume, 90);
+  const auto told = [&heard](const Job& job) {
+    return heard.find("event: done\ndata: {\"id\":\"" + job.id + "\",\"state\":\"succeeded\"") !=
+           std::string::npos;
+  };
+  while (!told(first) || !told(second)) {
+    const std::string more = connection.receive_some();
+    ASSERT_FALSE(more.empty()) << heard;
+    heard += more;
+  }
+  EXPECT_THAT(heard, HasSubstr("event: stage\ndata: {\"id\":\"" + second.id + "\""));
+  EXPECT_TRUE(blames(daemon_.get("/v1/events?job=1"), "job"));
+}
+
 TEST_F(EventsTest, AreRefusedByName) {
   const Job job = finished_job(daemon_);
   EXPECT_TRUE(blames(listen(job, {{"Last-Event-ID", "x"}}), "Last-Event-ID"));

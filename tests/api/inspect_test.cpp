@@ -152,8 +152,32 @@ TEST_F(InspectTest, ASliceIsRefusedByName) {
   EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/0123/slice.png"), ErrorCode::kNotFound));
 }
 
+TEST_F(InspectTest, APreviewIsTheVolumeReduced) {
+  const Answer answer = daemon_.get(path_ + "/preview?size=10&window=0,255");
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(answer.header("content-length"), std::to_string(answer.body.size()));
+  EXPECT_THAT(answer.body, testing::StartsWith("NRRD0004\n"));
+  EXPECT_THAT(answer.body, testing::HasSubstr("\nsizes: 7 10 10\n"));
+  // It is a volume like any other.
+  const Answer again = daemon_.send("POST", "/v1/volumes", answer.body);
+  ASSERT_EQ(again.status, 201) << again.body;
+  EXPECT_THAT(volume_from_json(again.body).dims, testing::ElementsAre(7, 10, 10));
+  // No larger than asked for, it is what was uploaded.
+  const Answer whole = daemon_.get(path_ + "/preview?window=0,255");
+  EXPECT_TRUE(whole.body.ends_with(sphere_.bytes));
+}
+
+TEST_F(InspectTest, APreviewIsRefusedByName) {
+  for (const std::string size : {"0", "257", "-1", "1.5", ""}) {
+    EXPECT_TRUE(blames(daemon_.get(path_ + "/preview?size=" + size), "size")) << size;
+  }
+  EXPECT_TRUE(blames(daemon_.get(path_ + "/preview?window=2,1"), "window"));
+  EXPECT_TRUE(blames(daemon_.get(path_ + "/preview?axis=x"), "axis"));
+  EXPECT_TRUE(is_problem(daemon_.get("/v1/volumes/0123/preview"), ErrorCode::kNotFound));
+}
+
 TEST_F(InspectTest, WhatNeverChangesIsNotSentTwice) {
-  for (const std::string what : {"/histogram", "/slice.png?index=2"}) {
+  for (const std::string what : {"/histogram", "/slice.png?index=2", "/preview?size=5"}) {
     const Answer first = daemon_.get(path_ + what);
     EXPECT_THAT(first.header("cache-control"), testing::HasSubstr("immutable"));
     const std::string etag = first.header("etag");

@@ -359,6 +359,9 @@ TEST_F(JobsTest, ListsComeInPages) {
   const auto volumes = volumes_from_json(daemon_.get("/v1/volumes").body);
   EXPECT_EQ(volumes.size(), 5U);
   expect_pages<Volume>(daemon_, "/v1/volumes", volumes, volumes_from_json);
+  const auto newest = volumes_from_json(daemon_.get("/v1/volumes?order=newest&limit=2").body);
+  EXPECT_EQ(newest, (std::vector{volumes[4], volumes[3]}));
+  EXPECT_TRUE(blames(daemon_.get("/v1/volumes?order=size"), "order"));
   // A cursor of one list is none of the other.
   const Answer jobs = daemon_.get("/v1/jobs?limit=1");
   const auto next = nlohmann::json::parse(jobs.body)["next"].get<std::string>();

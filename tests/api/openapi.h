@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "proto/orders.h"
 #include "tests/api/daemon.h"
 #include "tests/api/schema.h"
 
@@ -17,6 +18,19 @@ inline std::string replaced(std::string text, const std::string& from, const std
   const std::size_t found = text.find(from);
   return found == std::string::npos ? text : text.replace(found, from.size(), to);
 }
+
+// A hospital whose PACS does not answer.
+class HospitalFile {
+ public:
+  HospitalFile() {
+    write_file(folder_ / "hospital.toml",
+               "[[pacs]]\nname = \"absent\"\ndicomweb = \"http://127.0.0.1:1/\"\n");
+  }
+  std::string path() const { return folder_ / "hospital.toml"; }
+
+ private:
+  TemporaryFolder folder_;
+};
 
 class OpenApiTest : public testing::Test {
  protected:
@@ -36,12 +50,20 @@ class OpenApiTest : public testing::Test {
 
   // A path with the ids of what is there.
   std::string example_of(const std::string& path) {
-    const bool of_volume = path.starts_with("/v1/volumes");
-    const std::string& id = of_volume ? job_.parameters.volume : job_.id;
+    const std::string& id = path.starts_with("/v1/volumes")  ? job_.parameters.volume
+                            : path.starts_with("/v1/orders") ? order_.id
+                                                             : job_.id;
     return replaced(replaced(path, "{format}", "drc"), "{id}", id);
   }
 
-  Daemon daemon_;
+  // An order that waits for a PACS which does not answer.
+  static constexpr const char* kOrder =
+      R"({"source": {"pacs": "absent", "study": "1.2", "series": "1.3"},
+          "parameters": {"iso": 1}, "send": [{"pacs": "absent"}]})";
+
+  const HospitalFile hospital_;
+  Daemon daemon_{{"--hospital", hospital_.path()}};
+  const Order order_ = order_from_json(daemon_.send("POST", "/v1/orders", kOrder).body);
   const Job job_ = finished_job(daemon_);
   const OpenApi api_{daemon_.get("/openapi.yaml").body};
 };

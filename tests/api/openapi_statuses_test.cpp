@@ -38,6 +38,14 @@ class Statuses {
     seen_[operation].insert(answer_to(daemon_.url(), bytes).status);
   }
 
+  // A stream that ends only when the client has gone.
+  void listen(const std::string& operation, const std::string& target) {
+    const Connection connection(daemon_.url());
+    connection.send(request("GET", target));
+    connection.finish_sending();
+    seen_[operation].insert(connection.receive().status);
+  }
+
   const std::set<int>& of(const std::string& operation) { return seen_[operation]; }
 
  private:
@@ -74,7 +82,7 @@ void probe_volumes(Statuses& statuses, const Job& running, const std::string& id
   statuses.probe(post, "/v1/volumes", two_volumes());
   statuses.probe("GET /v1/volumes", "/v1/volumes");
   statuses.probe("GET /v1/volumes", "/v1/volumes?cursor=x");
-  for (const std::string part : {"", "/histogram", "/labels", "/slice.png"}) {
+  for (const std::string part : {"", "/histogram", "/labels", "/slice.png", "/preview"}) {
     const std::string get = "GET /v1/volumes/{id}" + part;
     statuses.probe(get, "/v1/volumes/" + id + part);
     statuses.probe(get, "/v1/volumes/" + id + part + "?x=1");
@@ -130,6 +138,8 @@ void probe_jobs(Statuses& statuses, const Job& job) {
   statuses.probe(events, "/v1/jobs/0123/events");
   statuses.probe(events, "/v1/jobs/" + job.id + "/events", {},
                  {{"Last-Event-ID", "9999999999999999999"}});
+  statuses.listen("GET /v1/events", "/v1/events");
+  statuses.listen("GET /v1/events", "/v1/events?x=1");
 }
 
 void probe_meshes(Statuses& statuses, const Job& job, const Job& running) {
@@ -157,9 +167,44 @@ void probe_meshes(Statuses& statuses, const Job& job, const Job& running) {
   statuses.probe("GET /livez", "/livez");
   statuses.probe("GET /readyz", "/readyz");
   statuses.probe("GET /metrics", "/metrics");
+  statuses.probe("GET /version", "/version");
+  statuses.probe("GET /version", "/version?no=1");
   statuses.probe("GET /openapi.yaml", "/openapi.yaml");
   statuses.probe("GET /", "/");
   statuses.probe("GET /", "/", {}, {{"If-None-Match", "*"}});
+}
+
+void probe_orders(Statuses& statuses, const Order& order, const std::string& body) {
+  const std::string post = "POST /v1/orders";
+  const Headers key = {{"Idempotency-Key", "o"}};
+  const std::string other =
+      R"({"source": {"pacs": "absent", "study": "1.2", "series": "1.4"},
+          "parameters": {"iso": 1}, "send": []})";
+  statuses.probe(post, "/v1/orders", body, key);
+  statuses.probe(post, "/v1/orders", body, key);
+  statuses.probe(post, "/v1/orders", other, key);
+  statuses.probe(post, "/v1/orders", "{}");
+  statuses.probe(post, "/v1/orders", std::string(70'000, ' '));
+  statuses.probe(post, "/v1/orders", body, {{"Content-Type", "text/plain"}});
+  statuses.see(post, "POST /v1/orders HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  statuses.probe("GET /v1/orders", "/v1/orders");
+  statuses.probe("GET /v1/orders", "/v1/orders?state=x");
+  statuses.probe("GET /v1/pacs", "/v1/pacs");
+  statuses.probe("GET /v1/pacs", "/v1/pacs?x=1");
+  const std::string one = "/v1/orders/" + order.id;
+  statuses.probe("GET /v1/orders/{id}", one);
+  statuses.probe("GET /v1/orders/{id}", one, {}, {{"If-None-Match", "*"}});
+  statuses.probe("GET /v1/orders/{id}", one, {}, {{"If-Match", "\"x\""}});
+  const std::string retry = "POST /v1/orders/{id}/retry";
+  statuses.probe(retry, one + "/retry");
+  statuses.probe(retry, "/v1/orders/0123/retry");
+  statuses.probe(retry, one + "/retry?x=1");
+  statuses.see(retry, "POST " + one + "/retry HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  for (const std::string method : {"GET", "DELETE"}) {
+    statuses.probe(method + " /v1/orders/{id}", one + "?x=1");
+    statuses.probe(method + " /v1/orders/{id}", "/v1/orders/0123");
+  }
+  statuses.probe("DELETE /v1/orders/{id}", one);
 }
 
 // What is asked of a volume whose samples the disk has spoilt.
@@ -168,9 +213,9 @@ void probe_damaged(Statuses& statuses, const Daemon& daemon) {
       volume_from_json(daemon.send("POST", "/v1/volumes?dims=2,2,2&type=uint8", "87654321").body)
           .id;
   write_file(daemon.data() / "blobs" / id.substr(0, 2) / id, "spoilt");
-  statuses.probe("GET /v1/volumes/{id}/histogram", "/v1/volumes/" + id + "/histogram");
-  statuses.probe("GET /v1/volumes/{id}/labels", "/v1/volumes/" + id + "/labels");
-  statuses.probe("GET /v1/volumes/{id}/slice.png", "/v1/volumes/" + id + "/slice.png");
+  for (const std::string part : {"/histogram", "/labels", "/slice.png", "/preview"}) {
+    statuses.probe("GET /v1/volumes/{id}" + part, "/v1/volumes/" + id + part);
+  }
   statuses.probe("GET /v1/estimate", "/v1/estimate?iso=1&volume=" + id);
 }
 
@@ -182,6 +227,7 @@ TEST_F(OpenApiTest, TheStatusesAreThoseOfTheServer) {
   probe_meshes(statuses, job_, running);
   probe_volumes(statuses, running, job_.parameters.volume);
   probe_damaged(statuses, daemon_);
+  probe_orders(statuses, order_, kOrder);
   for (const auto& path : api_.paths()) {
     for (const auto& operation : path.second) {
       std::string name = operation.first.as<std::string>();
@@ -198,7 +244,9 @@ TEST_F(OpenApiTest, TheStatusesAreThoseOfTheServer) {
       }
       for (const std::string& status : described) {
         EXPECT_TRUE(kElsewhere.contains(status) || statuses.of(name).contains(std::stoi(status)) ||
-                    name + ' ' + status == "POST /v1/mesh 409")  // cancelled while it is waited for
+                    name + ' ' + status ==
+                        "POST /v1/mesh 409" ||  // cancelled while it is waited for
+                    name + ' ' + status == "POST /v1/orders/{id}/retry 202")  // none failed
             << name << " never answers " << status;
       }
     }

@@ -36,6 +36,15 @@ TEST(Start, HelpAndVersion) {
   EXPECT_THAT(version.output, testing::ContainsRegex("[0-9]+\\.[0-9]+\\.[0-9]+"));
 }
 
+TEST(Start, TellsItsVersion) {
+  const Daemon daemon;
+  const Answer answer = daemon.get("/version");
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_THAT(answer.body,
+              HasSubstr("\"version\":\"" + run({ISOMESHD, "--version"}).output.substr(0, 5) + '"'));
+  EXPECT_THAT(daemon.get("/metrics").body, HasSubstr("\nisomesh_build_info{"));
+}
+
 TEST(Start, WrongUsageIsToldAndNotServed) {
   const TemporaryFolder folder;
   const std::string data = folder / "data";

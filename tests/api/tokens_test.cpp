@@ -1,8 +1,10 @@
 // Who may ask what, where tokens are configured.
 #include <algorithm>
 #include <csignal>
+#include <filesystem>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -25,7 +27,7 @@ class TokensTest : public testing::Test {
  protected:
   // A new token, which the file knows from then on.
   std::string made(const std::string& name, const std::string& role) const {
-    const Finished result = run({ISOMESHD, "token", name, "--role", role, "--into", file_});
+    const Finished result = run({ISOMESHD, "token", "add", name, "--role", role, "--into", file_});
     EXPECT_EQ(result.status, 0) << result.errors;
     return result.output.substr(0, result.output.find('\n'));
   }
@@ -103,7 +105,7 @@ TEST_F(TokensTest, ATokenSeesItsOwnAloneAndAnAdministratorAll) {
   const std::string of_volume = "/v1/volumes/" + parameters.volume;
   for (const std::string& path :
        {of_job, of_job + "/mesh.drc", of_job + "/events", of_volume, of_volume + "/histogram",
-        of_volume + "/labels", of_volume + "/slice.png"}) {
+        of_volume + "/labels", of_volume + "/slice.png", of_volume + "/preview"}) {
     EXPECT_TRUE(is_problem(daemon_.get(path, bearer(mr_)), ErrorCode::kNotFound)) << path;
     EXPECT_EQ(daemon_.get(path, bearer(ct_)).status, 200) << path;
     EXPECT_EQ(daemon_.get(path, bearer(boss_)).status, 200) << path;
@@ -155,17 +157,79 @@ TEST_F(TokensTest, TheLogNamesTheOwnerAndNeverTheToken) {
 }
 
 TEST(TokenCommand, PrintsTheTokenAndItsLine) {
-  const Finished result = run({ISOMESHD, "token", "ct"});
+  const Finished result = run({ISOMESHD, "token", "add", "ct"});
   EXPECT_EQ(result.status, 0);
   EXPECT_THAT(result.output, testing::MatchesRegex("isomesh_[0-9a-f]{64}\nct user [0-9a-f]{64}\n"));
-  EXPECT_EQ(run({ISOMESHD, "token", "c t"}).status, 1);
-  EXPECT_EQ(run({ISOMESHD, "token", "ct", "--role", "root"}).status, 1);
-  EXPECT_EQ(run({ISOMESHD, "token"}).status, 2);
+  EXPECT_EQ(run({ISOMESHD, "token", "add", "c t"}).status, 1);
+  EXPECT_EQ(run({ISOMESHD, "token", "add", "ct", "--role", "root"}).status, 1);
+  EXPECT_EQ(run({ISOMESHD, "token", "add"}).status, 2);
+}
+
+// What `isomeshd token` says with that file.
+Finished token_command(std::vector<std::string> arguments, const std::string& file) {
+  std::vector<std::string> command = {ISOMESHD, "token"};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  command.insert(command.end(), {"--tokens", file});
+  return run(command);
+}
+
+TEST(TokenCommand, ListsAndRevokes) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "tokens";
+  write_file(file, "# of the ward\n");
+  EXPECT_EQ(token_command({"list"}, file).status, 1) << "the file holds no token";
+  ASSERT_EQ(run({ISOMESHD, "token", "add", "ct", "--into", folder / "new"}).status, 0);
+  std::filesystem::rename(folder / "new", file);
+  ASSERT_EQ(token_command({"add", "ct"}, file).status, 0);
+  ASSERT_EQ(token_command({"add", "boss", "--role", "admin"}, file).status, 0);
+  const Finished two_roles = token_command({"add", "boss"}, file);
+  EXPECT_EQ(two_roles.status, 1);
+  EXPECT_THAT(two_roles.errors, HasSubstr("boss is admin already"));
+
+  const Finished list = token_command({"list"}, file);
+  EXPECT_THAT(list.output,
+              testing::MatchesRegex(
+                  "ct user [0-9a-f]{12}\nct user [0-9a-f]{12}\nboss admin [0-9a-f]{12}\n"));
+  const std::string first = list.output.substr(8, 12);
+  EXPECT_THAT(token_command({"revoke", "ct", first}, file).output, HasSubstr("revoked 1 token;"));
+  EXPECT_THAT(token_command({"list"}, file).output, Not(HasSubstr(first)));
+  EXPECT_EQ(token_command({"revoke", "ct", first}, file).status, 1);
+  EXPECT_EQ(token_command({"revoke", "nobody"}, file).status, 1);
+  EXPECT_EQ(token_command({"revoke", "ct"}, file).status, 0);
+  const Finished last = token_command({"revoke", "boss"}, file);
+  EXPECT_EQ(last.status, 1);
+  EXPECT_THAT(last.errors, HasSubstr("no token would be left"));
+  EXPECT_EQ(run({ISOMESHD, "token", "list"}).status, 1);
+  EXPECT_EQ(run({ISOMESHD, "token", "ct"}).status, 2);
+  EXPECT_EQ(std::filesystem::status(file).permissions(), std::filesystem::perms(0600));
+}
+
+TEST(TokenCommand, ManyAtOnceLoseNoLine) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "tokens";
+  ASSERT_EQ(token_command({"add", "first"}, file).status, 0);
+  {
+    std::vector<std::jthread> threads;
+    for (int n = 0; n < 8; ++n) {
+      threads.emplace_back([&, n] {
+        EXPECT_EQ(token_command({"add", "many" + std::to_string(n)}, file).status, 0);
+      });
+    }
+  }
+  const std::string lines = token_command({"list"}, file).output;
+  EXPECT_EQ(std::ranges::count(lines, '\n'), 9);
+}
+
+TEST_F(TokensTest, ARevokedTokenIsRefusedAfterSighup) {
+  EXPECT_EQ(daemon_.get("/v1/jobs", bearer(ct_)).status, 200);
+  ASSERT_EQ(token_command({"revoke", "ct"}, file_).status, 0);
+  daemon_.send_signal(SIGHUP);
+  EXPECT_TRUE(eventually([&] { return daemon_.get("/v1/jobs", bearer(ct_)).status == 401; }));
 }
 
 TEST(Tokens, LetTheDaemonListenBeyondThisMachine) {
   const TemporaryFolder folder;
-  ASSERT_EQ(run({ISOMESHD, "token", "ct", "--into", folder / "tokens"}).status, 0);
+  ASSERT_EQ(run({ISOMESHD, "token", "add", "ct", "--into", folder / "tokens"}).status, 0);
   const Daemon daemon(folder / "data", "0.0.0.0:0", {"--tokens", folder / "tokens"});
   EXPECT_EQ(daemon.get("/livez").status, 200);
   EXPECT_EQ(daemon.get("/v1/jobs").status, 401);

@@ -142,7 +142,11 @@ std::uint64_t Stages::run_job(int passes, MeshFormat format) {
   const auto& [x, y, z] = samples_.dims;
   const Volume volume;
   jobs::make_mesh({samples_.type, {x, y, z}, samples_.geometry, samples_.bytes.data()},
-                  {volume, parameters, surface_.iso, std::numeric_limits<std::uint64_t>::max()},
+                  {.volume = volume,
+                   .parameters = parameters,
+                   .iso = surface_.iso,
+                   .certify = false,
+                   .memory_bytes = std::numeric_limits<std::uint64_t>::max()},
                   sinks, progress, mesh_);
   return counting.bytes;
 }

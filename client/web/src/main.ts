@@ -5,18 +5,22 @@ import './style/common.css';
 import './style/volumes.css';
 import './style/prepare.css';
 import './style/surface.css';
+import './style/accuracy.css';
 import './style/jobs.css';
 import './style/compare.css';
 import './style/small.css';
+import './style/contrast.css';
 import { connected, isAlive } from './api/client';
+import { watchVisibility } from './api/job_events';
 import { ApiError, asApiError } from './api/problem';
 import { button, h, icon, isTyping } from './ui/dom';
 import { showHelp } from './ui/help';
-import { mountNotices, refusal } from './ui/notices';
+import { mountNotices, pendingRefusal, refusal } from './ui/notices';
 import { currentRoute, go, hashOf, type Route } from './ui/route';
 import { Scope } from './ui/signal';
 import { startTheme, toggleTheme } from './ui/theme';
-import { tokenButton, watchToken } from './ui/token_dialog';
+import { tokenButtons, watchToken } from './ui/token_dialog';
+import { uploads } from './views/upload_panel';
 import { prepareView } from './views/prepare';
 import { queueView } from './views/queue';
 import { volumesView } from './views/volumes';
@@ -62,6 +66,16 @@ const links = [
   h('a', { href: hashOf(['jobs']), 'data-place': 'jobs' }, 'Jobs'),
 ];
 
+// What the upload does that goes on behind other views.
+function uploadNote(): HTMLElement {
+  const note = h('a', { class: 'upload-note', href: hashOf([]), hidden: true });
+  uploads.state.watch((state) => {
+    note.textContent = state;
+    note.hidden = state === '';
+  });
+  return note;
+}
+
 function shell(): HTMLElement[] {
   return [
     h('a', { class: 'skip', href: '#main', onClick: (event: Event) => {
@@ -74,7 +88,8 @@ function shell(): HTMLElement[] {
       h('a', { class: 'brand', href: hashOf([]) }, 'isomesh'),
       h('nav', { 'aria-label': 'Main' }, ...links),
       h('span', { class: 'grow' }),
-      tokenButton(),
+      uploadNote(),
+      ...tokenButtons(),
       button('Keys', showHelp, { class: 'quiet', title: 'Keyboard (?)' }),
       button(icon(halfDisc), toggleTheme, { class: 'quiet', 'aria-label': 'Light or dark' }),
     ),
@@ -85,6 +100,17 @@ function shell(): HTMLElement[] {
 
 let scope = new Scope();
 let shownPath = '';
+
+// Tabs are told apart by what they show.
+function nameTab(view: HTMLElement, place: Place): void {
+  const name = (): string => view.dataset.title ?? place.title;
+  document.title = `${name()} \u00b7 isomesh`;
+  const renamed = new MutationObserver(() => {
+    document.title = `${name()} \u00b7 isomesh`;
+  });
+  renamed.observe(view, { attributes: true, attributeFilter: ['data-title'] });
+  scope.onEnd(() => renamed.disconnect());
+}
 
 async function show(): Promise<void> {
   scope.end();
@@ -106,6 +132,7 @@ async function show(): Promise<void> {
     const view = await place.show(mine, route);
     if (mine.isOver) return;
     main.replaceChildren(view);
+    nameTab(view, place);
     if (isMove) {
       main.scrollTop = 0;
       main.focus({ preventScroll: true });
@@ -116,7 +143,9 @@ async function show(): Promise<void> {
     if (failure.status === -1 && !(error instanceof ApiError)) console.error(error);
     const again = button('Try again', () => void show());
     const home = h('a', { class: 'button', href: hashOf([]) }, 'All volumes');
-    main.replaceChildren(h('div', { class: 'page-problem' }, refusal(failure, again, home)));
+    const way = failure.link ? h('a', { class: 'button', href: failure.link.href }, failure.link.text) : home;
+    const shown = failure.isUnreachable ? pendingRefusal(failure, again, way) : refusal(failure, again, way);
+    main.replaceChildren(h('div', { class: 'page-problem' }, shown));
     // What failed because nobody answered is tried again when somebody does.
     if (failure.isUnreachable) {
       const stop = connected.subscribe((isConnected) => {
@@ -156,11 +185,39 @@ function watchKeys(): void {
   });
 }
 
+// A file that was dropped beside a view would replace the page, and what it is doing.
+function watchDrops(): void {
+  const mark = (isOver: boolean): void => {
+    uploads.element.classList.toggle('over', isOver);
+    main.classList.toggle('drop-over', isOver);
+  };
+  const isOfFiles = ({ dataTransfer }: DragEvent): boolean => dataTransfer?.types.includes('Files') ?? false;
+  window.addEventListener('dragover', (event) => {
+    if (!isOfFiles(event)) return;
+    event.preventDefault();
+    mark(true);
+  });
+  window.addEventListener('dragleave', (event) => {
+    if (event.relatedTarget === null) mark(false);
+  });
+  window.addEventListener('drop', (event) => {
+    if (!isOfFiles(event) || !event.dataTransfer) return;
+    event.preventDefault();
+    mark(false);
+    uploads.takeDrop(event.dataTransfer);
+  });
+  window.addEventListener('beforeunload', (event) => {
+    if (uploads.isBusy) event.preventDefault();
+  });
+}
+
 startTheme();
 document.body.append(...shell());
 mountNotices(document.body);
 watchConnection();
 watchKeys();
+watchDrops();
+watchVisibility();
 watchToken(() => void show());
 window.addEventListener('hashchange', () => void show());
 void show();

@@ -1,19 +1,16 @@
 #include "server/codec/zip/label_zip.h"
 
 #include <algorithm>
-#include <exception>
-#include <memory>
 #include <set>
 #include <string>
 #include <utility>
 
-#include <archive.h>
-#include <archive_entry.h>
-
 #include "base/hex.h"
 #include "base/sha256.h"
+#include "base/text.h"
 #include "proto/error.h"
 #include "server/codec/draco/grid.h"
+#include "server/codec/zip/zip_writer.h"
 #include "server/mesh/label_surface.h"
 #include "server/mesh/parallel.h"
 
@@ -23,68 +20,6 @@ namespace {
 // Labels are encoded side by side, some at a time, until they have so many triangles together.
 constexpr std::size_t kTrianglesAtOnce = 1'000'000;
 constexpr std::size_t kLabelsAtOnce = 256;
-
-// A ZIP whose bytes go to a sink at once, so that it is known where each file begins.
-class ZipWriter {
- public:
-  explicit ZipWriter(const Sink& sink) : sink_(sink), archive_(archive_write_new()) {
-    check(archive_ ? archive_write_set_format_zip(archive_.get()) : ARCHIVE_FATAL);
-    check(archive_write_set_options(archive_.get(), "zip:compression=store,zip:hdrcharset=UTF-8"));
-    check(archive_write_set_bytes_per_block(archive_.get(), 0));
-    check(archive_write_open(archive_.get(), this, nullptr, write, nullptr));
-  }
-
-  // Returns where the file's bytes begin.
-  std::uint64_t add(const std::string& name, std::span<const std::byte> bytes) {
-    const std::unique_ptr<archive_entry, Free> entry(archive_entry_new());
-    check(entry ? ARCHIVE_OK : ARCHIVE_FATAL);
-    archive_entry_set_pathname_utf8(entry.get(), name.c_str());
-    archive_entry_set_filetype(entry.get(), AE_IFREG);
-    archive_entry_set_perm(entry.get(), 0644);
-    archive_entry_set_size(entry.get(), static_cast<la_int64_t>(bytes.size()));
-    check(archive_write_header(archive_.get(), entry.get()));
-    const std::uint64_t begin = written_;
-    const la_ssize_t taken = archive_write_data(archive_.get(), bytes.data(), bytes.size());
-    check(taken == static_cast<la_ssize_t>(bytes.size()) ? ARCHIVE_OK : ARCHIVE_FATAL);
-    return begin;
-  }
-
-  void finish() { check(archive_write_close(archive_.get())); }
-
- private:
-  struct Free {
-    void operator()(archive* all) const { archive_write_free(all); }
-    void operator()(archive_entry* entry) const { archive_entry_free(entry); }
-  };
-
-  // An exception may not pass through the library; told of a failure, the library would leak what
-  // it writes with.
-  static la_ssize_t write(archive* /*all*/, void* self, const void* bytes, std::size_t count) {
-    auto& writer = *static_cast<ZipWriter*>(self);
-    try {
-      if (!writer.failure_) {
-        writer.sink_(std::span(static_cast<const std::byte*>(bytes), count));
-      }
-    } catch (...) {
-      writer.failure_ = std::current_exception();
-    }
-    writer.written_ += count;
-    return static_cast<la_ssize_t>(count);
-  }
-
-  void check(int status) const {
-    if (failure_) std::rethrow_exception(failure_);
-    if (status == ARCHIVE_OK) return;
-    const char* reason = archive_ ? archive_error_string(archive_.get()) : nullptr;
-    throw Error(ErrorCode::kInternal, std::string("a ZIP could not be written: ") +
-                                          (reason == nullptr ? "no memory" : reason));
-  }
-
-  const Sink& sink_;
-  std::uint64_t written_ = 0;
-  std::exception_ptr failure_;
-  std::unique_ptr<archive, Free> archive_;
-};
 
 // What a file is called: no path, nothing that a system has a use for, and no two alike, whether or
 // not capitals count.
@@ -97,7 +32,7 @@ class FileNames {
                             std::string_view("/\\:*?\"<>|").find(c) == std::string_view::npos;
       name += is_plain ? c : '_';
     }
-    cut(name);
+    name.resize(beginning(name, kMostBytes).size());
     while (!name.empty() && (name.back() == '.' || name.back() == ' ')) name.pop_back();
     if (name.starts_with('.') || name.empty()) name.insert(name.begin(), '_');
     const std::string title = name;
@@ -111,14 +46,7 @@ class FileNames {
  private:
   // So that no file's name, with its suffix and what tells it from others, is too long for a
   // system.
-  static void cut(std::string& name) {
-    constexpr std::size_t kMost = 200;
-    if (name.size() <= kMost) return;
-    std::size_t end = kMost;
-    while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80)
-      --end;  // within UTF-8
-    name.resize(end);
-  }
+  static constexpr std::size_t kMostBytes = 200;
 
   static std::string lowered(std::string name) {
     for (char& c : name) {
@@ -163,7 +91,7 @@ std::vector<LabelFiles> encode_labels_zip(const LabelledSurface& surface,
   const std::size_t labels = surface.labels.size();
   std::vector<LabelFiles> files(labels);
   FileNames names;
-  ZipWriter zip(sink);
+  ZipWriter zip(sink, ZipWriter::Compression::kStored);
   for (std::size_t begin = 0, end = 0; begin < labels; begin = end) {
     for (std::size_t triangles = 0;
          end < labels && end - begin < kLabelsAtOnce && triangles < kTrianglesAtOnce; ++end) {

@@ -24,7 +24,36 @@ std::string_view name_of(store::EventKind kind) {
   return "done";
 }
 
-class EventSource : public net::Source {
+std::string json_of(const store::Event& event) {
+  return to_json(JobEvent{event.state, event.stage, event.progress});
+}
+
+// What streams of events have in common: how they begin, and what is sent while nothing happens.
+class TalkingSource : public net::Source {
+ public:
+  bool ends_with_reader() const override { return true; }
+
+ protected:
+  // To be called before the first event is told.
+  void begin(std::string& bytes) {
+    if (!std::exchange(has_begun_, true)) bytes += kRetry;
+  }
+
+  // To be called when there is no event to tell any more.
+  More sent(std::string& bytes) {
+    const auto now = std::chrono::steady_clock::now();
+    if (bytes.empty() && now - last_told_ >= kPing) bytes += ": ping\n\n";
+    if (bytes.empty()) return More::kLater;
+    last_told_ = now;
+    return More::kBytes;
+  }
+
+ private:
+  bool has_begun_ = false;
+  std::chrono::steady_clock::time_point last_told_ = std::chrono::steady_clock::now();
+};
+
+class EventSource : public TalkingSource {
  public:
   explicit EventSource(EventStream stream) : stream_(std::move(stream)) {
     std::ranges::reverse(stream_.past);
@@ -39,7 +68,7 @@ class EventSource : public net::Source {
       tell(*std::exchange(end_, std::nullopt), bytes);
       return More::kBytes;
     }
-    if (!std::exchange(has_begun_, true)) bytes += kRetry;
+    begin(bytes);
     while (auto event = next_event()) {
       if (event->kind == store::EventKind::kDone) {
         end_ = std::move(event);
@@ -47,14 +76,8 @@ class EventSource : public net::Source {
       }
       tell(*event, bytes);
     }
-    const auto now = std::chrono::steady_clock::now();
-    if (bytes.empty() && now - last_told_ >= kPing) bytes += ": ping\n\n";
-    if (bytes.empty()) return More::kLater;
-    last_told_ = now;
-    return More::kBytes;
+    return sent(bytes);
   }
-
-  bool ends_with_reader() const override { return true; }
 
  private:
   std::optional<store::Event> next_event() {
@@ -72,27 +95,56 @@ class EventSource : public net::Source {
     stream_.last = event.id;
     bytes.append("id: ").append(std::to_string(event.id));
     bytes.append("\nevent: ").append(name_of(event.kind));
-    bytes.append("\ndata: ")
-        .append(is_over_ ? stream_.result()
-                         : to_json(JobEvent{event.state, event.stage, event.progress}));
+    bytes.append("\ndata: ").append(is_over_ ? stream_.result() : json_of(event));
     bytes.append("\n\n");
   }
 
-  EventStream stream_;  // the past in reverse
-  bool has_begun_ = false;
+  EventStream stream_;               // the past in reverse
   std::optional<store::Event> end_;  // the last event, which is to be told next
   bool is_over_ = false;
-  std::chrono::steady_clock::time_point last_told_ = std::chrono::steady_clock::now();
+};
+
+class AllEventsSource : public TalkingSource {
+ public:
+  AllEventsSource(std::shared_ptr<Broadcaster::Mailbox> mailbox, net::FairPlaces::Place place)
+      : mailbox_(std::move(mailbox)), place_(std::move(place)) {}
+
+  More next(std::string& bytes) override {
+    if (mailbox_->has_lost_some()) return More::kEnd;
+    begin(bytes);
+    while (const auto event = mailbox_->take()) {
+      bytes.append("event: ").append(name_of(event->kind));
+      // An id has nothing that JSON would have to escape.
+      bytes.append("\ndata: {\"id\":\"").append(event->job).append("\",");
+      bytes.append(json_of(*event).substr(1)).append("\n\n");
+    }
+    return sent(bytes);
+  }
+
+ private:
+  std::shared_ptr<Broadcaster::Mailbox> mailbox_;
+  net::FairPlaces::Place place_;
 };
 
 }  // namespace
 
 void Broadcaster::Mailbox::put(const store::Event& event) {
   const Lock lock(mutex_);
-  const bool replaces = event.kind == store::EventKind::kProgress && !events_.empty() &&
-                        events_.back().kind == store::EventKind::kProgress;
-  if (replaces) events_.pop_back();
-  events_.push_back(event);
+  const auto before = std::find_if(events_.rbegin(), events_.rend(),
+                                   [&](const auto& one) { return one.job == event.job; });
+  const bool replaces = event.kind == store::EventKind::kProgress && before != events_.rend() &&
+                        before->kind == store::EventKind::kProgress;
+  if (replaces) events_.erase(std::next(before).base());
+  if (events_.size() >= kMostUnread) {
+    events_.clear();
+    has_lost_some_ = true;
+  }
+  if (!has_lost_some_) events_.push_back(event);
+}
+
+bool Broadcaster::Mailbox::has_lost_some() {
+  const Lock lock(mutex_);
+  return has_lost_some_;
 }
 
 std::optional<store::Event> Broadcaster::Mailbox::take() {
@@ -104,28 +156,45 @@ std::optional<store::Event> Broadcaster::Mailbox::take() {
 }
 
 std::shared_ptr<Broadcaster::Mailbox> Broadcaster::listen_to(const std::string& job) {
+  return add(job, std::nullopt);
+}
+
+std::shared_ptr<Broadcaster::Mailbox> Broadcaster::listen_to_all(const store::Viewer& viewer) {
+  return add("", viewer);
+}
+
+std::shared_ptr<Broadcaster::Mailbox> Broadcaster::add(const std::string& job,
+                                                       const store::Viewer& viewer) {
   auto mailbox = std::make_shared<Mailbox>();
   const Lock lock(mutex_);
-  std::erase_if(listeners_, [](const auto& listener) { return listener.second.expired(); });
-  listeners_.emplace(job, mailbox);
+  std::erase_if(listeners_, [](const auto& one) { return one.second.mailbox.expired(); });
+  listeners_.emplace(job, Listener{mailbox, viewer});
   return mailbox;
 }
 
 bool Broadcaster::publish(const store::Event& event) {
   const Lock lock(mutex_);
   bool is_heard = false;
-  const auto [begin, end] = listeners_.equal_range(event.job);
-  for (auto listener = begin; listener != end; ++listener) {
-    const auto mailbox = listener->second.lock();
-    if (!mailbox) continue;
-    mailbox->put(event);
-    is_heard = true;
+  for (const std::string& key : {event.job, std::string()}) {
+    const auto [begin, end] = listeners_.equal_range(key);
+    for (auto listener = begin; listener != end; ++listener) {
+      const auto& [weak, viewer] = listener->second;
+      const auto mailbox = weak.lock();
+      if (!mailbox || (viewer && *viewer != event.owner)) continue;
+      mailbox->put(event);
+      is_heard = true;
+    }
   }
   return is_heard;
 }
 
 std::unique_ptr<net::Source> event_source(EventStream stream) {
   return std::make_unique<EventSource>(std::move(stream));
+}
+
+std::unique_ptr<net::Source> event_source(std::shared_ptr<Broadcaster::Mailbox> mailbox,
+                                          net::FairPlaces::Place place) {
+  return std::make_unique<AllEventsSource>(std::move(mailbox), std::move(place));
 }
 
 }  // namespace isomesh::http

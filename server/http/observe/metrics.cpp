@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <optional>
+#include <set>
 #include <sstream>
+#include <utility>
 #include <vector>
 
 #include <prometheus/counter.h>
@@ -12,6 +15,9 @@
 #include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
 #include <unistd.h>
+
+#include "base/mutex.h"
+#include "server/jobs/pipeline.h"
 
 namespace isomesh::http {
 namespace {
@@ -110,8 +116,51 @@ std::string_view name_of(callbacks::CallbackOutcome outcome) {
   return "given_up";
 }
 
+// What is there only where a PACS is configured.
+class OrderMetrics {
+ public:
+  explicit OrderMetrics(prometheus::Registry& registry)
+      : orders_(prometheus::BuildGauge()
+                    .Name("isomesh_orders")
+                    .Help("Orders by state and rule")
+                    .Register(registry)),
+        failed_(prometheus::BuildCounter()
+                    .Name("isomesh_order_attempts_failed_total")
+                    .Help("Attempts of orders that failed, by PACS and reason")
+                    .Register(registry)),
+        oldest_(prometheus::BuildGauge()
+                    .Name("isomesh_oldest_open_order_seconds")
+                    .Help("Age of the oldest order that has not ended; 0 without one")
+                    .Register(registry)
+                    .Add({})) {}
+
+  void set(const Levels::Orders& levels) {
+    for (Gauge* gauge : told_) gauge->Set(0);
+    for (const auto& [what, count] : levels.counts.by_state_and_rule) {
+      Gauge& gauge =
+          orders_.Add({{"state", std::string(to_string(what.first))}, {"rule", what.second}});
+      gauge.Set(static_cast<double>(count));
+      told_.insert(&gauge);
+    }
+    for (const orders::Attempts& attempts : levels.failed) {
+      Counter& counter = failed_.Add(
+          {{"pacs", attempts.pacs}, {"reason", std::string(orders::to_string(attempts.fault))}});
+      counter.Increment(static_cast<double>(attempts.count) - counter.Value());
+    }
+    oldest_.Set(levels.oldest_open_seconds);
+  }
+
+ private:
+  Family<Gauge>& orders_;
+  Family<Counter>& failed_;
+  Gauge& oldest_;
+  std::set<Gauge*> told_;  // in the last answer
+};
+
 struct Metrics::State {
   prometheus::Registry registry;
+  Mutex orders_mutex;
+  std::optional<OrderMetrics> orders ISOMESH_GUARDED_BY(orders_mutex);
 
   Family<Counter>& counter(const char* name, const char* help) {
     return prometheus::BuildCounter().Name(name).Help(help).Register(registry);
@@ -152,6 +201,9 @@ struct Metrics::State {
 };
 
 Metrics::Metrics() : state_(std::make_unique<State>()) {
+  state_->gauge("isomesh_build_info", "The version that runs, as a label; always 1")
+      .Add({{"version", ISOMESH_VERSION}, {"mesher", jobs::kMesherVersion}})
+      .Set(1);
   // What has not happened yet is 0, not missing: rates need a beginning.
   for (const JobState state : kEnds) state_->ended.Add(label("state", to_string(state)));
   for (const TimedStage& stage : kStages) {
@@ -213,6 +265,11 @@ std::string Metrics::text(const Levels& levels) const {
   state.waiting_callbacks.Set(static_cast<double>(levels.callbacks));
   state.disk_used.Set(static_cast<double>(levels.disk_used_bytes));
   state.disk_free.Set(static_cast<double>(levels.disk_free_bytes));
+  if (levels.orders) {
+    const Lock lock(state.orders_mutex);
+    if (!state.orders) state.orders.emplace(state.registry);
+    state.orders->set(*levels.orders);
+  }
   state.memory.Set(static_cast<double>(process_status("VmRSS:")) * kKibibyte);
   state.threads.Set(static_cast<double>(process_status("Threads:")));
   state.files.Set(static_cast<double>(open_files()));

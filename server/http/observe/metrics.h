@@ -7,12 +7,15 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "proto/error.h"
 #include "proto/types.h"
 #include "server/callbacks/callbacks.h"
+#include "server/orders/orders.h"
 
 namespace isomesh::http {
 
@@ -36,6 +39,13 @@ struct Levels {
   std::uint64_t callbacks = 0;  // that wait to be delivered
   std::uint64_t disk_used_bytes = 0;
   std::uint64_t disk_free_bytes = 0;
+  // Of a service that knows a PACS.
+  struct Orders {
+    store::OrderCounts counts;
+    std::vector<orders::Attempts> failed;
+    double oldest_open_seconds = 0;
+  };
+  std::optional<Orders> orders = {};
 };
 
 // Thread safe.

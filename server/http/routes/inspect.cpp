@@ -1,5 +1,4 @@
-// What a person looks at before starting a job: histograms, labels, slices,
-// estimates.
+// What a person looks at before starting a job: histograms, labels, slices, previews, estimates.
 #include <memory>
 #include <utility>
 
@@ -8,6 +7,7 @@
 #include "server/http/request_values.h"
 #include "server/http/routes/routes.h"
 #include "server/jobs/stored_samples.h"
+#include "server/volume/preview.h"
 #include "server/volume/slice.h"
 
 namespace isomesh::http {
@@ -15,6 +15,8 @@ namespace {
 
 constexpr std::uint64_t kMostBins = 65536;
 constexpr std::uint64_t kUsualBins = 256;
+constexpr std::uint64_t kMostPreviewSize = 256;
+constexpr std::uint64_t kUsualPreviewSize = 128;
 
 // A volume never changes under its id, so neither does what is made of it.
 constexpr const char* kForever = "private, max-age=31536000, immutable";
@@ -60,6 +62,29 @@ void slice(App& app, const Request& request, Response& response) {
                 [picture] { return std::optional<std::string>(picture->next()); });
 }
 
+void preview(App& app, const Request& request, Response& response) {
+  check_known(request, {"size", "window"});
+  const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
+  const volume::PreviewChoice choice = {
+      .most = static_cast<std::uint32_t>(
+          whole_number_of(request, "size", {1, kMostPreviewSize}, kUsualPreviewSize)),
+      .window = interval_of(request, "window").value_or(volume.range)};
+  const std::string etag = '"' + volume.id + ".preview" + std::to_string(choice.most) + '.' +
+                           to_text(choice.window[0]) + '.' + to_text(choice.window[1]) + '"';
+  if (is_known(request, response, etag, kForever)) return;
+  const auto canonical = std::make_shared<const volume::CanonicalFile>(
+      jobs::stored_samples(app.services.blobs, volume.id).path);
+  const auto reduced = std::make_shared<volume::PreviewNrrd>(canonical, choice);
+  const auto next = [reduced] { return std::optional<std::string>(reduced->next()); };
+  response.status = 200;
+  response.set_header("Accept-Ranges", "none");
+  response.set_header("Content-Disposition", "attachment; filename=\"preview.nrrd\"");
+  response.stream = {.source = computed_source(next, false),
+                     .media_type = "application/octet-stream",
+                     .framing = Framing::kLength,
+                     .length = reduced->size()};
+}
+
 // Names come and go with the volume's record, so the list is not for ever.
 void labels(App& app, const Request& request, Response& response) {
   check_known(request, {"background"});
@@ -93,6 +118,9 @@ void add_inspect_routes(App& app) {
                    [&app](const auto& request, auto& response) { labels(app, request, response); });
   add_computed_get(app, volume + "/slice.png",
                    [&app](const auto& request, auto& response) { slice(app, request, response); });
+  add_computed_get(app, volume + "/preview", [&app](const auto& request, auto& response) {
+    preview(app, request, response);
+  });
   add_computed_get(app, "/v1/estimate", [&app](const auto& request, auto& response) {
     estimate(app, request, response);
   });

@@ -1,4 +1,5 @@
 #include <chrono>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -111,6 +112,15 @@ std::vector<store::Event> past_of(const App& app, const store::Viewer& viewer,
   }
 }
 
+void answer_events(Response& response, std::unique_ptr<net::Source> source) {
+  response.status = 200;
+  response.set_header("Cache-Control", "no-store");
+  response.set_header("X-Accel-Buffering", "no");  // nginx would collect them
+  response.stream = {.source = std::move(source),
+                     .media_type = "text/event-stream",
+                     .framing = Framing::kUntilConnectionEnds};
+}
+
 void events(App& app, const Request& request, Response& response) {
   check_known(request, {});
   const std::string id = request.path_parameter("id");
@@ -129,18 +139,20 @@ void events(App& app, const Request& request, Response& response) {
     // The job is kept for longer than its events.
     past.push_back({1, "", id, store::EventKind::kDone, job.state, job.stage, job.progress});
   }
-  response.status = 200;
-  response.set_header("Cache-Control", "no-store");
-  response.set_header("X-Accel-Buffering", "no");  // nginx would collect them
-  response.stream = {
-      .source = event_source({.mailbox = std::move(mailbox),
+  answer_events(response,
+                event_source({.mailbox = std::move(mailbox),
                               .past = std::move(past),
                               .last = last,
                               .result = [&jobs = app.services.jobs, who = viewer_of(request),
                                          id] { return to_json(jobs.get(who, id)); },
-                              .place = std::move(place)}),
-      .media_type = "text/event-stream",
-      .framing = Framing::kUntilConnectionEnds};
+                              .place = std::move(place)}));
+}
+
+void all_events(App& app, const Request& request, Response& response) {
+  check_known(request, {});
+  auto place = app.streams.take(party_of(request));
+  answer_events(response,
+                event_source(app.events.listen_to_all(viewer_of(request)), std::move(place)));
 }
 
 }  // namespace
@@ -156,6 +168,8 @@ void add_job_routes(App& app) {
              [&app](const auto& request, auto& response) { cancel(app, request, response); });
   add_get(app, kJobs + "/{id}/events",
           [&app](const auto& request, auto& response) { events(app, request, response); });
+  add_get(app, "/v1/events",
+          [&app](const auto& request, auto& response) { all_events(app, request, response); });
 }
 
 }  // namespace isomesh::http

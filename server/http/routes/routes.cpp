@@ -10,6 +10,7 @@
 #include "base/text.h"
 #include "proto/json.h"
 #include "server/http/upload.h"
+#include "server/jobs/crop.h"
 #include "server/jobs/settle_labels.h"
 
 namespace isomesh::http {
@@ -36,9 +37,15 @@ void report_refused(Metrics& metrics, const std::string& address, const Error& e
       .add("remote", address.empty() ? "unix" : address);
 }
 
-bool has_ended(const store::JobStore& jobs, const std::string& job) {
+// Requests wait for jobs and for orders.
+bool has_ended(const Services& services, const std::string& id) {
   try {
-    return is_final(jobs.get(std::nullopt, job).state);
+    if (services.orders != nullptr) return is_final(services.orders->get(std::nullopt, id).state);
+  } catch (const Error&) {
+    // it is no order
+  }
+  try {
+    return is_final(services.jobs.get(std::nullopt, id).state);
   } catch (const Error&) {
     return true;  // it is not there any more
   }
@@ -66,7 +73,7 @@ App::App(const Services& the_services, const ServerOptions& the_options)
           connection_options(the_options),
           {.answer = [this](Request& request,
                             Response& response) { return answer(*this, request, response); },
-           .has_ended = [this](const std::string& job) { return has_ended(services.jobs, job); },
+           .has_ended = [this](const std::string& job) { return has_ended(services, job); },
            .on_answered =
                [this](const Request& request, const Response& response, const BodySizes& sizes) {
                  end_request(metrics, request, response, sizes);
@@ -159,9 +166,11 @@ std::string json_body(App& app, const Request& request) {
 }
 
 JobParameters settled(const App& app, const Request& request, JobParameters parameters) {
-  if (!parameters.labels) return parameters;
+  if (!parameters.labels && !parameters.crop) return parameters;
   const store::Viewer viewer = viewer_of(request);
   const Volume volume = app.services.volumes.get(viewer, parameters.volume);
+  if (parameters.crop) jobs::samples_in(*parameters.crop, volume.geometry, volume.dims);
+  if (!parameters.labels) return parameters;
   return jobs::settle_labels(std::move(parameters), viewer, volume, app.services.labels);
 }
 

@@ -1,5 +1,9 @@
+#include <nlohmann/json.hpp>
+
 #include "server/http/openapi.h"
+#include "server/http/request_values.h"
 #include "server/http/routes/routes.h"
+#include "server/jobs/pipeline.h"
 
 namespace isomesh::http {
 
@@ -16,6 +20,11 @@ void add_service_routes(App& app) {
       throw Error(ErrorCode::kUnavailable, "jobs wait for room on the disk");
     }
     response.set_body("ok\n", "text/plain");
+  });
+  add_get(app, "/version", [](const auto& request, auto& response) {
+    check_known(request, {});
+    const nlohmann::json version = {{"version", ISOMESH_VERSION}, {"mesher", jobs::kMesherVersion}};
+    response.set_body(version.dump(), "application/json");
   });
   add_get(app, "/openapi.yaml", [](const auto& /*request*/, auto& response) {
     response.set_body(kOpenApi, "application/yaml");

@@ -38,14 +38,24 @@ bool is_place(const std::string& text) {
          text.find_first_not_of("0123456789-T:.Z", 0) == space;
 }
 
+store::ListOrder order_of(const Request& request) {
+  const std::string_view order =
+      request.has_parameter("order") ? request.parameter("order") : "oldest";
+  if (order != "oldest" && order != "newest") {
+    throw invalid_parameter("order", R"(must be "oldest" or "newest")");
+  }
+  return order == "newest" ? store::ListOrder::kNewestFirst : store::ListOrder::kOldestFirst;
+}
+
 void list(App& app, const Request& request, Response& response) {
-  check_known(request, {"cursor", "limit"});
+  check_known(request, {"cursor", "limit", "order"});
+  const store::ListOrder order = order_of(request);
   const std::string after = id_after(request, kVolumeCursor);
   if (!after.empty() && !is_place(after)) throw wrong_cursor();
   const std::size_t limit = whole_number_of(request, "limit", kListLengths, kUsualListLength);
-  const auto read = [&volumes = app.services.volumes, viewer = viewer_of(request)](
+  const auto read = [&volumes = app.services.volumes, viewer = viewer_of(request), order](
                         const std::string& from, std::size_t count) {
-    std::vector<Volume> rows = volumes.list(viewer, from, count);
+    std::vector<Volume> rows = volumes.list(viewer, from, count, order);
     // Lists leave out the identifiers of slices, of which one volume may have thousands.
     for (Volume& row : rows) row.dicom.reset();
     return rows;

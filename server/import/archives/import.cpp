@@ -1,7 +1,6 @@
 #include "server/import/archives/import.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <functional>
 #include <map>
 #include <optional>
@@ -10,37 +9,16 @@
 #include <utility>
 #include <vector>
 
-#include <stdlib.h>
-
 #include "base/error.h"
 #include "base/text.h"
 #include "proto/error.h"
 #include "server/import/archives/archive.h"
 #include "server/import/dicom/import.h"
 #include "server/import/readers.h"
+#include "server/import/scratch_folder.h"
 
 namespace isomesh::import {
 namespace {
-
-// A folder within the scratch folder, removed with all that was unpacked into it.
-class MembersFolder {
- public:
-  explicit MembersFolder(const std::filesystem::path& scratch)
-      : path_((scratch / "members-XXXXXX").string()) {
-    if (::mkdtemp(path_.data()) == nullptr) throw_system_error("mkdtemp", errno);
-  }
-  ~MembersFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  MembersFolder(const MembersFolder&) = delete;
-  MembersFolder& operator=(const MembersFolder&) = delete;
-
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
 
 // A member that is of a format that is read.
 struct FoundVolume {
@@ -68,7 +46,7 @@ class Members {
  public:
   explicit Members(const Input& input)
       : input_(input),
-        folder_(input.task.scratch),
+        folder_(input.task.scratch, "members-"),
         all_(unpack(input.path, folder_.path(), limits_of(input.task.limits),
                     [&](const auto& beginning) { return most_of_slice(beginning, input.task); })) {}
 
@@ -83,7 +61,7 @@ class Members {
 
  private:
   const Input& input_;
-  MembersFolder folder_;
+  TemporaryFolder folder_;
   std::vector<ArchiveMember> all_;
 };
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "proto/error.h"
+#include "proto/presets.h"
 #include "server/import/dicom/beginning.h"
 #include "server/import/dicom/choice.h"
 #include "server/import/dicom/pixels.h"
@@ -134,7 +135,8 @@ void suggest(const Stack& stack, Volume& volume) {
   volume.presets = volume::presets_for(image.modality, image.rescale_type, volume.range);
   if (!are_labels(stack) || !are_shares(stack)) return;
   volume.suggested_iso = half_of(stack);
-  if (half_of(stack) <= volume.range[1]) volume.presets.push_back({"segment", half_of(stack)});
+  if (half_of(stack) <= volume.range[1])
+    volume.presets.push_back({std::string(kSegmentPreset), half_of(stack)});
 }
 
 DicomIdentity identify(const Stack& stack, std::span<const Source> sources, const DataSet& data) {

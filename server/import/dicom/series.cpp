@@ -139,6 +139,30 @@ std::string joined_titles(const std::vector<Choice>& choices) {
   return text + (choices.size() > kMostNamed ? "; ..." : "");
 }
 
+DicomCode code_of(const DataSet& data, Tag sequence) {
+  const DataSet* code = data.item(sequence);
+  if (code == nullptr) return {};
+  return {.value = utf8(*code, kCodeValue),
+          .scheme = utf8(*code, kCodingSchemeDesignator),
+          .meaning = utf8(*code, kCodeMeaning)};
+}
+
+std::vector<DicomSegment> segments_of(const DataSet& data) {
+  std::vector<DicomSegment> segments;
+  const Element* sequence = data.find(kSegmentSequence);
+  if (sequence == nullptr) return segments;
+  for (const DataSet& item : sequence->items) {
+    const auto number = item.unsigned_number(kSegmentNumber);
+    if (!number) continue;
+    segments.push_back({.label = *number,
+                        .category = code_of(item, kSegmentedPropertyCategoryCodeSequence),
+                        .type = code_of(item, kSegmentedPropertyTypeCodeSequence),
+                        .region = code_of(item, kAnatomicRegionSequence)});
+  }
+  std::ranges::sort(segments, {}, &DicomSegment::label);
+  return segments;
+}
+
 }  // namespace
 
 Upload read_headers(std::span<const std::filesystem::path> files,
@@ -201,7 +225,18 @@ DicomIdentity identity_of(const DataSet& data) {
           .series_description = utf8(data, kSeriesDescription),
           .modality = utf8(data, kModality),
           .frame_of_reference_uid = utf8(data, kFrameOfReferenceUid),
-          .instances = {}};
+          .instances = {},
+          .issuer_of_patient_id = utf8(data, kIssuerOfPatientId),
+          .patient_identity_removed = utf8(data, kPatientIdentityRemoved),
+          .deidentification_method = utf8(data, kDeidentificationMethod),
+          .acquisition_datetime = utf8(data, kAcquisitionDateTime),
+          .position_reference_indicator = utf8(data, kPositionReferenceIndicator),
+          .equipment = {.manufacturer = utf8(data, kManufacturer),
+                        .model_name = utf8(data, kManufacturerModelName),
+                        .station_name = utf8(data, kStationName),
+                        .device_serial_number = utf8(data, kDeviceSerialNumber),
+                        .software_versions = utf8(data, kSoftwareVersions)},
+          .segments = segments_of(data)};
 }
 
 }  // namespace isomesh::import::dicom

@@ -119,6 +119,11 @@ std::string converted(std::string_view text, const char* from) {
 
 }  // namespace
 
+void load_character_sets() {
+  // A module stays loaded as long as a converter of it is open.
+  for (const CharacterSet& set : kCharacterSets) static_cast<void>(iconv_open("UTF-8", set.name));
+}
+
 std::string utf8(const DataSet& data, Tag tag) {
   const std::string_view text = data.text(tag);
   if (text.empty()) return {};

@@ -13,4 +13,8 @@ namespace isomesh::import::dicom {
 // U+FFFD.
 std::string utf8(const DataSet& data, Tag tag);
 
+// Loads what converts each of them, for as long as the process lives. To be called before the
+// process gives up opening files: without it names that are not ASCII or UTF-8 would be lost.
+void load_character_sets();
+
 }  // namespace isomesh::import::dicom

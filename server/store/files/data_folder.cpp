@@ -16,7 +16,10 @@ namespace isomesh::store {
 DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uint64_t> reserve)
     : root_(root) {
   std::error_code error;
-  std::filesystem::create_directories(root_, error);
+  // What it holds tells of patients. One that was there has the rights that somebody gave it.
+  if (std::filesystem::create_directories(root_, error)) {
+    std::filesystem::permissions(root_, std::filesystem::perms::owner_all, error);
+  }
   if (!error) root_ = std::filesystem::canonical(root_, error);
   if (error) throw Error(ErrorCode::kInternal, "the data folder: " + error.message());
 

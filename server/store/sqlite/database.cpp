@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstdio>
-#include <ctime>
 
+#include "base/clock.h"
 #include "proto/error.h"
 #include "server/store/files/files.h"
 
@@ -105,6 +104,55 @@ CREATE TABLE identity(        -- one row: see Identity
   number INTEGER NOT NULL,
   seen INTEGER NOT NULL
 );
+)sql",
+                               R"sql(
+CREATE TABLE orders(          -- states are the values of OrderState; those from 4 on are final
+  id TEXT NOT NULL PRIMARY KEY,
+  owner TEXT NOT NULL,
+  state INTEGER NOT NULL,
+  rule TEXT,
+  created INTEGER NOT NULL,
+  finished INTEGER,
+  next INTEGER NOT NULL,      -- when it is due, while it is open
+  idempotency_key TEXT,
+  request_digest TEXT,
+  record TEXT NOT NULL,       -- the JSON of the API
+  work TEXT NOT NULL          -- what the API does not tell
+) WITHOUT ROWID;
+CREATE INDEX orders_due ON orders(next) WHERE state < 4;
+CREATE INDEX orders_by_owner ON orders(owner, id);
+CREATE INDEX orders_by_end ON orders(finished) WHERE finished IS NOT NULL;
+CREATE UNIQUE INDEX orders_by_key ON orders(owner, idempotency_key)
+  WHERE idempotency_key IS NOT NULL;
+
+CREATE TABLE order_blobs(     -- objects that are about to be sent
+  "order" TEXT NOT NULL REFERENCES orders(id) ON DELETE CASCADE,
+  blob TEXT NOT NULL,
+  PRIMARY KEY("order", blob)
+) WITHOUT ROWID;
+CREATE INDEX order_blobs_by_blob ON order_blobs(blob);
+
+CREATE TABLE watched(         -- series that rules have made orders of
+  rule TEXT NOT NULL,
+  study TEXT NOT NULL,
+  series TEXT NOT NULL,
+  "order" TEXT NOT NULL,      -- the last one
+  instances INTEGER NOT NULL, -- as many as there were for that
+  seen INTEGER NOT NULL,
+  PRIMARY KEY(rule, study, series)
+) WITHOUT ROWID;
+CREATE INDEX watched_by_order ON watched("order");
+CREATE INDEX watched_by_time ON watched(seen);
+
+CREATE TABLE audit(
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  at TEXT NOT NULL,
+  record TEXT NOT NULL
+);
+CREATE TRIGGER audit_is_not_changed BEFORE UPDATE ON audit
+  BEGIN SELECT raise(ABORT, 'the audit trail is not changed'); END;
+CREATE TRIGGER audit_is_not_removed BEFORE DELETE ON audit
+  BEGIN SELECT raise(ABORT, 'the audit trail is not removed'); END;
 )sql"};
 
 // Versions 1 and 2 were never released.
@@ -188,18 +236,6 @@ std::int64_t to_us(Time time) {
 
 Time from_us(std::int64_t us) { return Time(std::chrono::microseconds(us)); }
 
-std::int64_t us_of_timestamp(std::string_view text) {
-  std::tm parts = {};
-  int milliseconds = 0;
-  const std::string copy(text);
-  if (std::sscanf(copy.c_str(), "%d-%d-%dT%d:%d:%d.%dZ", &parts.tm_year, &parts.tm_mon,
-                  &parts.tm_mday, &parts.tm_hour, &parts.tm_min, &parts.tm_sec,
-                  &milliseconds) != 7) {
-    return 0;
-  }
-  parts.tm_year -= 1900;
-  parts.tm_mon -= 1;
-  return (static_cast<std::int64_t>(::timegm(&parts)) * 1000 + milliseconds) * 1000;
-}
+std::int64_t us_of_timestamp(std::string_view text) { return to_us(time_of(text)); }
 
 }  // namespace isomesh::store

@@ -286,8 +286,10 @@ const Job& job_of(const Submission& submission) {
 }
 
 std::string result_key(const std::string& volume, const std::vector<Note>& notes,
-                       const MeshParameters& parameters, const std::string& mesher_version) {
-  std::string text = mesher_version + '\n' + volume + '\n' + to_json(parameters);
+                       const JobParameters& parameters, const std::string& mesher_version) {
+  std::string text = mesher_version + '\n' + volume + '\n' +
+                     to_json(static_cast<const MeshParameters&>(parameters));
+  if (parameters.certify) text += "\ncertified";
   for (const Note& note : notes_in_mesh(notes)) text += '\n' + note.code + ": " + note.detail;
   return sha256_of(text);
 }

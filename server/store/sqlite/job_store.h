@@ -110,9 +110,9 @@ class SqliteJobStore : public JobStore {
   std::uint64_t work_generation_ ISOMESH_GUARDED_BY(work_mutex_) = 0;
 };
 
-// The same for all jobs that make the same bytes, whatever else they are.
+// The same for all jobs that make the same bytes and say the same of them, whatever else they are.
 // `notes` are the volume's: a mesh carries some of them.
 std::string result_key(const std::string& volume, const std::vector<Note>& notes,
-                       const MeshParameters& parameters, const std::string& mesher_version);
+                       const JobParameters& parameters, const std::string& mesher_version);
 
 }  // namespace isomesh::store

@@ -15,9 +15,13 @@ std::string receiver_of(const std::string& url) {
 
 void SqliteOutbox::add(Connection& connection, const Job& job) {
   if (!job.parameters.callback) return;
-  const std::string& url = job.parameters.callback->url;
-  connection.run("INSERT OR REPLACE INTO callbacks VALUES(?, ?, ?, ?, 0, ?, ?)", job.id,
-                 receiver_of(url), url, to_json(job), now_us(), now_us());
+  add(connection, job.id, job.parameters.callback->url, to_json(job));
+}
+
+void SqliteOutbox::add(Connection& connection, const std::string& id, const std::string& url,
+                       const std::string& body) {
+  connection.run("INSERT OR REPLACE INTO callbacks VALUES(?, ?, ?, ?, 0, ?, ?)", id,
+                 receiver_of(url), url, body, now_us(), now_us());
 }
 
 std::vector<Delivery> SqliteOutbox::due(Time now, std::size_t per_receiver) const {

@@ -16,6 +16,9 @@ class SqliteOutbox : public Outbox {
 
   // Has the end of a job delivered, if the job has a callback; part of the open transaction.
   static void add(Connection& connection, const Job& job);
+  // The same for anything that has ended, under its id.
+  static void add(Connection& connection, const std::string& id, const std::string& url,
+                  const std::string& body);
 
   std::vector<Delivery> due(Time now, std::size_t per_receiver) const override;
   std::optional<Time> next_after(Time now) const override;

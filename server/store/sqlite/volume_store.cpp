@@ -66,9 +66,9 @@ bool SqliteVolumeStore::contains(const Viewer& viewer, const std::string& id) co
 }
 
 std::vector<Volume> SqliteVolumeStore::list(const Viewer& viewer, const std::string& after,
-                                            std::size_t limit) const {
+                                            std::size_t limit, ListOrder order) const {
   std::vector<Volume> volumes;
-  for (const std::string& record : records(viewer, after, limit)) {
+  for (const std::string& record : records(viewer, after, limit, order)) {
     volumes.push_back(volume_from_record(record));
   }
   return volumes;
@@ -76,16 +76,19 @@ std::vector<Volume> SqliteVolumeStore::list(const Viewer& viewer, const std::str
 
 // Without a look at what is in them, so that others do not wait for that.
 std::vector<std::string> SqliteVolumeStore::records(const Viewer& viewer, const std::string& after,
-                                                    std::size_t limit) const {
+                                                    std::size_t limit, ListOrder order) const {
   const std::size_t space = after.find(' ');
   const std::int64_t created = us_of_timestamp(after.substr(0, space));
   const std::string id = space == std::string::npos ? "" : after.substr(space + 1);
   const Reading reading(database_.reader());
+  const bool is_descending = order == ListOrder::kNewestFirst;
+  const std::int64_t beginning = is_descending ? std::numeric_limits<std::int64_t>::max() : -1;
   Query query = reading->query(
-      "SELECT iif(instr(record, '\"labels\":['), json_remove(record, '$.labels'), record) FROM "
-      "volumes WHERE (?1 IS NULL OR owner = ?1) AND (created, id) > (?2, ?3) "
-      "ORDER BY created, id LIMIT ?4",
-      viewer, after.empty() ? std::int64_t{-1} : created, id,
+      std::string("SELECT iif(instr(record, '\"labels\":['), json_remove(record, '$.labels'), "
+                  "record) FROM volumes WHERE (?1 IS NULL OR owner = ?1) AND (created, id) ") +
+          (is_descending ? "< (?2, ?3) ORDER BY created DESC, id DESC LIMIT ?4"
+                         : "> (?2, ?3) ORDER BY created, id LIMIT ?4"),
+      viewer, after.empty() ? beginning : created, id,
       static_cast<std::int64_t>(std::min<std::size_t>(limit, 1 << 30)));
   std::vector<std::string> records;
   while (query.next()) records.push_back(query.text(0));

@@ -20,8 +20,8 @@ class SqliteVolumeStore : public VolumeStore {
   Volume rename(const std::string& owner, const std::string& id,
                 const std::optional<std::string>& name) override;
   bool contains(const Viewer& viewer, const std::string& id) const override;
-  std::vector<Volume> list(const Viewer& viewer, const std::string& after,
-                           std::size_t limit) const override;
+  std::vector<Volume> list(const Viewer& viewer, const std::string& after, std::size_t limit,
+                           ListOrder order) const override;
   void erase(const Viewer& viewer, const std::string& id) override;
   bool names(const std::string& blob) const override;
   std::vector<Expirable> unused(const ExpiryFilter& filter, std::size_t limit) const override;
@@ -31,7 +31,7 @@ class SqliteVolumeStore : public VolumeStore {
 
  private:
   std::vector<std::string> records(const Viewer& viewer, const std::string& after,
-                                   std::size_t limit) const;
+                                   std::size_t limit, ListOrder order) const;
 
   Database& database_;
 };

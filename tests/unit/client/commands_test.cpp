@@ -1,5 +1,6 @@
 #include "client/cli/commands.h"
 
+#include <algorithm>
 #include <atomic>
 #include <functional>
 
@@ -126,6 +127,45 @@ TEST_F(Commands, AServerThatIsNotThereIsStatusThree) {
   const Outcome outcome = outcome_of(options_);
   EXPECT_EQ(outcome.status, kServerUnreachable);
   EXPECT_THAT(outcome.err, StartsWith("isomesh: no answer from http://"));
+}
+
+TEST_F(Commands, AServerThatGoesAwayLeavesAJobToComeBackTo) {
+  job_.state = JobState::kRunning;
+  job_.mesh.reset();
+  at_a_look_ = [&] { server_.http.stop(); };
+  const Outcome outcome = outcome_of(options_);
+  EXPECT_EQ(outcome.status, kServerUnreachable);
+  EXPECT_THAT(outcome.err, HasSubstr(options_.server));
+  EXPECT_THAT(outcome.err, HasSubstr(" wait 7\n"));
+  EXPECT_THAT(outcome.err, HasSubstr(" fetch 7 -o OUT"));
+}
+
+TEST_F(Commands, QuietSaysNothing) {
+  options_.quiet = true;
+  const Outcome outcome = outcome_of(options_);
+  EXPECT_EQ(outcome.status, kDone);
+  EXPECT_EQ(outcome.out + outcome.err, "");
+  EXPECT_EQ(test::read_file(folder_ / "head.drc"), "mesh");
+}
+
+TEST_F(Commands, StandardOutputTakesTheMeshAlone) {
+  options_.outputs = {{.path = "-", .format = MeshFormat::kDrc}};
+  const Outcome outcome = outcome_of(options_);
+  EXPECT_EQ(outcome.status, kDone);
+  EXPECT_EQ(outcome.out, "mesh");
+}
+
+TEST_F(Commands, SeveralInputsHaveAMeshEach) {
+  test::write_file(folder_ / "knee.nii", "another");
+  options_.files.emplace_back(folder_ / "knee.nii");
+  options_.outputs = {{.path = folder_ / "{name}.drc", .format = MeshFormat::kDrc}};
+  options_.jobs = 2;
+  const Outcome outcome = outcome_of(options_);
+  EXPECT_EQ(outcome.status, kDone) << outcome.err;
+  EXPECT_EQ(test::read_file(folder_ / "head.drc"), "mesh");
+  EXPECT_EQ(test::read_file(folder_ / "knee.drc"), "mesh");
+  options_.json = true;
+  EXPECT_EQ(std::ranges::count(outcome_of(options_).out, '\n'), 2);
 }
 
 TEST_F(Commands, AnAddressThatIsNoneIsWrongUsage) {

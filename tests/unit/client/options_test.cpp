@@ -89,7 +89,7 @@ TEST_F(OptionsTest, ReadsEverythingThatAMeshCanBeAskedFor) {
   expected.pass_band = 0.05;
   expected.max_displacement_mm = 0.75;
   expected.close = true;
-  expected.components = {.keep = 3, .min_triangles = 500};
+  expected.components = {.keep = 3, .min_triangles = 500, .nearest_to = {}};
   expected.normals = true;
   expected.draco = {.position_bits = 11, .speed = 0};
   expected.priority = Priority::kStat;
@@ -112,13 +112,111 @@ TEST_F(OptionsTest, ReadsRawSamples) {
   EXPECT_TRUE(options.upload.raw->big_endian);
 }
 
-TEST_F(OptionsTest, LeavesRangesToTheServer) {
-  const Options options = parse(
-      {"submit", "abc", "--iso", "otsu", "--scheme", "7", "--passes", "-1", "--format", "drc,glb"});
+TEST_F(OptionsTest, RefusesValuesThatTheServerWouldRefuse) {
+  const Options options =
+      parse({"submit", "abc", "--iso", "otsu", "--passes", "0", "--format", "drc,glb"});
   EXPECT_FALSE(options.parameters.iso);
-  EXPECT_EQ(static_cast<int>(options.parameters.scheme), 7);
-  EXPECT_EQ(options.parameters.passes, -1);
   EXPECT_THAT(options.parameters.formats, ElementsAre(MeshFormat::kDrc, MeshFormat::kGlb));
+  const char* file = file_.c_str();
+  const char* drc = drc_.c_str();
+  for (const std::vector<const char*>& wrong : std::vector<std::vector<const char*>>{
+           {"submit", "abc", "--iso", "1", "--passes", "-1"},
+           {"submit", "abc", "--iso", "1", "--scheme", "7"},
+           {"estimate", "abc", "--iso", "bone", "--passes", "1001"},
+           {"mesh", file, "-o", drc, "--iso", "1", "--smoothing", "taubin", "--lambda", "0.9"},
+           {"mesh", file, "-o", drc, "--iso", "1", "--speed", "11"}}) {
+    EXPECT_EQ(ending_of(wrong).first, kWrongUsage) << wrong.back();
+  }
+  EXPECT_THAT(ending_of({"submit", "abc", "--iso", "1", "--passes", "1001"}).second,
+              HasSubstr("passes: must be a whole number from 0 to 1000"));
+}
+
+TEST_F(OptionsTest, AnIsoValueMayBeAPreset) {
+  EXPECT_EQ(parse({"submit", "abc", "--iso", "bone"}).preset, "bone");
+  EXPECT_EQ(parse({"submit", "abc", "--iso", "Soft-Tissue"}).preset, "soft tissue");
+  EXPECT_EQ(parse({"submit", "abc", "--iso", "250"}).preset, "");
+  EXPECT_EQ(ending_of({"submit", "abc", "--iso", "bones"}).first, kWrongUsage);
+}
+
+TEST_F(OptionsTest, OutputsAreFilesFoldersNamesOrStandardOutput) {
+  const auto outputs_of = [&](std::vector<const char*> more) {
+    more.insert(more.begin(), {"mesh", file_.c_str(), "--iso", "1"});
+    return parse(more).outputs;
+  };
+  const std::string folder = folder_.path().string();
+  const std::string upper = folder + "/brain.DRC";
+  const std::string named = folder + "/{name}-skin.ply";
+  EXPECT_EQ(outputs_of({"-o", upper.c_str()}), (std::vector<Output>{{upper, MeshFormat::kDrc}}));
+  EXPECT_EQ(outputs_of({"-o", named.c_str()}), (std::vector<Output>{{named, MeshFormat::kPly}}));
+  EXPECT_EQ(outputs_of({"-o", folder.c_str()}),
+            (std::vector<Output>{{folder + "/{name}.drc", MeshFormat::kDrc}}));
+  EXPECT_EQ(outputs_of({"-o", folder.c_str(), "--format", "STL,glb"}),
+            (std::vector<Output>{{folder + "/{name}.stl", MeshFormat::kStl},
+                                 {folder + "/{name}.glb", MeshFormat::kGlb}}));
+  EXPECT_EQ(outputs_of({"-o", "-", "--format", "stl"}),
+            (std::vector<Output>{{"-", MeshFormat::kStl}}));
+
+  const std::string absent = folder + "/absent/";
+  const char* drc = drc_.c_str();
+  for (const std::vector<const char*>& wrong :
+       std::vector<std::vector<const char*>>{{"-o", "-"},
+                                             {"-o", "-", "--format", "stl,glb"},
+                                             {"-o", "-", "--format", "stl", "--json"},
+                                             {"-o", "-", "--format", "stl", "-o", drc},
+                                             {"-o", absent.c_str()},
+                                             {"-o", drc, "--format", "drc"},
+                                             {"-o", drc, "-o", named.c_str()},
+                                             {"-o", folder.c_str(), "--format", "xyz"},
+                                             {"-o", drc, "--jobs", "0"},
+                                             {"-o", drc, "--jobs", "65"},
+                                             {}}) {
+    std::vector<const char*> all = {"mesh", file_.c_str(), "--iso", "1"};
+    all.insert(all.end(), wrong.begin(), wrong.end());
+    EXPECT_EQ(ending_of(all).first, kWrongUsage) << testing::PrintToString(wrong);
+  }
+  EXPECT_EQ(ending_of({"mesh", "-", "-", "--iso", "1", "-o", folder.c_str()}).first, kWrongUsage);
+}
+
+TEST_F(OptionsTest, ADryRunNeedsNoOutput) {
+  const Options options =
+      parse({"mesh", file_.c_str(), "--iso", "1", "--dry-run", "--format", "stl,obj"});
+  EXPECT_TRUE(options.dry_run);
+  EXPECT_THAT(options.parameters.formats, ElementsAre(MeshFormat::kStl, MeshFormat::kObj));
+  EXPECT_EQ(
+      ending_of({"mesh", file_.c_str(), "--labels", "1", "--dry-run", "--label-values", "1=2"})
+          .first,
+      kWrongUsage);
+}
+
+// A query carries no names of labels and no callback.
+TEST_F(OptionsTest, AnEstimateHasTheOptionsThatAQueryCarries) {
+  const std::string help = ending_of({"estimate", "--help"}).second;
+  JobParameters parameters;
+  parameters.callback.emplace();
+  visit_leaves(parameters, [&](const std::string& path, const Parameter& parameter, const auto&) {
+    if (path == "volume") return;
+    const std::string option = "--" + option_name_of(parameter) + ' ';
+    EXPECT_EQ(help.find(option) != std::string::npos, parameter.in_query) << option;
+  });
+}
+
+TEST_F(OptionsTest, LocalTakesWhatMeshTakes) {
+  const Options options = parse({"local", file_.c_str(), "--iso", "1", "-o", drc_.c_str(), "-q"});
+  EXPECT_EQ(options.command, Command::kMesh);
+  EXPECT_TRUE(options.is_local);
+  EXPECT_TRUE(options.quiet);
+  EXPECT_FALSE(parse({"mesh", file_.c_str(), "--iso", "1", "-o", drc_.c_str()}).is_local);
+}
+
+TEST_F(OptionsTest, DescribesItselfToShellsAndReaders) {
+  const auto [status, manual] = ending_of({"manual"});
+  EXPECT_EQ(status, 0);
+  EXPECT_THAT(manual, HasSubstr(".SH NAME\nisomesh \\- "));
+  EXPECT_THAT(manual, HasSubstr("\\fB\\-\\-max\\-displacement\\fR"));
+  for (const char* shell : {"bash", "zsh", "fish"}) {
+    EXPECT_THAT(ending_of({"completion", shell}).second, HasSubstr("max-displacement")) << shell;
+  }
+  EXPECT_EQ(ending_of({"completion", "cmd"}).first, kWrongUsage);
 }
 
 TEST_F(OptionsTest, TakesGlobalOptionsBeforeAndAfterTheCommand) {

@@ -51,7 +51,8 @@ TEST(MeshReport, NamesWhatTheMeshIs) {
                   .components = 3,
                   .genus = 5,
                   .aspect_ratio = {{.mean = 0.6514}, {.mean = 0.8}},
-                  .smallest_angle_deg = {{.mean = 30.04}, {.mean = 41.96}}};
+                  .smallest_angle_deg = {{.mean = 30.04}, {.mean = 41.96}},
+                  .encloses_volume = true};
   EXPECT_EQ(mesh_report(mesh),
             "  triangles       1,234,567\n"
             "  vertices        617,283\n"
@@ -71,6 +72,36 @@ TEST(MeshReport, NamesWhatTheMeshIs) {
             "  aspect ratio    0.651 extracted, 0.800 smoothed\n"
             "  smallest angle  30.0° extracted, 42.0° smoothed, on average\n"
             "  mesh.drc        3.5 MB (3,510,351 B)\n");
+}
+
+TEST(MeshReport, SaysThatAnOpenSurfaceEnclosesNothing) {
+  MeshSummary mesh;
+  mesh.triangles = 7;
+  mesh.volume_mm3 = {.extracted = 1234.5, .smoothed = 1234.5};
+  const std::string report = mesh_report(mesh);
+  EXPECT_THAT(report, HasSubstr("volume          none: the surface is open; --close"));
+  EXPECT_THAT(report, Not(HasSubstr("1,234.5")));
+}
+
+TEST(MeshReport, TellsTheIsoValueAndTheError) {
+  MeshSummary mesh;
+  mesh.iso = 61.5;
+  mesh.simplified = {.triangles_before = 5000, .bound_by = Simplification::Bound::kTriangles};
+  mesh.certificate.emplace();
+  mesh.certificate->file = MeshFormat::kStl;
+  mesh.certificate->max_mm = 0.09876;
+  mesh.certificate->from_mesh = {.max_mm = 0.05, .mean_mm = 0.01, .p99_mm = 0.04};
+  mesh.certificate->from_extracted = {.max_mm = 0.09876, .mean_mm = 0.02, .p99_mm = 0.03};
+  mesh.certificate->budget_mm = {.smoothing = 0.05, .quantisation = 0.01, .simplification = 0.04};
+  mesh.quality.self_intersections = {.pairs = 3, .triangles = 5};
+  const std::string report = mesh_report(mesh);
+  EXPECT_THAT(report, HasSubstr("iso-value            61.5\n"));
+  EXPECT_THAT(report, HasSubstr("from 5,000 triangles, bound by the number of triangles\n"));
+  EXPECT_THAT(report,
+              HasSubstr("0.0988 mm from the extracted surface, measured on the stl file\n"));
+  EXPECT_THAT(report, HasSubstr("scan to mesh       0.0988 mm at most, 0.0300 mm for 99 of 100"));
+  EXPECT_THAT(report, HasSubstr("0.0500 mm smoothing, 0.0400 mm simplification, 0.0100 mm"));
+  EXPECT_THAT(report, HasSubstr("runs through itself  at 3 pairs of triangles\n"));
 }
 
 TEST(VolumeReport, NamesWhatTheVolumeIs) {

@@ -280,6 +280,35 @@ TEST_F(Fetch, StartsOverWhenTheConnectionBreaksInTheMiddle) {
   EXPECT_TRUE(test::read_file(folder_ / "brain.drc") == mesh);
 }
 
+TEST_F(Fetch, GoesOnWhereTheConnectionBroke) {
+  const std::string mesh = test::pattern(200'000);
+  const std::string job = to_json(test::finished_job("7", mesh));
+  std::vector<std::string> asked;
+  const test::SocketServer server([&](int socket) {
+    const std::string head = test::read_head(socket);
+    if (head.find("mesh.drc") == std::string::npos) {
+      return test::send_text(
+          socket, "HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: " +
+                      std::to_string(job.size()) + "\r\n\r\n" + job);
+    }
+    asked.push_back(head);
+    const std::size_t at = head.find("Range: bytes=");
+    const std::size_t from = at == std::string::npos ? 0 : std::stoul(head.substr(at + 13));
+    const std::string rest = mesh.substr(from);
+    test::send_text(socket, std::string("HTTP/1.1 ") +
+                                (from > 0 ? "206 Partial Content" : "200 OK") +
+                                "\r\nContent-Length: " + std::to_string(rest.size()) + "\r\n\r\n" +
+                                rest.substr(0, asked.size() < 3 ? 70'000 : rest.size()));
+  });
+  Client({.server = server.url()}).fetch("7", MeshFormat::kDrc, folder_ / "mesh.drc");
+  EXPECT_EQ(test::read_file(folder_ / "mesh.drc"), mesh);
+  ASSERT_EQ(asked.size(), 3U);
+  EXPECT_THAT(asked[0], testing::Not(testing::HasSubstr("Range")));
+  EXPECT_THAT(asked[1], testing::HasSubstr("\r\nRange: bytes=70000-\r\n"));
+  EXPECT_THAT(asked[1], testing::HasSubstr("\r\nIf-Range: \""));
+  EXPECT_THAT(asked[2], testing::HasSubstr("\r\nRange: bytes=140000-\r\n"));
+}
+
 TEST_F(Fetch, NamesATargetThatCannotBeWritten) {
   Client client = client_for("mesh", "mesh");
   const auto target = folder_ / "missing" / "brain.drc";

@@ -83,7 +83,8 @@ TEST_P(EncodeInBlocks, PassesOnWhatItsSinkThrows) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, EncodeInBlocks,
-                         testing::Values(MeshFormat::kStl, MeshFormat::kPly, MeshFormat::kObj),
+                         testing::Values(MeshFormat::kStl, MeshFormat::kPly, MeshFormat::kObj,
+                                         MeshFormat::k3mf),
                          [](const auto& test) { return std::string(to_string(test.param)); });
 
 TEST(Formats, EveryOneHasItsRow) {
@@ -126,6 +127,7 @@ TEST(Formats, HaveTheMediaTypesThatAreRegistered) {
   EXPECT_EQ(media_type(MeshFormat::kObj), "model/obj");
   EXPECT_EQ(media_type(MeshFormat::kDrc), "application/octet-stream");
   EXPECT_EQ(media_type(MeshFormat::kPly), "application/octet-stream");
+  EXPECT_EQ(media_type(MeshFormat::k3mf), "model/3mf");
   EXPECT_EQ(media_type(MeshFormat::kZip), "application/zip");
 }
 

@@ -75,14 +75,16 @@ std::vector<GlbPrimitive> read_with_node(const std::string& glb) {
   const std::string out = read_file(folder / "out");
   std::vector<GlbPrimitive> primitives;
   for (Bytes bytes(out); !bytes.empty();) {
-    std::array<std::uint32_t, 3> counts;
+    std::array<std::uint32_t, 4> counts;
     bytes.take(std::span<std::uint32_t>(counts));
     GlbPrimitive& primitive = primitives.emplace_back();
     primitive.mesh.points.resize(counts[0]);
     primitive.mesh.triangles.resize(counts[1]);
     primitive.normals.resize(counts[2]);
+    primitive.distances.resize(counts[3]);
     bytes.take(std::span(primitive.mesh.points));
     bytes.take(std::span(primitive.normals));
+    bytes.take(std::span(primitive.distances));
     bytes.take(std::span(primitive.mesh.triangles));
   }
   return primitives;

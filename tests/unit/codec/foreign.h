@@ -21,6 +21,7 @@ std::vector<std::string> objects_in(const std::string& bytes, const std::string&
 struct GlbPrimitive {
   DecodedMesh mesh;
   std::vector<mesh::Vec3> normals;  // of the points, or none
+  std::vector<float> distances;     // of the points, or none
 };
 
 // A GLB file's primitives as draco3d decodes them, once gltf-validator has neither an error nor a

@@ -39,7 +39,8 @@ class ForeignReader : public testing::TestWithParam<MeshFormat> {};
 TEST_P(ForeignReader, FindsEveryTriangleInItsPlace) {
   const std::string suffix(to_string(GetParam()));
   // assimp reads text with an error of its own.
-  const float relative = GetParam() == MeshFormat::kObj ? 1e-6F : 0;
+  const bool is_text = GetParam() == MeshFormat::kObj || GetParam() == MeshFormat::k3mf;
+  const float relative = is_text ? 1e-6F : 0;
   for (const auto& [name, mesh] : test::meshes_to_encode()) {
     SCOPED_TRACE(name);
     expect_same_triangles(test::read_with_assimp(encoded(mesh, GetParam()), suffix), mesh,
@@ -50,7 +51,8 @@ TEST_P(ForeignReader, FindsEveryTriangleInItsPlace) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, ForeignReader,
-                         testing::Values(MeshFormat::kStl, MeshFormat::kPly, MeshFormat::kObj),
+                         testing::Values(MeshFormat::kStl, MeshFormat::kPly, MeshFormat::kObj,
+                                         MeshFormat::k3mf),
                          [](const auto& test) { return std::string(to_string(test.param)); });
 
 TEST(ForeignGlbReader, FindsEveryTriangleInItsPlaceAndNoFault) {
@@ -77,8 +79,9 @@ TEST(ForeignGlbReader, FindsNormalsThatAreTheSameOnBothSidesOfASeam) {
   ASSERT_GT(primitives.size(), 2U);
   std::map<mesh::Vec3, mesh::Vec3> found;
   std::size_t on_seams = 0;
-  for (const auto& [part, part_normals] : primitives) {
+  for (const auto& [part, part_normals, part_distances] : primitives) {
     ASSERT_EQ(part_normals.size(), part.points.size());
+    EXPECT_TRUE(part_distances.empty());
     for (std::size_t v = 0; v < part.points.size(); ++v) {
       const auto [at, is_new] = found.emplace(part.points[v], part_normals[v]);
       if (is_new) continue;

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstring>
 #include <string>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/unit/codec/decode.h"
+#include "tests/unit/codec/glb_container.h"
 #include "tests/unit/codec/meshes.h"
 #include "tests/unit/codec/same_mesh.h"
 
@@ -24,40 +24,13 @@ namespace {
 using nlohmann::json;
 using test::DecodedMesh;
 using test::encoded;
+using test::GlbContainer;
+using test::open_container;
 using test::several_blocks;
 using test::welded;
 
-std::uint32_t word_at(const std::string& bytes, std::size_t offset) {
-  std::uint32_t word = 0;
-  std::memcpy(&word, bytes.data() + offset, sizeof word);
-  return word;
-}
-
-// The two chunks of a GLB file; fails where the container is not as specified.
-struct Container {
-  json document;
-  std::string binary;
-};
-
-Container open_container(const std::string& glb) {
-  EXPECT_EQ(glb.substr(0, 4), "glTF");
-  EXPECT_EQ(word_at(glb, 4), 2U);
-  EXPECT_EQ(word_at(glb, 8), glb.size());
-  EXPECT_EQ(glb.size() % 4, 0U);
-  const std::uint32_t json_bytes = word_at(glb, 12);
-  EXPECT_EQ(glb.substr(16, 4), "JSON");
-  Container container;
-  container.document = json::parse(glb.substr(20, json_bytes));
-  const std::size_t binary_at = 20 + std::size_t{json_bytes};
-  if (binary_at == glb.size()) return container;
-  EXPECT_EQ(glb.substr(binary_at + 4, 4), std::string("BIN\0", 4));
-  EXPECT_EQ(word_at(glb, binary_at), glb.size() - binary_at - 8);
-  container.binary = glb.substr(binary_at + 8);
-  return container;
-}
-
 // The primitives decoded, each checked against its accessors.
-std::vector<DecodedMesh> decoded_primitives(const Container& container) {
+std::vector<DecodedMesh> decoded_primitives(const GlbContainer& container) {
   const json& document = container.document;
   std::vector<DecodedMesh> result;
   for (const json& primitive : document["meshes"][0]["primitives"]) {
@@ -83,7 +56,7 @@ std::vector<DecodedMesh> decoded_primitives(const Container& container) {
 
 TEST(Glb, CarriesTheMeshInBlocksWhoseSeamsFit) {
   const mesh::Mesh mesh = several_blocks();
-  const Container container = open_container(encoded(mesh, MeshFormat::kGlb, {16, 7}));
+  const GlbContainer container = open_container(encoded(mesh, MeshFormat::kGlb, {16, 7}));
   const auto parts = decoded_primitives(container);
   ASSERT_GT(parts.size(), 2U) << "one block has no seams: " << mesh.triangles.size();
   const DecodedMesh whole = welded(parts);
@@ -169,7 +142,7 @@ TEST(Glb, SaysWhereItComesFrom) {
 }
 
 TEST(Glb, AnEmptyMeshIsASceneWithoutOne) {
-  const Container container = open_container(encoded(mesh::Mesh{}, MeshFormat::kGlb));
+  const GlbContainer container = open_container(encoded(mesh::Mesh{}, MeshFormat::kGlb));
   EXPECT_FALSE(container.document.contains("meshes"));
   EXPECT_FALSE(container.document["nodes"][0].contains("mesh"));
   EXPECT_TRUE(container.binary.empty());

@@ -1,4 +1,6 @@
 // Files of labels: what two labels share has the same bits in both, whatever the format.
+#include "tests/unit/codec/label_files.h"
+
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -18,103 +20,19 @@
 
 #include "base/sha256.h"
 #include "server/codec/encode_labels.h"
-#include "server/codec/zip/label_zip.h"
-#include "server/mesh/smooth.h"
 #include "tests/unit/codec/decode.h"
 #include "tests/unit/codec/foreign.h"
-#include "tests/unit/mesh/separated.h"
+#include "tests/unit/codec/foreign_3mf.h"
+#include "tests/unit/codec/glb_container.h"
 
 namespace isomesh::codec {
 namespace {
 
 using mesh::Vec3;
-using Places = std::set<Vec3>;
+using test::LabelFilesTest;
+using Places = LabelFilesTest::Places;
 
-constexpr std::size_t kLabels = 5;
-
-// Some labels that touch each other, smoothed; the second has a name and a colour.
-class LabelFilesTest : public testing::Test {
- protected:
-  LabelFilesTest() {
-    const auto volume = mesh::label_cells(kLabels, {30, 26, 28}, 12, 401);
-    mesh::separate_into(walls_, volume,
-                        {mesh::consecutive<std::int64_t>(1, kLabels), Scheme::kSix, true});
-    smooth({.passes = 4, .lambda = 0.5}, {}, walls_.mesh);
-    triangles_ = std::make_unique<mesh::LabelTriangles>(walls_);
-    for (const mesh::LabelMeasure& measure : measure_labels(walls_, *triangles_, {})) {
-      const auto label = static_cast<std::int64_t>(labels_.size() + 1);
-      labels_.push_back({.label = label,
-                         .voxels = 10 * static_cast<std::uint64_t>(label),
-                         .triangles = measure.triangles,
-                         .area_mm2 = measure.extent.area_mm2,
-                         .volume_mm3 = measure.extent.volume_mm3});
-    }
-    labels_[1].name = "Left ventr\u00edculo";
-    labels_[1].color = "#ff8000";
-    provenance_.volume = "abc";
-    provenance_.parameters = label_parameters({});
-  }
-
-  LabelledSurface surface() const { return {walls_, *triangles_, labels_}; }
-
-  std::string encoded(MeshFormat format) const {
-    std::string bytes;
-    encode_labels(surface(), format, provenance_, {}, [&](std::span<const std::byte> piece) {
-      bytes.append(reinterpret_cast<const char*>(piece.data()), piece.size());
-    });
-    return bytes;
-  }
-
-  struct Zip {
-    std::string bytes;
-    std::vector<LabelFiles> files;
-  };
-
-  Zip zipped(const std::vector<MeshFormat>& formats) const {
-    Zip zip;
-    zip.files = encode_labels_zip(
-        surface(), formats, provenance_, {}, [&](std::span<const std::byte> piece) {
-          zip.bytes.append(reinterpret_cast<const char*>(piece.data()), piece.size());
-        });
-    return zip;
-  }
-
-  // The places that both labels have, as extraction and smoothing left them.
-  Places shared_places(std::size_t a, std::size_t b) const {
-    Places shared;
-    for (std::size_t t = 0; t < walls_.sides.size(); ++t) {
-      if (walls_.sides[t] !=
-          mesh::WallSides{static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b)})
-        continue;
-      for (const std::uint32_t v : walls_.mesh.triangles[t])
-        shared.insert(walls_.mesh.positions[v]);
-    }
-    return shared;
-  }
-
-  // Of each pair of neighbours, as many places are in both sets as their wall has, or a few less
-  // where quantisation lets some coincide.
-  void expect_shared(const std::vector<Places>& decoded) const {
-    std::size_t neighbours = 0;
-    for (std::size_t a = 1; a <= kLabels; ++a) {
-      for (std::size_t b = a + 1; b <= kLabels; ++b) {
-        const std::size_t shared = shared_places(a, b).size();
-        if (shared == 0) continue;
-        ++neighbours;
-        Places both;
-        std::ranges::set_intersection(decoded[a - 1], decoded[b - 1],
-                                      std::inserter(both, both.end()));
-        EXPECT_GE(both.size(), shared - shared / 100) << a << " and " << b;
-      }
-    }
-    EXPECT_GT(neighbours, 2U);
-  }
-
-  mesh::SeparatingSurface walls_;
-  std::unique_ptr<mesh::LabelTriangles> triangles_;
-  std::vector<LabelSummary> labels_;
-  Provenance provenance_;
-};
+constexpr std::size_t kLabels = LabelFilesTest::kLabels;
 
 // The names and bytes in a ZIP, as libarchive reads them.
 std::map<std::string, std::string> unzipped(const std::string& bytes) {
@@ -234,12 +152,7 @@ TEST_F(LabelFilesTest, ASinkThatThrowsEndsTheZipWithThat) {
 
 TEST_F(LabelFilesTest, GlbHasANodeWithNameColourAndFiguresForEachLabel) {
   const std::string glb = encoded(MeshFormat::kGlb);
-  const auto json_bytes = [&] {
-    std::uint32_t bytes = 0;
-    std::memcpy(&bytes, glb.data() + 12, sizeof bytes);
-    return bytes;
-  }();
-  const auto gltf = nlohmann::json::parse(glb.substr(20, json_bytes));
+  const auto gltf = test::open_container(glb).document;
   ASSERT_EQ(gltf["nodes"].size(), kLabels + 1);
   EXPECT_EQ(gltf["nodes"][0]["children"].size(), kLabels);
   for (std::size_t n = 0; n < kLabels; ++n) {
@@ -288,6 +201,7 @@ TEST_F(LabelFilesTest, LabelsWithoutTrianglesHaveANodeWithoutAMesh) {
   EXPECT_NE(glb.find("label 3"), std::string::npos);
   EXPECT_EQ(unzipped(zipped({MeshFormat::kStl}).bytes).at("label 3.stl").size(), 84U);
   EXPECT_NE(encoded(MeshFormat::kPly).find("element face 0"), std::string::npos);
+  EXPECT_TRUE(test::read_with_lib3mf(encoded(MeshFormat::k3mf)).objects.empty());
 }
 
 TEST_F(LabelFilesTest, PlyHasEveryLabelsFacesWithItsValue) {
@@ -322,6 +236,26 @@ TEST_F(LabelFilesTest, ObjHasAGroupForEachLabel) {
   EXPECT_EQ(test::objects_in(obj, "obj"),
             (std::vector<std::string>{"label_1", "Left_ventr\u00edculo", "label_3", "label_4",
                                       "label_5"}));
+}
+
+TEST_F(LabelFilesTest, ThreeMfHasAnObjectWithNameColourAndValueForEachLabel) {
+  labels_[2].name = "a < b & \"c\"\x01";
+  const test::Model3mf model = test::read_with_lib3mf(encoded(MeshFormat::k3mf));
+  EXPECT_TRUE(model.is_in_millimetres);
+  ASSERT_EQ(model.objects.size(), kLabels);
+  std::vector<Places> places;
+  for (std::size_t n = 0; n < kLabels; ++n) {
+    const test::Object3mf& object = model.objects[n];
+    EXPECT_EQ(object.name, n == 2 ? "a < b & \"c\"\uFFFD" : title_of(labels_[n]));
+    EXPECT_EQ(object.part_number, std::to_string(labels_[n].label));
+    EXPECT_TRUE(object.is_model);
+    EXPECT_EQ(object.points.size(), labels_[n].vertices);
+    EXPECT_EQ(object.triangles.size(), labels_[n].triangles);
+    places.push_back({object.points.begin(), object.points.end()});
+  }
+  EXPECT_EQ(model.objects[1].color, (std::array<std::uint8_t, 3>{0xff, 0x80, 0}));
+  EXPECT_NE(model.objects[0].color, model.objects[2].color);
+  expect_shared(places);
 }
 
 TEST_F(LabelFilesTest, AFileOfOneSurfaceIsNoFileOfAllLabels) {

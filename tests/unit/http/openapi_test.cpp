@@ -30,6 +30,7 @@ class OpenApi : public testing::Test {
     add_page_routes(app_);
     add_service_routes(app_);
     add_metrics_route(app_);
+    add_order_routes(app_);
   }
 
   static Methods methods_of(const Route& route) {

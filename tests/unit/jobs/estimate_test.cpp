@@ -57,6 +57,30 @@ TEST_F(EstimateTest, CountsTheCapsOfASurfaceThatIsClosed) {
   EXPECT_EQ(estimate.vertices, job.mesh->vertices);
 }
 
+TEST_F(EstimateTest, IsOfTheBoxThatAJobIsCroppedTo) {
+  const Volume volume = add_sphere();
+  JobParameters parameters = parameters_of(volume, 0);
+  const std::uint64_t whole = estimator_.estimate("", parameters).triangles;
+  parameters.crop = Box{{{0, 0, 0}, {12, 100, 100}}};
+  parameters.close = true;
+  const Estimate part = estimator_.estimate("", parameters);
+  EXPECT_EQ(part.triangles, run(parameters).mesh->triangles);
+  EXPECT_NE(part.triangles, whole);
+}
+
+TEST_F(EstimateTest, OfFewerTrianglesSaysAboutHowMany) {
+  const Volume volume = add_sphere();
+  JobParameters parameters = parameters_of(volume, 0);
+  const Estimate all = estimator_.estimate("", parameters);
+  EXPECT_FALSE(all.simplified_triangles);
+  parameters.triangles = 100;
+  const Estimate few = estimator_.estimate("", parameters);
+  EXPECT_EQ(few.triangles, all.triangles);
+  EXPECT_EQ(few.simplified_triangles, 100U);
+  EXPECT_LT(few.bytes.at(MeshFormat::kDrc), all.bytes.at(MeshFormat::kDrc));
+  EXPECT_GT(few.memory_bytes, all.memory_bytes);
+}
+
 TEST_F(EstimateTest, OtsuIsTheVolumesOwn) {
   const Volume volume = add_sphere();
   JobParameters parameters = parameters_of(volume, 0);
@@ -138,7 +162,7 @@ TEST_F(EstimateTest, JobsOfOthersShiftNothing) {
 TEST(CostModel, FollowsTheJobsThatItHasSeen) {
   const SurfaceSize surface = {1'000'000, 500'000};
   JobParameters parameters;
-  const double first = CostModel().milliseconds(surface, 1000, parameters);
+  const double first = CostModel().milliseconds(surface, surface, 1000, parameters);
   const auto bytes = CostModel().file_bytes(MeshFormat::kDrc, surface, parameters);
   Job job;
   job.parameters = parameters;
@@ -151,13 +175,37 @@ TEST(CostModel, FollowsTheJobsThatItHasSeen) {
   job.mesh->files[MeshFormat::kDrc] = {3'000'000, "", ""};
   job.mesh->files[MeshFormat::kStl] = {84 + 50'000'000, "", ""};
   CostModel slower;
-  for (int n = 0; n < 20; ++n) slower.learn(job, 1000);
-  EXPECT_NEAR(slower.milliseconds(surface, 1000, parameters), 3600, 400);
-  EXPECT_GT(slower.milliseconds(surface, 1000, parameters), first);
+  for (int n = 0; n < 20; ++n) slower.learn(job, 1000, 1);
+  EXPECT_NEAR(slower.milliseconds(surface, surface, 1000, parameters), 3600, 400);
+  EXPECT_GT(slower.milliseconds(surface, surface, 1000, parameters), first);
   EXPECT_NEAR(static_cast<double>(slower.file_bytes(MeshFormat::kDrc, surface, parameters)), 3e6,
               2e5);
   EXPECT_LT(bytes, 2'500'000U);
   EXPECT_EQ(slower.file_bytes(MeshFormat::kStl, surface, parameters), 50'000'084U);
+}
+
+TEST(CostModel, LearnsWhatAnErrorLeaves) {
+  const SurfaceSize surface = {1'000'000, 500'000};
+  JobParameters parameters;
+  parameters.max_error_mm = 0.1;
+  parameters.certify = true;
+  const SurfaceSize first = CostModel().simplified(surface, parameters, 1);
+  EXPECT_LT(first.triangles, surface.triangles);
+  EXPECT_LT(CostModel().simplified(surface, parameters, 0.5).triangles, first.triangles);
+  Job job;
+  job.parameters = parameters;
+  job.timing = {.extract = 100, .smooth = 100, .simplify = 30'000, .encode = 100, .certify = 9000};
+  job.mesh.emplace();
+  job.mesh->triangles = 150'000;
+  job.mesh->vertices = 75'000;
+  job.mesh->simplified = {.triangles_before = 1'000'000};
+  CostModel costs;
+  for (int n = 0; n < 20; ++n) costs.learn(job, 1000, 1);
+  const SurfaceSize later = costs.simplified(surface, parameters, 1);
+  EXPECT_NEAR(static_cast<double>(later.triangles), 150'000, 10'000);
+  EXPECT_NEAR(costs.milliseconds(surface, later, 1000, parameters), 39'300, 3000);
+  parameters.triangles = 1000;
+  EXPECT_EQ(costs.simplified(surface, parameters, 1).triangles, 1000U);
 }
 
 TEST(CostModel, AJobWithoutARunTeachesNothing) {
@@ -165,9 +213,9 @@ TEST(CostModel, AJobWithoutARunTeachesNothing) {
   job.mesh.emplace();
   job.mesh->triangles = 1'000'000;
   CostModel costs;
-  costs.learn(job, 1000);
-  EXPECT_EQ(costs.milliseconds({1000, 500}, 1000, {}),
-            CostModel().milliseconds({1000, 500}, 1000, {}));
+  costs.learn(job, 1000, 1);
+  EXPECT_EQ(costs.milliseconds({1000, 500}, {1000, 500}, 1000, {}),
+            CostModel().milliseconds({1000, 500}, {1000, 500}, 1000, {}));
 }
 
 using HistogramsTest = test::JobsFixture;

@@ -146,7 +146,7 @@ void do_one() {
   confine_ahead();
   const std::string message = read_order();
   if (message.empty()) return;
-  const ImportOrder order = order_from(message);
+  const auto order = std::get<ImportOrder>(order_from(message));
   say(begun_message());
   std::ifstream file(order.task.source);
   const std::string what{std::istreambuf_iterator<char>(file), {}};

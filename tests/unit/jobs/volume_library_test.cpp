@@ -67,7 +67,7 @@ TEST_F(VolumeLibraryTest, AddsAVolumeWithItsRecordAndItsBlob) {
 TEST_F(VolumeLibraryTest, TheSameVolumeAgainIsNotNew) {
   const Volume first = add_bytes(bytes_).first;
   EXPECT_EQ(add_bytes(bytes_), std::pair(first, false));
-  EXPECT_EQ(volumes_.list("", {}, 100).size(), 1U);
+  EXPECT_EQ(volumes_.list("", {}, 100, store::ListOrder::kOldestFirst).size(), 1U);
   EXPECT_EQ(blob_count(), 1U);
 }
 
@@ -77,7 +77,7 @@ TEST_F(VolumeLibraryTest, OtherSamplesOrGeometryAreAnotherVolume) {
   Geometry geometry;
   geometry.spacing = {1, 1, 2};
   EXPECT_NE(add_bytes(bytes_, geometry).first.id, id);
-  EXPECT_EQ(volumes_.list("", {}, 100).size(), 3U);
+  EXPECT_EQ(volumes_.list("", {}, 100, store::ListOrder::kOldestFirst).size(), 3U);
 }
 
 TEST_F(VolumeLibraryTest, ARefusedUploadLeavesNothing) {
@@ -85,7 +85,7 @@ TEST_F(VolumeLibraryTest, ARefusedUploadLeavesNothing) {
   test::write_file(folder_ / "upload", "not a volume");
   EXPECT_EQ(code_thrown_by([&] { library_.add("", folder_ / "upload"); }),
             ErrorCode::kUnsupportedMedia);
-  EXPECT_TRUE(volumes_.list("", {}, 100).empty());
+  EXPECT_TRUE(volumes_.list("", {}, 100, store::ListOrder::kOldestFirst).empty());
   EXPECT_EQ(blob_count(), 0U);
   EXPECT_EQ(scratch_count(), 0U);
 }

@@ -133,11 +133,12 @@ TEST(KeepComponents, KeepsTheLargest) {
   for (const bool close : {false, true}) {
     for (const std::uint32_t keep : {1U, 2U, 5U, 17U}) {
       SCOPED_TRACE(keep);
-      expect_kept(close, {.keep = keep, .min_triangles = {}}, keep);
+      expect_kept(close, {.keep = keep, .min_triangles = {}, .nearest_to = {}}, keep);
     }
   }
-  expect_kept(false, {.keep = static_cast<std::uint32_t>(all), .min_triangles = {}}, all);
-  expect_kept(false, {.keep = 4294967295, .min_triangles = {}}, all);
+  expect_kept(
+      false, {.keep = static_cast<std::uint32_t>(all), .min_triangles = {}, .nearest_to = {}}, all);
+  expect_kept(false, {.keep = 4294967295, .min_triangles = {}, .nearest_to = {}}, all);
   expect_kept(false, {}, all);
 }
 
@@ -149,11 +150,13 @@ TEST(KeepComponents, KeepsThoseOfEnoughTriangles) {
   };
   for (const std::uint32_t triangles : {1U, 24U, 25U, 100U}) {
     SCOPED_TRACE(triangles);
-    expect_kept(false, {.keep = {}, .min_triangles = triangles}, at_least(triangles));
+    expect_kept(false, {.keep = {}, .min_triangles = triangles, .nearest_to = {}},
+                at_least(triangles));
   }
-  expect_kept(false, {.keep = {}, .min_triangles = 4294967295}, 0);
-  expect_kept(false, {.keep = 3, .min_triangles = 25}, std::min<std::size_t>(3, at_least(25)));
-  expect_kept(false, {.keep = 1000, .min_triangles = 25}, at_least(25));
+  expect_kept(false, {.keep = {}, .min_triangles = 4294967295, .nearest_to = {}}, 0);
+  expect_kept(false, {.keep = 3, .min_triangles = 25, .nearest_to = {}},
+              std::min<std::size_t>(3, at_least(25)));
+  expect_kept(false, {.keep = 1000, .min_triangles = 25, .nearest_to = {}}, at_least(25));
 }
 
 TEST(KeepComponents, TakesTheFirstOfEqualOnes) {
@@ -163,7 +166,8 @@ TEST(KeepComponents, TakesTheFirstOfEqualOnes) {
   const Mesh all = test::extracted(volume, {5, Scheme::kFive, Interpolation::kLinear});
   const std::vector<Part> parts = parts_of(all);
   ASSERT_EQ(parts.size(), 5U);
-  const Dropped dropped = keep_components({.keep = 2, .min_triangles = {}}, {}, mesh);
+  const Dropped dropped =
+      keep_components({.keep = 2, .min_triangles = {}, .nearest_to = {}}, {}, mesh);
   EXPECT_EQ(dropped.components, 3U);
   EXPECT_TRUE(test::same_bytes(mesh, only(all, {parts[0], parts[1]})));
   EXPECT_LT(mesh.positions[mesh.positions.size() - 1][2], 13);
@@ -174,14 +178,15 @@ TEST(KeepComponents, AreTheSameOnAnyNumberOfThreads) {
   for (const int threads : {1, 3, 16}) {
     const test::ThreadCount count(threads);
     meshes.push_back(specks());
-    keep_components({.keep = 9, .min_triangles = {}}, {}, meshes.back());
+    keep_components({.keep = 9, .min_triangles = {}, .nearest_to = {}}, {}, meshes.back());
     EXPECT_TRUE(test::same_bytes(meshes[0], meshes.back()));
   }
 }
 
 TEST(KeepComponents, OfNothingAreNothing) {
   Mesh mesh = test::extracted(test::constant<std::uint8_t>(0, {5, 5, 5}), {5});
-  EXPECT_EQ(keep_components({.keep = 1, .min_triangles = 5}, {}, mesh).components, 0U);
+  EXPECT_EQ(keep_components({.keep = 1, .min_triangles = 5, .nearest_to = {}}, {}, mesh).components,
+            0U);
   EXPECT_EQ(mesh.triangles.size(), 0U);
 }
 
@@ -190,10 +195,45 @@ TEST(KeepComponents, StopBeforeAnythingIsChanged) {
   stop.request_stop();
   Mesh mesh = specks();
   EXPECT_EQ(test::code_thrown_by([&] {
-              keep_components({.keep = 1, .min_triangles = {}}, {stop.get_token(), {}}, mesh);
+              keep_components({.keep = 1, .min_triangles = {}, .nearest_to = {}},
+                              {stop.get_token(), {}}, mesh);
             }),
             ErrorCode::kCancelled);
   EXPECT_TRUE(test::same_bytes(mesh, specks()));
+}
+
+// The part whose vertex is nearest, whatever its size; and only of those what the other members
+// keep.
+TEST(Components, AreKeptWhereTheyAreNearestToAPlace) {
+  const Mesh mesh = specks();
+  const std::vector<std::uint32_t> first = first_of(mesh);
+  const std::vector<Part> parts = parts_of(mesh);
+  const auto triangles_at = [&](std::uint32_t vertex) {
+    return std::ranges::find(parts, first[vertex], &Part::first)->triangles;
+  };
+  const auto near = [&](std::uint32_t vertex) {
+    const Vec3& place = mesh.positions[vertex];
+    return std::array<double, 3>{place[0] + 1e-3, place[1] - 1e-3, place[2]};
+  };
+  const std::uint32_t large = parts.front().first;
+  const std::uint32_t small = parts.back().first;
+  Mesh kept = specks();
+  keep_components({.keep = {}, .min_triangles = {}, .nearest_to = {near(small)}}, {}, kept);
+  EXPECT_TRUE(test::same_bytes(kept, only(mesh, {parts.back()})));
+  kept = specks();
+  ComponentFilter filter = {
+      .keep = {}, .min_triangles = {}, .nearest_to = {near(small), near(large)}};
+  const Dropped dropped = keep_components(filter, {}, kept);
+  EXPECT_EQ(kept.triangles.size(), triangles_at(small) + triangles_at(large));
+  EXPECT_EQ(dropped.components, parts.size() - 2);
+  kept = specks();
+  filter.keep = 1;
+  keep_components(filter, {}, kept);
+  EXPECT_TRUE(test::same_bytes(kept, only(mesh, {parts.front()})));
+  kept = specks();
+  filter = {.keep = {}, .min_triangles = parts.back().triangles + 1, .nearest_to = {near(small)}};
+  keep_components(filter, {}, kept);
+  EXPECT_EQ(kept.triangles.size(), 0U);
 }
 
 }  // namespace

@@ -229,6 +229,22 @@ TEST(Simplify, KeepsLinesWhereWallsMeet) {
   EXPECT_EQ(measure_topology(surface.mesh, {}).boundary_edges, 0U);
 }
 
+// From where the vertices were before they were smoothed.
+TEST(Simplify, KeepsWithinTheErrorOfWhereTheVerticesWere) {
+  constexpr double kError = 0.3;
+  const auto ball = test::sample<float>(test::sphere({20, 20, 20}, 17.3), {41, 41, 41});
+  const ExtractOptions options = {0, Scheme::kSix, Interpolation::kMidpoint, false};
+  const Mesh extracted = test::extracted(ball, options);
+  Mesh mesh = test::extracted(ball, options);
+  smooth({.passes = 5, .max_displacement_mm = kError / 2}, {}, mesh);
+  simplify({.max_error_mm = kError, .before = extracted.positions.span()}, {}, mesh);
+  EXPECT_LT(mesh.triangles.size(), extracted.triangles.size() / 2);
+  const double from_extracted = certify(mesh, extracted, {}).max_mm();
+  EXPECT_LE(from_extracted, kError);
+  EXPECT_GT(from_extracted, kError / 2);  // more than smoothing may take
+  EXPECT_EQ(measure_topology(mesh, {}), measure_topology(extracted, {}));
+}
+
 // What smoothing makes of a speck may be a point.
 TEST(Simplify, KeepsTrianglesWithoutAreaWhereTheyAre) {
   std::vector<Vec3> positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};

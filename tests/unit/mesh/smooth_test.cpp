@@ -349,6 +349,30 @@ TEST(SmoothWithin, AFarLimitChangesNothing) {
   EXPECT_TRUE(test::same_bytes(smoothed(mesh, options), free));
 }
 
+// Taubin's second step would push what is next to a cap through it.
+TEST(SmoothWithin, KeepsClosedSurfacesOnTheirSideOfTheCaps) {
+  for (const Geometry& geometry : {Geometry{}, test::oblique_geometry()}) {
+    const auto volume = test::sample<float>(test::gyroid(8.3), {31, 30, 29}, geometry);
+    const ExtractOptions closed = {0, Scheme::kSix, Interpolation::kLinear, true};
+    const auto farthest_out = [&](const std::vector<HalfSpace>& within) {
+      Mesh mesh = test::extracted(volume, closed);
+      smooth({.passes = 20, .lambda = 0.33, .mu = taubin_mu(0.33, 0.1), .within = within}, {},
+             mesh);
+      double farthest = -std::numeric_limits<double>::infinity();
+      for (const HalfSpace& half : box_around(volume.lattice().to_space, volume.dims, 0)) {
+        for (const Vec3& p : mesh.positions) {
+          farthest = std::max(farthest, half.normal[0] * p[0] + half.normal[1] * p[1] +
+                                            half.normal[2] * p[2] - half.offset);
+        }
+      }
+      return farthest;
+    };
+    constexpr double kRounding = 1e-4;
+    EXPECT_GT(farthest_out({}), 100 * kRounding);
+    EXPECT_LT(farthest_out(box_around(volume.lattice().to_space, volume.dims, 0)), kRounding);
+  }
+}
+
 TEST(SmoothMemory, IsAFewLayersWhenTheVolumeIsDeep) {
   const test::ThreadCount two(2);
   const auto size = [](std::uint64_t layers, std::uint64_t vertices_each) {

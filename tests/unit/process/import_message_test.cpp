@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/errors.h"
+
 namespace isomesh::process {
 namespace {
 
@@ -23,7 +25,13 @@ TEST(ImportMessage, AnOrderComesAsItWent) {
                                                        .spacing = {1.0 / 3, 2, 3},
                                                        .direction = {0, 1, 0, 1, 0, 0, 0, 0, -1}},
                                           .big_endian = true};
-  const ImportOrder read = order_from(to_message(order));
+  order.task.options.peers = PeersSeries{"multipart/related; boundary=b", "1.2", "1.3", {"1.4"}};
+  const auto read = std::get<ImportOrder>(order_from(to_message(order)));
+  ASSERT_TRUE(read.task.options.peers);
+  EXPECT_EQ(read.task.options.peers->content_type, "multipart/related; boundary=b");
+  EXPECT_EQ(read.task.options.peers->study, "1.2");
+  EXPECT_EQ(read.task.options.peers->series, "1.3");
+  EXPECT_EQ(read.task.options.peers->instances, std::vector<std::string>{"1.4"});
   EXPECT_EQ(read.task.source, order.task.source);
   EXPECT_EQ(read.task.scratch, order.task.scratch);
   EXPECT_EQ(read.task.target, order.task.target);
@@ -40,6 +48,41 @@ TEST(ImportMessage, AnOrderComesAsItWent) {
   EXPECT_EQ(read.task.options.raw->type, SampleType::kFloat64);
   EXPECT_EQ(read.task.options.raw->geometry, order.task.options.raw->geometry);
   EXPECT_TRUE(read.task.options.raw->big_endian);
+}
+
+TEST(ImportMessage, AnOrderToReadAnAnswerComesAsItWent) {
+  const auto read = std::get<AnswerOrder>(
+      order_from(to_message(AnswerOrder{{"/a/b"}, {.memory_bytes = 8, .time = seconds(9)}})));
+  EXPECT_EQ(read.task.source, "/a/b");
+  EXPECT_EQ(read.bounds.memory_bytes, 8U);
+  EXPECT_EQ(read.bounds.time, seconds(9));
+}
+
+TEST(ImportMessage, AnAnswerComesAsItWent) {
+  PeersAnswer answer;
+  answer.objects = {{.study = "1.2",
+                     .series = "1.3",
+                     .instance = "1.4",
+                     .patient_id = "ÄÖ\"\\",
+                     .modality = "CT",
+                     .series_description = "head",
+                     .instances = 54}};
+  answer.stored = {{.instance = "1.5"}};
+  answer.failed = {{.instance = "1.6", .failure = 0xA700}};
+  const ImportReport report = report_from(begun_message() + answer_message(answer));
+  ASSERT_TRUE(report.answer);
+  EXPECT_EQ(*report.answer, answer);
+}
+
+// They go into addresses of further requests.
+TEST(ImportMessage, AUidThatIsNoneIsRefused) {
+  for (const char* uid : {"../../x", "1.2/../3", "1..2", "1 2", "1.2?x=1"}) {
+    PeersAnswer answer;
+    answer.objects = {{.series = uid}};
+    EXPECT_EQ(test::code_thrown_by([&] { report_from(answer_message(answer)); }),
+              ErrorCode::kInternal)
+        << uid;
+  }
 }
 
 TEST(ImportMessage, AReportHasWhatWasSaid) {

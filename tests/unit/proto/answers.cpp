@@ -78,7 +78,21 @@ Volume dicom_volume() {
                                .modality = "CT",
                                .frame_of_reference_uid = "1.2.3.5",
                                .instances = {{"1.2.840.10008.5.1.4.1.1.2", "1.2.3.4.1"},
-                                             {"1.2.840.10008.5.1.4.1.1.2", "1.2.3.4.2"}}};
+                                             {"1.2.840.10008.5.1.4.1.1.2", "1.2.3.4.2"}},
+                               .issuer_of_patient_id = "Hospital",
+                               .patient_identity_removed = "YES",
+                               .deidentification_method = "by hand",
+                               .acquisition_datetime = "20240501101500",
+                               .position_reference_indicator = "SN",
+                               .equipment = {.manufacturer = "Maker",
+                                             .model_name = "X",
+                                             .station_name = "CT-2",
+                                             .device_serial_number = "77",
+                                             .software_versions = "VB20"},
+                               .segments = {{.label = 3,
+                                             .category = {"123037004", "SCT", "Structure"},
+                                             .type = {"10200004", "SCT", "Liver"},
+                                             .region = {}}}};
   return volume;
 }
 
@@ -92,7 +106,7 @@ JobParameters some_parameters() {
            .pass_band = 0.2,
            .max_displacement_mm = 1.5,
            .close = true,
-           .components = {.keep = 4294967295, .min_triangles = {}},
+           .components = {.keep = 4294967295, .min_triangles = {}, .nearest_to = {}},
            .formats = {MeshFormat::kStl, MeshFormat::kDrc},
            .draco = {.position_bits = 30, .speed = 0},
            .normals = true},

@@ -53,8 +53,12 @@ int status_in_the_contract(ErrorCode code) {
       return 431;
     case ErrorCode::kInternal:
       return 500;
+    case ErrorCode::kPacsRefused:
+      return 502;
     case ErrorCode::kUnavailable:
     case ErrorCode::kUnreachable:
+    case ErrorCode::kPacsUnreachable:
+    case ErrorCode::kSeriesIncomplete:
       return 503;
     case ErrorCode::kOutOfSpace:
       return 507;

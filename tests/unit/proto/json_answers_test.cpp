@@ -97,14 +97,15 @@ TEST(AnswerJson, SpellsAJobAsTheContractDoes) {
   EXPECT_EQ(job["priority"], "stat");
   EXPECT_TRUE(job["error"].is_null());
   EXPECT_EQ(job["timing"], json::parse(R"({"queue": 0.5, "load": 1, "extract": 2, "smooth": 3,
-                                           "encode": 4, "total": 11})"));
+                                           "simplify": 0, "encode": 4, "certify": 0,
+                                           "total": 11})"));
 }
 
 TEST(AnswerJson, SpellsAMeshAsTheContractDoes) {
   json mesh = json::parse(to_json(succeeded_job()))["mesh"];
   mesh.erase("quality");
   EXPECT_EQ(mesh, json::parse(R"({
-      "triangles": 5091320, "vertices": 2544488, "boundary_edges": 7, "components": 12,
+      "empty": false, "triangles": 5091320, "vertices": 2544488, "boundary_edges": 7, "components": 12,
       "euler": -35, "dropped": {"components": 3, "triangles": 48},
       "area_mm2": 593150.7, "area_extracted_mm2": 600000.5,
       "volume_mm3": {"extracted": 2795793.9, "smoothed": 2790000.25},
@@ -127,7 +128,7 @@ TEST(AnswerJson, SpellsAMeshsQualityAsTheContractDoes) {
   }
   EXPECT_EQ(quality, json::parse(R"({
       "closed": true, "manifold": true, "oriented": false, "components": 12, "genus": 29,
-      "aspect_ratio": {"extracted": {"mean": 0.5, "min": 0.25},
+      "encloses_volume": false, "aspect_ratio": {"extracted": {"mean": 0.5, "min": 0.25},
                        "smoothed": {"mean": 0.75, "min": 0.25}},
       "smallest_angle_deg": {"extracted": {"mean": 30.0, "min": 0.25},
                              "smoothed": {"mean": 40.0, "min": 0.25}}})"));
@@ -264,6 +265,25 @@ TEST(AnswerJson, VolumesOfTheFirstVersionAreRead) {
   Volume expected = some_volume();
   expected.format = "dicom";
   EXPECT_EQ(volume_from_json(volume.dump()), expected);
+}
+
+// Identities told less once.
+TEST(AnswerJson, RecordsOfIdentitiesThatToldLessAreRead) {
+  Volume expected = dicom_volume();
+  json record = json::parse(to_record(expected));
+  for (const char* name :
+       {"issuer_of_patient_id", "patient_identity_removed", "deidentification_method",
+        "acquisition_datetime", "position_reference_indicator", "equipment", "segments"}) {
+    record["dicom"].erase(name);
+  }
+  expected.dicom->issuer_of_patient_id.clear();
+  expected.dicom->patient_identity_removed.clear();
+  expected.dicom->deidentification_method.clear();
+  expected.dicom->acquisition_datetime.clear();
+  expected.dicom->position_reference_indicator.clear();
+  expected.dicom->equipment = {};
+  expected.dicom->segments.clear();
+  EXPECT_EQ(volume_from_record(record.dump()), expected);
 }
 
 TEST(AnswerJson, UnknownMembersAreIgnored) {
@@ -419,41 +439,6 @@ TEST(Record, KeepsTheParametersOfEarlierVersions) {
   EXPECT_EQ(job.parameters.volume, "abc");
   EXPECT_EQ(job.parameters.components.keep, 2U);
   EXPECT_EQ(job.parameters.callback, Callback{"https://receiver.example/?key=1"});
-}
-
-TEST(JobJson, TellsOfLabelsOnlyWhereThereAreSome) {
-  Job job = succeeded_job();
-  const std::string by_iso = to_json(job);
-  for (const char* member : {"labels", "background", "label_names"}) {
-    EXPECT_EQ(by_iso.find(member), std::string::npos) << member;
-  }
-  static_cast<MeshParameters&>(job.parameters) = label_parameters({{3}});
-  job.parameters.label_names = {{3, "Liver"}};
-  job.parameters.label_values = {{3, {3, 9}}};
-  job.mesh->labels = {
-      {.label = 3,
-       .name = "Liver",
-       .color = "#112233",
-       .voxels = 7,
-       .voxels_mm3 = 3.5,
-       .triangles = 40,
-       .vertices = 22,
-       .closed = true,
-       .manifold = true,
-       .oriented = true,
-       .components = 1,
-       .area_mm2 = 12.5,
-       .volume_mm3 = 3.25,
-       .files = {{MeshFormat::kStl, {.bytes = 9, .sha256 = "aa", .offset = 4, .href = "/x"}}}}};
-  const std::string text = to_json(job);
-  EXPECT_EQ(text.find("\"iso\""), std::string::npos);
-  EXPECT_EQ(text.find("interpolation"), std::string::npos);
-  Job read = job_from_json(text);
-  read.parameters.interpolation = job.parameters.interpolation;
-  EXPECT_EQ(read, job);
-  read = job_from_record(text);
-  read.parameters.interpolation = job.parameters.interpolation;
-  EXPECT_EQ(read, job);
 }
 
 }  // namespace

@@ -42,6 +42,10 @@ std::vector<std::string> faults_in(const Query& query) {
   return error ? fields_of(*error) : std::vector<std::string>{"nothing was refused"};
 }
 
+std::vector<std::string> faults_of(const std::string& member) {
+  return faults_in(body_with(member));
+}
+
 // No member as it is by default.
 JobParameters unusual_parameters(const std::string& volume) {
   return {{.iso = -150,
@@ -53,7 +57,7 @@ JobParameters unusual_parameters(const std::string& volume) {
            .pass_band = 0.05,
            .max_displacement_mm = 0.5,
            .close = true,
-           .components = {.keep = 2, .min_triangles = 100},
+           .components = {.keep = 2, .min_triangles = 100, .nearest_to = {}},
            .formats = {MeshFormat::kStl, MeshFormat::kGlb},
            .draco = {.position_bits = 11, .speed = 3},
            .normals = true},
@@ -180,9 +184,74 @@ TEST(JobBody, DracoMayBePartial) {
 
 TEST(JobBody, ComponentsMayBePartialAndNull) {
   EXPECT_EQ(parsed(R"("components": {})").components, ComponentFilter{});
-  EXPECT_EQ(parsed(R"("components": {"keep": 1})").components, (ComponentFilter{1, {}}));
+  EXPECT_EQ(parsed(R"("components": {"keep": 1})").components, (ComponentFilter{1, {}, {}}));
   EXPECT_EQ(parsed(R"("components": {"keep": null, "min_triangles": 4294967295})").components,
-            (ComponentFilter{{}, 4294967295}));
+            (ComponentFilter{{}, 4294967295, {}}));
+}
+
+TEST(JobBody, LevelsOfDetailGoDown) {
+  const auto lods = [](const std::string& list) {
+    return R"("formats": ["glb"], "lods": )" + list;
+  };
+  EXPECT_EQ(parsed(lods("[1, 0.25, 0.05]")).lods, (std::vector<double>{1, 0.25, 0.05}));
+  for (const char* const wrong : {"[]", "[0.5]", "[1, 1]", "[1, 0.2, 0.3]", "[1, 0]", "[2, 1]", "1",
+                                  R"(["1"])", "[1,0.9,0.8,0.7,0.6,0.5,0.4,0.3,0.2]"}) {
+    EXPECT_THAT(faults_of(lods(wrong)), ElementsAre("lods")) << wrong;
+  }
+  EXPECT_THAT(faults_of(R"("formats": ["stl"], "lods": [1])"), ElementsAre("lods"));
+}
+
+TEST(JobBody, DistancesAreForGlb) {
+  EXPECT_TRUE(parsed(R"("formats": ["stl", "glb"], "distances": true)").distances);
+  EXPECT_FALSE(parsed("").distances);
+  EXPECT_THAT(faults_of(R"("formats": ["stl"], "distances": true)"), ElementsAre("distances"));
+  EXPECT_THAT(faults_of(R"("formats": ["glb"], "distances": 1)"), ElementsAre("distances"));
+}
+
+TEST(JobBody, ABoxIsItsTwoCornersAndClosesTheSurface) {
+  const JobParameters parameters = parsed(R"("crop": [[-1, -2, -3], [4, 5, 6.5]])");
+  EXPECT_EQ(parameters.crop, (Box{{{-1, -2, -3}, {4, 5, 6.5}}}));
+  EXPECT_TRUE(parameters.close);
+  EXPECT_TRUE(parsed(R"("crop": [[0, 0, 0], [1, 1, 1]], "close": false)").close);
+  for (const char* const wrong :
+       {"[]", "[[0, 0, 0]]", "[[0, 0, 0], [1, 1]]", "[[0, 0, 0], [1, 1, 0]]", "[0, 0, 0, 1, 1, 1]",
+        R"([["0", 0, 0], [1, 1, 1]])", "true"}) {
+    EXPECT_THAT(faults_of(std::string(R"("crop": )") + wrong), ElementsAre("crop")) << wrong;
+  }
+}
+
+TEST(JobBody, ABoundForTheErrorIsMeasured) {
+  EXPECT_TRUE(parsed(R"("max_error_mm": 0.1)").certify);
+  EXPECT_TRUE(parsed(R"("triangles": 1000)").certify);
+  EXPECT_FALSE(parsed(R"("triangles": 1000, "certify": false)").certify);
+  EXPECT_FALSE(parsed("").certify);
+  EXPECT_THAT(faults_of(R"("max_error_mm": 0.1, "certify": false)"), ElementsAre("certify"));
+  EXPECT_THAT(faults_of(R"("max_error_mm": 0)"), ElementsAre("max_error_mm"));
+  EXPECT_THAT(faults_of(R"("triangles": 3)"), ElementsAre("triangles"));
+}
+
+TEST(JobBody, PlacesOfPartsAreOfThreeNumbers) {
+  const auto at = [](const std::string& list) {
+    return R"("components": {"nearest_to": )" + list + "}";
+  };
+  EXPECT_EQ(parsed(at("[[1, 2, 3], [-4, 5, 6]]")).components.nearest_to.size(), 2U);
+  for (const char* const wrong : {"[]", "[1, 2, 3]", "[[1, 2]]", "null"}) {
+    EXPECT_THAT(faults_of(at(wrong)), ElementsAre("components.nearest_to")) << wrong;
+  }
+}
+
+TEST(JobQuery, CarriesNumbersAndPlacesInOneList) {
+  const JobParameters parameters = parse_job_parameters(Query{{"volume", "a"},
+                                                              {"iso", "60"},
+                                                              {"crop", "-1,-2,-3,4,5,6.5"},
+                                                              {"nearest_to", "1,2,3,4,5,6"},
+                                                              {"lods", "1,0.25"},
+                                                              {"format", "glb"}},
+                                                        VolumeIn::kQuery);
+  EXPECT_EQ(parameters.crop, (Box{{{-1, -2, -3}, {4, 5, 6.5}}}));
+  EXPECT_EQ(parameters.components.nearest_to.size(), 2U);
+  EXPECT_EQ(parameters.lods, (std::vector<double>{1, 0.25}));
+  EXPECT_EQ(parse_job_parameters(to_query(parameters), VolumeIn::kQuery), parameters);
 }
 
 TEST(JobBody, AFormatNamedTwiceIsMadeOnce) {

@@ -99,6 +99,8 @@ TEST(Parameters, BoundsAreThoseOfTheTable) {
     constexpr bool kIsReal =
         std::is_same_v<Member, double> || std::is_same_v<Member, std::optional<double>>;
     const double step = kIsReal ? 1e-6 : 1;
+    // Each level of detail depends on the one before it: see JobBody.LevelsOfDetailGoDown.
+    if (std::is_same_v<Member, std::vector<double>>) return;
     const auto takes = [&](double value) {
       json number = kIsReal ? json(value) : json(std::llround(value));
       if (std::is_same_v<Member, std::optional<LabelChoice>>) number = json::array({number});
@@ -158,7 +160,7 @@ TEST(Parameters, AQueryHasAllButTheCallback) {
   parameters.pass_band = 0.05;
   parameters.max_displacement_mm = 0.25;
   parameters.close = true;
-  parameters.components = {.keep = 3, .min_triangles = 7};
+  parameters.components = {.keep = 3, .min_triangles = 7, .nearest_to = {}};
   parameters.formats = {MeshFormat::kStl, MeshFormat::kGlb};
   parameters.draco = {.position_bits = 11, .speed = 3};
   parameters.normals = true;

@@ -36,9 +36,10 @@ class VolumeConformance : public test::EngineTest {
     volumes().erase("other", kVolume);
   }
 
-  std::string order(const std::string& after = {}, std::size_t limit = 100) {
+  std::string order(const std::string& after = {}, std::size_t limit = 100,
+                    ListOrder order = ListOrder::kOldestFirst) {
     std::string ids;
-    for (const Volume& volume : volumes().list("", after, limit)) ids += volume.id;
+    for (const Volume& volume : volumes().list("", after, limit, order)) ids += volume.id;
     return ids;
   }
 };
@@ -132,6 +133,9 @@ TEST_P(VolumeConformance, ListsTheOldestFirstInPages) {
   EXPECT_EQ(order(cursor_of(second), 1), "dd");
   EXPECT_EQ(order(cursor_of(second), 9), "ddaa");
   EXPECT_EQ(order("no cursor", 9), "ccbbddaa");
+  EXPECT_EQ(order("", 9, ListOrder::kNewestFirst), "aaddbbcc");
+  EXPECT_EQ(order("", 2, ListOrder::kNewestFirst), "aadd");
+  EXPECT_EQ(order(cursor_of(second), 9, ListOrder::kNewestFirst), "cc");
 }
 
 TEST_P(VolumeConformance, ErasesOnce) {

@@ -20,6 +20,19 @@ TEST(DataFolder, CreatesWhatIsMissing) {
   EXPECT_TRUE(std::filesystem::is_directory(folder.scratch()));
 }
 
+TEST(DataFolder, IsForItsOwnerOnlyUnlessItWasThere) {
+  const TemporaryFolder parent;
+  const auto rights = [](const std::filesystem::path& path) {
+    return std::filesystem::status(path).permissions();
+  };
+  const DataFolder made(parent / "made");
+  EXPECT_EQ(rights(parent / "made"), std::filesystem::perms::owner_all);
+  std::filesystem::create_directory(parent / "there");
+  const auto before = rights(parent / "there");
+  const DataFolder there(parent / "there");
+  EXPECT_EQ(rights(parent / "there"), before);
+}
+
 TEST(DataFolder, RefusesASecondHolder) {
   const TemporaryFolder parent;
   std::optional<DataFolder> first(std::in_place, parent / "data");

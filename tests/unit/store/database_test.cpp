@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include "server/store/sqlite/audit_trail.h"
 #include "server/store/sqlite/volume_store.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
@@ -34,7 +35,7 @@ TEST_F(DatabaseTest, ReadersReadSideBySide) {
   SqliteVolumeStore volumes(database);
   const Reading much(database.reader());
   const Reading more(database.reader());
-  EXPECT_TRUE(volumes.list(std::nullopt, "", 10).empty());
+  EXPECT_TRUE(volumes.list(std::nullopt, "", 10, ListOrder::kOldestFirst).empty());
 }
 
 TEST_F(DatabaseTest, OfANewerVersionIsRefusedAndLeftAsItIs) {
@@ -68,6 +69,21 @@ TEST_F(DatabaseTest, IsOpenedAgainAsItWas) {
   }
   Database again(data_);
   EXPECT_EQ(SqliteVolumeStore(again).get("", "aa"), volume);
+}
+
+// Not even by whoever has the file open.
+TEST_F(DatabaseTest, TheAuditTrailIsNeitherChangedNorRemoved) {
+  Database database(data_);
+  SqliteAuditTrail(database).add({.event = AuditEvent::kStart});
+  for (const char* sql : {"UPDATE audit SET record = ''", "DELETE FROM audit"}) {
+    EXPECT_EQ(test::code_thrown_by([&] {
+                Transaction transaction(database.writer());
+                transaction->run(sql);
+                transaction.commit();
+              }),
+              ErrorCode::kInternal)
+        << sql;
+  }
 }
 
 TEST_F(DatabaseTest, ThatIsNoneIsRefusedWithoutItsPath) {

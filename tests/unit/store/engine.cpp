@@ -4,8 +4,10 @@
 
 #include "server/store/files/blob_store.h"
 #include "server/store/files/files.h"
+#include "server/store/sqlite/audit_trail.h"
 #include "server/store/sqlite/database.h"
 #include "server/store/sqlite/job_store.h"
+#include "server/store/sqlite/order_store.h"
 #include "server/store/sqlite/outbox.h"
 #include "server/store/sqlite/volume_store.h"
 #include "tests/support/files.h"
@@ -22,6 +24,8 @@ class SqliteEngine : public Engine {
   store::VolumeStore& volumes() override { return *volumes_; }
   store::BlobStore& blobs() override { return *blobs_; }
   store::Outbox& outbox() override { return *outbox_; }
+  store::OrderStore& orders() override { return *orders_; }
+  store::AuditTrail& audit() override { return *audit_; }
 
   void restart() override {
     close();
@@ -59,6 +63,8 @@ class SqliteEngine : public Engine {
   }
 
   void close() {
+    audit_.reset();
+    orders_.reset();
     outbox_.reset();
     jobs_.reset();
     volumes_.reset();
@@ -69,6 +75,8 @@ class SqliteEngine : public Engine {
     database_.emplace(*data_);
     volumes_.emplace(*database_);
     outbox_.emplace(*database_);
+    orders_.emplace(*database_);
+    audit_.emplace(*database_);
     jobs_.emplace(*database_, *blobs_,
                   store::JobStoreOptions{.max_queued = options_.max_queued,
                                          .retry_delay = options_.retry_delay,
@@ -84,6 +92,8 @@ class SqliteEngine : public Engine {
   std::optional<store::Database> database_;
   std::optional<store::SqliteVolumeStore> volumes_;
   std::optional<store::SqliteOutbox> outbox_;
+  std::optional<store::SqliteOrderStore> orders_;
+  std::optional<store::SqliteAuditTrail> audit_;
   std::optional<store::SqliteJobStore> jobs_;
 };
 

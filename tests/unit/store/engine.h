@@ -9,8 +9,10 @@
 
 #include <gtest/gtest.h>
 
+#include "server/store/audit_trail.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
+#include "server/store/order_store.h"
 #include "server/store/outbox.h"
 #include "server/store/volume_store.h"
 
@@ -31,6 +33,8 @@ class Engine {
   virtual store::VolumeStore& volumes() = 0;
   virtual store::BlobStore& blobs() = 0;
   virtual store::Outbox& outbox() = 0;
+  virtual store::OrderStore& orders() = 0;
+  virtual store::AuditTrail& audit() = 0;
 
   // As after a crash: the stores are opened anew on what is on disk, and nobody holds a lease. What
   // was returned before is not valid any more.
@@ -89,6 +93,8 @@ class EngineTest : public testing::TestWithParam<NamedEngine> {
   store::VolumeStore& volumes() { return engine_->volumes(); }
   store::BlobStore& blobs() { return engine_->blobs(); }
   store::Outbox& outbox() { return engine_->outbox(); }
+  store::OrderStore& orders() { return engine_->orders(); }
+  store::AuditTrail& audit() { return engine_->audit(); }
   void restart() { engine_->restart(); }
   void lose_power() { engine_->lose_power(); }
 

@@ -1,6 +1,5 @@
 #include "server/volume/slice.h"
 
-#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -12,6 +11,7 @@
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/png.h"
+#include "tests/unit/volume/stored.h"
 
 namespace isomesh::volume::test {
 namespace {
@@ -25,9 +25,7 @@ class SliceTest : public testing::Test {
   template <class Sample>
   std::shared_ptr<const CanonicalFile> volume_of(const CanonicalHeader& header,
                                                  const std::vector<Sample>& samples) {
-    CanonicalWriter writer(folder_ / "volume", header);
-    std::memcpy(writer.samples().data(), samples.data(), writer.samples().size());
-    return std::make_shared<const CanonicalFile>(folder_ / "volume");
+    return stored(folder_, header, samples);
   }
 
   // The sample (i,j,k) is 100 k + 10 j + i.

@@ -43,7 +43,7 @@ function words(...values: number[]): Buffer {
 }
 
 // One slice of a CT of 4 x 4 samples, `index` mm from the first, with the name of its series.
-export function ctSlice(index: number, frameOfReference: string, series: string): Buffer {
+export function ctSlice(index: number, frameOfReference: string, series: string, seriesUid = '1.2.3.4'): Buffer {
   const image = '1.2.840.10008.5.1.4.1.1.2';
   const uid = `1.2.826.0.1.3680043.9.1.${index}`;
   const meta = Buffer.concat([
@@ -63,7 +63,7 @@ export function ctSlice(index: number, frameOfReference: string, series: string)
     element(8, 0x60, 'CS', 'CT'),
     element(8, 0x103e, 'LO', series),
     element(0x20, 0xd, 'UI', '1.2.3'),
-    element(0x20, 0xe, 'UI', '1.2.3.4'),
+    element(0x20, 0xe, 'UI', seriesUid),
     element(0x20, 0x32, 'DS', `0\\0\\${index}`),
     element(0x20, 0x37, 'DS', '1\\0\\0\\0\\1\\0'),
     element(0x20, 0x52, 'UI', frameOfReference),

@@ -94,6 +94,31 @@ describe('the labels of a volume', () => {
   });
 });
 
+describe('more labels than are listed', () => {
+  it('are said to be more, and found', async () => {
+    const { page, daemon } = at;
+    const samples = Uint16Array.from({ length: 1000 }, (_, n) => (n < 600 ? n + 1 : 0));
+    const header = 'NRRD0004\ntype: uint16\ndimension: 3\nsizes: 10 10 10\nendian: little\nencoding: raw\n\n';
+    const many = await daemon.upload(Buffer.concat([Buffer.from(header), Buffer.from(samples.buffer)]));
+    await page.goto(`${daemon.url}/#/volumes/${many}?labels=all`);
+    const rows = page.locator('.label-choice .labels li');
+    await expect.poll(() => rows.count()).toBe(500);
+    const count = page.locator('.label-choice .hint[role=status]');
+    expect(await count.innerText()).toBe('600 of 600 labels; the first 500 are listed');
+    await page.getByLabel('Search the labels').fill('577');
+    await expect.poll(() => rows.count()).toBe(1);
+    expect(await rows.innerText()).toMatch(/label 577[^]*1 voxels/);
+    expect(await count.innerText()).toBe('600 of 600 labels');
+    await page.getByRole('button', { name: 'None' }).click();
+    expect(await count.innerText()).toBe('599 of 600 labels');
+    // A surface's list says it as well.
+    const { id } = await daemon.submit({ volume: many, labels: 'all', passes: 0, formats: ['glb'] }, 30);
+    await page.goto(`${daemon.url}/#/jobs/${id}`);
+    await expect.poll(() => page.locator('.label-list .labels li').count()).toBe(500);
+    expect(await page.locator('.label-list .hint[role=status]').innerText()).toContain('the first 500 are listed');
+  });
+});
+
 describe('a segmentation that names its labels', () => {
   // As 3D Slicer writes it; the first name would run if the page took a text for HTML.
   const hostile = '<img src=x onerror="document.title=1">';
@@ -234,6 +259,8 @@ describe('the surfaces of labels', () => {
     await page.keyboard.press('c');
     await page.getByLabel('Direction of the cut').selectOption({ label: 'Coronal' });
     await expect.poll(() => page.locator('.viewport[data-slice^=y]').count()).toBe(1);
+    // The camera has turned to the cut; from the side half of the surface is gone.
+    await page.keyboard.press('l');
     const cut = await seen(view);
     expect(cut.blue / whole.blue).toBeGreaterThan(0.3);
     expect(cut.blue / whole.blue).toBeLessThan(0.7);

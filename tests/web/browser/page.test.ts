@@ -87,6 +87,7 @@ describe('a real volume', () => {
 
     const download = page.waitForEvent('download');
     await page.locator('[data-format=glb]').click();
+    expect((await download).suggestedFilename()).toBe(`ch2bet-iso-${brainHull}.glb`);
     const file = readFileSync(await (await download).path());
     expect(createHash('sha256').update(file).digest('hex')).toBe(mesh.files.glb?.sha256);
 
@@ -261,7 +262,7 @@ describe('a job', () => {
       try {
         await expect.poll(() => mine.locator('.banner').isVisible()).toBe(false);
         await mine.goto(`${other.url}/#/volumes/${volume}`);
-        await expect.poll(() => mine.locator('.slice').count()).toBe(3);
+        await expect.poll(() => mine.locator('[data-plane]').count()).toBe(3);
       } finally {
         await again.kill();
       }

@@ -34,6 +34,13 @@ function valueAt(job: Record<string, unknown>, name: string): unknown {
   return name.split('.').reduce<unknown>((value, part) => (value as Record<string, unknown>)[part], job);
 }
 
+// Values of parameters that are lists.
+const lists: Readonly<Record<string, string>> = {
+  'components.nearest_to': '1, 2, 3',
+  crop: '0, 0, 0, 100, 100, 100',
+  lods: '1, 0.5',
+};
+
 // Chooses another value than the one that is there.
 async function change(element: Locator): Promise<void> {
   const number = element.locator('input[type=number]');
@@ -43,6 +50,20 @@ async function change(element: Locator): Promise<void> {
     await number.fill(String(isWhole ? (low ?? 0) + 2 : (low ?? 0) + (high || 1) / 4));
     return;
   }
+  const slider = element.locator('input[type=range]');
+  if ((await slider.count()) > 0) {
+    await slider.fill((await slider.getAttribute('max')) ?? '');
+    return;
+  }
+  const list = element.locator('input[type=text]');
+  if ((await list.count()) > 0) {
+    const name = (await element.getAttribute('data-parameter')) ?? '';
+    await list.fill(lists[name] ?? '');
+    return;
+  }
+  // What another parameter brings with it.
+  const [box] = await element.locator('input[type=checkbox]:disabled').all();
+  if (box && (await element.evaluate((node) => node.matches('label'))) && (await box.isChecked())) return;
   // A row of choices, or boxes; whichever is not on.
   const labels = (await element.evaluate((node) => node.matches('label'))) ? element : element.locator('label');
   for (const label of await labels.all()) {
@@ -85,9 +106,10 @@ describe('the form', () => {
     const { page } = at;
     await openForm(page);
     const lambda = control(page, 'lambda').locator('input');
-    for (const [text, isBad] of [['0', true], ['0.123', false], ['1.5', true]] as const) {
+    for (const [text, isBad] of [['0', true], ['1.5', true], ['0.123', false]] as const) {
       await lambda.fill(text);
       expect(await lambda.getAttribute('aria-invalid'), text).toBe(String(isBad));
+      expect(await page.getByRole('button', { name: 'Make the surface' }).isDisabled(), text).toBe(isBad);
     }
     expect(valueAt(await make(page), 'lambda')).toBe(0.123);
   });

@@ -8,7 +8,7 @@ import { gunzipSync } from 'node:zlib';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { encodePng } from './png';
-import { brain, brainHull, contourPixels, Daemon, openPage, silhouette, startBrowser, still, surfaceLoaded } from './support';
+import { brain, brainHull, contourPixels, Daemon, openPage, pixelsOf, silhouette, startBrowser, still, surfaceLoaded } from './support';
 
 const skullProject = '/usr/share/doc/invesalius-examples/examples/Cranium.inv3';
 const atlas = '/usr/share/mricron/templates/aal.nii';
@@ -87,32 +87,21 @@ async function uploadAtlas(): Promise<{ id: string; names: Record<string, string
 }
 
 async function take(page: Page, name: string): Promise<void> {
-  const { width, height, text } = await pixelsOf(page, await page.screenshot());
+  const { width, height, text } = await readPng(page, await page.screenshot());
   const bytes = encodePng(width, height, new Uint8Array(Buffer.from(text, 'base64')));
   writeFileSync(join(folder, `${name}.png`), bytes);
   expect(bytes.length, name).toBeLessThan(mostBytes);
   expect(bytes.length, name).toBeGreaterThan(10_000);
 }
 
-function pixelsOf(
-  page: Page,
-  picture: Buffer,
-): Promise<{ width: number; height: number; text: string }> {
-  return page.evaluate(async (given) => {
-    const bytes = Uint8Array.from(atob(given), (letter) => letter.charCodeAt(0));
-    const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-    const { width, height } = bitmap;
-    const canvas = document.createElement('canvas');
-    canvas.width = width;
-    canvas.height = height;
-    const context = canvas.getContext('2d');
-    if (!context) throw new Error('no canvas');
-    context.drawImage(bitmap, 0, 0);
-    const { data } = context.getImageData(0, 0, width, height);
+// A PNG's pixels as text, which is how they come out of the page.
+async function readPng(page: Page, picture: Buffer): Promise<{ width: number; height: number; text: string }> {
+  const pixels = await pixelsOf(page, picture);
+  return pixels.evaluate(({ data, width, height }) => {
     let text = '';
     for (let i = 0; i < data.length; i += 8192) text += String.fromCharCode(...data.subarray(i, i + 8192));
     return { width, height, text: btoa(text) };
-  }, picture.toString('base64'));
+  });
 }
 
 describe('pictures', () => {
@@ -127,6 +116,9 @@ describe('pictures', () => {
     for (const plane of ['axial', 'coronal', 'sagittal']) {
       await expect.poll(() => contourPixels(page, plane)).toBeGreaterThan(100);
     }
+    const live = page.locator('.live');
+    await expect.poll(async () => Number(await live.getAttribute('data-size'))).toBeGreaterThan(64);
+    await expect.poll(() => live.locator('.live-picture[data-still]').count()).toBe(1);
     await take(page, 'iso-value');
 
     // A fresh page each, so that no surface of the last one is taken for the next.

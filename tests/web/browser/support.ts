@@ -4,7 +4,7 @@ import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { createInterface } from 'node:readline';
-import { chromium, type Browser, type Locator, type Page } from 'playwright-core';
+import { chromium, type Browser, type JSHandle, type Locator, type Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, beforeEach, expect } from 'vitest';
 
 // A head in magnetic resonance and its brain alone, of Debian's mricron-data. The brain's hull has a
@@ -74,7 +74,21 @@ export class Daemon {
 
 // A new token, whose hash is in that file then.
 export function makeToken(file: string): string {
-  return execFileSync(fromEnvironment('ISOMESHD'), ['token', 'page', '--into', file]).toString().trim();
+  return execFileSync(fromEnvironment('ISOMESHD'), ['token', 'add', 'page', '--into', file]).toString().trim();
+}
+
+// Runs it with a daemon that wants a token, and one that it takes.
+export async function withTokens(run: (guarded: Daemon, token: string) => Promise<void>): Promise<void> {
+  const folder = mkdtempSync(join(tmpdir(), 'isomesh-tokens-'));
+  const file = join(folder, 'tokens');
+  const token = makeToken(file);
+  const guarded = await Daemon.start(undefined, '127.0.0.1:0', ['--tokens', file]);
+  try {
+    await run(guarded, token);
+  } finally {
+    await guarded.remove();
+    rmSync(folder, { recursive: true });
+  }
 }
 
 export interface JobAnswer {
@@ -83,7 +97,9 @@ export interface JobAnswer {
   parameters: Record<string, unknown>;
   mesh: {
     triangles: number;
+    components: number;
     bounds: [[number, number, number], [number, number, number]];
+    certificate?: { max_mm: number; from_mesh: { max_mm: number } };
     files: Record<string, { bytes: number; sha256: string }>;
     labels?: { label: number; triangles: number; volume_mm3: number; area_mm2: number }[];
   } | null;
@@ -195,6 +211,25 @@ export function ballNrrd(size: number, radius: number, seed = 0): Buffer {
   return Buffer.concat([Buffer.from(nrrdHeader(size)), samples]);
 }
 
+// A ball and a smaller one on its left side, which do not touch.
+export function ballsNrrd(size: number): Buffer {
+  const samples = Buffer.alloc(size ** 3);
+  const middle = (size - 1) / 2;
+  let at = 0;
+  for (let z = 0; z < size; z += 1) {
+    for (let y = 0; y < size; y += 1) {
+      for (let x = 0; x < size; x += 1) {
+        const inside = ([centre, radius]: readonly [number, number]): number =>
+          radius * size - Math.hypot(x - centre * size, y - middle, z - middle);
+        const depth = Math.max(inside([0.3, 0.2]), inside([0.78, 0.12]));
+        samples[at] = Math.max(0, Math.min(255, 100 + 8 * depth));
+        at += 1;
+      }
+    }
+  }
+  return Buffer.concat([Buffer.from(nrrdHeader(size)), samples]);
+}
+
 // A ball cut into two labels, 1 towards the patient's right and 2 towards the left, and a block of label 5
 // above it.
 export function labelsNrrd(size: number, fields: string[] = []): Buffer {
@@ -225,6 +260,19 @@ export function noiseNrrd(size: number): Buffer {
   return Buffer.concat([Buffer.from(nrrdHeader(size)), samples]);
 }
 
+// A cube of samples that grow along z, in slices that each lie farther back: a gantry tilted by that angle.
+export function tiltedNrrd(size: number, degrees: number): Buffer {
+  const angle = (degrees * Math.PI) / 180;
+  const header = nrrdHeader(size).replace('(0,0,1)', `(0,${Math.sin(angle)},${Math.cos(angle)})`);
+  const samples = Buffer.alloc(size ** 3, 200);
+  return Buffer.concat([Buffer.from(header), samples.fill(100, 0, samples.length / 2)]);
+}
+
+// What the address says of that.
+export function noted(page: Page, name: string): string {
+  return new URLSearchParams(new URL(page.url()).hash.split('?')[1] ?? '').get(name) ?? '';
+}
+
 function nrrdHeader(size: number, fields: string[] = []): string {
   return [
     'NRRD0004',
@@ -241,8 +289,8 @@ function nrrdHeader(size: number, fields: string[] = []): string {
   ].join('\n');
 }
 
-// As if files were dropped from the system.
-export async function drop(page: Page, files: { name: string; bytes: Buffer }[]): Promise<void> {
+// As if files were dropped from the system, on that element.
+export async function drop(page: Page, files: { name: string; bytes: Buffer }[], on = '.drop'): Promise<void> {
   const transfer = await page.evaluateHandle((given) => {
     const made = new DataTransfer();
     for (const { name, text } of given) {
@@ -250,7 +298,7 @@ export async function drop(page: Page, files: { name: string; bytes: Buffer }[])
     }
     return made;
   }, files.map(({ name, bytes }) => ({ name, text: bytes.toString('base64') })));
-  await page.dispatchEvent('.drop', 'drop', { dataTransfer: transfer });
+  await page.dispatchEvent(on, 'drop', { dataTransfer: transfer });
 }
 
 // Pixels of a slice that have the contour's colour.
@@ -285,12 +333,9 @@ export interface Hues {
   blue: number;
 }
 
-// Pixels of a view, without the tools over it, that are clearly of one of these hues.
-export async function hues(page: Page, element: Locator): Promise<Hues> {
-  await showTools(page, false);
-  const picture = (await element.screenshot()).toString('base64');
-  await showTools(page, true);
-  return page.evaluate(async (text) => {
+// A PNG's pixels, in the page.
+export function pixelsOf(page: Page, picture: Buffer): Promise<JSHandle<ImageData>> {
+  return page.evaluateHandle(async (text) => {
     const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
     const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
     const canvas = document.createElement('canvas');
@@ -299,7 +344,22 @@ export async function hues(page: Page, element: Locator): Promise<Hues> {
     const context = canvas.getContext('2d');
     if (!context) throw new Error('no canvas');
     context.drawImage(bitmap, 0, 0);
-    const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+    return context.getImageData(0, 0, bitmap.width, bitmap.height);
+  }, picture.toString('base64'));
+}
+
+// The pixels of a view, without the tools over it.
+async function pixelsOfView(page: Page, element: Locator): Promise<JSHandle<ImageData>> {
+  await showTools(page, false);
+  const picture = await element.screenshot();
+  await showTools(page, true);
+  return pixelsOf(page, picture);
+}
+
+// Pixels of a view, without the tools over it, that are clearly of one of these hues.
+export async function hues(page: Page, element: Locator): Promise<Hues> {
+  const pixels = await pixelsOfView(page, element);
+  return pixels.evaluate(({ data }) => {
     const count = { red: 0, green: 0, blue: 0 };
     const clear = 60;
     for (let at = 0; at < data.length; at += 4) {
@@ -309,12 +369,12 @@ export async function hues(page: Page, element: Locator): Promise<Hues> {
       if (blue > Math.max(red, green) + clear) count.blue += 1;
     }
     return count;
-  }, picture);
+  });
 }
 
 function showTools(page: Page, isShown: boolean): Promise<void> {
   return page.evaluate((visibility) => {
-    for (const tools of document.querySelectorAll<HTMLElement>('.tools')) {
+    for (const tools of document.querySelectorAll<HTMLElement>('.tools, .legend')) {
       tools.style.visibility = visibility;
     }
   }, isShown ? '' : 'hidden');
@@ -322,54 +382,40 @@ function showTools(page: Page, isShown: boolean): Promise<void> {
 
 // What stands out in a picture of a view, without the tools over it.
 export async function silhouette(page: Page, element: Locator, tolerance = 24): Promise<Silhouette> {
-  await showTools(page, false);
-  const picture = (await element.screenshot()).toString('base64');
-  await showTools(page, true);
-  return page.evaluate(
-    async ({ text, most }) => {
-      const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-      const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-      const canvas = document.createElement('canvas');
-      canvas.width = bitmap.width;
-      canvas.height = bitmap.height;
-      const context = canvas.getContext('2d');
-      if (!context) throw new Error('no canvas');
-      context.drawImage(bitmap, 0, 0);
-      const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
-      const corner = 116; // the orientation cube
-      const seen = { count: 0, left: Infinity, right: -1, top: Infinity, bottom: -1 };
-      const colours = new Set<number>();
-      for (let y = 0; y < bitmap.height; y += 1) {
-        // The background is a gradient from top to bottom, so that every row has its own.
-        const edge = 4 * (y * bitmap.width + bitmap.width - 3);
-        for (let x = 0; x < bitmap.width; x += 1) {
-          if (x < corner && y > bitmap.height - corner) continue;
-          const at = 4 * (y * bitmap.width + x);
-          const difference =
-            Math.abs((data[at] ?? 0) - (data[edge] ?? 0)) +
-            Math.abs((data[at + 1] ?? 0) - (data[edge + 1] ?? 0)) +
-            Math.abs((data[at + 2] ?? 0) - (data[edge + 2] ?? 0));
-          if (difference <= most) continue;
-          seen.count += 1;
-          seen.left = Math.min(seen.left, x);
-          seen.right = Math.max(seen.right, x);
-          seen.top = Math.min(seen.top, y);
-          seen.bottom = Math.max(seen.bottom, y);
-          colours.add(((data[at] ?? 0) << 16) | ((data[at + 1] ?? 0) << 8) | (data[at + 2] ?? 0));
-        }
+  const pixels = await pixelsOfView(page, element);
+  return pixels.evaluate(({ data, width: across, height: down }, most) => {
+    const corner = 116; // the orientation cube
+    const seen = { count: 0, left: Infinity, right: -1, top: Infinity, bottom: -1 };
+    const colours = new Set<number>();
+    for (let y = 0; y < down; y += 1) {
+      // The background is a gradient from top to bottom, so that every row has its own.
+      const edge = 4 * (y * across + across - 3);
+      for (let x = 0; x < across; x += 1) {
+        if (x < corner && y > down - corner) continue;
+        const at = 4 * (y * across + x);
+        const difference =
+          Math.abs((data[at] ?? 0) - (data[edge] ?? 0)) +
+          Math.abs((data[at + 1] ?? 0) - (data[edge + 1] ?? 0)) +
+          Math.abs((data[at + 2] ?? 0) - (data[edge + 2] ?? 0));
+        if (difference <= most) continue;
+        seen.count += 1;
+        seen.left = Math.min(seen.left, x);
+        seen.right = Math.max(seen.right, x);
+        seen.top = Math.min(seen.top, y);
+        seen.bottom = Math.max(seen.bottom, y);
+        colours.add(((data[at] ?? 0) << 16) | ((data[at + 1] ?? 0) << 8) | (data[at + 2] ?? 0));
       }
-      const width = Math.max(0, seen.right - seen.left + 1);
-      const height = Math.max(0, seen.bottom - seen.top + 1);
-      return {
-        part: seen.count / (bitmap.width * bitmap.height),
-        width: width / bitmap.width,
-        height: height / bitmap.height,
-        filling: seen.count / Math.max(1, width * height),
-        colours: colours.size,
-      };
-    },
-    { text: picture, most: tolerance },
-  );
+    }
+    const width = Math.max(0, seen.right - seen.left + 1);
+    const height = Math.max(0, seen.bottom - seen.top + 1);
+    return {
+      part: seen.count / (across * down),
+      width: width / across,
+      height: height / down,
+      filling: seen.count / Math.max(1, width * height),
+      colours: colours.size,
+    };
+  }, tolerance);
 }
 
 // Waits until all parts of the surfaces are there and drawn.

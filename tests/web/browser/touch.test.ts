@@ -1,7 +1,7 @@
 // The page under fingers, as on a tablet.
 import type { CDPSession, Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, chordOfBall, contourPixels, setup, settled, silhouette, still, surfaceLoaded } from './support';
+import { ballNrrd, chordOfBall, contourPixels, noted, setup, settled, silhouette, still, surfaceLoaded } from './support';
 
 const at = setup({ viewport: { width: 820, height: 1180 }, hasTouch: true, isMobile: true });
 
@@ -33,10 +33,6 @@ async function middleOf(page: Page, selector: string): Promise<Point & { width: 
   const box = await page.locator(selector).boundingBox();
   if (!box) throw new Error(`${selector} is not shown`);
   return { x: box.x + box.width / 2, y: box.y + box.height / 2, width: box.width, height: box.height };
-}
-
-function noted(page: Page, name: string): string {
-  return new URLSearchParams(new URL(page.url()).hash.split('?')[1] ?? '').get(name) ?? '';
 }
 
 // Where the camera stands around its target, and what it looks at.
@@ -143,8 +139,8 @@ describe('fingers', () => {
     await expect.poll(() => noted(page, 'at')).not.toBe(place);
     expect(await page.evaluate(() => document.querySelector('main')?.scrollTop)).toBe(0);
 
-    // Beside the slices a finger scrolls to what is below.
-    await fingers(page, [{ from: { x: 400, y: 1000 }, to: { x: 400, y: 700 } }]);
+    // Beside slices and histogram a finger scrolls to what is below.
+    await fingers(page, [{ from: { x: 400, y: 840 }, to: { x: 400, y: 500 } }]);
     await expect.poll(() => page.evaluate(() => document.querySelector('main')?.scrollTop)).toBeGreaterThan(0);
   });
 });

@@ -1,18 +1,15 @@
 // What comes in: several files, refused ones, and those of people with a token.
-import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
-import { tmpdir } from 'node:os';
-import { join } from 'node:path';
+import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import {
   ballNrrd,
   brain,
   contourPixels,
-  Daemon,
   setup,
   drop,
-  makeToken,
   openPage,
   surfaceLoaded,
+  withTokens,
 } from './support';
 
 const at = setup();
@@ -75,11 +72,7 @@ describe('several files', () => {
 describe('a server with tokens', () => {
   it('is entered with one, and with none but one', async () => {
     const { browser } = at;
-    const folder = mkdtempSync(join(tmpdir(), 'isomesh-tokens-'));
-    const file = join(folder, 'tokens');
-    const token = makeToken(file);
-    const guarded = await Daemon.start(undefined, '127.0.0.1:0', ['--tokens', file]);
-    try {
+    await withTokens(async (guarded, token) => {
       const { page: mine, faults: none } = await openPage(browser, guarded.url);
       await mine.goto(guarded.url);
       const field = mine.getByLabel('Token', { exact: true }).and(mine.locator('input'));
@@ -105,10 +98,7 @@ describe('a server with tokens', () => {
       expect(mine.url()).not.toContain(token);
       await mine.close();
       expect(none).toEqual([]);
-    } finally {
-      await guarded.remove();
-      rmSync(folder, { recursive: true });
-    }
+    });
   });
 });
 

@@ -1,5 +1,6 @@
+import { Vector3 } from 'three';
 import { describe, expect, it } from 'vitest';
-import { borderVertices, clustered, mostTriangles, prepare, split, type Triangles } from '@/mesh/blocks';
+import { areaNormals, borderVertices, clustered, mostTriangles, prepare, split, type Triangles } from '@/mesh/blocks';
 import { Seams } from '@/mesh/seams';
 
 // A bumpy sheet of n x n squares over [x0, x0 + n] x [0, n].
@@ -109,5 +110,36 @@ describe('Seams', () => {
     const slope = [-Math.cos(20 / 3) / 3, Math.sin(10 / 4) / 4, 1] as const;
     const cosine = at(right, place).reduce((sum, value, axis) => sum + (value / 32_767) * (slope[axis as 0]), 0) / Math.hypot(...slope);
     expect(cosine).toBeGreaterThan(0.995);
+  });
+});
+
+describe('a coarse copy', () => {
+  // One that is turned over would be dark, or of a label's surface a hole.
+  it('faces as the surface does', () => {
+    const size = 60;
+    const positions = new Float32Array(3 * size * size);
+    const index: number[] = [];
+    for (let y = 0; y < size; y += 1) {
+      for (let x = 0; x < size; x += 1) {
+        const height = 3 * Math.sin(x * 1.7) * Math.cos(y * 1.3);
+        positions.set([x, y, height], 3 * (y * size + x));
+        const a = y * size + x;
+        if (x + 1 < size && y + 1 < size) index.push(a, a + 1, a + size, a + 1, a + size + 1, a + size);
+      }
+    }
+    const triangles = { positions, index: Uint32Array.from(index) };
+    const normals = areaNormals(triangles);
+    const coarse = clustered(triangles, normals, borderVertices(triangles.index, size * size), 3.5);
+    expect(coarse.length).toBeGreaterThan(300);
+    let turned = 0;
+    for (let i = 0; i < coarse.length; i += 3) {
+      const vertices = [...coarse.subarray(i, i + 3)];
+      const [a, b, c] = vertices.map((vertex) => new Vector3().fromArray(positions, 3 * vertex)) as [Vector3, Vector3, Vector3];
+      const face = b.sub(a).cross(c.sub(a));
+      const mean = new Vector3();
+      for (const vertex of vertices) mean.add(new Vector3().fromArray(normals, 3 * vertex).normalize());
+      if (face.dot(mean) < 0) turned += 1;
+    }
+    expect(turned).toBe(0);
   });
 });

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Vec3 } from '@/api/types';
-import { patientAxes, sideOf, slicePlane, toPatient } from '@/volume/geometry';
+import { patientAxes, placedAt, sideOf, slicePlacement, slicePlane, toPatient, type Placement } from '@/volume/geometry';
 
 const identity = [1, 0, 0, 0, 1, 0, 0, 0, 1];
 // Columns: x towards the right, y towards the front, z up, as NIfTI templates lie.
@@ -42,5 +42,53 @@ describe('geometry', () => {
   it('places samples in the patient', () => {
     const volume = { dims: [9, 9, 9] as Vec3, spacing: [2, 3, 4] as Vec3, origin: [10, 20, 30] as Vec3, direction: sagittal };
     expect(toPatient(volume, [1, 1, 1])).toEqual([14, 22, 27]);
+  });
+});
+
+describe('a slice on the screen', () => {
+  const room = { width: 200, height: 100, edge: 10 };
+  const volume = (direction: number[], spacing: [number, number, number] = [1, 1, 1]) => ({
+    dims: [40, 20, 10] as [number, number, number],
+    spacing,
+    origin: [0, 0, 0] as [number, number, number],
+    direction,
+  });
+  const placed = ([a, b, c, d, e, f]: Placement, u: number, v: number): [number, number] => [a * u + c * v + e, b * u + d * v + f];
+
+  it('is as large as the room allows, and lies in its middle', () => {
+    const straight = volume([1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    const placement = slicePlacement(straight, slicePlane(straight, 'axial'), room);
+    expect(placed(placement, 0, 0)).toEqual([20, 10]);
+    expect(placed(placement, 40, 20)).toEqual([180, 90]);
+    expect(placedAt(placement, 180, 10)).toEqual([40, 0]);
+  });
+
+  it('is turned over where the volume runs the other way', () => {
+    const turned = volume([-1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    const placement = slicePlacement(turned, slicePlane(turned, 'coronal'), room);
+    // x runs to the patient's right, which is on the left; z runs up.
+    expect(placed(placement, 0, 0)[0]).toBeGreaterThan(placed(placement, 40, 0)[0]);
+    expect(placed(placement, 0, 0)[1]).toBeGreaterThan(placed(placement, 0, 10)[1]);
+  });
+
+  it('leans as a tilted gantry does', () => {
+    const tilt = (18.5 * Math.PI) / 180;
+    // Slices lie across z, and each lies farther back than the one below it.
+    const tilted = volume([1, 0, 0, 0, 1, Math.sin(tilt), 0, 0, Math.cos(tilt)]);
+    const placement = slicePlacement(tilted, slicePlane(tilted, 'sagittal'), room);
+    const [x0, y0] = placed(placement, 0, 0);
+    const [x1, y1] = placed(placement, 0, 10);
+    expect((180 * Math.atan2(x1 - x0, y0 - y1)) / Math.PI).toBeCloseTo(18.5, 6);
+    const [x2, y2] = placed(placement, 20, 0);
+    expect(y2).toBeCloseTo(y0, 9);
+    // True proportions: ten samples along the tilted axis are half as long as twenty along the other.
+    expect(Math.hypot(x1 - x0, y1 - y0)).toBeCloseTo((x2 - x0) / 2, 9);
+    const [u, v] = placedAt(placement, ...placed(placement, 7, 3));
+    expect(u).toBeCloseTo(7, 9);
+    expect(v).toBeCloseTo(3, 9);
+    // The oblique axes of a scan that is not tilted stay at right angles.
+    const oblique = volume([0.8, 0.6, 0, -0.6, 0.8, 0, 0, 0, 1]);
+    const [a, b, c, d] = slicePlacement(oblique, slicePlane(oblique, 'axial'), room);
+    expect(a * c + b * d).toBe(0);
   });
 });

@@ -79,7 +79,7 @@ describe('GlbReader', () => {
     let found: unknown;
     const reader = new GlbReader({ onPrimitives: (parts) => (found = parts), onStream: () => undefined });
     reader.take(glb([[1]]));
-    expect(found).toEqual([{ offset: 0, length: 1, positionId: 7, triangles: 2, vertices: 4, low: [0, 0, 0], high: [1, 2, 3], part: null }]);
+    expect(found).toEqual([{ offset: 0, length: 1, positionId: 7, distanceId: null, isCoarse: false, triangles: 2, vertices: 4, low: [0, 0, 0], high: [1, 2, 3], part: null }]);
   });
 
   it('says whose surface a primitive is, and its colour as a screen has it', () => {
@@ -107,6 +107,43 @@ describe('GlbReader', () => {
     );
     const liver = { label: 7, colour: '#d86500' };
     expect(found.map(({ part }) => part)).toEqual([liver, liver, { label: -2, colour: '#ffffff' }]);
+  });
+
+  it('takes the coarsest level of detail, whose bytes come first, and the finest', () => {
+    let found: DracoPrimitive[] = [];
+    const order: number[] = [];
+    const reader = new GlbReader({ onPrimitives: (parts) => (found = parts), onStream: (index) => order.push(index) });
+    reader.take(
+      glb(three, (gltf) => {
+        const [mesh] = gltf.meshes as { primitives: unknown[] }[];
+        gltf.meshes = mesh?.primitives.map((primitive) => ({ primitives: [primitive] })).reverse();
+        gltf.materials = [{ pbrMetallicRoughness: { baseColorFactor: [0, 0, 0, 1] } }];
+        gltf.nodes = [
+          { mesh: 0, extras: { label: 3 }, extensions: { MSFT_lod: { ids: [1, 2] } } },
+          { mesh: 1 },
+          { mesh: 2 },
+        ];
+      }),
+    );
+    expect(found.map(({ length, isCoarse, part }) => [length, isCoarse, part?.label])).toEqual([
+      [1, false, 3],
+      [3, true, 3],
+    ]);
+    expect(order).toEqual([1, 0]);
+    expect(reader.isComplete).toBe(true);
+  });
+
+  it('says which attribute of a stream holds distances', () => {
+    let found: DracoPrimitive[] = [];
+    const reader = new GlbReader({ onPrimitives: (parts) => (found = parts), onStream: () => undefined });
+    reader.take(
+      glb(three, (gltf) => {
+        const [mesh] = gltf.meshes as { primitives: Record<string, { KHR_draco_mesh_compression: { attributes: object } }>[] }[];
+        const draco = mesh?.primitives[1]?.extensions?.KHR_draco_mesh_compression;
+        Object.assign(draco?.attributes ?? {}, { _DISTANCE_MM: 4 });
+      }),
+    );
+    expect(found.map(({ distanceId }) => distanceId)).toEqual([null, 4, null]);
   });
 
   it('is not complete while bytes are missing', () => {

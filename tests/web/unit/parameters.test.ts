@@ -131,6 +131,14 @@ describe('the kind of smoothing', () => {
     expect(isSameJob(laplacian, variantOf(laplacian, { passes: 0 }))).toBe(false);
   });
 
+  it('is kept by a variant of other parts', () => {
+    const place = { components: { keep: null, min_triangles: null, nearest_to: [[1, 2, 3] as [number, number, number]] } };
+    expect(jobRequest(variantOf({ ...taubin, components: { keep: 4, min_triangles: 9 } }, place))).toEqual({
+      ...jobRequest(taubin),
+      components: { nearest_to: [[1, 2, 3]] },
+    });
+  });
+
   it('decides which steps an address may hold', () => {
     const read = (query: string): JobParameters => parametersOfQuery(new URLSearchParams(query), defaults);
     expect(read('lambda=1&smoothing=taubin').lambda).toBe(null);

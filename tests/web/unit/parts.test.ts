@@ -3,11 +3,13 @@ import { Mesh, MeshPhongMaterial, Plane, Ray, Scene, Vector3, type BufferGeometr
 import { prepare, type Block } from '@/mesh/blocks';
 import { defaultStyle, Parts } from '@/scene/parts';
 import { wholeRay } from '@/scene/pick';
+import type { Waiting } from '@/scene/uploading';
 
-// A square across z at that height.
-function square(z: number): Block {
+// A square across z at that height; its distances are x + y.
+function square(z: number, hasDistances = false): Block {
   const positions = Float32Array.from([0, 0, z, 4, 0, z, 4, 4, z, 0, 4, z]);
-  return prepare({ positions, index: Uint32Array.from([0, 1, 2, 0, 2, 3]) });
+  const index = Uint32Array.from([0, 1, 2, 0, 2, 3]);
+  return prepare(hasDistances ? { positions, index, distances: Float32Array.from([0, 4, 8, 4]) } : { positions, index });
 }
 
 type Drawn = Mesh<BufferGeometry, MeshPhongMaterial>;
@@ -26,9 +28,12 @@ function sides(scene: Scene): Side[] {
 
 const up = new Ray(new Vector3(1, 2, -1), new Vector3(0, 0, 1));
 
+// Blocks are at the graphics processor as soon as they come.
+const atOnce = { add: ({ onThere }: Waiting): void => onThere() };
+
 function labelled(): { parts: Parts; scene: Scene } {
   const scene = new Scene();
-  const parts = new Parts(scene, () => undefined);
+  const parts = new Parts(scene, atOnce, () => undefined);
   parts.add([square(0)], { label: 1, colour: '#d02020' });
   parts.add([square(2), square(5)], { label: 2, colour: '#2040d0' });
   return { parts, scene };
@@ -37,7 +42,7 @@ function labelled(): { parts: Parts; scene: Scene } {
 describe('the parts of a surface', () => {
   it('are of one colour, and of no label, without labels', () => {
     const scene = new Scene();
-    const parts = new Parts(scene, () => undefined);
+    const parts = new Parts(scene, atOnce, () => undefined);
     parts.add([square(0), square(3)], null);
     expect(new Set(colours(scene)).size).toBe(1);
     expect(parts.triangles).toBe(4);
@@ -84,9 +89,63 @@ describe('the parts of a surface', () => {
     expect(drawn(scene).length).toBe(3);
   });
 
+  it('are not drawn before they are at the graphics processor', () => {
+    const scene = new Scene();
+    const waiting: Waiting[] = [];
+    const parts = new Parts(scene, { add: (one) => waiting.push(one) }, () => undefined);
+    parts.add([square(0), square(3)], null);
+    parts.setStyle({ ...defaultStyle, opacity: 0.5 });
+    expect(drawn(scene)).toEqual([]);
+    waiting[0]?.onThere();
+    expect(drawn(scene)).toHaveLength(1);
+    expect(waiting[0]?.geometries).toHaveLength(2);
+  });
+
+  it('are seen by their coarse level until all is there, and while they move', () => {
+    const scene = new Scene();
+    const parts = new Parts(scene, atOnce, () => undefined);
+    const heights = (): number[] => drawn(scene).map(({ geometry }) => geometry.getAttribute('position').array[2] ?? NaN);
+    parts.add([square(9)], null, true);
+    parts.add([square(1)], null);
+    expect([heights(), parts.triangles]).toEqual([[9], 2]);
+    expect(parts.hit(up, wholeRay)?.at).toBe(10);
+    parts.add([square(2)], null);
+    parts.finish();
+    expect([heights(), parts.triangles]).toEqual([[1, 2], 4]);
+    expect(parts.hit(up, wholeRay)?.at).toBe(2);
+    parts.setCoarse(true);
+    expect(heights()).toEqual([9]);
+    parts.setCoarse(false);
+    expect(heights()).toEqual([1, 2]);
+    expect([0, 1, 2, 3].map((number) => parts.joinSeams(number))).toEqual([true, true, true, false]);
+  });
+
+  it('stay as they are while another label has a coarse level', () => {
+    const { parts, scene } = labelled();
+    parts.add([square(9)], { label: 1, colour: '#d02020' }, true);
+    expect(colours(scene).sort()).toEqual(['2040d0', '2040d0', 'd02020']);
+    parts.finish();
+    parts.setCoarse(true);
+    expect(colours(scene).sort()).toEqual(['2040d0', '2040d0', 'd02020']);
+    parts.setHidden(new Set([1]));
+    expect(colours(scene)).toEqual(['2040d0', '2040d0']);
+  });
+
+  it('tell the distance where they are hit, and how far all reach', () => {
+    const parts = new Parts(new Scene(), atOnce, () => undefined);
+    parts.add([square(0)], null);
+    expect([parts.hit(up, wholeRay), parts.reach()]).toEqual([{ at: 1, label: null }, null]);
+    parts.add([square(-0.5, true)], null);
+    parts.add([square(9, true)], null, true);
+    parts.finish();
+    expect(parts.hit(up, wholeRay)).toMatchObject({ at: 0.5, label: null });
+    expect(parts.hit(up, wholeRay)?.distance).toBeCloseTo(3, 5);
+    expect(parts.reach()?.most).toBe(8);
+  });
+
   it('join their normals within a label and not across a wall that two share', () => {
     const scene = new Scene();
-    const parts = new Parts(scene, () => undefined);
+    const parts = new Parts(scene, atOnce, () => undefined);
     const front = square(0);
     const back = prepare({ positions: front.positions.slice(), index: Uint32Array.from([0, 2, 1, 0, 3, 2]) });
     parts.add([front], { label: 1, colour: '#d02020' });

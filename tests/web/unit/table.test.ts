@@ -25,6 +25,10 @@ function otherValue(parameter: Parameter): Value {
       return minimum + (maximum - minimum) / 4;
     case 'text':
       return 'text';
+    case 'numbers':
+      return [1, 0.25];
+    case 'places':
+      return parameter.name === 'crop' ? [[-1, -2, -3], [4, 5, 6.5]] : [[-1, -2.5, 3]];
     case 'labels':
     case 'by label':
       throw new Error(`${parameter.name} is not in the form`);

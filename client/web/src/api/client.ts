@@ -4,6 +4,7 @@ import { Signal } from '../ui/signal';
 import type { Axis, Estimate, Histogram, Job, JobList, JobRequest, Volume, VolumeLabels, VolumeList } from './types';
 
 const tokenKey = 'isomesh.token';
+const volumesPerPage = 60;
 
 // The token that requests carry; empty without one. It lives as long as the tab.
 export const token = new Signal<string>(sessionStorage.getItem(tokenKey) ?? '');
@@ -43,8 +44,11 @@ async function json<T>(path: string, init?: RequestInit): Promise<T> {
   return (await (await send(path, init)).json()) as T;
 }
 
-export async function listVolumes(): Promise<Volume[]> {
-  return (await json<VolumeList>('/v1/volumes')).volumes;
+// The newest first, in pages.
+export function listVolumes(cursor = '', signal?: AbortSignal): Promise<VolumeList> {
+  const query = new URLSearchParams({ order: 'newest', limit: String(volumesPerPage) });
+  if (cursor !== '') query.set('cursor', cursor);
+  return json(`/v1/volumes?${query.toString()}`, { signal });
 }
 
 export function getVolume(id: string): Promise<Volume> {
@@ -87,6 +91,17 @@ export async function slicePicture(
   const query = `axis=${axis}&index=${index}&window=${window[0]},${window[1]}`;
   const path = `/v1/volumes/${encodeURIComponent(id)}/slice.png?${query}`;
   return (await send(path, { signal })).blob();
+}
+
+// The volume, reduced to at most that many samples along each axis, as NRRD.
+export async function previewFile(
+  id: string,
+  size: number,
+  window: [number, number],
+  signal?: AbortSignal,
+): Promise<ArrayBuffer> {
+  const path = `/v1/volumes/${encodeURIComponent(id)}/preview?size=${size}&window=${window[0]},${window[1]}`;
+  return (await send(path, { signal })).arrayBuffer();
 }
 
 export function listJobs(cursor = ''): Promise<JobList> {

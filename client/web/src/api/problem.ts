@@ -12,6 +12,8 @@ export class ApiError extends Error {
     readonly faults: FieldFault[] = [],
     // What can be added to the request so that it is not refused again.
     readonly remedy: Remedy = {},
+    // Where a person finds what is missing.
+    readonly link: { href: string; text: string } | null = null,
   ) {
     super(detail || title);
     this.name = 'ApiError';
@@ -68,7 +70,7 @@ export function adviceFor(error: ApiError): string {
   if (error.remedy.overridable !== undefined || choicesOf(error).size > 0) return '';
   switch (error.status) {
     case 0:
-      return 'The page tries again by itself.';
+      return 'Try again when the connection is back.';
     case 401:
     case 403:
       return 'Enter a token that may do this.';
@@ -93,7 +95,7 @@ export function adviceFor(error: ApiError): string {
 
 // Whether the same request may be taken another time.
 export function mayPass({ status }: ApiError): boolean {
-  return ![400, 413, 415, 422].includes(status);
+  return ![400, 404, 410, 413, 415, 422].includes(status);
 }
 
 // The choices by their parameters: one of each can be taken.

@@ -17,6 +17,7 @@ export type Priority = Schemas['Priority'];
 export type JobRequest = Schemas['JobRequest'];
 export type Job = Schemas['Job'];
 export type JobList = Schemas['JobList'];
+export type JobChange = Schemas['AnyJobEvent'];
 // All of them, as a job has them; a request names only some.
 export type JobParameters = Job['parameters'];
 export type JobState = Schemas['JobState'];
@@ -25,6 +26,7 @@ export type MeshSummary = Schemas['MeshSummary'];
 export type LabelSummary = Schemas['LabelSummary'];
 export type VolumeLabels = Schemas['VolumeLabels'];
 export type VolumeLabel = Schemas['VolumeLabel'];
+export type DistanceSummary = Schemas['DistanceSummary'];
 export type MeshFile = Schemas['MeshFile'];
 export type Distribution = Schemas['Distribution'];
 export type QualityStages = Schemas['QualityStages'];

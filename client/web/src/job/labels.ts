@@ -2,7 +2,7 @@
 import type { Estimate, Job, LabelSummary } from '../api/types';
 import { Signal } from '../ui/signal';
 
-interface Named {
+export interface Named {
   label: number;
   name?: string | null;
 }

@@ -5,6 +5,7 @@ import {
   applies,
   asText,
   fits,
+  holdsAllLabels,
   isByLabels,
   isDefault,
   meshFormats,
@@ -36,9 +37,14 @@ export function changed(job: JobParameters, parameter: Parameter, value: Value):
     .reduce((result, dependent) => withValue(result, dependent, dependent.default ?? null), next);
 }
 
-// The same for several, one after the other.
+// The same for several, one after the other; of a group (components) for each of its members.
 export function variantOf(job: JobParameters, changes: Partial<JobParameters>): JobParameters {
-  return Object.entries(changes).reduce(
+  const each = Object.entries(changes).flatMap(([name, value]): [string, unknown][] =>
+    parameters.some((one) => one.name === name)
+      ? [[name, value]]
+      : Object.entries(value as object).map(([member, inner]) => [`${name}.${member}`, inner]),
+  );
+  return each.reduce(
     (result, [name, value]) => changed(result, parameterOf(name), value as Value),
     job,
   );
@@ -61,7 +67,13 @@ function fromJson(text: string): Value {
   }
 }
 
-function fromText({ kind, values }: Parameter, text: string): Value {
+// Each three numbers are one place.
+function placesFrom(text: string): number[][] {
+  const numbers = text.split(',').map(Number);
+  return Array.from({ length: Math.ceil(numbers.length / 3) }, (_, n) => numbers.slice(3 * n, 3 * n + 3));
+}
+
+export function fromText({ kind, values }: Parameter, text: string): Value {
   switch (kind) {
     case 'number':
     case 'integer':
@@ -76,6 +88,10 @@ function fromText({ kind, values }: Parameter, text: string): Value {
       return text;
     case 'labels':
       return text === 'all' ? text : text.split(',').map(Number);
+    case 'numbers':
+      return text.split(',').map(Number);
+    case 'places':
+      return placesFrom(text);
     case 'by label':
       return fromJson(text);
   }
@@ -142,13 +158,10 @@ export function isSameJob(a: JobParameters, b: JobParameters): boolean {
   return JSON.stringify(jobRequest(a)) === JSON.stringify(jobRequest(b));
 }
 
-// One file of these holds all labels; those of the others are in a ZIP.
-const wholeFormats: readonly MeshFormat[] = ['glb', 'ply', 'obj'];
-
 // The files that the job makes.
 export function filesOf({ labels, formats }: JobParameters): MeshFormat[] {
   if (labels === undefined) return [...formats];
-  const whole = formats.filter((format) => wholeFormats.includes(format));
+  const whole = formats.filter(holdsAllLabels);
   return whole.length < formats.length ? [...whole, 'zip'] : whole;
 }
 

@@ -1,7 +1,7 @@
 // How to do the same without the page.
 import type { JobParameters } from '../api/types';
 import { filesOf, jobRequest, toSay } from './parameters';
-import { asText, valueIn, type ByLabel, type Parameter } from './table';
+import { asText, valueIn, type ByLabel, type Parameter, type Places } from './table';
 
 function quoted(text: string): string {
   return /^[A-Za-z0-9_./:=,-]+$/.test(text) ? text : `'${text.replaceAll("'", `'\\''`)}'`;
@@ -24,6 +24,9 @@ function optionFor(parameter: Parameter, job: JobParameters): string {
   if (parameter.kind === 'by label') {
     const each = Object.entries(value as ByLabel);
     return each.map(([label, of]) => `--${parameter.option} ${quoted(`${label}=${String(of)}`)}`).join(' ');
+  }
+  if (parameter.kind === 'places' && parameter.name !== 'crop') {
+    return (value as Places).map((place) => `--${parameter.option} ${place.join(',')}`).join(' ');
   }
   return value === true ? `--${parameter.option}` : `--${parameter.option} ${quoted(asText(value))}`;
 }

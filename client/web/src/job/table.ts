@@ -1,23 +1,25 @@
 // The table of a job's parameters, which generate.mjs makes of proto/openapi.yaml. What the page keeps,
 // shows, sends and writes of a parameter follows from its row here.
-import { parameters as all } from '../../generated/parameters';
+import { parameters as all, wholeFormats } from '../../generated/parameters';
 import type { JobParameters, MeshFormat, Priority } from '../api/types';
 
 // By labels' values.
 export type ByLabel = Readonly<Record<string, string | readonly number[]>>;
-export type Value = string | number | boolean | readonly string[] | readonly number[] | ByLabel | null;
+// A place is x, y and z in millimetres, LPS.
+export type Places = readonly (readonly number[])[];
+export type Value = string | number | boolean | readonly string[] | readonly number[] | Places | ByLabel | null;
 
 // Empty for no value.
 export function asText(value: Value | undefined): string {
   if (value === undefined || value === null) return '';
   if (typeof value !== 'object') return String(value);
-  return Array.isArray(value) ? value.join(',') : JSON.stringify(value);
+  return Array.isArray(value) ? value.flat().join(',') : JSON.stringify(value);
 }
 
 export interface Parameter {
   // Where it stands in a job: passes, draco.speed.
   name: string;
-  kind: 'number' | 'integer' | 'switch' | 'choice' | 'choices' | 'text' | 'labels' | 'by label';
+  kind: 'number' | 'integer' | 'switch' | 'choice' | 'choices' | 'text' | 'labels' | 'by label' | 'numbers' | 'places';
   title: string;
   help: string;
   unit: string;
@@ -34,6 +36,10 @@ export interface Parameter {
   minimum?: number;
   above?: number;
   maximum?: number;
+  // Which jobs it is for: those at an iso-value, those by labels, or both; and its default in the latter
+  // where it is another one.
+  jobs: 'iso' | 'labels' | 'any';
+  byLabels?: number;
   // The parameter is only for jobs in which the other one has a value that is among the cases; what the
   // case says replaces what stands above.
   by?: { parameter: string; cases: Readonly<Record<string, { default?: number; maximum?: number }>> };
@@ -44,12 +50,6 @@ export interface Parameter {
 const forPrograms = ['callback.url'];
 
 export const parameters = all.filter(({ name }) => !forPrograms.includes(name));
-
-// A job goes by an iso-value or by labels; the daemon refuses what is for the other one.
-const forIso = ['iso', 'interpolation', 'components.keep', 'components.min_triangles'];
-const forLabels = ['labels', 'background', 'label_names', 'label_colors', 'label_values'];
-// What the daemon takes for labels where it takes something else for an iso-value.
-const labelDefaults: Readonly<Record<string, Value>> = { passes: 10 };
 
 export function isByLabels({ labels }: Partial<JobParameters>): boolean {
   return labels !== undefined;
@@ -96,7 +96,7 @@ export function withLabels(job: JobParameters, labels: JobParameters['labels']):
   const next = { ...job, labels };
   if (labels === undefined) delete next.labels;
   return parameters
-    .filter(({ name }) => name in labelDefaults)
+    .filter(({ byLabels }) => byLabels !== undefined)
     .filter((parameter) => valueIn(job, parameter) === defaultOf(parameter, job))
     .reduce((result, parameter) => withValue(result, parameter, defaultOf(parameter, next) ?? null), next);
 }
@@ -106,8 +106,8 @@ function caseOf({ by }: Parameter, job: JobParameters): { default?: number; maxi
 }
 
 // Whether the parameter is for jobs at an iso-value, or by labels, as this one is.
-export function isOfKind({ name }: Parameter, job: JobParameters): boolean {
-  return !(isByLabels(job) ? forIso : forLabels).includes(name);
+export function isOfKind({ jobs }: Parameter, job: JobParameters): boolean {
+  return jobs === 'any' || jobs === (isByLabels(job) ? 'labels' : 'iso');
 }
 
 // Whether the parameter is for such a job.
@@ -122,7 +122,7 @@ export function maximumOf(parameter: Parameter, job: JobParameters): number | un
 
 // What the daemon takes when such a job does not say it; null: no limit.
 export function defaultOf(parameter: Parameter, job: JobParameters): Value | undefined {
-  const forThese = isByLabels(job) ? labelDefaults[parameter.name] : undefined;
+  const forThese = isByLabels(job) ? parameter.byLabels : undefined;
   if (forThese !== undefined) return forThese;
   return caseOf(parameter, job)?.default ?? parameter.default;
 }
@@ -151,9 +151,17 @@ export function fits(parameter: Parameter, value: Value, job: JobParameters): bo
       return typeof value === 'string';
     case 'labels':
       return value === 'all' || areLabels(value);
+    case 'numbers':
+      return areNumbers(value) && value.length > 0 && value.every((one) => isWithin(parameter, one, job));
+    case 'places':
+      return Array.isArray(value) && value.length > 0 && value.every((one) => areNumbers(one) && one.length === 3);
     case 'by label':
       return typeof value === 'object' && Object.entries(value).every(([label, of]) => isOfLabel(label, of));
   }
+}
+
+function areNumbers(value: unknown): value is number[] {
+  return Array.isArray(value) && value.every(Number.isFinite);
 }
 
 function areLabels(value: unknown): boolean {
@@ -166,9 +174,17 @@ function isOfLabel(label: string, value: unknown): boolean {
 
 // Whether the daemon takes that value without being told.
 export function isDefault(parameter: Parameter, job: JobParameters): boolean {
-  const value = JSON.stringify(valueIn(job, parameter) ?? null);
-  const isOther = isByLabels(job) && parameter.name in labelDefaults;
+  const own = valueIn(job, parameter);
+  if (own === undefined || (own === null && parameter.default === undefined)) return true;
+  const value = JSON.stringify(own);
+  // Null leaves it to the daemon, whatever the job is.
+  const isOther = isByLabels(job) && parameter.byLabels !== undefined && parameter.default !== null;
   return [isOther ? undefined : parameter.default, defaultOf(parameter, job)].some(
     (standard) => standard !== undefined && JSON.stringify(standard) === value,
   );
+}
+
+// Whether one file of the format holds all labels; those of the others are in a ZIP.
+export function holdsAllLabels(format: MeshFormat): boolean {
+  return wholeFormats.includes(format);
 }

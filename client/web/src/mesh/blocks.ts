@@ -4,6 +4,8 @@
 export interface Triangles {
   positions: Float32Array<ArrayBuffer>;
   index: Uint32Array<ArrayBuffer>;
+  // Of each vertex, in millimetres; where the file has them.
+  distances?: Float32Array<ArrayBuffer>;
 }
 
 // A block as it is drawn. Transferable.
@@ -18,6 +20,7 @@ export interface Block {
   // normalisation.
   border: Uint16Array<ArrayBuffer>;
   borderNormals: Float32Array<ArrayBuffer>;
+  distances?: Float32Array<ArrayBuffer>;
 }
 
 const mostVertices = 65_535;
@@ -163,19 +166,41 @@ export function clustered(
     const b = heads[index[i + 1] as number] as number;
     const c = heads[index[i + 2] as number] as number;
     if (a === b || b === c || a === c) continue;
+    // What was turned over by that would be dark or, of a label, not be drawn at all.
+    const isOver = isTurned(positions, normals, 3 * a, 3 * b, 3 * c);
     kept[used] = a;
-    kept[used + 1] = b;
-    kept[used + 2] = c;
+    kept[used + 1] = isOver ? c : b;
+    kept[used + 2] = isOver ? b : c;
     used += 3;
   }
   return kept.slice(0, used);
 }
 
+// Whether the triangle faces away from where the normals of its vertices point.
+function isTurned(positions: Float32Array, normals: Float32Array, a: number, b: number, c: number): boolean {
+  const at = (vertex: number, axis: number): number => positions[vertex + axis] as number;
+  const normal = (axis: number): number => {
+    let sum = 0;
+    for (const vertex of [a, b, c]) {
+      const length = Math.hypot(normals[vertex] as number, normals[vertex + 1] as number, normals[vertex + 2] as number);
+      if (length > 0) sum += (normals[vertex + axis] as number) / length;
+    }
+    return sum;
+  };
+  const side = (axis: number): number => {
+    const [second, third] = [(axis + 1) % 3, (axis + 2) % 3];
+    return (
+      (at(b, second) - at(a, second)) * (at(c, third) - at(a, third)) -
+      (at(b, third) - at(a, third)) * (at(c, second) - at(a, second))
+    );
+  };
+  return side(0) * normal(0) + side(1) * normal(1) + side(2) * normal(2) < 0;
+}
+
 // Parts of consecutive triangles, each with the vertices that it names: few enough for 16-bit indices.
-export function split({ positions, index }: Triangles): Triangles[] {
-  if (index.length <= 3 * mostTriangles && positions.length <= 3 * mostVertices) {
-    return [{ positions, index }];
-  }
+export function split(whole: Triangles): Triangles[] {
+  const { positions, index, distances } = whole;
+  if (index.length <= 3 * mostTriangles && positions.length <= 3 * mostVertices) return [whole];
   const parts: Triangles[] = [];
   const newNumber = new Int32Array(positions.length / 3).fill(-1);
   const most = Math.floor(mostVertices / 3); // triangles that surely fit
@@ -205,6 +230,7 @@ export function split({ positions, index }: Triangles): Triangles[] {
       part.positions.set(positions.subarray(3 * vertex, 3 * vertex + 3), 3 * number);
       newNumber[vertex] = -1;
     });
+    if (distances) part.distances = Float32Array.from(names, (vertex) => distances[vertex] as number);
     parts.push(part);
     begin = end;
   }
@@ -226,5 +252,6 @@ export function prepare(triangles: Triangles): Block {
     normals: packedNormals(sums),
     border,
     borderNormals,
+    ...(triangles.distances && { distances: triangles.distances }),
   };
 }

@@ -1,5 +1,5 @@
 // Decodes Draco streams beside the page and makes blocks of them.
-import create, { type DracoModule } from 'three/examples/jsm/libs/draco/gltf/draco_wasm_wrapper.js';
+import create, { type DracoAttribute, type DracoModule } from 'three/examples/jsm/libs/draco/gltf/draco_wasm_wrapper.js';
 import wasmUrl from 'three/examples/jsm/libs/draco/gltf/draco_decoder.wasm?url';
 import { prepare, split, type Block, type Triangles } from './blocks';
 
@@ -8,6 +8,8 @@ export interface DecodeRequest {
   bytes: Uint8Array<ArrayBuffer>;
   // The position attribute's number in the stream; null: the stream's only one.
   positionId: number | null;
+  // The number of the attribute of distances; null: it has none.
+  distanceId: number | null;
 }
 
 export interface DecodeAnswer {
@@ -38,7 +40,7 @@ function copyOut<T>(draco: DracoModule, bytes: number, read: (pointer: number) =
   }
 }
 
-function decode(draco: DracoModule, { bytes, positionId }: DecodeRequest): Triangles {
+function decode(draco: DracoModule, { bytes, positionId, distanceId }: DecodeRequest): Triangles {
   const decoder = new draco.Decoder();
   const buffer = new draco.DecoderBuffer();
   const mesh = new draco.Mesh();
@@ -52,22 +54,20 @@ function decode(draco: DracoModule, { bytes, positionId }: DecodeRequest): Trian
         : decoder.GetAttributeByUniqueId(mesh, positionId);
     if (attribute.ptr === 0) throw new Error('Draco: the stream holds no positions');
     const corners = 3 * mesh.num_faces();
-    const coordinates = 3 * mesh.num_points();
+    const floatsOf = (one: DracoAttribute, count: number): Float32Array<ArrayBuffer> =>
+      copyOut(draco, 4 * count, (pointer) => {
+        decoder.GetAttributeDataArrayForAllPoints(mesh, one, draco.DT_FLOAT32, 4 * count, pointer);
+        return draco.HEAPF32.slice(pointer / 4, pointer / 4 + count);
+      });
     const index = copyOut(draco, 4 * corners, (pointer) => {
       decoder.GetTrianglesUInt32Array(mesh, 4 * corners, pointer);
       return draco.HEAPU32.slice(pointer / 4, pointer / 4 + corners);
     });
-    const positions = copyOut(draco, 4 * coordinates, (pointer) => {
-      decoder.GetAttributeDataArrayForAllPoints(
-        mesh,
-        attribute,
-        draco.DT_FLOAT32,
-        4 * coordinates,
-        pointer,
-      );
-      return draco.HEAPF32.slice(pointer / 4, pointer / 4 + coordinates);
-    });
-    return { positions, index };
+    const positions = floatsOf(attribute, 3 * mesh.num_points());
+    if (distanceId === null) return { positions, index };
+    const distance = decoder.GetAttributeByUniqueId(mesh, distanceId);
+    if (distance.ptr === 0) throw new Error('Draco: the stream holds no distances');
+    return { positions, index, distances: floatsOf(distance, mesh.num_points()) };
   } finally {
     draco.destroy(mesh);
     draco.destroy(buffer);

@@ -13,6 +13,10 @@ export interface DracoPrimitive {
   offset: number;
   length: number;
   positionId: number;
+  // Of the distances to the surface as it was extracted; null where the file has none.
+  distanceId: number | null;
+  // Of the coarsest level of detail, which stands for finer ones while these come, and while it moves.
+  isCoarse: boolean;
   triangles: number;
   vertices: number;
   low: [number, number, number];
@@ -38,7 +42,11 @@ interface Gltf {
       };
     }[];
   }[];
-  nodes?: { mesh?: number; extras?: { label?: unknown } | null }[];
+  nodes?: {
+    mesh?: number;
+    extras?: { label?: unknown } | null;
+    extensions?: { MSFT_lod?: { ids?: number[] } };
+  }[];
   materials?: { pbrMetallicRoughness?: { baseColorFactor?: number[] } }[];
   accessors?: { count: number; min?: number[]; max?: number[] }[];
   bufferViews?: { byteOffset?: number; byteLength: number }[];
@@ -59,22 +67,41 @@ function screenColour([red = 1, green = 1, blue = 1]: readonly number[]): string
   return `#${digits(red)}${digits(green)}${digits(blue)}`;
 }
 
-// The labels of meshes, by the meshes' numbers.
-function labelsOf({ nodes = [] }: Gltf): Map<number, number> {
-  const labels = new Map<number, number>();
-  for (const { mesh, extras } of nodes) {
-    const label = extras?.label;
-    if (mesh !== undefined && Number.isInteger(label)) labels.set(mesh, label as number);
-  }
-  return labels;
+// A mesh's place: whose it is, and its level of detail: 0 is the finest, of `levels`.
+interface Place {
+  label: number | undefined;
+  level: number;
+  levels: number;
 }
 
+// By the meshes' numbers.
+function placesOf({ nodes = [] }: Gltf): Map<number, Place> {
+  const places = new Map<number, Place>();
+  const put = (mesh: number | undefined, place: Place): void => {
+    if (mesh !== undefined) places.set(mesh, place);
+  };
+  const coarser = nodes.map(({ extensions }) => extensions?.MSFT_lod?.ids ?? []);
+  const areNamed = new Set(coarser.flat());
+  nodes.forEach(({ mesh, extras }, number) => {
+    if (areNamed.has(number)) return;
+    const label = Number.isInteger(extras?.label) ? (extras?.label as number) : undefined;
+    const ids = coarser[number] ?? [];
+    [mesh, ...ids.map((id) => nodes[id]?.mesh)].forEach((one, level) =>
+      put(one, { label, level, levels: ids.length + 1 }),
+    );
+  });
+  return places;
+}
+
+// Of the finest level of detail, and of the coarsest where there are several.
 export function primitivesOf(gltf: Gltf): DracoPrimitive[] {
-  const labels = labelsOf(gltf);
-  const primitives = (gltf.meshes ?? []).flatMap((mesh, number) =>
-    mesh.primitives.map((primitive) => ({ primitive, label: labels.get(number) })),
-  );
-  return primitives.map(({ primitive, label }) => {
+  const places = placesOf(gltf);
+  const primitives = (gltf.meshes ?? []).flatMap((mesh, number) => {
+    const { label, level, levels } = places.get(number) ?? { label: undefined, level: 0, levels: 1 };
+    if (level > 0 && level < levels - 1) return [];
+    return mesh.primitives.map((primitive) => ({ primitive, label, isCoarse: level > 0 }));
+  });
+  return primitives.map(({ primitive, label, isCoarse }) => {
     const material = gltf.materials?.[primitive.material ?? -1]?.pbrMetallicRoughness;
     const draco = primitive.extensions?.KHR_draco_mesh_compression;
     const view = draco && gltf.bufferViews?.[draco.bufferView];
@@ -88,6 +115,8 @@ export function primitivesOf(gltf: Gltf): DracoPrimitive[] {
       offset: view.byteOffset ?? 0,
       length: view.byteLength,
       positionId,
+      distanceId: draco?.attributes._DISTANCE_MM ?? null,
+      isCoarse,
       triangles: indices.count / 3,
       vertices: position.count,
       low: vector(position.min),

@@ -19,8 +19,8 @@ export interface LoadTiming {
 }
 
 export interface LoadListener {
-  // Of one label, or of the only surface.
-  onBlocks: (blocks: Block[], part: Part | null) => void;
+  // Of one label, or of the only surface; of the coarsest level of detail, or of the finest.
+  onBlocks: (blocks: Block[], part: Part | null, isCoarse: boolean) => void;
   onProgress: (progress: LoadProgress) => void;
 }
 
@@ -39,6 +39,25 @@ function wait(milliseconds: number): Promise<void> {
   return new Promise((resolve) => setTimeout(resolve, milliseconds));
 }
 
+// Waits until somebody answers again, however long that takes.
+function reconnected(signal: AbortSignal): Promise<void> {
+  return new Promise((resolve, reject) => {
+    if (connected.value) {
+      resolve();
+      return;
+    }
+    const stop = connected.subscribe((isConnected) => {
+      if (!isConnected) return;
+      stop();
+      resolve();
+    });
+    signal.addEventListener('abort', () => {
+      stop();
+      reject(new DOMException('Not wanted any more', 'AbortError'));
+    });
+  });
+}
+
 // Hands over the file's bytes in order. A connection that is lost is taken up where it broke.
 async function download(
   file: MeshFile,
@@ -48,6 +67,7 @@ async function download(
   let received = 0;
   let resumes = 0;
   while (received < file.bytes) {
+    const before = received;
     try {
       const range: Record<string, string> =
         received > 0 ? { Range: `bytes=${received}-`, 'If-Range': `"${file.sha256}"` } : {};
@@ -69,10 +89,11 @@ async function download(
     } catch (error) {
       if (signal.aborted) throw error;
       const failure = asApiError(error);
-      resumes += 1;
+      resumes = received > before ? 1 : resumes + 1;
       if (!failure.isUnreachable || resumes > mostResumes) throw failure;
       connected.value = false;
       await wait(resumeDelay * resumes);
+      await reconnected(signal);
     }
   }
 }
@@ -94,10 +115,11 @@ export async function loadMesh(
   const began = performance.now();
   const decoding: Promise<void>[] = [];
   const decode = (bytes: Uint8Array<ArrayBuffer>, primitive: DracoPrimitive | undefined): void => {
-    const done = decoders.decode(bytes, primitive?.positionId ?? null, signal).then((blocks) => {
+    const { positionId = null, distanceId = null, part = null, isCoarse = false } = primitive ?? {};
+    const done = decoders.decode(bytes, { positionId, distanceId }, signal).then((blocks) => {
       if (signal.aborted) return;
-      for (const block of blocks) progress.triangles += block.index.length / 3;
-      listener.onBlocks(blocks, primitive?.part ?? null);
+      if (!isCoarse) for (const block of blocks) progress.triangles += block.index.length / 3;
+      listener.onBlocks(blocks, part, isCoarse);
       listener.onProgress({ ...progress });
     });
     // Awaited with the others once all bytes are here. Without a handler until then, the browser would

@@ -18,11 +18,11 @@ class DecodePool {
 
   decode(
     bytes: Uint8Array<ArrayBuffer>,
-    positionId: number | null,
+    ids: Pick<DecodeRequest, 'positionId' | 'distanceId'>,
     signal: AbortSignal,
   ): Promise<Block[]> {
     return new Promise((resolve, reject) => {
-      const task: Task = { request: { id: this.nextId++, bytes, positionId }, resolve, reject };
+      const task: Task = { request: { id: this.nextId++, bytes, ...ids }, resolve, reject };
       signal.addEventListener('abort', () => {
         const place = this.waiting.indexOf(task);
         if (place >= 0) this.waiting.splice(place, 1);

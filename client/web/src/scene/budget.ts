@@ -10,17 +10,15 @@ export class FrameBudget {
   private later = 0;
   private lastEnd = 0;
 
-  // A frame's cost shows in when the browser is ready for the next one.
+  // A frame that began then is done.
   drawn(began: number, isMoving: boolean): void {
-    requestAnimationFrame(() => {
-      const now = performance.now();
-      const took = now - began;
-      this.cost = this.cost === 0 ? took : 0.6 * this.cost + 0.4 * took;
-      this.lastEnd = now;
-      if (!isMoving) return;
-      this.moving.push(took);
-      if (this.moving.length > keptFrames) this.moving.shift();
-    });
+    const now = performance.now();
+    const took = now - began;
+    this.cost = this.cost === 0 ? took : 0.6 * this.cost + 0.4 * took;
+    this.lastEnd = now;
+    if (!isMoving) return;
+    this.moving.push(took);
+    if (this.moving.length > keptFrames) this.moving.shift();
   }
 
   get isSlow(): boolean {

@@ -15,18 +15,13 @@ import {
   type Raycaster,
 } from 'three';
 import type { Axis, Volume } from '../api/types';
-import { axisDirection, axisIndex, toPatient } from '../volume/geometry';
+import { axisDirection, axisIndex, pictureAxes, toPatient } from '../volume/geometry';
 
 export interface CutPlace {
   axis: Axis;
   index: number;
   // Which side of the plane stays.
   flipped: boolean;
-}
-
-// The two axes of a slice's picture: its columns run along the first, its rows along the second.
-export function pictureAxes(axis: Axis): [0 | 1 | 2, 0 | 1 | 2] {
-  return axis === 'x' ? [1, 2] : axis === 'y' ? [0, 2] : [0, 1];
 }
 
 export class Cut {

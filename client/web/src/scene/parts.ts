@@ -9,24 +9,30 @@ import {
   MeshPhongMaterial,
   type Object3D,
   type Plane,
+  Vector3,
   type Ray,
 } from 'three';
 import type { Block } from '../mesh/blocks';
 import type { Part } from '../mesh/glb';
 import { Seams } from '../mesh/seams';
-import { firstHit, type Interval } from './pick';
+import { DistanceShader, reachOf, valueWithin, type Reach } from './distances';
+import { firstMet, type Interval } from './pick';
+import type { Uploading } from './uploading';
 
 export interface SurfaceStyle {
   shading: 'smooth' | 'flat';
   wireframe: boolean;
   opacity: number;
+  // Colours tell the vertices' distances, where the file has them.
+  distance: boolean;
 }
 
-export const defaultStyle: SurfaceStyle = { shading: 'smooth', wireframe: false, opacity: 1 };
+export const defaultStyle: SurfaceStyle = { shading: 'smooth', wireframe: false, opacity: 1, distance: false };
 
 export interface Hit {
   at: number; // along the ray
   label: number | null;
+  distance?: number; // where the surface has distances
 }
 
 interface Look {
@@ -34,6 +40,10 @@ interface Look {
   isShown: boolean;
   seams: Seams;
   blocks: number;
+  // Blocks of the coarsest level of detail, which stand for the others while these are still to come, and
+  // while it moves.
+  level: { seams: Seams; blocks: number };
+  showsDistance: boolean;
 }
 
 interface DrawnBlock {
@@ -43,7 +53,10 @@ interface DrawnBlock {
   coarse: BufferGeometry;
   look: Look;
   label: number | null;
-  member: number; // of its look's blocks
+  isLevel: boolean;
+  member: number; // of its look's blocks, or of their level's
+  distances: Float32Array | undefined;
+  isThere: boolean; // at the graphics processor
 }
 
 const neutral = '#dcd6c8';
@@ -74,22 +87,27 @@ export class Parts {
   private style = defaultStyle;
   private planes: Plane[] | null = null;
   private isCoarse = false;
+  private isWhole = false;
+  private readonly shader = new DistanceShader();
 
   constructor(
     private readonly scene: Object3D,
+    private readonly uploading: Pick<Uploading, 'add'>,
     private readonly draw: () => void,
   ) {}
 
-  add(blocks: Block[], part: Part | null): void {
+  add(blocks: Block[], part: Part | null, isLevel = false): void {
     const label = part?.label ?? null;
     const look = this.looks.get(label) ?? this.newLook(part);
     for (const block of blocks) {
       const position = new BufferAttribute(block.positions, 3);
       const normal = new BufferAttribute(block.normals, 4, true);
+      const distance = block.distances && new BufferAttribute(block.distances, 1);
       const geometry = (index: Uint16Array<ArrayBuffer>): BufferGeometry => {
         const made = new BufferGeometry();
         made.setAttribute('position', position);
         made.setAttribute('normal', normal);
+        if (distance) made.setAttribute('distanceMm', distance);
         made.setIndex(new BufferAttribute(index, 1));
         return made;
       };
@@ -98,21 +116,48 @@ export class Parts {
       fine.computeBoundingBox();
       fine.computeBoundingSphere();
       coarse.boundingSphere = fine.boundingSphere;
-      const meshes = look.materials.map((made) => new Mesh(this.isCoarse ? coarse : fine, made));
-      const drawn = { meshes, fine, coarse, look, label, member: look.blocks };
-      look.blocks += 1;
+      const meshes = look.materials.map((made) => new Mesh(this.isCoarse && !isLevel ? coarse : fine, made));
+      const owner = isLevel ? look.level : look;
+      const member = owner.blocks;
+      const drawn: DrawnBlock = { meshes, fine, coarse, look, label, isLevel, member, distances: block.distances, isThere: false };
+      this.uploading.add({
+        geometries: [fine, coarse],
+        onThere: () => {
+          drawn.isThere = true;
+          this.show(drawn);
+        },
+      });
+      owner.blocks += 1;
       for (const mesh of meshes) {
         mesh.matrixAutoUpdate = false;
         this.scene.add(mesh);
       }
       this.show(drawn);
       this.blocks.push(drawn);
-      look.seams.add(block);
+      owner.seams.add(block);
     }
+    if (isLevel) this.showAll();
+  }
+
+  // All of it has come.
+  finish(): void {
+    this.isWhole = true;
+    this.showAll();
+  }
+
+  // Null where the file has no distances.
+  reach(): Reach | null {
+    const finest = this.blocks.filter(({ isLevel }) => !isLevel);
+    return reachOf(finest.flatMap(({ distances }) => distances ?? []));
+  }
+
+  setDistanceTop(millimetres: number): void {
+    this.shader.setTop(millimetres);
   }
 
   get triangles(): number {
-    return this.blocks.reduce((sum, { fine }) => sum + (fine.index?.count ?? 0) / 3, 0);
+    const finest = this.blocks.filter(({ isLevel }) => !isLevel);
+    return finest.reduce((sum, { fine }) => sum + (fine.index?.count ?? 0) / 3, 0);
   }
 
   setStyle(style: SurfaceStyle): void {
@@ -147,28 +192,40 @@ export class Parts {
 
   setCoarse(isCoarse: boolean): void {
     this.isCoarse = isCoarse;
-    for (const { meshes, fine, coarse } of this.blocks) {
-      for (const mesh of meshes) mesh.geometry = isCoarse ? coarse : fine;
+    for (const { meshes, fine, coarse, isLevel } of this.blocks) {
+      for (const mesh of meshes) mesh.geometry = isCoarse && !isLevel ? coarse : fine;
     }
+    if ([...this.looks.values()].some(({ level }) => level.blocks > 0)) this.showAll();
   }
 
   // The first triangle of what is shown that the ray meets within the interval.
   hit(ray: Ray, { from, to }: Interval): Hit | null {
-    let nearest: Hit | null = null;
-    for (const { fine, look, label } of this.blocks) {
-      if (!look.isShown || !fine.index || !fine.boundingBox || !ray.intersectsBox(fine.boundingBox)) continue;
-      const end = nearest?.at ?? to;
-      const at = firstHit(fine.getAttribute('position').array, fine.index.array, ray, { from, to: end });
-      if (at < end) nearest = { at, label };
+    let end = to;
+    let nearest: { block: DrawnBlock; corner: number } | null = null;
+    for (const block of this.blocks) {
+      const { fine } = block;
+      if (!this.isSeen(block) || !fine.index || !fine.boundingBox || !ray.intersectsBox(fine.boundingBox)) continue;
+      const met = firstMet(fine.getAttribute('position').array, fine.index.array, ray, { from, to: end });
+      if (met.corner < 0) continue;
+      end = met.at;
+      nearest = { block, corner: met.corner };
     }
-    return nearest;
+    if (!nearest) return null;
+    const { block, corner } = nearest;
+    const { label, distances, fine } = block;
+    if (!distances) return { at: end, label };
+    const point = ray.at(end, new Vector3()).toArray();
+    const corners = [0, 1, 2].map((i) => fine.index?.array[corner + i] ?? 0) as [number, number, number];
+    const distance = valueWithin(distances, fine.getAttribute('position').array, corners, point);
+    return { at: end, label, distance };
   }
 
   // Makes the shading go on across the seams of one block; false when there is none of that number.
   joinSeams(number: number): boolean {
     const block = this.blocks[number];
     if (!block) return false;
-    block.look.seams.join(block.member);
+    const { look, isLevel, member } = block;
+    (isLevel ? look.level.seams : look.seams).join(member);
     block.fine.getAttribute('normal').needsUpdate = true;
     return true;
   }
@@ -179,6 +236,7 @@ export class Parts {
       coarse.dispose();
     }
     for (const { materials } of this.looks.values()) for (const made of materials) made.dispose();
+    this.shader.dispose();
   }
 
   private newLook(part: Part | null): Look {
@@ -188,20 +246,28 @@ export class Parts {
       isShown: !part || !this.hidden.has(part.label),
       seams: new Seams(),
       blocks: 0,
+      level: { seams: new Seams(), blocks: 0 },
+      showsDistance: false,
     };
     this.apply(look);
     this.looks.set(part?.label ?? null, look);
     return look;
   }
 
-  private apply({ materials }: Look): void {
-    const { shading, wireframe, opacity } = this.style;
+  private apply(look: Look): void {
+    const { materials } = look;
+    const { shading, wireframe, opacity, distance } = this.style;
+    if (distance !== look.showsDistance) {
+      look.showsDistance = distance;
+      for (const made of materials) this.shader.apply(made, distance);
+    }
     for (const made of materials) {
       // What of it is a part of the shader.
-      made.needsUpdate =
+      const isOther =
         made.flatShading !== (shading === 'flat') ||
         made.transparent !== opacity < 1 ||
         made.clippingPlanes !== this.planes;
+      if (isOther) made.needsUpdate = true;
       made.flatShading = shading === 'flat';
       made.wireframe = wireframe;
       made.opacity = opacity;
@@ -212,10 +278,17 @@ export class Parts {
   }
 
   // The back of a closed surface is only seen where it is cut or looked through.
-  private show({ meshes, look }: DrawnBlock): void {
-    const [front, back] = meshes;
-    if (front) front.visible = look.isShown;
-    if (back) back.visible = look.isShown && (this.planes !== null || this.style.opacity < 1 || this.style.wireframe);
+  private show(block: DrawnBlock): void {
+    const [front, back] = block.meshes;
+    const isSeen = this.isSeen(block);
+    if (front) front.visible = isSeen;
+    if (back) back.visible = isSeen && (this.planes !== null || this.style.opacity < 1 || this.style.wireframe);
+  }
+
+  // Of a look with a coarse level either that one is seen or the finest.
+  private isSeen({ look, isLevel, isThere }: DrawnBlock): boolean {
+    const isByLevel = look.level.blocks > 0 && (this.isCoarse || !this.isWhole);
+    return look.isShown && isThere && isLevel === isByLevel;
   }
 
   private showAll(): void {

@@ -20,17 +20,23 @@ export function keptBy(plane: Plane, { origin, direction }: Ray): Interval {
   return slope > 0 ? { from: Math.max(0, meets), to: Infinity } : { from: 0, to: meets };
 }
 
-// The place of the first triangle, seen from either side, that the ray meets within the interval; the
-// interval's end when there is none. Three coordinates a vertex, three vertices a triangle.
-export function firstHit(
+export interface Met {
+  at: number; // along the ray
+  corner: number; // the triangle's first, in the index; -1 for none
+}
+
+// The first triangle, seen from either side, that the ray meets within the interval; at the interval's
+// end when there is none. Three coordinates a vertex, three vertices a triangle.
+export function firstMet(
   positions: ArrayLike<number>,
   index: ArrayLike<number>,
   { origin, direction }: Ray,
   { from, to }: Interval,
-): number {
+): Met {
   const { x: ox, y: oy, z: oz } = origin;
   const { x: dx, y: dy, z: dz } = direction;
   let nearest = to;
+  let corner = -1;
   for (let i = 0; i + 2 < index.length; i += 3) {
     const a = 3 * (index[i] as number);
     const b = 3 * (index[i + 1] as number);
@@ -61,7 +67,10 @@ export function firstHit(
     const v = (dx * qx + dy * qy + dz * qz) / determinant;
     if (v < 0 || u + v > 1) continue;
     const at = (vx * qx + vy * qy + vz * qz) / determinant;
-    if (at >= from && at < nearest) nearest = at;
+    if (at >= from && at < nearest) {
+      nearest = at;
+      corner = i;
+    }
   }
-  return nearest;
+  return { at: nearest, corner };
 }

@@ -22,6 +22,10 @@ export function lengthOf({ from, to }: Ruler): number {
   return Math.hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
 }
 
+function labelOf(ruler: Ruler): string {
+  return `${lengthOf(ruler).toFixed(1)} mm`;
+}
+
 const mostRulers = 32;
 
 export class Rulers {
@@ -33,7 +37,11 @@ export class Rulers {
   private readonly labels = h('div', { class: 'ruler-labels', 'aria-hidden': 'true' });
   private readonly middle = new Vector3();
 
-  constructor(parent: Object3D, host: HTMLElement, colour: string) {
+  constructor(
+    parent: Object3D,
+    host: HTMLElement,
+    private readonly colour: string,
+  ) {
     const options = { color: colour, depthTest: false, transparent: true };
     this.lineMaterial = new LineBasicMaterial(options);
     this.pointMaterial = new PointsMaterial({ ...options, size: 7, sizeAttenuation: false });
@@ -84,16 +92,38 @@ export class Rulers {
   }
 
   placeLabels(camera: Camera, width: number, height: number): void {
-    this.rulers.forEach(({ from, to }, index) => {
+    this.rulers.forEach((ruler, index) => {
       const label = this.labels.children[index] as HTMLElement;
-      this.middle
-        .set((from[0] + to[0]) / 2, (from[1] + to[1]) / 2, (from[2] + to[2]) / 2)
-        .project(camera);
+      this.middleOf(ruler).project(camera);
       const x = ((this.middle.x + 1) / 2) * width;
       const y = ((1 - this.middle.y) / 2) * height;
       label.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -130%)`;
       label.hidden = this.middle.z > 1;
     });
+  }
+
+  // The same labels in a picture of that size, whose element of the page is `scale` pixels wide.
+  paintLabels(context: CanvasRenderingContext2D, camera: Camera, scale: number): void {
+    const { width, height } = context.canvas;
+    const size = 12 * scale;
+    context.font = `600 ${size}px system-ui, sans-serif`;
+    context.textAlign = 'center';
+    context.textBaseline = 'middle';
+    for (const ruler of this.rulers) {
+      const { x, y, z } = this.middleOf(ruler).project(camera);
+      if (z > 1) continue;
+      const text = labelOf(ruler);
+      const place = { x: ((x + 1) / 2) * width, y: ((1 - y) / 2) * height - 1.3 * size };
+      const wide = context.measureText(text).width + size;
+      context.fillStyle = this.colour;
+      context.fillRect(place.x - wide / 2, place.y - 0.75 * size, wide, 1.5 * size);
+      context.fillStyle = '#fff';
+      context.fillText(text, place.x, place.y);
+    }
+  }
+
+  private middleOf({ from, to }: Ruler): Vector3 {
+    return this.middle.set((from[0] + to[0]) / 2, (from[1] + to[1]) / 2, (from[2] + to[2]) / 2);
   }
 
   dispose(): void {
@@ -110,7 +140,7 @@ export class Rulers {
     this.geometry.setAttribute('position', new BufferAttribute(new Float32Array(places), 3));
     this.geometry.setDrawRange(0, places.length / 3);
     this.labels.replaceChildren(
-      ...this.rulers.map((ruler) => h('span', {}, `${lengthOf(ruler).toFixed(1)} mm`)),
+      ...this.rulers.map((ruler) => h('span', {}, labelOf(ruler))),
     );
   }
 }

@@ -17,20 +17,27 @@ import type { Part } from '../mesh/glb';
 import { OrientationCube } from './cube';
 import { Cut } from './cut';
 import { FrameBudget } from './budget';
+import type { Reach } from './distances';
+import { whenDrawn } from './fence';
 import { Parts, type SurfaceStyle } from './parts';
 import { keptBy, wholeRay } from './pick';
 import { Rulers } from './rulers';
+import { Uploading } from './uploading';
 import { onTap } from './tap';
 import { firstOffset, fitDistance, turned, viewOffsets, type CameraPlace, type ViewName } from './views';
 
 const verticalAngle = 30;
 const fill = 1.02;
 const settleDelay = 180;
+// The cosine of the angle between the view and the way into the cut below which the cut is not seen.
+const leastFacing = 0.25;
+const cutAngle = 0.9;
 
 // A point of the surface, and whose it is; null: of the only surface, or of the slice on the cut.
 export interface Picked {
   point: Vec3;
   label: number | null;
+  distance?: number; // of a surface that has distances, there
 }
 
 export class Surface {
@@ -47,7 +54,8 @@ export class Surface {
   private readonly camera = new PerspectiveCamera(verticalAngle, 1, 1, 1000);
   private readonly controls: OrbitControls;
   private readonly cube = new OrientationCube();
-  private readonly parts = new Parts(this.scene, () => this.draw());
+  private readonly uploading: Uploading;
+  private readonly parts: Parts;
   private readonly ray = new Raycaster();
   private readonly resizing: ResizeObserver;
   private bounds: [Vec3, Vec3] = [
@@ -59,9 +67,16 @@ export class Surface {
   private isMoving = false;
   private isCoarse = false;
   private isDisposed = false;
+  // While the graphics processor has something to do; and whether a frame waits for its end.
+  private isBusy = false;
+  private isWaiting = false;
+  // Blocks came that the last frame does not show.
+  private isStale = false;
 
   constructor(private readonly host: HTMLElement) {
     this.renderer = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' });
+    this.uploading = new Uploading(this.renderer);
+    this.parts = new Parts(this.scene, this.uploading, () => this.draw());
     this.renderer.localClippingEnabled = true;
     this.renderer.autoClear = false;
     this.canvas = this.renderer.domElement;
@@ -99,13 +114,35 @@ export class Surface {
     this.fit(firstOffset);
   }
 
-  addBlocks(blocks: Block[], part: Part | null): void {
-    this.parts.add(blocks, part);
-    this.budget.soon(() => this.draw());
+  addBlocks(blocks: Block[], part: Part | null, isCoarse = false): void {
+    this.parts.add(blocks, part, isCoarse);
+    delete this.host.dataset.still;
+    this.bring();
+  }
+
+  // Some blocks at a time, with a frame when drawing has left time for one.
+  private bring(): void {
+    if (this.uploading.isEmpty || this.isBusy || this.isDisposed) return;
+    this.isBusy = true;
+    this.isStale = true;
+    this.uploading.step(this.camera);
+    this.whenDone(() => this.budget.soon(() => this.draw()));
+  }
+
+  // What is drawn next waits until this is done.
+  private whenDone(then: () => void): void {
+    whenDrawn(this.renderer.getContext() as WebGL2RenderingContext, () => {
+      this.isBusy = false;
+      if (this.isDisposed) return;
+      then();
+      if (this.isWaiting) this.draw();
+      else this.bring();
+    });
   }
 
   // To be called once the last block has come: from then on the shading has no edges at the seams.
   finish(): void {
+    this.parts.finish();
     this.joinSeams(0);
   }
 
@@ -118,9 +155,41 @@ export class Surface {
     this.draw();
   }
 
+  // How far its vertices are from the surface as it was extracted; null where the file does not say.
+  reach(): Reach | null {
+    return this.parts.reach();
+  }
+
+  // The distance that has the last colour, in millimetres.
+  setDistanceTop(millimetres: number): void {
+    this.parts.setDistanceTop(millimetres);
+    this.draw();
+  }
+
+  // What is seen below a pointer; null where nothing is, and while it moves.
+  below({ clientX, clientY }: { clientX: number; clientY: number }): Picked | null {
+    const box = this.canvas.getBoundingClientRect();
+    const x = (2 * (clientX - box.left)) / box.width - 1;
+    return this.isMoving ? null : this.pickedAt(x, 1 - (2 * (clientY - box.top)) / box.height);
+  }
+
   setCut(isCut: boolean): void {
     this.parts.setCut(isCut ? [this.cut.plane] : null);
     this.draw();
+  }
+
+  // Turns the camera so that the cut is seen, where it is seen edge-on or from the side that stays.
+  faceCut(): void {
+    const { normal } = this.cut.plane;
+    const { offset, target } = this.place;
+    const away = new Vector3(...offset);
+    const distance = away.length();
+    const facing = -away.dot(normal) / distance;
+    if (facing >= leastFacing) return;
+    const aside = away.addScaledVector(normal, facing * distance);
+    if (aside.length() < 1e-3 * distance) aside.set(-normal.z, 0.1, normal.x).projectOnPlane(normal);
+    aside.setLength(distance * Math.sin(cutAngle)).addScaledVector(normal, -distance * Math.cos(cutAngle));
+    this.moveTo({ offset: [aside.x, aside.y, aside.z], target });
   }
 
   setHidden(labels: ReadonlySet<number>): void {
@@ -190,9 +259,12 @@ export class Surface {
   draw(): void {
     if (this.scheduled !== 0 || this.isDisposed) return;
     delete this.host.dataset.still;
+    this.isWaiting = this.isBusy;
+    if (this.isBusy) return;
     this.scheduled = requestAnimationFrame(() => {
       this.scheduled = 0;
-      this.render();
+      if (this.isBusy) this.isWaiting = true;
+      else this.render();
     });
   }
 
@@ -208,6 +280,7 @@ export class Surface {
     context.fillStyle = background;
     context.fillRect(0, 0, canvas.width, canvas.height);
     context.drawImage(this.canvas, 0, 0);
+    this.rulers.paintLabels(context, this.camera, canvas.width / Math.max(1, this.host.clientWidth));
     return new Promise((resolve, reject) => {
       canvas.toBlob((blob) => {
         if (blob) resolve(blob);
@@ -223,6 +296,7 @@ export class Surface {
     this.resizing.disconnect();
     this.controls.dispose();
     this.parts.dispose();
+    this.uploading.dispose();
     this.rulers.dispose();
     this.cut.dispose();
     this.cube.dispose();
@@ -239,6 +313,7 @@ export class Surface {
 
   private render(): void {
     if (this.isDisposed) return;
+    this.isStale = false;
     const began = performance.now();
     const { clientWidth: width, clientHeight: height } = this.host;
     this.renderer.setViewport(0, 0, width, height);
@@ -246,14 +321,18 @@ export class Surface {
     this.renderer.render(this.scene, this.camera);
     this.cube.render(this.renderer, this.camera, height);
     this.rulers.placeLabels(this.camera, width, height);
-    this.budget.drawn(began, this.isMoving);
-    if (this.isMoving && this.budget.isSlow) this.setCoarse(true);
-    this.noteStill();
+    this.isBusy = true;
+    this.whenDone(() => {
+      this.budget.drawn(began, this.isMoving);
+      if (this.isMoving && this.budget.isSlow) this.setCoarse(true);
+      this.noteStill();
+    });
   }
 
   // What is seen is all of it, and nothing is to be drawn any more.
   private noteStill(): void {
-    if (!this.isMoving && !this.isCoarse && this.scheduled === 0) this.host.dataset.still = '';
+    const isToDraw = this.scheduled !== 0 || this.isWaiting || this.isBusy || this.isStale || !this.uploading.isEmpty;
+    if (!this.isMoving && !this.isCoarse && !isToDraw) this.host.dataset.still = '';
   }
 
   private resize(): void {
@@ -346,6 +425,7 @@ export class Surface {
     const found = hit?.at ?? slice;
     if (found === Infinity) return null;
     const point = ray.at(found, new Vector3());
-    return { point: [point.x, point.y, point.z], label: hit?.label ?? null };
+    const picked: Picked = { point: [point.x, point.y, point.z], label: hit?.label ?? null };
+    return hit?.distance === undefined ? picked : { ...picked, distance: hit.distance };
   }
 }

@@ -127,5 +127,5 @@ export function checkbox(
 // True while a control takes what is typed, so that the keys are no shortcuts of the page.
 export function isTyping(event: KeyboardEvent): boolean {
   const target = event.target as HTMLElement | null;
-  return target?.closest('input:not([type=checkbox]):not([type=radio]), textarea, select, dialog') != null;
+  return target?.closest('input:not([type=checkbox]):not([type=radio]):not([type=range]):not([type=color]), textarea, select, dialog') != null;
 }

@@ -75,6 +75,7 @@ export const formatNames: Record<string, string> = {
   stl: 'STL',
   ply: 'PLY',
   obj: 'OBJ',
+  '3mf': '3MF',
   zip: 'ZIP of labels',
   nifti: 'NIfTI',
   nrrd: 'NRRD',

@@ -10,8 +10,8 @@ export function mountNotices(parent: HTMLElement): void {
   parent.append(stack);
 }
 
-export function tell(text: string): void {
-  const toast = h('div', { class: 'toast' }, text);
+export function tell(content: Child): void {
+  const toast = h('div', { class: 'toast' }, content);
   stack.append(toast);
   setTimeout(() => toast.remove(), shownFor);
 }
@@ -32,7 +32,15 @@ export function tellError(error: unknown): void {
 
 // A refusal with what is at fault and what to do next.
 export function refusal(error: ApiError, ...actions: Child[]): HTMLElement {
-  const advice = adviceFor(error);
+  return refusalWith(error, adviceFor(error), actions);
+}
+
+// Of what the page tries again by itself.
+export function pendingRefusal(error: ApiError, ...actions: Child[]): HTMLElement {
+  return refusalWith(error, error.isUnreachable ? 'The page tries again by itself.' : adviceFor(error), actions);
+}
+
+function refusalWith(error: ApiError, advice: string, actions: readonly Child[]): HTMLElement {
   const faults = error.faults.filter(({ message }) => !error.detail.includes(message));
   return h(
     'div',

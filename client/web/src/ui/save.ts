@@ -9,9 +9,13 @@ export function saveBlob(blob: Blob, name: string): void {
   setTimeout(() => URL.revokeObjectURL(url), 60_000);
 }
 
-// A link cannot carry a token, so that then the page fetches the file itself.
-export async function saveFile(href: string, name: string): Promise<void> {
-  if (token.value !== '') {
+// What is larger a browser writes to the disk itself, under the name that the daemon gives it.
+const mostInMemory = 250_000_000;
+
+// Under that name. A link cannot carry a token, and browsers take the name that the daemon says before that of a
+// link, so that the page fetches the file itself.
+export async function saveFile(href: string, name: string, bytes: number): Promise<void> {
+  if (token.value !== '' || bytes <= mostInMemory) {
     saveBlob(await (await send(href)).blob(), name);
     return;
   }

@@ -1,5 +1,9 @@
 import { token, unauthorized } from '../api/client';
 import { button, field, h } from './dom';
+import { Signal } from './signal';
+
+// Whether the dialog was closed without a token.
+const isDeclined = new Signal<boolean>(false);
 
 // Asks for a token whenever the daemon refuses for want of one.
 export function watchToken(onToken: () => void): void {
@@ -29,30 +33,52 @@ export function watchToken(onToken: () => void): void {
       if (value === '') return;
       token.value = value;
       unauthorized.value = false;
+      isDeclined.value = false;
       dialog = null;
       made.close();
-      made.remove();
       onToken();
     });
-    made.addEventListener('cancel', (event) => event.preventDefault());
+    // Who closes it without a token is not asked by what the page does on its own, but in the next view, or by the
+    // button in the bar.
+    made.addEventListener('close', () => {
+      made.remove();
+      if (dialog !== made) return;
+      dialog = null;
+      unauthorized.value = false;
+      isDeclined.value = true;
+    });
     document.body.append(made);
     made.showModal();
     input.focus();
   };
   unauthorized.watch((isWanted) => {
-    if (isWanted) open();
+    if (!isWanted) return;
+    if (isDeclined.value) unauthorized.value = false;
+    else open();
   });
+  window.addEventListener('hashchange', () => (isDeclined.value = false));
 }
 
-// For the bar at the top: to forget the token.
-export function tokenButton(): HTMLElement {
-  const element = button('Forget token', () => {
-    token.value = '';
-    window.location.reload();
-  });
-  element.classList.add('quiet');
+// For the bar at the top: to forget the token, or to enter one after all.
+export function tokenButtons(): HTMLElement[] {
+  const forget = button(
+    'Forget token',
+    () => {
+      token.value = '';
+      window.location.reload();
+    },
+    { class: 'quiet' },
+  );
+  const ask = (): void => {
+    isDeclined.value = false;
+    unauthorized.value = true;
+  };
+  const enter = button('Enter a token', ask, { class: 'primary' });
   token.watch((value) => {
-    element.hidden = value === '';
+    forget.hidden = value === '';
   });
-  return element;
+  isDeclined.watch((isOn) => {
+    enter.hidden = !isOn;
+  });
+  return [enter, forget];
 }

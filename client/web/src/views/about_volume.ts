@@ -28,7 +28,7 @@ function notesOf({ notes }: Volume): HTMLElement | null {
 }
 
 // The volume's name, which a person can change.
-function nameHeading(volume: Volume): HTMLElement {
+function nameHeading(volume: Volume, onRenamed: () => void): HTMLElement {
   const text = h('span', {}, volumeName(volume));
   const rename = async (): Promise<void> => {
     const name = await askText('Name of this volume', volume.name ?? '', 'Rename');
@@ -36,6 +36,7 @@ function nameHeading(volume: Volume): HTMLElement {
     try {
       volume.name = (await renameVolume(volume.id, name === '' ? null : name)).name;
       text.textContent = volumeName(volume);
+      onRenamed();
     } catch (error) {
       tellError(error);
     }
@@ -58,18 +59,30 @@ function factsOf(volume: Volume): string {
 // How to move in slices.
 export function sliceHelp(): HTMLElement {
   return h(
-    'ul',
-    {},
-    h('li', {}, h('b', {}, 'Drag'), ' in a slice: window and level'),
+    'details',
+    { class: 'more slice-help' },
+    h('summary', {}, 'How to move in the slices'),
+    h(
+      'ul',
+      {},
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Drag'), ' in a slice: window and level'),
+    h('li', { class: 'by-touch' }, h('b', {}, 'Drag to the side'), ' in a slice: window and level; up and down scrolls'),
     h('li', { class: 'by-mouse' }, h('b', {}, 'Wheel'), ' or arrow keys: next slice'),
     h('li', { class: 'by-mouse' }, h('b', {}, 'Click'), ': the other slices go there'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Double click'), ' or i: the value there becomes the iso-value'),
     h('li', { class: 'by-touch' }, h('b', {}, 'Slider'), ' below it: next slice'),
     h('li', { class: 'by-touch' }, h('b', {}, 'Tap'), ': the other slices go there'),
     h('li', {}, h('b', {}, 'Line in the histogram'), ': the iso-value', h('span', { class: 'by-mouse' }, '; arrow keys move it too')),
+    ),
   );
 }
 
-// Its name, what it is, and what was noted when it was read.
-export function aboutVolume(volume: Volume): (HTMLElement | null)[] {
-  return [nameHeading(volume), h('p', { class: 'facts' }, factsOf(volume)), notesOf(volume), ignoredNote(volume)];
+// Its name and what it is.
+export function aboutVolume(volume: Volume, onRenamed: () => void): HTMLElement {
+  return h('header', { class: 'about' }, nameHeading(volume, onRenamed), h('p', { class: 'facts' }, factsOf(volume)));
+}
+
+// What was noted when it was read.
+export function notedOf(volume: Volume): (HTMLElement | null)[] {
+  return [notesOf(volume), ignoredNote(volume)];
 }

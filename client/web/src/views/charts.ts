@@ -12,11 +12,13 @@ export interface Step {
   duration: number;
 }
 
-const order = ['queue', 'load', 'extract', 'smooth', 'encode'];
+const order = ['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify'];
+// Left out where they took no time: few jobs have them.
+const seldom = ['simplify', 'certify'];
 
 // The stages one after the other; members that this page does not know come at the end.
 export function stepsOf(timing: Durations, more: Durations = {}): Step[] {
-  const known = order.filter((name) => name in timing);
+  const known = order.filter((name) => name in timing && (!seldom.includes(name) || timing[name] !== 0));
   const others = Object.keys(timing).filter((name) => !order.includes(name) && name !== 'total');
   let begin = 0;
   return [

@@ -24,10 +24,13 @@ function numbersOf(job: Job): HTMLElement {
   const { extracted, smoothed } = mesh.volume_mm3;
   const percent = extracted === 0 ? 0 : (100 * (smoothed - extracted)) / Math.abs(extracted);
   const work = job.timing.total - job.timing.queue;
-  const rows: [string, string][] = [
-    ['Triangles', formatCount(mesh.triangles)],
+  const volume: [string, string][] = [
     ['Volume', `${formatValue(smoothed)} mm\u00b3`],
     ['by smoothing', `${percent > 0 ? '+' : ''}${formatNumber(percent, 2)} %`],
+  ];
+  const rows: [string, string][] = [
+    ['Triangles', formatCount(mesh.triangles)],
+    ...(mesh.quality.encloses_volume ? volume : [['Volume', 'none: open'] as [string, string]]),
     // An equal job's files were there already.
     ['Time', work < 1 ? 'was made before' : formatMilliseconds(work)],
     ['Mean smallest angle', `${formatNumber(mesh.quality.smallest_angle_deg.smoothed.mean, 1)}\u00b0`],
@@ -43,7 +46,8 @@ async function finished(id: string, scope: Scope, onChange: (job: Job) => void):
 export async function compareView(scope: Scope, route: Route): Promise<HTMLElement> {
   const ids = (route.query.get('jobs') ?? '').split(',').filter(Boolean).slice(0, most);
   if (ids.length < 2) {
-    throw new ApiError(-1, 'Nothing to compare', 'Choose two to four jobs in the list of jobs.');
+    const link = { href: hashOf(['jobs']), text: 'To the list of jobs' };
+    throw new ApiError(-1, 'Nothing to compare', 'Choose two to four jobs in the list of jobs.', [], {}, link);
   }
   const jobs = await Promise.all(ids.map((id) => getJob(id)));
   const [first] = jobs;
@@ -98,7 +102,7 @@ class Comparison {
     const cells = jobs.map((job, place) => this.cellFor(job, titles[place] ?? ''));
     this.element = h(
       'div',
-      { class: 'compare', 'data-count': cells.length },
+      { class: 'compare', 'data-count': cells.length, 'data-title': `Compare ${titles.join(', ')}` },
       this.head(volume && isOneVolume ? `Compare, ${volumeName(volume)}` : 'Compare'),
       h('div', { class: 'grid' }, ...cells),
     );

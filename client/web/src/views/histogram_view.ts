@@ -74,6 +74,11 @@ export class HistogramView {
     this.listen();
   }
 
+  // The values that are shown.
+  get shown(): Window {
+    return [this.low, this.high];
+  }
+
   show(iso: number, window: Window): void {
     this.iso = iso;
     const x = Math.max(0, Math.min(width, this.toX(iso)));

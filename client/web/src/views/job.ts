@@ -3,6 +3,7 @@ import { cancelJob, getJob, getVolume } from '../api/client';
 import { follow } from '../api/follow';
 import { asApiError, errorOfProblem } from '../api/problem';
 import { isFinal, type Job, type JobParameters, type Volume } from '../api/types';
+import { emptyReason } from '../job/empty';
 import { LabelState, labelsOfMesh } from '../job/labels';
 import { inWords, surfaceInWords } from '../job/parameters';
 import { placeOfText, placeToText } from '../scene/views';
@@ -12,12 +13,18 @@ import { refusal, tellError } from '../ui/notices';
 import { noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { volumeName } from '../volume/names';
-import { againSection, changeLink, compareSection, downloads, numbers, quality, section, timings } from './job_panel';
+import { accuracy, againSection, changeLink, compareSection, downloads, numbers, quality, section, timings } from './job_panel';
 import { LabelList } from './label_list';
 import { SurfacePane } from './surface_pane';
 
-const stages = ['queue', 'load', 'extract', 'smooth', 'encode'];
+const stages = ['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify'];
 const noteDelay = 300;
+
+// Those that such a job goes through.
+function stagesOf({ parameters }: Job): string[] {
+  const isSimplified = (parameters.max_error_mm ?? parameters.triangles ?? null) !== null;
+  return stages.filter((name) => (name !== 'simplify' || isSimplified) && (name !== 'certify' || parameters.certify));
+}
 
 // The volume may be gone while its surface is still there.
 async function volumeOf(job: Job): Promise<Volume | null> {
@@ -57,15 +64,15 @@ class ProgressPanel {
   private readonly text = h('p', { role: 'status', class: 'progress-text' });
   private readonly steps = new Map<string, HTMLElement>();
 
-  constructor(id: string) {
+  constructor(job: Job) {
     const cancel = button('Cancel', () => {
       cancel.disabled = true;
-      cancelJob(id).catch((error: unknown) => {
+      cancelJob(job.id).catch((error: unknown) => {
         cancel.disabled = false;
         tellError(error);
       });
     });
-    for (const name of stages) this.steps.set(name, h('li', {}, name));
+    for (const name of stagesOf(job)) this.steps.set(name, h('li', {}, name));
     this.element = h(
       'section',
       { class: 'panel-section progress-panel' },
@@ -103,8 +110,17 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
   const panel = h('aside', { class: 'panel', 'aria-label': 'The job' });
   const element = h('div', { class: 'job', 'data-state': first.state }, stageArea, panel);
 
+  // A tab in the background says how far its job is.
+  const name = [titleOf(first.parameters), volume && volumeName(volume)].filter(Boolean).join(', ');
+  const nameTab = (job: Job): void => {
+    const far = job.state === 'succeeded' ? '' : job.state === 'running' ? `${Math.round(100 * job.progress)} %: ` : `${job.state}: `;
+    element.dataset.title = far + name;
+  };
+  nameTab(first);
+
   const showEnd = (job: Job): void => {
     element.dataset.state = job.state;
+    nameTab(job);
     if (job.state === 'succeeded' && job.mesh) showSurface(scope, route, job, volume, stageArea, panel);
     else showFailure(job, volume, stageArea, panel);
   };
@@ -113,12 +129,13 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
     return element;
   }
 
-  const progress = new ProgressPanel(first.id);
+  const progress = new ProgressPanel(first);
   progress.show(first);
   stageArea.append(h('div', { class: 'waiting' }, h('p', {}, 'The surface appears here when it is made.')));
   panel.append(head(first, volume), progress.element);
   follow(first.id, scope.signal, (job) => {
     element.dataset.state = job.state;
+    nameTab(job);
     progress.show(job);
   }).then(
     (job) => {
@@ -163,11 +180,12 @@ function showSurface(
   const times = timings(job);
   panel.replaceChildren(
     head(job, volume),
-    ...(labels.labels.length > 0 ? [new LabelList(scope, job, labels).element] : []),
-    section('Numbers', numbers(mesh)),
+    ...(labels.labels.length > 0 ? [new LabelList(scope, job, labels, volume).element] : []),
+    section('Numbers', mesh.empty ? h('p', { class: 'warning' }, emptyReason(job, volume)) : numbers(job, mesh)),
+    accuracy(job) ?? '',
     times,
-    downloads(job),
-    quality(mesh),
+    downloads(job, volume),
+    ...(mesh.empty ? [] : [quality(mesh)]),
     compareSection(job),
     againSection(job),
   );

@@ -1,7 +1,7 @@
 // What stands beside a surface: its numbers, timings, files, and how to make others.
 import { submitJob, token } from '../api/client';
-import type { Job, JobParameters, MeshFormat, MeshSummary } from '../api/types';
-import { defaultParameters, isSameJob, jobRequest, queryOfParameters, variantOf, withGlb } from '../job/parameters';
+import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../api/types';
+import { defaultParameters, isSameJob, jobRequest, queryOfParameters, surfaceInWords, variantOf, withGlb } from '../job/parameters';
 import { commandSnippet, curlSnippet, librarySnippet } from '../job/snippets';
 import { meshFormats } from '../job/table';
 import { button, h, type Child } from '../ui/dom';
@@ -9,6 +9,8 @@ import { formatBytes, formatCount, formatNames, formatNumber, formatValue, short
 import { tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import { saveFile } from '../ui/save';
+import { fileStem } from '../volume/names';
+import { certificateBody, intersectionsText, openText } from './certificate';
 import { distributionChart, stepsOf, waterfall, type Durations } from './charts';
 
 export function section(title: string, ...children: Child[]): HTMLElement {
@@ -30,23 +32,44 @@ function sized(value: number, unit: string): string {
   return `${formatValue(value)} ${unit}`;
 }
 
-export function numbers(mesh: MeshSummary): HTMLElement {
+// Starts a job with these changes and goes to it.
+export function makeVariant(job: Job): (variant: Partial<JobParameters>) => void {
+  return (variant) =>
+    void submitVariant(job, variant).then(({ id }) => {
+      tell('Another job was started.');
+      go(['jobs', id]);
+    }, tellError);
+}
+
+function trianglesText({ triangles, simplified }: MeshSummary): Child {
+  if (!simplified) return formatCount(triangles);
+  const bound = { error: 'the error allows no fewer', triangles: 'as few as were asked for' }[simplified.bound_by];
+  return h(
+    'span',
+    { title: `Simplified until ${bound}` },
+    formatCount(triangles),
+    h('span', { class: 'faint' }, ` simplified from ${formatCount(simplified.triangles_before)}; ${bound}`),
+  );
+}
+
+function volumeText({ volume_mm3: { extracted, smoothed } }: MeshSummary): Child {
+  return h(
+    'span',
+    {},
+    sized(smoothed, 'mm\u00b3'),
+    h('span', { class: 'faint' }, `${change(extracted, smoothed)} was ${sized(extracted, 'mm\u00b3')}`),
+  );
+}
+
+export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
   const [low, high] = mesh.bounds;
   const extent = low.map((value, axis) => formatNumber((high[axis as 0] ?? 0) - value, 1)).join(' \u00d7 ');
-  const { extracted, smoothed } = mesh.volume_mm3;
   const { mean, max } = mesh.displacement_mm;
   const rows: [string, Child][] = [
-    ['Triangles', formatCount(mesh.triangles)],
+    ['Iso-value', mesh.iso === undefined ? '' : `${formatValue(mesh.iso)}${job.parameters.iso === 'otsu' ? ', by Otsu' : ''}`],
+    ['Triangles', trianglesText(mesh)],
     ['Vertices', formatCount(mesh.vertices)],
-    [
-      'Volume',
-      h(
-        'span',
-        {},
-        sized(smoothed, 'mm\u00b3'),
-        h('span', { class: 'faint' }, `${change(extracted, smoothed)} was ${sized(extracted, 'mm\u00b3')}`),
-      ),
-    ],
+    ['Volume', mesh.quality.encloses_volume ? volumeText(mesh) : openText(job, makeVariant(job))],
     [
       'Area',
       h(
@@ -69,6 +92,7 @@ export function numbers(mesh: MeshSummary): HTMLElement {
     ['Parts', formatCount(mesh.components)],
     ['Genus', mesh.quality.genus === null ? '' : formatCount(mesh.quality.genus)],
     ['Extent', `${extent} mm`],
+    ['Run through themselves', intersectionsText(mesh)],
     ['Moved by smoothing', `mean ${formatNumber(mean, 3)}, most ${formatNumber(max, 3)} mm`],
   ];
   if (mesh.dropped.components > 0) {
@@ -94,6 +118,18 @@ export function quality(mesh: MeshSummary): HTMLElement {
   );
 }
 
+// Null where the job's error was not measured.
+export function accuracy(job: Job): HTMLElement | null {
+  const body = certificateBody(job);
+  if (!body) return null;
+  const { distances, formats } = job.parameters;
+  if (!distances) {
+    const colour = (): void => makeVariant(job)({ distances: true, formats: withGlb(formats) });
+    body.append(button('Show it as colour', colour, { title: 'Starts a job whose GLB holds the distances' }));
+  }
+  return section('Distance from the scan', body);
+}
+
 export function timings(job: Job, more: Durations = {}): HTMLElement {
   return section('Time', waterfall(stepsOf(job.timing, more)));
 }
@@ -103,9 +139,15 @@ export async function submitVariant(job: Job, variant: Partial<JobParameters>): 
   return submitJob(jobRequest(variantOf(job.parameters, variant)));
 }
 
-export function downloads(job: Job): HTMLElement {
+// Of the surface, with what it is of: head-iso-60.glb.
+export function fileNameOf(job: Job, volume: Volume | null, suffix: string): string {
+  const surface = surfaceInWords(job.parameters).replaceAll(' ', '-');
+  return `${fileStem(volume, `surface-${shortId(job.id)}`)}-${surface}${suffix}`;
+}
+
+export function downloads(job: Job, volume: Volume | null): HTMLElement {
   const files = job.mesh?.files ?? {};
-  const name = (format: string): string => `surface-${shortId(job.id)}.${format}`;
+  const name = (format: string): string => fileNameOf(job, volume, `.${format}`);
   const missing = meshFormats.filter((format) => !job.parameters.formats.includes(format));
   const make = async (format: MeshFormat): Promise<void> => {
     try {
@@ -127,7 +169,7 @@ export function downloads(job: Job): HTMLElement {
           ? [
               button(
                 h('span', {}, h('b', {}, formatNames[format] ?? format), ` ${formatBytes(file.bytes)}`),
-                () => void saveFile(file.href, name(format)).catch(tellError),
+                () => void saveFile(file.href, name(format), file.bytes).catch(tellError),
                 { 'data-format': format },
               ),
             ]

@@ -2,16 +2,14 @@
 import { labelsOf } from '../api/client';
 import { asApiError } from '../api/problem';
 import type { JobParameters, VolumeLabel } from '../api/types';
-import { labelTitle, matching } from '../job/labels';
+import { labelTitle } from '../job/labels';
 import { button, checkbox, field, h } from '../ui/dom';
 import { formatCount } from '../ui/format';
 import { refusal } from '../ui/notices';
 import type { Scope } from '../ui/signal';
+import { LabelSearch } from './label_search';
 
 export type Choice = Pick<JobParameters, 'labels' | 'background'>;
-
-// More rows than these a person searches.
-const mostRows = 500;
 
 interface Box {
   element: HTMLElement;
@@ -29,9 +27,7 @@ export class LabelChoice {
   private readonly chosen = new Set<number>();
   private readonly boxes = new Map<number, Box>();
   private triangles: ReadonlyMap<number, number> = new Map();
-  private readonly list = h('ul', { class: 'labels', 'aria-label': 'Labels' });
-  private readonly count = h('p', { class: 'hint', role: 'status' });
-  private text = '';
+  private search: LabelSearch<VolumeLabel> | null = null;
 
   // Tells no labels while none is chosen.
   constructor(
@@ -61,6 +57,7 @@ export class LabelChoice {
     this.labels = [];
     this.chosen.clear();
     this.boxes.clear();
+    this.search = null;
     labelsOf(this.volume, this.background, asking.signal).then(
       ({ labels }) => {
         if (!asking.signal.aborted) this.show(labels, wanted);
@@ -79,24 +76,18 @@ export class LabelChoice {
     }
     const wanted = Array.isArray(start) ? new Set(start) : null;
     for (const { label } of labels) if (!wanted || wanted.has(label)) this.chosen.add(label);
-    this.text = '';
-    const search = h('input', { type: 'search', placeholder: 'Name or value', 'aria-label': 'Search the labels' });
-    search.addEventListener('input', () => {
-      this.text = search.value;
-      this.fill();
-    });
-    this.body.replaceChildren(
-      h(
-        'div',
-        { class: 'label-tools' },
-        search,
-        button('All', () => this.choose(true), { title: 'Choose all that are listed' }),
-        button('None', () => this.choose(false), { title: 'Choose none of those that are listed' }),
-      ),
-      this.list,
-      this.count,
+    this.search = new LabelSearch(
+      labels,
+      (label) => this.boxOf(label).element,
+      () => `${formatCount(this.chosen.size)} of ${formatCount(labels.length)} labels`,
     );
-    this.fill();
+    this.body.replaceChildren(
+      ...this.search.elements(
+        button('All', () => this.choose(true), { title: 'Choose all that are found' }),
+        button('None', () => this.choose(false), { title: 'Choose none of those that are found' }),
+      ),
+    );
+    this.search.fill();
   }
 
   // Of each label's surface, as an estimate tells them.
@@ -107,17 +98,11 @@ export class LabelChoice {
 
   // All that the search finds.
   private choose(isOn: boolean): void {
-    for (const { label } of matching(this.labels, this.text)) {
+    for (const { label } of this.search?.found ?? []) {
       if (isOn) this.chosen.add(label);
       else this.chosen.delete(label);
     }
     this.changed();
-  }
-
-  private fill(): void {
-    const found = matching(this.labels, this.text).slice(0, mostRows);
-    this.list.replaceChildren(...found.map((label) => this.boxOf(label).element));
-    this.update();
   }
 
   private boxOf(label: VolumeLabel): Box {
@@ -145,17 +130,20 @@ export class LabelChoice {
       voxels: label.voxels,
     };
     this.boxes.set(label.label, box);
+    this.updateBox(label.label, box);
     return box;
   }
 
   private update(): void {
-    for (const [label, { input, size, voxels }] of this.boxes) {
-      input.checked = this.chosen.has(label);
-      const triangles = input.checked ? this.triangles.get(label) : undefined;
-      size.textContent =
-        `${formatCount(voxels)} voxels` + (triangles === undefined ? '' : `, ${formatCount(triangles)} triangles`);
-    }
-    this.count.textContent = `${formatCount(this.chosen.size)} of ${formatCount(this.labels.length)} labels`;
+    for (const [label, box] of this.boxes) this.updateBox(label, box);
+    this.search?.recount();
+  }
+
+  private updateBox(label: number, { input, size, voxels }: Box): void {
+    input.checked = this.chosen.has(label);
+    const triangles = input.checked ? this.triangles.get(label) : undefined;
+    size.textContent =
+      `${formatCount(voxels)} voxels` + (triangles === undefined ? '' : `, ${formatCount(triangles)} triangles`);
   }
 
   private changed(): void {

@@ -1,14 +1,13 @@
 // The labels of a surface beside it: to be found, hidden, isolated, coloured and downloaded.
-import type { Job, LabelSummary } from '../api/types';
-import { labelTitle, matching, type LabelState } from '../job/labels';
+import type { Job, LabelSummary, Volume } from '../api/types';
+import { labelTitle, type LabelState } from '../job/labels';
 import { button, checkbox, h } from '../ui/dom';
-import { formatBytes, formatCount, formatNames, formatValue, shortId } from '../ui/format';
+import { formatBytes, formatCount, formatNames, formatValue } from '../ui/format';
 import { tellError } from '../ui/notices';
 import { saveFile } from '../ui/save';
 import type { Scope } from '../ui/signal';
-
-// More rows than these a person searches.
-const mostRows = 500;
+import { fileNameOf } from './job_panel';
+import { LabelSearch } from './label_search';
 
 export function volumeText({ volume_mm3: volume }: LabelSummary): string {
   return `${formatValue(volume)} mm\u00b3`;
@@ -28,49 +27,32 @@ interface Row {
 export class LabelList {
   readonly element: HTMLElement;
   private readonly rows = new Map<number, Row>();
-  private readonly list = h('ul', { class: 'labels', 'aria-label': 'Labels' });
-  private readonly count = h('p', { class: 'hint', role: 'status' });
-  private text = '';
 
   constructor(
     scope: Scope,
     private readonly job: Job,
     private readonly state: LabelState,
+    private readonly volume: Volume | null,
   ) {
-    const search = h('input', { type: 'search', placeholder: 'Name or value', 'aria-label': 'Search the labels' });
-    search.addEventListener('input', () => {
-      this.text = search.value;
-      this.fill();
-    });
+    const { labels } = state;
+    const search = new LabelSearch(
+      labels,
+      (label) => this.rowOf(label).element,
+      (found) => `${formatCount(found)} of ${formatCount(labels.length)} labels`,
+    );
     this.element = h(
       'section',
       { class: 'panel-section label-list' },
       h('h2', {}, 'Labels'),
-      h(
-        'div',
-        { class: 'label-tools' },
-        search,
+      ...search.elements(
         button('Show all', () => state.showAll(), { title: 'Show every label (e)' }),
         button('Hide all', () => state.hideAll()),
       ),
-      this.list,
-      this.count,
     );
-    this.fill();
+    search.fill();
     scope.onEnd(state.hidden.subscribe(() => this.update()));
     scope.onEnd(state.colours.subscribe(() => this.update()));
     scope.onEnd(state.picked.subscribe((picked) => this.markPicked(picked)));
-  }
-
-  private fill(): void {
-    const found = matching(this.state.labels, this.text);
-    const shown = found.slice(0, mostRows);
-    this.list.replaceChildren(...shown.map((label) => this.rowOf(label).element));
-    const more = found.length - shown.length;
-    this.count.textContent =
-      `${formatCount(found.length)} of ${formatCount(this.state.labels.length)} labels` +
-      (more > 0 ? `; the first ${formatCount(mostRows)} are listed` : '');
-    this.update();
   }
 
   private rowOf(label: LabelSummary): Row {
@@ -116,6 +98,7 @@ export class LabelList {
       alone,
     };
     this.rows.set(label.label, row);
+    this.updateRow(label.label, row);
     return row;
   }
 
@@ -123,19 +106,21 @@ export class LabelList {
     return Object.entries(label.files ?? {}).map(([format, { bytes, href }]) =>
       button(
         formatNames[format] ?? format,
-        () => void saveFile(href, `surface-${shortId(this.job.id)}-${label.label}.${format}`).catch(tellError),
+        () => void saveFile(href, fileNameOf(this.job, this.volume, `-${label.label}.${format}`), bytes).catch(tellError),
         { class: 'quiet', 'data-format': format, title: formatBytes(bytes), 'aria-label': `Download ${title} as ${formatNames[format] ?? format}` },
       ),
     );
   }
 
   private update(): void {
-    for (const [label, { shown, colour, alone }] of this.rows) {
-      shown.checked = this.state.isShown(label);
-      alone.setAttribute('aria-pressed', String(this.state.isAlone(label)));
-      const now = this.state.colours.value.get(label);
-      if (now !== undefined) colour.value = now;
-    }
+    for (const [label, row] of this.rows) this.updateRow(label, row);
+  }
+
+  private updateRow(label: number, { shown, colour, alone }: Row): void {
+    shown.checked = this.state.isShown(label);
+    alone.setAttribute('aria-pressed', String(this.state.isAlone(label)));
+    const now = this.state.colours.value.get(label);
+    if (now !== undefined) colour.value = now;
   }
 
   private markPicked(picked: LabelSummary | null): void {

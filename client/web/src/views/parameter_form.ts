@@ -1,6 +1,6 @@
 // The parameters of a job beside its iso-value, one control for each row of their table.
 import type { JobParameters, MeshFormat } from '../api/types';
-import { withGlb } from '../job/parameters';
+import { fromText, withGlb } from '../job/parameters';
 import {
   applies,
   asText,
@@ -15,25 +15,37 @@ import {
   type Parameter,
   type Value,
 } from '../job/table';
-import { checkbox, field, h, segmented } from '../ui/dom';
+import { checkbox, field, h, segmented, uniqueId } from '../ui/dom';
 import { formatNames, formatValue } from '../ui/format';
+import { errorSlider, type SliderHost } from './error_slider';
 
 export interface FormHost {
   job: () => JobParameters;
   set: (parameter: Parameter, value: Value) => void;
+  // Whether what stands in the parameter's control can be used; while it cannot, the job has another value.
+  mark: (parameter: Parameter, isGood: boolean) => void;
+  slider: SliderHost;
 }
 
 interface Control {
   element: HTMLElement;
-  // Shows the job's present value.
+  // Shows the job's present value; called when one of these has changed.
   update?: () => void;
+  follows?: readonly string[];
 }
 
 // These are chosen elsewhere: the volume before, the iso-value in the histogram, labels in their list;
 // what labels are called and are made of is the volume's.
 const elsewhere = ['volume', 'iso', 'labels', 'background', 'label_names', 'label_colors', 'label_values'];
 // Those that are seen at once, in rows. All others are under "More".
-const front = [['scheme', 'interpolation'], ['smoothing', 'passes'], ['priority']];
+const front = [
+  ['scheme', 'interpolation'],
+  ['smoothing', 'passes'],
+  ['max_error_mm'],
+  ['triangles', 'certify'],
+  ['fill_cavities'],
+  ['priority'],
+];
 
 export const shown = parameters.filter(({ name }) => !elsewhere.includes(name));
 
@@ -67,6 +79,26 @@ function switchControl(parameter: Parameter, host: FormHost): Control {
   return { element: checkbox(labelOf(parameter), isOn, (value) => host.set(parameter, value)) };
 }
 
+// A bound for the error, or for the triangles, has it measured in any case.
+function certifyControl(parameter: Parameter, host: FormHost): Control {
+  const element = checkbox(labelOf(parameter), false, (value) => host.set(parameter, value));
+  const [input] = element.getElementsByTagName('input');
+  const update = (): void => {
+    const job = host.job();
+    const isImplied = (job.max_error_mm ?? job.triangles ?? null) !== null;
+    if (!input) return;
+    input.checked = isImplied || job.certify === true;
+    input.disabled = isImplied;
+  };
+  update();
+  return { element, update, follows: ['max_error_mm', 'triangles'] };
+}
+
+function errorControl(parameter: Parameter, host: FormHost): Control {
+  const value = host.job().max_error_mm ?? null;
+  return { element: errorSlider(parameter.title, value, host.slider, (error) => host.set(parameter, error)) };
+}
+
 // The step of the arrows beside a number; other values may be typed.
 function stepOf({ kind, maximum }: Parameter): number | 'any' {
   if (kind === 'integer') return 1;
@@ -80,6 +112,19 @@ function placeholderOf(parameter: Parameter, job: JobParameters): string {
   return typeof standard === 'number' ? formatValue(standard) : 'no limit';
 }
 
+// What a number has to be.
+function faultOf(parameter: Parameter, job: JobParameters): string {
+  const { kind, minimum, above } = parameter;
+  const most = maximumOf(parameter, job);
+  const limits = [
+    minimum === undefined ? '' : `at least ${minimum}`,
+    above === undefined ? '' : `more than ${above}`,
+    most === undefined ? '' : `at most ${most}`,
+  ].filter(Boolean);
+  const noun = kind === 'integer' ? 'a whole number' : 'a number';
+  return `Enter ${[noun, limits.join(' and ')].filter(Boolean).join(', ')}${parameter.isNullable ? '; or nothing' : ''}.`;
+}
+
 function numberControl(parameter: Parameter, host: FormHost): Control {
   const input = h('input', {
     type: 'number',
@@ -87,7 +132,15 @@ function numberControl(parameter: Parameter, host: FormHost): Control {
     step: stepOf(parameter),
     min: parameter.minimum ?? parameter.above,
   });
-  const mark = (isGood: boolean): void => input.setAttribute('aria-invalid', String(!isGood));
+  const fault = h('p', { class: 'fault', id: uniqueId('fault'), hidden: true });
+  const mark = (isGood: boolean): void => {
+    input.setAttribute('aria-invalid', String(!isGood));
+    fault.hidden = isGood;
+    if (isGood) input.removeAttribute('aria-errormessage');
+    else input.setAttribute('aria-errormessage', fault.id);
+    fault.textContent = isGood ? '' : faultOf(parameter, host.job());
+    host.mark(parameter, isGood);
+  };
   const update = (): void => {
     const job = host.job();
     const isUsed = applies(parameter, job);
@@ -105,7 +158,23 @@ function numberControl(parameter: Parameter, host: FormHost): Control {
     if (isGood) host.set(parameter, value);
   });
   update();
-  return { element: field(labelOf(parameter), input), update };
+  const element = field(labelOf(parameter), input);
+  element.append(fault);
+  return { element, update };
+}
+
+// Numbers with commas between them.
+function listControl(parameter: Parameter, host: FormHost): Control {
+  const input = h('input', { type: 'text', inputmode: 'text', placeholder: 'none', autocomplete: 'off' });
+  input.value = asText(valueIn(host.job(), parameter));
+  input.addEventListener('input', () => {
+    const text = input.value.replaceAll(/\s/g, '');
+    const value = text === '' ? null : fromText(parameter, text);
+    const isGood = value === null || fits(parameter, value, host.job());
+    input.setAttribute('aria-invalid', String(!isGood));
+    if (isGood) host.set(parameter, value);
+  });
+  return { element: field(labelOf(parameter), input) };
 }
 
 function formatsControl(parameter: Parameter, host: FormHost): Control {
@@ -127,6 +196,8 @@ function formatsControl(parameter: Parameter, host: FormHost): Control {
 }
 
 function controlFor(parameter: Parameter, host: FormHost): Control {
+  if (parameter.name === 'max_error_mm') return errorControl(parameter, host);
+  if (parameter.name === 'certify') return certifyControl(parameter, host);
   switch (parameter.kind) {
     case 'number':
     case 'integer':
@@ -135,6 +206,9 @@ function controlFor(parameter: Parameter, host: FormHost): Control {
       return switchControl(parameter, host);
     case 'choice':
       return choiceControl(parameter, host);
+    case 'numbers':
+    case 'places':
+      return listControl(parameter, host);
     case 'choices':
       if (parameter.name === 'formats') return formatsControl(parameter, host);
   }
@@ -143,17 +217,18 @@ function controlFor(parameter: Parameter, host: FormHost): Control {
 
 // For a job at an iso-value, or for one by labels, as the present one is.
 export function parameterForm(host: FormHost): HTMLElement {
-  const dependents: { on: string; update: () => void }[] = [];
+  const dependents: { on: readonly string[]; update: () => void }[] = [];
   const watching: FormHost = {
-    job: host.job,
+    ...host,
     set: (parameter, value) => {
       host.set(parameter, value);
-      for (const { on, update } of dependents) if (on === parameter.name) update();
+      for (const { on, update } of dependents) if (on.includes(parameter.name)) update();
     },
   };
   const elementFor = (parameter: Parameter): HTMLElement => {
-    const { element, update } = controlFor(parameter, watching);
-    if (parameter.by && update) dependents.push({ on: parameter.by.parameter, update });
+    const { element, update, follows = [] } = controlFor(parameter, watching);
+    const on = parameter.by ? [...follows, parameter.by.parameter] : follows;
+    if (update) dependents.push({ on, update });
     element.dataset.parameter = parameter.name;
     element.title = parameter.help;
     return element;

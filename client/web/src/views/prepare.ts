@@ -15,21 +15,18 @@ import {
 import { trianglesOf } from '../job/labels';
 import { isByLabels, withLabels } from '../job/table';
 import { button, field, h, isTyping, segmented } from '../ui/dom';
-import {
-  formatBytes,
-  formatCount,
-  formatMilliseconds,
-  formatNames,
-  formatValue,
-} from '../ui/format';
-import { refusal, tellError } from '../ui/notices';
+import { formatCount, formatValue } from '../ui/format';
+import { refusal } from '../ui/notices';
 import { go, hashOf, noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { cssColour, theme } from '../ui/theme';
 import { defaultWindow, type Histogram } from '../volume/histogram';
 import { SliceSource, type Window } from '../volume/slices';
-import { aboutVolume, sliceHelp } from './about_volume';
+import { volumeName } from '../volume/names';
+import { aboutVolume, notedOf, sliceHelp } from './about_volume';
+import { estimateTexts } from './estimate_texts';
 import { HistogramView } from './histogram_view';
+import { LiveView } from './live_view';
 import { LabelChoice, type Choice } from './label_choice';
 import { parameterForm } from './parameter_form';
 import { SliceView, type SliceHost } from './slice_view';
@@ -41,6 +38,11 @@ const shownSurfaces = 3;
 // NIfTI and DICOM scale whole samples to values that are not.
 function isInteger({ type, range }: Volume): boolean {
   return !type.startsWith('float') && range.every(Number.isInteger);
+}
+
+// Enough digits for any iso-value, and few enough to be read.
+function shortened(iso: number): number {
+  return Number(iso.toPrecision(6));
 }
 
 function windowOfQuery(query: URLSearchParams): Window | null {
@@ -73,6 +75,12 @@ function startOfQuery(query: URLSearchParams, volume: Volume, defaults: JobParam
   return areLabels && !query.has('iso') && !isByLabels(parameters) ? withLabels(parameters, 'all') : parameters;
 }
 
+// '' where no fewer triangles are asked for.
+function simplifiedInWords({ triangles, simplified_triangles: left }: Estimate): string {
+  if (left === undefined) return '';
+  return `About ${formatCount(left)} triangles of ${formatCount(triangles)}.`;
+}
+
 class Prepare {
   readonly element: HTMLElement;
   private parameters: JobParameters;
@@ -81,6 +89,7 @@ class Prepare {
   private cursor: Vec3;
   private readonly slices: SliceView[];
   private readonly histogram: HistogramView;
+  private readonly live: LiveView;
   private readonly isoInput: HTMLInputElement;
   private readonly estimate = h('div', { class: 'estimate', 'aria-live': 'polite' });
   private readonly run: HTMLButtonElement;
@@ -88,12 +97,16 @@ class Prepare {
   private readonly labelPart = h('div');
   private labelChoice: LabelChoice | null = null;
   private hasLabel = true;
+  // The controls in which something stands that is no value of theirs.
+  private readonly faulty = new Set<string>();
   private readonly form = h('div');
+  private readonly simplified = h('p', { class: 'hint', 'aria-live': 'polite' });
   private readonly problem = h('div');
   private readonly surfaces = h('div', { class: 'made' });
   private readonly windowText = h('span', { class: 'window-text faint' });
   private estimating: AbortController | null = null;
   private estimateTimer = 0;
+  private isStarting = false;
 
   constructor(
     private readonly scope: Scope,
@@ -101,7 +114,7 @@ class Prepare {
     private readonly volume: Volume,
     counts: Histogram,
   ) {
-    this.defaults = defaultParameters(volume.id, volume.suggested_iso);
+    this.defaults = defaultParameters(volume.id, shortened(volume.suggested_iso));
     this.parameters = startOfQuery(route.query, volume, this.defaults);
     const common = defaultWindow(counts, volume.suggested_iso);
     this.window = windowOfQuery(route.query) ?? common;
@@ -124,6 +137,10 @@ class Prepare {
         this.cursor = cursor;
         this.update();
       },
+      setIso: (iso) => {
+        if (!isByLabels(this.parameters)) this.setIso(iso);
+      },
+      isInteger: isInteger(volume),
       contourColour: () => cssColour('--contour'),
       onError: (error) => this.sliceFailed(error),
     };
@@ -131,10 +148,9 @@ class Prepare {
     this.slices = (['axial', 'coronal', 'sagittal'] as const).map(
       (plane) => new SliceView(plane, host, scope),
     );
+    this.live = new LiveView({ volume, window: this.histogram.shown, setCursor: host.setCursor }, scope);
     this.isoInput = h('input', { type: 'number', step: 'any', id: 'iso', class: 'iso-input' });
-    this.isoInput.addEventListener('input', () => {
-      if (Number.isFinite(this.isoInput.valueAsNumber)) this.setIso(this.isoInput.valueAsNumber);
-    });
+    this.listenToIso();
     this.run = button('Make the surface', () => void this.start(), { class: 'primary' });
     this.isoPart = h('div', { class: 'by-iso' }, this.isoRow(), this.histogram.element);
     this.element = this.layout(common);
@@ -144,13 +160,33 @@ class Prepare {
       clearTimeout(this.estimateTimer);
       this.estimating?.abort();
     });
+    this.listenToPage();
+    this.update();
+    this.askForEstimate();
+  }
+
+  private listenToPage(): void {
+    const { scope } = this;
     scope.onEnd(theme.subscribe(() => this.update()));
     scope.listen(window, 'keydown', (event: KeyboardEvent) => {
       if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) void this.start();
       else if (event.key === '[' && !isTyping(event)) this.histogram.element.focus();
     });
-    this.update();
-    this.askForEstimate();
+  }
+
+  private listenToIso(): void {
+    this.isoInput.addEventListener('input', () => {
+      const isGood = Number.isFinite(this.isoInput.valueAsNumber);
+      this.isoInput.setAttribute('aria-invalid', String(!isGood));
+      this.mark('iso', isGood);
+      if (isGood) this.setIso(this.isoInput.valueAsNumber);
+    });
+    // What was left unfinished gives way to the value that is used.
+    this.isoInput.addEventListener('blur', () => {
+      this.isoInput.setAttribute('aria-invalid', 'false');
+      this.mark('iso', true);
+      this.update();
+    });
   }
 
   private get iso(): number {
@@ -167,6 +203,7 @@ class Prepare {
       this.labelChoice = new LabelChoice(this.scope, this.volume.id, this.parameters, (choice) => this.setLabels(choice));
       this.labelPart.append(this.labelChoice.element);
     }
+    this.faulty.clear();
     this.form.replaceChildren(
       parameterForm({
         job: () => this.parameters,
@@ -174,8 +211,22 @@ class Prepare {
           this.parameters = changed(this.parameters, parameter, value);
           this.changed();
         },
+        mark: (parameter, isGood) => this.mark(parameter.name, isGood),
+        slider: { spacing: this.volume.spacing, outcome: this.simplified },
       }),
     );
+  }
+
+  private mark(name: string, isGood: boolean): void {
+    if (isGood === !this.faulty.has(name)) return;
+    if (isGood) this.faulty.delete(name);
+    else this.faulty.add(name);
+    this.changed();
+  }
+
+  // Whether a job can be made of what is entered.
+  private get isReady(): boolean {
+    return this.hasLabel && this.faulty.size === 0;
   }
 
   private setKind(kind: 'iso' | 'labels'): void {
@@ -203,50 +254,48 @@ class Prepare {
   }
 
   private layout(common: Window): HTMLElement {
-    return h(
+    const { volume } = this;
+    const element = h(
       'div',
-      { class: 'prepare' },
-      h(
-        'section',
-        { class: 'slices', 'aria-label': 'Slices' },
-        ...this.slices.map((view) => view.element),
-        this.about(common),
-      ),
+      { class: 'prepare', 'data-title': volumeName(volume) },
+      h('section', { class: 'slices', 'aria-label': 'Slices' }, ...this.slices.map((view) => view.element), this.live.element),
       h(
         'section',
         { class: 'panel', 'aria-label': 'Parameters' },
+        aboutVolume(volume, () => (element.dataset.title = volumeName(volume))),
         this.kindChoice(),
         this.isoPart,
         this.labelPart,
+        this.windowRow(common),
+        ...notedOf(volume),
         this.form,
+        this.surfaces,
+        sliceHelp(),
         this.estimate,
         this.problem,
         h('div', { class: 'run' }, this.run, h('span', { class: 'hint by-mouse' }, 'Ctrl + Enter')),
       ),
     );
+    return element;
   }
 
-  // What stands beside the slices: the volume, how to move in it, and what was made of it.
-  private about(common: Window): HTMLElement {
-    const { volume } = this;
-    const reset = button('Reset window', () => {
-      this.window = common;
-      this.update();
-    });
-    return h(
-      'div',
-      { class: 'slice-help' },
-      ...aboutVolume(volume),
-      sliceHelp(),
-      h('div', { class: 'actions' }, reset, this.windowText),
-      this.surfaces,
+  // The window of the slices, and the way back to the usual one.
+  private windowRow(common: Window): HTMLElement {
+    const reset = button(
+      'Reset window',
+      () => {
+        this.window = common;
+        this.update();
+      },
+      { class: 'chip' },
     );
+    return h('div', { class: 'window-row' }, this.windowText, reset);
   }
 
   private isoRow(): HTMLElement {
     const { suggested_iso: otsu, presets } = this.volume;
     const chips = [{ name: 'Otsu', iso: otsu }, ...presets].map(({ name, iso }) =>
-      button(`${name} ${formatValue(iso)}`, () => this.setIso(iso), { class: 'chip' }),
+      button(`${name} ${formatValue(iso)}`, () => this.setIso(shortened(iso)), { class: 'chip' }),
     );
     return h(
       'div',
@@ -288,20 +337,22 @@ class Prepare {
   }
 
   private changed(): void {
-    this.run.disabled = !this.hasLabel;
+    this.run.disabled = !this.isReady || this.isStarting;
     this.update();
-    if (this.hasLabel) this.askForEstimate();
-    else this.showNoLabel();
+    if (this.isReady) this.askForEstimate();
+    else this.showMissing(this.hasLabel ? 'Correct what is marked.' : 'Choose a label.');
   }
 
-  private showNoLabel(): void {
+  private showMissing(text: string): void {
     clearTimeout(this.estimateTimer);
     this.estimating?.abort();
-    this.estimate.replaceChildren(h('p', { class: 'warning' }, 'Choose a label.'));
+    this.estimate.classList.remove('stale');
+    this.estimate.replaceChildren(h('p', { class: 'warning' }, text));
   }
 
   private update(): void {
     for (const view of this.slices) view.update();
+    this.live.show(isByLabels(this.parameters) ? null : this.iso, this.cursor);
     this.histogram.show(this.iso, this.window);
     const [low, high] = this.window;
     this.windowText.textContent = `window ${formatValue(high - low)}, level ${formatValue((low + high) / 2)}`;
@@ -337,41 +388,8 @@ class Prepare {
   private showEstimate(estimate: Estimate): void {
     this.estimate.classList.remove('stale');
     this.labelChoice?.showTriangles(trianglesOf(estimate));
-    const files = Object.entries(estimate.bytes).map(
-      ([format, bytes]) => `${formatNames[format] ?? format} ${formatBytes(bytes)}`,
-    );
-    const rows: [string, string][] = [
-      ['Triangles', formatCount(estimate.triangles)],
-      ['Vertices', formatCount(estimate.vertices)],
-      ['Files', `about ${files.join(', ')}`],
-      ['Time', `about ${formatMilliseconds(estimate.milliseconds)}`],
-    ];
-    const before = estimate.queue.queued + estimate.queue.running;
-    if (before > 0) rows.push(['Before it', before === 1 ? '1 job' : `${before} jobs`]);
-    this.estimate.replaceChildren(
-      h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)])),
-    );
-    if (estimate.triangles === 0) {
-      this.estimate.append(
-        h(
-          'p',
-          { class: 'warning' },
-          isByLabels(this.parameters)
-            ? 'These labels have no boundary: the surface would be empty.'
-            : 'No sample boundary has this value: the surface would be empty.',
-        ),
-      );
-    }
-    if (!estimate.fits) {
-      this.estimate.append(
-        h(
-          'p',
-          { class: 'warning' },
-          `This needs ${formatBytes(estimate.memory_bytes)} of memory, more than a job may take. ` +
-            (isByLabels(this.parameters) ? 'Choose fewer labels.' : 'Choose an iso-value with fewer triangles.'),
-        ),
-      );
-    }
+    this.simplified.textContent = simplifiedInWords(estimate);
+    this.estimate.replaceChildren(...estimateTexts(estimate, isByLabels(this.parameters)));
   }
 
   private showNoEstimate(error: ApiError): void {
@@ -385,6 +403,7 @@ class Prepare {
 
   private async start(): Promise<void> {
     if (this.run.disabled) return;
+    this.isStarting = true;
     this.run.disabled = true;
     this.problem.replaceChildren();
     try {
@@ -392,10 +411,10 @@ class Prepare {
       go(['jobs', job.id]);
     } catch (error) {
       const failure = asApiError(error);
-      this.problem.replaceChildren(refusal(failure));
-      if (failure.isUnreachable) tellError(failure);
+      this.problem.replaceChildren(refusal(failure, failure.isUnreachable && button('Try again', () => void this.start())));
     } finally {
-      this.run.disabled = false;
+      this.isStarting = false;
+      this.run.disabled = !this.isReady;
     }
   }
 }

@@ -1,6 +1,6 @@
 // All jobs: what waits in which order, what runs, what is done. #/jobs
-import { cancelJob, listJobs, listVolumes } from '../api/client';
-import { isFinal, type Job, type Volume } from '../api/types';
+import { cancelJob, listJobs } from '../api/client';
+import { isFinal, type Job } from '../api/types';
 import { inWords, surfaceInWords } from '../job/parameters';
 import { priorities } from '../job/table';
 import { button, h } from '../ui/dom';
@@ -8,7 +8,7 @@ import { formatCount, formatMilliseconds, formatTime, shortId } from '../ui/form
 import { tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
-import { nameIn } from '../volume/names';
+import { KnownVolumes } from '../volume/known';
 
 const refreshEvery = 1500;
 const mostCompared = 4;
@@ -76,9 +76,7 @@ class Queue {
   private readonly chosen = new Set<string>();
   private jobs: Job[] = [];
   private next: string | null = null;
-  private volumes = new Map<string, Volume>();
-  // Those that were asked for already: what is gone is not asked for again.
-  private readonly asked = new Set<string>();
+  private readonly volumes = new KnownVolumes();
 
   constructor() {
     this.compare = button('Compare', () => this.goCompare(), { class: 'primary', disabled: true });
@@ -105,7 +103,7 @@ class Queue {
     const older = this.jobs.filter((job) => !newest.has(job.id) && job.id < (page.jobs.at(-1)?.id ?? ''));
     if (older.length === 0) this.next = page.next;
     this.jobs = [...page.jobs, ...older];
-    await this.findVolumes();
+    await this.volumes.find(this.jobs.map(({ volume }) => volume));
     this.show();
   }
 
@@ -114,15 +112,8 @@ class Queue {
     const page = await listJobs(this.next);
     this.jobs = [...this.jobs, ...page.jobs];
     this.next = page.next;
-    await this.findVolumes();
+    await this.volumes.find(this.jobs.map(({ volume }) => volume));
     this.show();
-  }
-
-  private async findVolumes(): Promise<void> {
-    const unknown = this.jobs.filter((job) => !this.volumes.has(job.volume) && !this.asked.has(job.volume));
-    if (unknown.length === 0) return;
-    this.volumes = new Map((await listVolumes()).map((volume) => [volume.id, volume]));
-    for (const job of unknown) this.asked.add(job.volume);
   }
 
   private show(): void {
@@ -156,7 +147,7 @@ class Queue {
       cell(this.pickBox(job)),
       stateCell(job, place),
       cell(h('span', { class: `priority ${job.priority}` }, job.priority)),
-      surfaceCell(job, nameIn(this.volumes, job.volume)),
+      surfaceCell(job, this.volumes.nameOf(job.volume)),
       cell(progressOf(job)),
       cell(time),
       cell(h('span', { class: 'faint' }, formatTime(job.created))),

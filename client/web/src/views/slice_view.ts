@@ -1,10 +1,21 @@
 // One orthogonal slice: grey samples, the iso-contour over them, and the place of the other two planes.
 import type { Axis, Vec3, Volume } from '../api/types';
 import { h, uniqueId } from '../ui/dom';
+import { formatValue } from '../ui/format';
 import type { Scope } from '../ui/signal';
 import { contour } from '../volume/contour';
-import { axisIndex, slicePlane, type Plane, type SlicePlane } from '../volume/geometry';
-import { greyTable, inSlice, windowToFetch, type Slice, type SliceSource, type Window } from '../volume/slices';
+import {
+  axisIndex,
+  pictureAxes,
+  placedAt,
+  slicePlacement,
+  slicePlane,
+  type Placement,
+  type Plane,
+  type SlicePlane,
+} from '../volume/geometry';
+import { SliceLoader } from '../volume/slice_loader';
+import { greyTable, inSlice, valueIn, windowToFetch, type Slice, type SliceSource, type Window } from '../volume/slices';
 
 export interface SliceState {
   iso: number | null; // of the contour
@@ -20,12 +31,25 @@ export interface SliceHost {
   state: () => SliceState;
   setWindow: (window: Window) => void;
   setCursor: (cursor: Vec3) => void;
+  setIso: (iso: number) => void;
+  isInteger: boolean;
   contourColour: () => string;
   onError: (error: unknown) => void;
 }
 
+interface Press {
+  pointer: number;
+  x: number;
+  y: number;
+  window: Window;
+  moved: boolean;
+  isWindowing: boolean;
+}
+
 const titles: Record<Plane, string> = { axial: 'Axial', coronal: 'Coronal', sagittal: 'Sagittal' };
 const padding = 14;
+// How much is seen of a slice that stands in for one that is not there yet.
+const otherSlice = 0.35;
 
 export class SliceView {
   readonly element: HTMLElement;
@@ -34,8 +58,10 @@ export class SliceView {
   private readonly place = h('span', { class: 'slice-place' });
   private readonly layout: SlicePlane;
   private readonly buffer = document.createElement('canvas');
-  private slice: Slice | null = null;
-  private wanted = '';
+  private readonly loader: SliceLoader;
+  private readonly state = h('p', { class: 'slice-state', role: 'status' });
+  // Of the sample under the pointer.
+  private readonly value = h('p', { class: 'slice-value', 'aria-hidden': 'true' });
   private scheduled = false;
 
   constructor(
@@ -58,10 +84,16 @@ export class SliceView {
     this.element = h(
       'figure',
       { class: 'slice', 'data-plane': plane },
-      this.canvas,
+      h('div', { class: 'slice-picture' }, this.canvas, this.state, this.value),
       h('figcaption', {}, h('span', { class: 'slice-title' }, titles[plane]), this.slider, this.place),
     );
+    this.loader = new SliceLoader(host.source, this.layout.normal, scope, {
+      onChange: () => this.draw(),
+      onRefused: (error) => host.onError(error),
+    });
     this.listen();
+    this.listenToSteps();
+    this.listenToValues();
     const resizing = new ResizeObserver(() => this.draw());
     resizing.observe(this.canvas);
     scope.onEnd(() => resizing.disconnect());
@@ -74,21 +106,7 @@ export class SliceView {
     this.slider.value = String(index);
     this.place.textContent = `${index + 1} / ${this.count(this.layout.normal)}`;
     const fetched = windowToFetch(window, iso ?? window[0], this.host.commonWindow);
-    const wanted = `${index}/${fetched.join(',')}`;
-    if (wanted !== this.wanted) {
-      this.wanted = wanted;
-      this.host.source.get(this.layout.normal, index, fetched).then(
-        (slice) => {
-          // Older answers may come late; a slice that is near is better than none.
-          if (this.wanted !== wanted && this.slice !== null) return;
-          this.slice = slice;
-          this.draw();
-        },
-        (error: unknown) => {
-          if (!this.scope.isOver) this.host.onError(error);
-        },
-      );
-    }
+    this.loader.want(index, fetched);
     this.draw();
   }
 
@@ -107,18 +125,11 @@ export class SliceView {
     this.goTo(this.host.state().cursor[axisIndex(this.layout.normal)] + by);
   }
 
-  // Where the samples lie on the canvas, in its own pixels.
-  private frame(): { x: number; y: number; width: number; height: number } {
-    const { volume } = this.host;
-    const size = (axis: Axis): number => this.count(axis) * volume.spacing[axisIndex(axis)];
-    const across = size(this.layout.right.axis);
-    const along = size(this.layout.down.axis);
-    const room = { width: this.canvas.width, height: this.canvas.height };
-    const edge = padding * (this.canvas.width / (this.canvas.clientWidth || 1));
-    const scale = Math.min((room.width - 2 * edge) / across, (room.height - 2 * edge) / along);
-    const width = Math.max(1, across * scale);
-    const height = Math.max(1, along * scale);
-    return { x: (room.width - width) / 2, y: (room.height - height) / 2, width, height };
+  // Where the picture lies on the canvas, in its own pixels.
+  private placement(): Placement {
+    const { width, height, clientWidth } = this.canvas;
+    const edge = padding * (width / (clientWidth || 1));
+    return slicePlacement(this.host.volume, this.layout, { width, height, edge });
   }
 
   private draw(): void {
@@ -138,15 +149,23 @@ export class SliceView {
       this.canvas.width = width;
       this.canvas.height = height;
     }
-    const context = this.canvas.getContext('2d');
+    const context = this.canvas.getContext('2d', { willReadFrequently: true });
     if (!context || width === 0 || height === 0) return;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.fillStyle = '#000';
     context.fillRect(0, 0, width, height);
-    if (this.slice) this.paintSlice(context, this.slice, ratio);
-    this.paintLetters(context, ratio);
     const { iso, cursor } = this.host.state();
     const index = cursor[axisIndex(this.layout.normal)];
+    const { slice, isLate, error } = this.loader;
+    if (slice) {
+      // What is another slice's is never shown as this one's.
+      context.globalAlpha = slice.index === index ? 1 : otherSlice;
+      this.paintSlice(context, slice, ratio);
+      context.globalAlpha = 1;
+    }
+    this.paintLetters(context, ratio);
+    const says = error ? `Slice ${index + 1} could not be loaded` : isLate ? `Loading slice ${index + 1}` : '';
+    if (this.state.textContent !== says) this.state.textContent = says;
     this.canvas.setAttribute(
       'aria-label',
       `${titles[this.plane]} slice ${index + 1}${iso === null ? '' : ` with the contour at iso-value ${iso}`}`,
@@ -154,26 +173,15 @@ export class SliceView {
   }
 
   private paintSlice(context: CanvasRenderingContext2D, slice: Slice, ratio: number): void {
-    const frame = this.frame();
-    const { right, down } = this.layout;
     this.fillBuffer(slice);
     context.save();
-    // From samples of the picture to the screen: columns may run down, and either way.
-    const isTurned = axisIndex(right.axis) > axisIndex(down.axis);
-    const [acrossCount, downCount] = isTurned
-      ? [slice.height, slice.width]
-      : [slice.width, slice.height];
-    context.translate(frame.x, frame.y);
-    if (right.flipped) context.transform(-1, 0, 0, 1, frame.width, 0);
-    if (down.flipped) context.transform(1, 0, 0, -1, 0, frame.height);
-    context.scale(frame.width / acrossCount, frame.height / downCount);
-    if (isTurned) context.transform(0, 1, 1, 0, 0, 0);
+    context.setTransform(...this.placement());
     context.imageSmoothingEnabled = true;
     context.drawImage(this.buffer, 0, 0);
 
     const { iso, cursor } = this.host.state();
     const segments = iso === null ? [] : contour(slice, inSlice(slice, iso));
-    const [column, row] = this.pictureAxes();
+    const [column, row] = pictureAxes(this.layout.normal);
     context.translate(0.5, 0.5);
     context.beginPath();
     context.moveTo(cursor[column], -0.5);
@@ -190,15 +198,10 @@ export class SliceView {
     context.restore();
   }
 
-  private pictureAxes(): [0 | 1 | 2, 0 | 1 | 2] {
-    const normal = this.layout.normal;
-    return normal === 'x' ? [1, 2] : normal === 'y' ? [0, 2] : [0, 1];
-  }
-
   private fillBuffer(slice: Slice): void {
     this.buffer.width = slice.width;
     this.buffer.height = slice.height;
-    const context = this.buffer.getContext('2d');
+    const context = this.buffer.getContext('2d', { willReadFrequently: true });
     if (!context) return;
     const picture = context.createImageData(slice.width, slice.height);
     const table = greyTable(slice, this.host.state().window);
@@ -229,20 +232,19 @@ export class SliceView {
   private sampleAt(event: PointerEvent | MouseEvent): Vec3 | null {
     const box = this.canvas.getBoundingClientRect();
     const scale = this.canvas.width / (box.width || 1);
-    const frame = this.frame();
-    const u = ((event.clientX - box.left) * scale - frame.x) / frame.width;
-    const v = ((event.clientY - box.top) * scale - frame.y) / frame.height;
-    if (u < 0 || u >= 1 || v < 0 || v >= 1) return null;
+    const point = placedAt(this.placement(), (event.clientX - box.left) * scale, (event.clientY - box.top) * scale);
     const cursor: Vec3 = [...this.host.state().cursor];
-    const { right, down } = this.layout;
-    const at = (axis: Axis, part: number): number => Math.floor(part * this.count(axis));
-    cursor[axisIndex(right.axis)] = at(right.axis, right.flipped ? 1 - u - 1e-9 : u);
-    cursor[axisIndex(down.axis)] = at(down.axis, down.flipped ? 1 - v - 1e-9 : v);
+    const { dims } = this.host.volume;
+    for (const [at, axis] of pictureAxes(this.layout.normal).entries()) {
+      const index = Math.floor(point[at as 0]);
+      if (index < 0 || index >= dims[axis]) return null;
+      cursor[axis] = index;
+    }
     return cursor;
   }
 
   private listen(): void {
-    let press: { pointer: number; x: number; y: number; window: Window; moved: boolean } | null = null;
+    let press: Press | null = null;
     const { canvas, scope } = this;
     scope.listen(canvas, 'pointerdown', (event: PointerEvent) => {
       if (event.button !== 0 && event.button !== 2) return;
@@ -258,6 +260,7 @@ export class SliceView {
         y: event.clientY,
         window: this.host.state().window,
         moved: false,
+        isWindowing: false,
       };
     });
     scope.listen(canvas, 'pointermove', (event: PointerEvent) => {
@@ -265,6 +268,9 @@ export class SliceView {
       const dx = event.clientX - press.x;
       const dy = event.clientY - press.y;
       press.moved ||= Math.hypot(dx, dy) > (event.pointerType === 'mouse' ? 3 : 10);
+      // A finger that goes up or down scrolls the page, which the browser sees to (touch-action).
+      if (event.pointerType !== 'mouse' && Math.abs(dy) > Math.abs(dx) && !press.isWindowing) return;
+      press.isWindowing ||= press.moved;
       if (press.moved) this.host.setWindow(draggedWindow(press.window, dx, dy));
     });
     scope.listen(canvas, 'pointerup', (event: PointerEvent) => {
@@ -273,8 +279,48 @@ export class SliceView {
       press = null;
       if (cursor) this.host.setCursor(cursor);
     });
-    scope.listen(canvas, 'pointercancel', () => (press = null));
+    scope.listen(canvas, 'pointercancel', () => {
+      // The browser has taken the finger to scroll with: what it did here before was not meant.
+      if (press?.isWindowing) this.host.setWindow(press.window);
+      press = null;
+    });
     scope.listen(canvas, 'contextmenu', (event) => event.preventDefault());
+  }
+
+  // The value of the sample there, rounded to what the picture's eight bits tell; null where they tell none.
+  private valueOf(place: Vec3 | null): { text: string; value: number | null } {
+    const { slice } = this.loader;
+    const normal = axisIndex(this.layout.normal);
+    if (!slice || place?.[normal] !== slice.index) return { text: '', value: null };
+    const [column, row] = pictureAxes(this.layout.normal);
+    const { low, high } = valueIn(slice, place[column], place[row]);
+    if (low === -Infinity) return { text: `at most ${formatValue(high)}`, value: null };
+    if (high === Infinity) return { text: `at least ${formatValue(low)}`, value: null };
+    const digits = 10 ** Math.floor(Math.log10(Math.max(1e-12, high - low)));
+    const middle = Math.round((low + high) / 2 / digits) * digits;
+    const value = Number(middle.toPrecision(6));
+    const isExact = this.host.isInteger && high - low < 1.5;
+    return { text: `${isExact ? '' : 'about '}${formatValue(isExact ? Math.round(value) : value)}`, value: isExact ? Math.round(value) : value };
+  }
+
+  private listenToValues(): void {
+    const { canvas, scope } = this;
+    const take = (place: Vec3 | null): void => {
+      const { value } = this.valueOf(place);
+      if (value !== null) this.host.setIso(value);
+    };
+    scope.listen(canvas, 'pointermove', (event: PointerEvent) => {
+      if (event.pointerType === 'mouse') this.value.textContent = this.valueOf(this.sampleAt(event)).text;
+    });
+    scope.listen(canvas, 'pointerleave', () => (this.value.textContent = ''));
+    scope.listen(canvas, 'dblclick', (event: MouseEvent) => take(this.sampleAt(event)));
+    scope.listen(canvas, 'keydown', (event: KeyboardEvent) => {
+      if (event.key === 'i' && !event.ctrlKey && !event.metaKey && !event.altKey) take(this.host.state().cursor);
+    });
+  }
+
+  private listenToSteps(): void {
+    const { canvas, scope } = this;
     scope.listen(
       canvas,
       'wheel',

@@ -8,9 +8,9 @@ import { defaultStyle, type SurfaceStyle } from '../scene/parts';
 import { Surface, type Picked } from '../scene/surface';
 import { viewNames, viewTitles, type CameraPlace } from '../scene/views';
 import type { LabelState } from '../job/labels';
-import { isByLabels } from '../job/table';
+import { emptyReason } from '../job/empty';
 import { button, checkbox, h, isTyping } from '../ui/dom';
-import { formatCount, shortId } from '../ui/format';
+import { formatCount } from '../ui/format';
 import { refusal, tell, tellError } from '../ui/notices';
 import { saveBlob } from '../ui/save';
 import { Scope } from '../ui/signal';
@@ -18,7 +18,10 @@ import { cssColour } from '../ui/theme';
 import { axisIndex, patientAxes } from '../volume/geometry';
 import { defaultWindow } from '../volume/histogram';
 import type { Window } from '../volume/slices';
+import { DistanceLook } from './distance_look';
+import { changeLink, fileNameOf, makeVariant } from './job_panel';
 import { PickedLabel } from './picked_label';
+import { PickedPart } from './picked_part';
 
 const bins = 512;
 const turnStep = Math.PI / 36;
@@ -50,6 +53,8 @@ export class SurfacePane {
   private readonly cutControls = h('div', { class: 'cut-controls', hidden: true });
   private readonly announcement = h('div', { class: 'sr-only', 'aria-live': 'polite' });
   private readonly pickedLabel: PickedLabel;
+  private readonly pickedPart: PickedPart;
+  private distance: DistanceLook | null = null;
   private style: SurfaceStyle = defaultStyle;
   private isMeasuring = false;
   private readonly cut: CutState;
@@ -67,6 +72,7 @@ export class SurfacePane {
   ) {
     const { volume } = options;
     this.pickedLabel = new PickedLabel(scope, options.labels);
+    this.pickedPart = new PickedPart(job, makeVariant(job));
     const [sagittal, coronal, axial] = volume ? patientAxes(volume) : (['x', 'y', 'z'] as const);
     this.cutAxes = [
       ['Axial', axial],
@@ -92,7 +98,7 @@ export class SurfacePane {
       return null;
     }
     if (mesh.triangles === 0) {
-      this.say(this.emptyText());
+      this.say(emptyReason(this.job, this.options.volume), h('a', { href: changeLink(this.job) }, 'Change parameters'));
       return null;
     }
     let surface: Surface;
@@ -109,9 +115,9 @@ export class SurfacePane {
     if (this.options.camera) surface.moveTo(this.options.camera);
     try {
       const timing = await loadMesh(this.job, this.scope.signal, {
-        onBlocks: (blocks, part) => {
+        onBlocks: (blocks, part, isCoarse) => {
           if (part) this.options.labels.learnColour(part.label, part.colour);
-          surface.addBlocks(blocks, part);
+          surface.addBlocks(blocks, part, isCoarse);
         },
         onProgress: ({ bytes, totalBytes, triangles, totalTriangles }) => {
           this.bar.value = (bytes / totalBytes + triangles / Math.max(1, totalTriangles)) / 2;
@@ -123,6 +129,8 @@ export class SurfacePane {
       });
       if (this.scope.isOver) return null;
       surface.finish();
+      // Who asked for distances wants to see them.
+      if (this.distance?.loaded()) this.distance.set(this.options.hasKeys);
       this.element.dataset.loaded = 'true';
       this.bar.parentElement?.remove();
       return timing;
@@ -171,15 +179,9 @@ export class SurfacePane {
     return this.surface?.budget.moving ?? [];
   }
 
-  private emptyText(): string {
-    return isByLabels(this.job.parameters)
-      ? 'The surface is empty: the labels have no boundary.'
-      : 'The surface is empty: no sample boundary has this iso-value.';
-  }
-
-  private say(text: string): void {
+  private say(text: string, ...more: Node[]): void {
     this.bar.parentElement?.remove();
-    this.view.append(h('p', { class: 'overlay message' }, text));
+    this.view.append(h('div', { class: 'overlay message' }, h('p', {}, text), ...more));
   }
 
   private prepareSurface(surface: Surface): void {
@@ -190,7 +192,10 @@ export class SurfacePane {
     surface.onCamera = () => this.onCamera?.(surface.place);
     surface.onPick = (picked) => this.picked(picked, surface);
     this.followLabels(surface);
-    this.element.append(h('div', { class: 'tools' }, this.toolbar(surface), this.cutControls, this.pickedLabel.element));
+    const distance = new DistanceLook(this.scope, surface, (isOn) => this.setStyle({ distance: isOn }));
+    this.distance = distance;
+    const tools = [this.toolbar(surface, distance), this.cutControls, this.pickedLabel.element, this.pickedPart.element];
+    this.element.append(h('div', { class: 'tools' }, ...tools), distance.legend);
     this.scope.listen(surface.canvas, 'keydown', (event: KeyboardEvent) => this.moveKey(event, surface));
     if (this.options.hasKeys) {
       this.scope.listen(window, 'keydown', (event: KeyboardEvent) => this.toolKey(event, surface));
@@ -200,6 +205,7 @@ export class SurfacePane {
   private picked(picked: Picked | null, surface: Surface): void {
     if (!this.isMeasuring) {
       this.options.labels.pick(picked?.label ?? null);
+      this.pickedPart.show(picked?.point ?? null);
       return;
     }
     if (!picked) {
@@ -231,7 +237,7 @@ export class SurfacePane {
     this.toggles.get(name)?.setAttribute('aria-pressed', String(isDown));
   }
 
-  private toolbar(surface: Surface): HTMLElement {
+  private toolbar(surface: Surface, distance: DistanceLook): HTMLElement {
     const opacity = h('input', {
       type: 'range',
       min: 0.1,
@@ -261,6 +267,7 @@ export class SurfacePane {
         { class: 'tool-group' },
         this.toggle('flat', 'Flat', 'Flat shading shows every triangle (t)', () => this.toggleFlat()),
         this.toggle('wireframe', 'Wires', 'Edges only (w)', () => this.toggleWires()),
+        distance.toggle,
         h('label', { class: 'opacity' }, h('span', {}, 'Opacity'), opacity),
       ),
       h(
@@ -303,6 +310,7 @@ export class SurfacePane {
     }
     this.showCutControls(volume);
     this.placeCut();
+    this.surface.faceCut();
   }
 
   private showCutControls(volume: Volume): void {
@@ -333,6 +341,7 @@ export class SurfacePane {
       this.cut.index = Math.floor(volume.dims[axisIndex(this.cut.axis)] / 2);
       this.showCutControls(volume);
       this.placeCut();
+      this.surface?.faceCut();
     });
     const other = checkbox('Other side', this.cut.flipped, (flipped) => {
       this.cut.flipped = flipped;
@@ -383,7 +392,7 @@ export class SurfacePane {
   private async savePicture(surface: Surface): Promise<void> {
     try {
       const blob = await surface.picture(cssColour('--viewport'));
-      saveBlob(blob, `surface-${shortId(this.job.id)}.png`);
+      saveBlob(blob, fileNameOf(this.job, this.options.volume, '.png'));
     } catch (error) {
       tellError(error);
     }
@@ -412,6 +421,7 @@ export class SurfacePane {
     else if (key === 'w') this.toggleWires();
     else if (key === 'c') this.toggleCut();
     else if (key === 'm') this.toggleMeasure();
+    else if (key === 'd') this.distance?.set(!this.distance.isOn);
     else if (key === 'h') this.pickedLabel.hide();
     else if (key === 'o') this.pickedLabel.isolate();
     else if (key === 'e') this.options.labels.showAll();

@@ -3,14 +3,17 @@ import { ApiError, asApiError, mayPass } from '../api/problem';
 import type { UploadedVolume } from '../api/types';
 import { upload, type RawDescription } from '../api/upload';
 import { button, h, icon } from '../ui/dom';
-import { formatBytes } from '../ui/format';
-import { refusal } from '../ui/notices';
-import type { Scope } from '../ui/signal';
+import { refusal, tell, tellError } from '../ui/notices';
+import { hashOf } from '../ui/route';
+import { Signal } from '../ui/signal';
 import { filesOfDrop, filesOfList, gather, type Gathered } from '../volume/gather';
+import { volumeName } from '../volume/names';
+import { mayBeVolume } from '../volume/sniff';
 import type { NamedFile } from '../volume/tar';
 import { outcomeList, outcomeOf, type Outcome } from './outcomes';
 import { rawForm } from './raw_form';
 import { acceptButton, choiceForms, type Choices } from './remedies';
+import { UploadProgress } from './upload_progress';
 
 const arrow = 'M8 11V2.5M4.5 6 8 2.5 11.5 6M2.5 10.5v3h11v-3';
 
@@ -25,50 +28,56 @@ interface Addition {
 // Called with the only volume of an upload, or with none after an upload of several, which stay listed here.
 type OnVolumes = (only: UploadedVolume | null) => void;
 
-// How far an upload is.
-class Progress {
-  readonly bar: HTMLProgressElement;
-  readonly text = h('p', { class: 'upload-status', role: 'status' });
-  private readonly began = performance.now();
+const idle = '';
 
-  constructor(private readonly total: number) {
-    this.bar = h('progress', { max: total, value: 0, 'aria-label': 'Upload' });
-  }
-
-  show(sent: number): void {
-    this.bar.value = sent;
-    if (sent >= this.total) {
-      this.bar.removeAttribute('value');
-      this.text.textContent = `${formatBytes(this.total)} sent; the server reads the volume`;
-      return;
-    }
-    const rate = sent / Math.max(0.001, (performance.now() - this.began) / 1000);
-    this.text.textContent = `${formatBytes(sent)} of ${formatBytes(this.total)}, ${formatBytes(rate)}/s`;
-  }
-}
-
+// The whole page has one. An upload goes on while other views are shown; `state` says in a word what it does.
 export class UploadPanel {
   readonly element: HTMLElement;
+  readonly state = new Signal<string>(idle);
+  // Null while the view that shows this panel is not there.
+  onVolumes: OnVolumes | null = null;
   private readonly body = h('div', { class: 'drop-body' });
+  private readonly queue = h('p', { class: 'upload-queue', role: 'status', hidden: true });
   private readonly fileInput = h('input', { type: 'file', multiple: true, hidden: true, 'data-pick': 'files' });
   private readonly folderInput = h('input', { type: 'file', webkitdirectory: true, hidden: true, 'data-pick': 'folder' });
   private running: AbortController | null = null;
+  private waiting: Gathered[] = [];
 
-  constructor(
-    private readonly scope: Scope,
-    private readonly onVolumes: OnVolumes,
-  ) {
+  constructor() {
     this.element = h(
       'section',
       { class: 'drop', 'aria-label': 'Upload a volume' },
       this.body,
+      this.queue,
       this.fileInput,
       this.folderInput,
     );
     this.takeChosenFiles();
-    this.takeDrops();
-    scope.onEnd(() => this.running?.abort());
     this.showIdle();
+  }
+
+  get isBusy(): boolean {
+    return this.running !== null;
+  }
+
+  // Uploads them; after the upload that is under way.
+  take(files: NamedFile[]): void {
+    const gathered = gather(files);
+    if (!gathered) {
+      if (!this.running) this.showUnusable(new ApiError(-1, 'Nothing to upload', 'There are no files with content in it.'));
+    } else if (this.running) {
+      this.waiting.push(gathered);
+      this.showQueue();
+    } else {
+      void this.begin(gathered);
+    }
+  }
+
+  takeDrop(transfer: DataTransfer): void {
+    filesOfDrop(transfer).then(
+      (files) => this.take(files),
+      (error: unknown) => this.showUnusable(asApiError(error)),
+    );
   }
 
   private takeChosenFiles(): void {
@@ -80,52 +89,60 @@ export class UploadPanel {
     }
   }
 
-  // The whole page takes a drop: a file that misses the zone would replace the page.
-  private takeDrops(): void {
-    const { scope, element } = this;
-    scope.listen(window, 'dragover', (event: DragEvent) => {
-      event.preventDefault();
-      element.classList.add('over');
-    });
-    scope.listen(window, 'dragleave', (event: DragEvent) => {
-      if (event.relatedTarget === null) element.classList.remove('over');
-    });
-    scope.listen(window, 'drop', (event: DragEvent) => {
-      event.preventDefault();
-      element.classList.remove('over');
-      if (!event.dataTransfer) return;
-      filesOfDrop(event.dataTransfer).then(
-        (files) => this.take(files),
-        (error: unknown) => this.showUnusable(asApiError(error)),
-      );
-    });
+  private showQueue(): void {
+    const count = this.waiting.length;
+    this.queue.hidden = count === 0;
+    this.queue.textContent = `Then ${this.waiting.map(({ name }) => name).join(', ')}`;
   }
 
-  private take(files: NamedFile[]): void {
-    if (this.running) return;
-    const gathered = gather(files);
-    if (gathered) void this.send(gathered);
-    else this.showUnusable(new ApiError(-1, 'Nothing to upload', 'There are no files with content in it.'));
+  // What surely is no volume is not sent without being asked about.
+  private async begin(gathered: Gathered): Promise<void> {
+    this.running = new AbortController();
+    if (gathered.count > 1 || (await mayBeVolume(gathered.body).catch(() => true))) {
+      await this.send(gathered);
+      return;
+    }
+    this.running = null;
+    const error = new ApiError(
+      415,
+      'This is no volume that can be read',
+      `The first bytes of ${gathered.name} are those of no known format. Nothing was sent.`,
+    );
+    const anyway = button('Upload it anyway', () => void this.send(gathered));
+    this.showProblem(error, gathered, anyway);
   }
 
   private async send(gathered: Gathered, addition: Addition = {}): Promise<void> {
     const controller = new AbortController();
     this.running = controller;
-    const progress = new Progress(gathered.body.size);
+    const progress = new UploadProgress(gathered.body.size);
     this.showRunning(gathered, progress, controller);
+    this.state.value = 'Uploading';
     try {
       const uploaded = await upload(gathered.body, {
         ...addition,
         name: gathered.name,
         signal: controller.signal,
-        onProgress: (sent) => progress.show(sent),
+        onProgress: (sent) => {
+          progress.show(sent);
+          this.state.value = `Uploading ${Math.floor((100 * sent) / gathered.body.size)} %`;
+        },
       });
-      if (!this.scope.isOver) this.showUploaded(uploaded, gathered, addition);
-    } catch (error) {
-      if (!this.scope.isOver) this.showFailed(error, gathered, addition);
-    } finally {
       this.running = null;
+      this.state.value = idle;
+      this.showUploaded(uploaded, gathered, addition);
+    } catch (error) {
+      this.running = null;
+      this.state.value = idle;
+      this.showFailed(error, gathered, addition);
     }
+  }
+
+  // What waits comes next, unless a person has to look at this one first.
+  private goOn(): void {
+    const [next] = this.waiting.splice(0, 1);
+    this.showQueue();
+    if (next) void this.begin(next);
   }
 
   private showUploaded(uploaded: UploadedVolume[], gathered: Gathered, { outcomes, choices = {} }: Addition): void {
@@ -136,7 +153,21 @@ export class UploadPanel {
       this.showOutcomes(uploaded.map((each) => outcomeOf(each, choices)), gathered);
     } else {
       this.showIdle();
-      this.onVolumes(first);
+      this.tellOf(first);
+      this.goOn();
+    }
+  }
+
+  // To the view that shows this panel; elsewhere a note says that it is there.
+  private tellOf(only: UploadedVolume | null): void {
+    if (this.onVolumes && this.waiting.length === 0) {
+      this.onVolumes(only);
+      return;
+    }
+    this.onVolumes?.(null);
+    if (only?.volume) {
+      const link = h('a', { href: hashOf(['volumes', only.volume.id]) }, volumeName(only.volume));
+      tell(h('span', {}, link, ' was uploaded.'));
     }
   }
 
@@ -150,6 +181,7 @@ export class UploadPanel {
       this.showOutcomes(shown, gathered);
     } else if (isCancelled) {
       this.showIdle();
+      this.goOn();
     } else {
       this.showRefused(asApiError(error), gathered, addition);
     }
@@ -157,6 +189,7 @@ export class UploadPanel {
 
   private showIdle(): void {
     this.element.classList.remove('busy');
+    this.state.value = idle;
     this.body.replaceChildren(
       icon(arrow),
       h('h2', {}, 'Drop a volume here'),
@@ -170,7 +203,7 @@ export class UploadPanel {
     );
   }
 
-  private showRunning({ name, count }: Gathered, progress: Progress, controller: AbortController): void {
+  private showRunning({ name, count }: Gathered, progress: UploadProgress, controller: AbortController): void {
     this.element.classList.add('busy');
     this.body.replaceChildren(
       h('h2', {}, count > 1 ? `${name} (${count} files)` : name),
@@ -182,18 +215,21 @@ export class UploadPanel {
 
   // What the server refused, with all that may help it: another try, a choice, a description.
   private showRefused(error: ApiError, gathered: Gathered, before: Addition): void {
-    this.element.classList.remove('busy');
     const again = mayPass(error) && button('Try again', () => void this.send(gathered, before));
     const known = before.choices ?? {};
     const sendWith = (choices: Choices): void => void this.send(gathered, { ...before, choices });
-    const parts: Node[] = [
-      refusal(error, again, acceptButton(error, known, sendWith), this.otherButton()),
-      ...choiceForms(error, known, sendWith),
-    ];
+    this.showProblem(error, gathered, again, acceptButton(error, known, sendWith));
+    this.body.append(...choiceForms(error, known, sendWith));
+  }
+
+  private showProblem(error: ApiError, gathered: Gathered, ...actions: (HTMLElement | false)[]): void {
+    this.element.classList.remove('busy');
+    this.state.value = 'Upload: a question';
+    if (!this.onVolumes) tellError(error);
+    this.body.replaceChildren(refusal(error, ...actions, this.otherButton()));
     if (error.status === 415 && gathered.count === 1) {
-      parts.push(rawForm(gathered.body.size, (raw) => void this.send(gathered, { raw })));
+      this.body.append(rawForm(gathered.body.size, (raw) => void this.send(gathered, { raw })));
     }
-    this.body.replaceChildren(...parts);
   }
 
   // What became of several volumes stays until the next upload, since each refused one may be tried again.
@@ -205,7 +241,8 @@ export class UploadPanel {
       outcomeList(outcomes, (_, choices) => void this.send(gathered, { choices, outcomes })),
       h('div', { class: 'actions' }, button('Upload another', () => this.showIdle())),
     );
-    this.onVolumes(null);
+    this.tellOf(null);
+    if (outcomes.every(({ volume }) => volume !== null)) this.goOn();
   }
 
   private showUnusable(error: ApiError): void {
@@ -213,10 +250,15 @@ export class UploadPanel {
   }
 
   private otherButton(): HTMLButtonElement {
-    return button('Choose another', () => this.showIdle());
+    return button('Choose another', () => {
+      this.showIdle();
+      this.goOn();
+    });
   }
 }
 
 function withOutcome(outcomes: readonly Outcome[], choices: Choices, uploaded: UploadedVolume): Outcome[] {
   return outcomes.map((each) => (each.member === uploaded.member ? outcomeOf(uploaded, choices) : each));
 }
+
+export const uploads = new UploadPanel();

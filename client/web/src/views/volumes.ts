@@ -1,42 +1,37 @@
 // The first view: upload, the volumes that are there, the last surfaces.
 import { eraseVolume, listJobs, listVolumes, slicePicture } from '../api/client';
-import type { Job, Volume } from '../api/types';
+import { jobEvents } from '../api/job_events';
+import type { Job, UploadedVolume, Volume } from '../api/types';
 import { inWords, surfaceInWords } from '../job/parameters';
 import { button, h } from '../ui/dom';
 import { formatBytes, formatCount, formatSpacing, formatTime } from '../ui/format';
 import { ask, tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
-import { axisIndex, slicePlane } from '../volume/geometry';
-import { nameIn, volumeKind, volumeName } from '../volume/names';
-import { UploadPanel } from './upload_panel';
+import { axisIndex, slicePlacement, slicePlane } from '../volume/geometry';
+import { KnownVolumes } from '../volume/known';
+import { volumeKind, volumeName } from '../volume/names';
+import { uploads } from './upload_panel';
 
 const shownJobs = 8;
 const thumbnailPixels = 112;
+const refreshEvery = 5000;
+// Several changes of jobs are one reason to look.
+const refreshDelay = 700;
 
 // The middle axial slice, turned as radiologists look.
 async function paintThumbnail(canvas: HTMLCanvasElement, volume: Volume, signal: AbortSignal): Promise<void> {
-  const { normal, right, down } = slicePlane(volume, 'axial');
+  const plane = slicePlane(volume, 'axial');
+  const { normal } = plane;
   const index = Math.floor(volume.dims[axisIndex(normal)] / 2);
   const bitmap = await createImageBitmap(
     await slicePicture(volume.id, normal, index, volume.range, signal),
   );
-  const size = (axis: 'x' | 'y' | 'z'): number =>
-    volume.dims[axisIndex(axis)] * volume.spacing[axisIndex(axis)];
-  const scale = thumbnailPixels / Math.max(size(right.axis), size(down.axis));
   const context = canvas.getContext('2d');
   if (!context) return;
-  const width = size(right.axis) * scale;
-  const height = size(down.axis) * scale;
-  context.translate((thumbnailPixels - width) / 2, (thumbnailPixels - height) / 2);
-  if (right.flipped) context.transform(-1, 0, 0, 1, width, 0);
-  if (down.flipped) context.transform(1, 0, 0, -1, 0, height);
-  if (axisIndex(right.axis) > axisIndex(down.axis)) {
-    context.transform(0, 1, 1, 0, 0, 0);
-    context.drawImage(bitmap, 0, 0, height, width);
-  } else {
-    context.drawImage(bitmap, 0, 0, width, height);
-  }
+  const room = { width: thumbnailPixels, height: thumbnailPixels, edge: 0 };
+  context.setTransform(...slicePlacement(volume, plane, room));
+  context.drawImage(bitmap, 0, 0);
   bitmap.close();
   canvas.dataset.painted = '';
 }
@@ -123,51 +118,134 @@ function surfaceRow(job: Job, volume: string): HTMLElement {
 }
 
 export async function volumesView(scope: Scope): Promise<HTMLElement> {
-  const list = h('ul', { class: 'cards' });
-  const count = h('span', { class: 'count' });
-  const surfaces = h('ul', { class: 'rows' });
-  const show = async (): Promise<void> => {
-    const [volumes, page] = await Promise.all([listVolumes(), listJobs()]);
-    count.textContent = volumes.length > 0 ? formatCount(volumes.length) : '';
-    list.replaceChildren(
-      ...[...volumes].reverse().map((volume) =>
-        volumeCard(volume, scope, () => void show().catch(tellError)),
+  const home = new Home(scope);
+  await home.refresh();
+  home.keepFresh();
+  return home.element;
+}
+
+class Home {
+  readonly element: HTMLElement;
+  private readonly known = new KnownVolumes();
+  // What a card shows, and the card.
+  private readonly cards = new Map<string, { text: string; card: HTMLElement }>();
+  private readonly list = h('ul', { class: 'cards' });
+  private readonly count = h('span', { class: 'count' });
+  private readonly surfaces = h('ul', { class: 'rows' });
+  private readonly more = button('Older volumes', () => void this.showMore().catch(tellError), { hidden: true });
+  private older: Volume[] = [];
+  // Where the list goes on behind the older ones.
+  private next: string | null = null;
+  private soon = 0;
+
+  constructor(private readonly scope: Scope) {
+    this.element = h(
+      'div',
+      { class: 'home' },
+      h('h1', { class: 'sr-only' }, 'Volumes and surfaces'),
+      uploads.element,
+      h(
+        'section',
+        { 'aria-labelledby': 'volumes-title' },
+        h('h2', { id: 'volumes-title' }, 'Volumes ', this.count),
+        this.list,
+        h('div', { class: 'actions' }, this.more),
+      ),
+      h(
+        'section',
+        { 'aria-labelledby': 'surfaces-title' },
+        h(
+          'div',
+          { class: 'section-head' },
+          h('h2', { id: 'surfaces-title' }, 'Last surfaces'),
+          h('a', { href: hashOf(['jobs']) }, 'All jobs'),
+        ),
+        this.surfaces,
       ),
     );
-    if (volumes.length === 0) {
-      list.append(h('li', { class: 'empty' }, 'No volumes yet. Drop one above to begin.'));
+    uploads.onVolumes = (only) => this.uploaded(only);
+    scope.onEnd(() => (uploads.onVolumes = null));
+  }
+
+  // What others do is seen as well: jobs at once, volumes some seconds later.
+  keepFresh(): void {
+    const refresh = (): void => {
+      // A lost connection is said at the top of the page.
+      if (!document.hidden && !this.scope.isOver) this.refresh().catch(() => undefined);
+    };
+    const timer = setInterval(refresh, refreshEvery);
+    this.scope.onEnd(() => clearInterval(timer));
+    this.scope.onEnd(() => clearTimeout(this.soon));
+    const refreshSoon = (): void => {
+      if (this.soon !== 0) return;
+      this.soon = window.setTimeout(() => {
+        this.soon = 0;
+        refresh();
+      }, refreshDelay);
+    };
+    jobEvents.listen({ onBegin: refreshSoon, onChange: refreshSoon, onPause: () => undefined }, this.scope.signal);
+    this.scope.listen(document, 'visibilitychange', refresh);
+  }
+
+  async refresh(): Promise<void> {
+    const [page, { jobs }] = await Promise.all([listVolumes('', this.scope.signal), listJobs()]);
+    const newest = new Set(page.volumes.map(({ id }) => id));
+    this.older = this.older.filter(({ id }) => !newest.has(id));
+    if (this.older.length === 0) this.next = page.next;
+    this.known.learn(page.volumes);
+    const shown = jobs.slice(0, shownJobs);
+    await this.known.find(shown.map(({ volume }) => volume));
+    this.showVolumes([...page.volumes, ...this.older]);
+    this.surfaces.replaceChildren(...shown.map((job) => surfaceRow(job, this.known.nameOf(job.volume))));
+    if (shown.length === 0) this.surfaces.append(h('li', { class: 'empty' }, 'No surfaces yet.'));
+  }
+
+  private async showMore(): Promise<void> {
+    if (this.next === null || this.more.disabled) return;
+    this.more.disabled = true;
+    try {
+      const page = await listVolumes(this.next, this.scope.signal);
+      this.older = [...this.older, ...page.volumes];
+      this.next = page.next;
+      await this.refresh();
+    } finally {
+      this.more.disabled = false;
     }
-    const jobs = page.jobs.slice(0, shownJobs);
-    const byId = new Map(volumes.map((volume) => [volume.id, volume]));
-    surfaces.replaceChildren(...jobs.map((job) => surfaceRow(job, nameIn(byId, job.volume))));
-    if (jobs.length === 0) surfaces.append(h('li', { class: 'empty' }, 'No surfaces yet.'));
-  };
-  const panel = new UploadPanel(scope, (only) => {
-    if (only?.volume) {
-      // Its page shows the notes of the file that came first.
-      const notes = only.volume.notes.map(({ detail }) => detail);
-      if (only.status === 200) tell(['This volume was there already.', ...notes].join(' '));
-      go(['volumes', only.volume.id]);
-    } else {
-      void show().catch(tellError);
+  }
+
+  // Cards that stay as they are keep their elements, and with those their pictures and the focus.
+  private showVolumes(volumes: readonly Volume[]): void {
+    const cards = volumes.map((volume) => {
+      const text = JSON.stringify(volume);
+      const known = this.cards.get(volume.id);
+      if (known?.text === text) return known.card;
+      const card = volumeCard(volume, this.scope, () => this.erased(volume.id));
+      this.cards.set(volume.id, { text, card });
+      return card;
+    });
+    this.more.hidden = this.next === null;
+    this.count.textContent = volumes.length > 0 ? `${formatCount(volumes.length)}${this.next === null ? '' : '+'}` : '';
+    if (cards.length === 0) cards.push(h('li', { class: 'empty' }, 'No volumes yet. Drop one above to begin.'));
+    const isSame = cards.length === this.list.children.length && cards.every((card, at) => card === this.list.children[at]);
+    if (isSame) return;
+    const focused = document.activeElement;
+    this.list.replaceChildren(...cards);
+    if (focused instanceof HTMLElement && this.list.contains(focused)) focused.focus({ preventScroll: true });
+  }
+
+  private erased(volume: string): void {
+    this.older = this.older.filter(({ id }) => id !== volume);
+    this.refresh().catch(tellError);
+  }
+
+  private uploaded(only: UploadedVolume | null): void {
+    if (!only?.volume) {
+      this.refresh().catch(tellError);
+      return;
     }
-  });
-  await show();
-  return h(
-    'div',
-    { class: 'home' },
-    panel.element,
-    h('section', { 'aria-labelledby': 'volumes-title' }, h('h2', { id: 'volumes-title' }, 'Volumes ', count), list),
-    h(
-      'section',
-      { 'aria-labelledby': 'surfaces-title' },
-      h(
-        'div',
-        { class: 'section-head' },
-        h('h2', { id: 'surfaces-title' }, 'Last surfaces'),
-        h('a', { href: hashOf(['jobs']) }, 'All jobs'),
-      ),
-      surfaces,
-    ),
-  );
+    // Its page shows the notes of the file that came first.
+    const notes = only.volume.notes.map(({ detail }) => detail);
+    if (only.status === 200) tell(['This volume was there already.', ...notes].join(' '));
+    go(['volumes', only.volume.id]);
+  }
 }

@@ -108,3 +108,69 @@ export function slicePlane(volume: Directed, plane: Plane): SlicePlane {
   };
   return { plane, normal: along[normals[plane]], right: sliceAxis(right), down: sliceAxis(down) };
 }
+
+// The two axes of a slice's picture: its columns run along the first, its rows along the second.
+export function pictureAxes(normal: Axis): [0 | 1 | 2, 0 | 1 | 2] {
+  return normal === 'x' ? [1, 2] : normal === 'y' ? [0, 2] : [0, 1];
+}
+
+// a, b, c, d, e, f as a canvas takes them: x = a u + c v + e, y = b u + d v + f.
+export type Placement = [number, number, number, number, number, number];
+
+export interface Room {
+  width: number;
+  height: number;
+  // Left free on every side.
+  edge: number;
+}
+
+// Where a slice's picture lies in the room, as large as it fits, in true proportions: u and v count the
+// picture's columns and rows, whose samples are one wide. A volume whose axes are not at right angles (a tilted
+// gantry) gives a parallelogram, with its axis of the screen's right level.
+export function slicePlacement(volume: Geometry, { normal, right, down }: SlicePlane, room: Room): Placement {
+  const towards = ({ axis, flipped }: SliceAxis): Vec3 => {
+    const direction = axisDirection(volume, axisIndex(axis));
+    return flipped ? opposite(direction) : direction;
+  };
+  const cosine = dot(towards(right), towards(down));
+  const lean = Math.abs(cosine) < 1e-6 ? 0 : cosine;
+  const screenOf = (axis: 0 | 1 | 2): [number, number] => {
+    const isAcross = axisIndex(right.axis) === axis;
+    const { flipped } = isAcross ? right : down;
+    const step = volume.spacing[axis] * (flipped ? -1 : 1);
+    return isAcross ? [step, 0] : [step * lean, step * Math.sqrt(1 - lean * lean)];
+  };
+  const [columns, rows] = pictureAxes(normal);
+  const u = screenOf(columns);
+  const v = screenOf(rows);
+  const size = ([du, dv]: [number, number], at: 0 | 1): number => du * u[at] + dv * v[at];
+  const corners: [number, number][] = [
+    [0, 0],
+    [volume.dims[columns], 0],
+    [0, volume.dims[rows]],
+    [volume.dims[columns], volume.dims[rows]],
+  ];
+  const low = ([0, 1] as const).map((at) => Math.min(...corners.map((corner) => size(corner, at)))) as [number, number];
+  const high = ([0, 1] as const).map((at) => Math.max(...corners.map((corner) => size(corner, at)))) as [number, number];
+  const scale = Math.max(
+    1e-9,
+    Math.min(
+      (room.width - 2 * room.edge) / (high[0] - low[0]),
+      (room.height - 2 * room.edge) / (high[1] - low[1]),
+    ),
+  );
+  return [
+    u[0] * scale,
+    u[1] * scale,
+    v[0] * scale,
+    v[1] * scale,
+    (room.width - scale * (high[0] + low[0])) / 2,
+    (room.height - scale * (high[1] + low[1])) / 2,
+  ];
+}
+
+// Which column and row of the picture lie at a point.
+export function placedAt([a, b, c, d, e, f]: Placement, x: number, y: number): [number, number] {
+  const determinant = a * d - b * c;
+  return [(d * (x - e) - c * (y - f)) / determinant, (a * (y - f) - b * (x - e)) / determinant];
+}

@@ -16,10 +16,14 @@ export function volumeName(volume: Volume): string {
   return told.length > 0 ? told.join(', ') : volumeKind(volume);
 }
 
-// Of a job's volume, which may be gone.
-export function nameIn(volumes: ReadonlyMap<string, Volume>, id: string): string {
-  const volume = volumes.get(id);
-  return volume ? volumeName(volume) : 'a volume that was erased';
+// What a file made of it is called, without its suffix: nothing of whom it shows, since files are sent around.
+export function fileStem(volume: Volume | null, otherwise: string): string {
+  const own = (volume?.name ?? volume?.dicom?.series_description ?? '').replace(/\.(nii|nrrd|mha|mhd|vti|dcm|zip|tar|gz|tgz)\b/gi, '');
+  const plain = own
+    .normalize('NFKD')
+    .replace(/[^\w.-]+/g, '-')
+    .replace(/^[-.]+|[-.]+$/g, '');
+  return plain === '' ? otherwise : plain.slice(0, 60);
 }
 
 export function volumeKind(volume: Volume): string {

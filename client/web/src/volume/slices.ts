@@ -32,17 +32,27 @@ async function grey(picture: Blob): Promise<{ width: number; height: number; val
   return { width, height, values };
 }
 
+export function sliceKey(axis: Axis, index: number, window: Window): string {
+  return `${axis}/${index}/${window.join(',')}`;
+}
+
 export class SliceSource {
   // The oldest first.
   private readonly kept = new Map<string, Promise<Slice>>();
+  private readonly made = new Map<string, Slice>();
 
   constructor(
     private readonly volume: Volume,
     private readonly signal: AbortSignal,
   ) {}
 
+  // The slice if it is here already.
+  find(axis: Axis, index: number, window: Window): Slice | null {
+    return this.made.get(sliceKey(axis, index, window)) ?? null;
+  }
+
   get(axis: Axis, index: number, window: Window): Promise<Slice> {
-    const key = `${axis}/${index}/${window.join(',')}`;
+    const key = sliceKey(axis, index, window);
     const found = this.kept.get(key);
     if (found) {
       this.kept.delete(key);
@@ -53,10 +63,12 @@ export class SliceSource {
       .then(grey)
       .then((samples) => ({ axis, index, window, ...samples }));
     this.kept.set(key, slice);
+    slice.then((made) => this.made.set(key, made), () => undefined);
     slice.catch(() => this.kept.delete(key));
     for (const oldest of this.kept.keys()) {
       if (this.kept.size <= mostSlices) break;
       this.kept.delete(oldest);
+      this.made.delete(oldest);
     }
     return slice;
   }
@@ -83,6 +95,23 @@ export function greyTable(slice: Pick<Slice, 'window'>, shown: Window): Uint8Cla
     table[value] = (255 * (sample - shown[0])) / width;
   }
   return table;
+}
+
+// A sample's value as far as the slice tells it: between two values that are the same when it is exact.
+export interface ValueRange {
+  low: number;
+  high: number;
+}
+
+export function valueIn({ window: [low, high], values, width }: Slice, column: number, row: number): ValueRange {
+  const value = values[row * width + column] ?? 0;
+  const step = (high - low) / 255;
+  const middle = low + value * step;
+  // At both ends of the window it may be anything beyond.
+  return {
+    low: value === 0 ? -Infinity : middle - step / 2,
+    high: value === 255 ? Infinity : middle + step / 2,
+  };
 }
 
 // An iso-value in the units of a slice's values.

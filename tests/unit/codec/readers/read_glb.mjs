@@ -1,6 +1,7 @@
 // node read_glb.mjs FILE.glb OUT: what gltf-validator and draco3d make of a GLB file. Fails where the
 // validator finds an error or a warning. Writes the primitives to OUT, each as the numbers of points,
-// of triangles and of normals, then points and normals as floats and triangles as indices.
+// of triangles, of normals and of distances, then points, normals and distances as floats and triangles
+// as indices.
 import { readFileSync, writeFileSync } from 'node:fs';
 import draco3d from 'draco3d';
 import validator from 'gltf-validator';
@@ -58,11 +59,20 @@ function decode(primitive) {
     'NORMAL' in draco.attributes
       ? vectors(decoder, mesh, draco.attributes.NORMAL)
       : new Float32Array();
+  const distances =
+    '_DISTANCE_MM' in draco.attributes
+      ? vectors(decoder, mesh, draco.attributes._DISTANCE_MM)
+      : new Float32Array();
   const indices = triangles(decoder, mesh);
-  const counts = new Uint32Array([points.length / 3, indices.length / 3, normals.length / 3]);
+  const counts = new Uint32Array([
+    points.length / 3,
+    indices.length / 3,
+    normals.length / 3,
+    distances.length,
+  ]);
   decoderModule.destroy(mesh);
   decoderModule.destroy(decoder);
-  return [counts, points, normals, indices].map((array) => new Uint8Array(array.buffer));
+  return [counts, points, normals, distances, indices].map((array) => new Uint8Array(array.buffer));
 }
 
 const primitives = (gltf.meshes ?? []).flatMap((mesh) => mesh.primitives.flatMap(decode));

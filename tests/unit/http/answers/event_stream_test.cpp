@@ -91,5 +91,43 @@ TEST_F(EventStreamTest, ListenersThatAreGoneAreForgotten) {
   EXPECT_THAT(told_by(*second), testing::HasSubstr("id: 2\n"));
 }
 
+TEST_F(EventStreamTest, ToAllJobsTellsOfEachThatItsViewerSees) {
+  const auto mine = event_source(broadcaster_.listen_to_all("me"), places_.take(""));
+  const auto all = event_source(broadcaster_.listen_to_all(std::nullopt), places_.take(""));
+  const auto owned = [](std::uint64_t id, EventKind kind, const std::string& job,
+                        const std::string& owner) {
+    store::Event made = event(id, kind, job);
+    made.owner = owner;
+    return made;
+  };
+  EXPECT_TRUE(broadcaster_.publish(owned(1, EventKind::kProgress, "a", "me")));
+  broadcaster_.publish(owned(2, EventKind::kStage, "b", "other"));
+  // What another job did in between hides no newer progress.
+  broadcaster_.publish(owned(3, EventKind::kProgress, "a", "me"));
+  broadcaster_.publish(owned(4, EventKind::kDone, "a", "me"));
+  const std::string progress =
+      "event: progress\n"
+      "data: {\"id\":\"a\",\"state\":\"running\",\"stage\":\"smooth\",\"progress\":0.5}\n\n";
+  const std::string done =
+      "event: done\n"
+      "data: {\"id\":\"a\",\"state\":\"succeeded\",\"stage\":\"smooth\",\"progress\":0.5}\n\n";
+  EXPECT_EQ(told_by(*mine), "retry: 2000\n\n" + progress + done);
+  const std::string others = told_by(*all);
+  EXPECT_THAT(others, testing::HasSubstr("\"id\":\"b\""));
+  EXPECT_THAT(others, testing::HasSubstr(progress + done));
+  std::string nothing;
+  EXPECT_EQ(mine->next(nothing), net::Source::More::kLater);
+}
+
+TEST_F(EventStreamTest, ToAllJobsEndsForWhoDoesNotRead) {
+  const auto stream = event_source(broadcaster_.listen_to_all(std::nullopt), places_.take(""));
+  for (std::uint64_t id = 1; id <= Broadcaster::Mailbox::kMostUnread + 1; ++id) {
+    broadcaster_.publish(event(id, EventKind::kStage, std::to_string(id)));
+  }
+  std::string bytes;
+  EXPECT_EQ(stream->next(bytes), net::Source::More::kEnd);
+  EXPECT_EQ(bytes, "");
+}
+
 }  // namespace
 }  // namespace isomesh::http

@@ -24,6 +24,8 @@ TEST(Metrics, AreOpenMetrics) {
   EXPECT_THAT(text, HasSubstr("# HELP isomesh_jobs_ended Jobs"));
   EXPECT_THAT(text, HasSubstr("\nisomesh_jobs_ended_total{state=\"failed\"} 0\n"));
   EXPECT_THAT(text, Not(ContainsRegex("# [A-Z]+ [a-z_]+_total ")));
+  EXPECT_THAT(text,
+              ContainsRegex("\nisomesh_build_info\\{mesher=\"[0-9]+\",version=\"[0-9.]+\"\\} 1\n"));
 }
 
 TEST(Metrics, CountRequestsByRouteAndClassOfStatus) {

@@ -1,0 +1,17 @@
+# cmake -D FILE=FILE -P write.cmake -- PROGRAM ARGUMENTS..: writes what the program prints to the file.
+set(command)
+set(is_command OFF)
+math(EXPR last "${CMAKE_ARGC} - 1")
+foreach(at RANGE ${last})
+  if(is_command)
+    list(APPEND command ${CMAKE_ARGV${at}})
+  elseif(CMAKE_ARGV${at} STREQUAL "--")
+    set(is_command ON)
+  endif()
+endforeach()
+# Not of whoever builds: what a program prints must not depend on the environment.
+foreach(name SERVER TOKEN CA CONFIG DATA LISTEN)
+  unset(ENV{ISOMESH_${name}})
+endforeach()
+execute_process(COMMAND ${command} OUTPUT_FILE ${FILE}.part COMMAND_ERROR_IS_FATAL ANY)
+file(RENAME ${FILE}.part ${FILE})

@@ -1,0 +1,57 @@
+// What libcurl hands out, let go of when it is not needed any more. For those who are linked with
+// it.
+#pragma once
+
+#include <memory>
+#include <new>
+#include <string>
+
+#include <curl/curl.h>
+
+#include "base/error.h"
+
+namespace isomesh::curl {
+
+struct EasyCleanup {
+  void operator()(CURL* easy) const { curl_easy_cleanup(easy); }
+};
+struct MultiCleanup {
+  void operator()(CURLM* multi) const { curl_multi_cleanup(multi); }
+};
+struct ListCleanup {
+  void operator()(curl_slist* list) const { curl_slist_free_all(list); }
+};
+using Easy = std::unique_ptr<CURL, EasyCleanup>;
+using Multi = std::unique_ptr<CURLM, MultiCleanup>;
+using Headers = std::unique_ptr<curl_slist, ListCleanup>;
+
+// To be called before anything else of the library. Throws Error kInternal.
+inline void start() {
+  // Not thread safe in every version, so it is called once.
+  static const CURLcode ready = curl_global_init(CURL_GLOBAL_DEFAULT);
+  if (ready != CURLE_OK) throw Error(ErrorCode::kInternal, "libcurl cannot be used");
+}
+
+inline Multi make_multi() {
+  start();
+  Multi multi(curl_multi_init());
+  if (!multi) throw Error(ErrorCode::kInternal, "libcurl cannot be used");
+  return multi;
+}
+
+inline Easy make_easy() {
+  start();
+  Easy easy(curl_easy_init());
+  if (!easy) throw Error(ErrorCode::kInternal, "libcurl cannot be used");
+  return easy;
+}
+
+// Adds a header's line, which holds no control characters.
+inline void append(Headers& headers, const std::string& line) {
+  curl_slist* longer = curl_slist_append(headers.get(), line.c_str());
+  if (longer == nullptr) throw std::bad_alloc();
+  static_cast<void>(headers.release());
+  headers.reset(longer);
+}
+
+}  // namespace isomesh::curl

@@ -1,0 +1,178 @@
+#include "client/cli/console.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <mutex>
+
+#include <unistd.h>
+
+#include "base/files.h"
+#include "base/text.h"
+#include "client/cli/commands.h"
+#include "client/cli/report.h"
+#include "client/cli/text.h"
+#include "client/isomesh/package.h"
+#include "proto/parameters.h"
+
+namespace isomesh::cli {
+namespace {
+
+std::mutex& console_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+Error reason_of(const Job& job) {
+  if (job.error) return to_error(*job.error);
+  return {ErrorCode::kCancelled, "the job was cancelled"};
+}
+
+std::string why_empty(const MeshSummary& mesh) {
+  if (mesh.dropped.components > 0) return "no part of it was kept";
+  if (!mesh.iso) return "the labels have no surface";
+  return "the volume has no surface at the iso-value " + human_number(*mesh.iso);
+}
+
+// "Soft tissue" and "soft-tissue" are "soft tissue".
+std::string folded(const std::string& name) {
+  std::string text = lower(name);
+  std::ranges::replace(text, '-', ' ');
+  std::ranges::replace(text, '_', ' ');
+  return text;
+}
+
+// A folder may hold more than its name lets one think.
+void tell_folders(const std::vector<std::filesystem::path>& files) {
+  for (const std::filesystem::path& path : files) {
+    std::error_code error;
+    if (!std::filesystem::is_directory(path, error)) continue;
+    const std::vector<PackedFile> packed = files_of_upload(path);
+    std::uint64_t bytes = 0;
+    for (const PackedFile& file : packed) bytes += std::filesystem::file_size(file.path, error);
+    complain("sending " + grouped(static_cast<std::int64_t>(packed.size())) + " files of " +
+             path.string() + ", " + human_bytes(bytes));
+  }
+}
+
+// Checked as a file is before it appears, and then written.
+void fetch_to_stdout(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
+                     std::optional<std::int64_t> label) {
+  const ScratchFile file(std::filesystem::temp_directory_path(), ".mesh");
+  fetch(client, id, {file.path(), output.format}, bar, label);
+  std::ifstream mesh(file.path(), std::ios::binary);
+  std::cout << mesh.rdbuf() << std::flush;
+  if (!std::cout) {
+    throw Error(ErrorCode::kInvalidParameter, "standard output takes no more of the mesh");
+  }
+}
+
+}  // namespace
+
+Client client_of(const Options& options, const std::stop_token& stop) {
+  return Client({.server = options.server,
+                 .token = options.token,
+                 .authorities = options.authorities,
+                 .stop = stop});
+}
+
+void complain(const std::string& message) {
+  const std::scoped_lock lock(console_mutex());
+  std::cerr << "isomesh: " << message << '\n';
+}
+
+void complain(const Error& error, const std::string& subject) {
+  const std::string remedy = remedy_report(error.remedy());
+  const std::scoped_lock lock(console_mutex());
+  std::cerr << "isomesh: " << subject << (subject.empty() ? "" : ": ") << error.what() << '\n'
+            << remedy;
+}
+
+int status_of(const Error& error) {
+  return error.code() == ErrorCode::kUnreachable ? kServerUnreachable : kRefused;
+}
+
+int status_of(const Job& job, const Options& options, const std::string& subject) {
+  if (job.state == JobState::kFailed || job.state == JobState::kCancelled) {
+    complain(reason_of(job), subject);
+    return kRefused;
+  }
+  if (!job.mesh || !job.mesh->empty || options.allow_empty) return kDone;
+  complain((subject.empty() ? "" : subject + ": ") + "the surface is empty: " +
+           why_empty(*job.mesh) + "; --allow-empty takes that for a result");
+  return kRefused;
+}
+
+void tell_notes(const Volume& volume) {
+  for (const Note& note : volume.notes) complain("note: " + note.detail + " (" + note.code + ")");
+}
+
+Job wait(Client& client, const std::string& id, ProgressBar& bar) {
+  const JobProgress draw = [&](const Job& job) { bar.job(job); };
+  Job job = client.wait(id, bar.visible() ? draw : JobProgress{});
+  bar.clear();
+  return job;
+}
+
+void fetch(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
+           std::optional<std::int64_t> label) {
+  if (output.is_stdout()) return fetch_to_stdout(client, id, output, bar, label);
+  client.fetch(
+      id, output.format, output.path,
+      [&](std::uint64_t done, std::uint64_t total) { bar.transfer("download", done, total); },
+      label);
+  bar.clear();
+}
+
+std::vector<UploadedVolume> upload_all(Client& client, const Options& options,
+                                       const std::vector<std::filesystem::path>& files,
+                                       const UploadOptions& how, ProgressBar& bar) {
+  if (!options.quiet) tell_folders(files);
+  UploadOptions watched = how;
+  watched.progress = [&](std::uint64_t done, std::uint64_t total) {
+    bar.transfer(done < total ? "upload" : "check", done, total);
+  };
+  std::vector<UploadedVolume> volumes = client.upload_all(files, watched);
+  bar.clear();
+  if (options.quiet) return volumes;
+  for (const UploadedVolume& each : volumes) {
+    if (each.volume) tell_notes(*each.volume);
+  }
+  return volumes;
+}
+
+double preset_of(const Volume& volume, const std::string& name) {
+  std::vector<std::string> names;
+  for (const Preset& preset : volume.presets) {
+    if (folded(preset.name) == folded(name)) return preset.iso;
+    names.push_back('"' + preset.name + '"');
+  }
+  const std::string has =
+      names.empty()
+          ? "it has none, which CTs have whose values are Hounsfield units and reach there"
+          : "it has " + listed(names);
+  throw Error(ErrorCode::kInvalidParameter,
+              "--iso: the volume has no preset \"" + name + "\"; " + has);
+}
+
+std::string outputs_report(const Job& job, const std::vector<Output>& outputs) {
+  std::string text;
+  for (const Output& output : outputs) {
+    if (output.is_stdout()) continue;
+    const auto file = job.mesh->files.find(output.format);
+    text += output.path.string();
+    if (file != job.mesh->files.end()) text += "  " + human_bytes(file->second.bytes);
+    text += '\n';
+  }
+  return text;
+}
+
+std::vector<std::filesystem::path> paths_of(const std::vector<Output>& outputs) {
+  std::vector<std::filesystem::path> paths;
+  paths.reserve(outputs.size());
+  for (const Output& output : outputs) paths.push_back(output.path);
+  return paths;
+}
+
+}  // namespace isomesh::cli

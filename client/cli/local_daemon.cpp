@@ -1,0 +1,150 @@
+#include "client/cli/local_daemon.h"
+
+#include <array>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <string_view>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "base/descriptor.h"
+#include "base/files.h"
+#include "base/text.h"
+#include "proto/error.h"
+
+namespace isomesh::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_program(const fs::path& file) {
+  std::error_code absent;
+  return fs::is_regular_file(file, absent) && ::access(file.c_str(), X_OK) == 0;
+}
+
+fs::path find_program(const fs::path& given) {
+  if (!given.empty()) {
+    if (is_program(given)) return given;
+    throw Error(ErrorCode::kInvalidParameter, "--daemon: " + given.string() + " is no program");
+  }
+  std::error_code unknown;
+  const fs::path own = fs::read_symlink("/proc/self/exe", unknown).parent_path();
+  std::vector<fs::path> places = {own, own / "../sbin"};
+  const char* path = std::getenv("PATH");
+  for (const std::string_view folder : split(path == nullptr ? "" : path, ':')) {
+    places.emplace_back(folder);
+  }
+  for (const fs::path& place : places) {
+    if (is_program(place / "isomeshd")) return (place / "isomeshd").lexically_normal();
+  }
+  throw Error(ErrorCode::kInvalidParameter,
+              "isomeshd is not installed here; --daemon FILE says where it is");
+}
+
+// What configures another daemon must not reach this one.
+std::vector<std::string> environment() {
+  std::vector<std::string> all;
+  for (char** entry = environ; *entry != nullptr; ++entry) {
+    if (!std::string_view(*entry).starts_with("ISOMESH")) all.emplace_back(*entry);
+  }
+  return all;
+}
+
+std::vector<char*> pointers(std::vector<std::string>& texts) {
+  std::vector<char*> result;
+  for (std::string& text : texts) result.push_back(text.data());
+  result.push_back(nullptr);
+  return result;
+}
+
+// The first line that comes, or what there is of it when the writer ends.
+std::string first_line(int pipe) {
+  std::string line;
+  char letter = 0;
+  while (::read(pipe, &letter, 1) == 1 && letter != '\n') line += letter;
+  return line;
+}
+
+}  // namespace
+
+LocalDaemon::LocalDaemon(const fs::path& program, int jobs) {
+  const fs::path found = find_program(program);
+  std::string folder = (fs::temp_directory_path() / "isomesh-XXXXXX").string();
+  if (::mkdtemp(folder.data()) == nullptr) {
+    throw Error(ErrorCode::kInvalidParameter, "no folder can be made: " + folder);
+  }
+  folder_ = folder;
+  try {
+    start(found, jobs);
+  } catch (...) {
+    end();
+    throw;
+  }
+}
+
+LocalDaemon::~LocalDaemon() { end(); }
+
+std::string LocalDaemon::url() const { return "unix:" + (folder_ / "socket").string(); }
+
+void LocalDaemon::start(const fs::path& program, int jobs) {
+  std::vector<std::string> words = {program.string(),
+                                    "--listen",
+                                    url(),
+                                    "--data",
+                                    folder_ / "data",
+                                    "--workers",
+                                    std::to_string(jobs),
+                                    "--log-level",
+                                    "error",
+                                    "--drain-seconds",
+                                    "0"};
+  std::vector<std::string> variables = environment();
+  const std::vector<char*> arguments = pointers(words);
+  const std::vector<char*> setting = pointers(variables);
+  std::array<int, 2> ends = {};
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) {
+    throw Error(ErrorCode::kInternal, std::string("a pipe: ") + std::strerror(errno));
+  }
+  const Descriptor output(ends[0]);
+  Descriptor input(ends[1]);
+  const std::string log = folder_ / "log";
+  const Descriptor errors(::open(log.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600));
+  const pid_t parent = ::getpid();
+  process_ = ::fork();
+  if (process_ == 0) {
+    // Only calls that are safe after a fork. Ctrl-C is for the command, which ends the daemon.
+    ::setpgid(0, 0);
+    ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (::getppid() != parent) ::_exit(1);
+    ::dup2(input.number(), STDOUT_FILENO);
+    ::dup2(errors.number(), STDERR_FILENO);
+    ::execve(arguments[0], arguments.data(), setting.data());
+    ::_exit(127);
+  }
+  if (process_ < 0) throw Error(ErrorCode::kInternal, "no process can be started");
+  input = Descriptor(-1);
+  if (!first_line(output.number()).starts_with("listening on ")) {
+    const std::string text = read_whole(log);
+    const std::string_view said = trimmed(text);
+    throw Error(ErrorCode::kUnreachable, program.string() + " did not start" +
+                                             (said.empty() ? "" : ": ") + std::string(said));
+  }
+}
+
+void LocalDaemon::end() noexcept {
+  if (process_ > 0) {
+    ::kill(process_, SIGTERM);
+    while (::waitpid(process_, nullptr, 0) < 0 && errno == EINTR) {
+    }
+  }
+  process_ = -1;
+  std::error_code ignored;  // what stays is in the folder for temporary files
+  std::filesystem::remove_all(folder_, ignored);
+}
+
+}  // namespace isomesh::cli

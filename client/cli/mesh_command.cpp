@@ -1,0 +1,253 @@
+#include "client/cli/mesh_command.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "base/files.h"
+#include "client/cli/batch.h"
+#include "client/cli/commands.h"
+#include "client/cli/console.h"
+#include "client/cli/report.h"
+#include "client/cli/text.h"
+#include "proto/json.h"
+
+namespace isomesh::cli {
+namespace {
+
+class Stopwatch {
+ public:
+  double milliseconds() const {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_)
+        .count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+// After an interrupt the job is no longer wanted, which the server must learn. The user does not
+// wait long for that.
+void cancel_after_stop(const Options& options, const std::string& id) {
+  Client client({.server = options.server,
+                 .token = options.token,
+                 .authorities = options.authorities,
+                 .connect_timeout = std::chrono::seconds{2},
+                 .silence_timeout = std::chrono::seconds{5}});
+  try {
+    client.cancel(id);
+    complain("interrupted; the job " + id + " is cancelled");
+  } catch (const Error& error) {
+    complain("interrupted; the job " + id + " could not be cancelled: " + error.what());
+  }
+}
+
+std::vector<MeshFormat> formats_of(const std::vector<Output>& outputs) {
+  std::vector<MeshFormat> formats;
+  for (const Output& output : outputs) {
+    if (std::ranges::find(formats, output.format) == formats.end()) {
+      formats.push_back(output.format);
+    }
+  }
+  return formats;
+}
+
+// What came from standard input, as a file, because an upload's size is told ahead.
+std::unique_ptr<ScratchFile> stdin_as_file() {
+  auto file = std::make_unique<ScratchFile>(std::filesystem::temp_directory_path(), ".volume");
+  std::vector<char> block(std::size_t{1} << 20);
+  while (const std::size_t count = std::fread(block.data(), 1, block.size(), stdin)) {
+    file->write(std::as_bytes(std::span(block).first(count)));
+  }
+  if (std::ferror(stdin) != 0) {
+    throw Error(ErrorCode::kInvalidParameter, "standard input cannot be read");
+  }
+  return file;
+}
+
+// One input's way: up, meshed, down. Made for each thread.
+class Run {
+ public:
+  Run(const Options& options, const std::stop_token& stop, bool is_one_of_many)
+      : options_(options),
+        stop_(stop),
+        is_one_of_many_(is_one_of_many),
+        client_(client_of(options, stop)),
+        bar_(!options.quiet && (!is_one_of_many || options.jobs == 1)) {}
+
+  // The exit status. Throws Error.
+  int input(const Input& input) {
+    seen_ = {};
+    std::unique_ptr<ScratchFile> copy;
+    UploadOptions how = options_.upload;
+    std::vector<std::filesystem::path> files = input.files;
+    for (std::filesystem::path& file : files) {
+      if (file != "-") continue;
+      copy = stdin_as_file();
+      file = copy->path();
+      if (how.name.empty()) how.name = "stdin";
+    }
+    const Stopwatch uploading;
+    const std::vector<UploadedVolume> volumes = upload_all(client_, options_, files, how, bar_);
+    seen_.upload = uploading.milliseconds();
+    if (volumes.size() == 1 && volumes.front().volume) {
+      return volume(volumes.front(), input.name, input.name);
+    }
+    if (!is_by_name(options_.outputs)) throw several_volumes(volumes);
+    int status = kDone;
+    for (const UploadedVolume& each : volumes) {
+      const std::string subject = input.name + ": " + each.member;
+      if (each.problem) complain(to_error(*each.problem), subject);
+      const int of_this =
+          each.problem ? kRefused
+                       : volume(each, input.name + '-' + name_of_input(each.member), subject);
+      status = std::max(status, of_this);
+    }
+    return status;
+  }
+
+ private:
+  int volume(const UploadedVolume& uploaded, const std::string& name, const std::string& subject) {
+    const Volume& volume = *uploaded.volume;
+    const std::vector<Output> outputs = filled(options_.outputs, name);
+    JobParameters parameters = options_.parameters;
+    parameters.volume = volume.id;
+    if (!outputs.empty()) parameters.formats = formats_of(outputs);
+    if (!options_.preset.empty()) parameters.iso = preset_of(volume, options_.preset);
+    if (options_.dry_run) return dry_run(uploaded, parameters, name);
+
+    const std::optional<Job> job = made(parameters);
+    if (!job) return kRefused;
+    const std::string about = is_one_of_many_ ? subject : "";
+    if (job->state != JobState::kSucceeded) {
+      if (options_.json) print(job_json(*job, {}, seen_) + '\n');
+      return status_of(*job, options_, about);
+    }
+    const Stopwatch downloading;
+    resumable(job->id, [&] {
+      for (const Output& output : outputs) fetch(client_, job->id, output, bar_);
+    });
+    seen_.download = downloading.milliseconds();
+    report(*job, outputs);
+    return status_of(*job, options_, about);
+  }
+
+  // The job that has ended; none after an interrupt.
+  std::optional<Job> made(const JobParameters& parameters) {
+    Job job = client_.submit(parameters);
+    try {
+      resumable(job.id, [&] { job = wait(client_, job.id, bar_); });
+      return job;
+    } catch (const Error&) {
+      bar_.clear();
+      if (!stop_.stop_requested()) throw;
+      cancel_after_stop(options_, job.id);
+      return std::nullopt;
+    }
+  }
+
+  // What to do when the server went away in the middle, which a job outlives.
+  template <class Step>
+  void resumable(const std::string& job, const Step& step) {
+    try {
+      step();
+    } catch (const Error& error) {
+      bar_.clear();
+      if (error.code() != ErrorCode::kUnreachable || options_.is_local) throw;
+      const std::string command = "isomesh --server " + options_.server;
+      throw Error(ErrorCode::kUnreachable, std::string(error.what()) + "\nThe server has the job " +
+                                               job + " and goes on with it. To go on here:\n  " +
+                                               command + " wait " + job + "\n  " + command +
+                                               " fetch " + job + " -o OUT");
+    }
+  }
+
+  // What a job would make and take; what was not there before is gone again.
+  int dry_run(const UploadedVolume& uploaded, const JobParameters& parameters,
+              const std::string& name) {
+    constexpr int kCreated = 201;
+    const Estimate estimate = client_.estimate(parameters);
+    if (uploaded.status == kCreated) client_.erase_volume(uploaded.volume->id);
+    print(options_.json ? to_json(estimate) + '\n'
+                        : (is_one_of_many_ ? name + '\n' : "") + estimate_report(estimate));
+    return kDone;
+  }
+
+  void report(const Job& job, const std::vector<Output>& outputs) {
+    if (options_.json) return print(job_json(job, paths_of(outputs), seen_) + '\n');
+    const bool has_mesh_on_stdout =
+        std::ranges::any_of(outputs, [](const Output& output) { return output.is_stdout(); });
+    if (options_.quiet || has_mesh_on_stdout) return;
+    std::string text = outputs_report(job, outputs);
+    if (!is_one_of_many_) {
+      if (job.reused) text += "\nthe mesh is that of an earlier job like this one\n";
+      text += '\n' + timing_report(job.timing, seen_) + '\n' + mesh_report(*job.mesh);
+    }
+    print(text);
+  }
+
+  static void print(const std::string& text) {
+    static std::mutex mutex;
+    const std::scoped_lock lock(mutex);
+    std::cout << text << std::flush;
+  }
+
+  const Options& options_;
+  const std::stop_token stop_;
+  const bool is_one_of_many_;
+  Client client_;
+  ProgressBar bar_;
+  ClientTiming seen_;
+};
+
+// Some at a time, each told of by itself.
+int mesh_all(const Options& options, const std::vector<Input>& inputs,
+             const std::stop_token& stop) {
+  std::atomic<std::size_t> next = 0;
+  std::atomic<int> worst = kDone;
+  std::atomic<std::size_t> failed = 0;
+  const auto work = [&] {
+    Run run(options, stop, true);
+    for (std::size_t at = next++; at < inputs.size() && !stop.stop_requested(); at = next++) {
+      int status = kDone;
+      try {
+        status = run.input(inputs[at]);
+      } catch (const Error& error) {
+        complain(error, inputs[at].name);
+        status = status_of(error);
+      }
+      if (status == kDone) continue;
+      ++failed;
+      for (int before = worst; status > before && !worst.compare_exchange_weak(before, status);) {
+      }
+    }
+  };
+  {
+    std::vector<std::jthread> threads;
+    const auto count = std::min<std::size_t>(static_cast<std::size_t>(options.jobs), inputs.size());
+    for (std::size_t n = 1; n < count; ++n) threads.emplace_back(work);
+    work();
+  }
+  if (stop.stop_requested()) return kRefused;
+  if (failed > 0) {
+    complain(std::to_string(failed) + " of " + std::to_string(inputs.size()) + " inputs failed");
+  }
+  return worst;
+}
+
+}  // namespace
+
+int mesh(const Options& options, const std::stop_token& stop) {
+  const std::vector<Input> inputs = inputs_of(options);
+  if (inputs.size() > 1) return mesh_all(options, inputs, stop);
+  return Run(options, stop, false).input(inputs.front());
+}
+
+}  // namespace isomesh::cli

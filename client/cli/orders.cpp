@@ -1,0 +1,182 @@
+#include "client/cli/orders.h"
+
+#include <cstdio>
+#include <iostream>
+#include <string>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "base/clock.h"
+#include "client/cli/commands.h"
+#include "proto/orders.h"
+
+namespace isomesh::cli {
+namespace {
+
+using Seconds = std::chrono::duration<double>;
+
+// Seconds with two digits behind the point.
+std::string in_seconds(Seconds time) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f s", time.count());
+  return text;
+}
+
+OrderRequest request_of(const Options& options) {
+  const OrderOptions& asked = options.order;
+  OrderRequest request;
+  request.source = {.pacs = asked.pacs, .study = asked.study, .series = asked.series};
+  if (!asked.rule.empty()) request.rule = asked.rule;
+  if (!asked.parameters.empty()) request.parameters = asked.parameters;
+  if (!asked.send.empty() || asked.sends_nothing) {
+    request.send.emplace();
+    for (const std::string& name : asked.send) request.send->push_back({.pacs = name});
+  }
+  if (asked.priority) request.priority = asked.priority;
+  return request;
+}
+
+std::string reason_of(const Order& order) {
+  return order.error ? ": " + order.error->detail : std::string();
+}
+
+// One line for each step that has ended, as it ends.
+class StepTimes {
+ public:
+  void see(const Order& order) {
+    if (order.state != state_) {
+      const auto now = std::chrono::steady_clock::now();
+      std::cerr << to_string(state_) << ' ' << in_seconds(now - began_) << '\n';
+      began_ = now;
+      state_ = order.state;
+    }
+    if (order.attempts != attempts_ && order.error) {
+      attempts_ = order.attempts;
+      std::cerr << "attempt " << attempts_ << " failed" << reason_of(order) << '\n';
+    }
+  }
+
+ private:
+  OrderState state_ = OrderState::kWaiting;
+  std::uint32_t attempts_ = 0;
+  std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
+};
+
+void show(const Order& order) {
+  std::cout << order.id << ' ' << to_string(order.state) << reason_of(order) << '\n';
+  if (order.next_attempt) std::cout << "  next attempt " << *order.next_attempt << '\n';
+  for (const OrderResult& result : order.results) {
+    std::cout << "  " << result.pacs << ' ' << (result.stored ? "has" : "lacks") << ' '
+              << result.sop_instance_uid << " (" << result.bytes << " bytes)\n";
+  }
+}
+
+void print(const Order& order, bool json) {
+  if (json) {
+    std::cout << to_json(order) << '\n';
+  } else {
+    show(order);
+  }
+}
+
+}  // namespace
+
+void add_order_options(CLI::App& app, Options& options) {
+  OrderOptions& order = options.order;
+  app.add_option("PACS", order.pacs, "The name of a PACS that the server knows")->required();
+  app.add_option("STUDY", order.study, "Study Instance UID")->required();
+  app.add_option("SERIES", order.series, "Series Instance UID")->required();
+  app.add_option("--rule", order.rule, "The rule that says what is not said here");
+  app.add_option("--parameters", order.parameters,
+                 "Parameters of the mesh as a JSON object, as in POST /v1/jobs, such as "
+                 "'{\"iso\": 250}'")
+      ->type_name("JSON")
+      ->check([](const std::string& text) {
+        return nlohmann::json::parse(text, nullptr, false).is_object()
+                   ? std::string()
+                   : std::string("must be a JSON object");
+      });
+  app.add_option("--send", order.send, "The PACS that get the mesh, instead of the rule's")
+      ->type_name("PACS")
+      ->allow_extra_args(false);
+  app.add_flag("--send-nothing", order.sends_nothing, "Make the mesh only")->excludes("--send");
+  app.add_option_function<std::string>(
+         "--priority",
+         [&order](const std::string& name) { order.priority = from_string<Priority>(name); },
+         "stat, routine or bulk")
+      ->check(CLI::IsMember({"stat", "routine", "bulk"}));
+  app.add_option("--key", options.key,
+                 "Idempotency key: the same one gives the same order again (default: a new one)")
+      ->type_name("KEY");
+  app.add_flag("--no-wait", order.does_not_wait, "Print the order's id and end");
+}
+
+void add_orders_options(CLI::App& app, Options& options) {
+  OrderOptions& order = options.order;
+  app.add_option("ORDER", options.id, "Show this one, instead of a list");
+  app.add_option_function<std::string>(
+         "--state",
+         [&order](const std::string& name) { order.state = from_string<OrderState>(name); },
+         "Only orders in this state")
+      ->check(CLI::IsMember(
+          {"waiting", "fetching", "meshing", "sending", "succeeded", "failed", "cancelled"}));
+  app.add_option("--rule", order.rule, "Only orders of this rule");
+  app.add_option("--cursor", options.cursor, "The page to show, as the one before names it");
+  auto* cancel = app.add_flag("--cancel", order.cancels, "Cancel it")->needs("ORDER");
+  app.add_flag("--retry", order.retries, "Try it anew, when it has failed")
+      ->needs("ORDER")
+      ->excludes(cancel);
+}
+
+int order(Client& client, const Options& options) {
+  const Order accepted = client.submit_order(request_of(options), options.key);
+  if (options.order.does_not_wait) {
+    std::cout << (options.json ? to_json(accepted) : accepted.id) << '\n';
+    return kDone;
+  }
+  StepTimes times;
+  const Order ended =
+      client.wait_for_order(accepted.id, [&times](const Order& now) { times.see(now); });
+  print(ended, options.json);
+  return ended.state == OrderState::kSucceeded ? kDone : kRefused;
+}
+
+int orders(Client& client, const Options& options) {
+  const OrderOptions& asked = options.order;
+  if (!options.id.empty()) {
+    print(asked.cancels   ? client.cancel_order(options.id)
+          : asked.retries ? client.retry_order(options.id)
+                          : client.order(options.id),
+          options.json);
+    return kDone;
+  }
+  const OrderPage page = client.orders(asked.state, asked.rule, options.cursor);
+  if (options.json) {
+    std::cout << to_json(page.orders, page.next) << '\n';
+    return kDone;
+  }
+  for (const Order& each : page.orders) show(each);
+  if (!page.next.empty()) std::cerr << "There are more: --cursor " << page.next << '\n';
+  return kDone;
+}
+
+int pacs(Client& client, const Options& options) {
+  const std::vector<PacsStatus> all = client.pacs();
+  if (options.json) {
+    std::cout << to_json(all) << '\n';
+    return kDone;
+  }
+  for (const PacsStatus& each : all) {
+    std::cout << each.name << "  last success " << each.last_success.value_or("never");
+    if (each.last_failure) {
+      std::cout << "  last failure " << *each.last_failure << " (" << each.reason.value_or("?")
+                << ')';
+    }
+    std::cout << '\n';
+  }
+  return kDone;
+}
+
+}  // namespace isomesh::cli

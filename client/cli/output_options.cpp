@@ -1,0 +1,104 @@
+#include "client/cli/output_options.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include <unistd.h>
+
+#include "base/text.h"
+#include "client/cli/batch.h"
+#include "client/cli/option_values.h"
+#include "proto/parameters.h"
+
+namespace isomesh::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void refuse_output(const std::string& message) {
+  throw EarlyExit(kWrongUsage, "-o: " + message + '\n');
+}
+
+// ".drc, .glb or .stl": what a file's name may end in.
+std::string suffixes() {
+  std::vector<std::string> all;
+  for (const std::string& name : names_from<MeshFormat>()) all.push_back('.' + name);
+  return listed(all);
+}
+
+MeshFormat format_of(const fs::path& path) {
+  const std::string suffix = lower(path.extension().string());
+  const auto format = from_string<MeshFormat>(suffix.empty() ? suffix : suffix.substr(1));
+  if (!format) {
+    refuse_output(path.string() + " must end in " + suffixes() +
+                  ", be a folder, or - with --format");
+  }
+  return *format;
+}
+
+// `path` is the file that is to lie in it; empty where the folder itself was named.
+void check_folder(const fs::path& folder, const std::string& path) {
+  const std::string which =
+      path.empty() ? "the folder " + folder.string() : "the folder of " + path;
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) refuse_output(which + " is not there");
+  if (::access(folder.c_str(), W_OK) != 0) refuse_output(which + " cannot be written to");
+}
+
+bool is_folder(const std::string& path) {
+  std::error_code error;
+  return path.ends_with('/') || fs::is_directory(path, error);
+}
+
+}  // namespace
+
+void add_outputs(CLI::App& app, GivenOutputs& given) {
+  app.add_option("-o,--output", given.paths,
+                 "Where the mesh goes: a file, whose suffix (" + suffixes() +
+                     ") says the format; a folder, or {name} in a file's name, for a mesh of each "
+                     "FILE; - for standard output. May be repeated")
+      ->type_name("OUT")
+      ->expected(1)
+      ->take_all();
+  add(app, "--format", type_of_names<MeshFormat>() + ",..",
+      "The formats in a folder (default: drc), or of -", [&given](const std::string& text) {
+        for (const std::string_view name : split(text, ',')) {
+          given.formats.push_back(name_from<MeshFormat>("--format", lower(name)));
+        }
+      });
+}
+
+std::vector<Output> outputs_from(const GivenOutputs& given) {
+  std::vector<Output> outputs;
+  bool is_format_used = false;
+  for (const std::string& path : given.paths) {
+    if (path == "-") {
+      if (given.formats.size() != 1) refuse_output("- needs a --format, and one only");
+      outputs.push_back({path, given.formats.front()});
+      is_format_used = true;
+    } else if (is_folder(path)) {
+      check_folder(path, "");
+      for (const MeshFormat format :
+           given.formats.empty() ? std::vector{MeshFormat::kDrc} : given.formats) {
+        const std::string name = "{name}." + std::string(to_string(format));
+        outputs.push_back({fs::path(path) / name, format});
+      }
+      is_format_used = true;
+    } else {
+      const fs::path file = path;
+      check_folder(file.has_parent_path() ? file.parent_path() : ".", path);
+      outputs.push_back({file, format_of(file)});
+    }
+  }
+  if (!given.formats.empty() && !is_format_used && !given.paths.empty()) {
+    throw EarlyExit(kWrongUsage, "--format: the suffixes of -o say the formats of files\n");
+  }
+  const auto by_name = [](const Output& output) { return is_by_name({output}); };
+  if (std::ranges::any_of(outputs, by_name) && !std::ranges::all_of(outputs, by_name)) {
+    refuse_output(
+        "either all outputs are called by their inputs, with {name} or in a folder, or none is");
+  }
+  return outputs;
+}
+
+}  // namespace isomesh::cli

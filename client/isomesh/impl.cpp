@@ -1,0 +1,129 @@
+#include "client/isomesh/impl.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <mutex>
+#include <utility>
+
+#include "client/isomesh/url.h"
+#include "proto/json.h"
+
+namespace isomesh {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr int kTries = 4;
+constexpr milliseconds kFirstPause{100};
+
+TransportOptions transport_options(ClientOptions&& options) {
+  const bool sendable =
+      std::ranges::all_of(options.token, [](char c) { return c > ' ' && c < '\x7f'; });
+  if (!sendable) throw invalid_parameter("token", "must be letters, digits and signs of ASCII");
+  return {.server = parse_server_address(options.server),
+          .server_url = options.server,
+          .token = std::move(options.token),
+          .authorities = std::move(options.authorities),
+          .connect_timeout = options.connect_timeout,
+          .silence_timeout = options.silence_timeout,
+          .stop = std::move(options.stop)};
+}
+
+// For refusals by something in front of the daemon, which does not send our problem documents.
+ErrorCode code_of_status(int status) {
+  switch (status) {
+    case 400:
+      return ErrorCode::kInvalidParameter;
+    case 401:
+      return ErrorCode::kUnauthorized;
+    case 403:
+      return ErrorCode::kForbidden;
+    case 404:
+      return ErrorCode::kNotFound;
+    case 405:
+      return ErrorCode::kMethodNotAllowed;
+    case 409:
+      return ErrorCode::kNotReady;
+    case 410:
+      return ErrorCode::kGone;
+    case 408:
+      return ErrorCode::kRequestTimeout;
+    case 411:
+      return ErrorCode::kLengthRequired;
+    case 412:
+      return ErrorCode::kPreconditionFailed;
+    case 413:
+      return ErrorCode::kTooLarge;
+    case 414:
+      return ErrorCode::kUriTooLong;
+    case 415:
+      return ErrorCode::kUnsupportedMedia;
+    case 422:
+      return ErrorCode::kUnusableVolume;
+    case 429:
+      return ErrorCode::kTooManyRequests;
+    case 431:
+      return ErrorCode::kHeadersTooLarge;
+    case 502:
+    case 504:
+      return ErrorCode::kUnreachable;
+    case 503:
+      return ErrorCode::kUnavailable;
+    case 507:
+      return ErrorCode::kOutOfSpace;
+    default:
+      return ErrorCode::kInternal;
+  }
+}
+
+Error refusal(const HttpAnswer& answer) {
+  const std::string status = "the server answered with status " + std::to_string(answer.status);
+  if (!answer.content_type.starts_with("application/problem+json")) {
+    return {code_of_status(answer.status), status};
+  }
+  Problem problem;
+  try {
+    problem = problem_from_json(answer.body);
+  } catch (const Error&) {
+    return {code_of_status(answer.status), status};
+  }
+  Error error = to_error(problem);
+  if (error.code() != ErrorCode::kInternal || answer.status == 500) return error;
+  return Error(code_of_status(answer.status), problem.detail.empty() ? status : problem.detail,
+               problem.errors)
+      .with_remedy(problem.remedy);
+}
+
+}  // namespace
+
+Client::Impl::Impl(ClientOptions&& options)
+    : stop_(options.stop), transport_(transport_options(std::move(options))) {}
+
+HttpAnswer Client::Impl::answer(const HttpRequest& request) const {
+  HttpAnswer answer = transport_.send(request);
+  if (answer.status < 200 || answer.status >= 300) throw refusal(answer);
+  return answer;
+}
+
+std::string Client::Impl::repeat(const HttpRequest& request,
+                                 const std::function<void()>& before) const {
+  for (int attempt = 1;; ++attempt) {
+    try {
+      if (before) before();
+      return send(request);
+    } catch (const NoAnswer& lost) {
+      if (!lost.broken() || attempt == kTries) throw;
+    }
+    pause(kFirstPause * (1 << (attempt - 1)));
+  }
+}
+
+void Client::Impl::pause(milliseconds duration) const {
+  std::mutex mutex;
+  std::unique_lock lock(mutex);
+  const auto never = [] { return false; };
+  std::condition_variable_any().wait_for(lock, stop_, duration, never);
+  if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
+}
+
+}  // namespace isomesh

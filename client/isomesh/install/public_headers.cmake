@@ -1,0 +1,25 @@
+# isomesh_public_headers(HEADER FOLDER): copies that header of the project and all that it includes to
+# FOLDER/isomesh, client/isomesh/x.h as x.h and the others as they lie, so that they include each other
+# as isomesh/... there. Done when CMake is run, and again when one of them has changed.
+function(isomesh_public_headers header folder)
+  set(waiting ${header})
+  set(copied)
+  while(waiting)
+    list(POP_FRONT waiting one)
+    list(APPEND copied ${one})
+    set(source ${PROJECT_SOURCE_DIR}/${one})
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${source})
+    file(READ ${source} text)
+    string(REGEX MATCHALL "#include \"[^\"]+\"" includes "${text}")
+    list(TRANSFORM includes REPLACE "#include \"([^\"]+)\"" "\\1")
+    foreach(included ${includes})
+      if(NOT included IN_LIST copied AND NOT included IN_LIST waiting)
+        list(APPEND waiting ${included})
+      endif()
+    endforeach()
+    string(REGEX REPLACE "#include \"(client/isomesh/)?([^\"]+)\"" "#include \"isomesh/\\2\"" text "${text}")
+    string(REGEX REPLACE "^client/isomesh/" "" name ${one})
+    # CONFIGURE writes only what has changed; nothing in a header looks like a variable of CMake's.
+    file(CONFIGURE OUTPUT ${folder}/isomesh/${name} CONTENT "${text}" @ONLY)
+  endwhile()
+endfunction()

@@ -1,0 +1,965 @@
+"""What the server takes and answers, as types; made by `generate` from openapi.yaml.
+
+They are the members of its JSON and exist for type checkers alone: an answer is a plain dict.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal, Mapping, Optional, Sequence, TypedDict, Union
+
+if TYPE_CHECKING:
+    from typing_extensions import NotRequired
+
+
+SampleType = Literal['uint8', 'int8', 'uint16', 'int16', 'uint32', 'int32', 'float32', 'float64']
+
+
+MeshFormat = Literal['drc', 'glb', 'stl', 'ply', 'obj', '3mf', 'zip']
+
+
+MeshBytes = str
+
+
+JobState = Literal['queued', 'running', 'succeeded', 'failed', 'cancelled']
+
+
+Stage = Literal['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify', 'done']
+
+
+Vector = Union['Sequence[float]']
+
+
+class Volume(TypedDict):
+    """A volume that is stored. The sample (i,j,k) lies at origin + direction * diag(spacing) *
+    (i,j,k), in millimetres, in DICOM's patient space (LPS)."""
+
+    #: The SHA-256 of what identifies the volume, its samples and geometry.
+    id: str
+    #: What its owner calls it: the series or file that it came as, until it is renamed. No part of
+    #: the id, in no mesh and in no log. Null where nothing told one.
+    name: Optional[str]
+    #: What was uploaded first.
+    format: Literal['raw', 'nifti', 'nrrd', 'metaimage', 'vti', 'dicom']
+    #: Samples along x, y and z.
+    dims: Sequence[int]
+    #: The type of one sample.
+    type: SampleType
+    #: Millimetres between samples along each axis; along z from slice to slice, also where slices
+    #: are sheared by a tilted gantry.
+    spacing: Vector
+    #: Where the first sample lies.
+    origin: Vector
+    #: Row-major; the columns are the unit vectors of x, y and z. They are at right angles but for
+    #: a tilted gantry, which shears z.
+    direction: Sequence[float]
+    #: The smallest and the largest sample.
+    range: Sequence[float]
+    #: Otsu's threshold.
+    suggested_iso: float
+    #: Of all samples.
+    bytes: int
+    created: str
+    #: DICOM's name for what made the images, such as CT or MR; null when it is not told.
+    modality: Optional[str]
+    #: Iso-values that suit the modality, as far as they lie within range: for a CT in Hounsfield
+    #: units skin, soft tissue and bone.
+    presets: Sequence[Preset]
+    #: What the upload holds beside the volume, up to a hundred of them.
+    ignored: Sequence[IgnoredObject]
+    #: What was decided, corrected or left open when the upload was read. The same samples and
+    #: geometry are one volume, whatever they came as: as name, format and ignored, its notes are
+    #: those of the upload that came first. A GLB repeats those that tell how samples or geometry
+    #: came about in asset.extras.notes; a job takes no mesh of an earlier one with other notes.
+    notes: Sequence[Note]
+    #: Whose volume it is and what it was made from, of a volume that came as DICOM; only for who
+    #: uploaded it, and not in lists of volumes. A text that DICOM does not tell is empty.
+    dicom: NotRequired[DicomIdentity]
+
+
+class UploadedVolumesVolumes(TypedDict):
+    #: Of the archive, as the query member takes it.
+    member: str
+    #: As if it had come alone: 201, 200 or that of the problem.
+    status: int
+    #: Null where it was refused.
+    volume: Optional[Volume]
+    #: Why it was refused.
+    problem: Optional[Problem]
+
+
+class UploadedVolumes(TypedDict):
+    volumes: Sequence[UploadedVolumesVolumes]
+
+
+class Note(TypedDict):
+    #: A name that stays, for programs.
+    code: NoteCode
+    #: What of it is true of this volume, for people.
+    detail: str
+
+
+NoteCode = Literal['forms-differ', 'pixdim-differs', 'volume-chosen', 'space-assumed', 'unit-unknown', 'non-finite-samples', 'trailing-bytes', 'values-rescaled', 'duplicate-file', 'looks-like-labels', 'frame-of-reference', 'empty-planes', 'distance-assumed', 'overlapping-segments', 'fractional-segments']
+
+
+AcceptableNote = Literal['frame-of-reference']
+
+
+class Preset(TypedDict):
+    name: str
+    iso: float
+
+
+class IgnoredObject(TypedDict):
+    #: Of the file, without folders.
+    name: str
+    reason: str
+
+
+class DicomIdentityEquipment(TypedDict):
+    """The device that made the images."""
+
+    manufacturer: str
+    model_name: str
+    station_name: str
+    device_serial_number: str
+    software_versions: str
+
+
+class DicomIdentity(TypedDict):
+    """Whose volume it is and what it was made from, of a volume that came as DICOM; only for
+    who uploaded it, and not in lists of volumes. A text that DICOM does not tell is empty."""
+
+    patient_name: str
+    patient_id: str
+    patient_birth_date: str
+    patient_sex: str
+    study_uid: str
+    study_date: str
+    study_time: str
+    study_id: str
+    study_description: str
+    accession_number: str
+    referring_physician: str
+    series_uid: str
+    series_description: str
+    modality: str
+    frame_of_reference_uid: str
+    #: The objects that hold the slices, in the slices' order.
+    instances: Sequence[DicomInstance]
+    issuer_of_patient_id: str
+    patient_identity_removed: str
+    deidentification_method: str
+    acquisition_datetime: str
+    position_reference_indicator: str
+    #: The device that made the images.
+    equipment: DicomIdentityEquipment
+    #: What the segments of a segmentation are, by their codes; left out where there are none.
+    segments: NotRequired[Sequence[DicomSegment]]
+
+
+class DicomSegment(TypedDict):
+    #: The volume's label that the segment became.
+    label: int
+    #: An entry of a coding scheme; its texts are empty where nothing was coded.
+    category: DicomCode
+    #: An entry of a coding scheme; its texts are empty where nothing was coded.
+    type: DicomCode
+    #: An entry of a coding scheme; its texts are empty where nothing was coded.
+    region: DicomCode
+
+
+class DicomCode(TypedDict):
+    """An entry of a coding scheme; its texts are empty where nothing was coded."""
+
+    value: str
+    scheme: str
+    meaning: str
+
+
+class DicomInstance(TypedDict):
+    sop_class_uid: str
+    sop_instance_uid: str
+
+
+class Version(TypedDict):
+    version: str
+    #: Of what makes meshes. While it stays, the same volume and parameters give the same bytes.
+    mesher: str
+
+
+class VolumeList(TypedDict):
+    volumes: Sequence[Volume]
+    #: The cursor of the next page; null on the last.
+    next: Optional[str]
+
+
+class Histogram(TypedDict):
+    #: The volume's id.
+    volume: str
+    #: Where the first bin begins and the last one ends, the volume's smallest and largest sample.
+    range: Sequence[float]
+    #: The samples in each bin, all of equal width. A sample at an edge counts for the bin above,
+    #: the largest for the last.
+    counts: Sequence[int]
+
+
+class VolumeLabels(TypedDict):
+    #: The volume's id.
+    volume: str
+    #: The value of samples that belong to no label.
+    background: int
+    #: In ascending order.
+    labels: Sequence[VolumeLabel]
+
+
+class VolumeLabel(TypedDict):
+    label: int
+    voxels: int
+    #: Of so many voxels.
+    volume_mm3: float
+    #: The smallest index along x, y and z of its voxels.
+    low: Sequence[int]
+    #: The largest.
+    high: Sequence[int]
+    #: The smallest and the largest corner (LPS, mm) of the box of these voxels.
+    bounds: Sequence[Sequence[float]]
+    #: As the file calls it; null where it does not.
+    name: Optional[str]
+    #: As the file has it; null where it has none.
+    color: Optional[str]
+
+
+class EstimateQueue(TypedDict):
+    """How many jobs there are at the moment, of those that the asker sees."""
+
+    queued: int
+    running: int
+
+
+class EstimateLabels(TypedDict):
+    label: int
+    triangles: int
+
+
+class Estimate(TypedDict):
+    #: The volume's id.
+    volume: str
+    #: Otsu's threshold where that was asked for; none by labels.
+    iso: NotRequired[float]
+    #: Tetrahedra per cell. With 5 every second cell is mirrored; the cell (0,0,0) is not.
+    scheme: Scheme
+    #: Exact, of the surface as it is extracted: before the parameters components and fill_cavities
+    #: drop any, and before it is simplified.
+    triangles: int
+    #: As exact.
+    vertices: int
+    #: About how many are left, where the parameters ask for fewer.
+    simplified_triangles: NotRequired[int]
+    #: Of each file; exact for stl.
+    bytes: Mapping[str, int]
+    #: At the job's peak, beside its mapped volume; an upper estimate.
+    memory_bytes: int
+    #: Whether one job may take that much memory.
+    fits: bool
+    #: Of the run, without the queue.
+    milliseconds: float
+    #: How many jobs there are at the moment, of those that the asker sees.
+    queue: EstimateQueue
+    #: Of a job by labels, how many triangles each label's own surface has; exact.
+    labels: NotRequired[Sequence[EstimateLabels]]
+
+
+class Callback(TypedDict):
+    """Whom to tell that the job has ended, whichever way: a POST of the job, as GET gives it.
+    Only addresses that the operator has listed are called. It is signed as the Standard
+    Webhooks specification says (webhook-id, webhook-timestamp, webhook-signature), repeated
+    until it is answered with success, for a day, and may come more than once with the same
+    webhook-id."""
+
+    #: http or https, without a user, a password or a fragment.
+    url: str
+
+
+Iso = Union["Union[float, Literal['otsu']]"]
+
+
+Labels = Union["Union[Literal['all'], Sequence[int]]"]
+
+
+Background = int
+
+
+LabelNames = Union['Union[Mapping[int, str], Mapping[str, str]]']
+
+
+LabelColors = Union['Union[Mapping[int, str], Mapping[str, str]]']
+
+
+LabelValues = Union['Union[Mapping[int, Sequence[int]], Mapping[str, Sequence[int]]]']
+
+
+Scheme = Literal[5, 6]
+
+
+Interpolation = Literal['linear', 'midpoint']
+
+
+Passes = int
+
+
+Smoothing = Literal['laplacian', 'taubin']
+
+
+Lambda = Union['Optional[float]']
+
+
+PassBand = float
+
+
+MaxDisplacement = Union['Optional[float]']
+
+
+Close = bool
+
+
+Keep = Union['Optional[int]']
+
+
+MinTriangles = Union['Optional[int]']
+
+
+NearestTo = Union['Sequence[Sequence[float]]']
+
+
+FillCavities = bool
+
+
+Crop = Union['Optional[Sequence[Sequence[float]]]']
+
+
+MaxError = Union['Optional[float]']
+
+
+Triangles = Union['Optional[int]']
+
+
+PositionBits = int
+
+
+Speed = int
+
+
+Normals = bool
+
+
+Distances = bool
+
+
+Lods = Union['Sequence[float]']
+
+
+Priority = Literal['stat', 'routine', 'bulk']
+
+
+Certify = bool
+
+
+class JobParametersComponents(TypedDict):
+    """Which parts of the surface are kept; the others are dropped before smoothing. With
+    several members, the largest of those that are large enough. Parts are compared by their
+    triangles, equal ones by their first vertex. Without members all are kept. Not for
+    labels."""
+
+    #: Of the parts, so many of the largest are kept.
+    keep: NotRequired[Keep]
+    #: Of the parts, those of so many triangles are kept.
+    min_triangles: NotRequired[MinTriangles]
+    #: Of the parts, those nearest to these places are kept. Places are x, y and z in millimetres,
+    #: LPS, one after the other; the part of the nearest vertex is meant.
+    nearest_to: NotRequired[NearestTo]
+
+
+class JobParametersDraco(TypedDict):
+    """Of the drc format, and of the Draco streams inside glb."""
+
+    #: Bits per coordinate on a grid over the mesh's longest extent.
+    position_bits: NotRequired[PositionBits]
+    #: Of Draco: 0 to 4 are smallest and slow (valence coding, by libdraco); 5 to 9 are all the
+    #: same (an encoder of isomesh's own, on several threads, in no more bytes than libdraco takes
+    #: at 5); 10 keeps the order of vertices and triangles at several times the bytes (sequential,
+    #: by libdraco).
+    speed: NotRequired[Speed]
+
+
+JobParameters = TypedDict(
+    'JobParameters',
+    {
+        'volume': 'NotRequired[str]',
+        'iso': 'NotRequired[Iso]',
+        'labels': 'NotRequired[Labels]',
+        'background': 'NotRequired[Background]',
+        'label_names': 'NotRequired[LabelNames]',
+        'label_colors': 'NotRequired[LabelColors]',
+        'label_values': 'NotRequired[LabelValues]',
+        'scheme': 'NotRequired[Scheme]',
+        'interpolation': 'NotRequired[Interpolation]',
+        'passes': 'NotRequired[Passes]',
+        'smoothing': 'NotRequired[Smoothing]',
+        'lambda': 'NotRequired[Lambda]',
+        'pass_band': 'NotRequired[PassBand]',
+        'max_displacement_mm': 'NotRequired[MaxDisplacement]',
+        'close': 'NotRequired[Close]',
+        'components': 'NotRequired[JobParametersComponents]',
+        'fill_cavities': 'NotRequired[FillCavities]',
+        'crop': 'NotRequired[Crop]',
+        'max_error_mm': 'NotRequired[MaxError]',
+        'triangles': 'NotRequired[Triangles]',
+        'formats': 'NotRequired[Sequence[MeshFormat]]',
+        'draco': 'NotRequired[JobParametersDraco]',
+        'normals': 'NotRequired[Normals]',
+        'distances': 'NotRequired[Distances]',
+        'lods': 'NotRequired[Lods]',
+        'priority': 'NotRequired[Priority]',
+        'certify': 'NotRequired[Certify]',
+        'callback': 'NotRequired[Callback]',
+    },
+)
+
+
+CompleteJobParameters = Union['JobParameters']
+
+
+class Job(TypedDict):
+    """A job and, once it has succeeded, its mesh."""
+
+    #: A UUID; younger jobs have greater ones.
+    id: str
+    state: JobState
+    #: What a job does at the moment, or did last.
+    stage: Stage
+    #: Of the whole job.
+    progress: float
+    #: All of them, with the defaults of those that were left out.
+    parameters: CompleteJobParameters
+    #: The volume's id, as in the parameters.
+    volume: str
+    #: Jobs are begun by priority, then by age.
+    priority: Priority
+    created: str
+    #: Null while the job is queued.
+    started: Optional[str]
+    #: Null until the job ends.
+    finished: Optional[str]
+    #: Milliseconds of each stage; 0 for one that has not ended yet.
+    timing: Timing
+    #: Null unless the job has succeeded.
+    mesh: Optional[MeshSummary]
+    #: Null unless the job has failed.
+    error: Optional[Problem]
+    #: Whether the job took the mesh of an earlier job with the same volume and parameters instead
+    #: of making it again; priority and callback may differ.
+    reused: bool
+    #: What a queued job waits for besides a worker: disk is room for its files, and it is run when
+    #: there is some. Null otherwise.
+    waiting_for: Optional[Literal['disk']]
+
+
+class JobEvent(TypedDict):
+    """How far a job is."""
+
+    state: JobState
+    #: What a job does at the moment, or did last.
+    stage: Stage
+    progress: float
+
+
+class AnyJobEvent(TypedDict):
+    """How far one of all jobs is."""
+
+    #: The job's.
+    id: str
+    state: JobState
+    #: What a job does at the moment, or did last.
+    stage: Stage
+    progress: float
+
+
+class JobList(TypedDict):
+    jobs: Sequence[Job]
+    #: The cursor of the next page; null on the last.
+    next: Optional[str]
+
+
+class Timing(TypedDict):
+    """Milliseconds of each stage; 0 for one that has not ended yet."""
+
+    #: From acceptance to the start.
+    queue: float
+    #: Bringing the samples into memory.
+    load: float
+    #: Marching tetrahedra.
+    extract: float
+    #: All passes.
+    smooth: float
+    #: Where fewer triangles are asked for.
+    simplify: float
+    #: Writing the files and measuring the mesh.
+    encode: float
+    #: Where the error is to be measured.
+    certify: float
+    #: From acceptance to the end.
+    total: float
+
+
+class MeshSummaryDropped(TypedDict):
+    """What the parameters components and fill_cavities took away."""
+
+    components: int
+    triangles: int
+
+
+class MeshSummarySimplified(TypedDict):
+    """Of a job with max_error_mm or triangles."""
+
+    triangles_before: int
+    #: What kept it from going on, the error or the number of triangles.
+    bound_by: Literal['error', 'triangles']
+
+
+class MeshSummaryVolumeMm3(TypedDict):
+    """What the surface encloses, before and after smoothing and simplification. An open surface
+    encloses nothing: it is closed by the cone to where the first sample lies, and the number
+    depends on that point and may be negative; see quality.encloses_volume, and the parameter
+    close."""
+
+    extracted: float
+    smoothed: float
+
+
+class MeshSummaryDisplacementMm(TypedDict):
+    """How far smoothing moved the vertices from where they were extracted."""
+
+    mean: float
+    max: float
+
+
+class MeshSummary(TypedDict):
+    """The mesh in numbers, after smoothing unless named otherwise. By labels: triangles,
+    vertices and areas are those of the walls, each counted once; volumes are what all labels
+    enclose together; pieces, edges and quality are those of the labels' own surfaces, all of
+    them."""
+
+    #: The value that was used; Otsu's, too. None by labels.
+    iso: NotRequired[float]
+    #: There is no surface: the iso-value is outside the samples' range, or nothing was left of the
+    #: parts. The files hold no triangle.
+    empty: bool
+    triangles: int
+    vertices: int
+    #: Edges of one triangle only; they lie on the volume's border. A surface that was closed has
+    #: none.
+    boundary_edges: int
+    #: Pieces that do not touch.
+    components: int
+    #: Vertices - edges + triangles.
+    euler: int
+    #: What the parameters components and fill_cavities took away.
+    dropped: MeshSummaryDropped
+    #: Of a job with max_error_mm or triangles.
+    simplified: NotRequired[MeshSummarySimplified]
+    #: How good the mesh is. All of it is found out on the mesh itself, in each job.
+    quality: MeshQuality
+    area_mm2: float
+    #: Before smoothing.
+    area_extracted_mm2: float
+    #: What the surface encloses, before and after smoothing and simplification. An open surface
+    #: encloses nothing: it is closed by the cone to where the first sample lies, and the number
+    #: depends on that point and may be negative; see quality.encloses_volume, and the parameter
+    #: close.
+    volume_mm3: MeshSummaryVolumeMm3
+    #: How far smoothing moved the vertices from where they were extracted.
+    displacement_mm: MeshSummaryDisplacementMm
+    #: The smallest and the largest corner; zero for an empty mesh.
+    bounds: Sequence[Vector]
+    #: One for each format that was asked for. By labels those that hold all labels, and a zip of
+    #: the others.
+    files: Mapping[str, MeshFile]
+    #: Of a job by labels, in ascending order. Lists of jobs leave it out.
+    labels: NotRequired[Sequence[LabelSummary]]
+    #: How far the files are from the surface as it was extracted, before it was smoothed; of a job
+    #: with certify. Each file's bytes are decoded as a stranger does, and measured at all vertices
+    #: and the centres of all triangles: exact distances from these points to the other surface's
+    #: triangles, which are found by a grid. Distances are kept in single precision.
+    certificate: NotRequired[MeshCertificate]
+
+
+class MeshCertificateBudgetMm(TypedDict):
+    """How max_error_mm was shared out; the three make it up."""
+
+    #: The farthest that it moved a vertex.
+    smoothing: float
+    #: The rest.
+    simplification: float
+    #: The most that rounding the files' coordinates moves a point.
+    quantisation: float
+
+
+class MeshCertificate(TypedDict):
+    """How far the files are from the surface as it was extracted, before it was smoothed; of a
+    job with certify. Each file's bytes are decoded as a stranger does, and measured at all
+    vertices and the centres of all triangles: exact distances from these points to the other
+    surface's triangles, which are found by a grid. Distances are kept in single precision."""
+
+    #: Of several files the one that is farthest, which these are the distances of.
+    file: MeshFormat
+    #: The largest distance, both ways.
+    max_mm: float
+    #: From the file to the extracted surface; shows what has been added.
+    from_mesh: DistanceSummary
+    #: From the extracted surface to the file; shows what has been left out.
+    from_extracted: DistanceSummary
+    #: How max_error_mm was shared out; the three make it up.
+    budget_mm: NotRequired[MeshCertificateBudgetMm]
+
+
+class DistanceSummary(TypedDict):
+    points: int
+    max_mm: float
+    mean_mm: float
+    rms_mm: float
+    #: 99 of 100 points are this near.
+    p99_mm: float
+    #: Points in equal bins from 0 to max_mm.
+    histogram: Sequence[int]
+
+
+class LabelSummary(TypedDict):
+    """A label's samples and its own surface after smoothing. What two labels share is in
+    both."""
+
+    label: int
+    name: Optional[str]
+    color: Optional[str]
+    voxels: int
+    #: The volume of so many voxels.
+    voxels_mm3: float
+    triangles: int
+    vertices: int
+    closed: bool
+    manifold: bool
+    oriented: bool
+    components: int
+    area_mm2: float
+    #: What the surface encloses.
+    volume_mm3: float
+    #: Those in the ZIP, one for each format.
+    files: Mapping[str, LabelFile]
+
+
+class LabelFile(TypedDict):
+    bytes: int
+    sha256: str
+    #: Of its first byte in the ZIP.
+    offset: int
+    #: Where it is downloaded from.
+    href: str
+
+
+class MeshQualitySelfIntersections(TypedDict):
+    """Pairs of triangles that intersect beyond the corners and edges that they share, decided
+    exactly. Of a job with certify."""
+
+    pairs: int
+    #: That intersect any other.
+    triangles: int
+    #: Of the first pairs, in millimetres, LPS.
+    places: Sequence[Vector]
+
+
+class MeshQuality(TypedDict):
+    """How good the mesh is. All of it is found out on the mesh itself, in each job."""
+
+    #: No edge belongs to one triangle only.
+    closed: bool
+    #: At most two triangles share an edge, and the triangles around a vertex are one fan, open or
+    #: closed.
+    manifold: bool
+    #: Triangles that share an edge run through it in opposite directions.
+    oriented: bool
+    #: Pieces that do not touch.
+    components: int
+    #: The handles of all pieces together; null for a mesh that is open or no manifold.
+    genus: Optional[int]
+    #: Of each triangle twice the radius of its inscribed circle over that of its circumscribed
+    #: one: 1 is equilateral, 0 is flat. Bins of 0.05.
+    aspect_ratio: QualityStages
+    #: The smallest angle of each triangle, at most 60 degrees. Bins of 3 degrees.
+    smallest_angle_deg: QualityStages
+    #: Whether the volumes are what the surface encloses: it is closed and oriented. Those of an
+    #: open surface depend on the point that they are summed from.
+    encloses_volume: bool
+    #: Pairs of triangles that intersect beyond the corners and edges that they share, decided
+    #: exactly. Of a job with certify.
+    self_intersections: NotRequired[MeshQualitySelfIntersections]
+
+
+class QualityStages(TypedDict):
+    """Before and after smoothing."""
+
+    #: Over all triangles, or, when they are more than 1 048 576, over some half a million that are
+    #: spread over the mesh; the histogram's sum says how many. 0 when there are none.
+    extracted: Distribution
+    #: Over all triangles, or, when they are more than 1 048 576, over some half a million that are
+    #: spread over the mesh; the histogram's sum says how many. 0 when there are none.
+    smoothed: Distribution
+
+
+class Distribution(TypedDict):
+    """Over all triangles, or, when they are more than 1 048 576, over some half a million that
+    are spread over the mesh; the histogram's sum says how many. 0 when there are none."""
+
+    mean: float
+    min: float
+    #: Measured triangles in equal bins from 0 on; the last bin includes its end.
+    histogram: Sequence[int]
+
+
+class MeshFile(TypedDict):
+    bytes: int
+    sha256: str
+    #: Where it is downloaded from.
+    href: str
+
+
+OrderState = Literal['waiting', 'fetching', 'meshing', 'sending', 'succeeded', 'failed', 'cancelled']
+
+
+class SendTarget(TypedDict):
+    pacs: str
+    format: NotRequired[Literal['stl']]
+
+
+class OrderRequestSource(TypedDict):
+    #: The name of a configured PACS.
+    pacs: str
+    #: Its Study Instance UID.
+    study: str
+    #: Its Series Instance UID.
+    series: str
+
+
+class OrderRequestCallback(TypedDict):
+    """As of a job. What is sent tells id, state, rule, job, created, finished and the type of
+    an error: nothing of a patient."""
+
+    url: str
+
+
+class OrderRequest(TypedDict):
+    source: OrderRequestSource
+    #: The name of a configured rule, which says what is left out here.
+    rule: NotRequired[str]
+    #: As in POST /v1/jobs, without volume, priority and callback; formats is [stl] unless it is
+    #: given. Where a rule is named, these members take the place of its own.
+    parameters: NotRequired[Mapping[str, Any]]
+    #: Where the mesh goes; may be empty.
+    send: NotRequired[Sequence[SendTarget]]
+    #: Jobs are begun by priority, then by age.
+    priority: NotRequired[Priority]
+    #: As of a job. What is sent tells id, state, rule, job, created, finished and the type of an
+    #: error: nothing of a patient.
+    callback: NotRequired[OrderRequestCallback]
+
+
+class OrderResult(TypedDict):
+    """One DICOM object for one PACS."""
+
+    pacs: str
+    format: str
+    #: Of an order by labels.
+    label: Optional[int]
+    series_uid: str
+    sop_instance_uid: str
+    bytes: int
+    #: The PACS has said that it stored it and finds it.
+    stored: bool
+
+
+class OrderSource(TypedDict):
+    pacs: str
+    study: str
+    series: str
+    #: How many the series has, once it is known to be whole.
+    instances: Optional[int]
+
+
+class Order(TypedDict):
+    id: str
+    #: waiting until the series is there and does not grow, fetching it, meshing in its job,
+    #: sending what that made; succeeded when all is stored and found.
+    state: OrderState
+    rule: Optional[str]
+    source: OrderSource
+    #: As of a job.
+    parameters: Mapping[str, Any]
+    #: Jobs are begun by priority, then by age.
+    priority: Priority
+    send: Sequence[SendTarget]
+    volume: Optional[str]
+    job: Optional[str]
+    results: Sequence[OrderResult]
+    #: How many have failed.
+    attempts: int
+    #: When a failed attempt is made again.
+    next_attempt: Optional[str]
+    created: str
+    finished: Optional[str]
+    #: Why the order failed, or what its last attempt met with.
+    error: Optional[Problem]
+
+
+class OrderList(TypedDict):
+    orders: Sequence[Order]
+    #: The cursor of the next page; null on the last.
+    next: Optional[str]
+
+
+class PacsListPacs(TypedDict):
+    name: str
+    last_success: Optional[str]
+    last_failure: Optional[str]
+    #: Of that failure, in a word.
+    reason: Optional[str]
+
+
+class PacsList(TypedDict):
+    pacs: Sequence[PacsListPacs]
+
+
+class ProblemErrors(TypedDict):
+    field: str
+    message: str
+
+
+class ProblemChoices(TypedDict):
+    #: Of the query.
+    parameter: Literal['series', 'member', 'volume']
+    value: str
+    #: What the value stands for, for people.
+    title: str
+
+
+class Problem(TypedDict):
+    """What went wrong (RFC 9457)."""
+
+    #: A name that stays, for programs.
+    type: Literal['urn:isomesh:problem:invalid-parameter', 'urn:isomesh:problem:digest-mismatch', 'urn:isomesh:problem:unauthorized', 'urn:isomesh:problem:forbidden', 'urn:isomesh:problem:not-found', 'urn:isomesh:problem:method-not-allowed', 'urn:isomesh:problem:not-ready', 'urn:isomesh:problem:gone', 'urn:isomesh:problem:length-required', 'urn:isomesh:problem:too-large', 'urn:isomesh:problem:uri-too-long', 'urn:isomesh:problem:unsupported-media', 'urn:isomesh:problem:range-not-satisfiable', 'urn:isomesh:problem:unusable-volume', 'urn:isomesh:problem:key-reused', 'urn:isomesh:problem:too-many-requests', 'urn:isomesh:problem:internal', 'urn:isomesh:problem:unavailable', 'urn:isomesh:problem:out-of-space', 'urn:isomesh:problem:cancelled', 'urn:isomesh:problem:request-timeout', 'urn:isomesh:problem:precondition-failed', 'urn:isomesh:problem:headers-too-large', 'urn:isomesh:problem:pacs-unreachable', 'urn:isomesh:problem:pacs-refused', 'urn:isomesh:problem:series-incomplete']
+    #: The type in words.
+    title: str
+    #: The HTTP status.
+    status: int
+    #: What is wrong with this request, for people.
+    detail: str
+    #: The path of the request or of the job.
+    instance: NotRequired[str]
+    #: The parameters or members that are at fault.
+    errors: NotRequired[Sequence[ProblemErrors]]
+    #: The code that the query accept takes to have the same request not refused for this reason,
+    #: where a person may overrule it.
+    overridable: NotRequired[AcceptableNote]
+    #: What can be chosen where the request leaves it open; at most a thousand.
+    choices: NotRequired[Sequence[ProblemChoices]]
+
+
+class JobOptions(TypedDict, total=False):
+    """Parameters of a job, as keywords. What a job is asked to do. The same volume and
+    parameters give the same bytes."""
+
+    #: The iso-value, in the volume's units, or Otsu's threshold. A sample is inside when its value
+    #: is >= iso.
+    iso: Iso
+    #: In place of an iso-value: the labels of a segmentation, each with a surface of its own, or
+    #: all of them. Neighbours share the wall between them. All other values, and those that are
+    #: not listed, are background. Vertices lie half-way between two samples. Unless the request
+    #: says, there are 10 passes with a lambda of 0.33, and no vertex moves farther than half the
+    #: smallest spacing.
+    labels: Labels
+    #: The value of samples without a label.
+    background: Background
+    #: What labels are called, by their values. Those that are left out are called as the volume's
+    #: file says.
+    label_names: LabelNames
+    #: The colours of labels, as #rrggbb, by their values. Those that are left out have the colour
+    #: that the volume's file says, or one of a fixed series.
+    label_colors: LabelColors
+    #: Labels that are made of the samples of several values, by their own. A value may belong to
+    #: several labels, which then overlap there. Those that are left out are as the volume's file
+    #: says.
+    label_values: LabelValues
+    #: Tetrahedra per cell. With 5 every second cell is mirrored; the cell (0,0,0) is not.
+    scheme: Scheme
+    #: Where a vertex lies on its edge. midpoint puts all half-way.
+    interpolation: Interpolation
+    #: How often the surface is smoothed. Vertices on its boundary stay. By labels the default is
+    #: 10.
+    passes: Passes
+    #: How a pass moves the vertices. laplacian: every pass moves each vertex by lambda of the way
+    #: to the mean of its neighbours; what the surface encloses shrinks. taubin: every pass does so
+    #: and then moves the vertices back by mu, the same for all, with 1/lambda + 1/mu = pass_band;
+    #: so a pass is two steps, and noise goes while shape and volume stay.
+    smoothing: Smoothing
+    #: How far a pass moves a vertex; 1 moves it onto the mean of its neighbours. Null: 1 for
+    #: laplacian, 0.33 for taubin, which takes at most 0.66.
+    lambda_: Lambda
+    #: Of taubin: what varies along the surface more slowly than this is kept. From 0 for a
+    #: constant to 2 for what changes sign from each vertex to the next.
+    pass_band: PassBand
+    #: Smoothing moves no vertex farther than this from where it was extracted. Millimetres; null:
+    #: as far as it goes, and of labels half the smallest spacing.
+    max_displacement_mm: MaxDisplacement
+    #: Cap the surface where it meets the volume's border, as if the samples beyond it were
+    #: outside. The result has no boundary. Caps lie in the border, stay flat and are not smoothed;
+    #: the rest is smoothed as if the surface were open.
+    close: Close
+    #: Which parts of the surface are kept; the others are dropped before smoothing. With several
+    #: members, the largest of those that are large enough. Parts are compared by their triangles,
+    #: equal ones by their first vertex. Without members all are kept. Not for labels.
+    components: JobParametersComponents
+    #: Leave out the walls of cavities, which no opening leads to, and what floats in them.
+    fill_cavities: FillCavities
+    #: Only what is in this box: its smallest and its largest corner, in millimetres, LPS. The
+    #: volume's samples within the box are taken as if they were all; of one that lies askew, those
+    #: between the box's extents along its axes. The surface is closed by caps: close is true.
+    crop: Crop
+    #: No part of a file is farther than this from the surface as it was extracted, nor that from
+    #: it. Millimetres. Half of it is what smoothing may take; then the surface gets as few
+    #: triangles as the rest allows, and Draco's coordinates as many bits as it takes. It is
+    #: measured on the files' own bytes: see certify, which comes with it.
+    max_error_mm: MaxError
+    #: Simplify the surface to so many triangles, or fewer. With max_error_mm, what binds first;
+    #: the answer says which. What it costs is measured: see certify, which comes with it unless it
+    #: is false.
+    triangles: Triangles
+    #: The files to make, each named once.
+    formats: Sequence[MeshFormat]
+    #: Of the drc format, and of the Draco streams inside glb.
+    draco: JobParametersDraco
+    #: Put the vertices' normals, weighted by the areas around them, into glb.
+    normals: Normals
+    #: Put each vertex's distance to the surface as it was extracted into glb, in millimetres. As
+    #: the vertex attribute _DISTANCE_MM, of all levels of detail; rounded to a four thousandth of
+    #: the largest. The page shows it as colour.
+    distances: Distances
+    #: Levels of detail for glb, as shares of the triangles from 1 downwards. By the extension
+    #: MSFT_lod, which readers that do not know it pass over. At most 8.
+    lods: Lods
+    #: Jobs are begun by priority, then by age.
+    priority: Priority
+    #: Measure how far the files are from the surface as it was extracted, and where they run
+    #: through themselves.
+    certify: Certify
+    #: Whom to tell that the job has ended, whichever way: a POST of the job, as GET gives it. Only
+    #: addresses that the operator has listed are called. It is signed as the Standard Webhooks
+    #: specification says (webhook-id, webhook-timestamp, webhook-signature), repeated until it is
+    #: answered with success, for a day, and may come more than once with the same webhook-id.
+    callback: Callback

@@ -1,0 +1,163 @@
+"""One HTTP request at a time, with the standard library."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import socket
+import ssl
+import time
+from dataclasses import dataclass, field
+from typing import Dict, Iterator, Optional
+from urllib.parse import urlsplit
+
+from .errors import Unreachable, refusal
+from .uploads import Body
+
+_TRIES = 4
+_FIRST_PAUSE = 0.1
+_PIECE = 1 << 18
+# A server never refuses or describes in more.
+_LONGEST_TEXT = 64 << 20
+
+
+class _UnixConnection(http.client.HTTPConnection):
+    def __init__(self, path: str, timeout: Optional[float]) -> None:
+        super().__init__("localhost", timeout=timeout)
+        self._path = path
+
+    def connect(self) -> None:
+        self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.sock.settimeout(self.timeout)
+        self.sock.connect(self._path)
+
+
+class Broken(Unreachable):
+    """The connection was there and broke: trying again can help."""
+
+
+@dataclass
+class Request:
+    method: str
+    target: str
+    headers: Dict[str, str] = field(default_factory=dict)
+    body: Optional[Body] = None
+    patience: float = 0  # how many seconds longer than usual the server may be silent
+
+
+class Answer:
+    """A successful answer; its body is read once, whole or in pieces."""
+
+    def __init__(self, connection: http.client.HTTPConnection, response: http.client.HTTPResponse) -> None:
+        self._connection = connection
+        self._response = response
+        self.status = response.status
+
+    def header(self, name: str) -> str:
+        return self._response.getheader(name) or ""
+
+    def pieces(self) -> Iterator[bytes]:
+        """The body's bytes as they come. Raises Broken when it ends too early."""
+        with contextlib.closing(self._connection):
+            try:
+                while piece := self._response.read(_PIECE):
+                    yield piece
+            except (OSError, http.client.HTTPException) as error:
+                raise Broken(f"the connection broke: {error}") from error
+            # `read` with a size ends quietly where the connection does.
+            if self._response.length:
+                raise Broken("the connection broke: the answer is not complete")
+
+    def text(self) -> bytes:
+        return b"".join(self.pieces())
+
+
+class Transport:
+    """Constant after construction, so it may be used from several threads. Every request has a
+    connection of its own, straight to the server: proxies of the environment are not used and
+    redirects not followed, because volumes and tokens are for the named machine only."""
+
+    def __init__(self, server: str, token: str, authorities: Optional[str], timeout: float) -> None:
+        if not token.isascii() or any(c <= " " or c == "\x7f" for c in token):
+            raise ValueError("the token must be letters, digits and signs of ASCII")
+        self._server = server
+        self._token = token
+        self._timeout = timeout
+        self._socket = server[len("unix:") :] if server.startswith("unix:") else ""
+        parts = urlsplit("http://localhost" if self._socket else server)
+        if (
+            parts.scheme not in ("http", "https")
+            or not parts.hostname
+            or parts.username is not None
+            or parts.path not in ("", "/")
+            or parts.query
+            or parts.fragment
+        ):
+            raise ValueError(f"{server!r} must be http://HOST:PORT, https://HOST:PORT or unix:PATH")
+        self._host = parts.hostname
+        self._port = parts.port  # raises ValueError for what is no port
+        self._tls = ssl.create_default_context(cafile=authorities) if parts.scheme == "https" else None
+
+    def send(self, request: Request) -> Answer:
+        """A successful answer. Raises Refused for any other, and Unreachable without one."""
+        connection = self._connection(request)
+        try:
+            connection.connect()
+        except OSError as error:
+            connection.close()
+            raise Unreachable(f"{self._server} cannot be reached: {error}") from error
+        try:
+            response = self._exchange(connection, request)
+            if 200 <= response.status < 300:
+                return Answer(connection, response)
+            body = response.read(_LONGEST_TEXT)
+        except (OSError, http.client.HTTPException) as error:
+            connection.close()
+            raise Broken(f"{self._server}: the connection broke: {error}") from error
+        except BaseException:
+            connection.close()
+            raise
+        connection.close()
+        raise refusal(response.status, response.getheader("Content-Type") or "", body)
+
+    def repeat(self, request: Request) -> bytes:
+        """The body of the answer to a request that may be sent again when its connection breaks."""
+        for attempt in range(1, _TRIES + 1):
+            try:
+                return self.send(request).text()
+            except Broken:
+                if attempt == _TRIES:
+                    raise
+            pause(attempt)
+        raise AssertionError("unreachable")
+
+    def _connection(self, request: Request) -> http.client.HTTPConnection:
+        timeout = self._timeout + request.patience
+        if self._socket:
+            return _UnixConnection(self._socket, timeout)
+        if self._tls is not None:
+            return http.client.HTTPSConnection(self._host, self._port, timeout=timeout, context=self._tls)
+        return http.client.HTTPConnection(self._host, self._port, timeout=timeout)
+
+    def _exchange(self, connection: http.client.HTTPConnection, request: Request) -> http.client.HTTPResponse:
+        headers = dict(request.headers)
+        if self._token:
+            headers["Authorization"] = f"Bearer {self._token}"
+        if request.body is not None:
+            headers["Content-Length"] = str(request.body.size)
+        pieces = None if request.body is None else request.body.pieces()
+        try:
+            connection.request(request.method, request.target, pieces, headers)
+        except (BrokenPipeError, ConnectionResetError):
+            # A server that refuses an upload may say so before it has all of it, and close.
+            try:
+                return connection.getresponse()
+            except (OSError, http.client.HTTPException):
+                pass
+            raise
+        return connection.getresponse()
+
+
+def pause(attempt: int) -> None:
+    """Before a request is tried again, the `attempt`-th time."""
+    time.sleep(_FIRST_PAUSE * 2 ** (attempt - 1))

@@ -1,0 +1,249 @@
+"""What an upload's body is made of: a file, several of them as one TAR, or samples in memory."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import tarfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, List, Optional, Sequence, Tuple, Union
+
+if TYPE_CHECKING:
+    from .api import SampleType
+
+_PIECE = 1 << 20
+_MOST_FILES = 20000  # as many as the server unpacks
+_LONGEST_HEADER = 1 << 20
+
+
+@dataclass
+class Body:
+    """Bytes of known number that are made while they are sent, so they are never held whole."""
+
+    size: int
+    pieces: Callable[[], Iterator[bytes]]
+    name: str = ""
+    query: Dict[str, str] = field(default_factory=dict)
+
+
+# --- Files ---------------------------------------------------------------------------------------
+
+
+def of_bytes(data: Union[bytes, bytearray, memoryview], name: str = "") -> Body:
+    view = memoryview(data).cast("B")
+    return Body(len(view), lambda: (bytes(view[at : at + _PIECE]) for at in range(0, len(view), _PIECE)), name)
+
+
+def of_paths(paths: Sequence[Path]) -> Body:
+    """The files that belong to an upload: of a folder all below it but hidden ones and links, of a
+    header the data beside it that it names, of several paths all of theirs."""
+    members: Dict[str, Path] = {}
+    for path in paths:
+        for name, file in _files_of(path):
+            if name in members and not members[name].samefile(file):
+                raise ValueError(f"{file}: another file of that name is sent with it")
+            members[name] = file
+    name = Path(os.path.abspath(paths[0])).name
+    if len(members) == 1 and not paths[0].is_dir():
+        (file,) = members.values()
+        size = file.stat().st_size
+        return Body(size, lambda: _read(file, size), name)
+    return _tar(members, name)
+
+
+def _files_of(path: Path) -> List[Tuple[str, Path]]:
+    if path.is_dir():
+        return _files_below(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} is no file or folder")
+    suffix = path.suffix.lower()
+    if suffix == ".mhd":
+        return _header_and_data(path, "=", "elementdatafile")
+    if suffix == ".nhdr":
+        return _header_and_data(path, ":", "datafile")
+    if suffix in (".hdr", ".img"):
+        pair = [path.with_suffix(each) for each in (".hdr", ".img", ".img.gz")]
+        return [(file.name, file) for file in pair if file.is_file()]
+    return [(path.name, path)]
+
+
+def _files_below(folder: Path) -> List[Tuple[str, Path]]:
+    found = []
+    for at, folders, files in os.walk(folder):
+        folders[:] = sorted(each for each in folders if not each.startswith("."))
+        for name in files:
+            file = Path(at, name)
+            if name.startswith(".") or file.is_symlink() or not file.is_file():
+                continue
+            found.append((file.relative_to(folder).as_posix(), file))
+    if not found:
+        raise ValueError(f"{folder} holds no files to send")
+    if len(found) > _MOST_FILES:
+        raise ValueError(f"{folder} holds more than {_MOST_FILES} files")
+    return sorted(found)
+
+
+def _header_and_data(path: Path, sign: str, wanted: str) -> List[Tuple[str, Path]]:
+    with path.open("rb") as file:
+        lines = [line.strip() for line in file.read(_LONGEST_HEADER).decode("latin-1").split("\n")]
+    names: List[str] = []
+    for at, line in enumerate(lines):
+        key, found, value = (part.strip() for part in line.partition(sign))
+        if not found or key.replace(" ", "").lower() != wanted or value.lower() == "local":
+            continue
+        if value.startswith("LIST"):
+            names = lines[at + 1 :]
+        else:
+            names = _names_like(path.parent, value.split()[0]) if "%" in value else [value]
+        break
+    files = [(path.name, path)]
+    for name in names:
+        # Data outside of the header's folder is not sent: the server refuses such a header.
+        below = os.path.normpath(name)
+        if name and not os.path.isabs(below) and not below.startswith("..") and below != path.name:
+            files.append((Path(below).as_posix(), path.parent / below))
+    return files
+
+
+def _names_like(folder: Path, pattern: str) -> List[str]:
+    """The names that a pattern such as slice%03d.raw may mean; the server takes those that it does."""
+    parts = re.fullmatch(r"([^%]*)%\d*[a-z](.*)", pattern)
+    if parts is None:
+        return []
+    like = re.compile(re.escape(parts[1]) + r"[ \d]+" + re.escape(parts[2]))
+    return sorted(each.name for each in folder.iterdir() if like.fullmatch(each.name))
+
+
+def _tar(members: Dict[str, Path], name: str) -> Body:
+    """A TAR in which nothing but names and bytes counts, so the same files make the same one."""
+    parts: List[Tuple[bytes, Path, int]] = []
+    for member, path in members.items():
+        info = tarfile.TarInfo(member)
+        info.size = path.stat().st_size
+        parts.append((info.tobuf(tarfile.PAX_FORMAT), path, info.size))
+
+    def padding(size: int) -> bytes:
+        return bytes(-size % tarfile.BLOCKSIZE)
+
+    def pieces() -> Iterator[bytes]:
+        for lead, path, size in parts:
+            yield lead
+            yield from _read(path, size)
+            yield padding(size)
+        yield bytes(2 * tarfile.BLOCKSIZE)
+
+    size = sum(len(lead) + each + len(padding(each)) for lead, _, each in parts)
+    return Body(size + 2 * tarfile.BLOCKSIZE, pieces, name)
+
+
+def _read(path: Path, size: int) -> Iterator[bytes]:
+    with path.open("rb") as file:
+        while size > 0:
+            piece = file.read(min(_PIECE, size))
+            if not piece:
+                raise ValueError(f"{path} was cut while it was sent")
+            size -= len(piece)
+            yield piece
+
+
+# --- Samples in memory ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Raw:
+    """What raw samples do not say of themselves; x runs fastest. Lengths in millimetres, origin and
+    direction in LPS; `direction` has nine numbers, row by row, its columns are the axes."""
+
+    dims: Tuple[int, int, int]
+    type: SampleType
+    spacing: Tuple[float, float, float] = (1, 1, 1)
+    origin: Tuple[float, float, float] = (0, 0, 0)
+    direction: Sequence[float] = (1, 0, 0, 0, 1, 0, 0, 0, 1)
+    big_endian: bool = False
+
+    def query(self) -> Dict[str, str]:
+        def joined(numbers: Sequence[float]) -> str:
+            return ",".join(repr(float(number)) for number in numbers)
+
+        return {
+            "dims": ",".join(str(int(each)) for each in self.dims),
+            "type": self.type,
+            "spacing": joined(self.spacing),
+            "origin": joined(self.origin),
+            "direction": joined(self.direction),
+            "byte_order": "big" if self.big_endian else "little",
+        }
+
+
+def placed(affine: Any, space: str) -> Dict[str, Any]:
+    """Spacing, origin and direction (LPS) of a 4 x 4 or 3 x 4 matrix that takes indices to
+    millimetres of `space`."""
+    rows = [[float(number) for number in row] for row in affine]
+    if len(rows) not in (3, 4) or any(len(row) != 4 for row in rows):
+        raise ValueError("the affine must be a 4 x 4 matrix")
+    if not all(math.isfinite(number) for row in rows for number in row):
+        raise ValueError("the affine holds a number that is not finite")
+    if space not in ("ras", "lps"):
+        raise ValueError("space must be 'ras' or 'lps'")
+    # RAS is LPS with x and y turned round.
+    signs = (-1, -1, 1) if space == "ras" else (1, 1, 1)
+    rows = [[sign * number for number in row] for sign, row in zip(signs, rows)]
+    spacing = [math.sqrt(sum(row[axis] ** 2 for row in rows)) for axis in range(3)]
+    if min(spacing) == 0:
+        raise ValueError("the affine has an axis of no length")
+    direction = [row[axis] / spacing[axis] for row in rows for axis in range(3)]
+    # 0.0 of -0.0: the same place has one spelling.
+    return {
+        "spacing": tuple(spacing),
+        "origin": tuple(row[3] + 0.0 for row in rows),
+        "direction": tuple(number + 0.0 for number in direction),
+    }
+
+
+def of_array(array: Any, affine: Optional[Any], space: str, spacing: Optional[Sequence[float]]) -> Body:
+    """The samples of a numpy array of three axes, of which the first is x, sent plane by plane."""
+    import numpy
+
+    samples = numpy.asanyarray(array)
+    while samples.ndim > 3 and samples.shape[-1] == 1:
+        samples = samples[..., 0]
+    if samples.ndim != 3 or samples.size == 0:
+        raise ValueError(f"the array must have three axes, and has the shape {samples.shape}")
+    target = _sendable(numpy, samples)
+    if affine is not None and spacing is not None:
+        raise ValueError("give either affine or spacing")
+    if affine is None:
+        steps = spacing or (1, 1, 1)
+        affine = [[float(steps[row]) if row == column else 0.0 for column in range(4)] for row in range(3)]
+        space = "lps"
+    x, y, z = samples.shape
+    raw = Raw((x, y, z), target.name, **placed(affine, space))
+    little = target.newbyteorder("<")
+
+    def pieces() -> Iterator[bytes]:
+        for index in range(z):
+            plane: bytes = numpy.asarray(samples[:, :, index]).astype(little).tobytes(order="F")
+            yield plane
+
+    return Body(samples.size * target.itemsize, pieces, query=raw.query())
+
+
+def _sendable(numpy: Any, samples: Any) -> Any:
+    """The type to send samples as: their own where the server knows it, else one that holds all."""
+    kind, size = samples.dtype.kind, samples.dtype.itemsize
+    if kind in "iu" and size <= 4 or kind == "f" and size in (4, 8):
+        return samples.dtype.newbyteorder("=")
+    if kind == "b":
+        return numpy.dtype("uint8")
+    if kind == "f" and size == 2:
+        return numpy.dtype("float32")
+    if kind in "iu":
+        low, high = int(samples.min()), int(samples.max())
+        for name in ("int32", "uint32"):
+            limits = numpy.iinfo(name)
+            if limits.min <= low and high <= limits.max:
+                return numpy.dtype(name)
+        raise ValueError(f"the samples, from {low} to {high}, do not fit into 32 bits; convert them to float64")
+    raise TypeError(f"samples of the type {samples.dtype} cannot be sent; integers and floats can")

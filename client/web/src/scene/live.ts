@@ -1,0 +1,400 @@
+// The surface that a volume has at an iso-value, drawn anew for each value and from any side: nothing is extracted.
+// Takes as many pixels as there is time for while something moves, and all of them when it rests.
+import {
+  BackSide,
+  BoxGeometry,
+  BufferAttribute,
+  BufferGeometry,
+  Data3DTexture,
+  GLSL3,
+  LinearFilter,
+  LineBasicMaterial,
+  LineSegments,
+  Matrix3,
+  Matrix4,
+  Mesh,
+  NearestFilter,
+  PerspectiveCamera,
+  PlaneGeometry,
+  RawShaderMaterial,
+  RedFormat,
+  RGFormat,
+  Scene,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+  WebGLRenderTarget,
+} from 'three';
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import type { Vec3 } from '../api/types';
+import { blockSize, firstCrossing, type Preview } from '../volume/preview';
+import { whenDrawn } from './fence';
+import { enlargingFragmentShader, enlargingVertexShader, fragmentShader, vertexShader } from './live_shader';
+import { onTap } from './tap';
+import { firstOffset, fitDistance } from './views';
+
+const verticalAngle = 30;
+const fill = 1.02;
+// How long a frame may take while something moves, and at rest, in milliseconds.
+const movingTime = 40;
+const movingTimeOfSoftware = 110;
+const restingTime = 1500;
+const settleDelay = 220;
+// Parts of the canvas's width and height.
+const scales = [1, 0.7, 0.5, 0.35, 0.25, 0.18];
+
+export interface Frame {
+  // From the change to the finished picture, in milliseconds.
+  took: number;
+  scale: number;
+  isResting: boolean;
+}
+
+interface Drawable {
+  preview: Preview;
+  samples: Data3DTexture;
+  blocks: Data3DTexture;
+}
+
+function drawable(preview: Preview): Drawable {
+  const samples = new Data3DTexture(preview.samples, ...preview.dims);
+  samples.format = RedFormat;
+  samples.minFilter = LinearFilter;
+  samples.magFilter = LinearFilter;
+  const blocks = new Data3DTexture(preview.blocks, ...preview.blockDims);
+  blocks.format = RGFormat;
+  blocks.minFilter = NearestFilter;
+  blocks.magFilter = NearestFilter;
+  for (const texture of [samples, blocks]) {
+    texture.unpackAlignment = 1;
+    texture.needsUpdate = true;
+  }
+  return { preview, samples, blocks };
+}
+
+function letGo({ samples, blocks }: Drawable): void {
+  samples.dispose();
+  blocks.dispose();
+}
+
+export class LiveSurface {
+  readonly canvas: HTMLCanvasElement;
+  // Software draws: coarser volumes do.
+  readonly isSoftware: boolean;
+  onFrame: ((frame: Frame) => void) | null = null;
+  // A click or tap on the surface, in samples of the preview.
+  onPick: ((place: Vec3) => void) | null = null;
+
+  private readonly renderer: WebGLRenderer;
+  private readonly gl: WebGL2RenderingContext;
+  private readonly scene = new Scene();
+  private readonly camera = new PerspectiveCamera(verticalAngle, 1, 1, 1000);
+  private readonly controls: OrbitControls;
+  private readonly resizing: ResizeObserver;
+  private readonly uniforms = {
+    samples: { value: null as Data3DTexture | null },
+    blocks: { value: null as Data3DTexture | null },
+    blockSize: { value: blockSize },
+    dims: { value: new Vector3(2, 2, 2) },
+    eye: { value: new Vector3() },
+    toNormal: { value: new Matrix3() },
+    towardsLight: { value: new Vector3() },
+    towardsEye: { value: new Vector3() },
+    colour: { value: new Vector3(0.86, 0.84, 0.78) },
+    iso: { value: 0.5 },
+    reach: { value: 1 },
+  };
+  private readonly box: Mesh<BoxGeometry, RawShaderMaterial>;
+  // Through where the slices meet, over the surface.
+  private readonly cross = new LineSegments(
+    new BufferGeometry(),
+    new LineBasicMaterial({ color: '#2ce0cb', transparent: true, opacity: 0.45, depthTest: false }),
+  );
+  private cursor: Vec3 | null = null;
+  // What is drawn with fewer pixels than the canvas has. A canvas that changes its size holds the page up until
+  // all that was drawn before is done.
+  private readonly target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
+  private readonly enlarging: Mesh<PlaneGeometry, RawShaderMaterial>;
+  private readonly part = { picture: { value: this.target.texture }, part: { value: new Vector2() }, last: { value: new Vector2() } };
+  // Software draws the first, coarser one while something moves.
+  private first: Drawable | null = null;
+  private best: Drawable | null = null;
+  private isDisposed = false;
+  private isBusy = false;
+  private changedAt = 0;
+  private isMoving = false;
+  private settling = 0;
+  // Milliseconds a pixel, of the last frames of each kind; guessed before the first.
+  private readonly costs: { moving: number; resting: number };
+
+  // Throws where WebGL 2 is missing.
+  constructor(private readonly host: HTMLElement) {
+    this.renderer = new WebGLRenderer({ antialias: false, alpha: true, powerPreference: 'high-performance' });
+    this.gl = this.renderer.getContext() as WebGL2RenderingContext;
+    this.isSoftware = isSoftware(this.gl);
+    const guess = this.isSoftware ? 4e-3 : 1e-5;
+    this.costs = { moving: guess, resting: 2 * guess };
+    this.canvas = this.renderer.domElement;
+    this.canvas.tabIndex = 0;
+    this.canvas.setAttribute('role', 'img');
+    host.prepend(this.canvas);
+    const material = new RawShaderMaterial({
+      glslVersion: GLSL3,
+      vertexShader,
+      fragmentShader,
+      uniforms: this.uniforms,
+      side: BackSide,
+      depthTest: false,
+    });
+    this.box = new Mesh(new BoxGeometry(1, 1, 1).translate(0.5, 0.5, 0.5), material);
+    this.box.matrixAutoUpdate = false;
+    this.box.frustumCulled = false;
+    this.cross.frustumCulled = false;
+    this.cross.geometry.setAttribute('position', new BufferAttribute(new Float32Array(18), 3));
+    this.box.add(this.cross);
+    this.scene.add(this.box);
+    const enlarged = new RawShaderMaterial({
+      glslVersion: GLSL3,
+      vertexShader: enlargingVertexShader,
+      fragmentShader: enlargingFragmentShader,
+      uniforms: this.part,
+      depthTest: false,
+      depthWrite: false,
+    });
+    this.enlarging = new Mesh(new PlaneGeometry(2, 2), enlarged);
+    this.enlarging.frustumCulled = false;
+    this.camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.controls.addEventListener('change', () => this.moved());
+    onTap(this.canvas, (event) => this.tapped(event));
+    this.canvas.addEventListener('webglcontextrestored', () => this.changed());
+    this.resizing = new ResizeObserver(() => this.changed());
+    this.resizing.observe(host);
+  }
+
+  // The first one is looked at as a whole; another one of the same volume leaves the camera where it is.
+  setPreview(preview: Preview): void {
+    const made = drawable(preview);
+    const isFirst = this.first === null;
+    // Of another window, or in place of the one before.
+    const isOther = this.first?.preview.window.join() !== preview.window.join();
+    if (isOther) for (const old of new Set([this.first, this.best])) if (old) letGo(old);
+    if (isOther) this.first = made;
+    else if (this.best && this.best !== this.first) letGo(this.best);
+    this.best = made;
+    this.use(made);
+    if (isFirst) this.fit(firstOffset);
+    this.changed();
+  }
+
+  private use({ preview, samples, blocks }: Drawable): void {
+    this.uniforms.samples.value = samples;
+    this.uniforms.blocks.value = blocks;
+    this.uniforms.dims.value.set(...preview.dims);
+    const [x, y, z] = preview.steps;
+    const [ox, oy, oz] = preview.origin;
+    this.box.matrix.set(x[0], y[0], z[0], ox, x[1], y[1], z[1], oy, x[2], y[2], z[2], oz, 0, 0, 0, 1);
+    this.box.matrixWorldNeedsUpdate = true;
+    this.uniforms.toNormal.value.setFromMatrix4(this.box.matrix).invert().transpose();
+    this.placeCross();
+  }
+
+  // Where the slices meet, in millimetres.
+  setCursor(cursor: Vec3): void {
+    if (this.cursor?.join() === cursor.join()) return;
+    this.cursor = cursor;
+    this.placeCross();
+    this.changed();
+  }
+
+  private placeCross(): void {
+    this.cross.visible = this.cursor !== null;
+    if (!this.cursor) return;
+    const place = new Vector3(...this.cursor).applyMatrix4(new Matrix4().copy(this.box.matrix).invert());
+    const positions = this.cross.geometry.getAttribute('position');
+    for (const axis of [0, 1, 2]) {
+      for (const end of [0, 1]) {
+        const point = place.clone().setComponent(axis, end * (this.uniforms.dims.value.getComponent(axis) - 1));
+        positions.setXYZ(2 * axis + end, ...point.toArray());
+      }
+    }
+    positions.needsUpdate = true;
+  }
+
+  // In parts of the preview's window.
+  setIso(iso: number): void {
+    if (this.uniforms.iso.value === iso) return;
+    this.uniforms.iso.value = iso;
+    this.moved();
+  }
+
+  fit(offset: Vec3): void {
+    if (!this.best) return;
+    const corners = this.corners();
+    const low = corners[0].clone().min(corners[1]);
+    const high = corners[0].clone().max(corners[1]);
+    const size = high.clone().sub(low).toArray();
+    const { clientWidth: width, clientHeight: height } = this.host;
+    const angle = (verticalAngle * Math.PI) / 180;
+    const distance = fill * fitDistance(size, offset, angle, width / Math.max(1, height));
+    const scale = distance / Math.hypot(...offset);
+    this.controls.target.copy(low).add(high).multiplyScalar(0.5);
+    this.camera.position.copy(this.controls.target).addScaledVector(new Vector3(...offset), scale);
+    this.controls.update();
+    this.moved();
+  }
+
+  // Around the patient's axis and up, in radians; and nearer by a factor below 1.
+  turn(azimuth: number, elevation: number, factor = 1): void {
+    const offset = this.camera.position.clone().sub(this.controls.target).multiplyScalar(factor);
+    const up = new Vector3(0, 0, 1);
+    offset.applyAxisAngle(up, azimuth);
+    const side = offset.clone().cross(up).normalize();
+    const limit = 0.02;
+    const wanted = Math.max(limit, Math.min(Math.PI - limit, offset.angleTo(up) - elevation));
+    offset.applyAxisAngle(side, offset.angleTo(up) - wanted);
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.update();
+    this.moved();
+  }
+
+  dispose(): void {
+    this.isDisposed = true;
+    clearTimeout(this.settling);
+    this.resizing.disconnect();
+    this.controls.dispose();
+    for (const old of new Set([this.first, this.best])) if (old) letGo(old);
+    this.box.geometry.dispose();
+    this.box.material.dispose();
+    this.cross.geometry.dispose();
+    this.cross.material.dispose();
+    this.enlarging.geometry.dispose();
+    this.enlarging.material.dispose();
+    this.target.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+    this.canvas.remove();
+  }
+
+  // Two opposite corners of the box around the whole volume.
+  private corners(): [Vector3, Vector3] {
+    const low = new Vector3(Infinity, Infinity, Infinity);
+    const high = low.clone().negate();
+    const { x, y, z } = this.uniforms.dims.value;
+    for (let corner = 0; corner < 8; corner += 1) {
+      const place = new Vector3(corner & 1 ? x - 1 : 0, corner & 2 ? y - 1 : 0, corner & 4 ? z - 1 : 0);
+      place.applyMatrix4(this.box.matrix);
+      low.min(place);
+      high.max(place);
+    }
+    return [low, high];
+  }
+
+  private moved(): void {
+    this.isMoving = true;
+    clearTimeout(this.settling);
+    this.settling = window.setTimeout(() => {
+      this.isMoving = false;
+      this.changed();
+    }, settleDelay);
+    this.changed();
+  }
+
+  private changed(): void {
+    delete this.host.dataset.still;
+    if (this.changedAt === 0) this.changedAt = performance.now();
+    // What changes while a frame is drawn is drawn next.
+    if (this.isBusy || this.isDisposed) return;
+    this.isBusy = true;
+    requestAnimationFrame(() => this.render());
+  }
+
+  private render(): void {
+    const { clientWidth, clientHeight } = this.host;
+    if (this.isDisposed || !this.first || !this.best || clientWidth === 0 || clientHeight === 0) {
+      this.isBusy = false;
+      return;
+    }
+    const isResting = !this.isMoving;
+    const changedAt = this.changedAt;
+    this.changedAt = 0;
+    const kind = isResting ? 'resting' : 'moving';
+    this.use(this.isSoftware && !isResting ? this.first : this.best);
+    this.uniforms.reach.value = this.isSoftware && !isResting ? 1 : 0.5;
+    const ratio = Math.min(2, window.devicePixelRatio || 1);
+    const [wide, high] = [Math.round(clientWidth * ratio), Math.round(clientHeight * ratio)];
+    if (this.canvas.width !== wide || this.canvas.height !== high) {
+      this.renderer.setSize(wide, high, false);
+      this.target.setSize(wide, high);
+    }
+    const scale = this.scaleFor(wide * high, kind);
+    const [width, height] = [Math.max(1, Math.round(wide * scale)), Math.max(1, Math.round(high * scale))];
+    this.camera.aspect = clientWidth / clientHeight;
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    this.camera.near = distance / 1000;
+    this.camera.far = distance * 20;
+    this.camera.updateProjectionMatrix();
+    this.camera.updateMatrixWorld();
+    this.uniforms.eye.value.copy(this.camera.position).applyMatrix4(new Matrix4().copy(this.box.matrix).invert());
+    this.uniforms.towardsEye.value.copy(this.camera.position).sub(this.controls.target).normalize();
+    this.uniforms.towardsLight.value.set(-0.35, 0.5, 1).transformDirection(this.camera.matrixWorld);
+    const began = performance.now();
+    this.paint(width, height);
+    whenDrawn(this.gl, () => {
+      const now = performance.now();
+      this.costs[kind] = 0.5 * this.costs[kind] + (0.5 * (now - began)) / (width * height);
+      this.isBusy = false;
+      if (this.isDisposed) return;
+      this.onFrame?.({ took: now - changedAt, scale, isResting });
+      if (this.changedAt !== 0) this.changed();
+      else if (isResting) this.host.dataset.still = '';
+    });
+  }
+
+  // With so many pixels.
+  private paint(width: number, height: number): void {
+    const { renderer, target } = this;
+    if (width === target.width) {
+      renderer.setRenderTarget(null);
+      renderer.render(this.scene, this.camera);
+      return;
+    }
+    target.viewport.set(0, 0, width, height);
+    renderer.setRenderTarget(target);
+    renderer.clear();
+    renderer.render(this.scene, this.camera);
+    renderer.setRenderTarget(null);
+    this.part.part.value.set(width / target.width, height / target.height);
+    this.part.last.value.set((width - 0.5) / target.width, (height - 0.5) / target.height);
+    renderer.render(this.enlarging, this.camera);
+  }
+
+  private scaleFor(pixels: number, kind: 'moving' | 'resting'): number {
+    const time = kind === 'resting' ? restingTime : this.isSoftware ? movingTimeOfSoftware : movingTime;
+    return scales.find((scale) => this.costs[kind] * pixels * scale * scale <= time) ?? (scales.at(-1) as number);
+  }
+
+  private tapped(event: PointerEvent): void {
+    if (!this.best || !this.onPick) return;
+    this.use(this.best);
+    const bounds = this.canvas.getBoundingClientRect();
+    const x = (2 * (event.clientX - bounds.left)) / bounds.width - 1;
+    const y = 1 - (2 * (event.clientY - bounds.top)) / bounds.height;
+    const toSamples = new Matrix4().copy(this.box.matrix).invert();
+    const from = this.camera.position.clone().applyMatrix4(toSamples);
+    const through = new Vector3(...new Vector2(x, y).toArray(), 0.5).unproject(this.camera).applyMatrix4(toSamples);
+    const place = firstCrossing(
+      this.best.preview,
+      this.uniforms.iso.value,
+      from.toArray(),
+      through.sub(from).toArray(),
+    );
+    if (place) this.onPick(place);
+  }
+}
+
+function isSoftware(gl: WebGL2RenderingContext): boolean {
+  const info = gl.getExtension('WEBGL_debug_renderer_info');
+  const name = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}

@@ -1,0 +1,41 @@
+// What an estimate says of a job before it runs.
+import type { Estimate } from '../api/types';
+import { h } from '../ui/dom';
+import { formatBytes, formatCount, formatMilliseconds, formatNames } from '../ui/format';
+
+function warning(text: string): HTMLElement {
+  return h('p', { class: 'warning' }, text);
+}
+
+export function estimateTexts(estimate: Estimate, isByLabels: boolean): HTMLElement[] {
+  const files = Object.entries(estimate.bytes).map(
+    ([format, bytes]) => `${formatNames[format] ?? format} ${formatBytes(bytes)}`,
+  );
+  const rows: [string, string][] = [
+    ['Triangles', formatCount(estimate.triangles)],
+    ['Vertices', formatCount(estimate.vertices)],
+    ['Files', `about ${files.join(', ')}`],
+    ['Time', `about ${formatMilliseconds(estimate.milliseconds)}`],
+  ];
+  const before = estimate.queue.queued + estimate.queue.running;
+  if (before > 0) rows.push(['Before it', before === 1 ? '1 job' : `${before} jobs`]);
+  const texts: HTMLElement[] = [h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]))];
+  if (estimate.triangles === 0) {
+    texts.push(
+      warning(
+        isByLabels
+          ? 'These labels have no boundary: the surface would be empty.'
+          : 'No sample boundary has this value: the surface would be empty.',
+      ),
+    );
+  }
+  if (!estimate.fits) {
+    texts.push(
+      warning(
+        `This needs ${formatBytes(estimate.memory_bytes)} of memory, more than a job may take. ` +
+          (isByLabels ? 'Choose fewer labels.' : 'Choose an iso-value with fewer triangles.'),
+      ),
+    );
+  }
+  return texts;
+}

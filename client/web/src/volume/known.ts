@@ -1,0 +1,36 @@
+// Volumes by their ids, each asked for once: to call those by their names that jobs were made of.
+import { getVolume } from '../api/client';
+import { asApiError } from '../api/problem';
+import type { Volume } from '../api/types';
+import { volumeName } from './names';
+
+export class KnownVolumes {
+  // Null: it was erased.
+  private readonly known = new Map<string, Volume | null>();
+
+  learn(volumes: readonly Volume[]): void {
+    for (const volume of volumes) this.known.set(volume.id, volume);
+  }
+
+  // Throws when nobody answers; what was learnt until then stays.
+  async find(ids: Iterable<string>): Promise<void> {
+    const unknown = [...new Set(ids)].filter((id) => !this.known.has(id));
+    await Promise.all(
+      unknown.map(async (id) => {
+        try {
+          this.known.set(id, await getVolume(id));
+        } catch (error) {
+          const { status } = asApiError(error);
+          if (status !== 404 && status !== 410) throw error;
+          this.known.set(id, null);
+        }
+      }),
+    );
+  }
+
+  nameOf(id: string): string {
+    const volume = this.known.get(id);
+    if (volume === undefined) return '';
+    return volume ? volumeName(volume) : 'a volume that was erased';
+  }
+}

@@ -1,0 +1,73 @@
+// Whether a file's first bytes are those of something that the daemon reads, so that gigabytes of something
+// else are not sent for nothing. The daemon judges; this only says what is surely none of it.
+
+const headBytes = 1024;
+// Of a compressed file, which surely hold the first bytes of what it was.
+const packedBytes = 65_536;
+
+function startsWith(head: Uint8Array, ...bytes: number[]): boolean {
+  return bytes.every((byte, at) => head[at] === byte);
+}
+
+function textOf(head: Uint8Array, from = 0, length = headBytes): string {
+  return String.fromCharCode(...head.subarray(from, from + length));
+}
+
+function isNifti(head: Uint8Array): boolean {
+  if (head.length < 348) return false;
+  const view = new DataView(head.buffer, head.byteOffset, head.byteLength);
+  return [true, false].some((isLittle) => [348, 540].includes(view.getInt32(0, isLittle)));
+}
+
+// Without a preamble it begins with an element of the group 0002 or 0008.
+function isDicom(head: Uint8Array): boolean {
+  return textOf(head, 128, 4) === 'DICM' || startsWith(head, 2, 0) || startsWith(head, 8, 0);
+}
+
+function isText(head: Uint8Array): boolean {
+  // NRRD, a header of MetaImage (Name = value), a VTK image.
+  return /^NRRD|^\s*[A-Za-z]\w*\s*=|^(\u00ef\u00bb\u00bf)?\s*<(\?xml|VTKFile)/.test(textOf(head));
+}
+
+function isArchive(head: Uint8Array): boolean {
+  return textOf(head, 0, 2) === 'PK' || textOf(head, 257, 5) === 'ustar';
+}
+
+// What is packed otherwise than with gzip, which browsers cannot look into.
+function isPackedOtherwise(head: Uint8Array): boolean {
+  return (
+    textOf(head, 0, 3) === 'BZh' ||
+    startsWith(head, 0xfd, 0x37, 0x7a, 0x58, 0x5a) ||
+    startsWith(head, 0x28, 0xb5, 0x2f, 0xfd)
+  );
+}
+
+async function bytesOf(file: Blob, count: number): Promise<Uint8Array<ArrayBuffer>> {
+  return new Uint8Array(await file.slice(0, count).arrayBuffer());
+}
+
+// The first bytes of what was compressed; none when it is broken.
+async function unpacked(file: Blob): Promise<Uint8Array> {
+  const reader = file.slice(0, packedBytes).stream().pipeThrough(new DecompressionStream('gzip')).getReader();
+  const found: number[] = [];
+  try {
+    while (found.length < headBytes) {
+      const { done, value } = await reader.read();
+      if (done) break;
+      found.push(...(value as Uint8Array).subarray(0, headBytes - found.length));
+    }
+  } catch {
+    // Cut off in the middle of the file, as it has to be.
+  }
+  reader.cancel().catch(() => undefined);
+  return Uint8Array.from(found);
+}
+
+function isKnown(head: Uint8Array): boolean {
+  return [isNifti, isDicom, isText, isArchive, isPackedOtherwise].some((test) => test(head));
+}
+
+export async function mayBeVolume(file: Blob): Promise<boolean> {
+  const head = await bytesOf(file, headBytes);
+  return isKnown(startsWith(head, 0x1f, 0x8b) ? await unpacked(file) : head);
+}

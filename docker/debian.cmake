@@ -1,0 +1,42 @@
+# The Debian packages, by CPack: isomeshd, isomesh and libisomesh-dev, of a build that was configured with
+# -D CMAKE_INSTALL_PREFIX=/usr. Whom they need is found from the binaries.
+foreach(pair daemon:isomeshd client:isomesh dev:libisomesh-dev)
+  string(REPLACE ":" ";" pair ${pair})
+  list(GET pair 0 component)
+  list(GET pair 1 package)
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package}
+    RENAME copyright COMPONENT ${component})
+  string(TOUPPER ${component} upper)
+  set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${package})
+endforeach()
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_COMPONENTS_ALL daemon client dev)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_SET_DESTDIR ON)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_PACKAGE_NAME isomesh)
+set(CPACK_PACKAGE_VENDOR isomesh)
+set(CPACK_PACKAGE_CONTACT "isomesh <isomesh@localhost>")
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_RELEASE 1 CACHE STRING "The packages' revision")
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+
+set(scripts ${PROJECT_SOURCE_DIR}/server/install)
+set(CPACK_DEBIAN_DAEMON_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_DAEMON_PACKAGE_DEPENDS "adduser")
+set(CPACK_DEBIAN_DAEMON_PACKAGE_CONTROL_EXTRA
+  ${scripts}/postinst ${scripts}/prerm ${scripts}/postrm ${scripts}/conffiles)
+set(CPACK_COMPONENT_DAEMON_DESCRIPTION
+  "daemon that turns medical volumes into surface meshes\nReads NIfTI, NRRD, MetaImage, VTK images and DICOM over HTTP, extracts and\nsmooths iso-surfaces and labels, and sends Draco, GLB, STL, PLY and OBJ.\nIt has a web page.")
+
+set(CPACK_DEBIAN_CLIENT_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_CLIENT_PACKAGE_SUGGESTS isomeshd)
+set(CPACK_COMPONENT_CLIENT_DESCRIPTION
+  "command that asks an isomesh daemon for meshes\nFrom a file of a volume to files of its surface, in one step or in many.")
+
+set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libcurl4-openssl-dev | libcurl4-gnutls-dev, libssl-dev")
+set(CPACK_COMPONENT_DEV_DESCRIPTION
+  "C++ library that asks an isomesh daemon for meshes\nHeaders, static libraries, and what CMake and pkg-config look for.")
+include(CPack)

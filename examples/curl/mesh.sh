@@ -1,0 +1,50 @@
+#!/usr/bin/env bash
+# From a volume to an STL with curl alone, step by step: so a job can be left and come back to.
+#
+#   examples/curl/mesh.sh head.nii.gz 60 head.stl
+#
+# ISOMESH_SERVER says where the daemon is, ISOMESH_TOKEN who asks.
+set -euo pipefail
+
+file="$1"
+iso="$2"
+output="$3"
+server="${ISOMESH_SERVER:-http://127.0.0.1:8080}"
+
+# ask ARGUMENT..: the answer's body; a refusal ends the script with the server's reason.
+ask() {
+  local token=() answer status
+  [[ -z "${ISOMESH_TOKEN:-}" ]] || token=(--header "Authorization: Bearer $ISOMESH_TOKEN")
+  answer="$(curl --silent --show-error --write-out '\n%{http_code}' "${token[@]}" "$@")"
+  status="${answer##*$'\n'}"
+  answer="${answer%$'\n'*}"
+  if [[ "$status" != 2* ]]; then
+    echo "mesh.sh: $(member detail "$answer")" >&2
+    return 1
+  fi
+  printf '%s' "$answer"
+}
+
+# member NAME JSON: the first text of that name; jq does this better where it is at hand.
+member() {
+  sed -n "s/.*\"$1\":\"\([^\"]*\)\".*/\1/p" <<<"${2//,\"/$'\n'\"}" | head -n 1
+}
+
+answer="$(ask --request POST --upload-file "$file" "$server/v1/volumes")"
+volume="$(member id "$answer")"
+answer="$(ask "$server/v1/jobs" --header 'Content-Type: application/json' \
+  --header "Idempotency-Key: $(basename "$file")-$iso" \
+  --data "{\"volume\": \"$volume\", \"iso\": $iso, \"formats\": [\"stl\"]}")"
+job="$(member id "$answer")"
+state=queued
+while [[ "$state" == queued || "$state" == running ]]; do
+  answer="$(ask "$server/v1/jobs/$job?wait=30")"
+  state="$(member state "$answer")"
+done
+if [[ "$state" != succeeded ]]; then
+  echo "mesh.sh: the job $job was $state: $(member detail "$answer")" >&2
+  exit 1
+fi
+curl --silent --show-error --fail ${ISOMESH_TOKEN:+--header "Authorization: Bearer $ISOMESH_TOKEN"} \
+  --output "$output" "$server/v1/jobs/$job/mesh.stl"
+echo "$output"

@@ -1,0 +1,64 @@
+// Text of YAML, as openapi.yaml is written. Private to this folder.
+#pragma once
+
+#include <cctype>
+#include <cstddef>
+#include <functional>
+#include <sstream>
+#include <string>
+#include <utility>
+
+namespace isomesh {
+
+// Lines of YAML, each indented as deep as the mapping that it stands in.
+class Yaml {
+ public:
+  static constexpr std::size_t kWidth = 104;
+
+  explicit Yaml(std::size_t depth) : depth_(depth) {}
+
+  void line(const std::string& text) { text_ += std::string(2 * depth_, ' ') + text + '\n'; }
+
+  // `name:` and what `inner` writes below it.
+  void under(const std::string& name, const std::function<void()>& inner) {
+    line(name + ':');
+    ++depth_;
+    inner();
+    --depth_;
+  }
+
+  // A text of any length, on the name's own line where it is short and nothing in it means
+  // something to YAML.
+  void text(const std::string& name, const std::string& value) {
+    const bool is_plain = std::isalpha(static_cast<unsigned char>(value.front())) != 0 &&
+                          value.find(": ") == std::string::npos &&
+                          value.find(" #") == std::string::npos;
+    if (is_plain && 2 * depth_ + name.size() + 2 + value.size() <= kWidth) {
+      return line(name + ": " + value);
+    }
+    line(name + ": |");
+    ++depth_;
+    wrapped(value);
+    --depth_;
+  }
+
+  const std::string& str() const { return text_; }
+
+ private:
+  void wrapped(const std::string& value) {
+    std::istringstream words(value);
+    std::string row;
+    for (std::string word; words >> word;) {
+      if (!row.empty() && 2 * depth_ + row.size() + 1 + word.size() > kWidth) {
+        line(std::exchange(row, {}));
+      }
+      row += (row.empty() ? "" : " ") + word;
+    }
+    line(row);
+  }
+
+  std::size_t depth_;
+  std::string text_;
+};
+
+}  // namespace isomesh

@@ -1,0 +1,69 @@
+// The fields of orders, as fields.h has those of everything else. Private to this folder.
+#pragma once
+
+#include "proto/fields.h"
+#include "proto/orders.h"
+
+namespace isomesh {
+
+void visit(Is<OrderSource> auto& self, auto&& field) {
+  field("pacs", self.pacs);
+  field("study", self.study);
+  field("series", self.series);
+  field("instances", self.instances);
+}
+
+void visit(Is<SendTarget> auto& self, auto&& field) {
+  field("pacs", self.pacs);
+  field("format", self.format);
+}
+
+void visit(Is<OrderResult> auto& self, auto&& field) {
+  field("pacs", self.pacs);
+  field("format", self.format);
+  field("label", self.label);
+  field("series_uid", self.series_uid);
+  field("sop_instance_uid", self.sop_instance_uid);
+  field("bytes", self.bytes);
+  field("stored", self.stored);
+}
+
+void visit(Is<Order> auto& self, auto&& field) {
+  field("id", self.id);
+  field("state", self.state);
+  field("rule", self.rule);
+  field("source", self.source);
+  field("parameters", self.parameters);
+  field("priority", self.priority);
+  field("send", self.send);
+  field("volume", self.volume);
+  field("job", self.job);
+  field("results", self.results);
+  field("attempts", self.attempts);
+  field("next_attempt", self.next_attempt);
+  field("created", self.created);
+  field("finished", self.finished);
+  field("error", self.error);
+}
+
+void visit(Is<OrderWork> auto& self, auto&& field) {
+  field("listed", self.listed);
+  field("listed_since", self.listed_since);
+  field("failures", self.failures);
+  field("looks", self.looks);
+  field("begun", self.begun);
+  field("identity", self.identity);
+  field("blobs", self.blobs);
+  field("label", self.label);
+  field("series_number", self.series_number);
+  field("callback", self.callback);
+}
+
+void visit(Is<PacsStatus> auto& self, auto&& field) {
+  field("name", self.name);
+  field("last_success", self.last_success);
+  field("last_failure", self.last_failure);
+  field("reason", self.reason);
+}
+
+}  // namespace isomesh

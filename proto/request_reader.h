@@ -1,0 +1,317 @@
+// Reads the members of a request, by the table of parameters. Private to this folder.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "base/text.h"
+#include "proto/fields.h"
+#include "proto/json.h"
+
+namespace isomesh {
+
+// Collects what is wrong with every member, so that one answer names all of it.
+class RequestReader {
+ public:
+  // How the request spells a member's path; as it is, unless this is set.
+  using Spelling = std::string (*)(const std::string& path);
+  void spell_by(Spelling spelling) { spelling_ = spelling; }
+
+  // Reads `json` into `value`, whose parameters are those of `visit`, and refuses any other member.
+  template <class T>
+  void read_object(const Json& json, T& value, const std::string& prefix) {
+    std::vector<std::string> known;
+    visit(value, [&](const Parameter& parameter, auto& member) {
+      known.emplace_back(parameter.name);
+      if (const auto found = json.find(parameter.name); found != json.end()) {
+        read_member(*found, prefix + parameter.name, parameter, member);
+      }
+    });
+    for (const auto& [name, unused] : json.items()) {
+      if (std::ranges::find(known, name) == known.end()) {
+        add(prefix + name, "is not a known member");
+      }
+    }
+  }
+
+  void add(const std::string& field, const std::string& message) {
+    if (errors_.size() >= kMostErrors) return;
+    const std::string name = field.substr(0, kLongestName);
+    errors_.push_back({spelling_ == nullptr ? name : spelling_(name), message});
+  }
+
+  void throw_if_any() {
+    if (!errors_.empty()) throw invalid_parameters(std::move(errors_));
+  }
+
+ private:
+  static constexpr std::size_t kMostErrors = 20;
+  static constexpr std::size_t kLongestName = 64;
+
+  static bool fits(const Parameter& parameter, double number) {
+    return std::isfinite(number) && !(parameter.minimum && number < *parameter.minimum) &&
+           !(parameter.above && number <= *parameter.above) &&
+           !(parameter.maximum && number > *parameter.maximum);
+  }
+
+  // `kind` of number, and what the table says that it may be.
+  void refuse(const std::string& path, const std::string& kind, const Parameter& parameter) {
+    const std::string range = range_of(parameter);
+    std::string message = "must be a " + kind + (range.empty() ? "" : ' ' + range);
+    if (parameter.when_empty != nullptr)
+      message += " or \"" + std::string(parameter.when_empty) + '"';
+    add(path, message);
+  }
+
+  template <class Whole>
+  void read_whole(const Json& json, const std::string& path, const Parameter& parameter,
+                  Whole& value) {
+    const double number = json.is_number() ? json.get<double>() : std::nan("");
+    if (std::floor(number) != number || !fits(parameter, number)) {
+      return refuse(path, "whole number", parameter);
+    }
+    value = static_cast<Whole>(number);
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   std::string& value) {
+    if (!json.is_string()) return add(path, "must be a string");
+    value = json.get<std::string>();
+  }
+
+  template <class Number>
+  requires std::is_arithmetic_v<Number>
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::optional<Number>& value) {
+    const Json empty = parameter.when_empty == nullptr ? Json(nullptr) : Json(parameter.when_empty);
+    if (json == empty) return value.reset();
+    read_member(json, path, parameter, value.emplace());
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   Scheme& value) {
+    if (json == 5) {
+      value = Scheme::kFive;
+    } else if (json == 6) {
+      value = Scheme::kSix;
+    } else {
+      add(path, "must be 5 or 6");
+    }
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   Enumeration auto& value) {
+    using Enum = std::remove_reference_t<decltype(value)>;
+    const auto known = json.is_string() ? from_string<Enum>(json.get<std::string>()) : std::nullopt;
+    if (!known) return add(path, "must be " + names_of<Enum>());
+    value = *known;
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   int& value) {
+    read_whole(json, path, parameter, value);
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::uint32_t& value) {
+    read_whole(json, path, parameter, value);
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   double& value) {
+    const double number = json.is_number() ? json.get<double>() : std::nan("");
+    // Without an upper bound "a number" would take in the infinite ones.
+    if (!fits(parameter, number)) {
+      return refuse(path, parameter.maximum ? "number" : "finite number", parameter);
+    }
+    value = number;
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   bool& value) {
+    if (!json.is_boolean()) return add(path, "must be true or false");
+    value = json.get<bool>();
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::vector<MeshFormat>& formats) {
+    if (!json.is_array() || json.empty()) {
+      return add(path, "must be a list of at least one of " + names_of<MeshFormat>());
+    }
+    formats.clear();
+    for (const Json& element : json) {
+      MeshFormat format{};
+      const std::size_t before = errors_.size();
+      read_member(element, path, parameter, format);
+      if (errors_.size() > before) return;
+      if (std::ranges::find(formats, format) == formats.end()) formats.push_back(format);
+    }
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::int64_t& value) {
+    read_whole(json, path, parameter, value);
+  }
+
+  // Ascending, each once.
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::vector<std::int64_t>& values) {
+    if (!json.is_array() || json.empty() || json.size() > Volume::kMostLabels) {
+      return add(
+          path, "must be a list of 1 to " + std::to_string(Volume::kMostLabels) + " whole numbers");
+    }
+    for (const Json& element : json) {
+      const std::size_t before = errors_.size();
+      read_member(element, path, parameter, values.emplace_back());
+      if (errors_.size() > before) return values.clear();
+    }
+    std::ranges::sort(values);
+    values.erase(std::unique(values.begin(), values.end()), values.end());
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::vector<double>& values) {
+    if (!json.is_array() || json.empty() || json.size() > MeshParameters::kMostLods) {
+      return add(
+          path, "must be a list of 1 to " + std::to_string(MeshParameters::kMostLods) + " numbers");
+    }
+    values.clear();
+    for (const Json& element : json) {
+      const std::size_t before = errors_.size();
+      read_member(element, path, parameter, values.emplace_back());
+      if (errors_.size() > before) return values.clear();
+    }
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   std::array<double, 3>& place) {
+    const auto is_number = [](const Json& one) {
+      return one.is_number() && std::isfinite(one.get<double>());
+    };
+    if (!json.is_array() || json.size() != place.size() || !std::ranges::all_of(json, is_number)) {
+      return add(path, "must be of three finite numbers each: x, y and z");
+    }
+    for (std::size_t axis = 0; axis < place.size(); ++axis) place[axis] = json[axis];
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::vector<std::array<double, 3>>& places) {
+    if (!json.is_array() || json.empty() || json.size() > ComponentFilter::kMostPlaces) {
+      return add(path, "must be a list of 1 to " + std::to_string(ComponentFilter::kMostPlaces) +
+                           " places");
+    }
+    for (const Json& element : json) {
+      const std::size_t before = errors_.size();
+      read_member(element, path, parameter, places.emplace_back());
+      if (errors_.size() > before) return places.clear();
+    }
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::optional<Box>& box) {
+    if (json.is_null()) return box.reset();
+    if (!json.is_array() || json.size() != 2) {
+      return add(path, "must be two corners, each of three numbers: x, y and z");
+    }
+    const std::size_t before = errors_.size();
+    box.emplace();
+    for (std::size_t n = 0; n < 2 && errors_.size() == before; ++n) {
+      read_member(json[n], path, parameter, (*box)[n]);
+    }
+    if (errors_.size() > before) return;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if ((*box)[0][axis] >= (*box)[1][axis]) {
+        return add(path, "must begin with its smaller corner, smaller in x, y and z");
+      }
+    }
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::optional<LabelChoice>& value) {
+    value.emplace();
+    if (json == kAllLabels) return;
+    if (!json.is_array()) {
+      return add(path, "must be \"all\" or a list of labels, which are whole numbers");
+    }
+    read_member(json, path, parameter, value->values);
+  }
+
+  // By the labels' own values.
+  template <class T>
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::map<std::int64_t, T>& value) {
+    if (!json.is_object() || json.size() > Volume::kMostLabels) {
+      return add(path, "must be an object with at most " + std::to_string(Volume::kMostLabels) +
+                           " members, which are named by labels");
+    }
+    for (const auto& [name, element] : json.items()) {
+      const auto label = parse_int64(name);
+      std::int64_t key = 0;
+      const std::size_t before = errors_.size();
+      const std::string place = path + '.' + name;
+      read_member(label ? Json(*label) : Json(), place, label_range(), key);
+      if (errors_.size() == before) read_of_label(element, place, parameter, value[key]);
+      if (errors_.size() > before) return;
+    }
+  }
+
+  void read_of_label(const Json& json, const std::string& path, const Parameter& parameter,
+                     std::vector<std::int64_t>& values) {
+    read_member(json, path, parameter, values);
+  }
+
+  void read_of_label(const Json& json, const std::string& path, const Parameter& parameter,
+                     std::string& value) {
+    if (!json.is_string()) return add(path, "must be a string");
+    read_member(json, path, parameter, value);
+    if (std::string_view(parameter.name) == "label_colors") {
+      std::ranges::transform(value, value.begin(), [](unsigned char c) { return std::tolower(c); });
+      if (!is_color(value)) add(path, "must be a colour such as \"#d8654f\"");
+    } else if (trimmed(value).empty() || value.size() > LabelEntry::kMostNameBytes ||
+               has_control_characters(value)) {
+      add(path, "must be a text of 1 to 255 bytes on one line");
+    }
+  }
+
+  // What a label may be, as the table has it.
+  static const Parameter& label_range() {
+    static const Parameter range = [] {
+      MeshParameters parameters;  // not constant, for those members that may be absent
+      Parameter found;
+      visit(parameters, [&](const Parameter& parameter, const auto& /*member*/) {
+        if (std::string_view(parameter.name) == "background") found = parameter;
+      });
+      return found;
+    }();
+    return range;
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   ParameterGroup auto& value) {
+    if (!json.is_object()) return add(path, "must be an object");
+    read_object(json, value, path + ".");
+  }
+
+  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
+                   std::optional<Callback>& value) {
+    if (json.is_null()) return value.reset();
+    if (!json.is_object()) return add(path, "must be an object");
+    read_object(json, value.emplace(), path + ".");
+    if (!json.contains("url")) add(path + ".url", "is required");
+  }
+
+  Spelling spelling_ = nullptr;
+  std::vector<FieldError> errors_;
+};
+
+}  // namespace isomesh

@@ -1,0 +1,109 @@
+#include "server/codec/decode/decode.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "proto/error.h"
+#include "server/codec/decode/formats.h"
+#include "server/mesh/parallel.h"
+
+namespace isomesh::codec {
+namespace decoding {
+namespace {
+
+constexpr std::size_t kElementsPerTask = std::size_t{1} << 16;
+
+// Whether that holds for all elements, looked at side by side.
+template <class T, class Holds>
+bool all_of(const mesh::Buffer<T>& elements, const mesh::Context& context, const Holds& holds) {
+  std::vector<char> fine(tasks_of(elements.size(), kElementsPerTask));
+  mesh::parallel_for({context.stop, nullptr}, fine.size(), [&](std::size_t task) {
+    const std::size_t begin = task * kElementsPerTask;
+    const std::size_t count = std::min(kElementsPerTask, elements.size() - begin);
+    fine[task] = std::ranges::all_of(elements.span().subspan(begin, count), holds) ? 1 : 0;
+  });
+  return std::ranges::all_of(fine, [](char is_fine) { return is_fine != 0; });
+}
+
+void check(const DecodedSurface& surface, MeshFormat format, const mesh::Context& context) {
+  const std::size_t vertices = surface.positions.size();
+  const bool is_finite = all_of(surface.positions, context, [](const mesh::Vec3& position) {
+    return std::isfinite(position[0]) && std::isfinite(position[1]) && std::isfinite(position[2]);
+  });
+  if (!is_finite) refuse(format, "a position is not a finite number");
+  const bool is_there = all_of(surface.triangles, context, [&](const mesh::Triangle& triangle) {
+    return triangle[0] < vertices && triangle[1] < vertices && triangle[2] < vertices;
+  });
+  if (!is_there) refuse(format, "a triangle names a vertex that is not there");
+}
+
+DecodedSurface decode_unchecked(Bytes file, MeshFormat format, const mesh::Context& context) {
+  switch (format) {
+    case MeshFormat::kDrc:
+      return decode_drc(file, context);
+    case MeshFormat::kGlb:
+      return decode_glb(file, context);
+    case MeshFormat::kStl:
+      return decode_stl(file, context);
+    case MeshFormat::kPly:
+      return decode_ply(file, context);
+    case MeshFormat::kObj:
+      return decode_obj(file, context);
+    case MeshFormat::k3mf:
+      return decode_3mf(file, context);
+    case MeshFormat::kZip:
+      break;
+  }
+  std::vector<DecodedSurface> parts;
+  for (auto& [each, surface] : decode_zip(file, context)) parts.push_back(std::move(surface));
+  return join(std::move(parts), context);
+}
+
+}  // namespace
+
+void refuse(MeshFormat format, const std::string& why) {
+  throw Error(ErrorCode::kInternal, "the " + std::string(to_string(format)) +
+                                        " file that was written cannot be read: " + why);
+}
+
+DecodedSurface join(std::vector<DecodedSurface>&& parts, const mesh::Context& context) {
+  if (parts.size() == 1) return std::move(parts.front());
+  std::vector<std::size_t> vertices = {0};
+  std::vector<std::size_t> triangles = {0};
+  for (const DecodedSurface& part : parts) {
+    vertices.push_back(vertices.back() + part.positions.size());
+    triangles.push_back(triangles.back() + part.triangles.size());
+  }
+  if (vertices.back() > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error(ErrorCode::kTooLarge, "the file has " + std::to_string(vertices.back()) +
+                                          " vertices; 32 bits cannot number them");
+  }
+  DecodedSurface all;
+  all.positions.resize_for_overwrite(vertices.back());
+  all.triangles.resize_for_overwrite(triangles.back());
+  mesh::parallel_for({context.stop, nullptr}, parts.size(), [&](std::size_t n) {
+    const DecodedSurface part = std::move(parts[n]);
+    std::ranges::copy(part.positions, all.positions.begin() + vertices[n]);
+    const auto first = static_cast<std::uint32_t>(vertices[n]);
+    std::ranges::transform(
+        part.triangles, all.triangles.begin() + triangles[n], [&](const mesh::Triangle& triangle) {
+          return mesh::Triangle{triangle[0] + first, triangle[1] + first, triangle[2] + first};
+        });
+  });
+  return all;
+}
+
+}  // namespace decoding
+
+DecodedSurface decode(std::span<const std::byte> file, MeshFormat format,
+                      const mesh::Context& context) {
+  context.throw_if_stopped();
+  DecodedSurface surface = decoding::decode_unchecked(file, format, context);
+  // Of a ZIP each file was.
+  if (format != MeshFormat::kZip) decoding::check(surface, format, context);
+  return surface;
+}
+
+}  // namespace isomesh::codec

@@ -1,0 +1,185 @@
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include <nlohmann/json.hpp>
+
+#include "proto/error.h"
+#include "server/codec/decode/formats.h"
+#include "server/mesh/parallel.h"
+
+namespace isomesh::codec::decoding {
+namespace {
+
+using Json = nlohmann::json;
+
+// Of glTF's specification, section 4.4.
+constexpr std::uint32_t kMagic = 0x46546C67;
+constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
+constexpr std::uint32_t kBinaryChunk = 0x004E4942;
+constexpr std::size_t kHeaderBytes = 12;
+constexpr std::size_t kChunkHeaderBytes = 8;
+
+[[noreturn]] void refuse_glb(const std::string& why) { refuse(MeshFormat::kGlb, why); }
+
+struct Chunks {
+  Bytes json;
+  Bytes binary;
+};
+
+Chunks chunks_of(Bytes file) {
+  if (file.size() < kHeaderBytes || value_at<std::uint32_t>(file, 0) != kMagic ||
+      value_at<std::uint32_t>(file, 4) != 2 || value_at<std::uint32_t>(file, 8) != file.size()) {
+    refuse_glb("its header is not that of a whole file of version 2");
+  }
+  Bytes rest = file.subspan(kHeaderBytes);
+  const auto take = [&](std::uint32_t type, const char* name) {
+    if (rest.size() < kChunkHeaderBytes || value_at<std::uint32_t>(rest, 4) != type) {
+      refuse_glb(std::string("it has no chunk of ") + name + " where it should be");
+    }
+    const std::size_t bytes = value_at<std::uint32_t>(rest, 0);
+    if (bytes > rest.size() - kChunkHeaderBytes) {
+      refuse_glb(std::string("it ends within its chunk of ") + name);
+    }
+    const Bytes chunk = rest.subspan(kChunkHeaderBytes, bytes);
+    rest = rest.subspan(kChunkHeaderBytes + bytes);
+    return chunk;
+  };
+  Chunks chunks;
+  chunks.json = take(kJsonChunk, "JSON");
+  if (!rest.empty()) chunks.binary = take(kBinaryChunk, "binary data");
+  if (!rest.empty()) refuse_glb("something follows its chunks");
+  return chunks;
+}
+
+// Rows, for columns of homogeneous coordinates.
+using Matrix = std::array<std::array<double, 4>, 4>;
+
+constexpr Matrix kIdentity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
+// glTF's metres, Y up, front +Z, to LPS millimetres.
+constexpr Matrix kToPatient = {{{1000, 0, 0, 0}, {0, 0, -1000, 0}, {0, 1000, 0, 0}, {0, 0, 0, 1}}};
+
+Matrix times(const Matrix& a, const Matrix& b) {
+  Matrix product = {};
+  for (std::size_t row = 0; row < 4; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      for (std::size_t k = 0; k < 4; ++k) product[row][column] += a[row][k] * b[k][column];
+    }
+  }
+  return product;
+}
+
+Matrix transformation_of(const Json& node) {
+  if (node.contains("matrix")) refuse_glb("a node has a matrix");
+  const auto [x, y, z, w] = node.value("rotation", std::array<double, 4>{0, 0, 0, 1});
+  const auto scale = node.value("scale", std::array<double, 3>{1, 1, 1});
+  const auto move = node.value("translation", std::array<double, 3>{0, 0, 0});
+  Matrix matrix = {{{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), 0},
+                    {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), 0},
+                    {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), 0},
+                    {0, 0, 0, 1}}};
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 3; ++column) matrix[row][column] *= scale[column];
+    matrix[row][3] = move[row];
+  }
+  return matrix;
+}
+
+struct Primitive {
+  Bytes stream;
+  int position_id = 0;
+  std::size_t vertices = 0;
+  std::size_t triangles = 0;
+};
+
+// The primitives that show when the default scene is drawn as it stands: levels of detail are nodes
+// that none of its nodes has as a child.
+class Scene {
+ public:
+  Scene(const Json& gltf, Bytes binary) : gltf_(gltf), binary_(binary) {
+    for (const Json& node : gltf.at("scenes").at(gltf.at("scene").get<std::size_t>()).at("nodes")) {
+      visit(node.get<std::size_t>(), kToPatient);
+    }
+  }
+
+  const std::vector<Primitive>& primitives() const { return primitives_; }
+
+ private:
+  void visit(std::size_t number, const Matrix& above) {
+    if (!visited_.insert(number).second) refuse_glb("a node is there twice");
+    const Json& node = gltf_.at("nodes").at(number);
+    const Matrix matrix = times(above, transformation_of(node));
+    if (node.contains("mesh")) {
+      expect_identity(matrix);
+      for (const Json& primitive :
+           gltf_.at("meshes").at(node["mesh"].get<std::size_t>()).at("primitives")) {
+        primitives_.push_back(primitive_of(primitive));
+      }
+    }
+    if (!node.contains("children")) return;
+    for (const Json& child : node["children"]) visit(child.get<std::size_t>(), matrix);
+  }
+
+  // Positions are looked at as they are, so they have to be in the patient's space already.
+  static void expect_identity(const Matrix& matrix) {
+    constexpr double kNearly = 1e-9;
+    for (std::size_t row = 0; row < 4; ++row) {
+      for (std::size_t column = 0; column < 4; ++column) {
+        if (!(std::abs(matrix[row][column] - kIdentity[row][column]) < kNearly)) {
+          refuse_glb("its nodes do not turn LPS millimetres into metres with Y up");
+        }
+      }
+    }
+  }
+
+  Primitive primitive_of(const Json& json) const {
+    const Json& draco = json.at("extensions").at("KHR_draco_mesh_compression");
+    const Json& view = gltf_.at("bufferViews").at(draco.at("bufferView").get<std::size_t>());
+    const auto offset = view.at("byteOffset").get<std::size_t>();
+    const auto bytes = view.at("byteLength").get<std::size_t>();
+    if (offset > binary_.size() || bytes > binary_.size() - offset) {
+      refuse_glb("a buffer view ends behind the file's binary data");
+    }
+    const auto count_of = [&](const Json& accessor) {
+      return gltf_.at("accessors").at(accessor.get<std::size_t>()).at("count").get<std::size_t>();
+    };
+    return {.stream = binary_.subspan(offset, bytes),
+            .position_id = draco.at("attributes").at("POSITION").get<int>(),
+            .vertices = count_of(json.at("attributes").at("POSITION")),
+            .triangles = count_of(json.at("indices")) / 3};
+  }
+
+  const Json& gltf_;
+  const Bytes binary_;
+  std::set<std::size_t> visited_;
+  std::vector<Primitive> primitives_;
+};
+
+std::vector<Primitive> primitives_of(Bytes file) {
+  const Chunks chunks = chunks_of(file);
+  try {
+    const Json gltf = Json::parse(as_text(chunks.json));
+    return Scene(gltf, chunks.binary).primitives();
+  } catch (const Json::exception& error) {
+    refuse_glb(std::string("its JSON is not as it should be: ") + error.what());
+  }
+}
+
+}  // namespace
+
+DecodedSurface decode_glb(Bytes file, const mesh::Context& context) {
+  const std::vector<Primitive> primitives = primitives_of(file);
+  std::vector<DecodedSurface> parts(primitives.size());
+  mesh::parallel_for(context, primitives.size(), [&](std::size_t n) {
+    const Primitive& primitive = primitives[n];
+    parts[n] = decode_draco_stream(primitive.stream, primitive.position_id);
+    if (parts[n].positions.size() != primitive.vertices ||
+        parts[n].triangles.size() != primitive.triangles) {
+      refuse_glb("the accessors of block " + std::to_string(n) + " do not say what is in it");
+    }
+  });
+  return join(std::move(parts), context);
+}
+
+}  // namespace isomesh::codec::decoding

@@ -1,0 +1,191 @@
+#include "server/codec/glb_document.h"
+
+#include <algorithm>
+
+#include "server/codec/provenance_json.h"
+
+namespace isomesh::codec {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
+constexpr const char* kLodExtension = "MSFT_lod";
+// Of an application's own, which glTF has begin with an underscore.
+constexpr const char* kDistanceAttribute = "_DISTANCE_MM";
+// Of glTF's specification, sections 3.4 and 3.6.2.
+constexpr int kUnsignedInt = 5125;
+constexpr int kFloat = 5126;
+
+// One primitive of the last mesh, with the accessors and the buffer view that it names.
+void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset,
+                   const MeshParameters& parameters) {
+  const std::size_t view = gltf["bufferViews"].size();
+  gltf["bufferViews"].push_back(
+      {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", chunk.bytes.size()}});
+  const std::size_t accessor = gltf["accessors"].size();
+  gltf["accessors"].push_back({{"componentType", kFloat},
+                               {"count", chunk.vertices},
+                               {"type", "VEC3"},
+                               {"min", chunk.low},
+                               {"max", chunk.high}});
+  gltf["accessors"].push_back({{"componentType", kUnsignedInt},
+                               {"count", std::size_t{chunk.triangles} * 3},
+                               {"type", "SCALAR"}});
+  Json accessors = {{"POSITION", accessor}};
+  Json attributes = {{"POSITION", chunk.position_id}};
+  const auto add = [&](const char* name, std::uint32_t id, const char* type) {
+    accessors[name] = gltf["accessors"].size();
+    attributes[name] = id;
+    gltf["accessors"].push_back(
+        {{"componentType", kFloat}, {"count", chunk.vertices}, {"type", type}});
+  };
+  if (parameters.normals) add("NORMAL", chunk.normal_id, "VEC3");
+  if (parameters.distances) add(kDistanceAttribute, chunk.distance_id, "SCALAR");
+  gltf["meshes"].back()["primitives"].push_back(
+      {{"attributes", accessors},
+       {"indices", accessor + 1},
+       {"material", gltf["materials"].size() - 1},
+       {"extensions", {{kDracoExtension, {{"bufferView", view}, {"attributes", attributes}}}}}});
+}
+
+Json asset_of(const Provenance& provenance) {
+  return {{"version", "2.0"}, {"generator", "isomesh"}, {"extras", provenance_json(provenance)}};
+}
+
+// Positions are LPS millimetres; glTF wants metres, Y up and the front towards +Z: a quarter turn
+// about x takes S to +Y and A to +Z.
+Json turned_node(const std::string& name) {
+  constexpr double kMetresPerMillimetre = 0.001;
+  constexpr double kHalfSqrt2 = 0.70710678118654752;
+  return {{"name", name},
+          {"rotation", {-kHalfSqrt2, 0, 0, kHalfSqrt2}},
+          {"scale", {kMetresPerMillimetre, kMetresPerMillimetre, kMetresPerMillimetre}}};
+}
+
+Json material_of(const GlbPart& part) {
+  const auto& [red, green, blue] = part.color;
+  return {{"name", part.material},
+          {"pbrMetallicRoughness",
+           {{"baseColorFactor", {red, green, blue, 1}},
+            {"metallicFactor", 0},
+            {"roughnessFactor", 0.6}}}};
+}
+
+// Adds a mesh with all that it names; of the material that was added last.
+void add_mesh(Json& gltf, const std::string& name, const GlbLevel& level, std::size_t offset,
+              const MeshParameters& parameters) {
+  gltf["meshes"].push_back({{"name", name}, {"primitives", Json::array()}});
+  for (const DracoStream& chunk : level.chunks) {
+    add_primitive(gltf, chunk, offset, parameters);
+    offset += glb_padded(chunk.bytes.size());
+  }
+}
+
+// Down to which share of the screen's height or width each level is drawn: where the next one has
+// as many triangles for a part of the screen as the finest has when it fills it. The last one
+// always is.
+Json screen_coverage(const GlbPart& part) {
+  Json coverage = Json::array();
+  for (std::size_t level = 1; level < part.levels.size(); ++level) {
+    coverage.push_back(part.levels[level].share);
+  }
+  coverage.push_back(0);
+  return coverage;
+}
+
+// All nodes: the root, its children, and behind them the coarser levels of any, which are no node's
+// children but named by MSFT_lod, in place of the node that has it.
+class Nodes {
+ public:
+  Nodes(Json& gltf, const GlbLayout& layout, const MeshParameters& parameters)
+      : gltf_(gltf), layout_(layout), parameters_(parameters) {}
+
+  // The node as it is to be for the part, with its meshes; `levels_from` is the number that the
+  // first of its coarser levels' nodes gets. Those are like the node in all but name and mesh.
+  // Empty parts have no mesh.
+  Json node_of(const GlbPart& part, std::size_t number, Json node, std::size_t levels_from) {
+    const Json bare = node;
+    if (!part.extras.is_null()) node["extras"] = part.extras;
+    if (part.levels.empty()) return node;
+    node["mesh"] = gltf_["meshes"].size();
+    gltf_["materials"].push_back(material_of(part));
+    add_mesh(gltf_, part.name, part.levels[0], layout_.begin(number, 0), parameters_);
+    if (part.levels.size() == 1) return node;
+    Json ids = Json::array();
+    for (std::size_t level = 1; level < part.levels.size(); ++level) {
+      const std::string name = part.name + ", level " + std::to_string(level + 1);
+      Json coarser = bare;
+      coarser["name"] = name;
+      coarser["mesh"] = gltf_["meshes"].size();
+      add_mesh(gltf_, name, part.levels[level], layout_.begin(number, level), parameters_);
+      ids.push_back(levels_from + levels_.size());
+      levels_.push_back(std::move(coarser));
+    }
+    node["extensions"] = {{kLodExtension, {{"ids", ids}}}};
+    node["extras"]["MSFT_screencoverage"] = screen_coverage(part);
+    return node;
+  }
+
+  const std::vector<Json>& levels() const { return levels_; }
+
+ private:
+  Json& gltf_;
+  const GlbLayout& layout_;
+  const MeshParameters& parameters_;
+  std::vector<Json> levels_;
+};
+
+}  // namespace
+
+GlbLayout::GlbLayout(std::span<const GlbPart> parts) : begins_(parts.size()) {
+  std::size_t most_levels = 0;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    begins_[p].resize(parts[p].levels.size());
+    most_levels = std::max(most_levels, parts[p].levels.size());
+  }
+  for (std::size_t level = most_levels; level-- > 0;) {
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+      if (level >= parts[p].levels.size()) continue;
+      begins_[p][level] = bytes_;
+      order_.push_back(&parts[p].levels[level]);
+      for (const DracoStream& chunk : order_.back()->chunks)
+        bytes_ += glb_padded(chunk.bytes.size());
+    }
+  }
+}
+
+Json glb_document(std::span<const GlbPart> parts, const GlbLayout& layout,
+                  const Provenance& provenance) {
+  Json gltf;
+  gltf["asset"] = asset_of(provenance);
+  gltf["scene"] = 0;
+  gltf["scenes"] = Json::array({{{"nodes", {0}}}});
+  if (layout.bytes() > 0) {
+    for (const char* list : {"meshes", "materials", "accessors", "bufferViews"}) {
+      gltf[list] = Json::array();
+    }
+    gltf["buffers"] = Json::array({{{"byteLength", layout.bytes()}}});
+    gltf["extensionsUsed"] = {kDracoExtension};
+    gltf["extensionsRequired"] = {kDracoExtension};
+  }
+  Nodes nodes(gltf, layout, provenance.parameters);
+  Json all = Json::array();
+  if (!provenance.parameters.labels) {
+    all.push_back(nodes.node_of(parts.front(), 0, turned_node("surface"), 1));
+  } else {
+    Json root = turned_node("labels");
+    all.push_back(nullptr);
+    for (std::size_t n = 0; n < parts.size(); ++n) {
+      root["children"].push_back(all.size());
+      all.push_back(nodes.node_of(parts[n], n, {{"name", parts[n].name}}, parts.size() + 1));
+    }
+    all[0] = root;
+  }
+  for (const Json& level : nodes.levels()) all.push_back(level);
+  if (!nodes.levels().empty()) gltf["extensionsUsed"].push_back(kLodExtension);
+  gltf["nodes"] = all;
+  return gltf;
+}
+
+}  // namespace isomesh::codec

@@ -1,0 +1,79 @@
+// The JSON of a GLB file, and what it is about; private to this folder.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "server/codec/draco_chunk.h"
+#include "server/codec/encode.h"
+
+namespace isomesh::codec {
+
+// Of the file's chunks and buffer views.
+inline constexpr std::size_t kGlbAlignment = 4;
+
+constexpr std::size_t glb_padded(std::size_t bytes) {
+  return (bytes + kGlbAlignment - 1) / kGlbAlignment * kGlbAlignment;
+}
+
+// A surface with about `share` of its triangles.
+struct GlbLevel {
+  double share = 1;
+  std::vector<DracoStream> chunks = {};
+
+  std::uint64_t triangles() const {
+    std::uint64_t triangles = 0;
+    for (const DracoStream& chunk : chunks) triangles += chunk.triangles;
+    return triangles;
+  }
+};
+
+// One surface, with a material and a node of its own.
+struct GlbPart {
+  std::string name;
+  std::string material;
+  std::array<double, 3> color = {0.8, 0.8, 0.8};  // linear
+  nlohmann::ordered_json extras = {};             // of the node; none where it is null
+  // From the finest to the coarsest, each with fewer triangles than the one before; none of an
+  // empty surface.
+  std::vector<GlbLevel> levels = {};
+
+  // Leaves out a level that gains nothing.
+  void add_level(GlbLevel level) {
+    const std::uint64_t triangles = level.triangles();
+    if (triangles == 0) return;
+    if (!levels.empty() && triangles >= levels.back().triangles()) return;
+    levels.push_back(std::move(level));
+  }
+};
+
+// Where the levels' bytes begin in the file's binary data. The coarsest are in front, so that
+// whoever reads the file as it arrives has the whole surface early.
+class GlbLayout {
+ public:
+  explicit GlbLayout(std::span<const GlbPart> parts);
+
+  std::size_t bytes() const { return bytes_; }
+  std::size_t begin(std::size_t part, std::size_t level) const { return begins_[part][level]; }
+  // Of the parts, which have to outlive it.
+  const std::vector<const GlbLevel*>& order() const { return order_; }
+
+ private:
+  std::size_t bytes_ = 0;
+  std::vector<std::vector<std::size_t>> begins_;
+  std::vector<const GlbLevel*> order_;
+};
+
+// glTF's document: of one surface, which is the turned node's own, or of one for each label, in
+// nodes below it. Coarser levels of either are nodes behind all others that MSFT_lod names.
+nlohmann::ordered_json glb_document(std::span<const GlbPart> parts, const GlbLayout& layout,
+                                    const Provenance& provenance);
+
+}  // namespace isomesh::codec

@@ -1,0 +1,29 @@
+#include "server/codec/provenance_json.h"
+
+#include <nlohmann/json.hpp>
+
+#include "proto/json.h"
+
+namespace isomesh::codec {
+
+using Json = nlohmann::ordered_json;
+
+Json provenance_json(const Provenance& provenance) {
+  Json parameters = {{"volume", provenance.volume}};
+  parameters.update(Json::parse(to_json(provenance.parameters)));
+  Json json = {{"parameters", parameters}};
+  if (!provenance.parameters.labels) json["iso"] = provenance.iso;
+  json.update({{"dims", provenance.dims},
+               {"spacing", provenance.geometry.spacing},
+               {"origin", provenance.geometry.origin},
+               {"direction", provenance.geometry.direction},
+               {"units", "mm"},
+               {"space", "LPS"}});
+  // Only where there are some: the meshes of other volumes keep their bytes.
+  for (const Note& note : provenance.notes) {
+    json["notes"].push_back({{"code", note.code}, {"detail", note.detail}});
+  }
+  return json;
+}
+
+}  // namespace isomesh::codec

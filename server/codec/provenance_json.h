@@ -1,0 +1,14 @@
+// What files say about where their mesh comes from; private to this folder.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "server/codec/encode.h"
+
+namespace isomesh::codec {
+
+// The volume and the parameters, the iso-value that was used (none by labels), the lattice, and
+// units and space of the positions; the volume's notes where there are some.
+nlohmann::ordered_json provenance_json(const Provenance& provenance);
+
+}  // namespace isomesh::codec

@@ -1,0 +1,166 @@
+#include "server/commands.h"
+
+#include <filesystem>
+#include <functional>
+#include <iostream>
+#include <string>
+#include <string_view>
+
+#include <CLI/CLI.hpp>
+#include <spdlog/spdlog.h>
+
+#include "base/command_line/completion.h"
+#include "base/command_line/manual.h"
+#include "server/options.h"
+#include "server/store/backup.h"
+#include "server/store/sqlite/audit_trail.h"
+#include "server/token_command.h"
+
+namespace isomesh {
+namespace {
+
+const command_line::Manual& manual() {
+  static const command_line::Manual text = {
+      .number = 8,
+      .version = ISOMESH_VERSION,
+      .name = "turn medical volumes into surface meshes over HTTP",
+      .sections = {
+          {"Configuration",
+           "Every option also comes from the environment and from the file of --config, which is "
+           "TOML: "
+           "lines such as\n\n  max-queue = 500\n\nWhat is nearer to the command line wins. A key "
+           "that is no "
+           "option is refused. `isomeshd config` prints such a file with every option in it, and "
+           "`isomeshd check` what would be used."},
+          {"Signals",
+           "SIGTERM and SIGINT drain: no job is accepted any more, running ones have "
+           "--drain-seconds to "
+           "finish and are put back otherwise. SIGHUP reads tokens, certificate and secrets of "
+           "callbacks "
+           "again."},
+          {"Exit status",
+           "0 when it was asked to end, 1 when it could not start or go on, 2 for wrong usage."},
+          {"Files",
+           "/etc/isomesh/isomeshd.toml is what the systemd unit starts it with. /var/lib/isomesh "
+           "is the data "
+           "folder there."},
+          {"See also", "isomesh(1)"}}};
+  return text;
+}
+
+}  // namespace
+
+struct Commands::State {
+  CLI::App& cli;
+  const Options& options;
+  TokenRequest token = {};
+  std::string shell = {};
+  std::filesystem::path folder = {};
+  std::uint64_t after = 0;  // of the audit trail
+  std::function<void()> chosen = {};
+
+  // Later options of the program itself may follow a subcommand.
+  CLI::App& add(CLI::App& parent, const std::string& name, const std::string& help,
+                const std::function<void()>& act) {
+    CLI::App& command = *parent.add_subcommand(name, help);
+    command.fallthrough()->configurable(false)->callback([this, act] { chosen = act; });
+    return command;
+  }
+
+  TokenRequest with_file() const {
+    TokenRequest request = token;
+    if (request.file.empty()) request.file = options.tokens;
+    return request;
+  }
+
+  void add_token_commands() {
+    CLI::App& tokens = *cli.add_subcommand("token", "Handle the file of --tokens");
+    tokens.require_subcommand(1)->fallthrough()->configurable(false);
+    CLI::App& added =
+        add(tokens, "add", "Make a token and print it, once", [this] { add_token(with_file()); });
+    added.add_option("NAME", token.name, "Whose it is, as jobs and the log name it")->required();
+    added
+        .add_option("--role", token.role,
+                    "user: its own volumes and jobs; admin: everybody's, and /metrics; monitor: "
+                    "/metrics alone")
+        ->type_name("user|admin|monitor")
+        ->capture_default_str();
+    added
+        .add_option("--into", token.file,
+                    "Add the token's hash to this file; that of --tokens otherwise, and without "
+                    "either its line is printed")
+        ->type_name("FILE");
+    add(tokens, "list", "Print name, role and the beginning of the hash of each token",
+        [this] { list_tokens(with_file()); });
+    CLI::App& revoked = add(tokens, "revoke", "Take tokens of a name out of the file",
+                            [this] { revoke_tokens(with_file()); });
+    revoked.add_option("NAME", token.name, "Whose")->required();
+    revoked.add_option("HASH", token.hash,
+                       "The beginning of one token's hash; all of the name without it");
+  }
+
+  void add_backup_commands() {
+    CLI::App& backup = add(cli, "backup", "Copy the data folder, also while a daemon uses it",
+                           [this] { tell("copied", store::back_up(options.data, folder)); });
+    backup.add_option("DIR", folder, "The folder to make, which must not be there")->required();
+    CLI::App& restored =
+        add(cli, "restore", "Make the data folder from a backup; it must be missing or empty",
+            [this] { tell("put back", store::restore(folder, options.data)); });
+    restored.add_option("DIR", folder, "The folder that `isomeshd backup` made")->required();
+  }
+
+  // May be asked for while a daemon runs.
+  void add_audit_command() {
+    CLI::App& audit =
+        add(cli, "audit", "Print the audit trail of the folder of --data, one JSON object a line",
+            [this] {
+              store::read_audit_trail(options.data, after,
+                                      [](std::string_view line) { std::cout << line << '\n'; });
+              std::cout.flush();
+              if (!std::cout) {
+                throw Error(ErrorCode::kInternal, "standard output takes no more of the trail");
+              }
+            });
+    audit.add_option("--after", after, "Only what has a greater id")->capture_default_str();
+  }
+
+  static void tell(const char* what, const store::Copied& copied) {
+    std::cout << what << ' ' << copied.blobs << " files of volumes and meshes, " << copied.bytes
+              << " bytes" << std::endl;
+    if (copied.damaged > 0) {
+      spdlog::warn("{} of them are damaged: their bytes are not what they were", copied.damaged);
+    }
+    if (copied.missing > 0) spdlog::warn("{} more are named and not there", copied.missing);
+  }
+
+  void add_description_commands() {
+    add(cli, "config", "Print a file for --config with every option and what it means",
+        [this] { std::cout << as_config(cli, Remarks::kYes) << std::flush; });
+    CLI::App& completion =
+        add(cli, "completion", "Print what a shell completes arguments with", [this] {
+          const auto shell_asked = command_line::shell_from(shell);
+          if (!shell_asked) throw invalid_parameter("SHELL", "must be bash, zsh or fish");
+          std::cout << command_line::completion(cli, *shell_asked) << std::flush;
+        });
+    completion.add_option("SHELL", shell, "bash, zsh or fish")->required();
+    add(cli, "manual", "Print the manual page", [this] {
+      std::cout << command_line::manual_page(cli, manual()) << std::flush;
+    }).group("");
+  }
+};
+
+Commands::Commands(CLI::App& cli, const Options& options)
+    : state_(std::make_unique<State>(State{cli, options})) {
+  state_->add_token_commands();
+  state_->add_backup_commands();
+  state_->add_audit_command();
+  state_->add_description_commands();
+}
+
+Commands::~Commands() = default;
+
+bool Commands::asked() const { return state_->chosen != nullptr; }
+
+void Commands::run() { state_->chosen(); }
+
+}  // namespace isomesh

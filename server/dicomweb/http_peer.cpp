@@ -1,0 +1,192 @@
+#include "server/dicomweb/http_peer.h"
+
+#include <cerrno>
+#include <exception>
+
+#include <fcntl.h>
+
+#include "base/curl.h"
+#include "base/descriptor.h"
+#include "base/files.h"
+#include "base/text.h"
+
+namespace isomesh::dicomweb {
+namespace {
+
+using orders::PacsFailure;
+using orders::PacsFault;
+
+// A secret of one line.
+std::string secret_in(const std::filesystem::path& file) {
+  std::string secret;
+  try {
+    const std::string text = read_whole(file);
+    secret = trimmed(text);
+  } catch (const Error&) {
+  }
+  if (secret.empty() || has_control_characters(secret)) {
+    throw PacsFailure(PacsFault::kUnauthorized,
+                      "the file of the password or token for the PACS cannot be used");
+  }
+  return secret;
+}
+
+// A transfer under way; libcurl is given pointers to it.
+class Transfer {
+ public:
+  Transfer(const orders::PacsSettings& settings, const PeerRequest& request, std::stop_token stop)
+      : request_(request),
+        stop_(std::move(stop)),
+        target_(::open(request.answer.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600)),
+        easy_(curl::make_easy()) {
+    if (target_.number() < 0) throw_system_error("open", errno);
+    set_connection(settings);
+    set_request();
+  }
+
+  PeerAnswerHead perform() {
+    const CURLcode result = curl_easy_perform(easy_.get());
+    if (thrown_) std::rethrow_exception(thrown_);
+    if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "the transfer was stopped");
+    if (result != CURLE_OK) throw_failure(result);
+    PeerAnswerHead head;
+    long status = 0;
+    curl_easy_getinfo(easy_.get(), CURLINFO_RESPONSE_CODE, &status);
+    head.status = static_cast<int>(status);
+    const char* type = nullptr;
+    curl_easy_getinfo(easy_.get(), CURLINFO_CONTENT_TYPE, &type);
+    constexpr std::size_t kLongestType = 1024;
+    if (type != nullptr)
+      head.content_type = printable(std::string_view(type).substr(0, kLongestType));
+    curl_off_t retry_after = 0;
+    curl_easy_getinfo(easy_.get(), CURLINFO_RETRY_AFTER, &retry_after);
+    head.retry_after = std::chrono::seconds(retry_after);
+    return head;
+  }
+
+ private:
+  void set_connection(const orders::PacsSettings& settings) {
+    CURL* easy = easy_.get();
+    curl_easy_setopt(easy, CURLOPT_URL, (settings.dicomweb + request_.target).c_str());
+    curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, "http,https");
+    curl_easy_setopt(easy, CURLOPT_FOLLOWLOCATION, 0L);
+    curl_easy_setopt(easy, CURLOPT_PROXY, "");
+    curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
+    curl_easy_setopt(easy, CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
+    if (!settings.ca_file.empty()) {
+      curl_easy_setopt(easy, CURLOPT_CAINFO, settings.ca_file.c_str());
+    }
+    const auto timeout = static_cast<long>(settings.timeout.count());
+    curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT, timeout);
+    // Slow is not bad: only what stands still is given up. A PACS is silent while it stores what it
+    // was sent, the longer the more that was.
+    constexpr std::uint64_t kStoredPerSecond = std::uint64_t{4} << 20;
+    const std::uint64_t sent = request_.body == nullptr ? 0 : request_.body->bytes;
+    curl_easy_setopt(easy, CURLOPT_LOW_SPEED_LIMIT, 1L);
+    curl_easy_setopt(easy, CURLOPT_LOW_SPEED_TIME,
+                     timeout + static_cast<long>(sent / kStoredPerSecond));
+    curl_easy_setopt(easy, CURLOPT_USERAGENT, "isomesh/" ISOMESH_VERSION);
+    if (!settings.user.empty()) {
+      curl_easy_setopt(easy, CURLOPT_HTTPAUTH, static_cast<long>(CURLAUTH_BASIC));
+      curl_easy_setopt(easy, CURLOPT_USERNAME, settings.user.c_str());
+      curl_easy_setopt(easy, CURLOPT_PASSWORD, secret_in(settings.password_file).c_str());
+    }
+    if (!settings.token_file.empty()) {
+      curl::append(headers_, "Authorization: Bearer " + secret_in(settings.token_file));
+    }
+  }
+
+  void set_request() {
+    CURL* easy = easy_.get();
+    curl::append(headers_, "Accept: " + request_.accept);
+    if (const RequestBody* body = request_.body) {
+      curl::append(headers_, "Content-Type: " + body->content_type);
+      curl::append(headers_, "Expect:");
+      curl_easy_setopt(easy, CURLOPT_POST, 1L);
+      curl_easy_setopt(easy, CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(body->bytes));
+      curl_easy_setopt(easy, CURLOPT_READFUNCTION, read);
+      curl_easy_setopt(easy, CURLOPT_READDATA, this);
+      curl_easy_setopt(easy, CURLOPT_UPLOAD_BUFFERSIZE, 512L * 1024);
+    }
+    curl_easy_setopt(easy, CURLOPT_HTTPHEADER, headers_.get());
+    curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, write);
+    curl_easy_setopt(easy, CURLOPT_WRITEDATA, this);
+    curl_easy_setopt(easy, CURLOPT_NOPROGRESS, 0L);
+    curl_easy_setopt(easy, CURLOPT_XFERINFOFUNCTION, is_over);
+    curl_easy_setopt(easy, CURLOPT_XFERINFODATA, this);
+  }
+
+  [[noreturn]] static void throw_failure(CURLcode result) {
+    switch (result) {
+      case CURLE_OPERATION_TIMEDOUT:
+        throw PacsFailure(PacsFault::kTimeout, "the PACS does not answer");
+      case CURLE_PEER_FAILED_VERIFICATION:
+      case CURLE_SSL_CONNECT_ERROR:
+      case CURLE_SSL_CACERT_BADFILE:
+        throw PacsFailure(PacsFault::kUnreachable,
+                          "no trusted TLS connection to the PACS can be made");
+      case CURLE_PARTIAL_FILE:
+      case CURLE_RECV_ERROR:
+      case CURLE_SEND_ERROR:
+      case CURLE_GOT_NOTHING:
+        throw PacsFailure(PacsFault::kUnreachable,
+                          "the PACS has closed the connection before its answer was complete");
+      default:
+        throw PacsFailure(PacsFault::kUnreachable, "the PACS cannot be connected to");
+    }
+  }
+
+  // Exceptions do not cross libcurl: they are kept, and end the transfer.
+  template <class Run>
+  std::size_t guarded(std::size_t on_failure, const Run& run) {
+    try {
+      return run();
+    } catch (...) {
+      thrown_ = std::current_exception();
+      return on_failure;
+    }
+  }
+
+  static std::size_t read(char* buffer, std::size_t size, std::size_t count, void* self) {
+    auto& transfer = *static_cast<Transfer*>(self);
+    return transfer.guarded(CURL_READFUNC_ABORT, [&] {
+      return transfer.request_.body->read(std::as_writable_bytes(std::span(buffer, size * count)));
+    });
+  }
+
+  static std::size_t write(char* data, std::size_t size, std::size_t count, void* self) {
+    auto& transfer = *static_cast<Transfer*>(self);
+    return transfer.guarded(0, [&] {
+      const std::size_t bytes = size * count;
+      transfer.received_ += bytes;
+      if (transfer.received_ > transfer.request_.most_bytes) {
+        throw Error(ErrorCode::kTooLarge, "the answer of the PACS is more than the " +
+                                              std::to_string(transfer.request_.most_bytes) +
+                                              " bytes that are accepted");
+      }
+      write_all(transfer.target_, std::as_bytes(std::span(data, bytes)));
+      return bytes;
+    });
+  }
+
+  static int is_over(void* self, curl_off_t /*all*/, curl_off_t /*now*/, curl_off_t /*up_all*/,
+                     curl_off_t /*up_now*/) {
+    return static_cast<Transfer*>(self)->stop_.stop_requested() ? 1 : 0;
+  }
+
+  const PeerRequest& request_;
+  const std::stop_token stop_;
+  const Descriptor target_;
+  std::uint64_t received_ = 0;
+  std::exception_ptr thrown_;
+  curl::Headers headers_;
+  const curl::Easy easy_;  // last: knows all of the above
+};
+
+}  // namespace
+
+PeerAnswerHead HttpPeer::send(const PeerRequest& request, const std::stop_token& stop) const {
+  return Transfer(settings_, request, stop).perform();
+}
+
+}  // namespace isomesh::dicomweb

@@ -1,0 +1,129 @@
+#include "proto/orders.h"
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "base/sha256.h"
+#include "server/http/request_values.h"
+#include "server/http/routes/routes.h"
+
+namespace isomesh::http {
+namespace {
+
+const std::string kOrders = "/v1/orders";
+constexpr const char* kOrderCursor = "orders";
+
+// Throws Error kNotFound where no PACS is configured.
+orders::Orders& orders_of(const App& app) {
+  if (app.services.orders != nullptr) return *app.services.orders;
+  throw Error(ErrorCode::kNotFound,
+              "this service knows no PACS: it was started without --hospital");
+}
+
+orders::Orderer orderer_of(const Request& request) {
+  return {.name = owner_of(request), .is_administrator = !viewer_of(request)};
+}
+
+void submit(App& app, const Request& request, Response& response) {
+  check_known(request, {});
+  orders::Orders& all = orders_of(app);
+  const std::string body = json_body(app, request);
+  const OrderRequest asked = parse_order_request(body);
+  if (asked.callback) app.services.callback_targets.check(asked.callback->url);
+  if (app.draining) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
+  const std::string key = idempotency_key_of(request);
+  try {
+    const auto [order, is_new] =
+        all.submit(orderer_of(request), asked, key, key.empty() ? "" : sha256_of(body));
+    response.set_header("Location", kOrders + '/' + order.id);
+    answer_json(response, is_new ? 202 : 200, to_json(order));
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kUnavailable) response.set_header("Retry-After", "30");
+    throw;
+  }
+}
+
+std::optional<Continuation> get(App& app, const Request& request, Response& response) {
+  check_known(request, {"wait"});
+  const auto wait = wait_of(request);
+  orders::Orders& all = orders_of(app);
+  const std::string id = request.path_parameter("id");
+  const Order order = all.get(viewer_of(request), id);
+  if (is_final(order.state) || wait.count() == 0 || app.stopping) {
+    answer_tagged_json(request, response, to_json(order));
+    return std::nullopt;
+  }
+  return Continuation{.job = id,
+                      .until = std::chrono::steady_clock::now() + wait,
+                      .resume = [&all, id](const Request& asked, Response& out) {
+                        answer_tagged_json(asked, out, to_json(all.get(viewer_of(asked), id)));
+                      }};
+}
+
+store::OrderFilter filter_of(const Request& request) {
+  store::OrderFilter filter;
+  if (request.has_parameter("state")) {
+    filter.state = from_string<OrderState>(request.parameter("state"));
+    if (!filter.state) {
+      throw invalid_parameter("state",
+                              "must be waiting, fetching, meshing, sending, succeeded, failed or "
+                              "cancelled");
+    }
+  }
+  if (request.has_parameter("rule")) filter.rule = std::string(request.parameter("rule"));
+  return filter;
+}
+
+void list(App& app, const Request& request, Response& response) {
+  check_known(request, {"state", "rule", "cursor", "limit"});
+  const orders::Orders& all = orders_of(app);
+  const std::string after = id_after(request, kOrderCursor);
+  const std::size_t limit = whole_number_of(request, "limit", kListLengths, kUsualListLength);
+  answer_list<Order>(
+      request, response,
+      {.kind = kOrderCursor,
+       .after = after,
+       .limit = limit,
+       .read = [&all, viewer = viewer_of(request), filter = filter_of(request)](
+                   const std::string& from,
+                   std::size_t count) { return all.list(viewer, filter, from, count); },
+       .place_of = [](const Order& order) { return order.id; }});
+}
+
+void cancel(App& app, const Request& request, Response& response) {
+  check_known(request, {});
+  answer_json(response, 200,
+              to_json(orders_of(app).cancel(viewer_of(request), request.path_parameter("id"))));
+}
+
+void retry(App& app, const Request& request, Response& response) {
+  check_known(request, {});
+  answer_json(response, 202,
+              to_json(orders_of(app).retry(viewer_of(request), request.path_parameter("id"))));
+}
+
+void pacs(App& app, const Request& request, Response& response) {
+  check_known(request, {});
+  answer_json(response, 200, to_json(orders_of(app).pacs()));
+}
+
+}  // namespace
+
+void add_order_routes(App& app) {
+  add_post(app, kOrders,
+           [&app](const auto& request, auto& response) { submit(app, request, response); });
+  add_computed_get(app, kOrders,
+                   [&app](const auto& request, auto& response) { list(app, request, response); });
+  add_get(app, kOrders + "/{id}",
+          [&app](const auto& request, auto& response) { return get(app, request, response); });
+  add_delete(app, kOrders + "/{id}",
+             [&app](const auto& request, auto& response) { cancel(app, request, response); });
+  add_post(app, kOrders + "/{id}/retry",
+           [&app](const auto& request, auto& response) { retry(app, request, response); });
+  add_get(app, "/v1/pacs",
+          [&app](const auto& request, auto& response) { pacs(app, request, response); });
+}
+
+}  // namespace isomesh::http

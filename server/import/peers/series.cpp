@@ -1,0 +1,58 @@
+#include "server/import/peers/series.h"
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "proto/error.h"
+#include "server/import/dicom/dataset.h"
+#include "server/import/dicom/import.h"
+#include "server/import/dicom/tags.h"
+#include "server/import/peers/multipart.h"
+#include "server/import/reader.h"
+#include "server/import/scratch_folder.h"
+
+namespace isomesh::import {
+namespace {
+
+constexpr std::size_t kMostInstances = 20000;
+
+// The files of the series' instances, each once. Nothing that is missing may pass: half a head is a
+// volume, too.
+std::vector<std::filesystem::path> checked(const std::vector<std::filesystem::path>& parts,
+                                           const process::PeersSeries& asked,
+                                           const ImportTask& task) {
+  std::vector<std::filesystem::path> files;
+  std::set<std::string> instances;
+  for (const std::filesystem::path& part : parts) {
+    const dicom::DicomFile file(part, task.scratch, task.limits.max_sample_bytes);
+    const dicom::DataSet& data = file.data();
+    if (data.text(dicom::kStudyInstanceUid) != asked.study ||
+        data.text(dicom::kSeriesInstanceUid) != asked.series) {
+      throw Error(ErrorCode::kSeriesIncomplete,
+                  "the PACS has sent an object of another series than the one that was asked for");
+    }
+    if (instances.emplace(data.text(dicom::kSopInstanceUid)).second) files.push_back(part);
+  }
+  const std::set<std::string> listed(asked.instances.begin(), asked.instances.end());
+  if (instances == listed) return files;
+  throw Error(ErrorCode::kSeriesIncomplete, "the PACS has sent " +
+                                                std::to_string(instances.size()) +
+                                                " objects of the series, and not the " +
+                                                std::to_string(listed.size()) + " that it lists");
+}
+
+}  // namespace
+
+Volume read_peers_series(const ImportTask& task, const FormatListener& listener) {
+  const process::PeersSeries& asked = *task.options.peers;
+  const TemporaryFolder folder(task.scratch, "parts-");
+  const MultipartLimits limits = {.max_bytes = task.limits.max_sample_bytes + kHeadroomBytes,
+                                  .max_parts = kMostInstances};
+  const auto parts =
+      unpack_multipart(task.source, boundary_of(asked.content_type), folder.path(), limits);
+  if (listener) listener("dicom");
+  return import_dicom(checked(parts, asked, task), task);
+}
+
+}  // namespace isomesh::import

@@ -1,0 +1,34 @@
+# The component daemon: programs, unit, configuration, manual page, completions.
+install(TARGETS isomeshd RUNTIME DESTINATION ${CMAKE_INSTALL_SBINDIR} COMPONENT daemon)
+install(TARGETS isomesh-import isomesh-job RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/isomesh
+  COMPONENT daemon)
+
+# What is installed in /usr has its configuration in /etc and its data in /var.
+set(config ${CMAKE_INSTALL_SYSCONFDIR}/isomesh)
+set(full_state ${CMAKE_INSTALL_FULL_LOCALSTATEDIR}/lib/isomesh)
+if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
+  set(config ${CMAKE_INSTALL_FULL_SYSCONFDIR}/isomesh)
+endif()
+set(ISOMESH_FULL_CONFIG ${CMAKE_INSTALL_FULL_SYSCONFDIR}/isomesh)
+set(made ${CMAKE_CURRENT_BINARY_DIR}/installed)
+file(MAKE_DIRECTORY ${made})
+configure_file(${CMAKE_CURRENT_LIST_DIR}/isomeshd.service.in ${made}/isomeshd.service @ONLY)
+
+isomesh_written(${made}/isomeshd.toml isomeshd --data ${full_state} config)
+isomesh_written(${made}/isomeshd.8 isomeshd manual)
+isomesh_written(${made}/isomeshd.bash isomeshd completion bash)
+isomesh_written(${made}/_isomeshd isomeshd completion zsh)
+isomesh_written(${made}/isomeshd.fish isomeshd completion fish)
+add_custom_target(isomesh_daemon_files ALL DEPENDS
+  ${made}/isomeshd.toml ${made}/isomeshd.8 ${made}/isomeshd.bash ${made}/_isomeshd ${made}/isomeshd.fish)
+
+install(FILES ${made}/isomeshd.toml DESTINATION ${config} COMPONENT daemon)
+install(FILES ${made}/isomeshd.service DESTINATION lib/systemd/system COMPONENT daemon)
+install(FILES ${CMAKE_CURRENT_LIST_DIR}/isomesh.sysusers RENAME isomesh.conf
+  DESTINATION lib/sysusers.d COMPONENT daemon)
+install(FILES ${made}/isomeshd.8 DESTINATION ${CMAKE_INSTALL_MANDIR}/man8 COMPONENT daemon)
+install(FILES ${made}/isomeshd.bash RENAME isomeshd
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT daemon)
+install(FILES ${made}/_isomeshd DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT daemon)
+install(FILES ${made}/isomeshd.fish
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT daemon)

@@ -1,0 +1,73 @@
+// What the file of --hospital says: PACS, rules, and how patient orders are.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/orders.h"
+
+namespace isomesh::orders {
+
+// A PACS that is spoken to by DICOMweb (PS3.18).
+struct PacsSettings {
+  std::string name;      // what requests call it
+  std::string dicomweb;  // URL below which /studies is
+  std::string user;      // empty: none
+  std::filesystem::path password_file;
+  std::filesystem::path token_file;  // of a bearer token
+  std::filesystem::path ca_file;     // empty: the system's authorities
+  std::chrono::seconds timeout{30};  // without a byte
+  std::string transfer_syntax = "*";
+  std::uint64_t max_send_bytes = 4'000'000'000;
+  std::vector<std::string> owners;  // who may order from it without a rule; empty: everybody
+};
+
+// Which series a watch takes. What is empty does not matter.
+struct SeriesMatch {
+  std::string modality;
+  std::string series_description;  // * stands for any text, ? for one character; in any case
+  std::uint32_t min_instances = 1;
+  std::uint32_t days = 2;  // of studies of today and so many days before
+};
+
+struct Rule {
+  std::string name;
+  std::string owner;  // the name of the token that its orders belong to
+  std::string label;  // what its meshes are called
+  std::int64_t series_number = 9001;
+  std::optional<std::string> watch;  // the PACS that is asked for new series
+  SeriesMatch match;
+  std::string parameters;  // of its jobs: JSON, as parse_order_parameters takes it
+  std::vector<SendTarget> send;
+};
+
+struct Hospital {
+  std::chrono::seconds settle{60};  // the list of a series' instances is unchanged for so long
+  std::chrono::seconds poll{30};
+  std::chrono::seconds first_delay{5};  // after a failed attempt; doubles
+  std::chrono::seconds longest_delay{std::chrono::hours(1)};
+  std::chrono::seconds give_up{std::chrono::hours(72)};
+  std::size_t most_open = 10'000;  // orders
+  std::string station_name = "isomesh";
+  std::vector<PacsSettings> pacs;
+  std::vector<Rule> rules;
+
+  // Null when there is none of that name.
+  const PacsSettings* find_pacs(std::string_view name) const;
+  const Rule* find_rule(std::string_view name) const;
+};
+
+// Reads TOML. Throws Error kInvalidParameter, without the value, that names the key which is
+// unknown, missing, of the wrong type or out of range, or the line that is no TOML.
+Hospital read_hospital(const std::filesystem::path& file);
+Hospital parse_hospital(std::string_view toml);
+
+// Whether a text is what the pattern stands for: see SeriesMatch.
+bool matches(std::string_view pattern, std::string_view text);
+
+}  // namespace isomesh::orders

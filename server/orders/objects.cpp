@@ -1,0 +1,179 @@
+#include "server/orders/objects.h"
+
+#include <algorithm>
+#include <array>
+#include <span>
+
+#include "base/text.h"
+#include "proto/error.h"
+#include "proto/json.h"
+#include "server/dicom/encapsulated_stl.h"
+#include "server/dicom/uid.h"
+
+namespace isomesh::orders {
+namespace {
+
+// The bytes of one STL within a blob.
+struct Part {
+  std::optional<std::int64_t> label = {};
+  std::string name = {};  // the label's
+  std::string blob;
+  std::uint64_t offset = 0;
+  std::uint64_t bytes = 0;
+  std::string sha256;
+};
+
+std::vector<Part> parts_of(const Job& job) {
+  std::vector<Part> parts;
+  if (!job.mesh) return parts;
+  const auto& files = job.mesh->files;
+  if (const auto stl = files.find(MeshFormat::kStl); stl != files.end()) {
+    parts.push_back(
+        {.blob = stl->second.sha256, .bytes = stl->second.bytes, .sha256 = stl->second.sha256});
+  }
+  const auto zip = files.find(MeshFormat::kZip);
+  if (zip == files.end()) return parts;
+  for (const LabelSummary& label : job.mesh->labels) {
+    const auto stl = label.files.find(MeshFormat::kStl);
+    if (stl == label.files.end() || label.triangles == 0) continue;
+    parts.push_back({.label = label.label,
+                     .name = label.name.value_or("Label " + std::to_string(label.label)),
+                     .blob = zip->second.sha256,
+                     .offset = stl->second.offset,
+                     .bytes = stl->second.bytes,
+                     .sha256 = stl->second.sha256});
+  }
+  return parts;
+}
+
+// What determines the mesh, and not which other files were asked for.
+std::string canonical_parameters(MeshParameters parameters) {
+  parameters.formats = {MeshFormat::kStl};
+  parameters.draco = {};
+  parameters.normals = false;
+  return to_json(parameters);
+}
+
+std::string series_uid_of(const DicomIdentity& identity, const Job& job) {
+  return dicom::name_based_uid("series\n" + identity.study_uid + '\n' + identity.series_uid + '\n' +
+                               canonical_parameters(job.parameters) + '\n' + ISOMESH_VERSION);
+}
+
+std::string instance_uid_of(const std::string& series_uid, const DicomIdentity& identity,
+                            const Part& part) {
+  std::vector<std::string> sources;
+  for (const DicomInstance& instance : identity.instances) {
+    sources.push_back(instance.sop_instance_uid);
+  }
+  std::ranges::sort(sources);
+  std::string name =
+      "instance\n" + series_uid + '\n' + std::string(dicom::kEncapsulatedStlStorage) + '\n';
+  for (const std::string& source : sources) name += source + '\n';
+  // Two labels may have the same surface.
+  if (part.label) name += "label " + std::to_string(*part.label) + '\n';
+  return dicom::name_based_uid(name + part.sha256);
+}
+
+// In LO's 64 characters.
+std::string in_short(const std::string& text) {
+  constexpr std::size_t kLongest = 64;
+  if (text.size() <= kLongest) return text;
+  std::size_t end = kLongest;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
+  return text.substr(0, end);
+}
+
+std::string without_backslashes(std::string text) {
+  std::ranges::replace(text, '\\', '/');
+  return text;
+}
+
+std::string description_of(const MeshParameters& parameters) {
+  const std::string what = parameters.labels ? "label"
+                           : parameters.iso  ? "iso " + to_text(*parameters.iso)
+                                             : "iso otsu";
+  return in_short(what + ", scheme " + std::to_string(static_cast<int>(parameters.scheme)) + ", " +
+                  std::to_string(parameters.passes) + " passes");
+}
+
+std::optional<DicomSegment> segment_of(const DicomIdentity& identity, const Part& part) {
+  if (!part.label) return std::nullopt;
+  const auto found = std::ranges::find(identity.segments, *part.label, &DicomSegment::label);
+  if (found != identity.segments.end()) return *found;
+  DicomSegment uncoded;
+  uncoded.label = *part.label;
+  return uncoded;
+}
+
+void copy(const store::BlobReader& from, const Part& part, store::BlobWriter& to) {
+  std::vector<std::byte> buffer(std::size_t{1} << 20);
+  for (std::uint64_t at = 0; at < part.bytes;) {
+    const auto piece =
+        std::span(buffer).first(std::min<std::uint64_t>(buffer.size(), part.bytes - at));
+    const std::size_t count = from.read_at(part.offset + at, piece);
+    if (count == 0) throw Error(ErrorCode::kInternal, "a mesh is shorter than it was");
+    to.write(piece.first(count));
+    at += count;
+  }
+}
+
+void write(const std::string& text, store::BlobWriter& to) {
+  to.write(std::as_bytes(std::span(text)));
+}
+
+}  // namespace
+
+std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
+                                     const std::string& station_name, std::uint64_t most_bytes,
+                                     std::chrono::system_clock::time_point made,
+                                     const store::BlobStore& blobs) {
+  const DicomIdentity& identity = record.work.identity.value();
+  const std::vector<Part> parts = parts_of(job);
+  if (!job.mesh || job.mesh->triangles == 0 || parts.empty()) {
+    throw Error(ErrorCode::kUnusableVolume,
+                "the surface is empty: no sample of the images is on the other side of the "
+                "iso-value");
+  }
+  std::vector<MadeObject> objects;
+  const std::string series_uid = series_uid_of(identity, job);
+  for (const Part& part : parts) {
+    MadeObject object = {.label = part.label,
+                         .series_uid = series_uid,
+                         .sop_instance_uid = instance_uid_of(series_uid, identity, part),
+                         .blob = {}};
+    const std::string title = part.label ? record.work.label + ' ' + part.name : record.work.label;
+    const dicom::StlEnvelope envelope = dicom::make_envelope(
+        {.identity = identity,
+         .series_uid = series_uid,
+         .sop_instance_uid = object.sop_instance_uid,
+         .series_number = record.work.series_number.value_or(0),
+         .title = in_short(without_backslashes(title)),
+         .made = made,
+         .station_name = station_name,
+         .content_description = description_of(job.parameters),
+         .algorithm_parameters = without_backslashes(canonical_parameters(job.parameters)),
+         .segment = segment_of(identity, part)},
+        part.bytes);
+    const std::uint64_t bytes = envelope.before.size() + part.bytes + envelope.after.size();
+    if (bytes > most_bytes) {
+      throw Error(ErrorCode::kTooLarge, "the object has " + std::to_string(bytes) +
+                                            " bytes, and the PACS takes at most " +
+                                            std::to_string(most_bytes) + " (max-send-bytes)");
+    }
+    const auto writer = blobs.begin();
+    write(envelope.before, *writer);
+    copy(*blobs.open(part.blob), part, *writer);
+    write(envelope.after, *writer);
+    object.blob = writer->commit();
+    objects.push_back(std::move(object));
+  }
+  return objects;
+}
+
+bool can_make_objects(const Job& job, const store::BlobStore& blobs) {
+  const std::vector<Part> parts = parts_of(job);
+  return std::ranges::all_of(
+      parts, [&](const Part& part) { return store::is_there_and_intact(blobs, part.blob, {}); });
+}
+
+}  // namespace isomesh::orders

@@ -1,0 +1,36 @@
+// A finished job's meshes as DICOM objects.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "proto/orders.h"
+#include "proto/types.h"
+#include "server/store/blob_store.h"
+#include "server/store/order_store.h"
+
+namespace isomesh::orders {
+
+// An object that lies in the store of blobs.
+struct MadeObject {
+  std::optional<std::int64_t> label;
+  std::string series_uid;
+  std::string sop_instance_uid;
+  store::Blob blob;
+};
+
+// Makes an object of each of the job's STL files: of the only one, or of each label's. Their UIDs
+// follow from what they are, so that objects of the same images with the same mesh have the same,
+// whoever makes them when. The blobs are not settled (BlobStore::settle). Throws Error
+// kUnusableVolume for an empty surface, kTooLarge when one has more than `most_bytes`, kOutOfSpace.
+std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
+                                     const std::string& station_name, std::uint64_t most_bytes,
+                                     std::chrono::system_clock::time_point made,
+                                     const store::BlobStore& blobs);
+
+// Whether the files that objects are made of are there as they were written.
+bool can_make_objects(const Job& job, const store::BlobStore& blobs);
+
+}  // namespace isomesh::orders

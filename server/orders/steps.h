@@ -1,0 +1,82 @@
+// What an order does, one step at a time.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <map>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "server/jobs/label_lists.h"
+#include "server/jobs/volume_library.h"
+#include "server/orders/hospital.h"
+#include "server/orders/pacs.h"
+#include "server/store/audit_trail.h"
+#include "server/store/blob_store.h"
+#include "server/store/files/data_folder.h"
+#include "server/store/job_store.h"
+#include "server/store/order_store.h"
+#include "server/store/volume_store.h"
+
+namespace isomesh::orders {
+
+using PacsByName = std::map<std::string, std::unique_ptr<Pacs>, std::less<>>;
+
+// What orders need of everything else.
+struct OrderServices {
+  const store::DataFolder& folder;
+  const store::BlobStore& blobs;
+  const store::VolumeStore& volumes;
+  store::JobStore& jobs;
+  jobs::VolumeLibrary& library;
+  jobs::LabelLists& labels;
+  store::OrderStore& orders;
+  store::AuditTrail& audit;
+  const PacsByName& pacs;
+};
+
+// The order has ended, by somebody else's wish, while a step was made.
+struct OrderIsOver {};
+
+// Steps follow from the order's record alone, so that any process can make the next one, and each
+// may be made again: it saves what it has come to before anything follows from that. Thread safe
+// for different orders; what it is made of must outlive it.
+class OrderSteps {
+ public:
+  using Clock = std::function<store::Time()>;
+
+  OrderSteps(const OrderServices& services, const Hospital& hospital, Clock now)
+      : services_(services), hospital_(hospital), now_(std::move(now)) {}
+
+  // Makes the next step of an open order and saves it. Returns when the next one is due. Throws
+  // PacsFailure and Error when the step failed; the record is then what is to be saved of that.
+  // Throws OrderIsOver.
+  store::Time advance(store::OrderRecord& record, const std::stop_token& stop) const;
+
+  // The PACS that the next step speaks to; empty for none.
+  static std::string pacs_of(const store::OrderRecord& record);
+
+ private:
+  store::Time wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const;
+  store::Time fetch(store::OrderRecord& record, const std::stop_token& stop) const;
+  store::Time mesh(store::OrderRecord& record) const;
+  store::Time submit_job(store::OrderRecord& record) const;
+  store::Time make(store::OrderRecord& record, const Job& job) const;
+  store::Time send(store::OrderRecord& record, const std::stop_token& stop) const;
+  // False when the study is another patient's now.
+  bool is_same_patient(const store::OrderRecord& record, const OrderResult& result,
+                       const std::stop_token& stop) const;
+  void send_one(store::OrderRecord& record, std::size_t index, const std::stop_token& stop) const;
+  store::Time start_over(store::OrderRecord& record) const;
+  // Returns `next`. Throws OrderIsOver.
+  store::Time save(store::OrderRecord& record, store::Time next) const;
+  Pacs& pacs(const std::string& name) const;
+
+  const OrderServices services_;
+  const Hospital& hospital_;
+  const Clock now_;
+};
+
+}  // namespace isomesh::orders

@@ -1,0 +1,270 @@
+#include "server/store/backup.h"
+
+#include <cerrno>
+#include <optional>
+#include <set>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/descriptor.h"
+#include "base/files.h"
+#include "base/hex.h"
+#include "base/sha256.h"
+#include "proto/error.h"
+#include "server/store/files/files.h"
+#include "server/store/sqlite/sqlite.h"
+
+namespace isomesh::store {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kCopiedAtOnce = std::size_t{1} << 20;
+constexpr int kTries = 5;
+// As DataFolder and FileBlobStore lay them out.
+constexpr const char* kRecords = "isomesh.sqlite";
+constexpr const char* kBlobs = "blobs";
+constexpr const char* kIdentity = "identity";
+
+[[noreturn]] void refuse(const fs::path& path, const std::string& why) {
+  throw Error(ErrorCode::kInvalidParameter, path.string() + " " + why);
+}
+
+void make_folder(const fs::path& folder) {
+  if (::mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
+    throw Error(ErrorCode::kInternal,
+                folder.string() + ": " + std::generic_category().message(errno));
+  }
+}
+
+// Copies one file and brings it to the disk. False, and nothing is there, where there is none.
+bool copy_file(const fs::path& from, const fs::path& to, Copied& copied) {
+  std::optional<File> source;
+  try {
+    source.emplace(File::open(from));
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kNotFound) return false;
+    throw;
+  }
+  std::error_code absent;
+  fs::remove(to, absent);
+  File target = File::create(to);
+  Sha256 digest;
+  std::vector<std::byte> block(kCopiedAtOnce);
+  std::uint64_t offset = 0;
+  while (const std::size_t count = source->read_at(offset, block)) {
+    const auto bytes = std::span<const std::byte>(block).first(count);
+    digest.update(bytes);
+    target.write(bytes);
+    offset += count;
+  }
+  target.sync();
+  ++copied.blobs;
+  copied.bytes += offset;
+  if (to_hex(digest.finish()) != from.filename().string()) ++copied.damaged;
+  return true;
+}
+
+// The names of all blobs that are there now, below their folders.
+std::vector<std::string> blobs_of(const fs::path& data) {
+  std::vector<std::string> names;
+  std::error_code gone;  // folders and files come and go
+  for (const auto& folder : fs::directory_iterator(data / kBlobs, gone)) {
+    if (!folder.is_directory(gone)) continue;
+    for (const auto& file : fs::directory_iterator(folder.path(), gone)) {
+      if (file.is_regular_file(gone)) {
+        names.push_back(folder.path().filename().string() + '/' + file.path().filename().string());
+      }
+    }
+  }
+  return names;
+}
+
+// Where a blob lies below the folder of blobs.
+std::string place_of(const std::string& key) { return key.substr(0, 2) + '/' + key; }
+
+class Copy {
+ public:
+  Copy(const fs::path& from, const fs::path& to) : from_(from), to_(to) {
+    make_folder(to_);
+    make_folder(to_ / kBlobs);
+  }
+
+  // False where it is gone.
+  bool take(const std::string& blob) {
+    if (taken_.contains(blob)) return true;
+    const fs::path target = to_ / kBlobs / blob;
+    make_folder(target.parent_path());
+    if (!copy_file(from_ / kBlobs / blob, target, copied_)) return false;
+    taken_.insert(blob);
+    return true;
+  }
+
+  void drop_all_but(const std::set<std::string>& wanted) {
+    for (auto blob = taken_.begin(); blob != taken_.end();) {
+      if (wanted.contains(*blob)) {
+        ++blob;
+        continue;
+      }
+      const fs::path file = to_ / kBlobs / *blob;
+      --copied_.blobs;
+      copied_.bytes -= fs::file_size(file);
+      fs::remove(file);
+      blob = taken_.erase(blob);
+    }
+  }
+
+  // Names are on the disk, too.
+  void sync() const {
+    for (const auto& folder : fs::directory_iterator(to_ / kBlobs)) {
+      if (folder.is_directory()) sync_folder(folder.path());
+    }
+    sync_folder(to_ / kBlobs);
+    sync_folder(to_);
+  }
+
+  const Copied& copied() const { return copied_; }
+
+ private:
+  const fs::path from_;
+  const fs::path to_;
+  std::set<std::string> taken_;
+  Copied copied_;
+};
+
+// The records as they are at one moment.
+void snapshot(const fs::path& data, const fs::path& file) {
+  std::error_code absent;
+  fs::remove(file, absent);
+  File::create(file);  // with the rights that records have
+  Connection connection(data / kRecords, Connection::Mode::kRead);
+  connection.run("VACUUM INTO ?", file.string());
+  File::open(file).sync();
+}
+
+// What the records name.
+std::set<std::string> named_blobs(const fs::path& records) {
+  Connection connection(records, Connection::Mode::kRead);
+  std::set<std::string> blobs;
+  Query query = connection.query("SELECT id FROM volumes UNION SELECT blob FROM meshes");
+  while (query.next()) blobs.insert(place_of(query.text(0)));
+  return blobs;
+}
+
+// What says that the blobs belong to those records (Identity): they do, as far as these name any.
+void mark_blobs(const fs::path& folder) {
+  Connection connection(folder / kRecords, Connection::Mode::kRead);
+  Query query = connection.query("SELECT id, number FROM identity");
+  if (!query.next()) return;  // of a version that marked nothing yet
+  const std::string text = query.text(0) + ' ' + std::to_string(query.integer(1)) + '\n';
+  File file = File::create(folder / kBlobs / kIdentity);
+  file.write(std::as_bytes(std::span(text)));
+  file.sync();
+}
+
+void check_is_data_folder(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_regular_file(folder / kRecords, error) || !fs::is_directory(folder / kBlobs, error)) {
+    refuse(folder, "is no data folder of isomeshd");
+  }
+}
+
+// Blobs first, then the records, then what these name and what was not there before. Where one of
+// that is gone, a later state of the records does not name it any more; what even that names has
+// been lost before.
+Copied copy_consistently(const fs::path& data, const fs::path& target) {
+  Copy copy(data, target);
+  std::set<std::string> missed_before;
+  for (int attempt = 0; attempt < kTries; ++attempt) {
+    for (const std::string& blob : blobs_of(data)) copy.take(blob);
+    snapshot(data, target / kRecords);
+    const std::set<std::string> named = named_blobs(target / kRecords);
+    std::set<std::string> missed;
+    for (const std::string& blob : named) {
+      if (!copy.take(blob)) missed.insert(blob);
+    }
+    if (!missed.empty() && missed != std::exchange(missed_before, missed)) continue;
+    copy.drop_all_but(named);
+    mark_blobs(target);
+    copy.sync();
+    Copied copied = copy.copied();
+    copied.missing = missed.size();
+    return copied;
+  }
+  throw Error(ErrorCode::kUnavailable, "too much changed while it was copied; try again");
+}
+
+// --- Putting back --------------------------------------------------------------------------------
+
+void give_to(uid_t user, gid_t group, const fs::path& folder) {
+  const auto give = [&](const fs::path& path) {
+    if (::lchown(path.c_str(), user, group) != 0) {
+      throw Error(ErrorCode::kInternal, path.string() + ": its owner cannot be changed");
+    }
+  };
+  give(folder);
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) give(entry.path());
+}
+
+}  // namespace
+
+Copied back_up(const fs::path& data, const fs::path& target) {
+  check_is_data_folder(data);
+  std::error_code error;
+  if (fs::exists(fs::symlink_status(target, error))) refuse(target, "is there already");
+  const fs::path part = target.string() + ".part";
+  if (fs::exists(fs::symlink_status(part, error))) {
+    refuse(part, "is there: another backup runs, or one did not end; remove it in the latter case");
+  }
+  try {
+    const Copied copied = copy_consistently(data, part);
+    move_to(part, target);
+    sync_folder(fs::absolute(target).parent_path());
+    return copied;
+  } catch (...) {
+    fs::remove_all(part, error);  // why it failed is what counts
+    throw;
+  }
+}
+
+Copied restore(const fs::path& backup, const fs::path& data) {
+  check_is_data_folder(backup);
+  std::error_code error;
+  const bool is_there = fs::exists(data, error);
+  if (is_there && (!fs::is_directory(data, error) || !fs::is_empty(data, error))) {
+    refuse(data, "is not empty: a backup is put back into a new folder");
+  }
+  fs::create_directories(data, error);
+  if (error) throw Error(ErrorCode::kInternal, data.string() + ": " + error.message());
+  // As DataFolder locks it: a daemon that starts meanwhile is refused.
+  const Descriptor lock(::open((data / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600));
+  if (lock.number() < 0 || ::flock(lock.number(), LOCK_EX | LOCK_NB) != 0) {
+    throw Error(ErrorCode::kUnavailable, "another isomeshd is using " + data.string());
+  }
+  struct stat owner = {};
+  const bool has_owner = is_there && ::stat(data.c_str(), &owner) == 0;
+
+  Copy copy(backup, data);
+  std::uint64_t missing = 0;
+  for (const std::string& blob : named_blobs(backup / kRecords)) {
+    if (!copy.take(blob)) ++missing;
+  }
+  // Last, because without them this is no data folder.
+  Copied records;
+  copy_file(backup / kRecords, data / kRecords, records);
+  mark_blobs(data);
+  copy.sync();
+  if (has_owner && ::geteuid() == 0) give_to(owner.st_uid, owner.st_gid, data);
+  Copied copied = copy.copied();
+  copied.missing = missing;
+  return copied;
+}
+
+}  // namespace isomesh::store

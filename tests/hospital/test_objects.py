@@ -1,0 +1,128 @@
+"""What the objects say, and what the judges say of them."""
+import json
+import os
+import subprocess
+
+import peers
+from fixture import Loop
+
+
+class Objects(Loop):
+    def made(self, series, **more):
+        daemon = self.daemon()
+        order = self.succeeded(daemon, self.order(daemon, series, **more))
+        path = os.path.join(self.folder.name, order["id"] + ".dcm")
+        with open(path, "wb") as file:
+            file.write(self.pacs.file(order["results"][0]["sop_instance_uid"]))
+        return daemon, order, path
+
+    def assert_valid(self, path, series):
+        said = subprocess.run(["dciodvfy", path], capture_output=True, text=True, check=False)
+        faults = [line for line in said.stderr.splitlines()
+                  if line.startswith(("Error", "Warning"))]
+        self.assertEqual(faults, [])
+        sources = []
+        for index, data in enumerate(series.files.values()):
+            sources.append(f"{path}.{index}")
+            with open(sources[-1], "wb") as file:
+                file.write(data)
+        said = subprocess.run(["dcentvfy", path, *sources], capture_output=True, text=True,
+                              check=False)
+        self.assertEqual([line for line in said.stderr.splitlines() if line.strip()], [])
+
+    def value(self, path, tag):
+        said = subprocess.run(["dcmdump", "+L", "+P", tag, path], check=True, capture_output=True,
+                              text=True).stdout
+        lines = [line.split("#")[0].strip().split(" ", 2)[-1].strip() for line in said.splitlines()]
+        return lines
+
+    def test_rows(self):
+        """Every row of the table, on an object of which the judges find nothing wrong."""
+        series = self.series(name="Muster^Erika")
+        _, order, path = self.made(series)
+        result = order["results"][0]
+        self.assert_valid(path, series)
+        rows = {
+            "0008,0005": "[ISO_IR 192]", "0008,0016": "=EncapsulatedSTLStorage",
+            "0008,0018": f"[{result['sop_instance_uid']}]", "0010,0010": "[Muster^Erika]",
+            "0010,0020": "[PAT-4711]", "0010,0021": "[Hospital]", "0010,0030": "[19700101]",
+            "0010,0040": "[F]", "0020,000d": f"[{series.study}]", "0008,0020": "[20261120]",
+            "0008,0030": "[101112]", "0020,0010": "[S1]", "0008,0050": "[ACC-1]",
+            "0008,0090": "[Refer^Red]", "0008,1030": "[Head study]", "0008,0060": "[M3D]",
+            "0020,0011": "[9001]", "0008,103e": "[Bone]",
+            "0020,1040": "[SN]", "0008,1090": "[isomeshd]",
+            "0020,0013": "[1]", "0008,002a": "[20261120101500]", "0028,0301": "[NO]",
+            "0028,0302": "[YES]", "0042,0010": "[Bone]", "0042,0012": "[model/stl]",
+            "0068,7001": "[NO]", "0068,7002": "[NO]",
+            "0070,0081": "[iso 500, scheme 6, 5 passes]",
+        }
+        for tag, value in rows.items():
+            self.assertEqual(self.value(path, tag)[0], value, tag)
+        self.assertIn(f"[{result['series_uid']}]", self.value(path, "0020,000e"))
+        self.assertEqual(len(self.value(path, "0020,0052")), 1)
+        # Equipment: the maker of the object, and the scanner as a contributor.
+        self.assertEqual(set(self.value(path, "0008,0070")), {"[isomesh]", "[Maker]"})
+        self.assertEqual(set(self.value(path, "0018,1000")), {"[isomesh-test]", "[SN-77]"})
+        self.assertIn("[CT-ROOM-2]", self.value(path, "0008,1010"))
+        codes = self.value(path, "0008,0100")
+        self.assertEqual(codes.count("[121324]"), 12)
+        for code in ["[85040-4]", "[123103]", "[109101]", "[mm]"]:
+            self.assertIn(code, codes)
+        # Every slice as a source, and under the source series.
+        referenced = self.value(path, "0008,1155")
+        for instance in series.instances:
+            self.assertEqual(referenced.count(f"[{instance}]"), 2)
+        self.assertIn(f"[{series.uid}]", self.value(path, "0020,000e"))
+        parameters = self.value(path, "0066,0032")[0]
+        self.assertEqual(json.loads(parameters[1:-1])["iso"], 500)
+        self.assertEqual(self.value(path, "0066,0036"), ["[isomesh marching tetrahedra]"])
+        # No offset of times is told, which would be taken for that of the others.
+        self.assertEqual(self.value(path, "0008,0201"), [])
+
+    def test_the_mesh_is_the_jobs(self):
+        series = self.series()
+        daemon, order, path = self.made(series)
+        mesh = peers.call(daemon.port, "GET", f"/v1/jobs/{order['job']}/mesh.stl")[2]
+        with open(path, "rb") as file:
+            data = file.read()
+        self.assertEqual(data.count(mesh), 1)
+        self.assertIn(b"SPACE=LPS", mesh[:80])
+        self.assertEqual(self.value(path, "0042,0015"), [str(len(mesh))])
+        self.assertEqual(order["results"][0]["bytes"], len(data))
+
+    def test_by_labels(self):
+        """One object a label, each with that label's own surface, all in one series."""
+        series = self.series()
+        daemon, order, _ = self.made(series, parameters={"labels": "all"})
+        results = order["results"]
+        self.assertEqual([each["label"] for each in results], [1000])
+        self.assertEqual(self.stored(series), [each["sop_instance_uid"] for each in results])
+        data = self.pacs.file(results[0]["sop_instance_uid"])
+        mesh = peers.call(daemon.port, "GET", f"/v1/jobs/{order['job']}/mesh.stl?label=1000")[2]
+        self.assertEqual(data.count(mesh), 1)
+
+    def test_other_modalities_have_other_concepts(self):
+        for modality, code in [("MR", "[85041-2]"), ("PT", None)]:
+            series = self.series(modality=modality)
+            _, _, path = self.made(series)
+            codes = self.value(path, "0008,0100")
+            self.assertEqual([each for each in codes if each.startswith("[850")],
+                             [code] if code else [])
+
+    def test_names_of_the_world(self):
+        names = {
+            "ISO_IR 100": ("Müller^Jörg", "latin-1"),
+            "ISO_IR 192": ("Łoś^Zażółć", "utf-8"),
+            "ISO_IR 144": ("Люкceмбypг", "iso8859-5"),
+            "\\ISO 2022 IR 87": ("Yamada^Tarou=山田^太郎", "iso2022_jp"),
+        }
+        for charset, (name, codec) in names.items():
+            with self.subTest(charset):
+                series = self.series(name=name.encode(codec), charset=charset)
+                _, _, path = self.made(series)
+                said = subprocess.run(["dciodvfy", path], capture_output=True, text=True,
+                                      check=False).stderr
+                self.assertNotIn("Error", said)
+                said = subprocess.run(["dcmdump", "+P", "0010,0010", path], check=True,
+                                      capture_output=True).stdout
+                self.assertIn(f"[{name}]".encode(), said)

@@ -1,0 +1,118 @@
+"""A real daemon for each test class, and a server that breaks."""
+
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+import threading
+import unittest
+from pathlib import Path
+
+import isomesh
+import numpy
+
+ROOT = Path(__file__).resolve().parents[2]
+DAEMON = Path(os.environ.get("ISOMESHD", ROOT / "build" / "release" / "bin" / "isomeshd"))
+
+
+class DaemonTest(unittest.TestCase):
+    """Every class has a daemon of its own; `options` are more of its options."""
+
+    options = ()
+    listen = "127.0.0.1:0"
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = Path(tempfile.mkdtemp(prefix="isomesh-python-"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("ISOMESH")}
+        listen = cls.listen.replace("FOLDER", str(cls.folder))
+        command = [DAEMON, "--listen", listen, "--data", cls.folder / "data", "--log-level", "error"]
+        options = [option.replace("FOLDER", str(cls.folder)) for option in cls.options]
+        cls.prepare(cls.folder)
+        cls.daemon = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True, env=environment)
+        cls.addClassCleanup(cls.end)
+        line = cls.daemon.stdout.readline()
+        if not line.startswith("listening on "):
+            raise RuntimeError(f"{DAEMON} did not start")
+        cls.url = line.split()[-1]
+        cls.client = isomesh.Client(cls.url)
+
+    @classmethod
+    def prepare(cls, folder):
+        """Before the daemon starts."""
+
+    @classmethod
+    def end(cls):
+        cls.daemon.terminate()
+        cls.daemon.stdout.close()
+        cls.daemon.wait(60)
+
+
+class Relay:
+    """Passes connections on to a server, and cuts the first `cuts` answers that grow beyond
+    `after` bytes there."""
+
+    def __init__(self, url, cuts, after):
+        self.target = url.removeprefix("http://").rsplit(":", 1)
+        self.cuts, self.after = cuts, after
+        self.requests = []
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.url = f"http://127.0.0.1:{self.listener.getsockname()[1]}"
+        self.thread = threading.Thread(target=self.serve, daemon=True)
+        self.thread.start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.listener.shutdown(socket.SHUT_RDWR)
+        self.listener.close()
+        self.thread.join(60)
+
+    def serve(self):
+        while True:
+            try:
+                client, _ = self.listener.accept()
+            except OSError:
+                return
+            with client, socket.create_connection((self.target[0], int(self.target[1]))) as server:
+                try:
+                    self.pass_on(client, server)
+                except OSError:
+                    pass  # one of both ended the connection, and the other one sees it end
+
+    def pass_on(self, client, server):
+        """Requests without a long body, as they are here."""
+        request = b""
+        while b"\r\n\r\n" not in request:
+            request += client.recv(65536)
+        self.requests.append(request)
+        server.sendall(request)
+        passed = 0
+        while piece := server.recv(65536):
+            if self.cuts > 0 and passed + len(piece) > self.after:
+                client.sendall(piece[: max(0, self.after - passed)])
+                self.cuts -= 1
+                return
+            client.sendall(piece)
+            passed += len(piece)
+
+
+def ball(size=(40, 32, 24), radius=9.0, spacing=(1.0, 1.0, 1.0)):
+    """Samples of distance from the middle, negated: the iso-value -r is a ball of the radius r."""
+    axes = [(numpy.arange(n) - (n - 1) / 2) * step for n, step in zip(size, spacing)]
+    x, y, z = numpy.meshgrid(*axes, indexing="ij")
+    return -numpy.sqrt(x * x + y * y + z * z).astype("float32")
+
+
+def turned(spacing=(0.5, 0.75, 1.25), origin=(12.0, -40.0, 7.5), angle=0.4):
+    """An affine that turns about z."""
+    affine = numpy.eye(4)
+    turn = numpy.array(
+        [[numpy.cos(angle), -numpy.sin(angle), 0], [numpy.sin(angle), numpy.cos(angle), 0], [0, 0, 1]]
+    )
+    affine[:3, :3] = turn @ numpy.diag(spacing)
+    affine[:3, 3] = origin
+    return affine

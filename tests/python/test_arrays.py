@@ -1,0 +1,144 @@
+"""Arrays and images up, arrays down."""
+
+import subprocess
+import sys
+import unittest
+
+import isomesh
+import nibabel
+import numpy
+from support import DaemonTest, ball, turned
+
+
+class Arrays(DaemonTest):
+    def test_a_ball_lies_where_its_affine_says(self):
+        size, radius = (40, 32, 24), 6.0
+        spacing = (0.5, 0.75, 1.25)
+        affine = turned(spacing)
+        mesh = self.client.mesh(ball(size, spacing=spacing), affine=affine, iso=-radius, passes=0)
+        middle = (affine @ [*((n - 1) / 2 for n in size), 1])[:3]
+        distances = numpy.linalg.norm(mesh.in_space("ras").vertices - middle, axis=1)
+        self.assertLess(abs(distances - radius).max(), 0.1)
+        self.assertGreater(abs(mesh.vertices - middle).max(), 20, "LPS and RAS are the same here")
+
+    def test_space_lps_takes_the_affine_as_it_is(self):
+        samples, affine = ball(), turned()
+        as_ras = self.client.upload(samples, affine=numpy.diag([-1.0, -1.0, 1.0, 1.0]) @ affine)
+        as_lps = self.client.upload(samples, affine=affine, space="lps")
+        self.assertEqual(as_ras["id"], as_lps["id"])
+
+    def test_faces_are_turned_outward(self):
+        mesh = self.client.mesh(ball(), iso=-8, passes=0)
+        corners = mesh.vertices[mesh.faces].astype("float64")
+        volume = numpy.einsum("ij,ij->i", corners[:, 0], numpy.cross(corners[:, 1], corners[:, 2])).sum() / 6
+        self.assertAlmostEqual(volume / (4 / 3 * numpy.pi * 8**3), 1, delta=0.02)
+        self.assertAlmostEqual(volume, mesh.job["mesh"]["volume_mm3"]["extracted"], delta=0.01)
+
+    def test_an_image_is_the_same_volume_as_its_file(self):
+        file = self.folder / "ball.nii.gz"
+        nibabel.save(nibabel.Nifti1Image(ball(), turned()), file)
+        of_file = self.client.upload(file)
+        self.assertEqual(self.client.upload(nibabel.load(file))["id"], of_file["id"])
+        self.assertEqual(of_file["name"], "ball.nii.gz")
+
+    def test_samples_keep_their_type_and_values(self):
+        for name in ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"):
+            with self.subTest(name):
+                samples = numpy.zeros((3, 4, 5), name)
+                samples[2, 0, 4] = 100
+                for order in ("<", ">"):
+                    volume = self.client.upload(samples.astype(samples.dtype.newbyteorder(order)))
+                    self.assertEqual(volume["type"], name)
+                    self.assertEqual(volume["dims"], [3, 4, 5])
+                    self.assertEqual(volume["range"], [0, 100])
+
+    def test_other_types_are_sent_as_one_that_holds_them(self):
+        for name, sent in (("bool", "uint8"), ("float16", "float32"), ("int64", "int32"), ("uint64", "int32")):
+            samples = numpy.zeros((3, 3, 3), name)
+            samples[1, 1, 1] = 1
+            self.assertEqual(self.client.upload(samples)["type"], sent, name)
+        large = numpy.full((2, 2, 2), 2**32 - 1, "uint64")
+        large[0, 0, 0] = 0
+        self.assertEqual(self.client.upload(large)["range"], [0, 2**32 - 1])
+
+    def test_what_cannot_be_sent_is_refused_with_the_reason(self):
+        wrong = [
+            (numpy.full((2, 2, 2), 2**40), {}, ValueError, "do not fit"),
+            (numpy.zeros((2, 2, 2), complex), {}, TypeError, "complex"),
+            (numpy.zeros((2, 2)), {}, ValueError, "three axes"),
+            (numpy.zeros((2, 2, 2, 2)), {}, ValueError, "three axes"),
+            (ball(), {"affine": numpy.eye(3)}, ValueError, "4 x 4"),
+            (ball(), {"affine": numpy.diag([1.0, 0, 1, 1])}, ValueError, "no length"),
+            (ball(), {"affine": numpy.eye(4), "space": "mni"}, ValueError, "'ras' or 'lps'"),
+            (ball(), {"affine": numpy.eye(4) * numpy.nan}, ValueError, "finite"),
+            (ball(), {"affine": numpy.eye(4), "spacing": (1, 1, 1)}, ValueError, "either"),
+            (object(), {}, TypeError, "object"),
+            ("/no/such/file.nii", {}, FileNotFoundError, "/no/such/file.nii"),
+            (b"", {"spacing": (1, 1, 1)}, ValueError, "for arrays"),
+        ]
+        for source, more, kind, text in wrong:
+            with self.subTest(text), self.assertRaisesRegex(kind, text):
+                self.client.upload(source, **more)
+
+    def test_labels_come_with_their_faces(self):
+        samples = numpy.zeros((12, 12, 12), "int64")
+        samples[2:6, 2:10, 2:10], samples[6:10, 2:10, 2:10] = 3, 7
+        mesh = self.client.mesh(samples, labels="all", label_names={3: "left", 7: "right"})
+        self.assertEqual(set(mesh.labels.tolist()), {3, 7})
+        self.assertEqual(len(mesh.labels), len(mesh.faces))
+        self.assertEqual([each["name"] for each in mesh.job["mesh"]["labels"]], ["left", "right"])
+        middle = mesh.vertices[mesh.faces[mesh.labels == 3]].mean()
+        self.assertLess(middle, mesh.vertices[mesh.faces[mesh.labels == 7]].mean())
+
+    def test_labels_beyond_31_bits_keep_their_value(self):
+        samples = numpy.zeros((4, 4, 4), "uint32")
+        samples[1:3, 1:3, 1:3] = 4294967295
+        self.assertEqual(set(self.client.mesh(samples, labels="all").labels.tolist()), {4294967295})
+
+    def test_an_empty_surface_is_an_empty_mesh(self):
+        mesh = self.client.mesh(ball(), iso=5)
+        self.assertEqual(mesh.vertices.shape, (0, 3))
+        self.assertEqual(mesh.in_space("ras").faces.shape, (0, 3))
+
+    def test_without_numpy_a_mesh_has_the_same_numbers(self):
+        mesh = self.client.mesh(ball(), iso=-8)
+        path = self.client.download(mesh.job, self.folder / "ball.ply")
+        script = """
+import sys
+sys.modules["numpy"] = None
+import isomesh, json
+mesh = isomesh.read_ply(sys.argv[1])
+ras = mesh.in_space("ras")
+empty = isomesh.Client(sys.argv[2]).mesh(sys.argv[3], iso=1000)
+print(json.dumps([mesh.vertices.tolist(), ras.vertices.tolist(), mesh.faces.tolist(), len(empty.faces)]))
+"""
+        volume = self.folder / "volume.nii"
+        nibabel.save(nibabel.Nifti1Image(ball(), numpy.eye(4)), volume)
+        text = subprocess.check_output([sys.executable, "-c", script, path, self.url, volume], text=True)
+        vertices, ras, faces, empty = __import__("json").loads(text)
+        self.assertTrue(numpy.array_equal(numpy.array(vertices, "float32"), mesh.vertices))
+        self.assertTrue(numpy.array_equal(numpy.array(ras, "float32"), mesh.in_space("ras").vertices))
+        self.assertTrue(numpy.array_equal(faces, mesh.faces))
+        self.assertEqual(empty, 0)
+
+    def test_a_damaged_ply_is_refused(self):
+        path = self.client.download(self.client.mesh(ball(), iso=-8).job, self.folder / "whole.ply")
+        whole = path.read_bytes()
+        self.assertGreater(len(isomesh.read_ply(whole).faces), 100)
+        begin = whole.index(b"end_header\n") + 11
+        for damaged in (
+            whole[:-1],
+            whole + b"\0",
+            b"",
+            whole[:40],
+            whole.replace(b"binary_little", b"binary_big", 1),
+            whole.replace(b"float x", b"float u", 1),
+            whole[:-13] + b"\4" + whole[-12:],
+            whole[:begin],
+        ):
+            with self.assertRaises(isomesh.WrongAnswer):
+                isomesh.read_ply(damaged)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,255 @@
+"""Files, jobs, refusals and broken connections."""
+
+import os
+import subprocess
+import threading
+import unittest
+from unittest import mock
+
+import isomesh
+import numpy
+from support import DAEMON, DaemonTest, Relay, ball
+
+
+class Files(DaemonTest):
+    options = ("--max-upload", "2000000")
+
+    def write_meta_image(self, folder, element, names):
+        """The ball as a header and its data in those files."""
+        folder.mkdir(exist_ok=True)
+        data = ball().tobytes(order="F")
+        piece = len(data) // len(names)
+        for number, name in enumerate(names):
+            (folder / name).write_bytes(data[number * piece : (number + 1) * piece])
+        header = folder / "ball.mhd"
+        header.write_text(
+            "ObjectType = Image\nNDims = 3\nDimSize = 40 32 24\nElementType = MET_FLOAT\n"
+            f"ElementByteOrderMSB = False\nElementDataFile = {element}\n"
+        )
+        return header
+
+    def test_all_ways_to_send_the_same_samples(self):
+        wanted = self.client.upload(ball())["id"]
+        one = self.write_meta_image(self.folder / "one", "ball.raw", ["ball.raw"])
+        planes = [f"plane{n:02}.raw" for n in range(24)]
+        many = self.write_meta_image(self.folder / "many", "plane%02d.raw 0 23 1", planes)
+        listed = self.write_meta_image(self.folder / "list", "LIST\n" + "\n".join(planes), planes)
+        (self.folder / "one" / ".hidden").write_bytes(b"nothing of the volume")
+        bare = isomesh.Raw((40, 32, 24), "float32")
+        for source, more in (
+            (one, {}),
+            (str(many), {}),
+            (listed, {}),
+            (self.folder / "one", {}),
+            ([one, one.with_name("ball.raw")], {}),
+            (one.with_name("ball.raw"), {"raw": bare}),
+            (ball().tobytes(order="F"), {"raw": bare}),
+            (ball().astype(">f4").tobytes(order="F"), {"raw": isomesh.Raw((40, 32, 24), "float32", big_endian=True)}),
+        ):
+            with self.subTest(source=str(source)[:60]):
+                self.assertEqual(self.client.upload(source, **more)["id"], wanted)
+
+    def test_several_volumes(self):
+        folder = self.folder / "several"
+        folder.mkdir()
+        for name, radius in (("a", 3), ("b", 5)):
+            header = self.write_meta_image(self.folder / f"only {name}", "ball.raw", ["ball.raw"])
+            header.rename(folder / f"{name}.mhd")
+            text = (folder / f"{name}.mhd").read_text().replace("ball.raw", f"{name}.raw")
+            (folder / f"{name}.mhd").write_text(text)
+            (folder / f"{name}.raw").write_bytes((ball() + radius).tobytes(order="F"))
+        answers = self.client.upload_all(folder)
+        self.assertEqual([each["member"] for each in answers], ["a.mhd", "b.mhd"])
+        self.assertTrue(all(each["volume"] for each in answers))
+        with self.assertRaisesRegex(isomesh.Refused, "member='a.mhd': stored") as refused:
+            self.client.upload(folder)
+        self.assertEqual(len(refused.exception.choices), 2)
+        chosen = self.client.upload(folder, member="b.mhd", name="the second")
+        self.assertEqual(chosen["id"], answers[1]["volume"]["id"])
+
+    def test_an_upload_that_is_too_large_is_refused_with_the_reason(self):
+        with self.assertRaises(isomesh.Refused) as refused:
+            self.client.upload(numpy.zeros((200, 200, 200)))
+        self.assertEqual(refused.exception.status, 413)
+
+    def test_what_is_no_volume_is_refused_with_the_reason(self):
+        with self.assertRaises(isomesh.Refused) as refused:
+            self.client.upload(b"not a volume at all")
+        self.assertEqual(refused.exception.status, 415)
+
+    def test_names_lists_and_erasing(self):
+        volume = self.client.upload(ball() * 2, name="Größe 1")
+        self.assertEqual(volume["name"], "Größe 1")
+        self.assertEqual(self.client.rename(volume, "knee")["name"], "knee")
+        self.assertIn(volume["id"], [each["id"] for each in self.client.volumes()])
+        self.assertEqual(sum(self.client.histogram(volume, 16)["counts"]), 40 * 32 * 24)
+        self.client.erase(volume)
+        with self.assertRaises(isomesh.Refused) as refused:
+            self.client.volume(volume)
+        self.assertEqual(refused.exception.status, 404)
+
+
+class Jobs(DaemonTest):
+    def test_step_by_step(self):
+        volume = self.client.upload(ball())
+        estimate = self.client.estimate(volume, iso=-8, formats=["stl"], components={"keep": 1}, close=True)
+        job = self.client.submit(
+            volume, iso=-8, formats=["stl", "glb"], lambda_=0.5, idempotency_key="once",
+            components={"keep": 1}, close=True,
+        )
+        self.assertEqual(job["parameters"]["lambda"], 0.5)
+        seen = []
+        done = self.client.wait(job, progress=lambda each: seen.append(each["state"]))
+        self.assertEqual(seen[-1], "succeeded")
+        self.assertEqual(done["mesh"]["triangles"], estimate["triangles"])
+        again = self.client.submit(
+            volume["id"], iso=-8, formats=["stl", "glb"], **{"lambda": 0.5}, idempotency_key="once",
+            components={"keep": 1}, close=True,
+        )
+        self.assertEqual(again["id"], job["id"])
+        path = self.client.download(done["id"], self.folder / "ball.STL")
+        self.assertEqual(path.stat().st_size, estimate["bytes"]["stl"])
+        self.assertEqual(path.stat().st_mode & 0o777, 0o666 & ~self.mask())
+        self.assertEqual((self.client.download(job["id"], self.folder / "b.glb")).read_bytes()[:4], b"glTF")
+        self.assertIn(job["id"], [each["id"] for each in self.client.jobs("succeeded")])
+        with self.assertRaisesRegex(ValueError, "no file of the format 'obj'; it has stl, glb|glb, stl"):
+            self.client.download(done, self.folder / "ball.obj")
+        with self.assertRaisesRegex(ValueError, "'ply'"):
+            self.client.fetch(done)
+
+    @staticmethod
+    def mask():
+        mask = os.umask(0)
+        os.umask(mask)
+        return mask
+
+    def test_numbers_of_numpy_are_numbers(self):
+        volume = self.client.upload(ball())
+        passes = numpy.arange(4)[3]
+        job = self.client.submit(volume, iso=numpy.float32(-8), passes=passes, close=numpy.bool_(True))
+        parameters = job["parameters"]
+        self.assertEqual((parameters["iso"], parameters["passes"], parameters["close"]), (-8, 3, True))
+
+    def test_labels_one_by_one(self):
+        samples = numpy.zeros((8, 8, 8), "uint8")
+        samples[2:4, 2:6, 2:6], samples[4:6, 2:6, 2:6] = 1, 2
+        job = self.client.wait(self.client.submit(self.client.upload(samples), labels=[1, 2], formats=["stl"]))
+        sizes = [self.client.download(job, self.folder / f"{n}.stl", label=n).stat().st_size for n in (1, 2)]
+        self.assertEqual(sizes, [84 + 50 * each["triangles"] for each in job["mesh"]["labels"]])
+        with self.assertRaisesRegex(ValueError, "of the label 9"):
+            self.client.download(job, self.folder / "9.stl", label=9)
+
+    def test_parameters_that_are_wrong_are_named(self):
+        volume = self.client.upload(ball())
+        for parameters, text in (
+            ({"iso": 1, "passez": 3}, "passez"),
+            ({"iso": 1, "passes": 1001}, "passes"),
+            ({}, "iso"),
+            ({"iso": float("nan")}, "cannot be sent"),
+            ({"iso": 1, "formats": ["fbx"]}, "fbx|formats"),
+        ):
+            with self.subTest(text), self.assertRaisesRegex((isomesh.Refused, ValueError), text):
+                self.client.submit(volume, **parameters)
+
+    def test_a_cancelled_job_fails_whoever_waits(self):
+        volume = self.client.upload(numpy.random.default_rng(1).random((128, 128, 96), "float32"))
+        job = self.client.submit(volume, iso=0.5, passes=1000, formats=["ply"])
+        with self.assertRaises(TimeoutError):
+            self.client.wait(job, timeout=0.3)
+        self.client.cancel(job)
+        with self.assertRaisesRegex(isomesh.JobFailed, "cancelled") as failed:
+            self.client.wait(job)
+        self.assertEqual(failed.exception.job["state"], "cancelled")
+        with self.assertRaises(isomesh.JobFailed):
+            self.client.fetch(job["id"])
+
+    def test_a_client_serves_several_threads(self):
+        volume = self.client.upload(ball())
+        sizes = {}
+
+        def mesh(iso):
+            job = self.client.submit(volume, iso=iso, formats=["ply"])
+            sizes[iso] = len(self.client.fetch(self.client.wait(job)).faces)
+
+        threads = [threading.Thread(target=mesh, args=(-radius,)) for radius in (3, 5, 7, 9)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(sorted(sizes, key=sizes.get), [-3, -5, -7, -9])
+
+
+class Connections(DaemonTest):
+    def test_a_broken_download_goes_on_where_it_broke(self):
+        mesh = self.client.mesh(ball((64, 64, 64), radius=20), iso=-20)
+        size = mesh.job["mesh"]["files"]["ply"]["bytes"]
+        self.assertGreater(size, 200_000)
+        with Relay(self.url, cuts=2, after=100_000) as relay:
+            again = isomesh.Client(relay.url).fetch(mesh.job)
+        self.assertTrue(numpy.array_equal(again.vertices, mesh.vertices))
+        self.assertNotIn(b"Range:", relay.requests[0])
+        self.assertRegex(relay.requests[1], rb"Range: bytes=\d{5}")
+        self.assertEqual(len(relay.requests), 3)
+
+    def test_a_connection_that_breaks_each_time_is_given_up(self):
+        job = self.client.mesh(ball(), iso=-8).job
+        target = self.folder / "never.ply"
+        with Relay(self.url, cuts=100, after=1000) as relay, self.assertRaises(isomesh.Unreachable):
+            isomesh.Client(relay.url).download(job, target)
+        self.assertEqual([each.name for each in self.folder.iterdir() if "never" in each.name], [])
+
+    def test_a_mesh_of_other_bytes_is_refused(self):
+        job = self.client.mesh(ball(), iso=-8).job
+        job["mesh"]["files"]["ply"]["sha256"] = "0" * 64
+        with self.assertRaises(isomesh.WrongAnswer):
+            self.client.fetch(job)
+
+    def test_no_server(self):
+        for server in ("http://127.0.0.1:1", f"unix:{self.folder}/nothing"):
+            with self.subTest(server), self.assertRaisesRegex(isomesh.Unreachable, "cannot be reached"):
+                isomesh.Client(server).volume("x")
+        for server in ("ftp://localhost", "localhost:80", "http://a/path", "http://u@h", "http://h:x", "http://h?q"):
+            with self.subTest(server), self.assertRaises(ValueError):
+                isomesh.Client(server)
+        with self.assertRaises(ValueError):
+            isomesh.Client(token="a\r\nb")
+
+    def test_the_environment_says_where_and_who(self):
+        with mock.patch.dict(os.environ, {"ISOMESH_SERVER": self.url, "http_proxy": "http://127.0.0.1:1"}):
+            self.assertEqual(len(list(isomesh.Client().jobs("failed"))), 0)
+
+
+class Sockets(DaemonTest):
+    listen = "unix:FOLDER/socket"
+
+    def test_a_unix_socket(self):
+        client = isomesh.Client(f"unix:{self.folder}/socket")
+        self.assertGreater(len(client.mesh(ball(), iso=-8).faces), 1000)
+
+
+class Guarded(DaemonTest):
+    options = ("--tokens", "FOLDER/tokens", "--tls-cert", "FOLDER/cert.pem", "--tls-key", "FOLDER/key.pem")
+
+    @classmethod
+    def prepare(cls, folder):
+        tokens = [DAEMON, "token", "add", "python", "--into", folder / "tokens"]
+        cls.token = subprocess.check_output(tokens, text=True).strip()
+        subprocess.check_call(
+            ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost",
+             "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", folder / "key.pem", "-out", folder / "cert.pem"],
+            stderr=subprocess.DEVNULL,
+        )
+
+    def test_tokens_over_tls(self):
+        authorities = str(self.folder / "cert.pem")
+        client = isomesh.Client(self.url, token=self.token, authorities=authorities)
+        self.assertGreater(len(client.mesh(ball(), iso=-8).faces), 1000)
+        with self.assertRaises(isomesh.Refused) as refused:
+            list(isomesh.Client(self.url, authorities=authorities).volumes())
+        self.assertEqual(refused.exception.status, 401)
+        with self.assertRaisesRegex(isomesh.Unreachable, "certificate"):
+            list(isomesh.Client(self.url, token=self.token).volumes())
+
+
+if __name__ == "__main__":
+    unittest.main()

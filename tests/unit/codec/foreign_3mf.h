@@ -1,0 +1,32 @@
+// What the 3MF Consortium's own library makes of 3MF files.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "server/mesh/mesh.h"
+
+namespace isomesh::test {
+
+struct Object3mf {
+  std::string name;
+  std::string part_number;
+  bool is_model = false;  // or of another type
+  std::array<std::uint8_t, 3> color = {};
+  std::vector<mesh::Vec3> points;
+  std::vector<mesh::Triangle> triangles;
+};
+
+struct Model3mf {
+  bool is_in_millimetres = false;
+  std::map<std::string, std::string> metadata;
+  std::vector<Object3mf> objects;  // that are built, in their order
+};
+
+// Throws std::runtime_error where lib3mf refuses the file, or warns of anything.
+Model3mf read_with_lib3mf(const std::string& bytes);
+
+}  // namespace isomesh::test

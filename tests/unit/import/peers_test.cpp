@@ -1,0 +1,147 @@
+// What a PACS sends: multipart/related and DICOM JSON.
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/import/peers/answer.h"
+#include "server/import/peers/multipart.h"
+#include "tests/support/errors.h"
+#include "tests/support/files.h"
+
+namespace isomesh::import {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+class Multipart : public testing::Test {
+ protected:
+  std::vector<std::string> parts_of(const std::string& bytes, const std::string& boundary = "b",
+                                    const MultipartLimits& limits = {.max_bytes = 1 << 24,
+                                                                     .max_parts = 9}) {
+    const test::TemporaryFolder folder;
+    test::write_file(folder / "file", bytes);
+    std::filesystem::create_directory(folder / "parts");
+    std::vector<std::string> parts;
+    for (const auto& part : unpack_multipart(folder / "file", boundary, folder / "parts", limits)) {
+      parts.push_back(test::read_file(part));
+    }
+    return parts;
+  }
+  std::optional<ErrorCode> refusal_of(const std::string& bytes) {
+    return test::code_thrown_by([&] { parts_of(bytes); });
+  }
+
+  const std::string whole_ =
+      "preamble\r\n--b\r\nContent-Type: application/dicom\r\nX: y\r\n\r\none\r\n--b\r\n\r\ntwo\r\n"
+      "\r\n--b--\r\nepilogue";
+};
+
+TEST_F(Multipart, IsUnpacked) {
+  EXPECT_THAT(parts_of(whole_), ElementsAre("one", "two\r\n"));
+  EXPECT_THAT(parts_of("--b\r\n\r\none\r\n--b--"), ElementsAre("one"));
+  EXPECT_THAT(parts_of("--b--"), IsEmpty());
+  EXPECT_THAT(parts_of("--b \r\n\r\n\r\n--b--"), ElementsAre(""));
+}
+
+// Whatever is missing at its end, nothing is taken for the whole.
+TEST_F(Multipart, CutAnywhereIsRefused) {
+  const std::size_t closed = whole_.find("--b--") + 5;
+  for (std::size_t length = 0; length < closed; ++length) {
+    EXPECT_EQ(refusal_of(whole_.substr(0, length)), ErrorCode::kSeriesIncomplete) << length;
+  }
+  EXPECT_FALSE(refusal_of(whole_.substr(0, closed)));
+}
+
+// Boundaries may lie across the pieces in which the file is read.
+TEST_F(Multipart, PartsOfAnyLengthComeWhole) {
+  constexpr std::size_t kPiece = std::size_t{1} << 20;
+  for (std::size_t length = kPiece - 40; length < kPiece + 8; ++length) {
+    std::string content(length, 'x');
+    content += "\r\n--";  // nearly a boundary
+    const std::string bytes = "--b\r\n\r\n" + content + "\r\n--b\r\n\r\n2\r\n--b--";
+    ASSERT_THAT(parts_of(bytes), ElementsAre(content, "2")) << length;
+  }
+}
+
+TEST_F(Multipart, IsBounded) {
+  const std::string bytes = "--b\r\n\r\n12345\r\n--b\r\n\r\n12345\r\n--b--";
+  for (const MultipartLimits& limits : {MultipartLimits{9, 9}, MultipartLimits{99, 1}}) {
+    EXPECT_EQ(test::code_thrown_by([&] { parts_of(bytes, "b", limits); }), ErrorCode::kTooLarge);
+  }
+  EXPECT_EQ(refusal_of("--b\r\n" + std::string(200'000, 'h') + "\r\nx: y\r\n\r\n1\r\n--b--"),
+            ErrorCode::kSeriesIncomplete);
+}
+
+TEST(Boundary, IsThatOfTheContentType) {
+  EXPECT_EQ(boundary_of("multipart/related; type=\"application/dicom\"; boundary=a-b"), "a-b");
+  EXPECT_EQ(boundary_of("Multipart/Related; Boundary=\"a; b\"; type=x"), "a; b");
+  for (const std::string& type :
+       {std::string(), std::string("application/dicom"), std::string("multipart/related"),
+        std::string("text/plain; boundary=b"), std::string("multipart/related; boundary="),
+        "multipart/related; boundary=" + std::string(71, 'b')}) {
+    EXPECT_EQ(test::code_thrown_by([&] { boundary_of(type); }), ErrorCode::kSeriesIncomplete)
+        << type;
+  }
+}
+
+process::PeersAnswer answer_of(const std::string& text) {
+  const test::TemporaryFolder folder;
+  test::write_file(folder / "answer", text);
+  return read_answer(folder / "answer");
+}
+
+TEST(Answer, OfASearchIsAListOfObjects) {
+  const auto answer = answer_of(R"([
+    {"0020000D": {"vr": "UI", "Value": ["1.2"]}, "0020000E": {"vr": "UI", "Value": ["1.3"]},
+     "00080018": {"vr": "UI", "Value": ["1.4"]}, "00100020": {"vr": "LO", "Value": ["P"]},
+     "00080060": {"vr": "CS", "Value": ["CT"]}, "0008103E": {"vr": "LO", "Value": ["head"]},
+     "00201209": {"vr": "IS", "Value": [54]}},
+    {"00201209": {"vr": "IS", "Value": ["54"]}}, {"00201209": {"vr": "IS"}}, {}])");
+  ASSERT_EQ(answer.objects.size(), 4U);
+  EXPECT_EQ(answer.objects[0], (process::PeersObject{.study = "1.2",
+                                                     .series = "1.3",
+                                                     .instance = "1.4",
+                                                     .patient_id = "P",
+                                                     .modality = "CT",
+                                                     .series_description = "head",
+                                                     .instances = 54}));
+  EXPECT_EQ(answer.objects[1].instances, 54U);
+  EXPECT_FALSE(answer.objects[2].instances);
+  EXPECT_EQ(answer.objects[3], process::PeersObject());
+  EXPECT_THAT(answer_of("").objects, IsEmpty());
+  EXPECT_THAT(answer_of("[]").objects, IsEmpty());
+}
+
+TEST(Answer, OfStoringTellsWhatWasStored) {
+  const auto answer = answer_of(R"({
+    "00081199": {"vr": "SQ", "Value": [{"00081155": {"vr": "UI", "Value": ["1.5"]}}]},
+    "00081198": {"vr": "SQ", "Value": [{"00081155": {"vr": "UI", "Value": ["1.6"]},
+                                        "00081197": {"vr": "US", "Value": [42752]}}]}})");
+  EXPECT_THAT(answer.stored, ElementsAre(process::PeersObject{.instance = "1.5"}));
+  EXPECT_THAT(answer.failed,
+              ElementsAre(process::PeersObject{.instance = "1.6", .failure = 0xA700}));
+}
+
+TEST(Answer, ThatIsNoneIsRefused) {
+  for (const char* text :
+       {"<html>", "1", "\"x\"", "null", "[1]", "[[]]", "[", "{\"00081199\": {\"Value\": [1]}}",
+        R"([{"0020000E": {"Value": ["../../secrets"]}}])"}) {
+    EXPECT_EQ(test::code_thrown_by([&] { answer_of(text); }), ErrorCode::kPacsUnreachable) << text;
+  }
+  // As deep as it may be, it is refused like the others and ends nothing.
+  EXPECT_TRUE(test::code_thrown_by([] { answer_of(std::string(2'000'000, '[')); }));
+}
+
+TEST(Answer, OfStrangeKindsTellsNothing) {
+  const auto answer = answer_of(
+      R"([{"0020000D": 1, "0020000E": {"Value": 1}, "00080018": {"Value": []},
+           "00100020": {"Value": [7]}, "00201209": {"Value": [-1]}},
+          {"00201209": {"Value": [1e99]}}])");
+  EXPECT_THAT(answer.objects, ElementsAre(process::PeersObject(), process::PeersObject()));
+}
+
+}  // namespace
+}  // namespace isomesh::import

@@ -1,0 +1,230 @@
+// Jobs whose error is bound or measured, and what they leave out of the surface.
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/codec/decode/decode.h"
+#include "server/jobs/estimate.h"
+#include "server/jobs/pipeline.h"
+#include "server/mesh/distance.h"
+#include "tests/support/errors.h"
+#include "tests/unit/jobs/fixture.h"
+
+namespace isomesh::jobs {
+namespace {
+
+const Report kSilent = [](Stage, double, const Timing&) {};
+
+// Two balls and a hollow, in samples of half a millimetre.
+test::SampleVolume<float> hollow() {
+  const test::Field large = test::sphere({10, 10, 10}, 8.1);
+  const test::Field inside = test::sphere({10, 10, 10}, 4.2);
+  const test::Field speck = test::sphere({20.5, 10, 10}, 1.4);
+  Geometry geometry;
+  geometry.spacing = {0.5, 0.5, 0.5};
+  return test::sample<float>(
+      [&](const test::Point& p) { return std::max(std::min(large(p), -inside(p)), speck(p)); },
+      {46, 41, 41}, geometry);
+}
+
+class ErrorJobsTest : public test::JobsFixture {
+ protected:
+  MeshSummary run(const JobParameters& parameters) {
+    return run_pipeline(volume_, parameters, {}, blobs_, process_, {}, kSilent).mesh;
+  }
+
+  codec::DecodedSurface decoded(const MeshSummary& mesh, MeshFormat format) {
+    const std::string bytes = blob(mesh.files.at(format).sha256);
+    return codec::decode(std::as_bytes(std::span(bytes)), format, {});
+  }
+
+  // The surface as it is extracted: in STL, which rounds nothing.
+  codec::DecodedSurface extracted() {
+    JobParameters parameters = parameters_of(volume_, 0);
+    parameters.passes = 0;
+    parameters.formats = {MeshFormat::kStl};
+    return decoded(run(parameters), MeshFormat::kStl);
+  }
+
+  Volume volume_ = add(hollow(), SampleType::kFloat32);
+  JobProcess process_{job_program()};
+};
+
+TEST_F(ErrorJobsTest, KeepEveryFileWithinTheError) {
+  const codec::DecodedSurface reference = extracted();
+  for (const double error : {0.02, 0.1, 0.4}) {
+    JobParameters parameters = parameters_of(volume_, 0);
+    parameters.formats = {MeshFormat::kDrc, MeshFormat::kGlb, MeshFormat::kStl, MeshFormat::k3mf};
+    parameters.max_error_mm = error;
+    parameters.certify = true;
+    const MeshSummary mesh = run(parameters);
+    ASSERT_TRUE(mesh.certificate);
+    ASSERT_TRUE(mesh.simplified);
+    EXPECT_EQ(mesh.simplified->triangles_before, reference.triangles.size());
+    EXPECT_EQ(mesh.simplified->bound_by, Simplification::Bound::kError);
+    double farthest = 0;
+    for (const MeshFormat format : parameters.formats) {
+      const codec::DecodedSurface file = decoded(mesh, format);
+      EXPECT_EQ(file.triangles.size(), mesh.triangles) << to_string(format);
+      const double max = certify(file.view(), reference.view(), {}).max_mm();
+      EXPECT_LE(max, error) << to_string(format);
+      farthest = std::max(farthest, max);
+    }
+    EXPECT_DOUBLE_EQ(mesh.certificate->max_mm, farthest);
+    const auto& budget = mesh.certificate->budget_mm.value();
+    EXPECT_NEAR(budget.smoothing + budget.simplification + budget.quantisation, error, 1e-12);
+    EXPECT_LE(budget.smoothing, error / 2);
+    EXPECT_LE(budget.quantisation, error / 10);
+    EXPECT_EQ(mesh.quality.self_intersections->pairs, 0U);
+    EXPECT_TRUE(mesh.quality.closed && mesh.quality.manifold && mesh.quality.oriented);
+    EXPECT_TRUE(mesh.quality.encloses_volume);
+    EXPECT_EQ(mesh.components, 3U);
+    EXPECT_LT(mesh.triangles, reference.triangles.size() / (error < 0.1 ? 1 : 3));
+  }
+}
+
+// Draco's default of bits is too few for some micrometres.
+TEST_F(ErrorJobsTest, TakeAsManyBitsAsTheErrorNeeds) {
+  JobParameters parameters = parameters_of(volume_, 0);
+  parameters.max_error_mm = 0.002;
+  parameters.certify = true;
+  EXPECT_LE(run(parameters).certificate->max_mm, 0.002);
+}
+
+TEST_F(ErrorJobsTest, SayWhatTheirTrianglesCost) {
+  JobParameters parameters = parameters_of(volume_, 0);
+  parameters.formats = {MeshFormat::kStl};
+  parameters.triangles = 500;
+  parameters.certify = true;
+  const MeshSummary mesh = run(parameters);
+  EXPECT_LE(mesh.triangles, 500U);
+  EXPECT_EQ(mesh.simplified->bound_by, Simplification::Bound::kTriangles);
+  const codec::DecodedSurface file = decoded(mesh, MeshFormat::kStl);
+  EXPECT_DOUBLE_EQ(mesh.certificate->max_mm, certify(file.view(), extracted().view(), {}).max_mm());
+  EXPECT_FALSE(mesh.certificate->budget_mm);
+  parameters.max_error_mm = 0.05;  // which 500 triangles cannot keep
+  const MeshSummary both = run(parameters);
+  EXPECT_GT(both.triangles, 500U);
+  EXPECT_EQ(both.simplified->bound_by, Simplification::Bound::kError);
+  EXPECT_LE(both.certificate->max_mm, 0.05);
+}
+
+TEST_F(ErrorJobsTest, MeasureWithoutChangingAnything) {
+  JobParameters parameters = parameters_of(volume_, 0);
+  const MeshSummary plain = run(parameters);
+  EXPECT_FALSE(plain.certificate || plain.simplified || plain.quality.self_intersections);
+  parameters.certify = true;
+  const MeshSummary certified = run(parameters);
+  EXPECT_EQ(certified.files.at(MeshFormat::kDrc).sha256, plain.files.at(MeshFormat::kDrc).sha256);
+  EXPECT_GE(certified.certificate->max_mm, 0.9 * plain.displacement_mm.max / 2);
+  EXPECT_TRUE(certified.quality.self_intersections);
+}
+
+TEST_F(ErrorJobsTest, TellTheStagesApart) {
+  JobParameters parameters = parameters_of(volume_, 0);
+  parameters.max_error_mm = 0.1;
+  parameters.certify = true;
+  std::vector<Stage> stages;
+  const Report note = [&](Stage stage, double, const Timing&) {
+    if (stages.empty() || stages.back() != stage) stages.push_back(stage);
+  };
+  const Timing timing = run_pipeline(volume_, parameters, {}, blobs_, process_, {}, note).timing;
+  EXPECT_THAT(stages,
+              testing::ElementsAre(Stage::kLoad, Stage::kExtract, Stage::kSmooth, Stage::kSimplify,
+                                   Stage::kEncode, Stage::kCertify, Stage::kEncode));
+  EXPECT_GT(timing.simplify, 0);
+  EXPECT_GT(timing.certify, 0);
+}
+
+TEST_F(ErrorJobsTest, FillCavitiesAndKeepPartsAtAPlace) {
+  JobParameters parameters = parameters_of(volume_, 0);
+  const MeshSummary all = run(parameters);
+  ASSERT_EQ(all.components, 3U);
+  parameters.fill_cavities = true;
+  const MeshSummary solid = run(parameters);
+  EXPECT_EQ(solid.components, 2U);
+  EXPECT_EQ(solid.dropped.components, 1U);
+  EXPECT_GT(solid.volume_mm3.smoothed, all.volume_mm3.smoothed + 200);
+  parameters.components.nearest_to = {{22, 10, 10}};
+  const MeshSummary speck = run(parameters);
+  EXPECT_EQ(speck.components, 1U);
+  EXPECT_EQ(speck.dropped.components, 2U);
+  EXPECT_GT(speck.bounds[0][0], 18);
+}
+
+TEST_F(ErrorJobsTest, CropToABoxWithCapsInIt) {
+  JobParameters parameters = parameters_of(volume_, 0);
+  const Box box = {{{4.9, -5, 3}, {14.2, 100, 10}}};
+  parameters.crop = box;
+  parameters.close = true;
+  const MeshSummary mesh = run(parameters);
+  EXPECT_TRUE(mesh.quality.closed);
+  // On the last samples in the box.
+  EXPECT_NEAR(mesh.bounds[0][0], 5, 1e-5);
+  EXPECT_NEAR(mesh.bounds[1][0], 14, 1e-5);
+  EXPECT_NEAR(mesh.bounds[0][2], 3, 1e-5);
+  EXPECT_NEAR(mesh.bounds[1][2], 10, 1e-5);
+}
+
+TEST_F(ErrorJobsTest, SayThatThereIsNoSurface) {
+  JobParameters parameters = parameters_of(volume_, 1000);
+  parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl, MeshFormat::kGlb, MeshFormat::k3mf};
+  EXPECT_TRUE(run(parameters).empty);
+  parameters.max_error_mm = 0.1;
+  parameters.certify = true;
+  const MeshSummary mesh = run(parameters);
+  EXPECT_TRUE(mesh.empty);
+  EXPECT_EQ(mesh.iso, 1000);
+  EXPECT_EQ(mesh.certificate->max_mm, 0);
+  EXPECT_EQ(mesh.certificate->from_mesh.points, 0U);
+}
+
+TEST_F(ErrorJobsTest, OfLabelsAreWithinTheErrorInEveryFile) {
+  const Volume labels = add(test::sample<std::uint8_t>(
+                                [](const test::Point& p) {
+                                  return p[0] < 9 ? (p[1] < 8 ? 1.0 : 2.0) : (p[2] < 7 ? 3.0 : 0);
+                                },
+                                {20, 20, 20}),
+                            SampleType::kUint8);
+  JobParameters parameters = label_parameters({});
+  parameters.volume = labels.id;
+  parameters.close = true;
+  parameters.formats = {MeshFormat::kGlb, MeshFormat::kStl, MeshFormat::k3mf};
+  parameters.max_error_mm = 0.2;
+  parameters.certify = true;
+  const MeshSummary mesh = run_pipeline(labels, parameters, {}, blobs_, process_, {}, kSilent).mesh;
+  EXPECT_LE(mesh.certificate->max_mm, 0.2);
+  EXPECT_GT(mesh.certificate->max_mm, 0);
+  EXPECT_LT(mesh.triangles, mesh.simplified->triangles_before / 2);
+  ASSERT_EQ(mesh.labels.size(), 3U);
+  for (const LabelSummary& label : mesh.labels) {
+    EXPECT_TRUE(label.closed && label.manifold && label.oriented) << label.label;
+  }
+}
+
+TEST_F(ErrorJobsTest, AreCancelledAndRefusedAsOthersAre) {
+  JobParameters parameters = parameters_of(volume_, 0);
+  parameters.max_error_mm = 0.1;
+  parameters.certify = true;
+  for (const Stage at : {Stage::kSimplify, Stage::kCertify}) {
+    std::stop_source stop;
+    const Report stop_there = [&](Stage stage, double, const Timing&) {
+      if (stage == at) stop.request_stop();
+    };
+    EXPECT_EQ(test::code_thrown_by([&] {
+                run_pipeline(volume_, parameters, {}, blobs_, process_, stop.get_token(),
+                             stop_there);
+              }),
+              ErrorCode::kCancelled);
+  }
+  const PipelineLimits few = {.memory_bytes = 3'000'000};
+  EXPECT_EQ(test::code_thrown_by(
+                [&] { run_pipeline(volume_, parameters, few, blobs_, process_, {}, kSilent); }),
+            ErrorCode::kTooLarge);
+}
+
+}  // namespace
+}  // namespace isomesh::jobs

@@ -1,0 +1,142 @@
+#include "server/mesh/cavities.h"
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/mesh/measure.h"
+#include "server/mesh/topology.h"
+#include "tests/support/errors.h"
+#include "tests/support/kernels.h"
+#include "tests/support/mesh_checks.h"
+#include "tests/support/shapes.h"
+
+namespace isomesh::mesh {
+namespace {
+
+using test::Point;
+
+// Balls within each other around one place: solid, hollow, solid, hollow.
+test::Field onion(const Point& centre) {
+  return [centre](const Point& point) {
+    const double radius = 13.2 - test::sphere(centre, 13.2)(point);
+    return std::max(std::min(13.2 - radius, radius - 9.1), std::min(6.3 - radius, radius - 3.2));
+  };
+}
+
+Mesh extracted(const test::SampleVolume<float>& volume, bool close) {
+  return test::extracted(volume, {0, Scheme::kSix, Interpolation::kLinear, close});
+}
+
+TEST(Cavities, LeaveTheOutermostShell) {
+  Mesh mesh = extracted(test::sample<float>(onion({15, 15, 15}), {31, 31, 31}), false);
+  Mesh ball = extracted(test::sample<float>(test::sphere({15, 15, 15}, 13.2), {31, 31, 31}), false);
+  ASSERT_EQ(measure_topology(mesh, {}).components, 4U);
+  const std::uint64_t before = mesh.triangles.size();
+  const Dropped dropped = fill_cavities({}, mesh);
+  EXPECT_EQ(dropped.components, 3U);
+  EXPECT_EQ(dropped.triangles, before - mesh.triangles.size());
+  EXPECT_EQ(measure_topology(mesh, {}).components, 1U);
+  EXPECT_NEAR(measure_extent(mesh, {}).volume_mm3, measure_extent(ball, {}).volume_mm3, 1e-3);
+}
+
+// The wall of a hollow that the border of the volume cuts open is no cavity's.
+TEST(Cavities, LeaveWhatIsOpen) {
+  const auto volume = test::sample<float>(onion({15, 15, 0}), {31, 31, 31});
+  Mesh open = extracted(volume, false);
+  EXPECT_EQ(fill_cavities({}, open).components, 0U);
+  EXPECT_EQ(measure_topology(open, {}).components, 4U);
+  // Closed, it is two shells, each with an opening to nowhere.
+  Mesh closed = extracted(volume, true);
+  const std::uint64_t components = measure_topology(closed, {}).components;
+  EXPECT_EQ(fill_cavities({}, closed).components, 0U);
+  EXPECT_EQ(measure_topology(closed, {}).components, components);
+}
+
+// Which samples are outside and joined to the border by edges of the lattice between outside
+// samples: brute force, without any mesh.
+std::vector<bool> open_air(const test::SampleVolume<float>& volume) {
+  const auto [nx, ny, nz] = volume.dims;
+  std::vector<bool> is_open(volume.samples.size(), false);
+  std::vector<std::array<std::int64_t, 3>> rest;
+  const auto visit = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+    if (x < 0 || y < 0 || z < 0 || x >= nx || y >= ny || z >= nz) return;
+    const auto at = static_cast<std::size_t>((z * ny + y) * nx + x);
+    if (is_open[at] || volume.samples[at] >= 0) return;
+    is_open[at] = true;
+    rest.push_back({x, y, z});
+  };
+  for (std::int64_t z = 0; z < nz; ++z) {
+    for (std::int64_t y = 0; y < ny; ++y) {
+      for (std::int64_t x = 0; x < nx; ++x) {
+        const bool is_border =
+            x == 0 || y == 0 || z == 0 || x == nx - 1 || y == ny - 1 || z == nz - 1;
+        if (is_border) visit(x, y, z);
+      }
+    }
+  }
+  while (!rest.empty()) {
+    const auto [x, y, z] = rest.back();
+    rest.pop_back();
+    for (int edge = 1; edge < 8; ++edge) {  // the seven of the six-way split
+      const int i = edge & 1;
+      const int j = edge >> 1 & 1;
+      const int k = edge >> 2 & 1;
+      visit(x + i, y + j, z + k);
+      visit(x - i, y - j, z - k);
+    }
+  }
+  return is_open;
+}
+
+TEST(Cavities, AreWhatIsOutsideAndNotJoinedToTheBorder) {
+  for (const double outside : {0.2, 0.3, 0.4}) {
+    auto volume = test::noise_between<float>(-outside, 1 - outside, {23, 25, 27}, 11);
+    Mesh mesh = extracted(volume, true);
+    const Dropped dropped = fill_cavities({}, mesh);
+    EXPECT_GT(dropped.components, 3U);
+    const std::vector<bool> is_open = open_air(volume);
+    for (std::size_t n = 0; n < is_open.size(); ++n) {
+      if (!is_open[n]) volume.samples[n] = std::max(volume.samples[n], 0.0F);
+    }
+    const Mesh solid = extracted(volume, true);
+    EXPECT_EQ(mesh.triangles.size(), solid.triangles.size());
+    EXPECT_EQ(measure_topology(mesh, {}), measure_topology(solid, {}));
+    EXPECT_NEAR(measure_extent(mesh, {}).volume_mm3, measure_extent(solid, {}).volume_mm3,
+                1e-3 * measure_extent(solid, {}).volume_mm3);
+    EXPECT_TRUE(test::is_sound(test::surface_of(mesh)));
+  }
+}
+
+TEST(Cavities, AreTheSameOnAnyNumberOfThreads) {
+  const auto volume = test::noise_between<float>(-0.3, 0.7, {23, 25, 70}, 12);
+  std::vector<Mesh> meshes;
+  for (const int threads : {1, 2, 5}) {
+    const test::ThreadCount on(threads);
+    fill_cavities({}, meshes.emplace_back(extracted(volume, true)));
+  }
+  EXPECT_TRUE(test::same_bytes(meshes[0], meshes[1]));
+  EXPECT_TRUE(test::same_bytes(meshes[0], meshes[2]));
+}
+
+TEST(Cavities, OfNothingAreNone) {
+  Mesh mesh = test::mesh_of({}, {});
+  EXPECT_EQ(fill_cavities({}, mesh).components, 0U);
+}
+
+TEST(Cavities, StopWhenTheyAreCancelledAndLeaveTheMesh) {
+  std::stop_source stop;
+  stop.request_stop();
+  Mesh mesh = extracted(test::sample<float>(onion({15, 15, 15}), {31, 31, 31}), false);
+  const std::size_t before = mesh.triangles.size();
+  EXPECT_EQ(test::code_thrown_by([&] {
+              fill_cavities({stop.get_token(), nullptr}, mesh);
+            }),
+            ErrorCode::kCancelled);
+  EXPECT_EQ(mesh.triangles.size(), before);
+}
+
+}  // namespace
+}  // namespace isomesh::mesh

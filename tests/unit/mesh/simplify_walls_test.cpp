@@ -1,0 +1,84 @@
+// Simplified walls between labels.
+#include <cstdint>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/mesh/distance.h"
+#include "server/mesh/label_surface.h"
+#include "server/mesh/simplify.h"
+#include "server/mesh/smooth.h"
+#include "tests/unit/mesh/separated.h"
+
+namespace isomesh::mesh {
+namespace {
+
+// Cells of labels, smoothed.
+SeparatingSurface smooth_cells(std::size_t count, const SeparateOptions& options) {
+  SeparatingSurface surface = separated(label_cells(count, {44, 40, 42}, 9, 31), options);
+  smooth({.passes = 5, .lambda = 0.5}, {}, surface.mesh);
+  return surface;
+}
+
+TEST(SimplifyWalls, KeepEveryLabelsSurfaceOfItsKindAndWithinTheError) {
+  constexpr std::size_t kCount = 7;
+  constexpr double kError = 0.15;
+  for (const SeparateOptions& options : all_separations(consecutive<std::int64_t>(1, kCount - 1))) {
+    const SeparatingSurface original = smooth_cells(kCount, options);
+    SeparatingSurface surface = smooth_cells(kCount, options);
+    const SimplificationEffect effect = simplify({.max_error_mm = kError}, {}, surface);
+    EXPECT_LT(effect.triangles_after, effect.triangles_before / 2);
+    ASSERT_EQ(surface.sides.size(), surface.mesh.triangles.size());
+    EXPECT_LE(certify(surface.mesh, original.mesh, {}).max_mm(), kError);
+    for (std::size_t number = 1; number < kCount; ++number) {
+      const Mesh before = label_mesh(original, number);
+      const Mesh after = label_mesh(surface, number);
+      EXPECT_EQ(measure_topology(after, {}), measure_topology(before, {})) << number;
+      EXPECT_TRUE(test::is_sound(test::surface_of(after))) << number;
+      EXPECT_LT(after.triangles.size(), before.triangles.size()) << number;
+      EXPECT_LE(certify(after, before, {}).max_mm(), kError) << number;
+    }
+  }
+}
+
+// A value that belongs to two labels: walls between what overlaps and what does not.
+TEST(SimplifyWalls, KeepLabelsThatOverlap) {
+  SeparateOptions options = {.labels = {1, 2, 3}, .close = true};
+  options.values = {{2, {2, 4}}, {3, {3, 4, 5}}};
+  const SeparatingSurface original = smooth_cells(6, options);
+  SeparatingSurface surface = smooth_cells(6, options);
+  simplify({.max_error_mm = 0.2}, {}, surface);
+  EXPECT_LT(surface.mesh.triangles.size(), original.mesh.triangles.size() / 2);
+  for (std::size_t number = 1; number <= options.labels.size(); ++number) {
+    const Mesh before = label_mesh(original, number);
+    const Mesh after = label_mesh(surface, number);
+    EXPECT_EQ(measure_topology(after, {}), measure_topology(before, {})) << number;
+    EXPECT_TRUE(test::is_sound(test::surface_of(after))) << number;
+  }
+}
+
+TEST(SimplifyWalls, ReachANumberOfTriangles) {
+  const SeparateOptions options = {.labels = {1, 2, 3}, .close = true};
+  SeparatingSurface surface = smooth_cells(4, options);
+  const std::uint64_t aim = surface.mesh.triangles.size() / 3;
+  const SimplificationEffect effect = simplify({.triangles = aim}, {}, surface);
+  EXPECT_TRUE(effect.reached_triangles);
+  EXPECT_LE(surface.mesh.triangles.size(), aim);
+  EXPECT_EQ(surface.sides.size(), surface.mesh.triangles.size());
+}
+
+TEST(SimplifyWalls, AreTheSameOnAnyNumberOfThreads) {
+  const SeparateOptions options = {.labels = {1, 2, 3}, .close = true};
+  std::vector<SeparatingSurface> surfaces;
+  for (const int threads : {1, 2, 5}) {
+    const test::ThreadCount on(threads);
+    simplify({.max_error_mm = 0.1}, {}, surfaces.emplace_back(smooth_cells(4, options)));
+  }
+  for (const SeparatingSurface& other : surfaces) {
+    EXPECT_TRUE(test::same_bytes(surfaces[0].mesh, other.mesh));
+    EXPECT_TRUE(std::ranges::equal(surfaces[0].sides.span(), other.sides.span()));
+  }
+}
+
+}  // namespace
+}  // namespace isomesh::mesh

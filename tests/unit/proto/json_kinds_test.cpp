@@ -1,0 +1,120 @@
+// What only some kinds of jobs tell: those by labels, and those whose error is bound or measured.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "proto/json.h"
+#include "tests/unit/proto/answers.h"
+
+namespace isomesh {
+namespace {
+
+using nlohmann::json;
+using test::succeeded_job;
+
+TEST(JobJson, TellsOfLabelsOnlyWhereThereAreSome) {
+  Job job = succeeded_job();
+  const std::string by_iso = to_json(job);
+  for (const char* member : {"labels", "background", "label_names"}) {
+    EXPECT_EQ(by_iso.find(member), std::string::npos) << member;
+  }
+  static_cast<MeshParameters&>(job.parameters) = label_parameters({{3}});
+  job.parameters.label_names = {{3, "Liver"}};
+  job.parameters.label_values = {{3, {3, 9}}};
+  job.mesh->labels = {
+      {.label = 3,
+       .name = "Liver",
+       .color = "#112233",
+       .voxels = 7,
+       .voxels_mm3 = 3.5,
+       .triangles = 40,
+       .vertices = 22,
+       .closed = true,
+       .manifold = true,
+       .oriented = true,
+       .components = 1,
+       .area_mm2 = 12.5,
+       .volume_mm3 = 3.25,
+       .files = {{MeshFormat::kStl, {.bytes = 9, .sha256 = "aa", .offset = 4, .href = "/x"}}}}};
+  const std::string text = to_json(job);
+  EXPECT_EQ(text.find("\"iso\""), std::string::npos);
+  EXPECT_EQ(text.find("interpolation"), std::string::npos);
+  Job read = job_from_json(text);
+  read.parameters.interpolation = job.parameters.interpolation;
+  EXPECT_EQ(read, job);
+  read = job_from_record(text);
+  read.parameters.interpolation = job.parameters.interpolation;
+  EXPECT_EQ(read, job);
+}
+
+// --- The error -----------------------------------------------------------------------------------
+
+Job certified_job() {
+  Job job = succeeded_job();
+  job.parameters.max_error_mm = 0.1;
+  job.parameters.triangles = 200000;
+  job.parameters.lods = {1, 0.25};
+  job.parameters.crop = Box{{{-1, -2, -3}, {4, 5, 6.5}}};
+  job.parameters.fill_cavities = true;
+  job.parameters.distances = true;
+  job.parameters.components.nearest_to = {{1, 2, 3}, {4, 5, 6}};
+  job.parameters.certify = true;
+  MeshSummary& mesh = *job.mesh;
+  mesh.iso = 61.5;
+  mesh.empty = true;
+  mesh.simplified = {.triangles_before = 7, .bound_by = Simplification::Bound::kTriangles};
+  mesh.quality.encloses_volume = true;
+  mesh.quality.self_intersections = {.pairs = 3, .triangles = 5, .places = {{1, 2, 3}}};
+  mesh.certificate.emplace();
+  mesh.certificate->file = MeshFormat::k3mf;
+  mesh.certificate->max_mm = 0.09;
+  mesh.certificate->from_mesh = {
+      .points = 9, .max_mm = 0.08, .mean_mm = 0.01, .rms_mm = 0.02, .p99_mm = 0.07};
+  mesh.certificate->from_extracted.histogram.back() = 9;
+  mesh.certificate->budget_mm = {.smoothing = 0.05, .quantisation = 0.01, .simplification = 0.04};
+  return job;
+}
+
+TEST(JobJson, TellsOfTheErrorAsTheContractDoes) {
+  const json job = json::parse(to_json(certified_job()));
+  const json& parameters = job["parameters"];
+  EXPECT_EQ(parameters["max_error_mm"], 0.1);
+  EXPECT_EQ(parameters["triangles"], 200000);
+  EXPECT_EQ(parameters["lods"], json::parse("[1, 0.25]"));
+  EXPECT_EQ(parameters["crop"], json::parse("[[-1, -2, -3], [4, 5, 6.5]]"));
+  EXPECT_EQ(parameters["fill_cavities"], true);
+  EXPECT_EQ(parameters["distances"], true);
+  EXPECT_EQ(parameters["components"]["nearest_to"], json::parse("[[1, 2, 3], [4, 5, 6]]"));
+  EXPECT_EQ(parameters["certify"], true);
+  const json& mesh = job["mesh"];
+  EXPECT_EQ(mesh["iso"], 61.5);
+  EXPECT_EQ(mesh["empty"], true);
+  EXPECT_EQ(mesh["simplified"], json::parse(R"({"triangles_before": 7, "bound_by": "triangles"})"));
+  EXPECT_EQ(mesh["quality"]["self_intersections"],
+            json::parse(R"({"pairs": 3, "triangles": 5, "places": [[1, 2, 3]]})"));
+  EXPECT_EQ(mesh["certificate"]["file"], "3mf");
+  EXPECT_EQ(mesh["certificate"]["max_mm"], 0.09);
+  EXPECT_EQ(mesh["certificate"]["from_mesh"]["p99_mm"], 0.07);
+  EXPECT_EQ(mesh["certificate"]["budget_mm"],
+            json::parse(R"({"smoothing": 0.05, "simplification": 0.04, "quantisation": 0.01})"));
+}
+
+TEST(JobJson, OfTheErrorComesBackTheSame) {
+  EXPECT_EQ(job_from_json(to_json(certified_job())), certified_job());
+}
+
+TEST(JobJson, TellsOfTheErrorOnlyWhereThereIsSomething) {
+  const json job = json::parse(to_json(succeeded_job()));
+  for (const char* const name :
+       {"max_error_mm", "triangles", "lods", "crop", "fill_cavities", "distances", "certify"}) {
+    EXPECT_FALSE(job["parameters"].contains(name)) << name;
+  }
+  EXPECT_FALSE(job["parameters"]["components"].contains("nearest_to"));
+  for (const char* const name : {"iso", "simplified", "certificate"}) {
+    EXPECT_FALSE(job["mesh"].contains(name)) << name;
+  }
+  EXPECT_FALSE(job["mesh"]["quality"].contains("self_intersections"));
+}
+
+}  // namespace
+}  // namespace isomesh

@@ -1,0 +1,191 @@
+// The error of a surface: asked for by a slider, measured, shown in numbers and as colour.
+import type { Page } from 'playwright-core';
+import { beforeAll, describe, expect, it } from 'vitest';
+import { ballNrrd, ballsNrrd, hues, openedJob, setup, silhouette, still, surfaceLoaded, type JobAnswer } from './support';
+
+const at = setup();
+let ball: string;
+
+beforeAll(async () => {
+  ball = await at.daemon.upload(ballNrrd(48, 18));
+});
+
+async function open(page: Page, path: string): Promise<void> {
+  await page.goto(`${at.daemon.url}/#/${path}`);
+}
+
+async function openJob(page: Page, job: JobAnswer): Promise<void> {
+  expect(job.state).toBe('succeeded');
+  await open(page, `jobs/${job.id}`);
+  await surfaceLoaded(page);
+}
+
+describe('the largest error', () => {
+  it('is chosen by a slider, said beside the spacing and in the address, and measured', async () => {
+    const { page } = at;
+    await open(page, `volumes/${ball}?iso=100`);
+    const slider = page.getByRole('slider', { name: 'Largest error' });
+    expect(await slider.getAttribute('aria-valuetext')).toBe('off');
+    const certify = page.getByLabel('Measure the error');
+    expect(await certify.isChecked()).toBe(false);
+    await slider.focus();
+    await page.keyboard.press('End');
+    expect(await slider.getAttribute('aria-valuetext')).toBe('2 mm, 2 of the spacing of 1 mm');
+    await slider.fill('22');
+    expect(await slider.getAttribute('aria-valuetext')).toBe('0.1 mm, 0.1 of the spacing of 1 mm');
+    expect([await certify.isChecked(), await certify.isDisabled()]).toEqual([true, true]);
+    await expect.poll(() => page.url()).toContain('max_error_mm=0.1');
+    await page.getByRole('button', { name: 'Make the surface' }).click();
+    await page.waitForURL(/#\/jobs\//);
+    await surfaceLoaded(page);
+    expect((await openedJob(at)).parameters).toMatchObject({ max_error_mm: 0.1, certify: true });
+    const panel = page.getByLabel('The job');
+    await expect.poll(() => panel.innerText()).toMatch(/0\.0\d+ mm of 0\.1 mm allowed/);
+    const text = await panel.innerText();
+    expect(text).toMatch(/simplified from \d/);
+    expect(text).toMatch(/Of 0\.1 mm: smoothing 0\.0\d+, fewer triangles 0\.0\d+, rounding/);
+    expect(text).toMatch(/Run through themselves\s+none/);
+    expect(text).toMatch(/simplify\s/);
+    expect(await page.locator('.both-ways td').count()).toBe(6);
+    expect(await page.locator('.distances path').count()).toBe(2);
+  });
+});
+
+describe('distances', () => {
+  it('are colours with a legend, and a number below the pointer', async () => {
+    const { daemon, page } = at;
+    const job = await daemon.submit(
+      { volume: ball, iso: 100, passes: 20, formats: ['glb'], certify: true, distances: true },
+      30,
+    );
+    await openJob(page, job);
+    const legend = page.getByRole('group', { name: 'Distance from the scan' }).first();
+    await legend.waitFor();
+    expect(await legend.innerText()).toMatch(/0\s+[\d.]+\s+[\d.]+ mm or more/);
+    const view = page.locator('.viewport');
+    const coloured = await silhouette(page, view);
+    await legend.getByRole('radio', { name: 'Largest' }).check({ force: true });
+    const largest = (await legend.locator('.legend-ends').innerText()).split(/\s+/);
+    const certified = job.mesh?.certificate?.from_mesh.max_mm ?? NaN;
+    expect(Number(largest.at(-2))).toBeGreaterThan(0.5 * certified);
+    expect(Number(largest.at(-2))).toBeLessThan(1.1 * certified);
+    await still(page);
+
+    const box = await view.boundingBox();
+    if (!box) throw new Error('there is no view');
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await expect.poll(() => page.locator('.legend-value').innerText()).toMatch(/^[<\d. ]+ mm here$/);
+    const here = parseFloat((await page.locator('.legend-value').innerText()).replace('<', ''));
+    expect(here).toBeLessThanOrEqual(Number(largest.at(-2)) + 0.001);
+    await page.mouse.move(box.x + 5, box.y + box.height / 2);
+    await expect.poll(() => page.locator('.legend-value').innerText()).toBe('');
+
+    await page.keyboard.press('d');
+    await still(page);
+    expect(await legend.isVisible()).toBe(false);
+    const plain = await hues(page, view);
+    expect([plain.blue, plain.green].every((count) => count < 200)).toBe(true);
+    const after = await silhouette(page, view);
+    expect(after.filling).toBeCloseTo(coloured.filling, 1);
+    expect(coloured.colours).toBeGreaterThan(after.colours);
+  });
+
+  it('are offered where an error was measured without them', async () => {
+    const { daemon, page } = at;
+    await openJob(page, await daemon.submit({ volume: ball, iso: 100, passes: 3, formats: ['glb'], certify: true }, 30));
+    expect(await page.getByRole('button', { name: 'Distance', exact: true }).isVisible()).toBe(false);
+    const before = page.url();
+    await page.getByRole('button', { name: 'Show it as colour' }).click();
+    await expect.poll(() => page.url()).not.toBe(before);
+    await surfaceLoaded(page);
+    await page.locator('.legend').waitFor();
+    expect((await openedJob(at)).parameters).toMatchObject({ distances: true, certify: true });
+  });
+});
+
+describe('a surface that is not what was meant', () => {
+  it('says why it is empty and what to do', async () => {
+    const { daemon, page } = at;
+    const { id } = await daemon.submit({ volume: ball, iso: 254.5, formats: ['glb'] }, 30);
+    await open(page, `jobs/${id}`);
+    const overlay = page.locator('.overlay.message');
+    await expect.poll(() => overlay.innerText()).toContain('There is no surface at the iso-value 254.5: the volume\u2019s'.replace('\u2019', "'"));
+    await overlay.getByRole('link', { name: 'Change parameters' }).click();
+    await page.waitForURL(/#\/volumes\//);
+  });
+
+  it('has no volume while it is open, and is closed by a link', async () => {
+    const { daemon, page } = at;
+    const cut = await daemon.upload(ballNrrd(24, 14));
+    await openJob(page, await daemon.submit({ volume: cut, iso: 100, formats: ['glb'] }, 30));
+    const panel = page.getByLabel('The job');
+    expect(await panel.innerText()).toMatch(/Volume\s+none: the surface is open/);
+    const before = page.url();
+    await panel.getByRole('button', { name: 'Close it' }).click();
+    await expect.poll(() => page.url()).not.toBe(before);
+    await surfaceLoaded(page);
+    await expect.poll(() => panel.innerText()).toMatch(/Volume\s+[\d\u202f]+ mm\u00b3/);
+    expect((await openedJob(at)).parameters).toMatchObject({ close: true });
+  });
+
+  it('keeps the part alone that is clicked', async () => {
+    const { daemon, page } = at;
+    const two = await daemon.upload(ballsNrrd(48));
+    const job = await daemon.submit({ volume: two, iso: 100, formats: ['glb'] }, 30);
+    await openJob(page, job);
+    await page.keyboard.press('a');
+    await still(page);
+    const box = await page.locator('.viewport canvas').boundingBox();
+    if (!box) throw new Error('there is no view');
+    await page.mouse.click(box.x + 4, box.y + box.height / 2);
+    expect(await page.locator('.picked-part').isVisible()).toBe(false);
+    // From the front the patient's left, where x grows, is on the right: the smaller ball.
+    const disc = await page.locator('.viewport').boundingBox();
+    if (!disc) throw new Error('there is no view');
+    const seen = await silhouette(page, page.locator('.viewport'));
+    await page.mouse.click(box.x + box.width * (0.5 + 0.4 * seen.width), box.y + box.height / 2);
+    await page.getByText('One of 2 parts').waitFor();
+    const before = page.url();
+    await page.getByRole('button', { name: 'Keep only this part' }).click();
+    await expect.poll(() => page.url()).not.toBe(before);
+    // The surface of before stays until the new one is there.
+    await expect.poll(async () => (await openedJob(at)).mesh?.components, { timeout: 30_000 }).toBe(1);
+    const kept = await openedJob(at);
+    const [low] = kept.mesh?.bounds ?? [[0, 0, 0]];
+    expect(low[0]).toBeGreaterThan(24);
+  });
+});
+
+describe('levels of detail', () => {
+  it('show the whole surface before its finest level has come', async () => {
+    const { daemon, page } = at;
+    const job = await daemon.submit({ volume: ball, iso: 100, formats: ['glb'], lods: [1, 0.1] }, 30);
+    const bytes = job.mesh?.files.glb?.bytes ?? 0;
+    // The rest of the file is held back until the first part of it was looked at.
+    let release = (): void => undefined;
+    const held = new Promise<void>((resolve) => (release = resolve));
+    let share = 0.5;
+    await page.route(/mesh\.glb/, async (route) => {
+      const answer = await route.fetch();
+      const body = await answer.body();
+      const from = Number(/bytes=(\d+)-/.exec(route.request().headers().range ?? '')?.[1] ?? 0);
+      if (from > 0) await held;
+      const whole = from > 0 ? body : body.subarray(0, Math.floor(share * bytes));
+      await route.fulfill({ response: answer, body: whole, headers: { ...answer.headers(), 'content-length': String(whole.length) } });
+      share = 1;
+    });
+    await open(page, `jobs/${job.id}`);
+    const filling = async (): Promise<number> => {
+      // The bar of the progress is in the same view.
+      await page.evaluate(() => {
+        for (const load of document.querySelectorAll<HTMLElement>('.load')) load.style.visibility = 'hidden';
+      });
+      return (await silhouette(page, page.locator('.viewport'))).filling;
+    };
+    await expect.poll(filling).toBeGreaterThan(Math.PI / 4 - 0.06);
+    expect(await page.locator('.pane[data-loaded]').count()).toBe(0);
+    release();
+    await surfaceLoaded(page);
+    expect((await silhouette(page, page.locator('.viewport'))).filling).toBeGreaterThan(Math.PI / 4 - 0.03);
+  });
+});

@@ -1,0 +1,118 @@
+// The surface beside the slices, which follows the iso-value.
+import type { Page } from 'playwright-core';
+import { beforeAll, describe, expect, it } from 'vitest';
+import { ballNrrd, contourPixels, labelsNrrd, noted, setup, silhouette } from './support';
+
+const at = setup();
+let ball: string;
+
+beforeAll(async () => {
+  ball = await at.daemon.upload(ballNrrd(80, 30));
+});
+
+async function open(page: Page, query: string): Promise<void> {
+  await page.goto('about:blank');
+  await page.goto(`${at.daemon.url}/#/volumes/${ball}?${query}`);
+  await rested(page);
+}
+
+// Waits until it is drawn as it is to be seen.
+async function rested(page: Page): Promise<void> {
+  await expect.poll(() => page.locator('.live[data-size="80"] .live-picture[data-still]').count()).toBe(1);
+}
+
+// The disc's area, in parts of the cell.
+async function area(page: Page): Promise<number> {
+  return (await silhouette(page, page.locator('.live-picture'))).part;
+}
+
+// That were drawn until now.
+function pictures(page: Page): Promise<number> {
+  return page
+    .locator('.live')
+    .evaluate(({ dataset: { moving = 0, resting = 0 } }) => Number(moving) + Number(resting));
+}
+
+describe('the surface beside the slices', () => {
+  it('is there before a job is made, and follows the line in the histogram', async () => {
+    const { page } = at;
+    const asked: string[] = [];
+    await open(page, 'iso=60');
+    const large = await area(page);
+    expect(large).toBeGreaterThan(0.05);
+    page.on('request', (request) => asked.push(new URL(request.url()).pathname));
+    const line = await page.locator('.histogram').boundingBox();
+    if (!line) throw new Error('the histogram is not shown');
+    const before = await pictures(page);
+    await page.mouse.move(line.x + 0.3 * line.width, line.y + 30);
+    await page.mouse.down();
+    for (let step = 1; step <= 20; step += 1) {
+      await page.mouse.move(line.x + (0.3 + 0.03 * step) * line.width, line.y + 30);
+      await page.waitForTimeout(30);
+    }
+    await expect.poll(() => pictures(page)).toBeGreaterThan(before + 2);
+    await page.mouse.up();
+    await rested(page);
+    const iso = Number(noted(page, 'iso'));
+    expect(iso).toBeGreaterThan(150);
+    // A ball's samples fall by 8 a millimetre.
+    const radius = (value: number): number => 30 - (value - 100) / 8;
+    const part = (await area(page)) / large;
+    expect(part / (radius(iso) / radius(60)) ** 2).toBeGreaterThan(0.85);
+    expect(part / (radius(iso) / radius(60)) ** 2).toBeLessThan(1.15);
+    // Nothing but the estimate is asked for on the way.
+    expect(asked.filter((path) => path.startsWith('/v1/') && path !== '/v1/estimate')).toEqual([]);
+    expect(await page.locator('.live').getAttribute('data-iso')).toBe(String(iso));
+  });
+
+  it('is turned by keys and by the pointer, and sends the slices to where it is clicked', async () => {
+    const { page } = at;
+    await open(page, 'iso=100&at=2,3,4');
+    const canvas = page.locator('.live canvas');
+    const box = await canvas.boundingBox();
+    if (!box) throw new Error('there is no canvas');
+    await canvas.click({ position: { x: box.width / 2, y: box.height / 2 } });
+    await expect.poll(() => noted(page, 'at')).not.toBe('2,3,4');
+    const place = noted(page, 'at').split(',').map(Number);
+    // On the ball, on the side that is seen: from the front and the patient's left.
+    expect(Math.hypot(...place.map((value) => value - 39.5))).toBeGreaterThan(28);
+    expect(Math.hypot(...place.map((value) => value - 39.5))).toBeLessThan(32);
+    expect(place[1]).toBeLessThan(30);
+    const before = await pictures(page);
+    await canvas.press('ArrowRight');
+    await expect.poll(() => pictures(page)).toBeGreaterThan(before);
+    await rested(page);
+    await page.mouse.move(box.x + 100, box.y + 100);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 160, box.y + 100, { steps: 3 });
+    await page.mouse.up();
+    await rested(page);
+    // Seen from another side by now.
+    await canvas.click({ position: { x: box.width / 2, y: box.height / 2 } });
+    await expect.poll(() => noted(page, 'at')).not.toBe(place.join(','));
+  });
+
+  it('says why there is none', async () => {
+    const { page, daemon } = at;
+    await open(page, 'iso=100');
+    await page.getByLabel('Iso-value', { exact: true }).nth(0).fill('9999');
+    await expect.poll(() => page.locator('.live .slice-state').innerText()).toMatch(/No sample/);
+    expect(await page.locator('.live-picture').isVisible()).toBe(false);
+    await page.getByLabel('Iso-value', { exact: true }).nth(0).fill('100');
+    await expect.poll(() => page.locator('.live-picture').isVisible()).toBe(true);
+    const labels = await daemon.upload(labelsNrrd(24));
+    await page.goto(`${daemon.url}/#/volumes/${labels}`);
+    await expect.poll(() => page.locator('.live .slice-state').innerText()).toMatch(/iso-values only/);
+  });
+
+  it('comes when the daemon has it again', async () => {
+    const { page } = at;
+    await page.route('**/preview?*', (route) => route.fulfill({ status: 503, body: '' }));
+    await page.goto(`${at.daemon.url}/#/volumes/${ball}?iso=100`);
+    await expect.poll(() => page.locator('.live .slice-state').innerText()).toMatch(/could not be loaded/);
+    await expect.poll(() => contourPixels(page, 'axial')).toBeGreaterThan(50);
+    await page.unroute('**/preview?*');
+    await rested(page);
+    expect(await page.locator('.live .slice-state').innerText()).toBe('');
+  });
+});

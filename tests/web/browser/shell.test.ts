@@ -1,0 +1,136 @@
+// What is around the views: notes, titles, keys, contrast, the token.
+import { readFileSync } from 'node:fs';
+import { beforeAll, describe, expect, it } from 'vitest';
+import { ballNrrd, noted, openPage, pixelsOf, setup, settled, still, surfaceLoaded, withTokens } from './support';
+
+const at = setup();
+let ball: string;
+let job: string;
+
+beforeAll(async () => {
+  ball = await at.daemon.upload(ballNrrd(48, 18));
+  job = (await at.daemon.submit({ volume: ball, iso: 100, formats: ['glb'] }, 30)).id;
+});
+
+describe('the page', () => {
+  it('tells its tabs apart, has a heading in each view, and leads on where there is nothing', async () => {
+    const { page, daemon } = at;
+    const titles: string[] = [];
+    for (const place of ['', `volumes/${ball}`, `jobs/${job}`, 'jobs', `compare?jobs=${job},${job}`]) {
+      await page.goto(`${daemon.url}/#/${place}`);
+      await expect.poll(() => page.locator('main h1').count()).toBe(1);
+      await expect.poll(() => page.locator('main').getAttribute('aria-busy')).toBeNull();
+      titles.push(await page.title());
+    }
+    expect(new Set(titles).size).toBe(titles.length);
+    expect(titles[2]).toContain('Surface at 100');
+    await page.goto(`${daemon.url}/#/compare`);
+    await page.getByRole('link', { name: 'To the list of jobs' }).click();
+    await page.waitForURL(/#\/jobs$/);
+  });
+
+  it('shows where one is also in colours that a person forces', async () => {
+    const { page, daemon } = at;
+    await page.emulateMedia({ forcedColors: 'active' });
+    await page.goto(`${daemon.url}/#/volumes/${ball}`);
+    await page.locator('.histogram .bars').waitFor();
+    const line = (selector: string): Promise<string> =>
+      page.locator(selector).evaluate((element) => getComputedStyle(element).borderBottomColor);
+    expect(await line('.top nav a[aria-current]')).not.toBe(await line('.top nav a:not([aria-current])'));
+    const [bars, ground] = await page.evaluate(() => [
+      getComputedStyle(document.querySelector('.histogram .bars') as Element).fill,
+      getComputedStyle(document.body).backgroundColor,
+    ]);
+    expect(bars).not.toBe(ground);
+  });
+
+  it('covers no button with its notes, and lets nothing out of its boxes', async () => {
+    const { page, daemon } = at;
+    await page.goto(`${daemon.url}/#/volumes/${ball}?iso=100&formats=glb,drc,stl,ply,obj`);
+    await expect.poll(() => page.locator('.estimate dl').count()).toBe(1);
+    const isIn = await page.locator('.estimate').evaluate((box) => box.scrollWidth <= box.clientWidth);
+    expect(isIn).toBe(true);
+    await page.evaluate(() => document.querySelector('.toasts')?.append(Object.assign(document.createElement('div'), { className: 'toast', textContent: 'A note that is as long as notes are, of two lines or of three' })));
+    const toast = await page.locator('.toast').boundingBox();
+    const run = await page.getByRole('button', { name: 'Make the surface' }).boundingBox();
+    expect((toast?.x ?? 0) + (toast?.width ?? 0)).toBeLessThan(run?.x ?? 0);
+  });
+});
+
+describe('a surface', () => {
+  it('has its keys also while a slider has the focus', async () => {
+    const { page, daemon } = at;
+    await page.goto(`${daemon.url}/#/jobs/${job}`);
+    await surfaceLoaded(page);
+    await page.getByLabel('Opacity').and(page.locator('input')).focus();
+    await page.keyboard.press('a');
+    await expect.poll(async () => Math.abs(Number((await settled(() => noted(page, 'cam'))).split(',')[0]))).toBeLessThan(1);
+  });
+
+  it('is turned when a cut would be seen edge-on', async () => {
+    const { page, daemon } = at;
+    await page.goto(`${daemon.url}/#/jobs/${job}`);
+    await surfaceLoaded(page);
+    await page.keyboard.press('a');
+    const slice = page.waitForResponse(/slice\.png/);
+    await page.keyboard.press('c');
+    await slice;
+    const height = async (): Promise<number> => {
+      const [x = 0, y = 0, z = 0] = (await settled(() => noted(page, 'cam'))).split(',').map(Number);
+      return Math.abs(z) / Math.hypot(x, y, z);
+    };
+    await expect.poll(height).toBeGreaterThan(0.4);
+  });
+
+  it('has its distances in its picture', async () => {
+    const { page, daemon } = at;
+    await page.goto(`${daemon.url}/#/jobs/${job}`);
+    await surfaceLoaded(page);
+    await page.keyboard.press('a');
+    await still(page);
+    await page.keyboard.press('m');
+    const view = await page.locator('.viewport').boundingBox();
+    if (!view) throw new Error('there is no viewport');
+    const middle = { x: view.x + view.width / 2, y: view.y + view.height / 2 };
+    await page.mouse.click(middle.x - 60, middle.y);
+    await page.mouse.click(middle.x + 60, middle.y);
+    await expect.poll(() => page.locator('.ruler-labels span').count()).toBe(1);
+    const download = page.waitForEvent('download');
+    await page.getByRole('button', { name: 'Picture' }).click();
+    const pixels = await pixelsOf(page, readFileSync(await (await download).path()));
+    const label = await pixels.evaluate(({ data }) => {
+      let count = 0;
+      for (let i = 0; i < data.length; i += 4) {
+        if (data[i] === 0x17 && data[i + 1] === 0xa3 && data[i + 2] === 0x98) count += 1;
+      }
+      return count;
+    });
+    // The line alone has some hundred.
+    expect(label).toBeGreaterThan(600);
+  });
+});
+
+describe('the token', () => {
+  it('is asked for again after its dialog was closed', async () => {
+    const { browser } = at;
+    await withTokens(async (guarded, token) => {
+      const { page } = await openPage(browser, guarded.url);
+      await page.goto(guarded.url);
+      await page.locator('dialog').waitFor();
+      await page.keyboard.press('Escape');
+      await page.keyboard.press('Escape');
+      await expect.poll(() => page.locator('dialog').count()).toBe(0);
+      // In the next view, and by the button.
+      await page.getByRole('link', { name: 'Jobs', exact: true }).click();
+      await page.locator('dialog').waitFor();
+      await page.keyboard.press('Escape');
+      await page.getByRole('button', { name: 'Enter a token' }).click();
+      const field = page.getByLabel('Token', { exact: true }).and(page.locator('input'));
+      await field.fill(token);
+      await page.getByRole('button', { name: 'Continue' }).click();
+      await expect.poll(() => page.getByRole('heading', { name: 'Jobs' }).count()).toBe(1);
+      expect(await page.getByRole('button', { name: 'Enter a token' }).isVisible()).toBe(false);
+      await page.close();
+    });
+  });
+});

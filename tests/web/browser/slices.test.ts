@@ -1,0 +1,177 @@
+// Slices and parameters never show or use something else than what is asked for.
+import type { Page } from 'playwright-core';
+import { beforeAll, describe, expect, it } from 'vitest';
+import { ballNrrd, contourPixels, noted, openedJob, setup, tiltedNrrd } from './support';
+
+const at = setup();
+let ball: string;
+
+beforeAll(async () => {
+  ball = await at.daemon.upload(ballNrrd(48, 18));
+});
+
+async function open(page: Page, query = ''): Promise<void> {
+  await page.goto('about:blank');
+  await page.goto(`${at.daemon.url}/#/volumes/${ball}?iso=100${query}`);
+  await expect.poll(() => contourPixels(page, 'axial')).toBeGreaterThan(50);
+}
+
+// Pixels in the middle of a slice that are not black.
+function greyPixels(page: Page, plane: string): Promise<number> {
+  return page.evaluate((name) => {
+    const canvas = document.querySelector<HTMLCanvasElement>(`[data-plane=${name}] canvas`);
+    const edge = 30;
+    const { data } = canvas?.getContext('2d')?.getImageData(edge, edge, canvas.width - 2 * edge, canvas.height - 2 * edge) ?? { data: [] };
+    let count = 0;
+    for (let i = 0; i < data.length; i += 4) if ((data[i] ?? 0) > 40) count += 1;
+    return count;
+  }, plane);
+}
+
+describe('a slice', () => {
+  it('that fails is not another one, and comes by itself later', async () => {
+    const { page } = at;
+    await open(page);
+    expect(await greyPixels(page, 'axial')).toBeGreaterThan(500);
+    await page.route('**/slice.png?axis=z*', (route) => route.abort());
+    await page.locator('[data-plane=axial] canvas').press('PageUp');
+    const state = page.locator('[data-plane=axial] .slice-state');
+    await expect.poll(() => state.innerText()).toBe('Slice 35 could not be loaded');
+    expect(await page.locator('[data-plane=axial] .slice-place').innerText()).toBe('35 / 48');
+    expect(await greyPixels(page, 'axial')).toBe(0);
+    expect(await contourPixels(page, 'axial')).toBe(0);
+    // The others are not touched by it.
+    expect(await greyPixels(page, 'coronal')).toBeGreaterThan(500);
+    await page.unroute('**/slice.png?axis=z*');
+    await expect.poll(() => greyPixels(page, 'axial')).toBeGreaterThan(500);
+    expect(await state.innerText()).toBe('');
+  });
+
+  it('that fails at first comes by itself as well', async () => {
+    const { page } = at;
+    await page.route('**/slice.png?*', (route) => route.fulfill({ status: 503, body: '' }));
+    await page.goto('about:blank');
+    await page.goto(`${at.daemon.url}/#/volumes/${ball}?iso=100`);
+    await expect.poll(() => page.locator('.slice-state', { hasText: 'could not be loaded' }).count()).toBe(3);
+    await page.unroute('**/slice.png?*');
+    await expect.poll(() => contourPixels(page, 'sagittal')).toBeGreaterThan(50);
+  });
+
+  it('is asked for when the one before has come: many moves are few requests', async () => {
+    const { page } = at;
+    await open(page);
+    const asked: string[] = [];
+    await page.route('**/slice.png?axis=z*', async (route) => {
+      asked.push(new URL(route.request().url()).searchParams.get('index') ?? '');
+      await new Promise((resolve) => setTimeout(resolve, 400));
+      await route.continue();
+    });
+    await page.locator('[data-plane=axial] canvas').focus();
+    for (let step = 0; step < 20; step += 1) await page.keyboard.press('ArrowUp');
+    await expect.poll(() => page.locator('[data-plane=axial] .slice-state').innerText()).toBe('');
+    await expect.poll(() => asked.at(-1)).toBe('44');
+    expect(asked.length).toBeLessThan(12);
+    await page.unroute('**/slice.png?axis=z*');
+  });
+
+  it('tells the value under the pointer, which becomes the iso-value', async () => {
+    const { page } = at;
+    await open(page, '&at=24,24,24');
+    const canvas = page.locator('[data-plane=axial] canvas');
+    const box = await canvas.boundingBox();
+    if (!box) throw new Error('there is no slice');
+    // A ball of 18 mm with 100 on its surface, 8 more for each millimetre inwards; 48 mm fill the cell's height.
+    const scale = (Math.min(box.width, box.height) - 28) / 48;
+    const position = { x: box.width / 2 + 13.5 * scale, y: box.height / 2 - 0.5 * scale };
+    await canvas.hover({ position });
+    const text = page.locator('[data-plane=axial] .slice-value');
+    await expect.poll(() => text.innerText()).toMatch(/^(about )?\d+/);
+    const told = Number(/[\d.]+/.exec(await text.innerText())?.[0]);
+    expect(Math.abs(told - 132)).toBeLessThan(12);
+    await canvas.dblclick({ position });
+    await expect.poll(() => noted(page, 'iso')).toBe(String(told));
+    expect(await page.locator('.iso-input').inputValue()).toBe(String(told));
+  });
+
+  it('of a tilted gantry leans as the slices lie', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(tiltedNrrd(40, 18.5));
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=150&window=0,255`);
+    await expect.poll(() => greyPixels(page, 'sagittal')).toBeGreaterThan(500);
+    // Where the grey begins in rows near the top and the bottom.
+    const begins = await page.evaluate(() => {
+      const canvas = document.querySelector<HTMLCanvasElement>('[data-plane=sagittal] canvas');
+      const context = canvas?.getContext('2d');
+      if (!canvas || !context) throw new Error('there is no slice');
+      return [0.15, 0.85].map((part) => {
+        const y = Math.round(part * canvas.height);
+        const { data } = context.getImageData(0, y, canvas.width, 1);
+        for (let x = 15; x < canvas.width; x += 1) if ((data[4 * x] ?? 0) > 60) return { x, y };
+        throw new Error('the row is black');
+      });
+    });
+    const [top, bottom] = begins as [{ x: number; y: number }, { x: number; y: number }];
+    // The front is on the left, and slices further up lie farther back.
+    const degrees = (180 * Math.atan2(top.x - bottom.x, bottom.y - top.y)) / Math.PI;
+    expect(degrees).toBeGreaterThan(17);
+    expect(degrees).toBeLessThan(20);
+    // A click there is a place in the volume, and one beside it none.
+    const canvas = page.locator('[data-plane=sagittal] canvas');
+    const before = noted(page, 'at');
+    await canvas.click({ position: { x: bottom.x + 4, y: bottom.y } });
+    await expect.poll(() => noted(page, 'at')).not.toBe(before);
+    const place = noted(page, 'at');
+    await canvas.click({ position: { x: bottom.x + 4, y: top.y } });
+    await page.waitForTimeout(600);
+    expect(noted(page, 'at')).toBe(place);
+  });
+});
+
+describe('parameters', () => {
+  it('that are no values of theirs make nothing, and say what they have to be', async () => {
+    const { page } = at;
+    await open(page);
+    const passes = page.locator('[data-parameter=passes] input');
+    const run = page.getByRole('button', { name: 'Make the surface' });
+    for (const wrong of ['1001', '2.5', '', '-1']) {
+      await passes.fill(wrong);
+      await expect.poll(() => run.isDisabled()).toBe(true);
+      expect(await page.locator('[data-parameter=passes] .fault').innerText()).toBe(
+        'Enter a whole number, at least 0 and at most 1000.',
+      );
+      await page.keyboard.press('Control+Enter');
+    }
+    expect(page.url()).toContain('#/volumes/');
+    await passes.fill('7');
+    await expect.poll(() => run.isEnabled()).toBe(true);
+    expect(await page.locator('[data-parameter=passes] .fault').isVisible()).toBe(false);
+    await run.click();
+    await page.waitForURL(/#\/jobs\//);
+    expect((await openedJob(at)).parameters['passes']).toBe(7);
+  });
+
+  it('are not carried over to the other smoothing', async () => {
+    const { page, daemon } = at;
+    const { id } = await daemon.submit({ volume: ball, iso: 100, smoothing: 'laplacian', lambda: 0.9, formats: ['glb'] }, 30);
+    await page.goto(`${daemon.url}/#/jobs/${id}`);
+    await page.getByRole('link', { name: 'Change parameters' }).click();
+    await page.waitForURL(/#\/volumes\//);
+    await page.locator('.parameters summary').click();
+    expect(await page.locator('[data-parameter=lambda] input').inputValue()).toBe('0.9');
+    await page.locator('[data-parameter=smoothing] label', { hasText: 'Taubin' }).click();
+    expect(await page.locator('[data-parameter=lambda] input').inputValue()).toBe('');
+    await page.getByRole('button', { name: 'Make the surface' }).click();
+    await page.waitForURL(/#\/jobs\//);
+    expect((await openedJob(at)).parameters).toMatchObject({ smoothing: 'taubin', lambda: 0.33 });
+  });
+
+  it('begin with an iso-value that can be read', async () => {
+    const { page, daemon } = at;
+    const samples = Float32Array.from({ length: 1000 }, (_, n) => (n < 400 ? 101.123456 : 20087.765432));
+    const header = 'NRRD0004\ntype: float\ndimension: 3\nsizes: 10 10 10\nendian: little\nencoding: raw\n\n';
+    const volume = await daemon.upload(Buffer.concat([Buffer.from(header), Buffer.from(samples.buffer)]));
+    await page.goto(`${daemon.url}/#/volumes/${volume}`);
+    await expect.poll(() => page.locator('.iso-input').inputValue()).toMatch(/^\d{5}(\.\d)?$/);
+    expect(noted(page, 'iso')).toBe(await page.locator('.iso-input').inputValue());
+  });
+});

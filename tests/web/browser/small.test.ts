@@ -1,0 +1,57 @@
+// A phone: 375 by 667, with fingers.
+import type { Page } from 'playwright-core';
+import { describe, expect, it } from 'vitest';
+import { ballNrrd, contourPixels, noted, setup, settled, surfaceLoaded } from './support';
+
+const at = setup({ viewport: { width: 375, height: 667 }, hasTouch: true, isMobile: true });
+
+function scrolled(page: Page): Promise<number> {
+  return page.evaluate(() => document.querySelector('main')?.scrollTop ?? 0);
+}
+
+async function swipe(page: Page, x: number, from: number, to: number): Promise<void> {
+  const session = await page.context().newCDPSession(page);
+  const touch = (type: 'touchStart' | 'touchMove' | 'touchEnd', y?: number): Promise<unknown> =>
+    session.send('Input.dispatchTouchEvent', { type, touchPoints: y === undefined ? [] : [{ x, y, id: 0 }] });
+  await touch('touchStart', from);
+  for (let step = 1; step <= 10; step += 1) await touch('touchMove', from + (step / 10) * (to - from));
+  await touch('touchEnd');
+  await session.detach();
+}
+
+describe('on a phone', () => {
+  it('a swipe on a slice scrolls, and the window stays', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(ballNrrd(48, 18));
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
+    await expect.poll(() => contourPixels(page, 'axial')).toBeGreaterThan(20);
+    const window = await settled(() => noted(page, 'window'));
+    for (let n = 0; n < 3; n += 1) await swipe(page, 90, 150, 60);
+    await expect.poll(() => scrolled(page)).toBeGreaterThan(100);
+    expect(noted(page, 'window')).toBe(window);
+    await page.evaluate(() => document.querySelector('main')?.scrollTo(0, 0));
+    // The histogram is seen together with the slices, and dragging it scrolls nothing.
+    const line = await page.locator('.histogram').boundingBox();
+    if (!line) throw new Error('there is no histogram');
+    expect(line.y + line.height).toBeLessThan(667 - 60);
+    for (const plane of ['axial', 'coronal', 'sagittal']) {
+      const slice = await page.locator(`[data-plane=${plane}]`).boundingBox();
+      expect((slice?.y ?? 999) + (slice?.height ?? 0), plane).toBeLessThanOrEqual(line.y);
+    }
+    expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBe(375);
+  });
+
+  it('what controls a cut is on the screen', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(ballNrrd(48, 18));
+    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    await page.goto(`${daemon.url}/#/jobs/${id}`);
+    await surfaceLoaded(page);
+    await page.getByRole('button', { name: 'Cut' }).tap();
+    for (const element of await page.locator('.cut-controls > *').all()) {
+      const box = await element.boundingBox();
+      expect(box?.x).toBeGreaterThanOrEqual(0);
+      expect((box?.x ?? 0) + (box?.width ?? 999)).toBeLessThanOrEqual(375);
+    }
+  });
+});

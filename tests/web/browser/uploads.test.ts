@@ -1,0 +1,126 @@
+// Uploads that go on, wait, ask before they send, and are dropped wherever.
+import type { Page } from 'playwright-core';
+import { describe, expect, it } from 'vitest';
+import { ctSlice } from './files';
+import { ballNrrd, Daemon, drop, openPage, setup } from './support';
+
+const at = setup();
+const volumePage = /#\/volumes\/[0-9a-f]{64}/;
+
+// The bodies of uploads wait until they are let through.
+async function held(page: Page): Promise<{ letGo: () => void; count: () => number }> {
+  let open = (): void => undefined;
+  const gate = new Promise<void>((resolve) => (open = resolve));
+  let count = 0;
+  await page.route('**/v1/volumes', async (route) => {
+    if (route.request().method() === 'POST') {
+      count += 1;
+      await gate;
+    }
+    await route.continue();
+  });
+  return { letGo: () => open(), count: () => count };
+}
+
+describe('an upload', () => {
+  it('is taken from a drop anywhere, and the page stays where it is', async () => {
+    const { page, daemon } = at;
+    await page.goto(`${daemon.url}/#/jobs`);
+    await page.getByRole('heading', { name: 'Jobs' }).waitFor();
+    const isTaken = await page.evaluate(() => {
+      const transfer = new DataTransfer();
+      transfer.items.add(new File(['x'], 'x.nii'));
+      const event = new DragEvent('dragover', { dataTransfer: transfer, bubbles: true, cancelable: true });
+      document.querySelector('main')?.dispatchEvent(event);
+      return event.defaultPrevented;
+    });
+    expect(isTaken).toBe(true);
+    await drop(page, [{ name: 'one.nrrd', bytes: ballNrrd(16, 5, 11) }], 'main');
+    const link = page.locator('.toast a');
+    await link.waitFor();
+    expect(page.url()).toContain('#/jobs');
+    await link.click();
+    await page.waitForURL(volumePage);
+  });
+
+  it('goes on while other views are shown, and others wait for it', async () => {
+    const { page, daemon } = at;
+    await page.goto(daemon.url);
+    const uploads = await held(page);
+    await drop(page, [{ name: 'first.nrrd', bytes: ballNrrd(16, 5, 21) }]);
+    await expect.poll(() => uploads.count()).toBe(1);
+    await drop(page, [{ name: 'second.nrrd', bytes: ballNrrd(16, 5, 22) }]);
+    await expect.poll(() => page.locator('.upload-queue').innerText()).toContain('second.nrrd');
+    await page.getByRole('link', { name: 'Jobs', exact: true }).click();
+    await page.getByRole('heading', { name: 'Jobs' }).waitFor();
+    await expect.poll(() => page.locator('.upload-note').innerText()).toMatch(/Uploading/);
+    expect(uploads.count()).toBe(1);
+    uploads.letGo();
+    await expect.poll(() => page.locator('.toast').count()).toBe(2);
+    expect(uploads.count()).toBe(2);
+    await expect.poll(() => page.locator('.upload-note').isVisible()).toBe(false);
+    await page.locator('.brand').click();
+    await expect.poll(() => page.locator('[data-volume] strong', { hasText: /first|second/ }).count()).toBe(2);
+  });
+
+  it('of what is no volume is not sent without being asked for', async () => {
+    const { page, daemon } = at;
+    const sent: string[] = [];
+    page.on('request', (request) => {
+      if (request.method() === 'POST') sent.push(request.url());
+    });
+    await page.goto(daemon.url);
+    const junk = Buffer.from(Array.from({ length: 4_000_000 }, (_, n) => (n * 7919) % 251));
+    await drop(page, [{ name: 'junk.bin', bytes: junk }]);
+    await expect.poll(() => page.locator('.refusal').innerText()).toContain('Nothing was sent');
+    expect(await page.getByRole('button', { name: 'Upload as raw samples' }).count()).toBe(1);
+    expect(sent).toEqual([]);
+    await page.getByRole('button', { name: 'Upload it anyway' }).click();
+    await expect.poll(() => page.locator('.refusal').innerText()).not.toContain('Nothing was sent');
+    expect(sent).toHaveLength(1);
+  });
+
+  it('of a series without a UID is taken from the dialog', async () => {
+    const { page, daemon } = at;
+    await page.goto(daemon.url);
+    const slices = [1, 2, 3, 4].map((index) => ({
+      name: `${index}.dcm`,
+      bytes: ctSlice(index, '1.9.1', index < 3 ? 'chest' : 'none', index < 3 ? '1.2.3.4' : ''),
+    }));
+    await drop(page, slices);
+    const choice = page.getByLabel('Series to read');
+    await choice.waitFor();
+    await choice.selectOption({ index: (await choice.locator('option').allInnerTexts()).findIndex((text) => text.startsWith('none')) });
+    await page.getByRole('button', { name: 'Upload this series' }).click();
+    await page.waitForURL(volumePage);
+    expect(await page.locator('.facts').innerText()).toContain('4 \u00d7 4 \u00d7 2');
+  });
+});
+
+describe('what fails for want of a connection', () => {
+  it('promises nothing that the page does not do', async () => {
+    const { browser } = at;
+    const other = await Daemon.start();
+    try {
+      const volume = await other.upload(ballNrrd(24, 8, 31));
+      const { page } = await openPage(browser, other.url);
+      await page.goto(`${other.url}/#/volumes/${volume}?iso=100`);
+      await expect.poll(() => page.locator('.estimate dl').count()).toBe(1);
+      await other.kill();
+      await page.getByRole('button', { name: 'Make the surface' }).click();
+      const refusal = page.locator('.panel .refusal');
+      await expect.poll(() => refusal.count(), { timeout: 30_000 }).toBe(1);
+      expect(await refusal.innerText()).not.toContain('by itself');
+      const again = await Daemon.start(other.data, new URL(other.url).host);
+      try {
+        await refusal.getByRole('button', { name: 'Try again' }).click();
+        await page.waitForURL(/#\/jobs\//);
+        await page.close();
+      } finally {
+        await again.kill();
+      }
+    } finally {
+      await other.remove();
+    }
+  });
+});

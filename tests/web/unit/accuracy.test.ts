@@ -1,0 +1,89 @@
+import { describe, expect, it } from 'vitest';
+import type { Job } from '@/api/types';
+import { emptyReason } from '@/job/empty';
+import { histogramPath, millimetres } from '@/views/certificate';
+import { stepsOf } from '@/views/charts';
+import { errorAt, errorInWords, placeOf } from '@/views/error_slider';
+import { keepOnlyAt } from '@/views/picked_part';
+
+describe('the slider of the largest error', () => {
+  it('is off at its left end, and goes from 0.02 to 2 mm in steps of the same factor', () => {
+    expect(errorAt(0)).toBe(null);
+    expect(errorAt(1)).toBe(0.02);
+    expect(errorAt(60)).toBe(2);
+    const all = Array.from({ length: 60 }, (_, place) => errorAt(place + 1) ?? 0);
+    for (let i = 1; i < all.length; i += 1) {
+      const factor = (all[i] ?? 0) / (all[i - 1] ?? 1);
+      expect(factor).toBeGreaterThan(1.02);
+      expect(factor).toBeLessThan(1.13);
+    }
+  });
+
+  it('stands at the error that it gave, and at its ends for what lies beyond', () => {
+    for (let place = 0; place <= 60; place += 1) expect(placeOf(errorAt(place))).toBe(place);
+    expect([placeOf(0.001), placeOf(50)]).toEqual([1, 60]);
+  });
+
+  it('says the error beside the smallest spacing', () => {
+    expect(errorInWords(null, [1, 1, 1])).toBe('off');
+    expect(errorInWords(0.1, [1, 0.5, 2])).toBe('0.1 mm, 0.2 of the spacing of 0.5 mm');
+    expect(errorInWords(0.02, [1.5, 1.5, 3])).toBe('0.02 mm, 0.013 of the spacing of 1.5 mm');
+  });
+});
+
+function emptyJob(parameters: object, mesh: object = {}): Job {
+  return { parameters, mesh: { dropped: { components: 0, triangles: 0 }, ...mesh } } as unknown as Job;
+}
+
+describe('why a surface is empty', () => {
+  const volume = { range: [0, 255] as [number, number] };
+
+  it('is an iso-value outside the samples, which are told', () => {
+    expect(emptyReason(emptyJob({ iso: 300 }, { iso: 300 }), volume)).toBe(
+      "There is no surface at the iso-value 300: the volume's samples go from 0 to 255. Choose an iso-value between them.",
+    );
+    expect(emptyReason(emptyJob({ iso: 0 }, { iso: 0 }), volume)).toMatch(/Choose an iso-value between/);
+    expect(emptyReason(emptyJob({ iso: 300 }), null)).toBe('There is no surface at the iso-value 300.');
+  });
+
+  it('is what the parameters left out, or a box without any', () => {
+    const dropped = { iso: 60, dropped: { components: 3, triangles: 90 } };
+    expect(emptyReason(emptyJob({ iso: 60 }, dropped), volume)).toMatch(/all 3 parts were dropped/);
+    expect(emptyReason(emptyJob({ iso: 60, crop: [[0, 0, 0], [1, 1, 1]] }, { iso: 60 }), volume)).toMatch(/within the box.*a larger box/);
+    expect(emptyReason(emptyJob({ labels: 'all' }), volume)).toMatch(/no boundary/);
+  });
+});
+
+describe('a certificate', () => {
+  it('tells millimetres to three digits that count', () => {
+    expect([0, 0.0001, 0.0123, 0.1234, 1.234, 12.34].map(millimetres)).toEqual(['0', '< 0.001', '0.012', '0.123', '1.23', '12.3']);
+  });
+
+  it('has its histograms over one axis, and shows a bin of a single point', () => {
+    const histogram = [99, ...Array<number>(18).fill(0), 1] as never;
+    const path = histogramPath({ points: 100, max_mm: 0.5, mean_mm: 0, rms_mm: 0, p99_mm: 0, histogram }, 1, 99);
+    const places = [...path.matchAll(/L([\d.]+) ([\d.]+)/g)].map(([, x, y]) => [Number(x), Number(y)]);
+    expect(Math.max(...places.map(([x]) => x ?? 0))).toBe(160);
+    expect(places[1]).toEqual([8, 2]);
+    const [, last] = places.at(-2) ?? [];
+    expect(last).toBeLessThan(64 - 5);
+    expect(histogramPath({ points: 1, max_mm: 0, mean_mm: 0, rms_mm: 0, p99_mm: 0, histogram }, 1, 99)).toBe('');
+  });
+});
+
+describe('the stages of a job', () => {
+  it('are told without those that it did not have', () => {
+    const timing = { queue: 1, load: 1, extract: 1, smooth: 0, simplify: 0, encode: 1, certify: 0, total: 4 };
+    const names = (more: object): string[] => stepsOf({ ...timing, ...more }).map(({ name }) => name);
+    expect(names({})).toEqual(['queue', 'load', 'extract', 'smooth', 'encode']);
+    expect(names({ simplify: 2, certify: 3 })).toEqual(['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify']);
+  });
+});
+
+describe('a part that was picked', () => {
+  it('is kept alone, at its place', () => {
+    expect(keepOnlyAt([1.23456, -2, 3])).toEqual({
+      components: { keep: null, min_triangles: null, nearest_to: [[1.235, -2, 3]] },
+    });
+  });
+});

@@ -1,0 +1,29 @@
+import { describe, expect, it } from 'vitest';
+import type { Volume } from '@/api/types';
+import { fileStem } from '@/volume/names';
+import { valueIn, type Slice } from '@/volume/slices';
+
+describe('a file that is made of a volume', () => {
+  const named = (name: string | null, series = ''): string =>
+    fileStem({ name, dicom: { patient_name: 'Doe^Jane', series_description: series } } as Volume, 'surface-1');
+
+  it('is called after it, in letters that every system takes, and never after the patient', () => {
+    expect(named('ch2bet.nii.gz')).toBe('ch2bet');
+    expect(named('T1 w\u00e9ighted / axial.nrrd')).toBe('T1-we-ighted-axial');
+    expect(named(null, 'Abdomen 1.0 B30f')).toBe('Abdomen-1.0-B30f');
+    expect(named('../../etc')).toBe('etc');
+    expect(named(null)).toBe('surface-1');
+    expect(fileStem(null, 'surface-1')).toBe('surface-1');
+    expect(named('x'.repeat(200))).toHaveLength(60);
+  });
+});
+
+describe('a value in a slice', () => {
+  const slice = { width: 2, height: 2, values: Uint8Array.from([0, 51, 255, 100]), window: [-100, 155] } as unknown as Slice;
+
+  it('is as exact as eight bits are', () => {
+    expect(valueIn(slice, 1, 0)).toEqual({ low: -49.5, high: -48.5 });
+    expect(valueIn(slice, 0, 0)).toEqual({ low: -Infinity, high: -99.5 });
+    expect(valueIn(slice, 0, 1)).toEqual({ low: 154.5, high: Infinity });
+  });
+});
