@@ -1,13 +1,10 @@
 #include <algorithm>
 #include <charconv>
-#include <exception>
 #include <limits>
-#include <memory>
 #include <string>
 #include <system_error>
 
-#include <expat.h>
-
+#include "base/xml.h"
 #include "proto/error.h"
 #include "server/codec/decode/formats.h"
 #include "server/codec/decode/zip_reader.h"
@@ -19,18 +16,14 @@ constexpr std::string_view kModelName = "3D/3dmodel.model";
 
 [[noreturn]] void refuse_3mf(const std::string& why) { refuse(MeshFormat::k3mf, why); }
 
-// The attributes of an element, as expat has them: names and values by turns, up to a null.
-using Attributes = const XML_Char**;
-
-std::string_view value_of(Attributes attributes, std::string_view name) {
-  for (; attributes[0] != nullptr; attributes += 2) {
-    if (attributes[0] == name) return attributes[1];
-  }
-  refuse_3mf("an element has no attribute \"" + std::string(name) + "\"");
+std::string_view value_of(const XmlAttributes& attributes, std::string_view name) {
+  const auto value = attributes.find(name);
+  if (!value) refuse_3mf("an element has no attribute \"" + std::string(name) + "\"");
+  return *value;
 }
 
 template <class T>
-T number_of(Attributes attributes, std::string_view name) {
+T number_of(const XmlAttributes& attributes, std::string_view name) {
   const std::string_view text = value_of(attributes, name);
   T number = {};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -41,39 +34,16 @@ T number_of(Attributes attributes, std::string_view name) {
   return number;
 }
 
-bool has(Attributes attributes, std::string_view name) {
-  for (; attributes[0] != nullptr; attributes += 2) {
-    if (attributes[0] == name) return true;
-  }
-  return false;
-}
-
 // The one model of a package. Objects are those that are built, each once; that is looked at in the
-// end. Exceptions cannot pass through the C library, so they are kept until parsing has stopped.
-class Model {
+// end.
+class Model : public XmlHandler {
  public:
-  Model() : parser_(::XML_ParserCreate("UTF-8")) {
-    if (!parser_) refuse_3mf("expat has no memory");
-    ::XML_SetUserData(parser_.get(), this);
-    ::XML_SetStartElementHandler(parser_.get(), &Model::on_start);
-    ::XML_SetStartDoctypeDeclHandler(parser_.get(), &Model::on_doctype);
-  }
-
   void parse(Bytes piece, bool is_last) {
-    constexpr std::size_t kMostBytes = std::size_t{1} << 20;
-    do {
-      const Bytes next = piece.first(std::min(piece.size(), kMostBytes));
-      piece = piece.subspan(next.size());
-      const auto status =
-          ::XML_Parse(parser_.get(), reinterpret_cast<const char*>(next.data()),
-                      static_cast<int>(next.size()), is_last && piece.empty() ? 1 : 0);
-      if (failure_) std::rethrow_exception(failure_);
-      if (status == XML_STATUS_OK) continue;
-      const char* reason = ::XML_ErrorString(::XML_GetErrorCode(parser_.get()));
-      refuse_3mf("its model is no well-formed XML: " +
-                 std::string(reason == nullptr ? "unknown" : reason) + " in line " +
-                 std::to_string(::XML_GetCurrentLineNumber(parser_.get())));
-    } while (!piece.empty());
+    try {
+      reader_.read({reinterpret_cast<const char*>(piece.data()), piece.size()}, is_last);
+    } catch (const XmlError& error) {
+      refuse_3mf("its model is no XML that is read: " + std::string(error.what()));
+    }
   }
 
   DecodedSurface surface() const {
@@ -88,32 +58,7 @@ class Model {
   }
 
  private:
-  struct Free {
-    void operator()(XML_Parser parser) const { ::XML_ParserFree(parser); }
-  };
-
-  template <class Action>
-  void guarded(const Action& action) {
-    if (failure_) return;
-    try {
-      action();
-    } catch (...) {
-      failure_ = std::current_exception();
-      ::XML_StopParser(parser_.get(), XML_FALSE);
-    }
-  }
-
-  static void XMLCALL on_start(void* self, const XML_Char* name, Attributes attributes) {
-    auto& model = *static_cast<Model*>(self);
-    model.guarded([&] { model.start(name, attributes); });
-  }
-  static void XMLCALL on_doctype(void* self, const XML_Char*, const XML_Char*, const XML_Char*,
-                                 int) {
-    auto& model = *static_cast<Model*>(self);
-    model.guarded([] { refuse_3mf("it has a document type, which the format forbids"); });
-  }
-
-  void start(std::string_view element, Attributes attributes) {
+  void start_element(std::string_view element, const XmlAttributes& attributes) override {
     if (element == "vertex") {
       if (positions_.size() == std::numeric_limits<std::uint32_t>::max()) {
         throw Error(ErrorCode::kTooLarge, "the file has more vertices than 32 bits can number");
@@ -128,7 +73,7 @@ class Model {
       first_vertex_ = static_cast<std::uint32_t>(positions_.size());
     } else if (element == "item") {
       built_.push_back(number_of<std::uint32_t>(attributes, "objectid"));
-      if (has(attributes, "transform")) refuse_3mf("an object is built elsewhere than it lies");
+      if (attributes.find("transform")) refuse_3mf("an object is built elsewhere than it lies");
     } else if (element == "model") {
       is_model_ = value_of(attributes, "unit") == "millimeter";
     } else if (element == "components") {
@@ -137,7 +82,7 @@ class Model {
   }
 
   // Of the object's own, which all come before its triangles.
-  std::uint32_t vertex_of(Attributes attributes, std::string_view name) const {
+  std::uint32_t vertex_of(const XmlAttributes& attributes, std::string_view name) const {
     const auto vertex = number_of<std::uint32_t>(attributes, name);
     if (vertex >= positions_.size() - first_vertex_) {
       refuse_3mf("a triangle names a vertex that is not there");
@@ -145,8 +90,7 @@ class Model {
     return first_vertex_ + vertex;
   }
 
-  const std::unique_ptr<std::remove_pointer_t<XML_Parser>, Free> parser_;
-  std::exception_ptr failure_;
+  XmlReader reader_{*this};
   bool is_model_ = false;
   std::uint32_t first_vertex_ = 0;
   std::vector<mesh::Vec3> positions_;

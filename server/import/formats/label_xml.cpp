@@ -1,17 +1,13 @@
 #include "server/import/formats/label_xml.h"
 
 #include <array>
-#include <exception>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
-#include <expat.h>
-
 #include "base/text.h"
-#include "proto/error.h"
+#include "base/xml.h"
 #include "server/import/label_table.h"
 
 namespace isomesh::import {
@@ -55,64 +51,23 @@ std::vector<LabelEntry> afni_labels(std::string_view text) {
   return entries;
 }
 
-// Exceptions cannot pass through the C library, so they are kept until parsing has stopped.
-class Parser {
+class Parser : public XmlHandler {
  public:
-  explicit Parser(std::uint64_t volume) : volume_(volume), parser_(::XML_ParserCreate(nullptr)) {
-    if (!parser_) throw Error(ErrorCode::kInternal, "XML_ParserCreate failed.");
-    ::XML_SetUserData(parser_.get(), this);
-    ::XML_SetElementHandler(parser_.get(), &Parser::on_start, &Parser::on_end);
-    ::XML_SetCharacterDataHandler(parser_.get(), &Parser::on_text);
-    ::XML_SetStartDoctypeDeclHandler(parser_.get(), &Parser::on_doctype);
-  }
+  explicit Parser(std::uint64_t volume) : volume_(volume) {}
 
   std::vector<LabelEntry> parse(std::string_view text) {
-    const auto status =
-        ::XML_Parse(parser_.get(), text.data(), static_cast<int>(text.size()), XML_TRUE);
-    if (failure_) std::rethrow_exception(failure_);
-    if (status != XML_STATUS_OK && !is_full_) return {};
+    try {
+      reader_.read(text, true);
+    } catch (const XmlError&) {
+      return {};  // names are an extra; the samples are there without
+    }
     return std::move(entries_);
   }
 
  private:
-  struct Free {
-    void operator()(XML_Parser parser) const { ::XML_ParserFree(parser); }
-  };
-
-  template <class Action>
-  void guarded(const Action& action) {
-    if (failure_) return;
-    try {
-      action();
-    } catch (...) {
-      failure_ = std::current_exception();
-      ::XML_StopParser(parser_.get(), XML_FALSE);
-    }
-  }
-
-  static void XMLCALL on_start(void* self, const XML_Char* name, const XML_Char** pairs) {
-    auto& parser = *static_cast<Parser*>(self);
-    parser.guarded([&] { parser.start(name, pairs); });
-  }
-  static void XMLCALL on_end(void* self, const XML_Char* name) {
-    auto& parser = *static_cast<Parser*>(self);
-    parser.guarded([&] { parser.end(name); });
-  }
-  static void XMLCALL on_text(void* self, const XML_Char* text, int count) {
-    auto& parser = *static_cast<Parser*>(self);
-    parser.guarded([&] {
-      if (parser.is_in_text_) parser.text_.append(text, static_cast<std::size_t>(count));
-    });
-  }
-  // A few lines of nested entities expand to gigabytes.
-  static void XMLCALL on_doctype(void* self, const XML_Char*, const XML_Char*, const XML_Char*,
-                                 int) {
-    ::XML_StopParser(static_cast<Parser*>(self)->parser_.get(), XML_FALSE);
-  }
-
-  void start(std::string_view name, const XML_Char** pairs) {
+  void start_element(std::string_view name, const XmlAttributes& pairs) override {
     attributes_.clear();
-    for (; pairs[0] != nullptr; pairs += 2) attributes_.emplace(pairs[0], pairs[1]);
+    pairs.for_each([&](const char* key, const char* value) { attributes_.emplace(key, value); });
     if (name == "VolumeInformation") {
       is_of_volume_ = parse_uint64(value_of(attributes_, "Index")).value_or(0) == volume_;
     }
@@ -121,7 +76,11 @@ class Parser {
     text_.clear();
   }
 
-  void end(std::string_view name) {
+  void text(std::string_view part) override {
+    if (is_in_text_) text_ += part;
+  }
+
+  void end_element(std::string_view name) override {
     if (is_in_text_ && name == "Label") {
       if (const auto label = parse_int64(value_of(attributes_, "Key"))) {
         entries_.push_back(
@@ -131,20 +90,16 @@ class Parser {
       for (LabelEntry& entry : afni_labels(text_)) entries_.push_back(std::move(entry));
     }
     is_in_text_ = false;
-    if (entries_.size() <= Volume::kMostLabels) return;
-    is_full_ = true;
-    ::XML_StopParser(parser_.get(), XML_FALSE);
+    if (entries_.size() > Volume::kMostLabels) reader_.stop();
   }
 
   const std::uint64_t volume_;
-  std::unique_ptr<std::remove_pointer_t<XML_Parser>, Free> parser_;
   std::vector<LabelEntry> entries_;
   Attributes attributes_;     // of the last element that began
   std::string text_;          // within it
   bool is_in_text_ = false;   // that is kept
   bool is_of_volume_ = true;  // where no element says of which
-  bool is_full_ = false;
-  std::exception_ptr failure_;
+  XmlReader reader_{*this};
 };
 
 }  // namespace

@@ -1,6 +1,5 @@
-// Requests of clients: read by the server.
+// Requests of clients as JSON: read by the server.
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -8,6 +7,7 @@
 
 #include "proto/json.h"
 #include "tests/support/errors.h"
+#include "tests/unit/proto/requests.h"
 
 namespace isomesh {
 namespace {
@@ -18,7 +18,6 @@ using test::thrown_by;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::UnorderedElementsAre;
-using Query = std::vector<std::pair<std::string, std::string>>;
 
 // A body with what is required and one member more.
 std::string body_with(const std::string& member) {
@@ -37,35 +36,9 @@ std::vector<std::string> faults_in(const std::string& body) {
   return fields_of(*error);
 }
 
-std::vector<std::string> faults_in(const Query& query) {
-  const auto error = thrown_by([&] { parse_job_parameters(query); });
-  return error ? fields_of(*error) : std::vector<std::string>{"nothing was refused"};
-}
-
 std::vector<std::string> faults_of(const std::string& member) {
   return faults_in(body_with(member));
 }
-
-// No member as it is by default.
-JobParameters unusual_parameters(const std::string& volume) {
-  return {{.iso = -150,
-           .scheme = Scheme::kFive,
-           .interpolation = Interpolation::kMidpoint,
-           .passes = 17,
-           .smoothing = Smoothing::kTaubin,
-           .lambda = 0.25,
-           .pass_band = 0.05,
-           .max_displacement_mm = 0.5,
-           .close = true,
-           .components = {.keep = 2, .min_triangles = 100, .nearest_to = {}},
-           .formats = {MeshFormat::kStl, MeshFormat::kGlb},
-           .draco = {.position_bits = 11, .speed = 3},
-           .normals = true},
-          volume,
-          Priority::kBulk};
-}
-
-// --- Bodies --------------------------------------------------------------------------------------
 
 TEST(JobBody, MayNameLabelsInPlaceOfAnIso) {
   const auto of_labels = [](const std::string& members) {
@@ -118,19 +91,6 @@ TEST(JobBody, RefusesWhatLabelsCannotHave) {
               UnorderedElementsAre("background", "label_names", "formats"));
 }
 
-TEST(JobQuery, NamesLabels) {
-  EXPECT_TRUE(parse_job_parameters(Query{{"labels", "all"}}).labels->is_all());
-  const JobParameters some = parse_job_parameters(Query{{"labels", "5,3"}, {"background", "-1"}});
-  EXPECT_EQ(some.labels->values, (std::vector<std::int64_t>{3, 5}));
-  EXPECT_EQ(some.background, -1);
-  EXPECT_THAT(faults_in(Query{{"labels", "3,x"}}), ElementsAre("labels"));
-  EXPECT_THAT(faults_in(Query{{"labels", ""}}), ElementsAre("labels"));
-  JobParameters asked = label_parameters({{3, 5}});
-  asked.volume = "a";
-  asked.lambda = 0.25;
-  EXPECT_EQ(parse_job_parameters(to_query(asked), VolumeIn::kQuery), asked);
-}
-
 TEST(JobBody, NeedsAVolumeAndAnIsoOnly) {
   JobParameters expected;
   expected.volume = "a";
@@ -148,7 +108,7 @@ TEST(JobBody, TakesEveryMember) {
       "pass_band": 0.05, "max_displacement_mm": 0.5,
       "close": true, "components": {"keep": 2, "min_triangles": 100}, "formats": ["stl", "glb"],
       "draco": {"position_bits": 11, "speed": 3}, "normals": true, "priority": "bulk"})"),
-            unusual_parameters("abc"));
+            test::unusual_parameters("abc"));
 }
 
 TEST(JobBody, IsWhatToJsonWrites) {
@@ -238,20 +198,6 @@ TEST(JobBody, PlacesOfPartsAreOfThreeNumbers) {
   for (const char* const wrong : {"[]", "[1, 2, 3]", "[[1, 2]]", "null"}) {
     EXPECT_THAT(faults_of(at(wrong)), ElementsAre("components.nearest_to")) << wrong;
   }
-}
-
-TEST(JobQuery, CarriesNumbersAndPlacesInOneList) {
-  const JobParameters parameters = parse_job_parameters(Query{{"volume", "a"},
-                                                              {"iso", "60"},
-                                                              {"crop", "-1,-2,-3,4,5,6.5"},
-                                                              {"nearest_to", "1,2,3,4,5,6"},
-                                                              {"lods", "1,0.25"},
-                                                              {"format", "glb"}},
-                                                        VolumeIn::kQuery);
-  EXPECT_EQ(parameters.crop, (Box{{{-1, -2, -3}, {4, 5, 6.5}}}));
-  EXPECT_EQ(parameters.components.nearest_to.size(), 2U);
-  EXPECT_EQ(parameters.lods, (std::vector<double>{1, 0.25}));
-  EXPECT_EQ(parse_job_parameters(to_query(parameters), VolumeIn::kQuery), parameters);
 }
 
 TEST(JobBody, AFormatNamedTwiceIsMadeOnce) {
@@ -440,73 +386,6 @@ TEST(JobBody, MembersOfNonUtf8NamesAreRefusedWithoutThem) {
   const auto error = thrown_by([] { parsed("\"\\ud800\": 1"); });
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
-}
-
-// --- Queries -------------------------------------------------------------------------------------
-
-TEST(JobQuery, NeedsAnIsoOnly) {
-  JobParameters expected;
-  expected.iso = 60;
-  expected.lambda = 1;
-  EXPECT_EQ(parse_job_parameters(Query{{"iso", "60"}}), expected);
-  EXPECT_THAT(faults_in(Query{}), ElementsAre("iso"));
-}
-
-TEST(JobQuery, TakesEveryParameter) {
-  EXPECT_EQ(parse_job_parameters(Query{{"iso", "-1.5e2"},
-                                       {"scheme", "5"},
-                                       {"interpolation", "midpoint"},
-                                       {"passes", "17"},
-                                       {"smoothing", "taubin"},
-                                       {"lambda", "0.25"},
-                                       {"pass_band", "0.05"},
-                                       {"max_displacement_mm", "0.5"},
-                                       {"close", "true"},
-                                       {"keep", "2"},
-                                       {"min_triangles", "100"},
-                                       {"normals", "true"},
-                                       {"format", "stl,glb"},
-                                       {"position_bits", "11"},
-                                       {"speed", "3"},
-                                       {"priority", "bulk"}}),
-            unusual_parameters(""));
-}
-
-TEST(JobQuery, OtsuStandsForAnIso) {
-  EXPECT_EQ(parse_job_parameters(Query{{"iso", "otsu"}}).iso, std::nullopt);
-}
-
-// Faults are named as the client spelled them.
-TEST(JobQuery, RefusesByTheQuerysNames) {
-  const auto fault = [](const std::string& name, const std::string& value) {
-    return faults_in(Query{{"iso", "1"}, {name, value}});
-  };
-  for (const auto& [name, value] : Query{{"scheme", "7"},        {"scheme", ""},
-                                         {"passes", "five"},     {"passes", "-1"},
-                                         {"lambda", "0"},        {"close", "yes"},
-                                         {"priority", "urgent"}, {"format", ""},
-                                         {"format", "exe"},      {"format", "drc,,stl"},
-                                         {"position_bits", "7"}, {"speed", "11"},
-                                         {"speed", ""},          {"keep", "0"},
-                                         {"keep", "all"},        {"min_triangles", "1.5"},
-                                         {"normals", "2"},       {"components", "{}"},
-                                         {"volume", "abc"},      {"formats", "drc"},
-                                         {"draco", "{}"},        {"isovalue", "3"}}) {
-    EXPECT_THAT(fault(name, value), ElementsAre(name)) << name << '=' << value;
-  }
-}
-
-TEST(JobQuery, RefusesAnIsoThatIsNoNumber) {
-  for (const std::string iso : {"", "abc", "nan", "inf", "1e999", "true", "[1]", "0x10", "1,5"}) {
-    EXPECT_THAT(faults_in(Query{{"iso", iso}}), ElementsAre("iso")) << iso;
-  }
-}
-
-TEST(JobQuery, RefusesAParameterGivenTwice) {
-  EXPECT_THAT(faults_in(Query{{"iso", "1"}, {"iso", "2"}}), ElementsAre("iso"));
-  EXPECT_THAT(faults_in(Query{{"iso", "1"}, {"speed", "2"}, {"speed", "2"}}), ElementsAre("speed"));
-  EXPECT_THAT(faults_in(Query{{"iso", "1"}, {"format", "drc"}, {"format", "stl"}}),
-              ElementsAre("format"));
 }
 
 }  // namespace
