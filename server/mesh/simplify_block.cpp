@@ -299,9 +299,12 @@ class BlockSimplifier {
     std::uint32_t guess = TriangleGrid::kNone;
     for (std::size_t n = 0; n < homes_.size(); ++n) {
       const Point point = measured_point(goal_.original, block_.points[n]);
-      const TriangleGrid::Nearest nearest = grid.nearest(point, guess);
-      if (nearest.squared_mm > squared_bound_) mark(mesh_.triangles[block_.homes[n]]);
-      homes_[n] = guess = nearest.triangle;
+      homes_[n] = grid.within(point, squared_bound_, guess).triangle;
+      if (homes_[n] == TriangleGrid::kNone) {
+        mark(mesh_.triangles[block_.homes[n]]);
+      } else {
+        guess = homes_[n];
+      }
     }
   }
 
@@ -311,10 +314,12 @@ class BlockSimplifier {
     std::uint32_t guess = TriangleGrid::kNone;
     for (std::size_t t = 0; t < proposed_.size(); ++t) {
       const SurfaceView one(mesh_.positions, {&proposed_[t], 1});
-      const TriangleGrid::Nearest nearest =
-          goal_.grid->nearest(measured_point(one, mesh_.positions.size()), guess);
-      guess = nearest.triangle;
-      if (nearest.squared_mm <= squared_bound_) continue;
+      const Point centre = measured_point(one, mesh_.positions.size());
+      const std::uint32_t found = goal_.grid->within(centre, squared_bound_, guess).triangle;
+      if (found != TriangleGrid::kNone) {
+        guess = found;
+        continue;
+      }
       is_far[t] = 1;
       mark(proposed_[t]);
     }

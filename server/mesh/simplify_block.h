@@ -28,7 +28,7 @@ inline Point measured_point(const SurfaceView& surface, std::size_t number) {
 struct SurfaceBlock {
   std::vector<Triangle> triangles;  // vertices of the mesh
   WallSides sides = {};             // of all of them, where they are walls
-  // The original's points whose nearest triangles these are, and which of them each.
+  // The original's points that these triangles are near, and which of them each.
   std::vector<std::uint32_t> points;
   std::vector<std::uint32_t> homes;
 };

@@ -404,6 +404,7 @@ void TriangleGrid::look_within(double radius_mm, Search& search) const {
       look_at(entry.triangle, search);
       if (search.nearest.squared_mm >= known) continue;
       known = search.nearest.squared_mm;
+      if (known <= search.enough_squared_mm) known = 0;
       reach_within(std::sqrt(known));
       reached = reach_in(box, cell);
     }
@@ -413,7 +414,7 @@ void TriangleGrid::look_within(double radius_mm, Search& search) const {
 
 TriangleGrid::Nearest TriangleGrid::nearest(const Point& point, std::uint32_t guess) const {
   if (levels_.empty()) return {};
-  Search search = {point, {}, {}};
+  Search search = {point, 0, {}, {}};
   search.seen.fill(kNone);
   if (guess != kNone) look_at(guess, search);
   // What is known may be far off: then too many cells would be looked into.
@@ -424,6 +425,19 @@ TriangleGrid::Nearest TriangleGrid::nearest(const Point& point, std::uint32_t gu
   }
   look_within(std::sqrt(search.nearest.squared_mm), search);
   return search.nearest;
+}
+
+TriangleGrid::Nearest TriangleGrid::within(const Point& point, double squared_mm,
+                                           std::uint32_t guess) const {
+  if (levels_.empty()) return {};
+  if (guess != kNone) {
+    const double squared = squared_distance(point, corners_of(surface_, guess));
+    if (squared <= squared_mm) return {guess, squared};
+  }
+  Search search = {point, squared_mm, {}, {}};
+  search.seen.fill(kNone);
+  look_within(std::sqrt(squared_mm), search);
+  return search.nearest.squared_mm <= squared_mm ? search.nearest : Nearest{};
 }
 
 }  // namespace isomesh::mesh

@@ -39,6 +39,10 @@ class TriangleGrid {
   // where there are no triangles. A guess that is near makes it faster; kNone is no guess.
   Nearest nearest(const Point& point, std::uint32_t guess) const;
 
+  // A triangle that is no farther than that, whichever is found first: much faster where the guess
+  // is one. kNone and infinity where there is none. Of a finite point and distance.
+  Nearest within(const Point& point, double squared_mm, std::uint32_t guess) const;
+
   // Calls visit(triangle) for all triangles that reach into the box, some of them several times,
   // and for some others near it.
   template <class Visit>
@@ -134,6 +138,7 @@ class TriangleGrid {
   // One point's; remembers some triangles that it has looked at, which several cells have.
   struct Search {
     Point point;
+    double enough_squared_mm;  // what need not be nearer
     Nearest nearest;
     std::array<std::uint32_t, 64> seen;
   };

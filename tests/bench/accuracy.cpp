@@ -7,8 +7,7 @@
 
 #include <meshoptimizer.h>
 
-#include "server/codec/encode.h"
-#include "server/mesh/simplify.h"
+#include "server/mesh/distance.h"
 #include "tests/bench/decimation_peers.h"
 #include "tests/bench/numbers.h"
 #include "tests/bench/peers.h"
@@ -19,19 +18,6 @@ namespace isomesh::bench {
 namespace {
 
 constexpr int kCertifyRuns = 3;
-
-mesh::Mesh copy_of(const mesh::Mesh& mesh) {
-  mesh::Mesh copy;
-  copy.origin = mesh.origin;
-  copy.positions.resize_for_overwrite(mesh.positions.size());
-  std::ranges::copy(mesh.positions, copy.positions.begin());
-  copy.triangles.resize_for_overwrite(mesh.triangles.size());
-  std::ranges::copy(mesh.triangles, copy.triangles.begin());
-  copy.layer_vertices = mesh.layer_vertices;
-  copy.layer_triangles = mesh.layer_triangles;
-  copy.on_border = mesh.on_border;
-  return copy;
-}
 
 // What a caller of the library has without anything of ours: one call on the whole surface.
 Decimated meshoptimizer_alone(const mesh::SurfaceView& surface, std::size_t triangles) {
@@ -54,10 +40,39 @@ Decimated meshoptimizer_alone(const mesh::SurfaceView& surface, std::size_t tria
   return result;
 }
 
+MeshParameters parameters_of(const AccuracyPlan& plan) {
+  MeshParameters parameters;
+  parameters.passes = plan.passes;
+  parameters.formats = {MeshFormat::kDrc};
+  return parameters;
+}
+
+Approximation row_of(std::string name, const JobFigures& job) {
+  const Timing& timing = job.timing;
+  Approximation row = {.name = std::move(name),
+                       .triangles = job.mesh.triangles,
+                       .simplify_ms = timing.simplify,
+                       .certify_ms = timing.certify,
+                       .encode_ms = timing.encode,
+                       .bytes = job.bytes};
+  row.job_ms = timing.extract + timing.smooth + timing.simplify + timing.encode + timing.certify;
+  if (job.mesh.certificate) {
+    row.to_scan = job.mesh.certificate->from_mesh;
+    row.from_scan = job.mesh.certificate->from_extracted;
+  }
+  return row;
+}
+
 class Measurement {
  public:
-  Measurement(const mesh::Mesh& original, const AccuracyPlan& plan)
-      : original_(original), plan_(plan) {
+  Measurement(const Samples& samples, const AccuracyPlan& plan)
+      : plan_(plan),
+        extracted_(samples, {.iso = plan.iso}),
+        smoothed_(samples, {.iso = plan.iso}),
+        job_(samples, {.iso = plan.iso}) {
+    extracted_.extract();
+    smoothed_.extract();
+    smoothed_.smooth(plan.passes);
     peers_.push_back({"meshoptimizer alone", meshoptimizer_alone});
     if (!plan.with_peers) return;
     const std::vector<DecimationPeer> slow = decimation_peers();
@@ -65,12 +80,14 @@ class Measurement {
   }
 
   std::vector<Approximation> run() {
-    mesh::Mesh whole = copy_of(original_);
-    Approximation& as_it_is = rows_.emplace_back();
-    as_it_is.name = "as it is";
-    encode(whole, as_it_is);
+    MeshParameters parameters = parameters_of(plan_);
+    job_.run_job(parameters, false);  // maps the memory
+    rows_.push_back(row_of("no bound", job_.run_job(parameters, false)));
+    rows_.push_back(row_of("no bound, certified", job_.run_job(parameters, true)));
     for (const double error : plan_.errors_mm) {
-      add_ours(error);
+      parameters.max_error_mm = error;
+      rows_.push_back(row_of("E = " + fixed(error, 2) + " mm", job_.run_job(parameters, true)));
+      rows_.back().error_mm = error;
       const std::uint64_t triangles = rows_.back().triangles;
       for (const DecimationPeer& peer : peers_) add_peer(peer, triangles);
     }
@@ -78,40 +95,24 @@ class Measurement {
   }
 
  private:
-  void encode(const mesh::Mesh& mesh, Approximation& row) {
-    row.triangles = mesh.triangles.size();
-    row.encode_ms = time_ms({[&] {
-      row.bytes = 0;
-      codec::encode_drc(mesh, {}, {}, [&](auto piece) { row.bytes += piece.size(); });
-    }});
-  }
-
-  void certify(const mesh::SurfaceView& mesh, Approximation& row) {
-    row.certify_ms = time_ms({[&] { row.certificate = mesh::certify(mesh, original_, {}); }});
-  }
-
-  void add_ours(double error_mm) {
-    mesh::Mesh mesh = copy_of(original_);
-    Approximation row;
-    row.name = "E = " + fixed(error_mm, 2) + " mm";
-    row.simplify_ms = time_ms({[&] { mesh::simplify({.max_error_mm = error_mm}, {}, mesh); }});
-    certify(mesh, row);
-    encode(mesh, row);
-    rows_.push_back(std::move(row));
-  }
-
   void add_peer(const DecimationPeer& peer, std::size_t triangles) {
     Decimated decimated;
     Approximation row;
-    row.name = "  " + peer.name;
-    row.simplify_ms = time_ms({[&] { decimated = peer.run(original_, triangles); }});
+    row.name = peer.name;
+    row.is_peer = true;
+    row.simplify_ms = time_ms({[&] { decimated = peer.run(smoothed_.mesh(), triangles); }});
     row.triangles = decimated.triangles.size();
-    certify({decimated.positions, decimated.triangles}, row);
+    const mesh::Certificate found =
+        mesh::certify({decimated.positions, decimated.triangles}, extracted_.mesh(), {});
+    row.to_scan = found.from_mesh;
+    row.from_scan = found.from_reference;
     rows_.push_back(std::move(row));
   }
 
-  const mesh::Mesh& original_;
   const AccuracyPlan& plan_;
+  Stages extracted_;
+  Stages smoothed_;
+  Stages job_;
   std::vector<DecimationPeer> peers_;
   std::vector<Approximation> rows_;
 };
@@ -122,10 +123,7 @@ std::vector<Approximation> measure_approximations(const Samples& samples,
                                                   const AccuracyPlan& plan) {
   set_threads(plan.threads);
   Peers::set_threads(plan.threads);
-  Stages stages(samples, {.iso = plan.iso});
-  stages.extract();
-  stages.smooth(plan.passes);
-  return Measurement(stages.mesh(), plan).run();
+  return Measurement(samples, plan).run();
 }
 
 CertifyTime measure_certify(const Samples& samples, const AccuracyPlan& plan) {
@@ -144,25 +142,37 @@ CertifyTime measure_certify(const Samples& samples, const AccuracyPlan& plan) {
   return time;
 }
 
-std::string to_table(const std::vector<Approximation>& approximations) {
-  std::ostringstream text;
-  const auto cells = [&](const std::string& name, const std::vector<std::string>& values) {
-    text << std::left << std::setw(24) << name << std::right;
-    for (const std::string& value : values) text << std::setw(13) << value;
-    text << '\n';
+std::vector<std::string> accuracy_head() {
+  return {"",         "triangles", "max to scan", "max from scan", "rms from scan",
+          "simplify", "certify",   "encode",      "whole job",     "bytes"};
+}
+
+std::vector<std::string> accuracy_row(const Approximation& row) {
+  const auto mm = [&](double value) {
+    return row.to_scan.points > 0 ? fixed(value, 4) : std::string("-");
   };
   const auto ms = [](double value) { return value > 0 ? milliseconds(value) : std::string("-"); };
-  cells("", {"triangles", "max to scan", "max to mesh", "rms to mesh", "simplify", "certify",
-             "encode", "bytes"});
-  for (const Approximation& row : approximations) {
-    const bool has_certificate = row.certificate.from_mesh.points > 0;
-    const auto mm = [&](double value) { return has_certificate ? fixed(value, 4) : "-"; };
-    cells(row.name,
-          {grouped(row.triangles), mm(row.certificate.from_mesh.max_mm),
-           mm(row.certificate.from_reference.max_mm), mm(row.certificate.from_reference.rms_mm),
-           ms(row.simplify_ms), ms(row.certify_ms), ms(row.encode_ms),
-           row.bytes > 0 ? grouped(row.bytes) : "-"});
-  }
+  return {row.name,
+          grouped(row.triangles),
+          mm(row.to_scan.max_mm),
+          mm(row.from_scan.max_mm),
+          mm(row.from_scan.rms_mm),
+          ms(row.simplify_ms),
+          ms(row.certify_ms),
+          ms(row.encode_ms),
+          ms(row.job_ms),
+          row.bytes > 0 ? grouped(row.bytes) : "-"};
+}
+
+std::string to_table(const std::vector<Approximation>& approximations) {
+  std::ostringstream text;
+  const auto line = [&](const std::vector<std::string>& cells) {
+    text << std::left << std::setw(24) << cells.front() << std::right;
+    for (std::size_t n = 1; n < cells.size(); ++n) text << std::setw(14) << cells[n];
+    text << '\n';
+  };
+  line(accuracy_head());
+  for (const Approximation& row : approximations) line(accuracy_row(row));
   return text.str();
 }
 

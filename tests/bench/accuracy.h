@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "proto/mesh_summary.h"
 #include "server/mesh/distance.h"
 #include "tests/bench/samples.h"
 
@@ -20,19 +21,24 @@ struct AccuracyPlan {
   bool with_peers = true;  // the slow ones, where they were found
 };
 
-// One way to fewer triangles. Zero where a time was not measured.
+// One way to fewer triangles. Zero where something was not measured.
 struct Approximation {
   std::string name;
+  double error_mm = 0;   // the bound, of a job that has one
+  bool is_peer = false;  // else a job of isomesh
   std::uint64_t triangles = 0;
-  mesh::Certificate certificate;
+  DistanceSummary to_scan = {};    // from the mesh to the surface as it was extracted
+  DistanceSummary from_scan = {};  // the other way
   double simplify_ms = 0;
   double certify_ms = 0;
-  double encode_ms = 0;  // to drc, with the parameters of a job that gives none
+  double encode_ms = 0;  // to drc
+  double job_ms = 0;     // from the samples in memory to the bytes of the file, and the certificate
   std::uint64_t bytes = 0;
 };
 
-// The smoothed surface as it is, then for each error ours, and behind each the others at as many
-// triangles. Each is run once: to be repeated by whoever wants to know how steady times are.
+// A job that bounds nothing, the same with a certificate, then for each error a job with that
+// bound, and behind it others that make as many triangles of the smoothed surface. Each is run
+// once: to be repeated by whoever wants to know how steady times are.
 std::vector<Approximation> measure_approximations(const Samples& samples, const AccuracyPlan& plan);
 
 // The smoothed surface against the extracted one and the other way round: milliseconds of both
@@ -44,6 +50,10 @@ struct CertifyTime {
   mesh::Certificate certificate;
 };
 CertifyTime measure_certify(const Samples& samples, const AccuracyPlan& plan);
+
+// As the cells of a table.
+std::vector<std::string> accuracy_head();
+std::vector<std::string> accuracy_row(const Approximation& row);
 
 // As text for a terminal.
 std::string to_table(const std::vector<Approximation>& approximations);

@@ -104,6 +104,10 @@ int write_report(const std::filesystem::path& folder, const std::filesystem::pat
     write_quality(subjects, report);
   }
   write_labels(surface_nets_root, report);
+  std::vector<AccuracySubject> scans;
+  if (real) scans.push_back({real->samples, real->levels.front()});
+  if (head) scans.push_back({head->samples, head->levels.back()});
+  if (!scans.empty()) write_accuracy(scans, report);
   document.heading("Where measurement and paper differ");
   document.bullets(report.remarks);
   document.write();

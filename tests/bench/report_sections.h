@@ -50,6 +50,13 @@ void write_goals(const Plan& plan, Report& report);
 void write_service(const ServicePlan& plan, Report& report);
 // All labels of a segmentation beside the peers. The root: see surface_nets.h.
 void write_labels(const std::filesystem::path& surface_nets_root, Report& report);
+// A volume at its own resolution, and the surface that is simplified.
+struct AccuracySubject {
+  const Samples& samples;
+  Subject::Level level;
+};
+// Triangles, distances and times against the bound of the error, beside others' simplification.
+void write_accuracy(const std::vector<AccuracySubject>& subjects, Report& report);
 // How much of a job is encoding, by libdraco and by our own encoder.
 void write_draco_share(const Subject& subject, Report& report);
 

@@ -130,25 +130,35 @@ std::string Stages::drc() const {
 
 std::uint64_t Stages::run_job(int passes, MeshFormat format) {
   MeshParameters parameters;
+  parameters.passes = passes;
+  parameters.formats = {format};
+  return run_job(parameters, false).bytes;
+}
+
+JobFigures Stages::run_job(const MeshParameters& asked, bool certify) {
+  MeshParameters parameters = asked;
   parameters.scheme = surface_.scheme;
   parameters.interpolation = surface_.interpolation;
   parameters.close = surface_.close;
-  parameters.passes = passes;
-  parameters.formats = {format};
   CountingSink counting;
-  const std::array sinks = {counting.sink()};
+  const std::vector<codec::Sink> sinks(parameters.formats.size(), counting.sink());
   const jobs::Report nobody = [](Stage, double, const Timing&) {};
   jobs::Progress progress({}, nobody);
   const auto& [x, y, z] = samples_.dims;
   const Volume volume;
-  jobs::make_mesh({samples_.type, {x, y, z}, samples_.geometry, samples_.bytes.data()},
-                  {.volume = volume,
-                   .parameters = parameters,
-                   .iso = surface_.iso,
-                   .certify = false,
-                   .memory_bytes = std::numeric_limits<std::uint64_t>::max()},
-                  sinks, progress, mesh_);
-  return counting.bytes;
+  JobFigures figures;
+  figures.mesh =
+      jobs::make_mesh({samples_.type, {x, y, z}, samples_.geometry, samples_.bytes.data()},
+                      {.volume = volume,
+                       .parameters = parameters,
+                       .iso = surface_.iso,
+                       .certify = certify,
+                       .memory_bytes = std::numeric_limits<std::uint64_t>::max()},
+                      sinks, progress, mesh_);
+  progress.end_stage();
+  figures.timing = progress.timing();
+  figures.bytes = counting.bytes;
+  return figures;
 }
 
 void Stages::release_memory() {

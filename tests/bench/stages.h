@@ -45,6 +45,13 @@ const char* name_of(Encoding encoding);
 // True when it runs on more than one thread.
 bool is_parallel(Encoding encoding);
 
+// What a job answers.
+struct JobFigures {
+  MeshSummary mesh;
+  Timing timing;
+  std::uint64_t bytes = 0;  // of all files
+};
+
 // Threads that the stages run on, 1 at least. Not while one runs.
 void set_threads(int threads);
 
@@ -72,6 +79,8 @@ class Stages {
   // What a job does between the samples in memory and the bytes of its one file, disk left out. The
   // number of bytes.
   std::uint64_t run_job(int passes, MeshFormat format);
+  // The same of a job that asks for more; the surface is this one's, whatever the parameters say.
+  JobFigures run_job(const MeshParameters& parameters, bool certify);
 
   // Gives the memory back to the system, so that the next run meets pages that are not mapped.
   void release_memory();

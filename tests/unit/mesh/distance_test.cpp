@@ -173,6 +173,35 @@ TEST(Distance, IsThatOfAPlainSearchWhereTrianglesDifferInSize) {
   expect_as_plain(mixed, random_triangles(60, 9));
 }
 
+// Whatever the guess, there is a triangle within a distance or there is none.
+TEST(Distance, WithinABoundIsThatOfAPlainSearch) {
+  const Mesh mesh = random_triangles(300, 5);
+  const TriangleGrid grid(mesh, {});
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> place(-7, 7);
+  std::uniform_int_distribution<std::uint32_t> any(0, 299);
+  int found = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Point point = {place(random), place(random), place(random)};
+    const double plain = plain_distance(point, mesh);
+    for (const double bound : {0.1, 0.5, 1.0, 3.0, 0.999999 * plain, 1.000001 * plain}) {
+      for (const std::uint32_t guess : {TriangleGrid::kNone, any(random)}) {
+        const TriangleGrid::Nearest near = grid.within(point, bound * bound, guess);
+        ASSERT_EQ(near.triangle != TriangleGrid::kNone, plain <= bound);
+        if (near.triangle == TriangleGrid::kNone) continue;
+        ++found;
+        EXPECT_EQ(near.squared_mm,
+                  squared_distance(point, corners_of(mesh, mesh.triangles[near.triangle])));
+        EXPECT_LE(near.squared_mm, bound * bound);
+      }
+    }
+  }
+  EXPECT_GT(found, 500);
+  const Mesh nothing;
+  EXPECT_EQ(TriangleGrid(nothing, {}).within({0, 0, 0}, 1, TriangleGrid::kNone).triangle,
+            TriangleGrid::kNone);
+}
+
 TEST(Distance, OfAMeshThatIsMovedAlongItsNormalIsTheMove) {
   constexpr double kMove = 0.375;
   const Certificate certificate = certify(sheet(30, kMove), sheet(30), {});
