@@ -22,6 +22,7 @@ constexpr double kSmoothPerTriangleAndPass = 3.0e-6;
 constexpr double kMeasurePerTriangle = 3.0e-5;
 constexpr double kSimplifyPerTriangle = 5.0e-4;
 constexpr double kSimplifyWithinPerTriangle = 4.0e-3;
+constexpr double kLevelsPerTriangle = 7.5e-4;
 constexpr double kCertifyPerTriangle = 1.0e-3;
 
 // Calibrating looks at these many finished jobs, the youngest.
@@ -72,7 +73,8 @@ double encode_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
     slowest = std::max(slowest, each);
     sum += each;
   }
-  return as_double(surface.triangles) * (slowest + (sum - slowest) / 2);
+  const double levels = parameters.lods.size() > 1 ? kLevelsPerTriangle : 0;
+  return as_double(surface.triangles) * (slowest + (sum - slowest) / 2 + levels);
 }
 
 // Files of labels have the triangles of each label's own surface.

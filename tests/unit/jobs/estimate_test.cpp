@@ -208,6 +208,16 @@ TEST(CostModel, LearnsWhatAnErrorLeaves) {
   EXPECT_EQ(costs.simplified(surface, parameters, 1).triangles, 1000U);
 }
 
+TEST(CostModel, LevelsOfDetailTakeTime) {
+  JobParameters parameters;
+  parameters.formats = {MeshFormat::kGlb};
+  const SurfaceSize surface = {1'000'000, 500'000};
+  const CostModel model;
+  const double without = model.milliseconds(surface, surface, 1'000, parameters);
+  parameters.lods = {1, 0.25};
+  EXPECT_GT(model.milliseconds(surface, surface, 1'000, parameters), 2 * without);
+}
+
 TEST(CostModel, AJobWithoutARunTeachesNothing) {
   Job job;
   job.mesh.emplace();
