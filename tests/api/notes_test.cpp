@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/isomesh/package.h"
 #include "proto/json.h"
 #include "tests/api/daemon.h"
 #include "tests/api/dicom_bytes.h"
@@ -270,6 +271,50 @@ TEST_F(NotesTest, ARefusalOffersTheVolumesOfAFile) {
   const Finished said = daemon_.command({"upload", folder_ / "a.nii"});
   EXPECT_EQ(said.status, 1);
   EXPECT_THAT(said.errors, HasSubstr("--volume 1"));
+}
+
+TEST_F(NotesTest, ARefusedUploadIsKeptForWhoWantsToChoose) {
+  const std::string file = nifti({.axes = 4});
+  EXPECT_EQ(daemon_.send("POST", "/v1/volumes", file).header("isomesh-upload"), "");
+  const Answer open = daemon_.send("POST", "/v1/volumes?keep=true", file,
+                                   {{"Content-Disposition", "attachment; filename=\"t.nii\""}});
+  EXPECT_EQ(open.status, 422);
+  const std::string kept = open.header("isomesh-upload");
+  ASSERT_EQ(kept.size(), 32U);
+  const std::string again = "/v1/volumes?keep=true&upload=" + kept;
+  EXPECT_EQ(daemon_.send("POST", again).header("isomesh-upload"), kept);
+  EXPECT_EQ(daemon_.send("POST", again + "&volume=1", "a body").status, 400);
+  EXPECT_EQ(daemon_.send("POST", "/v1/volumes?keep=maybe", file).status, 400);
+  const Answer chosen = daemon_.send("POST", again + "&volume=1");
+  ASSERT_EQ(chosen.status, 201) << chosen.body;
+  const Volume volume = volume_from_json(chosen.body);
+  EXPECT_EQ(volume.name, "t.nii");
+  EXPECT_THAT(volume.notes, Contains(Field(&Note::code, "volume-chosen")));
+  EXPECT_EQ(daemon_.send("POST", again + "&volume=0").status, 410);
+
+  // What nobody can help is not kept, and what is no volume can be described.
+  EXPECT_EQ(daemon_.send("POST", "/v1/volumes?keep=true", nrrd("", "few")).header("isomesh-upload"),
+            "");
+  const Answer raw = daemon_.send("POST", "/v1/volumes?keep=true", std::string(24, 'a'));
+  EXPECT_EQ(raw.status, 415);
+  const std::string described =
+      "/v1/volumes?dims=4,3,2&type=uint8&upload=" + raw.header("isomesh-upload");
+  EXPECT_EQ(daemon_.send("POST", described).status, 201);
+}
+
+TEST_F(NotesTest, AKeptFolderHasEachOfItsVolumesRead) {
+  const Shown several = {{{"a.nii", nifti({.axes = 4})}, {"b.nrrd", nrrd("")}}};
+  const std::filesystem::path folder = folder_ / "kept";
+  std::filesystem::create_directory(folder);
+  for (const auto& [name, bytes] : several.files) write_file(folder / name, bytes);
+  const UploadBody body(folder);
+  std::string bytes(body.size(), '\0');
+  body.read(0, bytes);
+  const Answer first = daemon_.send("POST", "/v1/volumes?keep=true", bytes);
+  EXPECT_EQ(first.status, 207);
+  const std::string again = "/v1/volumes?member=a.nii&upload=" + first.header("isomesh-upload");
+  EXPECT_EQ(daemon_.send("POST", again + "&volume=0").status, 201);
+  EXPECT_EQ(daemon_.send("POST", again + "&volume=1").status, 201);
 }
 
 TEST_F(NotesTest, EveryVolumeOfAFolderIsAnsweredFor) {

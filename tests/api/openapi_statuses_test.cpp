@@ -80,6 +80,7 @@ void probe_volumes(Statuses& statuses, const Job& running, const std::string& id
                "POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\n"
                "Content-Length: 99999999999999\r\n\r\n");
   statuses.probe(post, "/v1/volumes", two_volumes());
+  statuses.probe(post, "/v1/volumes?upload=" + std::string(32, '0'));
   statuses.probe("GET /v1/volumes", "/v1/volumes");
   statuses.probe("GET /v1/volumes", "/v1/volumes?cursor=x");
   for (const std::string part : {"", "/histogram", "/labels", "/slice.png", "/preview"}) {

@@ -42,6 +42,7 @@ TEST(Start, TellsItsVersion) {
   EXPECT_EQ(answer.status, 200);
   EXPECT_THAT(answer.body,
               HasSubstr("\"version\":\"" + run({ISOMESHD, "--version"}).output.substr(0, 5) + '"'));
+  EXPECT_THAT(answer.body, HasSubstr("\"orders\":false"));
   EXPECT_THAT(daemon.get("/metrics").body, HasSubstr("\nisomesh_build_info{"));
 }
 

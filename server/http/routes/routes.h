@@ -17,6 +17,7 @@
 #include "server/http/connections.h"
 #include "server/http/guards/access.h"
 #include "server/http/guards/origin.h"
+#include "server/http/kept_uploads.h"
 #include "server/http/request_values.h"
 #include "server/http/response.h"
 #include "server/http/router.h"
@@ -34,6 +35,7 @@ struct App {
   const Tokens* tokens = services.tokens;  // null: everybody may do everything
   Metrics& metrics = services.metrics;
   net::FairPlaces uploads;
+  KeptUploads kept;
   net::FairPlaces streams;  // of events
   Broadcaster events;
   OriginRules rules;  // constant once the server is bound

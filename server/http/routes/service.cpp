@@ -21,9 +21,11 @@ void add_service_routes(App& app) {
     }
     response.set_body("ok\n", "text/plain");
   });
-  add_get(app, "/version", [](const auto& request, auto& response) {
+  add_get(app, "/version", [&app](const auto& request, auto& response) {
     check_known(request, {});
-    const nlohmann::json version = {{"version", ISOMESH_VERSION}, {"mesher", jobs::kMesherVersion}};
+    const nlohmann::json version = {{"version", ISOMESH_VERSION},
+                                    {"mesher", jobs::kMesherVersion},
+                                    {"orders", app.services.orders != nullptr}};
     response.set_body(version.dump(), "application/json");
   });
   add_get(app, "/openapi.yaml", [](const auto& /*request*/, auto& response) {

@@ -10,16 +10,83 @@ namespace {
 const std::string kVolumes = "/v1/volumes";
 constexpr const char* kVolumeCursor = "volumes";
 
+// Names a refused upload that is kept; the request's parameter of that name names it in turn.
+constexpr const char* kUploadHeader = "Isomesh-Upload";
+
+bool is_to_be_kept(const Request& request) {
+  const std::string_view keep = request.has_parameter("keep") ? request.parameter("keep") : "false";
+  if (keep != "true" && keep != "false") {
+    throw invalid_parameter("keep", "must be true or false");
+  }
+  return keep == "true";
+}
+
+// The request's body, or one that came before and is kept.
+KeptUploads::Kept upload_of(App& app, const Request& request) {
+  if (request.has_parameter("upload")) {
+    if (request.content_length.value_or(1) != 0) {
+      throw invalid_parameter("upload", "names a body that is here already: send none");
+    }
+    return app.kept.find(owner_of(request), std::string(request.parameter("upload")));
+  }
+  const store::DataFolder& folder = app.services.folder;
+  const std::uint64_t free = folder.reserve().free_bytes();
+  if (!folder.reserve().has_room() || request.content_length.value_or(0) > free) {
+    app.kept.let_all_go();
+  }
+  return std::make_shared<const Upload>(folder, app.options.upload, app.stopping, request);
+}
+
+// What another request can have read otherwise: it leaves something to be chosen, or raw samples to
+// be described.
+bool may_be_helped(const Error& error) {
+  return error.code() == ErrorCode::kUnsupportedMedia || error.remedy() != Remedy();
+}
+
+void keep(App& app, const Request& request, Response& response, const KeptUploads::Kept& file) {
+  response.set_header(kUploadHeader, request.has_parameter("upload")
+                                         ? std::string(request.parameter("upload"))
+                                         : app.kept.keep(owner_of(request), file));
+}
+
+std::vector<UploadedVolume> imported(App& app, const Request& request, Response& response,
+                                     const process::ImportOptions& options) {
+  const bool is_kept = is_to_be_kept(request);
+  const KeptUploads::Kept file = upload_of(app, request);
+  try {
+    std::vector<UploadedVolume> volumes = counting_refusals(app, request, [&] {
+      return app.services.library.add_all(owner_of(request), file->path(), options, file->name());
+    });
+    bool is_helped = false;
+    for (const UploadedVolume& each : volumes) {
+      if (!each.problem) continue;
+      const Error error = to_error(*each.problem);
+      report_import_refused(app, request, error);
+      is_helped = is_helped || may_be_helped(error);
+    }
+    if (is_kept && is_helped) keep(app, request, response, file);
+    return volumes;
+  } catch (const Error& error) {
+    if (is_kept && may_be_helped(error)) keep(app, request, response, file);
+    throw;
+  }
+}
+
+std::set<std::string> upload_parameters() {
+  std::set<std::string> names = import_parameters();
+  names.insert({"keep", "upload"});
+  return names;
+}
+
 void upload(App& app, const Request& request, Response& response) {
-  check_known(request, import_parameters());
+  check_known(request, upload_parameters());
   const process::ImportOptions options = import_options_of(request);
   const auto place = place_for_upload(app, request);
-  const Upload file(app.services.folder, app.options.upload, app.stopping, request);
-  const std::vector<UploadedVolume> volumes = counting_refusals(app, request, [&] {
-    return app.services.library.add_all(owner_of(request), file.path(), options, file.name());
-  });
-  for (const UploadedVolume& each : volumes) {
-    if (each.problem) report_import_refused(app, request, to_error(*each.problem));
+  const std::vector<UploadedVolume> volumes = imported(app, request, response, options);
+  // Of an archive of several volumes another one may be wanted.
+  if (volumes.front().volume && request.has_parameter("upload") &&
+      !request.has_parameter("member")) {
+    app.kept.let_go(owner_of(request), std::string(request.parameter("upload")));
   }
   if (volumes.size() != 1 || !volumes.front().volume) {
     constexpr int kMultiStatus = 207;

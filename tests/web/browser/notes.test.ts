@@ -48,9 +48,10 @@ describe('an upload of several volumes', () => {
 
     const times = page.locator('[data-member="times.nii"]');
     await times.getByLabel('Volume to read').selectOption({ label: 'time 1 (1)' });
-    await times.getByRole('button', { name: 'Upload this volume' }).click();
+    await times.getByRole('button', { name: 'Take this volume' }).click();
     await expect.poll(() => page.locator('.outcomes .stored').count()).toBe(2);
-    expect(queries).toEqual(['', '?member=times.nii&volume=1']);
+    const [kept = ''] = /upload=\w{32}/.exec(queries[1] ?? '') ?? [];
+    expect(queries).toEqual(['?keep=true', `?keep=true&${kept}&member=times.nii&volume=1`]);
     expect(await page.locator('[data-member="cut.nrrd"]').getAttribute('class')).toBe('refused');
     await expect.poll(() => page.locator('[data-volume]').count()).toBe(2);
 
@@ -69,7 +70,7 @@ describe('a refusal', () => {
     await drop(page, [{ name: 'two.nii', bytes: seriesNifti() }]);
     await expect.poll(() => page.locator('.refusal').innerText()).toContain('2 volumes');
     await page.getByLabel('Volume to read').selectOption('0');
-    await page.getByRole('button', { name: 'Upload this volume' }).click();
+    await page.getByRole('button', { name: 'Take this volume' }).click();
     await page.waitForURL(volumePage);
     expect(await page.locator('[data-note="volume-chosen"]').innerText()).toContain('Volume 0');
   });
@@ -86,7 +87,8 @@ describe('a refusal', () => {
     await drop(page, slices);
     await page.getByRole('button', { name: 'Take it in spite of this' }).click();
     await page.waitForURL(volumePage);
-    expect(queries).toEqual(['', '?accept=frame-of-reference']);
+    const [kept = ''] = /upload=\w{32}/.exec(queries[1] ?? '') ?? [];
+    expect(queries).toEqual(['?keep=true', `?keep=true&${kept}&accept=frame-of-reference`]);
     await expect.poll(() => page.locator('[data-note="frame-of-reference"]').count()).toBe(1);
     await expectText(hostile); // the series' name
   });

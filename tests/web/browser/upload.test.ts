@@ -63,7 +63,7 @@ describe('several files', () => {
     await drop(page, [{ name: 'study.nrrd', bytes: ballNrrd(16, 5, 3) }]);
     const choice = page.getByLabel('Series to read');
     await choice.selectOption({ label: 'chest, 40 slices (1.2.840.2)' });
-    await page.getByRole('button', { name: 'Upload this series' }).click();
+    await page.getByRole('button', { name: 'Take this series' }).click();
     await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
     expect(asked).toEqual(['', '1.2.840.2']);
   });

@@ -1,7 +1,7 @@
 // Uploads that go on, wait, ask before they send, and are dropped wherever.
 import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ctSlice } from './files';
+import { ctSlice, seriesNifti } from './files';
 import { ballNrrd, Daemon, drop, openPage, setup } from './support';
 
 const at = setup();
@@ -12,7 +12,7 @@ async function held(page: Page): Promise<{ letGo: () => void; count: () => numbe
   let open = (): void => undefined;
   const gate = new Promise<void>((resolve) => (open = resolve));
   let count = 0;
-  await page.route('**/v1/volumes', async (route) => {
+  await page.route('**/v1/volumes?*', async (route) => {
     if (route.request().method() === 'POST') {
       count += 1;
       await gate;
@@ -80,8 +80,12 @@ describe('an upload', () => {
     expect(sent).toHaveLength(1);
   });
 
-  it('of a series without a UID is taken from the dialog', async () => {
+  it('of a series without a UID is taken from the dialog, and sent once', async () => {
     const { page, daemon } = at;
+    const sent: number[] = [];
+    page.on('requestfinished', (request) => {
+      if (request.method() === 'POST') void request.allHeaders().then((all) => sent.push(Number(all['content-length'])));
+    });
     await page.goto(daemon.url);
     const slices = [1, 2, 3, 4].map((index) => ({
       name: `${index}.dcm`,
@@ -91,9 +95,51 @@ describe('an upload', () => {
     const choice = page.getByLabel('Series to read');
     await choice.waitFor();
     await choice.selectOption({ index: (await choice.locator('option').allInnerTexts()).findIndex((text) => text.startsWith('none')) });
-    await page.getByRole('button', { name: 'Upload this series' }).click();
+    await page.getByRole('button', { name: 'Take this series' }).click();
     await page.waitForURL(volumePage);
     expect(await page.locator('.facts').innerText()).toContain('4 \u00d7 4 \u00d7 2');
+    const bytes = slices.reduce((sum, slice) => sum + slice.bytes.length, 0);
+    expect(sent).toEqual([expect.any(Number), 0]);
+    expect(sent[0]).toBeGreaterThan(bytes);
+  });
+});
+
+describe('what was uploaded and refused', () => {
+  it('is sent again when the daemon does not keep it any more', async () => {
+    const { page, daemon } = at;
+    await page.goto(daemon.url);
+    await drop(page, [{ name: 'two.nii', bytes: seriesNifti() }]);
+    const choice = page.getByLabel('Volume to read');
+    await choice.waitFor();
+    const statuses: number[] = [];
+    page.on('response', (response) => {
+      if (response.request().method() === 'POST') statuses.push(response.status());
+    });
+    // Others push it out.
+    for (let other = 0; other < 2; other += 1) {
+      await fetch(`${daemon.url}/v1/volumes?keep=true`, { method: 'POST', body: new Uint8Array(seriesNifti()) });
+    }
+    await page.getByRole('button', { name: 'Take this volume' }).click();
+    await page.waitForURL(volumePage);
+    expect(statuses).toEqual([410, 201]);
+  });
+
+  it('or would be, is not sent at all where its header tells so', async () => {
+    const { page, daemon } = at;
+    const sent: string[] = [];
+    page.on('request', (request) => {
+      if (request.method() === 'POST') sent.push(request.url());
+    });
+    await page.goto(daemon.url);
+    await drop(page, [{ name: 'cut.nrrd', bytes: ballNrrd(32, 10).subarray(0, 20_000) }]);
+    await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/32 × 32 × 32.*cut off.*Nothing was sent/);
+    await page.getByRole('button', { name: 'Choose another' }).click();
+    await drop(page, [
+      { name: 'a.txt', bytes: Buffer.from('Dear colleague') },
+      { name: 'b.txt', bytes: Buffer.from('Dear colleague') },
+    ]);
+    await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/all 2 files/);
+    expect(sent).toEqual([]);
   });
 });
 

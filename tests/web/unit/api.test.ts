@@ -73,10 +73,10 @@ describe('merged', () => {
 
 describe('uploadPath', () => {
   it('describes raw samples and what was chosen', () => {
-    expect(uploadPath({})).toBe('/v1/volumes');
-    expect(uploadPath({ choices: { series: '1.2.3', volume: '4' } })).toBe('/v1/volumes?series=1.2.3&volume=4');
+    expect(uploadPath({})).toBe('/v1/volumes?keep=true');
+    expect(uploadPath({ choices: { series: '1.2.3', volume: '4' } })).toBe('/v1/volumes?keep=true&series=1.2.3&volume=4');
     const raw = { dims: [2, 3, 4] as [number, number, number], type: 'int16' as const, spacing: [1, 1, 0.5] as [number, number, number], byteOrder: 'big' as const };
-    expect(decodeURIComponent(uploadPath({ raw }))).toBe('/v1/volumes?dims=2,3,4&type=int16&spacing=1,1,0.5&byte_order=big');
+    expect(decodeURIComponent(uploadPath({ raw }))).toBe('/v1/volumes?keep=true&dims=2,3,4&type=int16&spacing=1,1,0.5&byte_order=big');
   });
 });
 

@@ -183,6 +183,8 @@ class DicomInstance(TypedDict):
 
 class Version(TypedDict):
     version: str
+    #: Whether it knows a PACS, so that it takes orders.
+    orders: bool
     #: Of what makes meshes. While it stays, the same volume and parameters give the same bytes.
     mesher: str
 

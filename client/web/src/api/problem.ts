@@ -1,7 +1,10 @@
 import type { Choice, FieldFault, Problem } from './types';
 
 // Of a refusal: the note that a person may accept, and what there is to choose from.
-export type Remedy = Pick<Problem, 'overridable' | 'choices'>;
+export type Remedy = Pick<Problem, 'overridable' | 'choices'> & {
+  // The name by which the daemon keeps what was uploaded.
+  kept?: string;
+};
 
 // A request that the daemon refused, or (status 0) that never reached it.
 export class ApiError extends Error {
@@ -29,21 +32,21 @@ function isProblem(value: unknown): value is Problem {
   return typeof problem === 'object' && problem !== null && typeof problem.title === 'string';
 }
 
-export function errorOfProblem(problem: Problem): ApiError {
+export function errorOfProblem(problem: Problem, kept?: string): ApiError {
   return new ApiError(
     problem.status,
     problem.title,
     problem.detail,
     Array.isArray(problem.errors) ? problem.errors : [],
-    { overridable: problem.overridable, choices: problem.choices },
+    { overridable: problem.overridable, choices: problem.choices, kept },
   );
 }
 
 // What a refusal's body says; a proxy before the daemon may answer with anything.
-export function errorOf(status: number, body: string): ApiError {
+export function errorOf(status: number, body: string, kept?: string): ApiError {
   try {
     const problem: unknown = JSON.parse(body);
-    if (isProblem(problem)) return errorOfProblem({ ...problem, status });
+    if (isProblem(problem)) return errorOfProblem({ ...problem, status }, kept);
   } catch {
     // Not JSON: the status has to do.
   }

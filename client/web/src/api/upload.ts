@@ -16,13 +16,23 @@ export interface UploadOptions {
   choices?: Readonly<Record<string, string>>;
   // What the file is called.
   name?: string;
+  // The name by which the daemon keeps the body, which is not sent again then.
+  kept?: string;
   signal: AbortSignal;
   // Bytes that are sent; all of them while the daemon reads the volume.
   onProgress: (sent: number, total: number) => void;
 }
 
-export function uploadPath(options: Pick<UploadOptions, 'raw' | 'choices'>): string {
-  const query = new URLSearchParams();
+export interface Uploaded {
+  volumes: UploadedVolume[];
+  // Under which the daemon keeps the body, as long as something of it may be chosen.
+  kept?: string;
+}
+
+// What is refused stays with the daemon until a person has chosen what of it to read.
+export function uploadPath(options: Pick<UploadOptions, 'raw' | 'choices' | 'kept'>): string {
+  const query = new URLSearchParams({ keep: 'true' });
+  if (options.kept !== undefined) query.set('upload', options.kept);
   if (options.raw) {
     query.set('dims', options.raw.dims.join(','));
     query.set('type', options.raw.type);
@@ -30,8 +40,7 @@ export function uploadPath(options: Pick<UploadOptions, 'raw' | 'choices'>): str
     query.set('byte_order', options.raw.byteOrder);
   }
   for (const [parameter, value] of Object.entries(options.choices ?? {})) query.set(parameter, value);
-  const text = query.toString();
-  return `/v1/volumes${text === '' ? '' : `?${text}`}`;
+  return `/v1/volumes?${query.toString()}`;
 }
 
 // The header that tells a file's name, which is in no address because logs hold those.
@@ -46,7 +55,8 @@ export function uploadedOf(status: number, body: string): UploadedVolume[] {
   return [{ member: '', status, volume: answer as Volume, problem: null }];
 }
 
-export function upload(body: Blob, options: UploadOptions): Promise<UploadedVolume[]> {
+export function upload(whole: Blob, options: UploadOptions): Promise<Uploaded> {
+  const body = options.kept === undefined ? whole : new Blob();
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open('POST', uploadPath(options));
@@ -61,12 +71,13 @@ export function upload(body: Blob, options: UploadOptions): Promise<UploadedVolu
     request.upload.onload = () => options.onProgress(body.size, body.size);
     request.onload = () => {
       connected.value = true;
+      const kept = request.getResponseHeader('Isomesh-Upload') ?? undefined;
       if ([200, 201, 207].includes(request.status)) {
-        resolve(uploadedOf(request.status, request.responseText));
+        resolve({ volumes: uploadedOf(request.status, request.responseText), kept });
         return;
       }
       if (request.status === 401) unauthorized.value = true;
-      reject(errorOf(request.status, request.responseText));
+      reject(errorOf(request.status, request.responseText, kept));
     };
     request.onerror = () => {
       // A server that refuses early closes the connection while the body is still on its way, which

@@ -32,7 +32,7 @@ function choiceForm(
     'div',
     { class: 'series' },
     field(`${noun.charAt(0).toUpperCase()}${noun.slice(1)} to read`, select),
-    button(`Upload this ${noun}`, () => onChoice(select.value), { class: 'primary' }),
+    button(`Take this ${noun}`, () => onChoice(select.value), { class: 'primary' }),
   );
 }
 

@@ -8,7 +8,7 @@ import { hashOf } from '../ui/route';
 import { Signal } from '../ui/signal';
 import { filesOfDrop, filesOfList, gather, type Gathered } from '../volume/gather';
 import { volumeName } from '../volume/names';
-import { mayBeVolume } from '../volume/sniff';
+import { faultOf } from '../volume/sniff';
 import type { NamedFile } from '../volume/tar';
 import { outcomeList, outcomeOf, type Outcome } from './outcomes';
 import { rawForm } from './raw_form';
@@ -98,41 +98,49 @@ export class UploadPanel {
   // What surely is no volume is not sent without being asked about.
   private async begin(gathered: Gathered): Promise<void> {
     this.running = new AbortController();
-    if (gathered.count > 1 || (await mayBeVolume(gathered.body).catch(() => true))) {
+    // What the browser cannot read the daemon will not get either, and is said when it is sent.
+    const fault = await faultOf(gathered.files).catch(() => null);
+    if (!fault) {
       await this.send(gathered);
       return;
     }
     this.running = null;
-    const error = new ApiError(
-      415,
-      'This is no volume that can be read',
-      `The first bytes of ${gathered.name} are those of no known format. Nothing was sent.`,
-    );
     const anyway = button('Upload it anyway', () => void this.send(gathered));
-    this.showProblem(error, gathered, anyway);
+    this.showProblem(fault, gathered, anyway);
   }
 
   private async send(gathered: Gathered, addition: Addition = {}): Promise<void> {
     const controller = new AbortController();
     this.running = controller;
-    const progress = new UploadProgress(gathered.body.size);
+    const { kept } = gathered;
+    const progress = new UploadProgress(kept === undefined ? gathered.body.size : 0);
     this.showRunning(gathered, progress, controller);
     this.state.value = 'Uploading';
     try {
       const uploaded = await upload(gathered.body, {
         ...addition,
         name: gathered.name,
+        kept,
         signal: controller.signal,
         onProgress: (sent) => {
           progress.show(sent);
-          this.state.value = `Uploading ${Math.floor((100 * sent) / gathered.body.size)} %`;
+          if (kept === undefined) this.state.value = `Uploading ${Math.floor((100 * sent) / gathered.body.size)} %`;
         },
       });
+      gathered.kept = uploaded.kept ?? kept;
       this.running = null;
       this.state.value = idle;
-      this.showUploaded(uploaded, gathered, addition);
+      this.showUploaded(uploaded.volumes, gathered, addition);
     } catch (error) {
       this.running = null;
+      const failure = asApiError(error);
+      if (kept !== undefined && failure.status === 410) {
+        // It was chosen too late.
+        gathered.kept = undefined;
+        await this.send(gathered, addition);
+        return;
+      }
+      gathered.kept = failure.remedy.kept ?? kept;
       this.state.value = idle;
       this.showFailed(error, gathered, addition);
     }

@@ -7,11 +7,16 @@ export class UploadProgress {
   readonly text = h('p', { class: 'upload-status', role: 'status' });
   private readonly began = performance.now();
 
+  // Without bytes: the server has them already.
   constructor(private readonly total: number) {
-    this.bar = h('progress', { max: total, value: 0, 'aria-label': 'Upload' });
+    this.bar = h('progress', { max: Math.max(1, total), value: 0, 'aria-label': 'Upload' });
+    if (total > 0) return;
+    this.bar.removeAttribute('value');
+    this.text.textContent = 'The server reads the volume out of what it has';
   }
 
   show(sent: number): void {
+    if (this.total === 0) return;
     this.bar.value = sent;
     if (sent >= this.total) {
       this.bar.removeAttribute('value');

@@ -39,7 +39,10 @@ export function filesOfList(list: FileList): NamedFile[] {
 export interface Gathered {
   name: string;
   count: number;
+  files: readonly NamedFile[];
   body: Blob;
+  // Under which the daemon keeps the body while something of it is to be chosen.
+  kept?: string;
 }
 
 // One file goes as it is, several are packed. Null when there is none.
@@ -47,11 +50,12 @@ export function gather(files: NamedFile[]): Gathered | null {
   const wanted = files.filter(({ path, file }) => !systemFiles.test(path) && file.size > 0);
   const [first] = wanted;
   if (first === undefined) return null;
-  if (wanted.length === 1) return { name: first.path, count: 1, body: first.file };
+  if (wanted.length === 1) return { name: first.path, count: 1, files: wanted, body: first.file };
   const folder = first.path.includes('/') ? first.path.split('/')[0] : undefined;
   return {
     name: folder ?? `${wanted.length} files`,
     count: wanted.length,
+    files: wanted,
     body: packTar(wanted),
   };
 }

@@ -1,7 +1,14 @@
 // Whether a file's first bytes are those of something that the daemon reads, so that gigabytes of something
 // else are not sent for nothing. The daemon judges; this only says what is surely none of it.
 
+import { ApiError } from '../api/problem';
+import { formatBytes, formatDims } from '../ui/format';
+import { declaredBy } from './declared';
+import type { NamedFile } from './tar';
+
 const headBytes = 1024;
+// Headers of text may be long.
+const textBytes = 16_384;
 // Of a compressed file, which surely hold the first bytes of what it was.
 const packedBytes = 65_536;
 
@@ -70,4 +77,34 @@ function isKnown(head: Uint8Array): boolean {
 export async function mayBeVolume(file: Blob): Promise<boolean> {
   const head = await bytesOf(file, headBytes);
   return isKnown(startsWith(head, 0x1f, 0x8b) ? await unpacked(file) : head);
+}
+
+function unsent(status: 415 | 422, detail: string): ApiError {
+  const title = status === 415 ? 'This is no volume that can be read' : 'This volume is not whole';
+  return new ApiError(status, title, `${detail} Nothing was sent.`);
+}
+
+// Why sending it is surely for nothing; null where it may be a volume.
+async function faultOfOne({ path, file }: NamedFile): Promise<ApiError | null> {
+  if (!(await mayBeVolume(file))) return unsent(415, `The first bytes of ${path} are those of no known format.`);
+  const head = await bytesOf(file, textBytes);
+  const declared = declaredBy(head);
+  if (!declared) return null;
+  if (declared.isElsewhere) {
+    return unsent(422, `${path} is a header, whose samples are in a file of their own. Choose both together.`);
+  }
+  if (declared.bytes === null || file.size >= declared.bytes) return null;
+  return unsent(
+    422,
+    `${path} says that it has ${formatDims(declared.dims)} samples, which with its header are ` +
+    `${formatBytes(declared.bytes)}, but the file has ${formatBytes(file.size)}: it was cut off.`,
+  );
+}
+
+// The same of what is sent together: data files beside a header are known by nothing.
+export async function faultOf(files: readonly NamedFile[]): Promise<ApiError | null> {
+  const [only] = files;
+  if (only && files.length === 1) return faultOfOne(only);
+  for (const { file } of files) if (await mayBeVolume(file)) return null;
+  return unsent(415, `The first bytes of all ${files.length} files are those of no known format.`);
 }
