@@ -1,5 +1,6 @@
 // Arrays of triangles made ready for drawing: blocks of 16-bit indices, normals, borders, and a
 // coarse copy for the time that it is turned.
+import type { Vec3 } from '../api/types';
 
 export interface Triangles {
   positions: Float32Array<ArrayBuffer>;
@@ -21,6 +22,8 @@ export interface Block {
   border: Uint16Array<ArrayBuffer>;
   borderNormals: Float32Array<ArrayBuffer>;
   distances?: Float32Array<ArrayBuffer>;
+  // The corners of the box around it.
+  bounds: readonly [Vec3, Vec3];
 }
 
 const mostVertices = 65_535;
@@ -237,6 +240,18 @@ export function split(whole: Triangles): Triangles[] {
   return parts;
 }
 
+export function boundsOf(positions: ArrayLike<number>): [Vec3, Vec3] {
+  const low: Vec3 = [Infinity, Infinity, Infinity];
+  const high: Vec3 = [-Infinity, -Infinity, -Infinity];
+  for (let i = 0; i < positions.length; i += 1) {
+    const axis = (i % 3) as 0 | 1 | 2;
+    const value = positions[i] as number;
+    if (value < low[axis]) low[axis] = value;
+    if (value > high[axis]) high[axis] = value;
+  }
+  return [low, high];
+}
+
 export function prepare(triangles: Triangles): Block {
   const { positions, index } = triangles;
   const sums = areaNormals(triangles);
@@ -252,6 +267,7 @@ export function prepare(triangles: Triangles): Block {
     normals: packedNormals(sums),
     border,
     borderNormals,
+    bounds: boundsOf(positions),
     ...(triangles.distances && { distances: triangles.distances }),
   };
 }

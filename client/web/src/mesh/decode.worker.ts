@@ -81,7 +81,7 @@ scope.onmessage = (event) => {
     .then((draco) => {
       const blocks = split(decode(draco, request)).map(prepare);
       const buffers = blocks.flatMap((block) =>
-        Object.values<{ buffer: ArrayBuffer }>({ ...block }).map((array) => array.buffer),
+        Object.values(block).flatMap((value: unknown) => (ArrayBuffer.isView(value) ? [value.buffer as ArrayBuffer] : [])),
       );
       scope.postMessage({ id: request.id, blocks, error: '' }, buffers);
     })

@@ -51,8 +51,8 @@ function sizeIn(height: number): number {
 }
 
 export class OrientationCube {
-  private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(28, 1, 0.1, 10);
+  readonly scene = new Scene();
+  readonly camera = new PerspectiveCamera(28, 1, 0.1, 10);
   private readonly box: Mesh<BoxGeometry, MeshBasicMaterial[]>;
   private readonly ray = new Raycaster();
 

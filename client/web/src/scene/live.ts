@@ -28,6 +28,7 @@ import {
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3 } from '../api/types';
 import { blockSize, firstCrossing, type Preview } from '../volume/preview';
+import { compile } from './compile';
 import { whenDrawn } from './fence';
 import { enlargingFragmentShader, enlargingVertexShader, fragmentShader, vertexShader } from './live_shader';
 import { onTap } from './tap';
@@ -119,7 +120,9 @@ export class LiveSurface {
   // Software draws the first, coarser one while something moves.
   private first: Drawable | null = null;
   private best: Drawable | null = null;
-  private isDisposed = false;
+  private readonly over = new AbortController();
+  // Whether the shaders are there.
+  private isCompiled = false;
   private isBusy = false;
   private changedAt = 0;
   private isMoving = false;
@@ -170,6 +173,18 @@ export class LiveSurface {
     this.canvas.addEventListener('webglcontextrestored', () => this.changed());
     this.resizing = new ResizeObserver(() => this.changed());
     this.resizing.observe(host);
+    const shaders: [Scene | Mesh, PerspectiveCamera][] = [
+      [this.scene, this.camera],
+      [this.enlarging, this.camera],
+    ];
+    compile(this.renderer, shaders, this.over.signal, () => {
+      this.isCompiled = true;
+      this.changed();
+    });
+  }
+
+  private get isDisposed(): boolean {
+    return this.over.signal.aborted;
   }
 
   // The first one is looked at as a whole; another one of the same volume leaves the camera where it is.
@@ -259,7 +274,7 @@ export class LiveSurface {
   }
 
   dispose(): void {
-    this.isDisposed = true;
+    this.over.abort();
     clearTimeout(this.settling);
     this.resizing.disconnect();
     this.controls.dispose();
@@ -304,7 +319,7 @@ export class LiveSurface {
     delete this.host.dataset.still;
     if (this.changedAt === 0) this.changedAt = performance.now();
     // What changes while a frame is drawn is drawn next.
-    if (this.isBusy || this.isDisposed) return;
+    if (this.isBusy || this.isDisposed || !this.isCompiled) return;
     this.isBusy = true;
     requestAnimationFrame(() => this.render());
   }

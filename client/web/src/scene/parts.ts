@@ -1,6 +1,7 @@
 // The blocks of triangles in a scene: of one surface, or of one for each label with a colour of its own.
 import {
   BackSide,
+  Box3,
   BufferAttribute,
   BufferGeometry,
   DoubleSide,
@@ -9,6 +10,7 @@ import {
   MeshPhongMaterial,
   type Object3D,
   type Plane,
+  Sphere,
   Vector3,
   type Ray,
 } from 'three';
@@ -55,6 +57,7 @@ interface DrawnBlock {
   label: number | null;
   isLevel: boolean;
   member: number; // of its look's blocks, or of their level's
+  made: Block;
   distances: Float32Array | undefined;
   isThere: boolean; // at the graphics processor
 }
@@ -89,15 +92,23 @@ export class Parts {
   private isCoarse = false;
   private isWhole = false;
   private readonly shader = new DistanceShader();
+  // What a surface without labels is drawn with, so that its shader is there before its first block.
+  private readonly usual = material(neutral);
+  private readonly probe = new Mesh(new BufferGeometry(), this.usual);
 
   constructor(
     private readonly scene: Object3D,
     private readonly uploading: Pick<Uploading, 'add'>,
     private readonly draw: () => void,
-  ) {}
+  ) {
+    this.probe.visible = false;
+    scene.add(this.probe);
+  }
 
-  add(blocks: Block[], part: Part | null, isLevel = false): void {
+  // Whether they are drawn with shaders that may not be there.
+  add(blocks: Block[], part: Part | null, isLevel = false): boolean {
     const label = part?.label ?? null;
+    const areFirst = part !== null && this.looks.size === 0;
     const look = this.looks.get(label) ?? this.newLook(part);
     for (const block of blocks) {
       const position = new BufferAttribute(block.positions, 3);
@@ -113,13 +124,14 @@ export class Parts {
       };
       const fine = geometry(block.index);
       const coarse = geometry(block.coarse);
-      fine.computeBoundingBox();
-      fine.computeBoundingSphere();
+      const [low, high] = block.bounds;
+      fine.boundingBox = new Box3(new Vector3(...low), new Vector3(...high));
+      fine.boundingSphere = fine.boundingBox.getBoundingSphere(new Sphere());
       coarse.boundingSphere = fine.boundingSphere;
       const meshes = look.materials.map((made) => new Mesh(this.isCoarse && !isLevel ? coarse : fine, made));
       const owner = isLevel ? look.level : look;
       const member = owner.blocks;
-      const drawn: DrawnBlock = { meshes, fine, coarse, look, label, isLevel, member, distances: block.distances, isThere: false };
+      const drawn: DrawnBlock = { meshes, fine, coarse, look, label, isLevel, member, made: block, distances: block.distances, isThere: false };
       this.uploading.add({
         geometries: [fine, coarse],
         onThere: () => {
@@ -134,9 +146,9 @@ export class Parts {
       }
       this.show(drawn);
       this.blocks.push(drawn);
-      owner.seams.add(block);
     }
     if (isLevel) this.showAll();
+    return areFirst;
   }
 
   // All of it has come.
@@ -160,19 +172,22 @@ export class Parts {
     return finest.reduce((sum, { fine }) => sum + (fine.index?.count ?? 0) / 3, 0);
   }
 
-  setStyle(style: SurfaceStyle): void {
+  // Whether it takes other shaders.
+  setStyle(style: SurfaceStyle): boolean {
     const becameWire = style.wireframe && !this.style.wireframe;
     this.style = style;
-    for (const look of this.looks.values()) this.apply(look);
+    const isOther = this.applyAll();
     if (becameWire) this.showBySteps();
     else this.showAll();
+    return isOther;
   }
 
   // What is on the other side of these planes is not seen.
-  setCut(planes: Plane[] | null): void {
+  setCut(planes: Plane[] | null): boolean {
     this.planes = planes;
-    for (const look of this.looks.values()) this.apply(look);
+    const isOther = this.applyAll();
     this.showAll();
+    return isOther;
   }
 
   get cut(): Plane | null {
@@ -220,12 +235,19 @@ export class Parts {
     return { at: end, label, distance };
   }
 
-  // Makes the shading go on across the seams of one block; false when there is none of that number.
-  joinSeams(number: number): boolean {
-    const block = this.blocks[number];
-    if (!block) return false;
-    const { look, isLevel, member } = block;
-    (isLevel ? look.level.seams : look.seams).join(member);
+  // Makes the shading go on across the seams, a block at each step: first all of them are learned, then joined. False
+  // when there is no such step.
+  joinSeams(step: number): boolean {
+    const count = this.blocks.length;
+    const block = this.blocks[step % Math.max(1, count)];
+    if (!block || step >= 2 * count) return false;
+    const { look, isLevel, member, made } = block;
+    const { seams } = isLevel ? look.level : look;
+    if (step < count) {
+      seams.add(made);
+      return true;
+    }
+    seams.join(member);
     block.fine.getAttribute('normal').needsUpdate = true;
     return true;
   }
@@ -236,13 +258,14 @@ export class Parts {
       coarse.dispose();
     }
     for (const { materials } of this.looks.values()) for (const made of materials) made.dispose();
+    this.usual.dispose();
     this.shader.dispose();
   }
 
   private newLook(part: Part | null): Look {
     const colour = part ? (this.colours.get(part.label) ?? part.colour) : neutral;
     const look = {
-      materials: part ? labelMaterials(colour) : [material(colour)],
+      materials: part ? labelMaterials(colour) : [this.usual],
       isShown: !part || !this.hidden.has(part.label),
       seams: new Seams(),
       blocks: 0,
@@ -254,9 +277,15 @@ export class Parts {
     return look;
   }
 
-  private apply(look: Look): void {
+  private applyAll(): boolean {
+    return [...this.looks.values()].map((look) => this.apply(look)).some(Boolean);
+  }
+
+  // Whether its shader is another one now.
+  private apply(look: Look): boolean {
     const { materials } = look;
     const { shading, wireframe, opacity, distance } = this.style;
+    let hasChanged = distance !== look.showsDistance;
     if (distance !== look.showsDistance) {
       look.showsDistance = distance;
       for (const made of materials) this.shader.apply(made, distance);
@@ -268,6 +297,7 @@ export class Parts {
         made.transparent !== opacity < 1 ||
         made.clippingPlanes !== this.planes;
       if (isOther) made.needsUpdate = true;
+      hasChanged ||= isOther;
       made.flatShading = shading === 'flat';
       made.wireframe = wireframe;
       made.opacity = opacity;
@@ -275,6 +305,7 @@ export class Parts {
       made.depthWrite = opacity === 1;
       made.clippingPlanes = this.planes;
     }
+    return hasChanged;
   }
 
   // The back of a closed surface is only seen where it is cut or looked through.

@@ -15,12 +15,15 @@ import type { Vec3 } from '../api/types';
 import type { Block } from '../mesh/blocks';
 import type { Part } from '../mesh/glb';
 import { OrientationCube } from './cube';
+import { compile } from './compile';
 import { Cut } from './cut';
 import { FrameBudget } from './budget';
 import type { Reach } from './distances';
+import { facing } from './facing';
 import { whenDrawn } from './fence';
 import { Parts, type SurfaceStyle } from './parts';
 import { keptBy, wholeRay } from './pick';
+import { pictureOf } from './picture';
 import { Rulers } from './rulers';
 import { Uploading } from './uploading';
 import { onTap } from './tap';
@@ -29,9 +32,6 @@ import { firstOffset, fitDistance, turned, viewOffsets, type CameraPlace, type V
 const verticalAngle = 30;
 const fill = 1.02;
 const settleDelay = 180;
-// The cosine of the angle between the view and the way into the cut below which the cut is not seen.
-const leastFacing = 0.25;
-const cutAngle = 0.9;
 
 // A point of the surface, and whose it is; null: of the only surface, or of the slice on the cut.
 export interface Picked {
@@ -53,7 +53,8 @@ export class Surface {
   private readonly scene = new Scene();
   private readonly camera = new PerspectiveCamera(verticalAngle, 1, 1, 1000);
   private readonly controls: OrbitControls;
-  private readonly cube = new OrientationCube();
+  // Its letters take the browser a while.
+  private cube: OrientationCube | null = null;
   private readonly uploading: Uploading;
   private readonly parts: Parts;
   private readonly ray = new Raycaster();
@@ -70,6 +71,9 @@ export class Surface {
   // While the graphics processor has something to do; and whether a frame waits for its end.
   private isBusy = false;
   private isWaiting = false;
+  // Whether the shaders are there; one that is made anew ends the wait for those before.
+  private isCompiled = false;
+  private compiling = new AbortController();
   // Blocks came that the last frame does not show.
   private isStale = false;
 
@@ -106,6 +110,34 @@ export class Surface {
     this.resizing.observe(host);
     this.resize();
     this.moveTo({ offset: firstOffset, target: [0, 0, 0] });
+    setTimeout(() => this.prepare());
+  }
+
+  // A task after the one in which the canvas is made, which takes its time.
+  private prepare(): void {
+    if (this.isDisposed) return;
+    this.cube = new OrientationCube();
+    this.compile();
+  }
+
+  // Nothing is drawn until what it is drawn with is there.
+  private compile(): void {
+    if (!this.cube || this.isDisposed) return;
+    this.compiling.abort();
+    const compiling = new AbortController();
+    this.compiling = compiling;
+    this.isCompiled = false;
+    const scenes: [Scene, PerspectiveCamera][] = [
+      [this.scene, this.camera],
+      [this.cube.scene, this.cube.camera],
+    ];
+    compile(this.renderer, scenes, compiling.signal, () => {
+      this.uploading.compile(this.camera, compiling.signal, () => {
+        this.isCompiled = true;
+        this.draw();
+        this.bring();
+      });
+    });
   }
 
   // The corners of what is shown, known before its first block.
@@ -115,14 +147,14 @@ export class Surface {
   }
 
   addBlocks(blocks: Block[], part: Part | null, isCoarse = false): void {
-    this.parts.add(blocks, part, isCoarse);
+    if (this.parts.add(blocks, part, isCoarse)) this.compile();
     delete this.host.dataset.still;
     this.bring();
   }
 
   // Some blocks at a time, with a frame when drawing has left time for one.
   private bring(): void {
-    if (this.uploading.isEmpty || this.isBusy || this.isDisposed) return;
+    if (this.uploading.isEmpty || this.isBusy || this.isDisposed || !this.isCompiled) return;
     this.isBusy = true;
     this.isStale = true;
     this.uploading.step(this.camera);
@@ -151,7 +183,7 @@ export class Surface {
   }
 
   setStyle(style: SurfaceStyle): void {
-    this.parts.setStyle(style);
+    if (this.parts.setStyle(style)) this.compile();
     this.draw();
   }
 
@@ -174,22 +206,14 @@ export class Surface {
   }
 
   setCut(isCut: boolean): void {
-    this.parts.setCut(isCut ? [this.cut.plane] : null);
+    if (this.parts.setCut(isCut ? [this.cut.plane] : null)) this.compile();
     this.draw();
   }
 
   // Turns the camera so that the cut is seen, where it is seen edge-on or from the side that stays.
   faceCut(): void {
-    const { normal } = this.cut.plane;
-    const { offset, target } = this.place;
-    const away = new Vector3(...offset);
-    const distance = away.length();
-    const facing = -away.dot(normal) / distance;
-    if (facing >= leastFacing) return;
-    const aside = away.addScaledVector(normal, facing * distance);
-    if (aside.length() < 1e-3 * distance) aside.set(-normal.z, 0.1, normal.x).projectOnPlane(normal);
-    aside.setLength(distance * Math.sin(cutAngle)).addScaledVector(normal, -distance * Math.cos(cutAngle));
-    this.moveTo({ offset: [aside.x, aside.y, aside.z], target });
+    const { x, y, z } = this.cut.plane.normal;
+    this.moveTo(facing(this.place, [x, y, z]));
   }
 
   setHidden(labels: ReadonlySet<number>): void {
@@ -260,11 +284,11 @@ export class Surface {
     if (this.scheduled !== 0 || this.isDisposed) return;
     delete this.host.dataset.still;
     this.isWaiting = this.isBusy;
-    if (this.isBusy) return;
+    if (this.isBusy || !this.isCompiled) return;
     this.scheduled = requestAnimationFrame(() => {
       this.scheduled = 0;
       if (this.isBusy) this.isWaiting = true;
-      else this.render();
+      else if (this.isCompiled) this.render();
     });
   }
 
@@ -272,25 +296,13 @@ export class Surface {
   picture(background: string): Promise<Blob> {
     this.setCoarse(false);
     this.render();
-    const canvas = document.createElement('canvas');
-    canvas.width = this.canvas.width;
-    canvas.height = this.canvas.height;
-    const context = canvas.getContext('2d');
-    if (!context) return Promise.reject(new Error('The browser has no memory for the picture.'));
-    context.fillStyle = background;
-    context.fillRect(0, 0, canvas.width, canvas.height);
-    context.drawImage(this.canvas, 0, 0);
-    this.rulers.paintLabels(context, this.camera, canvas.width / Math.max(1, this.host.clientWidth));
-    return new Promise((resolve, reject) => {
-      canvas.toBlob((blob) => {
-        if (blob) resolve(blob);
-        else reject(new Error('The browser could not make the picture.'));
-      }, 'image/png');
-    });
+    const scale = this.canvas.width / Math.max(1, this.host.clientWidth);
+    return pictureOf(this.canvas, background, (context) => this.rulers.paintLabels(context, this.camera, scale));
   }
 
   dispose(): void {
     this.isDisposed = true;
+    this.compiling.abort();
     cancelAnimationFrame(this.scheduled);
     clearTimeout(this.settling);
     this.resizing.disconnect();
@@ -299,7 +311,7 @@ export class Surface {
     this.uploading.dispose();
     this.rulers.dispose();
     this.cut.dispose();
-    this.cube.dispose();
+    this.cube?.dispose();
     this.renderer.dispose();
     // The browser keeps only some contexts; it must not wait for garbage to be collected.
     this.renderer.forceContextLoss();
@@ -319,7 +331,7 @@ export class Surface {
     this.renderer.setViewport(0, 0, width, height);
     this.renderer.clear();
     this.renderer.render(this.scene, this.camera);
-    this.cube.render(this.renderer, this.camera, height);
+    this.cube?.render(this.renderer, this.camera, height);
     this.rulers.placeLabels(this.camera, width, height);
     this.isBusy = true;
     this.whenDone(() => {
@@ -331,7 +343,7 @@ export class Surface {
 
   // What is seen is all of it, and nothing is to be drawn any more.
   private noteStill(): void {
-    const isToDraw = this.scheduled !== 0 || this.isWaiting || this.isBusy || this.isStale || !this.uploading.isEmpty;
+    const isToDraw = !this.isCompiled || this.scheduled !== 0 || this.isWaiting || this.isBusy || this.isStale || !this.uploading.isEmpty;
     if (!this.isMoving && !this.isCoarse && !isToDraw) this.host.dataset.still = '';
   }
 
@@ -345,7 +357,7 @@ export class Surface {
     if (this.scheduled !== 0) cancelAnimationFrame(this.scheduled);
     this.scheduled = 0;
     // At once: a canvas of another size is blank.
-    this.render();
+    if (this.isCompiled) this.render();
   }
 
   private cameraChanged(): void {
@@ -405,7 +417,7 @@ export class Surface {
     const box = this.canvas.getBoundingClientRect();
     const x = event.clientX - box.left;
     const y = event.clientY - box.top;
-    const face = this.cube.faceAt(x, y, box.height);
+    const face = this.cube?.faceAt(x, y, box.height);
     if (face) {
       this.look(face);
       return;

@@ -1,6 +1,7 @@
 // Brings blocks to the graphics processor some at a time, before they are drawn: in one frame with their drawing,
 // millions of triangles hold the page up for seconds where software draws.
 import { BufferGeometry, Mesh, MeshBasicMaterial, Scene, WebGLRenderTarget, type Camera, type WebGLRenderer } from 'three';
+import { compile } from './compile';
 
 // In one step.
 const mostBytes = 2_500_000;
@@ -33,6 +34,12 @@ export class Uploading {
 
   add(waiting: Waiting): void {
     this.waiting.push(waiting);
+  }
+
+  compile(camera: Camera, signal: AbortSignal, then: () => void): void {
+    this.renderer.setRenderTarget(this.target);
+    compile(this.renderer, [[this.scene, camera]], signal, then);
+    this.renderer.setRenderTarget(null);
   }
 
   // Brings the next ones.

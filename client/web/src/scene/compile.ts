@@ -1,0 +1,32 @@
+// Shaders are made beside the page: whoever draws with one that is not ready waits for it in the middle of a call.
+import type { Camera, Material, Object3D, WebGLRenderer } from 'three';
+import { whenDrawn } from './fence';
+
+const lookEvery = 10;
+
+interface Program {
+  isReady(): boolean;
+}
+
+function isReady(renderer: WebGLRenderer, material: Material): boolean {
+  const { currentProgram } = renderer.properties.get(material) as { currentProgram?: Program };
+  return currentProgram?.isReady() ?? true;
+}
+
+// Begins to make what these scenes are drawn with, all of it for the render target that is set now. Calls back when
+// it is there, unless the signal has ended. three's own compileAsync throws when a material is let go meanwhile.
+export function compile(
+  renderer: WebGLRenderer,
+  scenes: readonly [Object3D, Camera][],
+  signal: AbortSignal,
+  then: () => void,
+): void {
+  const materials = scenes.flatMap(([scene, camera]) => [...renderer.compile(scene, camera)]);
+  const look = (): void => {
+    if (signal.aborted) return;
+    if (materials.every((material) => isReady(renderer, material))) then();
+    else setTimeout(look, lookEvery);
+  };
+  // Where nothing tells whether they are ready, they are made in turn with what is drawn.
+  whenDrawn(renderer.getContext() as WebGL2RenderingContext, look);
+}
