@@ -12,6 +12,7 @@ import './style/small.css';
 import './style/contrast.css';
 import { connected, isAlive } from './api/client';
 import { watchVisibility } from './api/job_events';
+import { hasOrders } from './api/orders';
 import { ApiError, asApiError } from './api/problem';
 import { button, h, icon, isTyping } from './ui/dom';
 import { showHelp } from './ui/help';
@@ -22,6 +23,7 @@ import { startTheme, toggleTheme } from './ui/theme';
 import { tokenButtons, watchToken } from './ui/token_dialog';
 import { uploads } from './views/upload_panel';
 import { prepareView } from './views/prepare';
+import { ordersView } from './views/orders';
 import { queueView } from './views/queue';
 import { volumesView } from './views/volumes';
 
@@ -40,6 +42,7 @@ function placeOf({ path }: Route): Place {
   }
   if (name === 'volumes') return { title: 'Choose the surface', show: prepareView };
   if (name === 'jobs' && id === undefined) return { title: 'Jobs', show: queueView };
+  if (name === 'orders') return { title: 'Orders', show: ordersView };
   if (name === 'jobs') {
     return {
       title: 'Surface',
@@ -64,7 +67,26 @@ const banner = h('div', { class: 'banner', role: 'alert', hidden: true });
 const links = [
   h('a', { href: hashOf([]), 'data-place': 'volumes' }, 'Volumes'),
   h('a', { href: hashOf(['jobs']), 'data-place': 'jobs' }, 'Jobs'),
+  h('a', { href: hashOf(['orders']), 'data-place': 'orders', hidden: true }, 'Orders'),
 ];
+
+// Only where the daemon knows a PACS.
+function showOrders(): void {
+  const link = links.find(({ dataset }) => dataset.place === 'orders');
+  hasOrders().then(
+    (isOn) => {
+      if (link) link.hidden = !isOn;
+    },
+    // Nobody answers, which is said at the top; asked again when somebody does.
+    () => {
+      const stop = connected.subscribe((isConnected) => {
+        if (!isConnected) return;
+        stop();
+        showOrders();
+      });
+    },
+  );
+}
 
 // What the upload does that goes on behind other views.
 function uploadNote(): HTMLElement {
@@ -180,6 +202,7 @@ function watchKeys(): void {
     if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event)) return;
     if (isGoing && event.key === 'v') go([]);
     if (isGoing && event.key === 'j') go(['jobs']);
+    if (isGoing && event.key === 'o' && links.some(({ dataset, hidden }) => dataset.place === 'orders' && !hidden)) go(['orders']);
     if (event.key === '?') showHelp();
     isGoing = event.key === 'g';
   });
@@ -218,6 +241,7 @@ watchConnection();
 watchKeys();
 watchDrops();
 watchVisibility();
+showOrders();
 watchToken(() => void show());
 window.addEventListener('hashchange', () => void show());
 void show();

@@ -40,7 +40,7 @@ export async function send(path: string, init: RequestInit = {}): Promise<Respon
   return answer;
 }
 
-async function json<T>(path: string, init?: RequestInit): Promise<T> {
+export async function json<T>(path: string, init?: RequestInit): Promise<T> {
   return (await (await send(path, init)).json()) as T;
 }
 

@@ -22,6 +22,11 @@ export type JobChange = Schemas['AnyJobEvent'];
 export type JobParameters = Job['parameters'];
 export type JobState = Schemas['JobState'];
 
+export type Order = Omit<Schemas['Order'], 'parameters'> & { parameters: Partial<JobParameters> };
+export type OrderList = Omit<Schemas['OrderList'], 'orders'> & { orders: Order[] };
+export type OrderState = Schemas['OrderState'];
+export type PacsList = Schemas['PacsList'];
+
 export type MeshSummary = Schemas['MeshSummary'];
 export type LabelSummary = Schemas['LabelSummary'];
 export type VolumeLabels = Schemas['VolumeLabels'];

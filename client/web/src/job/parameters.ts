@@ -166,7 +166,7 @@ export function filesOf({ labels, formats }: JobParameters): MeshFormat[] {
 }
 
 // Which surface: iso 60, all labels.
-export function surfaceInWords({ iso, labels }: JobParameters): string {
+export function surfaceInWords({ iso, labels }: Partial<JobParameters>): string {
   if (labels === undefined) return `iso ${formatIso(iso ?? 'otsu')}`;
   if (labels === 'all') return 'all labels';
   const [only] = labels;

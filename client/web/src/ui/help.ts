@@ -3,6 +3,7 @@ import { button, h } from './dom';
 const keys: [string, string][] = [
   ['g v', 'volumes'],
   ['g j', 'jobs'],
+  ['g o', 'orders, where the server knows a PACS'],
   ['?', 'this list'],
   ['Ctrl Enter', 'make the surface'],
   ['[', 'go to the line in the histogram'],
