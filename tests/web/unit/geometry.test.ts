@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Vec3 } from '@/api/types';
-import { patientAxes, placedAt, sideOf, slicePlacement, slicePlane, toPatient, type Placement } from '@/volume/geometry';
+import { cursorOfText, patientAxes, placedAt, sampleAt, sideOf, slicePlacement, slicePlane, toPatient, toSamples, type Placement } from '@/volume/geometry';
 
 const identity = [1, 0, 0, 0, 1, 0, 0, 0, 1];
 // Columns: x towards the right, y towards the front, z up, as NIfTI templates lie.
@@ -20,6 +20,18 @@ describe('geometry', () => {
       const coronal = slicePlane({ direction }, 'coronal');
       expect([coronal.right.begin, coronal.down.begin, coronal.down.end].join('')).toBe('RSI');
     }
+  });
+
+  it('finds the sample of a point, also where a gantry was tilted', () => {
+    const tilted = [1, 0, 0, 0, 1, Math.sin(0.3), 0, 0, Math.cos(0.3)];
+    for (const direction of [identity, template, sagittal, tilted]) {
+      const volume = { dims: [20, 30, 40] as Vec3, spacing: [0.5, 2, 3] as Vec3, origin: [-7, 8, 90] as Vec3, direction };
+      const place: Vec3 = [3.25, 17, 30.5];
+      toSamples(volume, toPatient(volume, place)).forEach((value, axis) => expect(value).toBeCloseTo(place[axis as 0], 9));
+      expect(sampleAt(volume, toPatient(volume, [-4, 17.4, 99]))).toEqual([0, 17, 39]);
+    }
+    expect(cursorOfText('3,99,x', { dims: [20, 30, 40] })).toEqual([3, 15, 20]);
+    expect(cursorOfText('', { dims: [20, 30, 40] })).toEqual([10, 15, 20]);
   });
 
   it('turns what runs the other way', () => {

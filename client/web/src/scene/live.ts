@@ -5,20 +5,17 @@ import {
   BoxGeometry,
   BufferAttribute,
   BufferGeometry,
-  Data3DTexture,
+  type Data3DTexture,
+  type DataTexture,
   GLSL3,
-  LinearFilter,
   LineBasicMaterial,
   LineSegments,
   Matrix3,
   Matrix4,
   Mesh,
-  NearestFilter,
   PerspectiveCamera,
   PlaneGeometry,
   RawShaderMaterial,
-  RedFormat,
-  RGFormat,
   Scene,
   Vector2,
   Vector3,
@@ -30,6 +27,8 @@ import type { Vec3 } from '../api/types';
 import { blockSize, firstCrossing, type Preview } from '../volume/preview';
 import { compile } from './compile';
 import { whenDrawn } from './fence';
+import { drawable, letGo, tablesOf, type Drawable } from './live_textures';
+import type { Look } from '../volume/looks';
 import { enlargingFragmentShader, enlargingVertexShader, fragmentShader, vertexShader } from './live_shader';
 import { onTap } from './tap';
 import { firstOffset, fitDistance } from './views';
@@ -41,6 +40,8 @@ const movingTime = 40;
 const movingTimeOfSoftware = 110;
 const restingTime = 1500;
 const settleDelay = 220;
+// How much longer a look through the volume takes than its surface, guessed for the first frame.
+const costOfLook = 3;
 // Parts of the canvas's width and height.
 const scales = [1, 0.7, 0.5, 0.35, 0.25, 0.18];
 
@@ -49,33 +50,6 @@ export interface Frame {
   took: number;
   scale: number;
   isResting: boolean;
-}
-
-interface Drawable {
-  preview: Preview;
-  samples: Data3DTexture;
-  blocks: Data3DTexture;
-}
-
-function drawable(preview: Preview): Drawable {
-  const samples = new Data3DTexture(preview.samples, ...preview.dims);
-  samples.format = RedFormat;
-  samples.minFilter = LinearFilter;
-  samples.magFilter = LinearFilter;
-  const blocks = new Data3DTexture(preview.blocks, ...preview.blockDims);
-  blocks.format = RGFormat;
-  blocks.minFilter = NearestFilter;
-  blocks.magFilter = NearestFilter;
-  for (const texture of [samples, blocks]) {
-    texture.unpackAlignment = 1;
-    texture.needsUpdate = true;
-  }
-  return { preview, samples, blocks };
-}
-
-function letGo({ samples, blocks }: Drawable): void {
-  samples.dispose();
-  blocks.dispose();
 }
 
 export class LiveSurface {
@@ -104,6 +78,10 @@ export class LiveSurface {
     colour: { value: new Vector3(0.86, 0.84, 0.78) },
     iso: { value: 0.5 },
     reach: { value: 1 },
+    isThrough: { value: false },
+    look: { value: null as DataTexture | null },
+    sums: { value: null as DataTexture | null },
+    edges: { value: 0 },
   };
   private readonly box: Mesh<BoxGeometry, RawShaderMaterial>;
   // Through where the slices meet, over the surface.
@@ -243,6 +221,23 @@ export class LiveSurface {
     this.moved();
   }
 
+  // Null: the surface at the iso-value.
+  setLook(look: Look | null): void {
+    const { isThrough, look: table, sums, edges } = this.uniforms;
+    if (isThrough.value !== (look !== null)) {
+      const factor = look ? costOfLook : 1 / costOfLook;
+      for (const kind of ['moving', 'resting'] as const) this.costs[kind] *= factor;
+    }
+    isThrough.value = look !== null;
+    if (look) {
+      table.value?.dispose();
+      sums.value?.dispose();
+      ({ table: table.value, sums: sums.value } = tablesOf(look));
+      edges.value = look.edges;
+    }
+    this.changed();
+  }
+
   fit(offset: Vec3): void {
     if (!this.best) return;
     const corners = this.corners();
@@ -279,6 +274,8 @@ export class LiveSurface {
     this.resizing.disconnect();
     this.controls.dispose();
     for (const old of new Set([this.first, this.best])) if (old) letGo(old);
+    this.uniforms.look.value?.dispose();
+    this.uniforms.sums.value?.dispose();
     this.box.geometry.dispose();
     this.box.material.dispose();
     this.cross.geometry.dispose();
@@ -362,6 +359,8 @@ export class LiveSurface {
       if (this.isDisposed) return;
       this.onFrame?.({ took: now - changedAt, scale, isResting });
       if (this.changedAt !== 0) this.changed();
+      // There was time for more.
+      else if (isResting && this.scaleFor(wide * high, kind) > scale) this.changed();
       else if (isResting) this.host.dataset.still = '';
     });
   }

@@ -1,4 +1,4 @@
-// The iso-surface of a volume by ray-casting: each pixel's ray goes through the samples until they cross the
+// The iso-surface of a volume, or a look through it, by ray-casting: each pixel's ray goes through the samples until they cross the
 // iso-value; there the gradient tells how the surface is turned. Blocks that the surface does not meet are passed
 // over at once. All places are in samples: sample (0,0,0) is at the origin.
 
@@ -56,6 +56,12 @@ uniform vec3 colour;
 uniform float iso;
 // In samples; a longer one may pass over what is thinner.
 uniform float reach;
+// Whether what is looked through is drawn: colours and opacities of 256 values, and for each the sum of those below it.
+uniform bool isThrough;
+uniform sampler2D look;
+uniform sampler2D sums;
+// How much only borders between values are seen.
+uniform float edges;
 in vec3 place;
 out vec4 pixel;
 
@@ -85,6 +91,58 @@ vec4 shaded(vec3 p) {
   return vec4(colour * diffuse + shine, 1.0);
 }
 
+bool hasAny(vec2 range) {
+  ivec2 ends = ivec2(round(255.0 * range));
+  return texelFetch(sums, ivec2(ends.y + 1, 0), 0).r > texelFetch(sums, ivec2(ends.x, 0), 0).r;
+}
+
+// One sample's light: its colour times its opacity, and the opacity.
+vec4 seenAt(vec3 p, float stride) {
+  vec4 here = texture(look, vec2((255.0 * valueAt(p) + 0.5) / 256.0, 0.5));
+  if (here.a <= 0.0) return vec4(0.0);
+  vec3 slope = 0.5 * vec3(
+    valueAt(p + vec3(1, 0, 0)) - valueAt(p - vec3(1, 0, 0)),
+    valueAt(p + vec3(0, 1, 0)) - valueAt(p - vec3(0, 1, 0)),
+    valueAt(p + vec3(0, 0, 1)) - valueAt(p - vec3(0, 0, 1)));
+  float steep = length(slope);
+  vec3 normal = toNormal * slope;
+  float size = length(normal);
+  normal = size > 0.0 ? normal / size : towardsEye;
+  if (dot(normal, towardsEye) < 0.0) normal = -normal;
+  float light = 0.35 + 0.7 * max(0.0, dot(normal, towardsLight));
+  float shine = 0.12 * pow(max(0.0, dot(normal, normalize(towardsLight + towardsEye))), 24.0);
+  // What hardly changes has no border to be lit.
+  float isBorder = clamp(steep * 24.0, 0.0, 1.0);
+  float opacity = here.a * mix(1.0, isBorder, edges);
+  opacity = 1.0 - pow(1.0 - min(opacity, 0.999), stride);
+  return vec4((here.rgb * mix(0.75, light, isBorder) + shine * isBorder) * opacity, opacity);
+}
+
+vec4 lookedThrough(vec3 direction, float t, float end, float stride) {
+  vec4 seen = vec4(0.0);
+  float blockEnd = -1.0;
+  // Each ray begins at another place, or steps would be seen as rings.
+  t += stride * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
+  for (int i = 0; i < mostSteps && t < end; i++) {
+    if (t >= blockEnd) {
+      vec3 p = clamp(eye + (t + 0.001 * stride) * direction, vec3(0.0), dims - 1.001);
+      ivec3 block = ivec3(p / blockSize);
+      vec3 low = vec3(block) * blockSize;
+      vec3 exits = (low + step(vec3(0.0), direction) * blockSize - eye) / direction;
+      blockEnd = min(min(exits.x, exits.y), exits.z);
+      if (!hasAny(texelFetch(blocks, block, 0).rg)) {
+        t += max(1.0, ceil((blockEnd - t) / stride)) * stride;
+        continue;
+      }
+    }
+    vec4 here = seenAt(eye + t * direction, reach);
+    seen += (1.0 - seen.a) * here;
+    if (seen.a > 0.985) break;
+    t += stride;
+  }
+  return seen;
+}
+
 void main() {
   vec3 direction = place - eye;
   vec3 first = -eye / direction;
@@ -96,6 +154,11 @@ void main() {
   if (!(t < end)) discard;
 
   float stride = reach / max(max(abs(direction.x), abs(direction.y)), abs(direction.z));
+  if (isThrough) {
+    pixel = lookedThrough(direction, t, end, stride);
+    if (pixel.a < 0.004) discard;
+    return;
+  }
   bool isInside = valueAt(eye + t * direction) >= iso;
   float blockEnd = -1.0;
   for (int i = 0; i < mostSteps && t < end; i++) {

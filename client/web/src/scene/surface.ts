@@ -1,8 +1,6 @@
 // A surface in a canvas: blocks of triangles that come one by one, a camera around them, and what is
 // drawn over them. Draws when something changed, never for nothing.
 import {
-  AmbientLight,
-  DirectionalLight,
   PerspectiveCamera,
   Raycaster,
   Scene,
@@ -11,16 +9,18 @@ import {
   WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
-import type { Vec3 } from '../api/types';
+import type { Vec3, Volume } from '../api/types';
 import type { Block } from '../mesh/blocks';
 import type { Part } from '../mesh/glb';
 import { OrientationCube } from './cube';
 import { compile } from './compile';
+import { Cross } from './cross';
 import { Cut } from './cut';
 import { FrameBudget } from './budget';
 import type { Reach } from './distances';
 import { facing } from './facing';
 import { whenDrawn } from './fence';
+import { addLights } from './lights';
 import { Parts, type SurfaceStyle } from './parts';
 import { keptBy, wholeRay } from './pick';
 import { pictureOf } from './picture';
@@ -44,6 +44,7 @@ export class Surface {
   readonly canvas: HTMLCanvasElement;
   readonly rulers: Rulers;
   readonly cut: Cut;
+  private readonly cross: Cross;
   readonly budget = new FrameBudget();
   onCamera: (() => void) | null = null;
   // A click or tap; null where nothing is.
@@ -89,13 +90,10 @@ export class Surface {
     host.prepend(this.canvas);
 
     this.camera.up.set(0, 0, 1);
-    const headlight = new DirectionalLight(0xffffff, 2.5);
-    headlight.position.set(-0.35, 0.5, 1);
-    headlight.target.position.set(0, 0, -1);
-    this.camera.add(headlight, headlight.target);
-    this.scene.add(this.camera, new AmbientLight(0xffffff, 0.6));
+    addLights(this.scene, this.camera);
     this.rulers = new Rulers(this.scene, host, '#17a398');
     this.cut = new Cut(this.scene);
+    this.cross = new Cross(this.scene);
 
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.zoomToCursor = true;
@@ -216,6 +214,12 @@ export class Surface {
     this.moveTo(facing(this.place, [x, y, z]));
   }
 
+  // Lines through that sample, along the volume's axes.
+  setCross(volume: Volume, cursor: Vec3 | null): void {
+    this.cross.place(volume, cursor);
+    this.draw();
+  }
+
   setHidden(labels: ReadonlySet<number>): void {
     this.parts.setHidden(labels);
     this.draw();
@@ -311,6 +315,7 @@ export class Surface {
     this.uploading.dispose();
     this.rulers.dispose();
     this.cut.dispose();
+    this.cross.dispose();
     this.cube?.dispose();
     this.renderer.dispose();
     // The browser keeps only some contexts; it must not wait for garbage to be collected.

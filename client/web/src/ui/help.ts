@@ -14,7 +14,7 @@ const keys: [string, string][] = [
   ['a p l r s i', 'on a surface: standard views'],
   ['f', 'show all'],
   ['t w d', 'flat shading, wires, distances as colour'],
-  ['c m', 'cut, measure'],
+  ['c x m', 'cut, slices beside the surface, measure'],
   ['h o e', 'of labels: hide the picked one, show only it, show all'],
   ['Esc Delete', 'take the last point back, remove all distances'],
 ];

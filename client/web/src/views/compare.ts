@@ -175,6 +175,7 @@ class Comparison {
     const camera = this.panes[0]?.camera ?? this.camera;
     const pane = new SurfacePane(this.scope, job, {
       hasKeys: false,
+      onSlices: null,
       camera,
       volume: this.volume,
       labels: new LabelState(labelsOfMesh(job)),

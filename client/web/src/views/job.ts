@@ -14,6 +14,7 @@ import { noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { volumeName } from '../volume/names';
 import { accuracy, againSection, changeLink, compareSection, downloads, numbers, quality, section, timings } from './job_panel';
+import { SlicesBeside } from './job_slices';
 import { LabelList } from './label_list';
 import { SurfacePane } from './surface_pane';
 
@@ -169,7 +170,10 @@ function showSurface(
   if (!mesh) return;
   const camera = placeOfText(route.query.get('cam') ?? '');
   const labels = new LabelState(labelsOfMesh(job));
-  const pane = new SurfacePane(scope, job, { hasKeys: true, camera, volume, labels });
+  const slices = volume && new SlicesBeside(scope, job, volume, stageArea, route.query);
+  const onSlices = slices && ((): void => slices.toggle());
+  const pane = new SurfacePane(scope, job, { hasKeys: true, camera, volume, labels, onSlices });
+  slices?.linkTo(pane);
   let noting = 0;
   pane.onCamera = (place) => {
     clearTimeout(noting);
@@ -192,7 +196,9 @@ function showSurface(
   // The canvas takes its size from the page, so the view has to be in it first.
   requestAnimationFrame(() => {
     if (scope.isOver) return;
-    void pane.load().then((timing) => {
+    const loading = pane.load();
+    slices?.restore();
+    void loading.then((timing) => {
       if (timing && !scope.isOver) times.replaceWith(timings(job, { ...timing }));
     });
   });

@@ -7,6 +7,7 @@ import { h } from '../ui/dom';
 import { formatValue } from '../ui/format';
 import type { Scope } from '../ui/signal';
 import { toPatient } from '../volume/geometry';
+import { lookOf, looksFor, type LookName } from '../volume/looks';
 import { inPreview, type Preview } from '../volume/preview';
 import type { PreviewAnswer } from '../volume/preview.worker';
 import type { Window } from '../volume/slices';
@@ -23,6 +24,9 @@ export interface LiveHost {
   // Where iso-values usually lie.
   window: Window;
   setCursor: (cursor: Vec3) => void;
+  // How the volume is looked through; '' for its surface.
+  look: string;
+  setLook: (look: LookName | '') => void;
 }
 
 export class LiveView {
@@ -39,6 +43,7 @@ export class LiveView {
   private worker: Worker | null = null;
   private retry = 0;
   private hasFailed = false;
+  private look: LookName | '' = '';
 
   constructor(
     private readonly host: LiveHost,
@@ -48,7 +53,7 @@ export class LiveView {
       'figure',
       { class: 'slice live' },
       h('div', { class: 'slice-picture' }, this.view, this.state),
-      h('figcaption', {}, h('span', { class: 'slice-title' }, 'Surface'), this.place),
+      h('figcaption', {}, this.lookChoice(), this.place),
     );
     scope.onEnd(() => {
       clearTimeout(this.retry);
@@ -61,6 +66,34 @@ export class LiveView {
         if (isConnected && this.hasFailed) this.load();
       }),
     );
+  }
+
+  private lookChoice(): HTMLElement {
+    const names = looksFor(this.host.volume);
+    this.look = names.find((name) => name === this.host.look) ?? '';
+    const choice = h(
+      'select',
+      { 'aria-label': 'What is drawn', class: 'look', title: 'The surface at the iso-value, or a look through the volume' },
+      h('option', { value: '' }, 'Surface'),
+      h(
+        'optgroup',
+        { label: 'Look through' },
+        ...names.map((name) => h('option', { value: name, selected: name === this.look }, name.charAt(0).toUpperCase() + name.slice(1))),
+      ),
+    );
+    choice.addEventListener('change', () => {
+      this.look = choice.value as LookName | '';
+      this.host.setLook(this.look);
+      this.showLook();
+    });
+    return choice;
+  }
+
+  private showLook(): void {
+    const { look, preview } = this;
+    if (!preview) return;
+    this.surface?.setLook(look === '' ? null : lookOf(look, preview.window));
+    this.element.dataset.look = look;
   }
 
   // No iso-value: the labels of a segmentation. The cursor is where the slices meet.
@@ -176,6 +209,7 @@ export class LiveView {
     this.preview = preview;
     this.surface?.setPreview(preview);
     this.showIso();
+    this.showLook();
     this.element.dataset.size = String(Math.max(...preview.dims));
     const coarseness = Math.max(...this.factors(preview));
     this.place.textContent = coarseness > 1 ? `preview, 1 : ${coarseness}` : 'preview';

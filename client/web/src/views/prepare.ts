@@ -22,7 +22,8 @@ import type { Scope } from '../ui/signal';
 import { cssColour, theme } from '../ui/theme';
 import { defaultWindow, type Histogram } from '../volume/histogram';
 import { SliceSource, type Window } from '../volume/slices';
-import { volumeName } from '../volume/names';
+import { cursorOfText } from '../volume/geometry';
+import { isInteger, volumeName } from '../volume/names';
 import { aboutVolume, notedOf, sliceHelp } from './about_volume';
 import { estimateTexts } from './estimate_texts';
 import { HistogramView } from './histogram_view';
@@ -35,11 +36,6 @@ const mostBins = 1024;
 const estimateDelay = 300;
 const shownSurfaces = 3;
 
-// NIfTI and DICOM scale whole samples to values that are not.
-function isInteger({ type, range }: Volume): boolean {
-  return !type.startsWith('float') && range.every(Number.isInteger);
-}
-
 // Enough digits for any iso-value, and few enough to be read.
 function shortened(iso: number): number {
   return Number(iso.toPrecision(6));
@@ -48,16 +44,6 @@ function shortened(iso: number): number {
 function windowOfQuery(query: URLSearchParams): Window | null {
   const [low, high] = (query.get('window') ?? '').split(',').map(Number);
   return low !== undefined && high !== undefined && high > low ? [low, high] : null;
-}
-
-function cursorOfQuery(query: URLSearchParams, volume: Volume): Vec3 {
-  const middle = volume.dims.map((count) => Math.floor(count / 2)) as Vec3;
-  const given = (query.get('at') ?? '').split(',').map(Number);
-  return middle.map((value, axis) => {
-    const wanted = given.length === 3 ? given[axis] : undefined;
-    const isThere = Number.isInteger(wanted) && (wanted as number) >= 0 && (wanted as number) < volume.dims[axis as 0];
-    return isThere ? (wanted as number) : value;
-  }) as Vec3;
 }
 
 export async function prepareView(scope: Scope, route: Route): Promise<HTMLElement> {
@@ -118,7 +104,7 @@ class Prepare {
     this.parameters = startOfQuery(route.query, volume, this.defaults);
     const common = defaultWindow(counts, volume.suggested_iso);
     this.window = windowOfQuery(route.query) ?? common;
-    this.cursor = cursorOfQuery(route.query, volume);
+    this.cursor = cursorOfText(route.query.get('at') ?? '', volume);
 
     const host: SliceHost = {
       volume,
@@ -148,7 +134,7 @@ class Prepare {
     this.slices = (['axial', 'coronal', 'sagittal'] as const).map(
       (plane) => new SliceView(plane, host, scope),
     );
-    this.live = new LiveView({ volume, window: this.histogram.shown, setCursor: host.setCursor }, scope);
+    this.live = this.liveView(route, host);
     this.isoInput = h('input', { type: 'number', step: 'any', id: 'iso', class: 'iso-input' });
     this.listenToIso();
     this.run = button('Make the surface', () => void this.start(), { class: 'primary' });
@@ -163,6 +149,19 @@ class Prepare {
     this.listenToPage();
     this.update();
     this.askForEstimate();
+  }
+
+  private liveView({ query }: Route, { volume, setCursor }: SliceHost): LiveView {
+    return new LiveView(
+      {
+        volume,
+        window: this.histogram.shown,
+        setCursor,
+        look: query.get('look') ?? '',
+        setLook: (look) => noteInAddress({ look }),
+      },
+      this.scope,
+    );
   }
 
   private listenToPage(): void {

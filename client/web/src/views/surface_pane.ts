@@ -1,7 +1,6 @@
 // A surface with its tools: what a job made, loaded part by part.
-import { histogramOf, slicePicture } from '../api/client';
 import { asApiError } from '../api/problem';
-import type { Axis, Job, Volume } from '../api/types';
+import type { Job, Vec3, Volume } from '../api/types';
 import { loadMesh, viewableFile, type LoadTiming } from '../mesh/load';
 import { lengthOf } from '../scene/rulers';
 import { defaultStyle, type SurfaceStyle } from '../scene/parts';
@@ -9,21 +8,18 @@ import { Surface, type Picked } from '../scene/surface';
 import { viewNames, viewTitles, type CameraPlace } from '../scene/views';
 import type { LabelState } from '../job/labels';
 import { emptyReason } from '../job/empty';
-import { button, checkbox, h, isTyping } from '../ui/dom';
+import { button, h, isTyping } from '../ui/dom';
 import { formatCount } from '../ui/format';
 import { refusal, tell, tellError } from '../ui/notices';
 import { saveBlob } from '../ui/save';
 import { Scope } from '../ui/signal';
 import { cssColour } from '../ui/theme';
-import { axisIndex, patientAxes } from '../volume/geometry';
-import { defaultWindow } from '../volume/histogram';
-import type { Window } from '../volume/slices';
+import { CutTool } from './cut_tool';
 import { DistanceLook } from './distance_look';
 import { changeLink, fileNameOf, makeVariant } from './job_panel';
 import { PickedLabel } from './picked_label';
 import { PickedPart } from './picked_part';
 
-const bins = 512;
 const turnStep = Math.PI / 36;
 
 export interface PaneOptions {
@@ -32,59 +28,37 @@ export interface PaneOptions {
   camera: CameraPlace | null;
   // Null where slices cannot be shown: the volume is gone.
   volume: Volume | null;
+  // Shows slices beside the surface, or takes them away; null where there are none.
+  onSlices: (() => void) | null;
   // Of a job by labels: which are shown and how.
   labels: LabelState;
-}
-
-interface CutState {
-  isOn: boolean;
-  axis: Axis;
-  index: number;
-  flipped: boolean;
 }
 
 export class SurfacePane {
   readonly element: HTMLElement;
   onCamera: ((place: CameraPlace) => void) | null = null;
+  // A place of the surface was clicked.
+  onPoint: ((point: Vec3) => void) | null = null;
   private surface: Surface | null = null;
   private readonly view = h('div', { class: 'viewport' });
   private readonly status = h('div', { class: 'load-status', role: 'status' });
   private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Loading the surface' });
-  private readonly cutControls = h('div', { class: 'cut-controls', hidden: true });
   private readonly announcement = h('div', { class: 'sr-only', 'aria-live': 'polite' });
   private readonly pickedLabel: PickedLabel;
   private readonly pickedPart: PickedPart;
   private distance: DistanceLook | null = null;
   private style: SurfaceStyle = defaultStyle;
   private isMeasuring = false;
-  private readonly cut: CutState;
-  private window: Window | null = null;
-  private pictureWanted = '';
-  private isFetching = false;
+  private cut: CutTool | null = null;
   private readonly toggles = new Map<string, HTMLButtonElement>();
-  // Axial first: what most people think of as a slice.
-  private readonly cutAxes: [string, Axis][];
 
   constructor(
     private readonly scope: Scope,
     private readonly job: Job,
     private readonly options: PaneOptions,
   ) {
-    const { volume } = options;
     this.pickedLabel = new PickedLabel(scope, options.labels);
     this.pickedPart = new PickedPart(job, makeVariant(job));
-    const [sagittal, coronal, axial] = volume ? patientAxes(volume) : (['x', 'y', 'z'] as const);
-    this.cutAxes = [
-      ['Axial', axial],
-      ['Coronal', coronal],
-      ['Sagittal', sagittal],
-    ];
-    this.cut = {
-      isOn: false,
-      axis: axial,
-      index: volume ? Math.floor(volume.dims[axisIndex(axial)] / 2) : 0,
-      flipped: false,
-    };
     this.element = h('div', { class: 'pane' }, this.view, this.announcement);
     this.view.append(h('div', { class: 'load' }, this.bar, this.status));
   }
@@ -165,6 +139,11 @@ export class SurfacePane {
     this.press('flat', this.style.shading === 'flat');
   }
 
+  // Where the slices meet, in the volume's samples; null for nowhere.
+  setCursor(cursor: Vec3 | null): void {
+    if (this.options.volume) this.surface?.setCross(this.options.volume, cursor);
+  }
+
   fit(): void {
     this.surface?.fit();
   }
@@ -194,7 +173,8 @@ export class SurfacePane {
     this.followLabels(surface);
     const distance = new DistanceLook(this.scope, surface, (isOn) => this.setStyle({ distance: isOn }));
     this.distance = distance;
-    const tools = [this.toolbar(surface, distance), this.cutControls, this.pickedLabel.element, this.pickedPart.element];
+    if (this.options.volume) this.cut = new CutTool(this.scope, this.job, this.options.volume, surface, this.view);
+    const tools = [this.toolbar(surface, distance), this.cut?.element ?? '', this.pickedLabel.element, this.pickedPart.element];
     this.element.append(h('div', { class: 'tools' }, ...tools), distance.legend);
     this.scope.listen(surface.canvas, 'keydown', (event: KeyboardEvent) => this.moveKey(event, surface));
     if (this.options.hasKeys) {
@@ -206,6 +186,7 @@ export class SurfacePane {
     if (!this.isMeasuring) {
       this.options.labels.pick(picked?.label ?? null);
       this.pickedPart.show(picked?.point ?? null);
+      if (picked) this.onPoint?.(picked.point);
       return;
     }
     if (!picked) {
@@ -233,7 +214,7 @@ export class SurfacePane {
     return element;
   }
 
-  private press(name: string, isDown: boolean): void {
+  press(name: string, isDown: boolean): void {
     this.toggles.get(name)?.setAttribute('aria-pressed', String(isDown));
   }
 
@@ -274,6 +255,7 @@ export class SurfacePane {
         'div',
         { class: 'tool-group' },
         this.options.volume && this.toggle('cut', 'Cut', 'Cut along a slice (c)', () => this.toggleCut()),
+        this.options.onSlices && this.toggle('slices', 'Slices', 'Slices beside the surface (x)', () => this.options.onSlices?.()),
         this.toggle('measure', 'Measure', 'Distance between two points (m)', () => this.toggleMeasure()),
         button('Picture', () => void this.savePicture(surface), { title: 'Save what is shown as PNG' }),
       ),
@@ -296,97 +278,9 @@ export class SurfacePane {
   }
 
   private toggleCut(): void {
-    const { volume } = this.options;
-    if (!volume || !this.surface) return;
-    this.cut.isOn = !this.cut.isOn;
+    if (!this.cut) return;
+    this.cut.set(!this.cut.isOn);
     this.press('cut', this.cut.isOn);
-    this.cutControls.hidden = !this.cut.isOn;
-    this.surface.setCut(this.cut.isOn);
-    if (!this.cut.isOn) {
-      this.pictureWanted = '';
-      this.surface.cut.show(null);
-      delete this.view.dataset.slice;
-      return;
-    }
-    this.showCutControls(volume);
-    this.placeCut();
-    this.surface.faceCut();
-  }
-
-  private showCutControls(volume: Volume): void {
-    const slider = h('input', {
-      type: 'range',
-      min: 0,
-      max: volume.dims[axisIndex(this.cut.axis)] - 1,
-      step: 1,
-      'aria-label': 'Slice of the cut',
-    });
-    slider.value = String(this.cut.index);
-    const count = volume.dims[axisIndex(this.cut.axis)];
-    const place = h('span', { class: 'cut-place' }, `${this.cut.index + 1} / ${count}`);
-    slider.addEventListener('input', () => {
-      this.cut.index = slider.valueAsNumber;
-      place.textContent = `${this.cut.index + 1} / ${count}`;
-      this.placeCut();
-    });
-    const choice = h(
-      'select',
-      { 'aria-label': 'Direction of the cut' },
-      ...this.cutAxes.map(([name, axis]) =>
-        h('option', { value: axis, selected: axis === this.cut.axis }, name),
-      ),
-    );
-    choice.addEventListener('change', () => {
-      this.cut.axis = choice.value as Axis;
-      this.cut.index = Math.floor(volume.dims[axisIndex(this.cut.axis)] / 2);
-      this.showCutControls(volume);
-      this.placeCut();
-      this.surface?.faceCut();
-    });
-    const other = checkbox('Other side', this.cut.flipped, (flipped) => {
-      this.cut.flipped = flipped;
-      this.placeCut();
-    });
-    this.cutControls.replaceChildren(choice, slider, place, other);
-  }
-
-  private placeCut(): void {
-    const { volume } = this.options;
-    if (!volume || !this.surface) return;
-    this.surface.cut.place(volume, this.cut);
-    this.surface.draw();
-    this.pictureWanted = `${this.cut.axis}/${this.cut.index}`;
-    void this.fetchPicture(volume);
-  }
-
-  // One request at a time; the place that is wanted last is the next.
-  private async fetchPicture(volume: Volume): Promise<void> {
-    if (this.isFetching) return;
-    this.isFetching = true;
-    try {
-      let shown = '';
-      while (this.pictureWanted !== '' && this.pictureWanted !== shown && !this.scope.isOver) {
-        shown = this.pictureWanted;
-        const { axis, index } = this.cut;
-        if (this.window === null) {
-          const { iso: asked } = this.job.parameters;
-          const iso = typeof asked === 'number' ? asked : volume.suggested_iso;
-          this.window = defaultWindow(await histogramOf(volume.id, bins, this.scope.signal), iso);
-        }
-        const blob = await slicePicture(volume.id, axis, index, this.window, this.scope.signal);
-        const picture = await createImageBitmap(blob);
-        if (this.scope.isOver || !this.cut.isOn) picture.close();
-        else {
-          this.surface?.cut.show(picture);
-          this.view.dataset.slice = shown;
-          this.surface?.draw();
-        }
-      }
-    } catch (error) {
-      if (!this.scope.isOver) tellError(error);
-    } finally {
-      this.isFetching = false;
-    }
   }
 
   private async savePicture(surface: Surface): Promise<void> {
@@ -420,6 +314,7 @@ export class SurfacePane {
     else if (key === 't') this.toggleFlat();
     else if (key === 'w') this.toggleWires();
     else if (key === 'c') this.toggleCut();
+    else if (key === 'x') this.options.onSlices?.();
     else if (key === 'm') this.toggleMeasure();
     else if (key === 'd') this.distance?.set(!this.distance.isOn);
     else if (key === 'h') this.pickedLabel.hide();

@@ -28,6 +28,25 @@ export function toPatient(volume: Geometry, index: Vec3): Vec3 {
   return point;
 }
 
+// Where a point of the patient lies, in samples, which may be parts of one.
+export function toSamples(volume: Geometry, point: Vec3): Vec3 {
+  const [a, b, c] = ([0, 1, 2] as const).map((axis) =>
+    axisDirection(volume, axis).map((value) => value * volume.spacing[axis]),
+  ) as [Vec3, Vec3, Vec3];
+  const from = point.map((value, axis) => value - volume.origin[axis as 0]) as Vec3;
+  const cross = (u: Vec3, v: Vec3): Vec3 => [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+  // Cramer's rule.
+  const volumeOf = dot(a, cross(b, c));
+  return [dot(from, cross(b, c)) / volumeOf, dot(a, cross(from, c)) / volumeOf, dot(a, cross(b, from)) / volumeOf];
+}
+
+// The nearest sample of the volume.
+export function sampleAt(volume: Geometry, point: Vec3): Vec3 {
+  return toSamples(volume, point).map((value, axis) =>
+    Math.max(0, Math.min(volume.dims[axis as 0] - 1, Math.round(value))),
+  ) as Vec3;
+}
+
 const letters: readonly [string, string][] = [
   ['L', 'R'],
   ['P', 'A'],
@@ -173,4 +192,15 @@ export function slicePlacement(volume: Geometry, { normal, right, down }: SliceP
 export function placedAt([a, b, c, d, e, f]: Placement, x: number, y: number): [number, number] {
   const determinant = a * d - b * c;
   return [(d * (x - e) - c * (y - f)) / determinant, (a * (y - f) - b * (x - e)) / determinant];
+}
+
+// A sample as an address names it; of each axis that is none of the volume's, the middle.
+export function cursorOfText(text: string, volume: Pick<Volume, 'dims'>): Vec3 {
+  const middle = volume.dims.map((count) => Math.floor(count / 2)) as Vec3;
+  const given = text.split(',').map(Number);
+  return middle.map((value, axis) => {
+    const wanted = given.length === 3 ? given[axis] : undefined;
+    const isThere = Number.isInteger(wanted) && (wanted as number) >= 0 && (wanted as number) < volume.dims[axis as 0];
+    return isThere ? (wanted as number) : value;
+  }) as Vec3;
 }

@@ -30,3 +30,8 @@ export function volumeKind(volume: Volume): string {
   const kind = volume.modality ?? formatNames[volume.format] ?? volume.format;
   return `${kind}, ${formatDims(volume.dims)}`;
 }
+
+// NIfTI and DICOM scale whole samples to values that are not.
+export function isInteger({ type, range }: Pick<Volume, 'type' | 'range'>): boolean {
+  return !type.startsWith('float') && range.every(Number.isInteger);
+}
