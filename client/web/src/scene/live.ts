@@ -82,6 +82,9 @@ export class LiveSurface {
     look: { value: null as DataTexture | null },
     sums: { value: null as DataTexture | null },
     edges: { value: 0 },
+    isCropped: { value: false },
+    cropLow: { value: new Vector3() },
+    cropHigh: { value: new Vector3(1, 1, 1) },
   };
   private readonly box: Mesh<BoxGeometry, RawShaderMaterial>;
   // Through where the slices meet, over the surface.
@@ -90,6 +93,7 @@ export class LiveSurface {
     new LineBasicMaterial({ color: '#2ce0cb', transparent: true, opacity: 0.45, depthTest: false }),
   );
   private cursor: Vec3 | null = null;
+  private crop: readonly [Vec3, Vec3] | null = null;
   // What is drawn with fewer pixels than the canvas has. A canvas that changes its size holds the page up until
   // all that was drawn before is done.
   private readonly target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
@@ -190,6 +194,7 @@ export class LiveSurface {
     this.box.matrixWorldNeedsUpdate = true;
     this.uniforms.toNormal.value.setFromMatrix4(this.box.matrix).invert().transpose();
     this.placeCross();
+    this.placeCrop();
   }
 
   // Where the slices meet, in millimetres.
@@ -219,6 +224,22 @@ export class LiveSurface {
     if (this.uniforms.iso.value === iso) return;
     this.uniforms.iso.value = iso;
     this.moved();
+  }
+
+  // What of the volume is drawn, as parts of its samples along each axis; null for all of it.
+  setCrop(box: readonly [Vec3, Vec3] | null): void {
+    if (JSON.stringify(box) === JSON.stringify(this.crop)) return;
+    this.crop = box;
+    this.changed();
+  }
+
+  // In samples of what is drawn now, of which a copy may have fewer.
+  private placeCrop(): void {
+    const { cropLow, cropHigh, dims, isCropped } = this.uniforms;
+    const last = dims.value.clone().subScalar(1);
+    isCropped.value = this.crop !== null;
+    cropLow.value.set(...(this.crop?.[0] ?? [0, 0, 0])).multiply(last);
+    cropHigh.value.set(...(this.crop?.[1] ?? [1, 1, 1])).multiply(last);
   }
 
   // Null: the surface at the iso-value.

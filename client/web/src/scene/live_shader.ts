@@ -58,6 +58,10 @@ uniform float iso;
 uniform float reach;
 // Whether what is looked through is drawn: colours and opacities of 256 values, and for each the sum of those below it.
 uniform bool isThrough;
+// What of the volume is drawn.
+uniform bool isCropped;
+uniform vec3 cropLow;
+uniform vec3 cropHigh;
 uniform sampler2D look;
 uniform sampler2D sums;
 // How much only borders between values are seen.
@@ -145,8 +149,8 @@ vec4 lookedThrough(vec3 direction, float t, float end, float stride) {
 
 void main() {
   vec3 direction = place - eye;
-  vec3 first = -eye / direction;
-  vec3 second = (dims - 1.0 - eye) / direction;
+  vec3 first = (cropLow - eye) / direction;
+  vec3 second = (cropHigh - eye) / direction;
   vec3 enter = min(first, second);
   vec3 leave = max(first, second);
   float t = max(max(enter.x, enter.y), max(enter.z, 0.0));
@@ -161,6 +165,11 @@ void main() {
   }
   bool isInside = valueAt(eye + t * direction) >= iso;
   float blockEnd = -1.0;
+  // A crop closes the surface where it is cut.
+  if (isCropped && isInside) {
+    pixel = vec4(0.62 * colour, 1.0);
+    return;
+  }
   for (int i = 0; i < mostSteps && t < end; i++) {
     if (t >= blockEnd) {
       vec3 p = clamp(eye + (t + 0.001 * stride) * direction, vec3(0.0), dims - 1.001);

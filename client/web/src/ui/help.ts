@@ -8,6 +8,7 @@ const keys: [string, string][] = [
   ['Ctrl Enter', 'make the surface'],
   ['[', 'go to the line in the histogram'],
   ['arrows', 'in a slice: next slice; on the line: iso-value; on a surface: turn'],
+  ['Ctrl wheel + \u2212 0', 'in a slice: zoom; all of it'],
   ['i', 'in a slice: its value at the cross becomes the iso-value'],
   ['Shift arrows', 'in a slice: window and level; on a surface: move'],
   ['+ \u2212', 'zoom'],

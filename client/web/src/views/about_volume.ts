@@ -68,6 +68,8 @@ export function sliceHelp(): HTMLElement {
     h('li', { class: 'by-mouse' }, h('b', {}, 'Drag'), ' in a slice: window and level'),
     h('li', { class: 'by-touch' }, h('b', {}, 'Drag to the side'), ' in a slice: window and level; up and down scrolls'),
     h('li', { class: 'by-mouse' }, h('b', {}, 'Wheel'), ' or arrow keys: next slice'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Ctrl and wheel'), ', or + and \u2212: zoom; ', h('b', {}, 'Shift and drag'), ': move; 0: all of it'),
+    h('li', { class: 'by-touch' }, h('b', {}, 'Two fingers'), ': zoom and move'),
     h('li', { class: 'by-mouse' }, h('b', {}, 'Click'), ': the other slices go there'),
     h('li', { class: 'by-mouse' }, h('b', {}, 'Double click'), ' or i: the value there becomes the iso-value'),
     h('li', { class: 'by-touch' }, h('b', {}, 'Slider'), ' below it: next slice'),

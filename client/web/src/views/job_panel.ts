@@ -3,7 +3,7 @@ import { submitJob, token } from '../api/client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../api/types';
 import { defaultParameters, isSameJob, jobRequest, queryOfParameters, surfaceInWords, variantOf, withGlb } from '../job/parameters';
 import { commandSnippet, curlSnippet, librarySnippet } from '../job/snippets';
-import { meshFormats } from '../job/table';
+import { isByLabels, meshFormats } from '../job/table';
 import { button, h, type Child } from '../ui/dom';
 import { formatBytes, formatCount, formatNames, formatNumber, formatValue, shortId } from '../ui/format';
 import { tell, tellError } from '../ui/notices';
@@ -61,6 +61,13 @@ function volumeText({ volume_mm3: { extracted, smoothed } }: MeshSummary): Child
   );
 }
 
+// Of a surface in many parts the largest is often the one that is wanted.
+function partsText(job: Job, { components }: MeshSummary): Child {
+  if (components < 2 || isByLabels(job.parameters)) return formatCount(components);
+  const keep = (): void => makeVariant(job)({ components: { keep: 1, min_triangles: null } });
+  return h('span', {}, `${formatCount(components)} `, button('Keep the largest', keep, { class: 'link', title: 'Starts a job that leaves the others out' }));
+}
+
 export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
   const [low, high] = mesh.bounds;
   const extent = low.map((value, axis) => formatNumber((high[axis as 0] ?? 0) - value, 1)).join(' \u00d7 ');
@@ -89,7 +96,7 @@ export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
         ? 'yes'
         : h('span', { class: 'attention' }, `no, ${formatCount(mesh.boundary_edges)} edges on the border`),
     ],
-    ['Parts', formatCount(mesh.components)],
+    ['Parts', partsText(job, mesh)],
     ['Genus', mesh.quality.genus === null ? '' : formatCount(mesh.quality.genus)],
     ['Extent', `${extent} mm`],
     ['Run through themselves', intersectionsText(mesh)],

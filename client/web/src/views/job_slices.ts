@@ -51,6 +51,7 @@ class JobSlices {
       setIso: () => undefined,
       isInteger: isInteger(volume),
       contourColour: () => cssColour('--contour'),
+      crop: null,
       onError: tellError,
     };
     this.views = (['axial', 'coronal', 'sagittal'] as const).map((plane) => new SliceView(plane, host, scope));

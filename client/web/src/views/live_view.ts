@@ -7,6 +7,7 @@ import { h } from '../ui/dom';
 import { formatValue } from '../ui/format';
 import type { Scope } from '../ui/signal';
 import { toPatient } from '../volume/geometry';
+import type { Box } from '../volume/crop';
 import { lookOf, looksFor, type LookName } from '../volume/looks';
 import { inPreview, type Preview } from '../volume/preview';
 import type { PreviewAnswer } from '../volume/preview.worker';
@@ -44,6 +45,7 @@ export class LiveView {
   private retry = 0;
   private hasFailed = false;
   private look: LookName | '' = '';
+  private box: Box | null = null;
 
   constructor(
     private readonly host: LiveHost,
@@ -94,6 +96,14 @@ export class LiveView {
     if (!preview) return;
     this.surface?.setLook(look === '' ? null : lookOf(look, preview.window));
     this.element.dataset.look = look;
+  }
+
+  // In samples of the volume; null for all of it.
+  showCrop(box: Box | null): void {
+    this.box = box;
+    const { dims } = this.host.volume;
+    const parts = (corner: Vec3): Vec3 => corner.map((value, axis) => value / Math.max(1, dims[axis as 0] - 1)) as Vec3;
+    this.surface?.setCrop(box && [parts(box[0]), parts(box[1])]);
   }
 
   // No iso-value: the labels of a segmentation. The cursor is where the slices meet.
@@ -210,6 +220,7 @@ export class LiveView {
     this.surface?.setPreview(preview);
     this.showIso();
     this.showLook();
+    this.showCrop(this.box);
     this.element.dataset.size = String(Math.max(...preview.dims));
     const coarseness = Math.max(...this.factors(preview));
     this.place.textContent = coarseness > 1 ? `preview, 1 : ${coarseness}` : 'preview';

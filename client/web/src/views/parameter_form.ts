@@ -25,6 +25,8 @@ export interface FormHost {
   // Whether what stands in the parameter's control can be used; while it cannot, the job has another value.
   mark: (parameter: Parameter, isGood: boolean) => void;
   slider: SliderHost;
+  // Has a control beside the form.
+  hides: readonly string[];
 }
 
 interface Control {
@@ -233,7 +235,7 @@ export function parameterForm(host: FormHost): HTMLElement {
     element.title = parameter.help;
     return element;
   };
-  const offered = shown.filter((parameter) => isOfKind(parameter, host.job()));
+  const offered = shown.filter((parameter) => isOfKind(parameter, host.job()) && !host.hides.includes(parameter.name));
   const rows = front.map((names) =>
     h('div', { class: 'row' }, ...names.map(parameterOf).filter((one) => offered.includes(one)).map(elementFor)),
   );

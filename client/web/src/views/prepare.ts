@@ -22,9 +22,11 @@ import type { Scope } from '../ui/signal';
 import { cssColour, theme } from '../ui/theme';
 import { defaultWindow, type Histogram } from '../volume/histogram';
 import { SliceSource, type Window } from '../volume/slices';
+import { boxOf, cropOf, isUpright, within, type Box } from '../volume/crop';
 import { cursorOfText } from '../volume/geometry';
 import { isInteger, volumeName } from '../volume/names';
 import { aboutVolume, notedOf, sliceHelp } from './about_volume';
+import { CropControl } from './crop_control';
 import { estimateTexts } from './estimate_texts';
 import { HistogramView } from './histogram_view';
 import { LiveView } from './live_view';
@@ -76,6 +78,8 @@ class Prepare {
   private readonly slices: SliceView[];
   private readonly histogram: HistogramView;
   private readonly live: LiveView;
+  // Null where a box of the patient's axes is none of the volume's; then its corners are typed.
+  private readonly crop: CropControl | null;
   private readonly isoInput: HTMLInputElement;
   private readonly estimate = h('div', { class: 'estimate', 'aria-live': 'polite' });
   private readonly run: HTMLButtonElement;
@@ -128,6 +132,7 @@ class Prepare {
       },
       isInteger: isInteger(volume),
       contourColour: () => cssColour('--contour'),
+      crop: isUpright(volume) ? { box: () => this.box, setBox: (box) => this.setBox(within(volume, box)) } : null,
       onError: (error) => this.sliceFailed(error),
     };
     this.histogram = new HistogramView(counts, isInteger(volume), (iso) => this.setIso(iso), scope);
@@ -135,6 +140,7 @@ class Prepare {
       (plane) => new SliceView(plane, host, scope),
     );
     this.live = this.liveView(route, host);
+    this.crop = host.crop && new CropControl(volume, this.box, (box) => this.setBox(box));
     this.isoInput = h('input', { type: 'number', step: 'any', id: 'iso', class: 'iso-input' });
     this.listenToIso();
     this.run = button('Make the surface', () => void this.start(), { class: 'primary' });
@@ -193,6 +199,15 @@ class Prepare {
     return typeof iso === 'number' ? iso : this.volume.suggested_iso;
   }
 
+  private get box(): Box | null {
+    return boxOf(this.volume, this.parameters.crop);
+  }
+
+  private setBox(box: Box | null): void {
+    this.parameters = { ...this.parameters, crop: box ? cropOf(this.volume, box) : null };
+    this.changed();
+  }
+
   // The controls that are for an iso-value, or those for labels.
   private showKind(): void {
     const byLabels = isByLabels(this.parameters);
@@ -212,6 +227,7 @@ class Prepare {
         },
         mark: (parameter, isGood) => this.mark(parameter.name, isGood),
         slider: { spacing: this.volume.spacing, outcome: this.simplified },
+        hides: this.crop ? ['crop'] : [],
       }),
     );
   }
@@ -266,6 +282,7 @@ class Prepare {
         this.isoPart,
         this.labelPart,
         this.windowRow(common),
+        this.crop?.element ?? '',
         ...notedOf(volume),
         this.form,
         this.surfaces,
@@ -352,6 +369,8 @@ class Prepare {
   private update(): void {
     for (const view of this.slices) view.update();
     this.live.show(isByLabels(this.parameters) ? null : this.iso, this.cursor);
+    this.live.showCrop(this.box);
+    this.crop?.show(this.box);
     this.histogram.show(this.iso, this.window);
     const [low, high] = this.window;
     this.windowText.textContent = `window ${formatValue(high - low)}, level ${formatValue((low + high) / 2)}`;

@@ -4,6 +4,8 @@ import { h, uniqueId } from '../ui/dom';
 import { formatValue } from '../ui/format';
 import type { Scope } from '../ui/signal';
 import { contour } from '../volume/contour';
+import { SliceCrop, type CropHost } from './slice_crop';
+import { SliceZoom } from './slice_zoom';
 import {
   axisIndex,
   pictureAxes,
@@ -34,6 +36,8 @@ export interface SliceHost {
   setIso: (iso: number) => void;
   isInteger: boolean;
   contourColour: () => string;
+  // Null where nothing can be cropped.
+  crop: CropHost | null;
   onError: (error: unknown) => void;
 }
 
@@ -50,6 +54,7 @@ const titles: Record<Plane, string> = { axial: 'Axial', coronal: 'Coronal', sagi
 const padding = 14;
 // How much is seen of a slice that stands in for one that is not there yet.
 const otherSlice = 0.35;
+const cropColour = '#f2b33d';
 
 export class SliceView {
   readonly element: HTMLElement;
@@ -62,6 +67,8 @@ export class SliceView {
   private readonly state = h('p', { class: 'slice-state', role: 'status' });
   // Of the sample under the pointer.
   private readonly value = h('p', { class: 'slice-value', 'aria-hidden': 'true' });
+  private readonly zoom: SliceZoom;
+  private readonly crop: SliceCrop | null;
   private scheduled = false;
 
   constructor(
@@ -81,10 +88,12 @@ export class SliceView {
     });
     this.slider.disabled = this.count(this.layout.normal) === 1;
     this.slider.addEventListener('input', () => this.goTo(Number(this.slider.value)));
+    this.crop = host.crop && new SliceCrop(host.crop, pictureAxes(this.layout.normal));
+    this.zoom = new SliceZoom(this.canvas, scope, () => this.draw());
     this.element = h(
       'figure',
       { class: 'slice', 'data-plane': plane },
-      h('div', { class: 'slice-picture' }, this.canvas, this.state, this.value),
+      h('div', { class: 'slice-picture' }, this.canvas, this.state, this.value, this.zoom.element),
       h('figcaption', {}, h('span', { class: 'slice-title' }, titles[plane]), this.slider, this.place),
     );
     this.loader = new SliceLoader(host.source, this.layout.normal, scope, {
@@ -129,7 +138,8 @@ export class SliceView {
   private placement(): Placement {
     const { width, height, clientWidth } = this.canvas;
     const edge = padding * (width / (clientWidth || 1));
-    return slicePlacement(this.host.volume, this.layout, { width, height, edge });
+    const whole = slicePlacement(this.host.volume, this.layout, { width, height, edge });
+    return this.zoom.zoom.placed(whole, width, height);
   }
 
   private draw(): void {
@@ -195,6 +205,7 @@ export class SliceView {
       context.lineTo(segments[i + 2] as number, segments[i + 3] as number);
     }
     strokePixels(context, 1.5 * ratio, this.host.contourColour());
+    if (this.crop?.paint(context)) strokePixels(context, 1.5 * ratio, cropColour);
     context.restore();
   }
 
@@ -228,11 +239,29 @@ export class SliceView {
     context.fillText(down.end, width / 2, height - edge);
   }
 
-  // The sample under a point of the screen.
-  private sampleAt(event: PointerEvent | MouseEvent): Vec3 | null {
+  // The column and row of the picture under a point of the screen.
+  private pointAt(event: PointerEvent | MouseEvent): [number, number] {
     const box = this.canvas.getBoundingClientRect();
     const scale = this.canvas.width / (box.width || 1);
-    const point = placedAt(this.placement(), (event.clientX - box.left) * scale, (event.clientY - box.top) * scale);
+    return placedAt(this.placement(), (event.clientX - box.left) * scale, (event.clientY - box.top) * scale);
+  }
+
+  // From the middles of samples, as a box is told.
+  private placeAt(event: PointerEvent): [number, number] {
+    const [column, row] = this.pointAt(event);
+    return [column - 0.5, row - 0.5];
+  }
+
+  private edgesAt(event: PointerEvent): ReturnType<SliceCrop['at']> {
+    const [a, b, c, d] = this.placement();
+    const ratio = window.devicePixelRatio || 1;
+    const pixels: [number, number] = [Math.hypot(a, b) / ratio, Math.hypot(c, d) / ratio];
+    return this.crop?.at(this.placeAt(event), pixels, event.pointerType === 'touch') ?? null;
+  }
+
+  // The sample under a point of the screen.
+  private sampleAt(event: PointerEvent | MouseEvent): Vec3 | null {
+    const point = this.pointAt(event);
     const cursor: Vec3 = [...this.host.state().cursor];
     const { dims } = this.host.volume;
     for (const [at, axis] of pictureAxes(this.layout.normal).entries()) {
@@ -247,13 +276,18 @@ export class SliceView {
     let press: Press | null = null;
     const { canvas, scope } = this;
     scope.listen(canvas, 'pointerdown', (event: PointerEvent) => {
-      if (event.button !== 0 && event.button !== 2) return;
+      if ((event.button !== 0 && event.button !== 2) || event.shiftKey) return;
       if (!event.isPrimary) {
         // A second finger: a pinch, or the palm.
         press = null;
         return;
       }
       canvas.setPointerCapture(event.pointerId);
+      const edges = this.edgesAt(event);
+      if (edges) {
+        this.crop?.begin(event.pointerId, edges);
+        return;
+      }
       press = {
         pointer: event.pointerId,
         x: event.clientX,
@@ -264,7 +298,9 @@ export class SliceView {
       };
     });
     scope.listen(canvas, 'pointermove', (event: PointerEvent) => {
-      if (press?.pointer !== event.pointerId) return;
+      if (this.crop?.move(event.pointerId, this.placeAt(event))) return;
+      if (event.pointerType === 'mouse') canvas.classList.toggle('on-edge', this.edgesAt(event) !== null);
+      if (press?.pointer !== event.pointerId || this.zoom.isMoving(event)) return;
       const dx = event.clientX - press.x;
       const dy = event.clientY - press.y;
       press.moved ||= Math.hypot(dx, dy) > (event.pointerType === 'mouse' ? 3 : 10);
@@ -274,12 +310,13 @@ export class SliceView {
       if (press.moved) this.host.setWindow(draggedWindow(press.window, dx, dy));
     });
     scope.listen(canvas, 'pointerup', (event: PointerEvent) => {
-      if (press?.pointer !== event.pointerId) return;
+      if (this.crop?.end(event.pointerId) || press?.pointer !== event.pointerId) return;
       const cursor = press.moved ? null : this.sampleAt(event);
       press = null;
       if (cursor) this.host.setCursor(cursor);
     });
-    scope.listen(canvas, 'pointercancel', () => {
+    scope.listen(canvas, 'pointercancel', (event: PointerEvent) => {
+      this.crop?.end(event.pointerId);
       // The browser has taken the finger to scroll with: what it did here before was not meant.
       if (press?.isWindowing) this.host.setWindow(press.window);
       press = null;
@@ -326,12 +363,14 @@ export class SliceView {
       'wheel',
       (event: WheelEvent) => {
         event.preventDefault();
-        if (event.deltaY !== 0) this.step(Math.sign(event.deltaY));
+        if (event.ctrlKey || event.metaKey) this.zoom.wheel(event);
+        else if (event.deltaY !== 0) this.step(Math.sign(event.deltaY));
       },
       { passive: false },
     );
     scope.listen(canvas, 'keydown', (event: KeyboardEvent) => {
       const key = event.key;
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
       if (event.shiftKey && key.startsWith('Arrow')) {
         const dx = key === 'ArrowLeft' ? -8 : key === 'ArrowRight' ? 8 : 0;
         const dy = key === 'ArrowUp' ? -8 : key === 'ArrowDown' ? 8 : 0;
