@@ -55,6 +55,12 @@ function placeOf({ path }: Route): Place {
       show: async (scope, route) => (await import('./views/compare')).compareView(scope, route),
     };
   }
+  if (name === 'together') {
+    return {
+      title: 'Surfaces together',
+      show: async (scope, route) => (await import('./views/together')).togetherView(scope, route),
+    };
+  }
   return {
     title: 'Not found',
     show: () => Promise.reject(new ApiError(404, 'Not found', 'There is nothing at this address.')),

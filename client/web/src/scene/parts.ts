@@ -46,6 +46,7 @@ interface Look {
   // while it moves.
   level: { seams: Seams; blocks: number };
   showsDistance: boolean;
+  opacity: number;
 }
 
 interface DrawnBlock {
@@ -86,6 +87,7 @@ export class Parts {
   private readonly blocks: DrawnBlock[] = [];
   private readonly looks = new Map<number | null, Look>();
   private readonly colours = new Map<number, string>();
+  private readonly opacities = new Map<number, number>();
   private hidden: ReadonlySet<number> = new Set();
   private style = defaultStyle;
   private planes: Plane[] | null = null;
@@ -205,6 +207,17 @@ export class Parts {
     for (const made of this.looks.get(label)?.materials ?? []) made.color.set(colour);
   }
 
+  // Whether it takes another shader.
+  setOpacity(label: number, opacity: number): boolean {
+    this.opacities.set(label, opacity);
+    const look = this.looks.get(label);
+    if (!look) return false;
+    look.opacity = opacity;
+    const isOther = this.apply(look);
+    this.showAll();
+    return isOther;
+  }
+
   setCoarse(isCoarse: boolean): void {
     this.isCoarse = isCoarse;
     for (const { meshes, fine, coarse, isLevel } of this.blocks) {
@@ -271,6 +284,7 @@ export class Parts {
       blocks: 0,
       level: { seams: new Seams(), blocks: 0 },
       showsDistance: false,
+      opacity: part ? (this.opacities.get(part.label) ?? 1) : 1,
     };
     this.apply(look);
     this.looks.set(part?.label ?? null, look);
@@ -284,7 +298,8 @@ export class Parts {
   // Whether its shader is another one now.
   private apply(look: Look): boolean {
     const { materials } = look;
-    const { shading, wireframe, opacity, distance } = this.style;
+    const { shading, wireframe, distance } = this.style;
+    const opacity = this.style.opacity * look.opacity;
     let hasChanged = distance !== look.showsDistance;
     if (distance !== look.showsDistance) {
       look.showsDistance = distance;
@@ -313,7 +328,8 @@ export class Parts {
     const [front, back] = block.meshes;
     const isSeen = this.isSeen(block);
     if (front) front.visible = isSeen;
-    if (back) back.visible = isSeen && (this.planes !== null || this.style.opacity < 1 || this.style.wireframe);
+    const isThrough = this.style.opacity * block.look.opacity < 1;
+    if (back) back.visible = isSeen && (this.planes !== null || isThrough || this.style.wireframe);
   }
 
   // Of a look with a coarse level either that one is seen or the finest.

@@ -2,9 +2,7 @@
 // drawn over them. Draws when something changed, never for nothing.
 import {
   PerspectiveCamera,
-  Raycaster,
   Scene,
-  Vector2,
   Vector3,
   WebGLRenderer,
 } from 'three';
@@ -22,7 +20,7 @@ import { facing } from './facing';
 import { whenDrawn } from './fence';
 import { addLights } from './lights';
 import { Parts, type SurfaceStyle } from './parts';
-import { keptBy, wholeRay } from './pick';
+import { pickedAt, type Picked } from './picked';
 import { pictureOf } from './picture';
 import { Rulers } from './rulers';
 import { Uploading } from './uploading';
@@ -32,13 +30,6 @@ import { firstOffset, fitDistance, turned, viewOffsets, type CameraPlace, type V
 const verticalAngle = 30;
 const fill = 1.02;
 const settleDelay = 180;
-
-// A point of the surface, and whose it is; null: of the only surface, or of the slice on the cut.
-export interface Picked {
-  point: Vec3;
-  label: number | null;
-  distance?: number; // of a surface that has distances, there
-}
 
 export class Surface {
   readonly canvas: HTMLCanvasElement;
@@ -58,7 +49,6 @@ export class Surface {
   private cube: OrientationCube | null = null;
   private readonly uploading: Uploading;
   private readonly parts: Parts;
-  private readonly ray = new Raycaster();
   private readonly resizing: ResizeObserver;
   private bounds: [Vec3, Vec3] = [
     [-1, -1, -1],
@@ -227,6 +217,12 @@ export class Surface {
 
   setColour(label: number, colour: string): void {
     this.parts.setColour(label, colour);
+    this.draw();
+  }
+
+  // Of one label beside others; times the opacity of all.
+  setOpacity(label: number, opacity: number): void {
+    if (this.parts.setOpacity(label, opacity)) this.compile();
     this.draw();
   }
 
@@ -433,16 +429,6 @@ export class Surface {
   // The nearest point of the surface, or of the slice on its cut, that is seen there.
   private pickedAt(x: number, y: number): Picked | null {
     this.setCoarse(false);
-    this.ray.setFromCamera(new Vector2(x, y), this.camera);
-    const { ray } = this.ray;
-    const plane = this.parts.cut;
-    const { from, to } = plane ? keptBy(plane, ray) : wholeRay;
-    const slice = this.cut.hit(this.ray)?.distance ?? Infinity;
-    const hit = this.parts.hit(ray, { from, to: Math.min(to, slice) });
-    const found = hit?.at ?? slice;
-    if (found === Infinity) return null;
-    const point = ray.at(found, new Vector3());
-    const picked: Picked = { point: [point.x, point.y, point.z], label: hit?.label ?? null };
-    return hit?.distance === undefined ? picked : { ...picked, distance: hit.distance };
+    return pickedAt(x, y, this.camera, this.parts, this.cut);
   }
 }

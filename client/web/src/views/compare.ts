@@ -103,13 +103,13 @@ class Comparison {
     this.element = h(
       'div',
       { class: 'compare', 'data-count': cells.length, 'data-title': `Compare ${titles.join(', ')}` },
-      this.head(volume && isOneVolume ? `Compare, ${volumeName(volume)}` : 'Compare'),
+      this.head(volume && isOneVolume ? `Compare, ${volumeName(volume)}` : 'Compare', jobs.map(({ id }) => id)),
       h('div', { class: 'grid' }, ...cells),
     );
     scope.onEnd(() => clearTimeout(this.noting));
   }
 
-  private head(title: string): HTMLElement {
+  private head(title: string, jobs: readonly string[]): HTMLElement {
     const views = viewNames.map((name) =>
       button(name, () => this.panes[0]?.look(name), { 'aria-label': viewTitles[name], title: viewTitles[name] }),
     );
@@ -125,7 +125,8 @@ class Comparison {
         this.styleButton('Flat', (isOn) => ({ shading: isOn ? 'flat' : 'smooth' })),
         this.styleButton('Wires', (isOn) => ({ wireframe: isOn })),
       ),
-      h('span', { class: 'hint' }, 'The cameras are linked.'),
+      h('span', { class: 'hint grow' }, 'The cameras are linked.'),
+      h('a', { class: 'button', href: hashOf(['together'], new URLSearchParams({ jobs: jobs.join(',') })) }, 'In one scene'),
     );
   }
 

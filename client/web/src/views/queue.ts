@@ -12,6 +12,7 @@ import { KnownVolumes } from '../volume/known';
 
 const refreshEvery = 1500;
 const mostCompared = 4;
+const mostTogether = 8;
 const columns = ['', 'State', 'Priority', 'Surface', 'Result', 'Time', 'Created', ''];
 
 // As the daemon takes them: by priority, then by age.
@@ -72,6 +73,7 @@ class Queue {
   readonly element: HTMLElement;
   private readonly body = h('div', { class: 'queue-body' });
   private readonly compare: HTMLButtonElement;
+  private readonly together: HTMLButtonElement;
   private readonly more: HTMLButtonElement;
   private readonly chosen = new Set<string>();
   private jobs: Job[] = [];
@@ -80,6 +82,10 @@ class Queue {
 
   constructor() {
     this.compare = button('Compare', () => this.goCompare(), { class: 'primary', disabled: true });
+    this.together = button('In one scene', () => go(['together'], new URLSearchParams({ jobs: [...this.chosen].join(',') })), {
+      disabled: true,
+      title: 'Two to eight surfaces with colours of their own',
+    });
     this.more = button('Older jobs', () => void this.showMore().catch(tellError), { hidden: true });
     this.element = h(
       'div',
@@ -89,6 +95,7 @@ class Queue {
         { class: 'section-head' },
         h('h1', {}, 'Jobs'),
         h('span', { class: 'hint grow' }, 'Stat goes before routine, routine before bulk; then the oldest.'),
+        this.together,
         this.compare,
       ),
       this.body,
@@ -177,6 +184,7 @@ class Queue {
     if (isOn) this.chosen.add(id);
     else this.chosen.delete(id);
     const { size } = this.chosen;
+    this.together.disabled = size < 2 || size > mostTogether;
     this.compare.disabled = size < 2 || size > mostCompared;
     this.compare.textContent = size > 0 ? `Compare (${size})` : 'Compare';
   }

@@ -1,0 +1,179 @@
+// Several surfaces in one scene, each with its colour and opacity: #/together?jobs=A,B
+import { getJob, getVolume } from '../api/client';
+import { ApiError } from '../api/problem';
+import type { Job, Vec3 } from '../api/types';
+import { differences } from '../job/differences';
+import { surfaceInWords } from '../job/parameters';
+import { loadMesh, viewableFile } from '../mesh/load';
+import { Surface } from '../scene/surface';
+import { placeOfText, placeToText, viewNames, viewTitles } from '../scene/views';
+import { button, checkbox, h } from '../ui/dom';
+import { formatCount } from '../ui/format';
+import { tellError } from '../ui/notices';
+import { hashOf, noteInAddress, type Route } from '../ui/route';
+import type { Scope } from '../ui/signal';
+import { volumeName } from '../volume/names';
+import { looksOfText, looksToText, type SurfaceLook } from './together_look';
+
+const most = 8;
+const noteDelay = 300;
+
+export async function togetherView(scope: Scope, route: Route): Promise<HTMLElement> {
+  const ids = (route.query.get('jobs') ?? '').split(',').filter(Boolean).slice(0, most);
+  const jobs = (await Promise.all(ids.map((id) => getJob(id)))).filter((job) => viewableFile(job) !== null);
+  if (jobs.length === 0) {
+    const link = { href: hashOf(['jobs']), text: 'To the list of jobs' };
+    throw new ApiError(-1, 'No surfaces to show', 'Choose jobs that have made a GLB or Draco file.', [], {}, link);
+  }
+  const titles = await titlesOf(jobs);
+  return new Together(scope, jobs, titles, route.query).element;
+}
+
+// What tells them apart; the volume's name too where there are several.
+async function titlesOf(jobs: readonly Job[]): Promise<string[]> {
+  const different = jobs.length > 1 ? differences(jobs) : [''];
+  const volumes = new Set(jobs.map(({ volume }) => volume));
+  const names = new Map(
+    await Promise.all(
+      [...volumes].map(async (id): Promise<[string, string]> => [id, await getVolume(id).then(volumeName, () => 'erased volume')]),
+    ),
+  );
+  const isNamed = volumes.size > 1 || jobs.length === 1;
+  return jobs.map((job, at) => {
+    // Named, a volume needs no number.
+    const words = (different[at] ?? '').split(', ').filter((word) => !isNamed || !/^volume [0-9a-f]{8}$/.test(word));
+    return [isNamed ? names.get(job.volume) : '', ...words, isNamed ? surfaceInWords(job.parameters) : ''].filter(Boolean).join(', ');
+  });
+}
+
+class Together {
+  readonly element: HTMLElement;
+  private readonly view = h('div', { class: 'viewport' });
+  private readonly status = h('p', { class: 'hint', role: 'status' });
+  private readonly looks: SurfaceLook[];
+  private surface: Surface | null = null;
+  private noting = 0;
+
+  constructor(
+    private readonly scope: Scope,
+    private readonly jobs: readonly Job[],
+    titles: readonly string[],
+    private readonly query: URLSearchParams,
+  ) {
+    this.looks = looksOfText(query.get('looks') ?? '', jobs.length);
+    this.element = h(
+      'div',
+      { class: 'job together', 'data-title': `Together: ${titles.join(', ')}` },
+      h('div', { class: 'stage-area' }, h('div', { class: 'pane' }, this.view, this.tools())),
+      h(
+        'aside',
+        { class: 'panel', 'aria-label': 'Surfaces' },
+        h('header', { class: 'panel-head' }, h('h1', {}, 'Surfaces together'), this.status),
+        h('ul', { class: 'surfaces' }, ...jobs.map((job, at) => this.row(job, at, titles[at] ?? ''))),
+        h('p', { class: 'hint' }, 'They lie as their volumes say. Volumes of different examinations need not lie one on the other.'),
+      ),
+    );
+    // The canvas takes its size from the page, so the view has to be in it first.
+    requestAnimationFrame(() => {
+      this.begin().catch((error: unknown) => {
+        if (!scope.isOver) tellError(error);
+      });
+    });
+    scope.onEnd(() => clearTimeout(this.noting));
+  }
+
+  private tools(): HTMLElement {
+    return h(
+      'div',
+      { class: 'tools' },
+      h(
+        'div',
+        { class: 'toolbar', role: 'toolbar', 'aria-label': 'View' },
+        h(
+          'div',
+          { class: 'tool-group' },
+          ...viewNames.map((name) => button(name, () => this.surface?.look(name), { 'aria-label': viewTitles[name], title: viewTitles[name] })),
+          button('Fit', () => this.surface?.fit()),
+        ),
+      ),
+    );
+  }
+
+  private row(job: Job, at: number, title: string): HTMLElement {
+    const look = this.looks[at] as SurfaceLook;
+    const change = (next: Partial<SurfaceLook>): void => {
+      Object.assign(look, next);
+      this.show(at);
+      noteInAddress({ looks: looksToText(this.looks) });
+    };
+    const colour = h('input', { type: 'color', value: look.colour, 'aria-label': `Colour of ${title}` });
+    colour.addEventListener('input', () => change({ colour: colour.value }));
+    const opacity = h('input', { type: 'range', min: 0.1, max: 1, step: 0.05, value: look.opacity, 'aria-label': `Opacity of ${title}` });
+    opacity.addEventListener('input', () => change({ opacity: opacity.valueAsNumber }));
+    return h(
+      'li',
+      { 'data-job': job.id },
+      colour,
+      h(
+        'div',
+        { class: 'surface-row' },
+        checkbox(title, look.isShown, (isShown) => change({ isShown })),
+        h('label', { class: 'surface-opacity' }, h('span', {}, 'Opacity'), opacity),
+        h('span', { class: 'faint' }, h('a', { href: hashOf(['jobs', job.id]) }, 'alone'), ` ${formatCount(job.mesh?.triangles ?? 0)} triangles`),
+      ),
+    );
+  }
+
+  // Each surface is a part of its own; the labels of one job share its look.
+  private show(at: number): void {
+    const { surface, looks } = this;
+    const look = looks[at];
+    if (!surface || !look) return;
+    surface.setColour(at, look.colour);
+    surface.setOpacity(at, look.opacity);
+    surface.setHidden(new Set(looks.flatMap(({ isShown }, place) => (isShown ? [] : [place]))));
+  }
+
+  private async begin(): Promise<void> {
+    if (this.scope.isOver) return;
+    const surface = new Surface(this.view);
+    this.surface = surface;
+    this.scope.onEnd(() => surface.dispose());
+    surface.canvas.setAttribute('aria-label', `${this.jobs.length} surfaces in one scene. Drag to turn them.`);
+    surface.setBounds(around(this.jobs));
+    const camera = placeOfText(this.query.get('cam') ?? '');
+    if (camera) surface.moveTo(camera);
+    surface.onCamera = () => {
+      clearTimeout(this.noting);
+      this.noting = window.setTimeout(() => noteInAddress({ cam: placeToText(surface.place) }), noteDelay);
+    };
+    this.jobs.forEach((_, at) => this.show(at));
+    const done = this.jobs.map(() => 0);
+    const total = this.jobs.reduce((sum, { mesh }) => sum + (mesh?.triangles ?? 0), 0);
+    await Promise.all(
+      this.jobs.map((job, at) =>
+        loadMesh(job, this.scope.signal, {
+          // The finest alone: a coarse level of one would stand for all.
+          onBlocks: (blocks, _, isCoarse) => {
+            const colour = this.looks[at]?.colour ?? '';
+            if (!isCoarse) surface.addBlocks(blocks, { label: at, colour });
+          },
+          onProgress: ({ triangles }) => {
+            done[at] = triangles;
+            this.status.textContent = `${formatCount(done.reduce((sum, count) => sum + count, 0))} of ${formatCount(total)} triangles`;
+          },
+        }),
+      ),
+    );
+    if (this.scope.isOver) return;
+    surface.finish();
+    this.view.parentElement?.setAttribute('data-loaded', 'true');
+  }
+}
+
+function around(jobs: readonly Job[]): [Vec3, Vec3] {
+  const boxes = jobs.flatMap(({ mesh }) => (mesh && !mesh.empty ? [mesh.bounds] : []));
+  const end = (corner: 0 | 1, pick: (...values: number[]) => number): Vec3 =>
+    [0, 1, 2].map((axis) => pick(...boxes.map((box) => box[corner][axis as 0]))) as Vec3;
+  return boxes.length > 0 ? [end(0, Math.min), end(1, Math.max)] : [[-1, -1, -1], [1, 1, 1]];
+}
