@@ -8,6 +8,7 @@
 
 #include "proto/error.h"
 #include "server/dicom/data_set.h"
+#include "server/dicom/file_head.h"
 #include "server/dicom/uid.h"
 
 namespace isomesh::dicom {
@@ -151,21 +152,6 @@ void add_model(const StlObject& object, DataSet& data) {
   data.set_sequence(0x00221612, {algorithm});                      // DerivationAlgorithmSequence
 }
 
-std::string meta_information(const StlObject& object) {
-  DataSet meta;
-  meta.set_bytes(0x00020001, "OB", std::string_view("\0\1", 2));
-  meta.set(0x00020002, "UI", kEncapsulatedStlStorage);
-  meta.set(0x00020003, "UI", object.sop_instance_uid);
-  meta.set(0x00020010, "UI", kExplicitLittleEndian);
-  meta.set(0x00020012, "UI", name_based_uid("implementation"));
-  meta.set(0x00020013, "SH", "ISOMESH " ISOMESH_VERSION);
-  const std::string rest = meta.bytes();
-  DataSet length;
-  length.set_long(0x00020000, static_cast<std::uint32_t>(rest.size()));
-  constexpr std::size_t kPreamble = 128;
-  return std::string(kPreamble, '\0') + "DICM" + length.bytes() + rest;
-}
-
 }  // namespace
 
 StlEnvelope make_envelope(const StlObject& object, std::uint64_t stl_bytes) {
@@ -188,9 +174,11 @@ StlEnvelope make_envelope(const StlObject& object, std::uint64_t stl_bytes) {
   add_document(object, made, stl_bytes, data);
   add_model(object, data);
   const auto padded = static_cast<std::uint32_t>(stl_bytes + stl_bytes % 2);
-  return {.before = meta_information(object) + data.bytes_before(kEncapsulatedDocument) +
-                    element_head(kEncapsulatedDocument, "OB", padded),
-          .after = std::string(stl_bytes % 2, '\0') + data.bytes_after(kEncapsulatedDocument)};
+  return {
+      .before = file_head(kEncapsulatedStlStorage, object.sop_instance_uid, kExplicitLittleEndian) +
+                data.bytes_before(kEncapsulatedDocument) +
+                element_head(kEncapsulatedDocument, "OB", padded),
+      .after = std::string(stl_bytes % 2, '\0') + data.bytes_after(kEncapsulatedDocument)};
 }
 
 }  // namespace isomesh::dicom

@@ -4,7 +4,7 @@
 #include <string>
 #include <system_error>
 
-#include "base/xml.h"
+#include "base/xml_reader.h"
 #include "proto/error.h"
 #include "server/codec/decode/formats.h"
 #include "server/codec/decode/zip_reader.h"

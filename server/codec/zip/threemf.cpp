@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/xml.h"
 #include "server/codec/block_writer.h"
 #include "server/codec/number_text.h"
 #include "server/codec/provenance_json.h"
@@ -52,34 +53,6 @@ std::byte* write_triangle(const mesh::Triangle& triangle, std::byte* begin) {
   out = write_number(std::uint64_t{triangle[1]}, write_text("\" v2=\"", out));
   out = write_number(std::uint64_t{triangle[2]}, write_text("\" v3=\"", out));
   return reinterpret_cast<std::byte*>(write_text("\"/>\n", out));
-}
-
-// As an attribute's value or an element's content. What XML cannot hold becomes U+FFFD.
-std::string escaped(std::string_view text) {
-  constexpr std::string_view kReplacement = "\uFFFD";
-  std::string result;
-  for (std::size_t at = 0; at < text.size(); ++at) {
-    const char c = text[at];
-    const bool is_noncharacter = text.substr(at).starts_with("\xEF\xBF\xBE") ||  // U+FFFE
-                                 text.substr(at).starts_with("\xEF\xBF\xBF");
-    if (is_noncharacter) {
-      result += kReplacement;
-      at += 2;
-    } else if (c == '&') {
-      result += "&amp;";
-    } else if (c == '<') {
-      result += "&lt;";
-    } else if (c == '>') {
-      result += "&gt;";
-    } else if (c == '"') {
-      result += "&quot;";
-    } else if (static_cast<unsigned char>(c) < ' ') {
-      result += kReplacement;
-    } else {
-      result += c;
-    }
-  }
-  return result;
 }
 
 // JSON without what XML escapes: some readers leave the text of elements as it stands.
@@ -137,7 +110,7 @@ class Package {
         "<model unit=\"millimeter\" xml:lang=\"en-US\" "
         "xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\" "
         "xmlns:isomesh=\"urn:isomesh:mesh\">\n");
-    write("<metadata name=\"Title\">" + escaped(title) + "</metadata>\n");
+    write("<metadata name=\"Title\">" + xml_escaped(title) + "</metadata>\n");
     write("<metadata name=\"Application\">isomesh</metadata>\n");
     write("<metadata name=\"isomesh:provenance\">" + plain_json(provenance) +
           "</metadata>\n<resources>\n");
@@ -145,7 +118,7 @@ class Package {
 
   void begin_materials() { write("<basematerials id=\"" + std::to_string(kMaterialsId) + "\">\n"); }
   void add_material(const std::string& name, const std::array<double, 3>& color) {
-    write("<base name=\"" + escaped(name) + "\" displaycolor=\"" + hex_color(color) + "\"/>\n");
+    write("<base name=\"" + xml_escaped(name) + "\" displaycolor=\"" + hex_color(color) + "\"/>\n");
   }
   void end_materials() { write("</basematerials>\n"); }
 
@@ -153,7 +126,7 @@ class Package {
     const std::string id = std::to_string(kMaterialsId + 1 + objects_);
     ++objects_;
     write("<object id=\"" + id + "\" type=\"" + (object.is_solid ? "model" : "surface") +
-          "\" name=\"" + escaped(object.name) + '"' +
+          "\" name=\"" + xml_escaped(object.name) + '"' +
           (object.part_number.empty() ? "" : " partnumber=\"" + object.part_number + '"') +
           " pid=\"" + std::to_string(kMaterialsId) + "\" pindex=\"" +
           std::to_string(object.material) + "\">\n<mesh>\n<vertices>\n");

@@ -1,66 +1,21 @@
 #include "server/import/dicom/object_kinds.h"
 
 #include <algorithm>
-#include <array>
 #include <string_view>
 
 #include "base/text.h"
+#include "server/dicom/object_classes.h"
 #include "server/import/dicom/tags.h"
 
 namespace isomesh::import::dicom {
-namespace {
-
-struct ObjectKind {
-  std::string_view sop_class;  // behind 1.2.840.10008.5.1.4.1.1. (PS3.4, B.5)
-  bool is_family;              // and all classes below it
-  std::string_view what;
-};
-
-constexpr std::string_view kStorage = "1.2.840.10008.5.1.4.1.1.";
-
-constexpr std::array kKinds = {
-    ObjectKind{"66", false, "raw data"},
-    ObjectKind{"66.1", false, "a spatial registration"},
-    ObjectKind{"66.2", false, "a set of spatial fiducials"},
-    ObjectKind{"66.3", false, "a deformable spatial registration"},
-    ObjectKind{"66.5", false, "a surface segmentation"},
-    ObjectKind{"66.6", false, "a set of tracts"},
-    ObjectKind{"67", false, "a real world value mapping"},
-    ObjectKind{"11", true, "a presentation state"},
-    ObjectKind{"88", true, "a report"},
-    ObjectKind{"104", true, "an encapsulated document"},
-    ObjectKind{"9", true, "a waveform"},
-    ObjectKind{"4.2", false, "a spectroscopy"},
-    ObjectKind{"481.3", false, "a set of structures"},
-    ObjectKind{"481.4", false, "a record of a treatment"},
-    ObjectKind{"481.5", false, "a plan of a treatment"},
-    ObjectKind{"481.6", false, "a record of a treatment"},
-    ObjectKind{"481.7", false, "a record of a treatment"},
-    ObjectKind{"481.8", false, "a plan of a treatment"},
-    ObjectKind{"481.9", false, "a record of a treatment"},
-};
-
-const ObjectKind* find_kind(std::string_view sop_class) {
-  if (!sop_class.starts_with(kStorage)) return nullptr;
-  sop_class.remove_prefix(kStorage.size());
-  const auto* found = std::ranges::find_if(kKinds, [&](const ObjectKind& kind) {
-    if (!sop_class.starts_with(kind.sop_class)) return false;
-    const std::string_view rest = sop_class.substr(kind.sop_class.size());
-    return rest.empty() || (kind.is_family && rest.front() == '.');
-  });
-  return found == kKinds.end() ? nullptr : found;
-}
-
-}  // namespace
-
 std::optional<std::string> reason_to_ignore(const DicomFile& file) {
   const DataSet& data = file.data();
   if (data.find(kDirectoryRecordSequence) != nullptr) return "it is a directory of DICOM files";
   const std::string_view sop_class = data.text(kSopClassUid);
-  const ObjectKind* kind = find_kind(sop_class.empty() ? file.meta().sop_class_uid : sop_class);
-  if (kind != nullptr) {
-    return "it is " + std::string(kind->what) + " (modality " + in_quotes(data.text(kModality)) +
-           ")";
+  const auto kind = isomesh::dicom::kind_without_images(
+      sop_class.empty() ? std::string_view(file.meta().sop_class_uid) : sop_class);
+  if (kind) {
+    return "it is " + std::string(*kind) + " (modality " + in_quotes(data.text(kModality)) + ")";
   }
   if (data.find(kRows) == nullptr && !file.pixels()) {
     return "it is no image (modality " + in_quotes(data.text(kModality)) + ")";

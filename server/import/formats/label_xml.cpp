@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/text.h"
-#include "base/xml.h"
+#include "base/xml_reader.h"
 #include "server/import/label_table.h"
 
 namespace isomesh::import {

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/text.h"
-#include "base/xml.h"
+#include "base/xml_reader.h"
 #include "proto/error.h"
 #include "server/import/names.h"
 

@@ -21,7 +21,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/codec", {"server/mesh"}},
     {"server/store", {"proto"}},
     {"server/process", {"server/volume"}},
-    {"server/import", {"server/volume", "server/process"}},
+    {"server/import", {"server/volume", "server/process", "server/dicom"}},
     {"server/jobs",
      {"server/store", "server/codec", "server/volume", "server/mesh", "server/process"}},
     {"server/dicom", {"proto"}},

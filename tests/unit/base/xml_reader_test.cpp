@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/xml.h"
+#include "base/xml_reader.h"
 
 namespace isomesh {
 namespace {
