@@ -22,6 +22,8 @@
 #include "server/callbacks/targets.h"
 #include "server/commands.h"
 #include "server/dicomweb/dicomweb.h"
+#include "server/dimse/c_store.h"
+#include "server/dimse/listener.h"
 #include "server/http/guards/auth.h"
 #include "server/http/observe/metrics.h"
 #include "server/http/observe/outcomes.h"
@@ -40,6 +42,7 @@
 #include "server/options.h"
 #include "server/orders/hospital.h"
 #include "server/orders/orders.h"
+#include "server/orders/received.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/retention.h"
@@ -49,6 +52,7 @@
 #include "server/store/sqlite/job_store.h"
 #include "server/store/sqlite/order_store.h"
 #include "server/store/sqlite/outbox.h"
+#include "server/store/sqlite/received_store.h"
 #include "server/store/sqlite/volume_store.h"
 
 namespace {
@@ -164,28 +168,66 @@ int tell_configuration(const Options& options, const CLI::App& cli) {
   check_reach(options, address, open_files(options, address));
   const callbacks::CallbackTargets targets(options.callback_targets);
   callback_secrets(options);
-  if (!options.hospital.empty()) orders::read_hospital(options.hospital);
+  if (!options.hospital.empty()) {
+    const orders::Hospital hospital = orders::read_hospital(options.hospital);
+    if (hospital.dimse) dimse::listen_address(*hospital.dimse);
+  }
   std::cout << as_config(cli, Remarks::kNo);
   return 0;
+}
+
+bool needs_dimse(const orders::Hospital& hospital) {
+  return hospital.dimse || std::ranges::any_of(hospital.pacs, [](const orders::PacsSettings& pacs) {
+           return pacs.send_by == orders::SendBy::kCStore;
+         });
 }
 
 // Who is spoken to, and where their answers are read.
 struct OpenHospital {
   OpenHospital(orders::Hospital the_settings, const jobs::RunnerOptions& runner)
-      : settings(std::move(the_settings)), answers(runner) {}
+      : settings(std::move(the_settings)), answers(runner) {
+    // As many as may soon be asked for at once; further ones take a moment.
+    constexpr std::size_t kPrepared = 2;
+    if (needs_dimse(settings)) {
+      dimse =
+          std::make_unique<process::PreparedProcesses>(program_of_ours("isomesh-dimse"), kPrepared);
+    }
+  }
 
-  orders::PacsByName peers(const std::filesystem::path& scratch, const Options& options) {
-    orders::PacsByName all;
-    for (const orders::PacsSettings& pacs : settings.pacs) {
-      all[pacs.name] = std::make_unique<dicomweb::DicomWeb>(
+  std::unique_ptr<orders::Pacs> peer(const orders::PacsSettings& pacs,
+                                     const std::filesystem::path& scratch, const Options& options) {
+    std::unique_ptr<orders::Pacs> web;
+    if (!pacs.dicomweb.empty()) {
+      web = std::make_unique<dicomweb::DicomWeb>(
           pacs, scratch, options.http.upload.max_bytes,
           [this](const std::filesystem::path& file) { return answers.read_answer(file); });
+    }
+    if (pacs.send_by == orders::SendBy::kStow) return web;
+    return std::make_unique<dimse::CStore>(pacs, std::move(web), *dimse);
+  }
+
+  orders::PacsByName peers(const std::filesystem::path& scratch, const Options& options,
+                           const store::ReceivedStore& received, const store::BlobStore& blobs) {
+    orders::PacsByName all;
+    for (const orders::PacsSettings& pacs : settings.pacs) {
+      all[pacs.name] = peer(pacs, scratch, options);
+    }
+    if (!settings.dimse) return all;
+    for (const auto& [title, rule] : settings.dimse->routes) {
+      all[orders::received_by(title)] = std::make_unique<orders::Received>(title, received, blobs);
     }
     return all;
   }
 
+  // Cuts off what is read and sent.
+  void stop() {
+    answers.stop();
+    if (dimse) dimse->stop();
+  }
+
   const orders::Hospital settings;
   jobs::ImportRunner answers;
+  std::unique_ptr<process::PreparedProcesses> dimse;  // null where nobody speaks it
 };
 
 std::unique_ptr<OpenHospital> open_hospital(const Options& options,
@@ -246,19 +288,27 @@ int run(const Options& options, const sigset_t& signals) {
   const auto hospital = open_hospital(options, runner.program);
   store::SqliteOrderStore order_store(database);
   store::SqliteAuditTrail audit(database);
+  store::SqliteReceivedStore received(database);
   const orders::PacsByName peers =
-      hospital ? hospital->peers(folder.scratch(), options) : orders::PacsByName();
+      hospital ? hospital->peers(folder.scratch(), options, received, blobs) : orders::PacsByName();
   std::unique_ptr<orders::Orders> orders;
+  std::unique_ptr<dimse::DimseListener> dimse_listener;
   if (hospital) {
     orders = std::make_unique<orders::Orders>(
         orders::OrderServices{folder, blobs, volumes, jobs, library, labels, order_store, audit,
-                              peers},
+                              received, peers},
         hospital->settings,
         orders::OrderOptions{.keep = std::chrono::duration_cast<std::chrono::hours>(keep),
                              .cut_off = [&] {
-                               hospital->answers.stop();
+                               hospital->stop();
                                library.stop_imports();
                              }});
+    if (hospital->settings.dimse) {
+      dimse_listener = std::make_unique<dimse::DimseListener>(
+          dimse::ListenerServices{folder, blobs, received, audit, *hospital->dimse},
+          *hospital->settings.dimse);
+      spdlog::info("series are received by C-STORE on {}", dimse_listener->authority());
+    }
   }
   const http::Services services = {
       folder,    blobs,   volumes, jobs,      library, histograms,         labels,      estimator,
@@ -282,6 +332,7 @@ int run(const Options& options, const sigset_t& signals) {
   while (::sigwait(&signals, &signal) == 0 && signal == SIGHUP) reload(options, files, callbacks);
   spdlog::info("signal {}: draining", signal);
   server.begin_drain();
+  if (dimse_listener) dimse_listener->stop();
   if (!workers.drain(std::chrono::seconds(options.drain_seconds))) {
     spdlog::warn("jobs still run after {} s; they are stopped", options.drain_seconds);
   }

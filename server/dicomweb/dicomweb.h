@@ -33,7 +33,8 @@ class DicomWeb : public orders::Pacs {
                            const std::stop_token& stop) override;
   std::optional<std::string> patient_of(const std::string& study,
                                         const std::stop_token& stop) override;
-  bool has_instance(const orders::InstancePlace& place, const std::stop_token& stop) override;
+  std::optional<bool> has_instance(const orders::InstancePlace& place,
+                                   const std::stop_token& stop) override;
   void store(const orders::OutgoingObject& object, const std::stop_token& stop) override;
 
  private:

@@ -1,6 +1,6 @@
 # The component daemon: programs, unit, configuration, manual page, completions.
 install(TARGETS isomeshd RUNTIME DESTINATION ${CMAKE_INSTALL_SBINDIR} COMPONENT daemon)
-install(TARGETS isomesh-import isomesh-job RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/isomesh
+install(TARGETS isomesh-dimse isomesh-import isomesh-job RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/isomesh
   COMPONENT daemon)
 
 # What is installed in /usr has its configuration in /etc and its data in /var.

@@ -11,6 +11,7 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "proto/error.h"
+#include "server/process/dimse_message.h"
 
 namespace isomesh::orders {
 namespace {
@@ -153,13 +154,43 @@ void check_name(const Section& section, const std::string& name) {
   }
 }
 
+void check_title(const std::string& key, const std::string& title) {
+  if (!process::is_ae_title(title)) {
+    refuse(key, "must be 1 to 16 printable ASCII characters without a backslash");
+  }
+}
+
+void read_send_by(Section& section, PacsSettings& pacs) {
+  std::string send_by = "stow";
+  section.read("send-by", send_by);
+  section.read("aet", pacs.aet);
+  section.read("calling-aet", pacs.calling_aet);
+  section.read("host", pacs.host);
+  section.read("port", pacs.port, 1, 65535);
+  if (send_by == "c-store") {
+    pacs.send_by = SendBy::kCStore;
+    for (const auto& [key, value] : {std::pair("aet", pacs.aet), std::pair("host", pacs.host)}) {
+      section.require(key, value);
+    }
+    if (pacs.port == 0) refuse(section.key_of("port"), "is required");
+    check_title(section.key_of("aet"), pacs.aet);
+    check_title(section.key_of("calling-aet"), pacs.calling_aet);
+    return;
+  }
+  if (send_by != "stow") refuse(section.key_of("send-by"), "must be \"stow\" or \"c-store\"");
+  if (!pacs.aet.empty() || !pacs.host.empty() || pacs.port != 0) {
+    refuse(section.key_of("send-by"), "must be \"c-store\" where there are aet, host or port");
+  }
+  section.require("dicomweb", pacs.dicomweb);
+}
+
 PacsSettings read_pacs(Section section) {
   PacsSettings pacs;
   section.read("name", pacs.name);
   check_name(section, pacs.name);
   section.read("dicomweb", pacs.dicomweb);
-  section.require("dicomweb", pacs.dicomweb);
-  if (!pacs.dicomweb.starts_with("http://") && !pacs.dicomweb.starts_with("https://")) {
+  if (!pacs.dicomweb.empty() && !pacs.dicomweb.starts_with("http://") &&
+      !pacs.dicomweb.starts_with("https://")) {
     refuse(section.key_of("dicomweb"), "must be an http or https URL");
   }
   while (pacs.dicomweb.ends_with('/')) pacs.dicomweb.pop_back();
@@ -178,9 +209,7 @@ PacsSettings read_pacs(Section section) {
   if (pacs.transfer_syntax != "*" && !is_uid(pacs.transfer_syntax)) {
     refuse(section.key_of("transfer-syntax"), "must be * or the UID of a transfer syntax");
   }
-  std::string send_by = "stow";
-  section.read("send-by", send_by);
-  if (send_by != "stow") refuse(section.key_of("send-by"), "must be \"stow\"");
+  read_send_by(section, pacs);
   section.read("max-send-bytes", pacs.max_send_bytes, 1, 4'294'967'294);
   section.read("owners", pacs.owners);
   section.finish();
@@ -247,6 +276,28 @@ Rule read_rule(Section section) {
   return rule;
 }
 
+DimseSettings read_dimse(Section section) {
+  DimseSettings dimse;
+  section.read("listen", dimse.listen);
+  section.require("listen", dimse.listen);
+  section.read("associations", dimse.associations, 1, 64);
+  section.read("idle-seconds", dimse.idle, 1, 3600);
+  constexpr std::int64_t kMostBytes = std::int64_t{1} << 50;
+  section.read("max-object-bytes", dimse.max_object_bytes, 1, kMostBytes);
+  section.read("max-held-bytes", dimse.max_held_bytes, 1, kMostBytes);
+  section.read("calling", dimse.calling);
+  for (const std::string& title : dimse.calling) check_title(section.key_of("calling"), title);
+  if (dimse.calling.empty()) refuse(section.key_of("calling"), "is required: nobody may send");
+  auto routes = section.section("routes");
+  if (!routes || routes->table().empty()) refuse(section.key_of("routes"), "is required");
+  for (const auto& [title, unused] : routes->table()) {
+    check_title(routes->key_of(title.str()), std::string(title.str()));
+    routes->read(title.str(), dimse.routes[std::string(title.str())]);
+  }
+  section.finish();
+  return dimse;
+}
+
 // Every name once, and none that does not stand for anything.
 void check_names(const Hospital& hospital) {
   std::set<std::string> names;
@@ -266,6 +317,15 @@ void check_names(const Hospital& hospital) {
       if (names.contains(name)) continue;
       refuse("rules." + rule.name, "names the PACS \"" + name + "\", which is not configured");
     }
+    if (rule.watch && hospital.find_pacs(*rule.watch)->dicomweb.empty()) {
+      refuse("rules." + rule.name + ".watch", "names a PACS without dicomweb");
+    }
+  }
+  if (!hospital.dimse) return;
+  for (const auto& [title, rule] : hospital.dimse->routes) {
+    if (!rules.contains(rule)) {
+      refuse("dimse.routes." + title, "names the rule \"" + rule + "\", which is not there");
+    }
   }
 }
 
@@ -275,6 +335,7 @@ Hospital hospital_of(const toml::table& table) {
   if (auto orders = all.section("orders")) read_orders(std::move(*orders), hospital);
   for (Section& section : all.sections("pacs")) hospital.pacs.push_back(read_pacs(section));
   for (Section& section : all.sections("rules")) hospital.rules.push_back(read_rule(section));
+  if (auto dimse = all.section("dimse")) hospital.dimse = read_dimse(std::move(*dimse));
   all.finish();
   if (hospital.pacs.empty()) refuse("pacs", "is required: there is nobody to speak to");
   check_names(hospital);

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,16 +14,24 @@
 
 namespace isomesh::orders {
 
-// A PACS that is spoken to by DICOMweb (PS3.18).
+// How objects are sent.
+enum class SendBy { kStow, kCStore };
+
+// A PACS that is spoken to by DICOMweb (PS3.18), and sent to by that or by DIMSE (PS3.7).
 struct PacsSettings {
   std::string name;      // what requests call it
-  std::string dicomweb;  // URL below which /studies is
+  std::string dicomweb;  // URL below which /studies is; empty: it is only sent to, by C-STORE
   std::string user;      // empty: none
   std::filesystem::path password_file;
   std::filesystem::path token_file;  // of a bearer token
   std::filesystem::path ca_file;     // empty: the system's authorities
   std::chrono::seconds timeout{30};  // without a byte
   std::string transfer_syntax = "*";
+  SendBy send_by = SendBy::kStow;
+  std::string aet;  // of C-STORE: its title, ours, and where it listens
+  std::string calling_aet = "ISOMESH";
+  std::string host;
+  std::uint16_t port = 0;
   std::uint64_t max_send_bytes = 4'000'000'000;
   std::vector<std::string> owners;  // who may order from it without a rule; empty: everybody
 };
@@ -46,6 +55,17 @@ struct Rule {
   std::vector<SendTarget> send;
 };
 
+// Where series are received by C-STORE, and from whom.
+struct DimseSettings {
+  std::string listen;                         // HOST:PORT
+  std::size_t associations = 8;               // at the same time; further ones wait
+  std::map<std::string, std::string> routes;  // rules by the titles that series are sent to
+  std::vector<std::string> calling;           // titles that may send
+  std::chrono::seconds idle{60};              // without a byte
+  std::uint64_t max_object_bytes = std::uint64_t{4} << 30;
+  std::uint64_t max_held_bytes = std::uint64_t{100} << 30;  // of all that orders do not have yet
+};
+
 struct Hospital {
   std::chrono::seconds settle{60};  // the list of a series' instances is unchanged for so long
   std::chrono::seconds poll{30};
@@ -56,6 +76,7 @@ struct Hospital {
   std::string station_name = "isomesh";
   std::vector<PacsSettings> pacs;
   std::vector<Rule> rules;
+  std::optional<DimseSettings> dimse;
 
   // Null when there is none of that name.
   const PacsSettings* find_pacs(std::string_view name) const;

@@ -67,6 +67,9 @@ Orders::Orders(const OrderServices& services, const Hospital& hospital, OrderOpt
     threads_.emplace_back([this](const std::stop_token& stop) { work(stop); });
   }
   threads_.emplace_back([this](const std::stop_token& stop) { watch(stop); });
+  if (hospital_.dimse) {
+    threads_.emplace_back([this](const std::stop_token& stop) { receive(stop); });
+  }
 }
 
 Orders::~Orders() { stop(); }

@@ -89,6 +89,8 @@ class Orders {
 
   void work(const std::stop_token& stop);
   void watch(const std::stop_token& stop);
+  void receive(const std::stop_token& stop);
+  store::ReceivedFate look_at_received(const store::HeldSeries& series);
   void look_at_rule(const Rule& rule, const std::stop_token& stop);
   // The next order that may be worked on, which is this thread's then; empty when there is none.
   std::optional<std::string> take(std::stop_token& cancelled);

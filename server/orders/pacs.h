@@ -14,6 +14,7 @@
 
 #include "base/error.h"
 #include "server/orders/hospital.h"
+#include "server/store/blob_store.h"
 
 namespace isomesh::orders {
 
@@ -68,6 +69,8 @@ struct OutgoingObject {
   std::uint64_t bytes = 0;
   // Reads up to buffer.size() bytes from `offset`; may throw.
   std::function<std::size_t(std::uint64_t offset, std::span<std::byte> buffer)> read;
+  // The same as a file, for those that another process sends.
+  store::LocalBlob file = {};
 };
 
 // Thread safe. Everything may throw PacsFailure, and Error kCancelled when `stop` is requested.
@@ -99,7 +102,9 @@ class Pacs {
   virtual std::optional<std::string> patient_of(const std::string& study,
                                                 const std::stop_token& stop) = 0;
 
-  virtual bool has_instance(const InstancePlace& place, const std::stop_token& stop) = 0;
+  // Empty when it cannot be asked: then what it says when it stores is all there is.
+  virtual std::optional<bool> has_instance(const InstancePlace& place,
+                                           const std::stop_token& stop) = 0;
 
   // Returns when the PACS has said that it stored just this.
   virtual void store(const OutgoingObject& object, const std::stop_token& stop) = 0;

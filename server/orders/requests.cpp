@@ -66,6 +66,9 @@ store::OrderRecord make_order(const Hospital& hospital, const Orderer& orderer,
   } else if (rule != nullptr) {
     order.send = rule->send;
   }
+  if (source.dicomweb.empty()) {
+    throw invalid_parameter("source.pacs", "is one that is only sent to");
+  }
   if (rule == nullptr) check_owner(source, orderer);
   for (const SendTarget& target : order.send) {
     const PacsSettings& pacs = pacs_of(hospital, target.pacs, "send.pacs");
@@ -81,14 +84,15 @@ store::OrderRecord make_order(const Hospital& hospital, const Orderer& orderer,
   return record;
 }
 
-store::OrderRecord make_order(const Rule& rule, const FoundSeries& series) {
+store::OrderRecord make_order(const Rule& rule, const std::string& pacs,
+                              const FoundSeries& series) {
   store::OrderRecord record;
   record.owner = rule.owner;
   Order& order = record.order;
   order.id = time_ordered_id();
   order.created = timestamp();
   order.rule = rule.name;
-  order.source = {.pacs = *rule.watch, .study = series.study, .series = series.series};
+  order.source = {.pacs = pacs, .study = series.study, .series = series.series};
   order.parameters = parse_order_parameters(rule.parameters, "", "parameters.");
   order.send = rule.send;
   add_sent_formats(order);

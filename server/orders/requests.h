@@ -20,7 +20,7 @@ struct Orderer {
 store::OrderRecord make_order(const Hospital& hospital, const Orderer& orderer,
                               const OrderRequest& request);
 
-// The order of a rule for a series that its watch has found.
-store::OrderRecord make_order(const Rule& rule, const FoundSeries& series);
+// The order of a rule for a series that its watch has found, or that was received, in that PACS.
+store::OrderRecord make_order(const Rule& rule, const std::string& pacs, const FoundSeries& series);
 
 }  // namespace isomesh::orders

@@ -9,6 +9,7 @@
 #include "proto/json.h"
 #include "server/jobs/settle_labels.h"
 #include "server/orders/objects.h"
+#include "server/orders/received.h"
 
 namespace isomesh::orders {
 namespace {
@@ -97,7 +98,7 @@ Time OrderSteps::start_over(store::OrderRecord& record) const {
 Time OrderSteps::wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const {
   OrderSource& source = record.order.source;
   OrderWork& work = record.work;
-  if (work.looks == 0 && !work.listed_since) {
+  if (work.looks == 0 && !work.listed_since && !is_received(source.pacs)) {
     services_.audit.add({.event = store::AuditEvent::kQuery,
                          .order = record.order.id,
                          .owner = record.owner,
@@ -263,10 +264,11 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
     peer.store({.place = place,
                 .bytes = blob->size(),
                 .read = [&](std::uint64_t offset,
-                            std::span<std::byte> bytes) { return blob->read_at(offset, bytes); }},
+                            std::span<std::byte> bytes) { return blob->read_at(offset, bytes); },
+                .file = services_.blobs.local(record.work.blobs[index])},
                stop);
     // What it says is one thing.
-    if (!peer.has_instance(place, stop)) {
+    if (peer.has_instance(place, stop) == false) {
       throw PacsFailure(PacsFault::kNotStored,
                         "the PACS says that it has stored the mesh, and does not find it");
     }
@@ -285,7 +287,7 @@ Time OrderSteps::send(store::OrderRecord& record, const std::stop_token& stop) c
     const InstancePlace place = {.study = record.work.identity->study_uid,
                                  .series = result.series_uid,
                                  .instance = result.sop_instance_uid};
-    if (!pacs(result.pacs).has_instance(place, stop)) {
+    if (pacs(result.pacs).has_instance(place, stop) != true) {
       if (!is_same_patient(record, result, stop)) return start_over(record);
       if (!store::is_there_and_intact(services_.blobs, record.work.blobs[index], stop)) {
         record.order.state = OrderState::kMeshing;

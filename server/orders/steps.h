@@ -18,6 +18,7 @@
 #include "server/store/files/data_folder.h"
 #include "server/store/job_store.h"
 #include "server/store/order_store.h"
+#include "server/store/received_store.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh::orders {
@@ -34,7 +35,8 @@ struct OrderServices {
   jobs::LabelLists& labels;
   store::OrderStore& orders;
   store::AuditTrail& audit;
-  const PacsByName& pacs;
+  store::ReceivedStore& received;
+  const PacsByName& pacs;  // and what stands for series that were received
 };
 
 // The order has ended, by somebody else's wish, while a step was made.

@@ -45,7 +45,7 @@ void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
                                                  rule.match.modality, stop);
     for (const FoundSeries& series : found) {
       if (!is_wanted(series, rule.match)) continue;
-      const store::OrderRecord record = make_order(rule, series);
+      const store::OrderRecord record = make_order(rule, *rule.watch, series);
       const bool is_new = services_.orders.submit_watched(
           {.record = record, .idempotency_key = "", .request_digest = ""},
           {.rule = rule.name,
@@ -84,6 +84,7 @@ void Orders::watch(const std::stop_token& stop) {
       if (now >= next_forgetting) {
         next_forgetting = now + kForgetPause;
         services_.orders.forget(now - options_.keep);
+        services_.received.forget(now - options_.keep);
       }
     } catch (const std::exception& error) {
       spdlog::error("orders that have ended are kept for longer: {}", error.what());

@@ -146,6 +146,12 @@ constexpr std::array kAllowedCalls = {
     SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep), SCMP_SYS(gettimeofday), SCMP_SYS(time),
     SCMP_SYS(restart_syscall)};
 
+// What sockets that are there already are used with.
+constexpr std::array kTalkingCalls = {
+    SCMP_SYS(recvfrom),    SCMP_SYS(sendto),      SCMP_SYS(poll),       SCMP_SYS(ppoll),
+    SCMP_SYS(select),      SCMP_SYS(pselect6),    SCMP_SYS(setsockopt), SCMP_SYS(getsockopt),
+    SCMP_SYS(getpeername), SCMP_SYS(getsockname), SCMP_SYS(shutdown),   SCMP_SYS(recvmsg)};
+
 // The calls that only confine_to() makes; prlimit64 beside them.
 constexpr std::array kConfiningCalls = {
     SCMP_SYS(landlock_create_ruleset), SCMP_SYS(landlock_add_rule),
@@ -186,11 +192,15 @@ scmp_arg_cmp argument_is(unsigned index, std::uint64_t value) {
   return {index, SCMP_CMP_EQ, value, 0};
 }
 
-enum class Threads { kOne, kMany };
+// What a process does besides reading and writing files.
+enum class Doing { kNothing, kTalk, kThreads };
 
-void filter_calls(Threads threads) {
+void filter_calls(Doing doing) {
   Filter filter(SCMP_ACT_ERRNO(EPERM));
-  if (threads == Threads::kMany) {
+  if (doing == Doing::kTalk) {
+    for (const int call : kTalkingCalls) filter.allow(call);
+  }
+  if (doing == Doing::kThreads) {
     // A thread, never a process; its newer form cannot be looked into, and the C library goes back
     // to this one where the kernel seems not to have it.
     filter.allow(SCMP_SYS(clone), {0, SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD});
@@ -236,22 +246,24 @@ bool has_landlock() { return landlock_version() >= 1; }
 
 namespace {
 
-void confine_process(Threads threads) {
+void confine_process(Doing doing) {
   constexpr std::uint64_t kMostOpenFiles = 64;
   become_first_victim();
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_NOFILE, kMostOpenFiles);
   require(::prctl(PR_SET_DUMPABLE, 0) == 0, "prctl");
   require(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0, "prctl");
-  filter_calls(threads);
+  filter_calls(doing);
 }
 
 }  // namespace
 
-void confine_ahead() { confine_process(Threads::kOne); }
+void confine_ahead() { confine_process(Doing::kNothing); }
+
+void confine_ahead_to_talk() { confine_process(Doing::kTalk); }
 
 void confine_job() {
-  confine_process(Threads::kMany);
+  confine_process(Doing::kThreads);
   limit(RLIMIT_FSIZE, 0);
   restrict_files({}, {});
 }

@@ -26,15 +26,19 @@ struct Confinement {
 // is started, once.
 void confine_ahead();
 
+// The same for a process that also talks over the sockets that it has; it makes none and connects
+// none.
+void confine_ahead_to_talk();
+
 // Takes the rest: limits memory, time and the size of files; Landlock, where the kernel has it,
 // keeps the process from all files but those; nothing of this can be changed any more. Needs
-// confine_ahead(), once. Throws as that does; a kernel without Landlock is no error.
+// one of the two above, once. Throws as that does; a kernel without Landlock is no error.
 void confine_to(const Confinement& confinement);
 
 // Confines a process that works for long, with threads: it may open no file at all and write
 // nothing, and has the calls of confine_ahead() and those that make threads or receive descriptors,
 // which are all that it can read. Throws as that does. Must be called before a second thread is
-// started, once, and instead of the two above.
+// started, once, and instead of those above.
 void confine_job();
 
 // Limits the process's private memory (RLIMIT_DATA), again and again. To be made before the process

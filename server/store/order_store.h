@@ -52,6 +52,13 @@ struct WatchedSeries {
   std::uint32_t instances = 0;
 };
 
+// What became of a series that was received.
+enum class ReceivedFate {
+  kNew,   // it has an order now
+  kOpen,  // it has one, which has not ended, or too many orders are open
+  kDone,  // it had one, of all that has come
+};
+
 // Which orders to list.
 struct OrderFilter {
   std::optional<OrderState> state = {};
@@ -76,6 +83,12 @@ class OrderStore {
   // made of that many instances. Returns whether it did.
   virtual bool submit_watched(const OrderSpec& spec, const WatchedSeries& series,
                               std::size_t most_open) = 0;
+
+  // Stores an order for a series that was received, the last of its instances at that time, unless
+  // one for it is open, or one that has succeeded was of that many instances. After one that ended
+  // otherwise there is another when something came later.
+  virtual ReceivedFate submit_received(const OrderSpec& spec, const WatchedSeries& series,
+                                       Time last, std::size_t most_open) = 0;
 
   // Throws Error kNotFound.
   virtual Order get(const Viewer& viewer, const std::string& id) const = 0;

@@ -54,11 +54,13 @@ class Orthanc:
         configuration = {
             "Name": "test", "StorageDirectory": os.path.join(folder, "db"),
             "IndexDirectory": os.path.join(folder, "db"), "HttpPort": self.port,
-            "DicomServerEnabled": False, "Plugins": [PLUGIN], "RemoteAccessAllowed": True,
+            "DicomServerEnabled": True, "DicomAet": "ORTHANC", "DicomPort": free_port(),
+            "DicomCheckCalledAet": True, "DicomAlwaysAllowStore": True, "Plugins": [PLUGIN], "RemoteAccessAllowed": True,
             "AuthenticationEnabled": user is not None, "OverwriteInstances": False,
             "RegisteredUsers": {user[0]: user[1]} if user else {},
             "DicomWeb": {"Enable": True, "Root": "/dicom-web/"},
         }
+        self.dicom_port = configuration["DicomPort"]
         self.configuration = os.path.join(folder, "orthanc.json")
         with open(self.configuration, "w", encoding="utf-8") as file:
             json.dump(configuration, file)
@@ -186,6 +188,84 @@ class Daemon:
             [self.program, "audit", "--data", self.data],
             check=True, capture_output=True, text=True).stdout
         return [json.loads(line) for line in lines.splitlines()]
+
+
+class StoreScp:
+    """DCMTK's storescp, which has no DICOMweb: what it has stored lies in its folder."""
+
+    def __init__(self, folder, *options):
+        self.folder = folder
+        self.port = free_port()
+        os.makedirs(folder, exist_ok=True)
+        self.process = None
+        self.start(*options)
+
+    def start(self, *options):
+        self.process = subprocess.Popen(
+            ["storescp", "--output-directory", self.folder, "--accept-all", *options,
+             str(self.port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+        def listens():
+            assert self.process.poll() is None, "storescp has ended"
+            try:
+                socket.create_connection(("127.0.0.1", self.port)).close()
+                return True
+            except OSError:
+                return False
+        until(listens)
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+
+    def files(self):
+        return sorted(os.path.join(self.folder, name) for name in os.listdir(self.folder))
+
+
+class Relay:
+    """Passes bytes on to a port, and may cut connections: after so many bytes of what comes, or of
+    what is answered."""
+
+    def __init__(self, port):
+        self.target = port
+        self.cut_after = None
+        self.cut_answer_after = None
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self.listener.getsockname()[1]
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def close(self):
+        self.listener.shutdown(socket.SHUT_RDWR)  # or the thread would take one more
+        self.listener.close()
+
+    def _serve(self):
+        while True:
+            try:
+                connection, _ = self.listener.accept()
+            except OSError:
+                return
+            there = socket.create_connection(("127.0.0.1", self.target))
+            for source, sink, most in [(connection, there, self.cut_after),
+                                       (there, connection, self.cut_answer_after)]:
+                threading.Thread(target=self._pass, args=(source, sink, most), daemon=True).start()
+
+    @staticmethod
+    def _pass(source, sink, most):
+        passed = 0
+        try:
+            while True:
+                data = source.recv(65536)
+                if not data or (most is not None and passed + len(data) > most):
+                    break
+                passed += len(data)
+                sink.sendall(data)
+        except OSError:
+            pass
+        for each in (source, sink):
+            try:
+                each.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass
 
 
 class Proxy:

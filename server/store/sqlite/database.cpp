@@ -153,6 +153,20 @@ CREATE TRIGGER audit_is_not_changed BEFORE UPDATE ON audit
   BEGIN SELECT raise(ABORT, 'the audit trail is not changed'); END;
 CREATE TRIGGER audit_is_not_removed BEFORE DELETE ON audit
   BEGIN SELECT raise(ABORT, 'the audit trail is not removed'); END;
+)sql",
+                               R"sql(
+CREATE TABLE received(        -- instances that peers have sent; see ReceivedStore
+  route TEXT NOT NULL,
+  study TEXT NOT NULL,
+  series TEXT NOT NULL,
+  instance TEXT NOT NULL,
+  blob TEXT,                  -- while it is held
+  bytes INTEGER NOT NULL,
+  at INTEGER NOT NULL,
+  PRIMARY KEY(route, study, series, instance)
+) WITHOUT ROWID;
+CREATE INDEX received_held ON received(route, study, series, at, bytes) WHERE blob IS NOT NULL;
+CREATE INDEX received_by_blob ON received(blob) WHERE blob IS NOT NULL;
 )sql"};
 
 // Versions 1 and 2 were never released.

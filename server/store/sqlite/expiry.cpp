@@ -21,7 +21,8 @@ OwnedBytes read_owned_bytes(Query&& query) {
 bool is_named(Connection& connection, const std::string& blob) {
   Query query = connection.query(
       "SELECT EXISTS(SELECT 1 FROM volumes WHERE id = ?1) OR EXISTS(SELECT 1 FROM meshes WHERE "
-      "blob = ?1) OR EXISTS(SELECT 1 FROM order_blobs WHERE blob = ?1)",
+      "blob = ?1) OR EXISTS(SELECT 1 FROM order_blobs WHERE blob = ?1) OR EXISTS(SELECT 1 FROM "
+      "received WHERE blob = ?1)",
       blob);
   query.next();
   return query.integer(0) != 0;

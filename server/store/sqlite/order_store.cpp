@@ -62,6 +62,28 @@ bool is_done(Connection& connection, const WatchedSeries& series) {
   return order_from_record(row.text(2)).source.instances == series.instances;
 }
 
+ReceivedFate fate_of(Connection& connection, const WatchedSeries& series, Time last) {
+  Query row = connection.query(
+      "SELECT w.instances, o.state, o.record FROM watched w LEFT JOIN orders o ON o.id = "
+      "w.\"order\" WHERE w.rule = ? AND w.study = ? AND w.series = ?",
+      series.rule, series.study, series.series);
+  if (!row.next()) return ReceivedFate::kNew;
+  const bool is_all = row.integer(0) == series.instances;
+  if (row.is_null(1)) return is_all ? ReceivedFate::kDone : ReceivedFate::kNew;
+  if (row.integer(1) < kFirstFinal) return ReceivedFate::kOpen;
+  if (!is_all) return ReceivedFate::kNew;
+  const Order order = order_from_record(row.text(2));
+  const bool is_over =
+      order.state == OrderState::kSucceeded || (order.finished && last <= time_of(*order.finished));
+  return is_over ? ReceivedFate::kDone : ReceivedFate::kNew;
+}
+
+void insert_watched(Connection& connection, const OrderSpec& spec, const WatchedSeries& series) {
+  insert(connection, spec);
+  connection.run("INSERT OR REPLACE INTO watched VALUES(?, ?, ?, ?, ?, ?)", series.rule,
+                 series.study, series.series, spec.record.order.id, series.instances, now_us());
+}
+
 void name_blobs(Connection& connection, const OrderRecord& record) {
   connection.run("DELETE FROM order_blobs WHERE \"order\" = ?", record.order.id);
   if (is_final(record.order.state)) return;
@@ -108,11 +130,21 @@ bool SqliteOrderStore::submit_watched(const OrderSpec& spec, const WatchedSeries
   Transaction transaction(database_.writer());
   Connection& connection = transaction.connection();
   if (is_done(connection, series) || count_open(connection) >= most_open) return false;
-  insert(connection, spec);
-  connection.run("INSERT OR REPLACE INTO watched VALUES(?, ?, ?, ?, ?, ?)", series.rule,
-                 series.study, series.series, spec.record.order.id, series.instances, now_us());
+  insert_watched(connection, spec, series);
   transaction.commit();
   return true;
+}
+
+ReceivedFate SqliteOrderStore::submit_received(const OrderSpec& spec, const WatchedSeries& series,
+                                               Time last, std::size_t most_open) {
+  Transaction transaction(database_.writer());
+  Connection& connection = transaction.connection();
+  const ReceivedFate fate = fate_of(connection, series, last);
+  if (fate != ReceivedFate::kNew) return fate;
+  if (count_open(connection) >= most_open) return ReceivedFate::kOpen;
+  insert_watched(connection, spec, series);
+  transaction.commit();
+  return fate;
 }
 
 Order SqliteOrderStore::get(const Viewer& viewer, const std::string& id) const {

@@ -16,6 +16,8 @@ class SqliteOrderStore : public OrderStore {
   OrderSubmission submit(const OrderSpec& spec, std::size_t most_open) override;
   bool submit_watched(const OrderSpec& spec, const WatchedSeries& series,
                       std::size_t most_open) override;
+  ReceivedFate submit_received(const OrderSpec& spec, const WatchedSeries& series, Time last,
+                               std::size_t most_open) override;
   Order get(const Viewer& viewer, const std::string& id) const override;
   std::vector<Order> list(const Viewer& viewer, const OrderFilter& filter, const std::string& after,
                           std::size_t limit) const override;

@@ -105,9 +105,69 @@ TEST(Hospital, NamesWhatIsWrong) {
       {with("watch = \"main\"", "watch = \"other\""), "\"other\", which is not configured"},
       {with("{ pacs = \"main\"", "{ pacs = \"other\""), "\"other\", which is not configured"},
       {with("name = \"bone\"", "name = \"a b\""), "rules[0].name"},
+      {with("send-by = \"stow\"", "send-by = \"c-store\"\nhost = \"h\"\nport = 104"),
+       "pacs[0].aet: is required"},
+      {with("send-by = \"stow\"", "send-by = \"c-store\"\naet = \"A\"\nport = 104"),
+       "pacs[0].host: is required"},
+      {with("send-by = \"stow\"", "send-by = \"c-store\"\naet = \"A\"\nhost = \"h\""),
+       "pacs[0].port: is required"},
+      {with("send-by = \"stow\"", "aet = \"A\""), "pacs[0].send-by"},
+      {with("send-by = \"stow\"",
+            "send-by = \"c-store\"\naet = \"12345678901234567\"\nhost = \"h\"\nport = 104"),
+       "pacs[0].aet: must be 1 to 16"},
+      {with("dicomweb = \"https://pacs.example.org/dicom-web/\"", ""), "pacs[0].dicomweb"},
+      {std::string(kWhole) + "[dimse]\ncalling = [\"A\"]\nroutes = { B = \"bone\" }\n",
+       "dimse.listen: is required"},
+      {std::string(kWhole) + "[dimse]\nlisten = \"h:1\"\nroutes = { B = \"bone\" }\n",
+       "dimse.calling: is required"},
+      {std::string(kWhole) + "[dimse]\nlisten = \"h:1\"\ncalling = [\"A\"]\n",
+       "dimse.routes: is required"},
+      {std::string(kWhole) +
+           "[dimse]\nlisten = \"h:1\"\ncalling = [\"A\"]\nroutes = { B = \"other\" }\n",
+       "dimse.routes.B: names the rule \"other\""},
       {std::string(kWhole) + "[[pacs]]\nname = \"main\"\ndicomweb = \"http://x\"\n", "twice"},
   };
   for (const auto& [toml, name] : wrong) EXPECT_THAT(refusal_of(toml), HasSubstr(name)) << toml;
+}
+
+TEST(Hospital, KnowsDimse) {
+  const Hospital hospital = parse_hospital(R"(
+[[pacs]]
+name = "archive"
+send-by = "c-store"
+aet = "ARCHIVE"
+calling-aet = "MESHES"
+host = "archive.example.org"
+port = 11112
+[[rules]]
+name = "bone"
+parameters = { iso = 250 }
+send = [ { pacs = "archive" } ]
+[dimse]
+listen = "127.0.0.1:11112"
+associations = 3
+routes = { BONE = "bone", "CT 2" = "bone" }
+calling = ["CT1", "ROUTER"]
+idle-seconds = 7
+max-object-bytes = 8
+max-held-bytes = 9
+)");
+  const PacsSettings& pacs = hospital.pacs.front();
+  EXPECT_EQ(pacs.send_by, SendBy::kCStore);
+  EXPECT_EQ(pacs.aet, "ARCHIVE");
+  EXPECT_EQ(pacs.calling_aet, "MESHES");
+  EXPECT_EQ(pacs.host, "archive.example.org");
+  EXPECT_EQ(pacs.port, 11112);
+  EXPECT_EQ(pacs.dicomweb, "");
+  ASSERT_TRUE(hospital.dimse);
+  EXPECT_EQ(hospital.dimse->listen, "127.0.0.1:11112");
+  EXPECT_EQ(hospital.dimse->associations, 3U);
+  EXPECT_EQ(hospital.dimse->routes,
+            (std::map<std::string, std::string>{{"BONE", "bone"}, {"CT 2", "bone"}}));
+  EXPECT_EQ(hospital.dimse->calling, (std::vector<std::string>{"CT1", "ROUTER"}));
+  EXPECT_EQ(hospital.dimse->idle, std::chrono::seconds(7));
+  EXPECT_EQ(hospital.dimse->max_object_bytes, 8U);
+  EXPECT_EQ(hospital.dimse->max_held_bytes, 9U);
 }
 
 // Secrets stand in files of their own, but who writes one into this is not to see it in a log.

@@ -12,8 +12,10 @@
 
 #include "base/clock.h"
 #include "base/sha256.h"
+#include "server/orders/received.h"
 #include "server/store/sqlite/audit_trail.h"
 #include "server/store/sqlite/order_store.h"
+#include "server/store/sqlite/received_store.h"
 #include "tests/api/dicom_bytes.h"
 #include "tests/support/errors.h"
 #include "tests/unit/jobs/fixture.h"
@@ -94,7 +96,8 @@ class FakePacs : public Pacs {
     answer(stop);
     return "PAT-1";
   }
-  bool has_instance(const InstancePlace& place, const std::stop_token& stop) override {
+  std::optional<bool> has_instance(const InstancePlace& place,
+                                   const std::stop_token& stop) override {
     answer(stop);
     const Lock lock(mutex_);
     return stored_.contains(place.instance);
@@ -128,6 +131,7 @@ class OrdersTest : public test::JobsFixture {
     for (const char* name : {"main", "other"}) {
       PacsSettings settings;
       settings.name = name;
+      settings.dicomweb = "http://pacs.example.org";
       hospital_.pacs.push_back(settings);
       auto pacs = std::make_unique<FakePacs>();
       (name == std::string("main") ? main_ : other_) = pacs.get();
@@ -141,7 +145,8 @@ class OrdersTest : public test::JobsFixture {
   void begin() {
     orders_.reset();
     orders_ = std::make_unique<Orders>(
-        OrderServices{data_, blobs_, volumes_, jobs_, library_, labels_, store_, audit_, pacs_},
+        OrderServices{data_, blobs_, volumes_, jobs_, library_, labels_, store_, audit_, received_,
+                      pacs_},
         hospital_,
         OrderOptions{.now = [this] { return std::chrono::system_clock::now() + ahead_.load(); },
                      .threads = 3});
@@ -176,17 +181,18 @@ class OrdersTest : public test::JobsFixture {
     return until([&] { return get(id).state == state; });
   }
 
-  // Does what a worker does with the next job: a mesh of one triangle.
-  bool finish_job() {
+  // Does what a worker does with the next job: a mesh of so many triangles.
+  bool finish_job(std::uint32_t triangles = 1) {
     std::optional<store::Lease> lease;
     if (!until([&] { return (lease = jobs_.claim("test", minutes(1))).has_value(); })) return false;
-    std::string stl(84 + 50, '\0');
+    last_parameters_ = lease->parameters;
+    std::string stl(84 + std::size_t{50} * triangles, '\0');
     stl[80] = 1;
     const auto writer = blobs_.begin();
     writer->write(std::as_bytes(std::span(stl)));
     const store::Blob blob = writer->commit();
     store::Outcome outcome;
-    outcome.mesh.emplace().triangles = 1;
+    outcome.mesh.emplace().triangles = triangles;
     outcome.mesh->files[MeshFormat::kStl] = {.bytes = blob.bytes, .sha256 = blob.key, .href = "/x"};
     const bool is_done = jobs_.finish(*lease, outcome);
     orders_->job_ended(lease->id);
@@ -201,6 +207,8 @@ class OrdersTest : public test::JobsFixture {
   jobs::LabelLists labels_{blobs_};
   store::SqliteOrderStore store_{database_};
   store::SqliteAuditTrail audit_{database_};
+  store::SqliteReceivedStore received_{database_};
+  JobParameters last_parameters_;  // of the job that was finished last
   std::unique_ptr<Orders> orders_;
 };
 
@@ -216,6 +224,78 @@ TEST_F(OrdersTest, GoTheirWay) {
   EXPECT_EQ(main_->stores, 1);
   // Whether or not it still lies there, no record keeps the object.
   EXPECT_FALSE(volumes_.names(order.results.front().sop_instance_uid));
+}
+
+class ReceivedOrdersTest : public OrdersTest {
+ protected:
+  ReceivedOrdersTest() {
+    Rule rule;
+    rule.name = "bone";
+    rule.parameters = R"({"iso": 100})";
+    rule.send = {{.pacs = "main"}};
+    hospital_.rules = {rule};
+    hospital_.settle = minutes(1);
+    hospital_.poll = seconds(1);
+    hospital_.dimse.emplace().routes = {{"BONE", "bone"}};
+    pacs_[received_by("BONE")] = std::make_unique<Received>("BONE", received_, blobs_);
+    begin();
+  }
+  void receive(int from, int to) {
+    for (int slice = from; slice < to; ++slice) {
+      const std::string file = slice_file(slice);
+      const auto writer = blobs_.begin();
+      writer->write(std::as_bytes(std::span(file)));
+      const store::Blob blob = writer->commit();
+      received_.add({"BONE", kStudy, kSeries}, {instance_of(slice), blob.key, blob.bytes});
+      blobs_.settle(blob.key);
+    }
+  }
+  std::vector<Order> all() const { return orders_->list(std::nullopt, {}, "", 10); }
+  bool is_held() const { return received_.held_bytes() > 0; }
+};
+
+TEST_F(ReceivedOrdersTest, AreMadeWhenNothingMoreComesAndLeaveNothing) {
+  receive(0, kSlices);
+  std::this_thread::sleep_for(milliseconds(700));
+  EXPECT_TRUE(all().empty());
+  const std::string blob = received_.instances({"BONE", kStudy, kSeries}).front().blob;
+  pass(minutes(2));
+  ASSERT_TRUE(finish_job());
+  ASSERT_EQ(all().size(), 1U);
+  const std::string id = all().front().id;
+  ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+  EXPECT_EQ(get(id).source.pacs, "dimse:BONE");
+  EXPECT_EQ(get(id).source.instances, 4U);
+  pass(minutes(1));
+  EXPECT_TRUE(until([&] { return !is_held(); }));
+  EXPECT_TRUE(until([&] { return !blobs_.size(blob); }));
+  // Once more the same, for which there is nothing to do.
+  receive(0, kSlices);
+  pass(minutes(2));
+  EXPECT_TRUE(until([&] { return !is_held(); }));
+  EXPECT_EQ(all().size(), 1U);
+}
+
+TEST_F(ReceivedOrdersTest, WaitForTheRestOfWhatIsNotHeldAnyMore) {
+  receive(0, 3);
+  pass(minutes(2));
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(until([&] { return is_final(all().front().state); }));
+  pass(minutes(1));
+  ASSERT_TRUE(until([&] { return !is_held(); }));
+  receive(3, kSlices);
+  pass(minutes(2));
+  ASSERT_TRUE(until([&] { return all().size() == 2 && all().front().attempts > 0; }));
+  EXPECT_EQ(all().front().error->type, "urn:isomesh:problem:series-incomplete");
+  receive(0, kSlices);
+  pass(hours(1));
+  ASSERT_TRUE(until([&] {
+    pass(minutes(2));
+    return all().front().state == OrderState::kMeshing;
+  }));
+  ASSERT_TRUE(finish_job());
+  EXPECT_TRUE(reaches(all().front().id, OrderState::kSucceeded));
+  EXPECT_EQ(all().front().source.instances, 4U);
 }
 
 // Sixty hours, of which nothing is waited for.

@@ -110,6 +110,24 @@ TEST_F(Sandbox, TakesSocketsAndProcessesAhead) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
+TEST_F(Sandbox, LeavesATalkToTheSocketsThatAreThere) {
+  const SocketPair sockets = make_socket_pair();
+  const int status = status_of([&] {
+    confine_ahead_to_talk();
+    confine_to(confinement());
+    const int on = 1;
+    char byte = 0;
+    return ::send(sockets.ours.number(), "x", 1, MSG_NOSIGNAL) == 1 &&
+           ::recv(sockets.theirs.number(), &byte, 1, 0) == 1 &&
+           ::setsockopt(sockets.ours.number(), SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on) == 0 &&
+           fails(::socket(AF_INET, SOCK_STREAM, 0), EPERM) &&
+           fails(::connect(sockets.ours.number(), nullptr, 0), EPERM) &&
+           fails(::accept(sockets.ours.number(), nullptr, nullptr), EPERM) &&
+           fails(::fork(), EPERM);
+  });
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
+
 TEST_F(Sandbox, CannotBeConfinedTwice) {
   EXPECT_TRUE(confined([&] {
     try {

@@ -9,6 +9,7 @@
 #include "server/store/sqlite/job_store.h"
 #include "server/store/sqlite/order_store.h"
 #include "server/store/sqlite/outbox.h"
+#include "server/store/sqlite/received_store.h"
 #include "server/store/sqlite/volume_store.h"
 #include "tests/support/files.h"
 #include "tests/unit/store/power_cut.h"
@@ -26,6 +27,7 @@ class SqliteEngine : public Engine {
   store::Outbox& outbox() override { return *outbox_; }
   store::OrderStore& orders() override { return *orders_; }
   store::AuditTrail& audit() override { return *audit_; }
+  store::ReceivedStore& received() override { return *received_; }
 
   void restart() override {
     close();
@@ -63,6 +65,7 @@ class SqliteEngine : public Engine {
   }
 
   void close() {
+    received_.reset();
     audit_.reset();
     orders_.reset();
     outbox_.reset();
@@ -77,6 +80,7 @@ class SqliteEngine : public Engine {
     outbox_.emplace(*database_);
     orders_.emplace(*database_);
     audit_.emplace(*database_);
+    received_.emplace(*database_);
     jobs_.emplace(*database_, *blobs_,
                   store::JobStoreOptions{.max_queued = options_.max_queued,
                                          .retry_delay = options_.retry_delay,
@@ -94,6 +98,7 @@ class SqliteEngine : public Engine {
   std::optional<store::SqliteOutbox> outbox_;
   std::optional<store::SqliteOrderStore> orders_;
   std::optional<store::SqliteAuditTrail> audit_;
+  std::optional<store::SqliteReceivedStore> received_;
   std::optional<store::SqliteJobStore> jobs_;
 };
 

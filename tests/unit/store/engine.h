@@ -14,6 +14,7 @@
 #include "server/store/job_store.h"
 #include "server/store/order_store.h"
 #include "server/store/outbox.h"
+#include "server/store/received_store.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh::test {
@@ -35,6 +36,7 @@ class Engine {
   virtual store::Outbox& outbox() = 0;
   virtual store::OrderStore& orders() = 0;
   virtual store::AuditTrail& audit() = 0;
+  virtual store::ReceivedStore& received() = 0;
 
   // As after a crash: the stores are opened anew on what is on disk, and nobody holds a lease. What
   // was returned before is not valid any more.
@@ -95,6 +97,7 @@ class EngineTest : public testing::TestWithParam<NamedEngine> {
   store::Outbox& outbox() { return engine_->outbox(); }
   store::OrderStore& orders() { return engine_->orders(); }
   store::AuditTrail& audit() { return engine_->audit(); }
+  store::ReceivedStore& received() { return engine_->received(); }
   void restart() { engine_->restart(); }
   void lose_power() { engine_->lose_power(); }
 

@@ -1,0 +1,376 @@
+"""Series that others send by C-STORE."""
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import time
+
+import dicom
+import peers
+import scu
+from fixture import Loop
+
+DIMSE = """
+[dimse]
+listen = "127.0.0.1:{port}"
+associations = {associations}
+routes = {{ BONE = "bone", SKIN = "skin" }}
+calling = ["CT1", "ROUTER", "ORTHANC"]
+idle-seconds = {idle}
+max-object-bytes = {most_object}
+max-held-bytes = {most_held}
+[[rules]]
+name = "skin"
+parameters = {{ iso = 300 }}
+send = [ {{ pacs = "main" }} ]
+"""
+
+
+class Receiving(Loop):
+    def receiver(self, settle=1, idle=2, associations=3, most_object=1 << 30, most_held=1 << 30,
+                 *options):
+        port = peers.free_port()
+        daemon = self.daemon(None, settle, 2, 500_000_000, "", DIMSE.format(
+            port=port, idle=idle, associations=associations, most_object=most_object,
+            most_held=most_held), *options)
+        daemon.dimse_port = port
+        return daemon
+
+    def made(self, **how):
+        """A series that nobody has, and the folder that its files are in."""
+        series = dicom.Series(self.uid(), **how)
+        folder = os.path.join(self.folder.name, "files-" + series.uid)
+        os.makedirs(folder)
+        for number, data in enumerate(series.files.values()):
+            with open(os.path.join(folder, f"{number:03}.dcm"), "wb") as file:
+                file.write(data)
+        return series, folder
+
+    @staticmethod
+    def send(daemon, files, called="BONE", calling="CT1", check=True, options=()):
+        said = subprocess.run(
+            ["storescu", "--no-halt", "--verbose", "--aetitle", calling, "--call", called,
+             "--timeout", "10", *options, "127.0.0.1", str(daemon.dimse_port), *files],
+            capture_output=True, text=True, check=False)
+        if check:
+            assert said.returncode == 0, said.stdout + said.stderr
+        return said.stdout + said.stderr
+
+    @staticmethod
+    def in_folder(folder):
+        return sorted(os.path.join(folder, name) for name in os.listdir(folder))
+
+    @staticmethod
+    def orders(daemon):
+        return daemon.call("GET", "/v1/orders")[2]["orders"]
+
+    def only_order(self, daemon, series, seconds=60):
+        found = peers.until(lambda: [each for each in self.orders(daemon)
+                                     if each["source"]["series"] == series.uid], seconds)
+        self.assertEqual(len(found), 1)
+        return found[0]["id"]
+
+    @staticmethod
+    def received(daemon):
+        """The files in the data folder, quarantine included, that are images as they were sent."""
+        found = []
+        for place, _, names in os.walk(daemon.data):
+            for name in names:
+                try:
+                    with open(os.path.join(place, name), "rb") as file:
+                        head = file.read(4096)
+                except FileNotFoundError:
+                    continue
+                if head[128:132] == b"DICM" and b"ORIGINAL" in head:
+                    found.append(name)
+        return found
+
+    def test_received(self):
+        """A series becomes an order by the rule of the title that it was sent to, and goes then."""
+        series, folder = self.made()
+        daemon = self.receiver()
+        # The PACS has the study too, as usual: the router sends to both.
+        self.pacs.upload(series.files.values())
+        self.send(daemon, self.in_folder(folder))
+        order = self.succeeded(daemon, self.only_order(daemon, series))
+        self.assertEqual((order["rule"], order["source"]["pacs"], order["source"]["instances"]),
+                         ("bone", "dimse:BONE", 12))
+        self.assert_one_mesh(order, series)
+        self.assertEqual([path for method, path in self.proxy.requests
+                          if path.endswith("/instances?includefield=00080018&limit=1000&offset=0")],
+                         [])
+        # What was received is not kept.
+        peers.until(lambda: not self.received(daemon))
+        transfers = [each for each in daemon.audit() if each["event"] == "110104"]
+        self.assertEqual([(each["direction"], each["instances"], each["patient_id"])
+                          for each in transfers],
+                         [("in", 12, "PAT-4711"), ("out", 1, "PAT-4711")])
+        for secret in (series.study, series.uid, series.instances[0], "PAT-4711"):
+            self.assertNotIn(secret, daemon.logged())
+
+    def test_orthanc_sends(self):
+        """A PACS that sends a series by itself gets the mesh back."""
+        series = self.series()
+        daemon = self.receiver()
+        modality = json.dumps({"AET": "BONE", "Host": "127.0.0.1", "Port": daemon.dimse_port})
+        self.assertEqual(self.pacs.call("PUT", "/modalities/isomesh", modality)[0], 200)
+        found = json.loads(self.pacs.call("POST", "/tools/lookup", series.uid)[2])[0]["ID"]
+        self.assertEqual(self.pacs.call("POST", "/modalities/isomesh/echo", "{}")[0], 200)
+        self.assertEqual(self.pacs.call("POST", "/modalities/isomesh/store", found)[0], 200)
+        order = self.succeeded(daemon, self.only_order(daemon, series))
+        self.assertEqual(order["source"]["instances"], 12)
+        self.assert_one_mesh(order, series)
+
+    def test_echo(self):
+        daemon = self.receiver()
+        subprocess.run(["echoscu", "-aet", "CT1", "-aec", "BONE", "127.0.0.1",
+                        str(daemon.dimse_port)], check=True)
+
+    def test_titles(self):
+        """Only known titles, on both sides."""
+        series, folder = self.made()
+        daemon = self.receiver()
+        for called, calling, why in [("NOBODY", "CT1", "Called AE Title Not Recognized"),
+                                     ("BONE", "STRANGER", "Calling AE Title Not Recognized")]:
+            said = self.send(daemon, self.in_folder(folder), called, calling, False)
+            self.assertIn(why, said)
+        self.assertIn("110114", [each["event"] for each in daemon.audit()])
+        time.sleep(2)
+        self.assertEqual(self.orders(daemon), [])
+        self.assertNotIn("STRANGER", daemon.logged())
+
+    def test_sent_twice(self):
+        """Within an association, later, and after it has succeeded: one order."""
+        series, folder = self.made()
+        daemon = self.receiver(2)
+        files = self.in_folder(folder)
+        self.send(daemon, files + files)
+        self.send(daemon, files)
+        self.succeeded(daemon, self.only_order(daemon, series))
+        self.send(daemon, files)
+        time.sleep(4)
+        self.only_order(daemon, series)
+        self.assertEqual(self.received(daemon), [])
+        self.assertEqual(len(self.stored(series)), 1)
+
+    def test_two_titles(self):
+        """The same series for two rules: two orders."""
+        series, folder = self.made()
+        daemon = self.receiver()
+        self.send(daemon, self.in_folder(folder))
+        self.send(daemon, self.in_folder(folder), "SKIN", "ROUTER")
+        orders = peers.until(lambda: (lambda o: o if len(o) == 2 else None)(self.orders(daemon)))
+        self.assertEqual({each["rule"] for each in orders}, {"bone", "skin"})
+        for each in orders:
+            self.succeeded(daemon, each["id"])
+
+    def test_settles(self):
+        """An order is made when nothing has come for a while, over several associations."""
+        series, folder = self.made()
+        daemon = self.receiver(2)
+        files = self.in_folder(folder)
+        for file in files:
+            self.send(daemon, [file])
+            time.sleep(0.2)
+            self.assertEqual(self.orders(daemon), [])
+        order = self.succeeded(daemon, self.only_order(daemon, series))
+        self.assertEqual(order["source"]["instances"], 12)
+
+    def test_late_slices(self):
+        """Slices that come after the mesh wait for the rest: never a mesh of a part."""
+        series, folder = self.made()
+        daemon = self.receiver()
+        files = self.in_folder(folder)
+        self.send(daemon, files[:9])
+        self.succeeded(daemon, self.only_order(daemon, series))
+        peers.until(lambda: not self.received(daemon))
+        self.send(daemon, files[9:])
+        late = peers.until(lambda: [each for each in self.orders(daemon)
+                                    if each["attempts"] > 0])[0]
+        self.assertEqual(late["error"]["type"], "urn:isomesh:problem:series-incomplete")
+        self.assertIn("sent again as a whole", late["error"]["detail"])
+        self.send(daemon, files)
+        late = self.succeeded(daemon, late["id"])
+        self.assertEqual(late["source"]["instances"], 12)
+        self.assertEqual(len(self.stored(series)), 2)
+
+    def test_after_a_failure(self):
+        """A series that made no mesh is tried when it is sent again."""
+        series, folder = self.made()
+        daemon = self.receiver()
+        files = self.in_folder(folder)
+        self.send(daemon, files[:5] + files[6:])
+        first = daemon.ended(self.only_order(daemon, series))
+        self.assertEqual((first["state"], first["error"]["status"]), ("failed", 422))
+        peers.until(lambda: not self.received(daemon))
+        self.send(daemon, files)
+        orders = peers.until(lambda: (lambda o: o if len(o) == 2 else None)(self.orders(daemon)))
+        self.succeeded(daemon, orders[0]["id"])
+
+    def test_what_is_no_image_is_not_accepted(self):
+        report = dicom.file_of("1.2.840.10008.5.1.4.1.1.88.11", "1.2.3.4", {
+            0x00080016: ("UI", "1.2.840.10008.5.1.4.1.1.88.11"), 0x00080018: ("UI", "1.2.3.4"),
+            0x0020000D: ("UI", "1.2.3"), 0x0020000E: ("UI", "1.2.3.1")})
+        path = os.path.join(self.folder.name, "report.dcm")
+        with open(path, "wb") as file:
+            file.write(report)
+        daemon = self.receiver()
+        said = self.send(daemon, [path], check=False)
+        self.assertIn("No presentation context", said)
+
+    def test_idle_associations(self):
+        """As many as may be that say nothing, or stop in the middle: they hold up nobody for long."""
+        series, folder = self.made()
+        daemon = self.receiver(1, 1, 3)
+        silent = [socket.create_connection(("127.0.0.1", daemon.dimse_port)) for _ in range(6)]
+        for each in silent[:3]:
+            each.sendall(b"\x01\x00\x00\x00\x10")
+        began = time.monotonic()
+        self.send(daemon, self.in_folder(folder))
+        self.assertLess(time.monotonic() - began, 9)
+        self.succeeded(daemon, self.only_order(daemon, series))
+        for each in silent:
+            each.close()
+
+    def test_aborted_association(self):
+        """What was acknowledged stays, what was not does not count: aborted, cut, left alone."""
+        series, folder = self.made()
+        daemon = self.receiver(3, 1)
+        instances = series.instances
+
+        def begun(number):
+            """One object stored, and the next one begun."""
+            peer = scu.Scu(daemon.dimse_port)
+            self.assertTrue(peer.accepted)
+            self.assertEqual(peer.store(instances[number], series.files[instances[number]]), 0)
+            peer.command(instances[number + 1])
+            peer.values(0, peer.data_set(series.files[instances[number + 1]])[:900])
+            return peer
+        begun(0).abort()
+        begun(2).connection.close()
+        left = begun(4)
+        self.assertIn(left.receive()[0], (7, None))  # given up after a second
+        self.send(daemon, [self.in_folder(folder)[n] for n in (1, 3, 5, 6, 7, 8, 9, 10, 11)])
+        order = self.succeeded(daemon, self.only_order(daemon, series))
+        self.assertEqual(order["source"]["instances"], 12)
+
+    def test_nonsense(self):
+        """Bytes that are no DICOM end one association, and nothing else."""
+        series, folder = self.made()
+        daemon = self.receiver()
+        for length in (1, 10, 1000, 100000):
+            with socket.create_connection(("127.0.0.1", daemon.dimse_port)) as connection:
+                try:
+                    connection.sendall(os.urandom(length))
+                except OSError:
+                    pass
+        # A request that promises four gigabytes.
+        with socket.create_connection(("127.0.0.1", daemon.dimse_port)) as connection:
+            connection.sendall(b"\x01\x00\xff\xff\xff\xff" + bytes(1000))
+            self.send(daemon, self.in_folder(folder))
+        self.succeeded(daemon, self.only_order(daemon, series))
+        self.assertIsNone(daemon.process.poll())
+
+    def test_mismatch(self):
+        """An object that is not what its request says, or that nobody can place, is refused."""
+        series, _ = self.made()
+        daemon = self.receiver()
+        instance = series.instances[0]
+        file = series.files[instance]
+        peer = scu.Scu(daemon.dimse_port)
+        self.assertEqual(peer.store("1.2.3.4.5", file), 0xA900)
+        self.assertEqual(peer.store(instance, file.replace(series.study.encode(), b"x" * len(
+            series.study))), 0xA900)
+        self.assertIn(peer.store(instance, file[:160] + bytes(range(256)) * 8), (0xA900, 0xC000))
+        self.assertEqual(peer.store(instance, file), 0)
+        self.assertTrue(peer.release())
+
+    def test_bounds(self):
+        """Objects that are too large, and more than may be held, are refused with A700."""
+        series, folder = self.made(size=64)
+        files = self.in_folder(folder)
+        daemon = self.receiver(60, 2, 3, 4000)
+        said = self.send(daemon, files[:1], check=False)
+        self.assertIn("OutOfResources", said)
+        daemon = self.receiver(60, 2, 3, 1 << 30, 30_000)
+        said = self.send(daemon, files, check=False)
+        self.assertEqual(said.count("Received Store Response (Success)"), 3)
+        self.assertIn("OutOfResources", said)
+
+    def test_disk_full(self):
+        """A full disk answers A700; what was acknowledged is there when there is room again."""
+        folder = os.path.join(self.folder.name, "small")
+        os.makedirs(folder)
+        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=48m", "small", folder], check=True)
+        try:
+            series, files = self.made(size=64)
+            files = self.in_folder(files)
+            daemon = self.receiver(3, 2, 3, 1 << 30, 1 << 30, "--data", folder)
+            self.send(daemon, files[:4])
+            filling = os.path.join(folder, "filling")
+            with open(filling, "wb", buffering=0) as file:
+                try:
+                    while file.write(bytes(1 << 12)):
+                        pass
+                except OSError:
+                    pass
+            said = self.send(daemon, files[4:], check=False)
+            self.assertNotIn("Received Store Response (Success)", said)
+            self.assertIn("OutOfResources", said)
+            os.remove(filling)
+            peers.until(lambda: peers.call(daemon.port, "GET", "/readyz")[0] == 200)
+            self.send(daemon, files[4:])
+            order = self.succeeded(daemon, self.only_order(daemon, series))
+            self.assertEqual(order["source"]["instances"], 12)
+        finally:
+            for daemon in self.daemons:
+                daemon.kill()
+            subprocess.run(["umount", "--lazy", folder], check=True)
+
+    def test_killed_while_receiving(self):
+        """kill -9 at any time: what storescu was told is stored is there, and one order comes of it."""
+        series, folder = self.made(slices=60)
+        daemon = self.receiver(2)
+        files = self.in_folder(folder)
+        left = files
+        for pause in (0.05, 0.15, 0.3):
+            sending = subprocess.Popen(
+                ["storescu", "--no-halt", "--verbose", "--aetitle", "CT1", "--call", "BONE",
+                 "--timeout", "5", "127.0.0.1", str(daemon.dimse_port), *left],
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            time.sleep(pause)
+            daemon.process.send_signal(signal.SIGKILL)
+            said = sending.communicate()[0]
+            daemon.process.wait()
+            daemon.process.stdout.close()
+            acknowledged = self.acknowledged(said)
+            left = [file for file in left if file not in acknowledged]
+            daemon.start()
+        if left:
+            self.send(daemon, left)
+        order = self.succeeded(daemon, self.only_order(daemon, series))
+        self.assertEqual(order["source"]["instances"], 60)
+        self.assert_one_mesh(order, series)
+
+    @staticmethod
+    def acknowledged(said):
+        """The files that storescu says were stored."""
+        stored = set()
+        file = None
+        for line in said.splitlines():
+            if found := re.search(r"Sending file: (\S+)", line):
+                file = found.group(1)
+            elif "Received Store Response (Success)" in line and file:
+                stored.add(file)
+        return stored
+
+    def test_drains(self):
+        """SIGTERM ends it also while associations are open."""
+        daemon = self.receiver()
+        with socket.create_connection(("127.0.0.1", daemon.dimse_port)):
+            time.sleep(0.3)
+            began = time.monotonic()
+            self.assertEqual(daemon.stop(), 0)
+            self.assertLess(time.monotonic() - began, 5)

@@ -1,0 +1,78 @@
+#include "server/process/dimse_message.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/errors.h"
+
+namespace isomesh::process {
+namespace {
+
+TEST(DimseMessage, OrdersComeBack) {
+  const DimseSending sending = {.calling = "ISOMESH",
+                                .called = "PACS \"1\"",
+                                .file = "/data/blobs/ab",
+                                .sop_class = "1.2",
+                                .instance = "1.3",
+                                .timeout = std::chrono::seconds(7),
+                                .answer_timeout = std::chrono::seconds(8)};
+  const auto sent = std::get<DimseSending>(dimse_order_from(to_line(DimseOrder(sending))));
+  EXPECT_EQ(sent.calling, sending.calling);
+  EXPECT_EQ(sent.called, sending.called);
+  EXPECT_EQ(sent.file, sending.file);
+  EXPECT_EQ(sent.sop_class, sending.sop_class);
+  EXPECT_EQ(sent.instance, sending.instance);
+  EXPECT_EQ(sent.timeout, sending.timeout);
+  EXPECT_EQ(sent.answer_timeout, sending.answer_timeout);
+  const DimseReceiving receiving = {.called = {"BONE", "SKIN"},
+                                    .calling = {"CT1"},
+                                    .folder = "/data/scratch/x",
+                                    .max_object_bytes = 1234,
+                                    .idle = std::chrono::seconds(9)};
+  const auto received = std::get<DimseReceiving>(dimse_order_from(to_line(DimseOrder(receiving))));
+  EXPECT_EQ(received.called, receiving.called);
+  EXPECT_EQ(received.calling, receiving.calling);
+  EXPECT_EQ(received.folder, receiving.folder);
+  EXPECT_EQ(received.max_object_bytes, receiving.max_object_bytes);
+  EXPECT_EQ(received.idle, receiving.idle);
+}
+
+TEST(DimseMessage, ReportsComeBack) {
+  for (const DimseReport& report :
+       {DimseReport(DimseSent{DimseEnd::kAnswered, 0xA700}),
+        DimseReport(DimseObject{"12", "BONE", "CT1", "1.2", "1.3", "1.4"}),
+        DimseReport(DimseEnded{DimseRefusal::kCalling})}) {
+    EXPECT_EQ(dimse_report_from(to_line(report)), report);
+  }
+}
+
+// The process that reports may have been taken over by what it read.
+TEST(DimseMessage, ReportsThatWouldDoHarmAreRefused) {
+  const DimseObject good = {"12", "BONE", "CT1", "1.2", "1.3", "1.4"};
+  std::vector<DimseObject> bad(6, good);
+  bad[0].file = "../1";
+  bad[1].file = "";
+  bad[2].study = "1.2/../3";
+  bad[3].series = "";
+  bad[4].instance = "x";
+  bad[5].calling = "A\\B";
+  for (const DimseObject& object : bad) {
+    const auto error = test::thrown_by([&] { dimse_report_from(to_line(DimseReport(object))); });
+    ASSERT_TRUE(error) << to_line(DimseReport(object));
+    EXPECT_EQ(error->code(), ErrorCode::kInternal);
+  }
+  for (const char* line :
+       {"", "{}", "[]", R"({"sent":{"end":7,"status":0}})", R"({"sent":{"end":0,"status":-1}})",
+        R"({"ended":{"refusal":4}})", R"({"ended":{"refusal":"x"}})"}) {
+    EXPECT_TRUE(test::thrown_by([&] { dimse_report_from(line); })) << line;
+  }
+}
+
+TEST(DimseMessage, TitlesAreThoseOfDicom) {
+  for (const char* good : {"A", "CT 1", "0123456789ABCDEF"}) EXPECT_TRUE(is_ae_title(good));
+  for (const char* bad : {"", " A", "A ", "A\\B", "0123456789ABCDEFG", "A\n", "\xC3\xA4"}) {
+    EXPECT_FALSE(is_ae_title(bad)) << bad;
+  }
+}
+
+}  // namespace
+}  // namespace isomesh::process
