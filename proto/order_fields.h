@@ -57,6 +57,8 @@ void visit(Is<OrderWork> auto& self, auto&& field) {
   field("label", self.label);
   field("series_number", self.series_number);
   field("callback", self.callback);
+  field("max_error_mm", self.max_error_mm);
+  field("triangles", self.triangles);
 }
 
 void visit(Is<PacsStatus> auto& self, auto&& field) {

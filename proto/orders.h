@@ -92,6 +92,9 @@ struct OrderWork {
   std::string label;                        // what the mesh is called
   std::optional<std::int64_t> series_number;
   std::optional<std::string> callback;  // a URL
+  // How far a mesh may be from the surface that is simplified to fit into what its PACS takes.
+  std::optional<double> max_error_mm = {};
+  std::optional<std::uint32_t> triangles = {};  // that fit, once it is known that all do not
 
   bool operator==(const OrderWork&) const = default;
 };

@@ -1,6 +1,7 @@
 #include "server/orders/hospital.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <set>
 #include <sstream>
@@ -67,6 +68,16 @@ class Section {
     std::int64_t count = value.count();
     read(key, count, low, high);
     value = seconds(count);
+  }
+
+  // A number of millimetres, which is more than none.
+  void read(std::string_view key, std::optional<double>& value) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    value = node->is_number() ? node->value<double>() : std::nullopt;
+    if (!value || !std::isfinite(*value) || !(*value > 0)) {
+      refuse(key_of(key), "must be a number above 0");
+    }
   }
 
   void read(std::string_view key, std::vector<std::string>& values) {
@@ -260,6 +271,7 @@ Rule read_rule(Section section) {
     refuse(section.key_of("label"), "must have at most 64 characters, and no backslash");
   }
   section.read("series-number", rule.series_number, 0, std::numeric_limits<std::int32_t>::max());
+  section.read("max-error-mm", rule.max_error_mm);
   std::string watch;
   section.read("watch", watch);
   if (!watch.empty()) rule.watch = watch;

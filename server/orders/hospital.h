@@ -51,6 +51,8 @@ struct Rule {
   std::int64_t series_number = 9001;
   std::optional<std::string> watch;  // the PACS that is asked for new series
   SeriesMatch match;
+  // What an object that is too large for its PACS may be simplified by; empty: it fails.
+  std::optional<double> max_error_mm;
   std::string parameters;  // of its jobs: JSON, as parse_order_parameters takes it
   std::vector<SendTarget> send;
 };

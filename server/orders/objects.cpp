@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <span>
 
 #include "base/text.h"
 #include "proto/error.h"
 #include "proto/json.h"
+#include "proto/parameters.h"
 #include "server/dicom/encapsulated_stl.h"
 #include "server/dicom/uid.h"
 
@@ -88,12 +90,24 @@ std::string without_backslashes(std::string text) {
   return text;
 }
 
-std::string description_of(const MeshParameters& parameters) {
+// With three digits behind the point, which is a certificate still.
+double rounded_up(double mm) {
+  constexpr double kThousandths = 1000;
+  return std::ceil(mm * kThousandths) / kThousandths;
+}
+
+std::string description_of(const Job& job) {
+  const MeshParameters& parameters = job.parameters;
   const std::string what = parameters.labels ? "label"
                            : parameters.iso  ? "iso " + to_text(*parameters.iso)
                                              : "iso otsu";
-  return in_short(what + ", scheme " + std::to_string(static_cast<int>(parameters.scheme)) + ", " +
-                  std::to_string(parameters.passes) + " passes");
+  std::string text = what + ", scheme " + std::to_string(static_cast<int>(parameters.scheme)) +
+                     ", " + std::to_string(parameters.passes) + " passes";
+  // How far the object's own bytes are from the surface as it was extracted.
+  if (job.mesh->certificate) {
+    text += ", within " + number_text(rounded_up(job.mesh->certificate->max_mm)) + " mm";
+  }
+  return in_short(text);
 }
 
 std::optional<DicomSegment> segment_of(const DicomIdentity& identity, const Part& part) {
@@ -121,45 +135,69 @@ void write(const std::string& text, store::BlobWriter& to) {
   to.write(std::as_bytes(std::span(text)));
 }
 
+// Throws where there is none.
+std::vector<Part> parts_of_surface(const Job& job) {
+  std::vector<Part> parts = parts_of(job);
+  if (job.mesh && job.mesh->triangles > 0 && !parts.empty()) return parts;
+  throw Error(ErrorCode::kUnusableVolume,
+              "the surface is empty: no sample of the images is on the other side of the "
+              "iso-value");
+}
+
+// Names the object, too.
+dicom::StlEnvelope envelope_of(const store::OrderRecord& record, const Job& job, const Part& part,
+                               const std::string& station_name,
+                               std::chrono::system_clock::time_point made, MadeObject& object) {
+  const DicomIdentity& identity = record.work.identity.value();
+  object.label = part.label;
+  object.series_uid = series_uid_of(identity, job);
+  object.sop_instance_uid = instance_uid_of(object.series_uid, identity, part);
+  const std::string title = part.label ? record.work.label + ' ' + part.name : record.work.label;
+  return dicom::make_envelope(
+      {.identity = identity,
+       .series_uid = object.series_uid,
+       .sop_instance_uid = object.sop_instance_uid,
+       .series_number = record.work.series_number.value_or(0),
+       .title = in_short(without_backslashes(title)),
+       .made = made,
+       .station_name = station_name,
+       .content_description = description_of(job),
+       .algorithm_parameters = without_backslashes(canonical_parameters(job.parameters)),
+       .segment = segment_of(identity, part)},
+      part.bytes);
+}
+
+std::uint64_t bytes_of(const dicom::StlEnvelope& envelope, const Part& part) {
+  return envelope.before.size() + part.bytes + envelope.after.size();
+}
+
+// What the simplified mesh's object says of that besides.
+constexpr std::uint64_t kGrowthOfText = 400;
+
+[[noreturn]] void throw_too_large(std::uint64_t bytes, std::uint64_t most_bytes,
+                                  const OrderWork& work) {
+  std::string text = "the object has " + std::to_string(bytes) +
+                     " bytes, and the PACS takes at most " + std::to_string(most_bytes) +
+                     " (max-send-bytes)";
+  if (work.max_error_mm) {
+    text += "; within " + number_text(*work.max_error_mm) +
+            " mm of the surface (max-error-mm) it cannot be made smaller";
+  }
+  throw Error(ErrorCode::kTooLarge, text);
+}
+
 }  // namespace
 
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const std::string& station_name, std::uint64_t most_bytes,
                                      std::chrono::system_clock::time_point made,
                                      const store::BlobStore& blobs) {
-  const DicomIdentity& identity = record.work.identity.value();
-  const std::vector<Part> parts = parts_of(job);
-  if (!job.mesh || job.mesh->triangles == 0 || parts.empty()) {
-    throw Error(ErrorCode::kUnusableVolume,
-                "the surface is empty: no sample of the images is on the other side of the "
-                "iso-value");
-  }
   std::vector<MadeObject> objects;
-  const std::string series_uid = series_uid_of(identity, job);
-  for (const Part& part : parts) {
-    MadeObject object = {.label = part.label,
-                         .series_uid = series_uid,
-                         .sop_instance_uid = instance_uid_of(series_uid, identity, part),
-                         .blob = {}};
-    const std::string title = part.label ? record.work.label + ' ' + part.name : record.work.label;
-    const dicom::StlEnvelope envelope = dicom::make_envelope(
-        {.identity = identity,
-         .series_uid = series_uid,
-         .sop_instance_uid = object.sop_instance_uid,
-         .series_number = record.work.series_number.value_or(0),
-         .title = in_short(without_backslashes(title)),
-         .made = made,
-         .station_name = station_name,
-         .content_description = description_of(job.parameters),
-         .algorithm_parameters = without_backslashes(canonical_parameters(job.parameters)),
-         .segment = segment_of(identity, part)},
-        part.bytes);
-    const std::uint64_t bytes = envelope.before.size() + part.bytes + envelope.after.size();
-    if (bytes > most_bytes) {
-      throw Error(ErrorCode::kTooLarge, "the object has " + std::to_string(bytes) +
-                                            " bytes, and the PACS takes at most " +
-                                            std::to_string(most_bytes) + " (max-send-bytes)");
-    }
+  for (const Part& part : parts_of_surface(job)) {
+    MadeObject object;
+    const dicom::StlEnvelope envelope = envelope_of(record, job, part, station_name, made, object);
+    const std::uint64_t bytes = bytes_of(envelope, part);
+    if (bytes > most_bytes) throw_too_large(bytes, most_bytes, record.work);
     const auto writer = blobs.begin();
     write(envelope.before, *writer);
     copy(*blobs.open(part.blob), part, *writer);
@@ -168,6 +206,30 @@ std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job
     objects.push_back(std::move(object));
   }
   return objects;
+}
+
+std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record, const Job& job,
+                                                const std::string& station_name,
+                                                std::uint64_t most_bytes) {
+  // An STL file has so many for each triangle.
+  constexpr std::uint64_t kTriangleBytes = 50;
+  double share = 1;
+  for (const Part& part : parts_of_surface(job)) {
+    MadeObject object;
+    const dicom::StlEnvelope envelope = envelope_of(record, job, part, station_name, {}, object);
+    const std::uint64_t bytes = bytes_of(envelope, part);
+    if (bytes <= most_bytes) continue;
+    const std::uint64_t over = bytes - most_bytes + kGrowthOfText;
+    if (over + kTriangleBytes > part.bytes) throw_too_large(bytes, most_bytes, record.work);
+    share =
+        std::min(share, static_cast<double>(part.bytes - over) / static_cast<double>(part.bytes));
+  }
+  if (share == 1) return std::nullopt;
+  // Of labels the largest is to fit, which may keep another share than all of them together.
+  constexpr double kOfLabels = 0.95;
+  if (job.parameters.labels) share *= kOfLabels;
+  return std::max<std::uint32_t>(
+      1, static_cast<std::uint32_t>(share * static_cast<double>(job.mesh->triangles)));
 }
 
 bool can_make_objects(const Job& job, const store::BlobStore& blobs) {

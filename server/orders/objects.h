@@ -30,6 +30,12 @@ std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job
                                      std::chrono::system_clock::time_point made,
                                      const store::BlobStore& blobs);
 
+// How many triangles the job's mesh may have for no object to have more than `most_bytes`; empty
+// when none has. Throws Error kTooLarge when not even one triangle fits.
+std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record, const Job& job,
+                                                const std::string& station_name,
+                                                std::uint64_t most_bytes);
+
 // Whether the files that objects are made of are there as they were written.
 bool can_make_objects(const Job& job, const store::BlobStore& blobs);
 

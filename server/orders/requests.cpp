@@ -80,6 +80,7 @@ store::OrderRecord make_order(const Hospital& hospital, const Orderer& orderer,
   record.work.begun = order.created;
   record.work.label = rule == nullptr ? kLabel : rule->label;
   record.work.series_number = rule == nullptr ? kSeriesNumber : rule->series_number;
+  if (rule != nullptr) record.work.max_error_mm = rule->max_error_mm;
   if (request.callback) record.work.callback = request.callback->url;
   return record;
 }
@@ -99,6 +100,7 @@ store::OrderRecord make_order(const Rule& rule, const std::string& pacs,
   record.work.begun = order.created;
   record.work.label = rule.label;
   record.work.series_number = rule.series_number;
+  record.work.max_error_mm = rule.max_error_mm;
   return record;
 }
 

@@ -27,8 +27,18 @@ constexpr seconds kJobLook{30};
 std::string job_key(const store::OrderRecord& record) {
   constexpr std::size_t kEnough = 12;
   const std::string what =
-      sha256_of(record.order.volume.value_or("") + ' ' + record.work.begun).substr(0, kEnough);
+      sha256_of(record.order.volume.value_or("") + ' ' + record.work.begun +
+                (record.work.triangles ? ' ' + std::to_string(*record.work.triangles) : ""))
+          .substr(0, kEnough);
   return "order-" + record.order.id + '-' + what;
+}
+
+// The parameters of a job whose mesh fits into its object.
+void simplify(const OrderWork& work, JobParameters& parameters) {
+  parameters.triangles = std::min(*work.triangles, parameters.triangles.value_or(*work.triangles));
+  parameters.max_error_mm =
+      std::min(*work.max_error_mm, parameters.max_error_mm.value_or(*work.max_error_mm));
+  parameters.certify = true;
 }
 
 // What has been said of the series is forgotten, and the images with it.
@@ -42,6 +52,7 @@ void forget_images(store::OrderRecord& record) {
   record.work.blobs.clear();
   record.work.listed.clear();
   record.work.listed_since.reset();
+  record.work.triangles.reset();
 }
 
 }  // namespace
@@ -165,6 +176,7 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
 Time OrderSteps::submit_job(store::OrderRecord& record) const {
   JobParameters parameters;
   static_cast<MeshParameters&>(parameters) = record.order.parameters;
+  if (record.work.triangles) simplify(record.work, parameters);
   parameters.volume = *record.order.volume;
   parameters.priority = record.order.priority;
   const store::Viewer viewer = record.owner;
@@ -211,6 +223,14 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
     for (const SendTarget& target : record.order.send) {
       const PacsSettings* pacs = hospital_.find_pacs(target.pacs);
       if (pacs != nullptr) most_bytes = std::min(most_bytes, pacs->max_send_bytes);
+    }
+    if (record.work.max_error_mm && !record.work.triangles) {
+      const auto triangles = triangles_that_fit(record, job, hospital_.station_name, most_bytes);
+      if (triangles) {
+        record.work.triangles = *triangles;
+        record.order.job.reset();
+        return save(record, now_());
+      }
     }
     const Time made = job.finished ? time_of(*job.finished) : now_();
     objects = make_objects(record, job, hospital_.station_name, most_bytes, made, services_.blobs);

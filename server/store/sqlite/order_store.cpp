@@ -264,6 +264,7 @@ Order SqliteOrderStore::retry(const Viewer& viewer, const std::string& id) {
   work.begun = timestamp();
   work.identity.reset();
   work.blobs.clear();
+  work.triangles.reset();
   write(transaction.connection(), record, now_us());
   transaction.commit();
   return order;

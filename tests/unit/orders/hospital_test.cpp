@@ -116,6 +116,7 @@ TEST(Hospital, NamesWhatIsWrong) {
             "send-by = \"c-store\"\naet = \"12345678901234567\"\nhost = \"h\"\nport = 104"),
        "pacs[0].aet: must be 1 to 16"},
       {with("dicomweb = \"https://pacs.example.org/dicom-web/\"", ""), "pacs[0].dicomweb"},
+      {std::string(kWhole) + "max-error-mm = 0\n", "rules[0].max-error-mm"},
       {std::string(kWhole) + "[dimse]\ncalling = [\"A\"]\nroutes = { B = \"bone\" }\n",
        "dimse.listen: is required"},
       {std::string(kWhole) + "[dimse]\nlisten = \"h:1\"\nroutes = { B = \"bone\" }\n",
@@ -141,6 +142,7 @@ host = "archive.example.org"
 port = 11112
 [[rules]]
 name = "bone"
+max-error-mm = 0.3
 parameters = { iso = 250 }
 send = [ { pacs = "archive" } ]
 [dimse]
@@ -159,6 +161,7 @@ max-held-bytes = 9
   EXPECT_EQ(pacs.host, "archive.example.org");
   EXPECT_EQ(pacs.port, 11112);
   EXPECT_EQ(pacs.dicomweb, "");
+  EXPECT_EQ(hospital.rules.front().max_error_mm, 0.3);
   ASSERT_TRUE(hospital.dimse);
   EXPECT_EQ(hospital.dimse->listen, "127.0.0.1:11112");
   EXPECT_EQ(hospital.dimse->associations, 3U);

@@ -226,6 +226,54 @@ TEST_F(OrdersTest, GoTheirWay) {
   EXPECT_FALSE(volumes_.names(order.results.front().sop_instance_uid));
 }
 
+class FittingOrdersTest : public OrdersTest {
+ protected:
+  FittingOrdersTest() {
+    hospital_.pacs.front().max_send_bytes = 20'000;
+    Rule rule;
+    rule.name = "fit";
+    rule.max_error_mm = 0.5;
+    rule.parameters = R"({"iso": 100})";
+    rule.send = {{.pacs = "main"}};
+    hospital_.rules = {rule};
+  }
+  std::string submit_by_rule() {
+    OrderRequest request;
+    request.source = {.pacs = "main", .study = kStudy, .series = kSeries};
+    request.rule = "fit";
+    return orders_->submit({.name = "", .is_administrator = true}, request, "", "").first.id;
+  }
+};
+
+TEST_F(FittingOrdersTest, HaveAnotherJobWithinTheError) {
+  const std::string id = submit_by_rule();
+  ASSERT_TRUE(finish_job(1000));
+  EXPECT_FALSE(last_parameters_.triangles);
+  ASSERT_TRUE(finish_job(100));
+  ASSERT_TRUE(last_parameters_.triangles);
+  EXPECT_GT(*last_parameters_.triangles, 200U);
+  EXPECT_LT(*last_parameters_.triangles, 400U);
+  EXPECT_EQ(last_parameters_.max_error_mm, 0.5);
+  EXPECT_TRUE(last_parameters_.certify);
+  ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+  EXPECT_LE(get(id).results.front().bytes, 20'000U);
+}
+
+TEST_F(FittingOrdersTest, FailWhereTheErrorIsNotEnough) {
+  const std::string id = submit_by_rule();
+  ASSERT_TRUE(finish_job(1000));
+  ASSERT_TRUE(finish_job(900));
+  ASSERT_TRUE(reaches(id, OrderState::kFailed));
+  EXPECT_EQ(get(id).error->type, "urn:isomesh:problem:too-large");
+  EXPECT_THAT(get(id).error->detail, testing::HasSubstr("max-error-mm"));
+}
+
+TEST_F(FittingOrdersTest, WithRoomHaveOneJob) {
+  const std::string id = submit_by_rule();
+  ASSERT_TRUE(finish_job(100));
+  ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+}
+
 class ReceivedOrdersTest : public OrdersTest {
  protected:
   ReceivedOrdersTest() {
