@@ -1,5 +1,6 @@
 // isomeshd: configuration, wiring, signals.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -17,6 +18,7 @@
 #include <unistd.h>
 
 #include "base/log.h"
+#include "server/audit/syslog.h"
 #include "server/callbacks/callbacks.h"
 #include "server/callbacks/signature.h"
 #include "server/callbacks/targets.h"
@@ -239,6 +241,27 @@ std::unique_ptr<OpenHospital> open_hospital(const Options& options,
   return std::make_unique<OpenHospital>(orders::read_hospital(options.hospital), runner);
 }
 
+std::string host_name() {
+  std::array<char, 256> name = {};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "-";
+}
+
+// Null where nobody collects it.
+std::unique_ptr<audit::SyslogSender> send_trail(const orders::Hospital& hospital,
+                                                store::AuditTrail& trail) {
+  if (!hospital.syslog) return nullptr;
+  const orders::SyslogSettings& to = *hospital.syslog;
+  return std::make_unique<audit::SyslogSender>(
+      trail,
+      audit::TlsServer{.host = to.host,
+                       .port = to.port,
+                       .authorities = to.ca_file,
+                       .certificate = to.certificate_file,
+                       .key = to.key_file},
+      audit::AuditSource{
+          .station = hospital.station_name, .host = host_name(), .process = ::getpid()});
+}
+
 int run(const Options& options, const sigset_t& signals) {
   const net::Address address = net::parse_address(options.listen);
   const Files files = open_files(options, address);
@@ -291,6 +314,7 @@ int run(const Options& options, const sigset_t& signals) {
   store::SqliteReceivedStore received(database);
   const orders::PacsByName peers =
       hospital ? hospital->peers(folder.scratch(), options, received, blobs) : orders::PacsByName();
+  const auto audit_sender = hospital ? send_trail(hospital->settings, audit) : nullptr;
   std::unique_ptr<orders::Orders> orders;
   std::unique_ptr<dimse::DimseListener> dimse_listener;
   if (hospital) {
@@ -337,6 +361,7 @@ int run(const Options& options, const sigset_t& signals) {
     spdlog::warn("jobs still run after {} s; they are stopped", options.drain_seconds);
   }
   if (orders) orders->stop();
+  if (audit_sender) audit_sender->stop();
   server.stop();
   return 0;
 }

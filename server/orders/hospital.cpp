@@ -310,6 +310,32 @@ DimseSettings read_dimse(Section section) {
   return dimse;
 }
 
+std::optional<SyslogSettings> read_audit(Section section) {
+  SyslogSettings syslog;
+  std::string url;
+  section.read("syslog", url);
+  section.read("ca-file", syslog.ca_file);
+  section.read("certificate-file", syslog.certificate_file);
+  section.read("key-file", syslog.key_file);
+  section.finish();
+  section.require("syslog", url);
+  if (syslog.certificate_file.empty() != syslog.key_file.empty()) {
+    refuse(section.key_of("certificate-file"), "needs key-file, and the other way round");
+  }
+  constexpr std::string_view kScheme = "tls://";
+  const std::size_t colon = url.rfind(':');
+  const bool has_port = colon != std::string::npos && colon >= kScheme.size();
+  const auto port =
+      has_port ? parse_uint64(url.substr(colon + 1)) : std::optional<std::uint64_t>(syslog.port);
+  if (!url.starts_with(kScheme) || !port || *port == 0 || *port > 65535) {
+    refuse(section.key_of("syslog"), "must be tls://HOST or tls://HOST:PORT");
+  }
+  syslog.port = static_cast<std::uint16_t>(*port);
+  syslog.host = url.substr(kScheme.size(), has_port ? colon - kScheme.size() : std::string::npos);
+  section.require("syslog", syslog.host);
+  return syslog;
+}
+
 // Every name once, and none that does not stand for anything.
 void check_names(const Hospital& hospital) {
   std::set<std::string> names;
@@ -348,6 +374,7 @@ Hospital hospital_of(const toml::table& table) {
   for (Section& section : all.sections("pacs")) hospital.pacs.push_back(read_pacs(section));
   for (Section& section : all.sections("rules")) hospital.rules.push_back(read_rule(section));
   if (auto dimse = all.section("dimse")) hospital.dimse = read_dimse(std::move(*dimse));
+  if (auto audit = all.section("audit")) hospital.syslog = read_audit(std::move(*audit));
   all.finish();
   if (hospital.pacs.empty()) refuse("pacs", "is required: there is nobody to speak to");
   check_names(hospital);

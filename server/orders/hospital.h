@@ -68,6 +68,15 @@ struct DimseSettings {
   std::uint64_t max_held_bytes = std::uint64_t{100} << 30;  // of all that orders do not have yet
 };
 
+// Where the audit trail is sent, as syslog over TLS (RFC 5425).
+struct SyslogSettings {
+  std::string host;
+  std::uint16_t port = 6514;
+  std::filesystem::path ca_file;           // empty: the system's authorities
+  std::filesystem::path certificate_file;  // ours; empty: none
+  std::filesystem::path key_file;
+};
+
 struct Hospital {
   std::chrono::seconds settle{60};  // the list of a series' instances is unchanged for so long
   std::chrono::seconds poll{30};
@@ -79,6 +88,7 @@ struct Hospital {
   std::vector<PacsSettings> pacs;
   std::vector<Rule> rules;
   std::optional<DimseSettings> dimse;
+  std::optional<SyslogSettings> syslog;
 
   // Null when there is none of that name.
   const PacsSettings* find_pacs(std::string_view name) const;

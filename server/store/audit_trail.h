@@ -41,6 +41,10 @@ class AuditTrail {
   // of JSON without a line break.
   virtual void read(std::uint64_t after,
                     const std::function<void(std::string_view line)>& line) const = 0;
+
+  // The number of the last entry that a collector has had; 0 for none.
+  virtual std::uint64_t sent() const = 0;
+  virtual void note_sent(std::uint64_t number) = 0;
 };
 
 }  // namespace isomesh::store

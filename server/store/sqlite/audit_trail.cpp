@@ -88,6 +88,21 @@ void SqliteAuditTrail::read(std::uint64_t after,
   read_pieces([this] { return Reading(database_.reader()); }, after, line);
 }
 
+std::uint64_t SqliteAuditTrail::sent() const {
+  const Reading reading(database_.reader());
+  Query row = reading->query("SELECT id FROM audit_sent");
+  row.next();
+  return static_cast<std::uint64_t>(row.integer(0));
+}
+
+void SqliteAuditTrail::note_sent(std::uint64_t number) {
+  database_.freeing([&] {
+    Transaction transaction(database_.writer());
+    transaction->run("UPDATE audit_sent SET id = ?", number);
+    transaction.commit();
+  });
+}
+
 void read_audit_trail(const std::filesystem::path& data, std::uint64_t after,
                       const std::function<void(std::string_view line)>& line) {
   const std::filesystem::path file = data / "isomesh.sqlite";

@@ -14,6 +14,8 @@ class SqliteAuditTrail : public AuditTrail {
   void add(const AuditEntry& entry) override;
   void read(std::uint64_t after,
             const std::function<void(std::string_view line)>& line) const override;
+  std::uint64_t sent() const override;
+  void note_sent(std::uint64_t number) override;
 
  private:
   Database& database_;

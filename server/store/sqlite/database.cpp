@@ -167,6 +167,11 @@ CREATE TABLE received(        -- instances that peers have sent; see ReceivedSto
 ) WITHOUT ROWID;
 CREATE INDEX received_held ON received(route, study, series, at, bytes) WHERE blob IS NOT NULL;
 CREATE INDEX received_by_blob ON received(blob) WHERE blob IS NOT NULL;
+
+CREATE TABLE audit_sent(      -- one row: up to which entry a collector has had the trail
+  id INTEGER NOT NULL
+);
+INSERT INTO audit_sent VALUES(0);
 )sql"};
 
 // Versions 1 and 2 were never released.

@@ -31,8 +31,9 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/dimse", {"server/orders", "server/net"}},
     {"server/callbacks", {"server/store"}},
     {"server/net", {"proto"}},
+    {"server/audit", {"server/store", "server/net"}},
     {"server/http", {"server/net", "server/callbacks", "server/orders"}},
-    {"server", {"server/http", "server/dicomweb", "server/dimse"}},
+    {"server", {"server/http", "server/audit", "server/dicomweb", "server/dimse"}},
     {"client/isomesh", {"proto"}},
     {"client/cli", {"client/isomesh"}},
 };

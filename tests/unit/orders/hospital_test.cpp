@@ -117,6 +117,10 @@ TEST(Hospital, NamesWhatIsWrong) {
        "pacs[0].aet: must be 1 to 16"},
       {with("dicomweb = \"https://pacs.example.org/dicom-web/\"", ""), "pacs[0].dicomweb"},
       {std::string(kWhole) + "max-error-mm = 0\n", "rules[0].max-error-mm"},
+      {std::string(kWhole) + "[audit]\nsyslog = \"udp://h\"\n", "audit.syslog"},
+      {std::string(kWhole) + "[audit]\nsyslog = \"tls://h:0\"\n", "audit.syslog"},
+      {std::string(kWhole) + "[audit]\nsyslog = \"tls://:6514\"\n", "audit.syslog"},
+      {std::string(kWhole) + "[audit]\nsyslog = \"tls://h\"\nkey-file = \"k\"\n", "key-file"},
       {std::string(kWhole) + "[dimse]\ncalling = [\"A\"]\nroutes = { B = \"bone\" }\n",
        "dimse.listen: is required"},
       {std::string(kWhole) + "[dimse]\nlisten = \"h:1\"\nroutes = { B = \"bone\" }\n",
@@ -153,6 +157,11 @@ calling = ["CT1", "ROUTER"]
 idle-seconds = 7
 max-object-bytes = 8
 max-held-bytes = 9
+[audit]
+syslog = "tls://collector.example.org:16514"
+ca-file = "/etc/isomesh/ca.pem"
+certificate-file = "/etc/isomesh/cert.pem"
+key-file = "/etc/isomesh/key.pem"
 )");
   const PacsSettings& pacs = hospital.pacs.front();
   EXPECT_EQ(pacs.send_by, SendBy::kCStore);
@@ -171,6 +180,12 @@ max-held-bytes = 9
   EXPECT_EQ(hospital.dimse->idle, std::chrono::seconds(7));
   EXPECT_EQ(hospital.dimse->max_object_bytes, 8U);
   EXPECT_EQ(hospital.dimse->max_held_bytes, 9U);
+  ASSERT_TRUE(hospital.syslog);
+  EXPECT_EQ(hospital.syslog->host, "collector.example.org");
+  EXPECT_EQ(hospital.syslog->port, 16514);
+  EXPECT_EQ(hospital.syslog->ca_file, "/etc/isomesh/ca.pem");
+  EXPECT_EQ(hospital.syslog->certificate_file, "/etc/isomesh/cert.pem");
+  EXPECT_EQ(hospital.syslog->key_file, "/etc/isomesh/key.pem");
 }
 
 // Secrets stand in files of their own, but who writes one into this is not to see it in a log.

@@ -1,0 +1,167 @@
+"""The audit trail over syslog-TLS (IHE ITI-20), to a collector that may be down."""
+import os
+import socket
+import ssl
+import subprocess
+import threading
+import time
+import xml.etree.ElementTree
+
+import peers
+from fixture import Loop
+
+
+class Collector:
+    """Takes syslog over TLS (RFC 5425)."""
+
+    def __init__(self, folder, port=None, name="localhost", client=None):
+        self.folder = folder
+        self.port = port or peers.free_port()
+        self.client = client
+        self.messages = []
+        self.certificate = os.path.join(folder, "collector.pem")
+        self.key = os.path.join(folder, "collector-key.pem")
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2",
+                        "-subj", f"/CN={name}", "-addext", f"subjectAltName=DNS:{name}",
+                        "-keyout", self.key, "-out", self.certificate],
+                       check=True, capture_output=True)
+        self.listener = None
+        self.connections = []
+
+    def start(self):
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.load_cert_chain(self.certificate, self.key)
+        if self.client:
+            context.verify_mode = ssl.CERT_REQUIRED
+            context.load_verify_locations(self.client)
+        self.listener = socket.create_server(("127.0.0.1", self.port))
+        threading.Thread(target=self._serve, args=(self.listener, context), daemon=True).start()
+        return self
+
+    def stop(self):
+        self.listener.shutdown(socket.SHUT_RDWR)
+        self.listener.close()
+        for connection in self.connections:
+            try:
+                connection.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass
+            connection.close()
+        self.connections = []
+
+    def _serve(self, listener, context):
+        while True:
+            try:
+                connection, _ = listener.accept()
+            except OSError:
+                return
+            threading.Thread(target=self._one, args=(connection, context), daemon=True).start()
+
+    def _one(self, connection, context):
+        try:
+            connection = context.wrap_socket(connection, server_side=True)
+            self.connections.append(connection)
+            stream = connection.makefile("rb")
+            while True:
+                length = b""
+                while not length.endswith(b" "):
+                    byte = stream.read(1)
+                    if not byte:
+                        return
+                    length += byte
+                message = stream.read(int(length))
+                if len(message) == int(length):
+                    self.messages.append(message.decode("utf-8"))
+        except (OSError, ValueError):
+            connection.close()
+
+    def events(self):
+        """Of each message: the code of its event, its type's, and the ids of its objects."""
+        found = []
+        for message in self.messages:
+            head, text = message.split("\ufeff", 1)
+            assert head.startswith("<85>1 "), head
+            assert head.split(" ")[3] == "isomeshd", head
+            root = xml.etree.ElementTree.fromstring(text)
+            identification = root.find("EventIdentification")
+            kind = identification.find("EventTypeCode")
+            found.append((identification.find("EventID").get("csd-code"),
+                          None if kind is None else kind.get("csd-code"),
+                          [each.get("ParticipantObjectID")
+                           for each in root.findall("ParticipantObjectIdentification")]))
+        return found
+
+
+class Syslog(Loop):
+    def collector(self, **how):
+        folder = os.path.join(self.folder.name, self.uid())
+        os.makedirs(folder)
+        collector = Collector(folder, **how)
+        self.addCleanup(lambda: collector.listener and collector.stop())
+        return collector
+
+    def audited(self, collector, more=""):
+        return self.daemon(rules=f'[audit]\nsyslog = "tls://localhost:{collector.port}"\n'
+                           f'ca-file = "{collector.certificate}"\n{more}\n')
+
+    def test_every_event_comes(self):
+        collector = self.collector().start()
+        daemon = self.audited(collector)
+        series = self.series()
+        self.succeeded(daemon, self.order(daemon, series))
+        self.assertEqual(daemon.stop(), 0)
+        told = collector.events()
+        self.assertEqual([(event, kind) for event, kind, _ in told],
+                         [("110100", "110120"), ("110112", None), ("110104", None),
+                          ("110104", None), ("110100", "110121")])
+        self.assertEqual(told[2][2], [series.study, "PAT-4711"])
+
+    def test_collector_down_then_up(self):
+        """What happens meanwhile waits, over kill -9 too, and comes in order, nothing left out."""
+        collector = self.collector()
+        daemon = self.audited(collector)
+        series = self.series()
+        self.succeeded(daemon, self.order(daemon, series))
+        daemon.kill()
+        daemon.start()
+        time.sleep(1)
+        self.assertEqual(collector.messages, [])
+        collector.start()
+        peers.until(lambda: len(collector.messages) >= 5)
+        self.assertEqual([kind or event for event, kind, _ in collector.events()],
+                         ["110120", "110112", "110104", "110104", "110120"])
+        collector.stop()
+        self.succeeded(daemon, self.order(daemon, self.series()))
+        collector.start()
+        peers.until(lambda: len(collector.messages) >= 8, 90)
+        self.assertEqual([kind or event for event, kind, _ in collector.events()[5:]],
+                         ["110112", "110104", "110104"])
+        daemon.kill()
+        daemon.start()
+        peers.until(lambda: len(collector.messages) >= 9)
+        # What it has had does not come again.
+        self.assertEqual(collector.events()[8][:2], ("110100", "110120"))
+
+    def test_a_stranger_gets_nothing(self):
+        """A collector whose certificate is not the one, or for another name."""
+        stranger = self.collector().start()
+        known = self.collector()
+        daemon = self.daemon(rules=f'[audit]\nsyslog = "tls://localhost:{stranger.port}"\n'
+                             f'ca-file = "{known.certificate}"\n')
+        other_name = self.collector(name="elsewhere").start()
+        other = self.audited(other_name)
+        peers.until(lambda: "not one that is trusted" in daemon.logged())
+        peers.until(lambda: "not one that is trusted" in other.logged())
+        self.assertEqual(stranger.messages + other_name.messages, [])
+
+    def test_a_certificate_of_ours(self):
+        ours = self.collector(name="isomesh-1")
+        collector = self.collector(client=ours.certificate).start()
+        daemon = self.audited(collector, f'certificate-file = "{ours.certificate}"\n'
+                              f'key-file = "{ours.key}"')
+        peers.until(lambda: collector.messages)
+        without = self.audited(collector)
+        time.sleep(2)
+        self.assertEqual(len(collector.messages), 1)
+        self.assertEqual(daemon.stop(), 0)
+        del without
