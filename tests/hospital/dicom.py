@@ -85,3 +85,86 @@ class Series:
         if charset:
             elements[0x00080005] = ("CS", charset)
         return file_of(CT_IMAGE_STORAGE, instance, elements)
+
+
+SEGMENTATION_STORAGE = "1.2.840.10008.5.1.4.1.1.66.4"
+
+
+def sequence(*items):
+    """The value of a sequence, of items {tag: (vr, value)}."""
+    value = b""
+    for item in items:
+        data = b"".join(element(tag, *item[tag]) for tag in sorted(item))
+        value += struct.pack("<HHI", 0xFFFE, 0xE000, len(data)) + data
+    return value
+
+
+def code(value, scheme, meaning):
+    return sequence({0x00080100: ("SH", value), 0x00080102: ("SH", scheme),
+                     0x00080104: ("LO", meaning)})
+
+
+SKULL = {"label": "Skull", "category": ("91723000", "SCT", "Anatomical Structure"),
+         "type": ("89546000", "SCT", "Skull"), "region": ("69536005", "SCT", "Head")}
+LESION = {"label": "Lesion", "category": ("49755003", "SCT", "Morphologically Abnormal Structure"),
+          "type": ("52988006", "SCT", "Lesion"), "region": ("12738006", "SCT", "Brain")}
+
+
+def segmentation(series, segments=(SKULL, LESION), slices=8, size=16):
+    """The UIDs of a series and its only object, and that: a binary segmentation in the study of a
+    series, of boxes beside each other, a frame for each slice of each."""
+    uid = series.uid[:-2] + ".77"
+    instance = uid + ".1"
+    bits = bytearray()
+    frames = []
+    width = size // len(segments)
+    for number in range(len(segments)):
+        for z in range(slices):
+            frames.append({
+                0x00209111: ("SQ", sequence({0x00209157: ("UL", struct.pack("<II", number + 1,
+                                                                            z + 1))})),
+                0x00209113: ("SQ", sequence({0x00200032: ("DS", f"-20\\-30\\{2 * z}")})),
+                0x0062000A: ("SQ", sequence({0x0062000B: ("US", struct.pack("<H", number + 1))}))})
+            bits += bytes(1 if 2 <= y < size - 2 and 1 <= x - number * width < width - 1
+                          and 2 <= z < slices - 2 else 0
+                          for y in range(size) for x in range(size))
+    pixels = bytes(sum(bits[at + bit] << bit for bit in range(8)) for at in range(0, len(bits), 8))
+    described = [{
+        0x00620003: ("SQ", code(*segment["category"])),
+        0x00620004: ("US", struct.pack("<H", number + 1)), 0x00620005: ("LO", segment["label"]),
+        0x00620008: ("CS", "MANUAL"), 0x0062000F: ("SQ", code(*segment["type"])),
+        0x00082218: ("SQ", code(*segment["region"]))} for number, segment in enumerate(segments)]
+    shared = {
+        0x00209116: ("SQ", sequence({0x00200037: ("DS", "1\\0\\0\\0\\1\\0")})),
+        0x00289110: ("SQ", sequence({0x00180050: ("DS", "2"), 0x00180088: ("DS", "2"),
+                                     0x00280030: ("DS", "2\\2")}))}
+    return uid, instance, file_of(SEGMENTATION_STORAGE, instance, {
+        0x00080008: ("CS", "DERIVED\\PRIMARY"), 0x00080016: ("UI", SEGMENTATION_STORAGE),
+        0x00080018: ("UI", instance), 0x00080020: ("DA", "20261120"),
+        0x00080023: ("DA", "20261120"), 0x00080030: ("TM", "101112"),
+        0x00080033: ("TM", "111213"), 0x00080050: ("SH", "ACC-1"), 0x00080060: ("CS", "SEG"),
+        0x00080070: ("LO", "Maker"), 0x00080090: ("PN", "Refer^Red"),
+        0x00081030: ("LO", "Head study"), 0x0008103E: ("LO", "Segments"),
+        0x00081090: ("LO", "Model X"), 0x00100010: ("PN", "Muster^Erika"),
+        0x00100020: ("LO", series.patient_id), 0x00100021: ("LO", "Hospital"),
+        0x00100030: ("DA", "19700101"), 0x00100040: ("CS", "F"), 0x00181000: ("LO", "SN-77"),
+        0x00181020: ("LO", "VB20"), 0x0020000D: ("UI", series.study), 0x0020000E: ("UI", uid),
+        0x00200010: ("SH", "S1"), 0x00200011: ("IS", "77"), 0x00200013: ("IS", "1"),
+        0x00200052: ("UI", uid + ".9"), 0x00201040: ("LO", "SN"),
+        0x00209221: ("SQ", sequence({0x00209164: ("UI", uid + ".8")})),
+        0x00209222: ("SQ", sequence(
+            {0x00209164: ("UI", uid + ".8"),
+             0x00209165: ("AT", struct.pack("<HH", 0x0062, 0x000B)),
+             0x00209167: ("AT", struct.pack("<HH", 0x0062, 0x000A))},
+            {0x00209164: ("UI", uid + ".8"),
+             0x00209165: ("AT", struct.pack("<HH", 0x0020, 0x0032)),
+             0x00209167: ("AT", struct.pack("<HH", 0x0020, 0x9113))})),
+        0x00280002: ("US", struct.pack("<H", 1)), 0x00280004: ("CS", "MONOCHROME2"),
+        0x00280008: ("IS", str(len(frames))), 0x00280010: ("US", struct.pack("<H", size)),
+        0x00280011: ("US", struct.pack("<H", size)), 0x00280100: ("US", struct.pack("<H", 1)),
+        0x00280101: ("US", struct.pack("<H", 1)), 0x00280102: ("US", struct.pack("<H", 0)),
+        0x00280103: ("US", struct.pack("<H", 0)), 0x00282110: ("CS", "00"),
+        0x00620001: ("CS", "BINARY"), 0x00620002: ("SQ", sequence(*described)),
+        0x00700080: ("CS", "SEGMENTS"), 0x00700081: ("LO", "Segments"),
+        0x00700084: ("PN", "Maker"), 0x52009229: ("SQ", sequence(shared)),
+        0x52009230: ("SQ", sequence(*frames)), 0x7FE00010: ("OB", pixels)})

@@ -1,8 +1,10 @@
 """What the objects say, and what the judges say of them."""
 import json
 import os
+import re
 import subprocess
 
+import dicom
 import peers
 from fixture import Loop
 
@@ -16,11 +18,18 @@ class Objects(Loop):
             file.write(self.pacs.file(order["results"][0]["sop_instance_uid"]))
         return daemon, order, path
 
-    def assert_valid(self, path, series):
+    def assert_judged(self, path, extensions=()):
+        """Nothing is wrong with an object; it may be of a Standard Extended SOP Class by those."""
         said = subprocess.run(["dciodvfy", path], capture_output=True, text=True, check=False)
         faults = [line for line in said.stderr.splitlines()
                   if line.startswith(("Error", "Warning"))]
+        if extensions:
+            extensions += ("this is a Standard Extended SOP Class",)
+            faults = [line for line in faults if not any(each in line for each in extensions)]
         self.assertEqual(faults, [])
+
+    def assert_valid(self, path, series):
+        self.assert_judged(path)
         sources = []
         for index, data in enumerate(series.files.values()):
             sources.append(f"{path}.{index}")
@@ -100,6 +109,87 @@ class Objects(Loop):
         data = self.pacs.file(results[0]["sop_instance_uid"])
         mesh = peers.call(daemon.port, "GET", f"/v1/jobs/{order['job']}/mesh.stl?label=1000")[2]
         self.assertEqual(data.count(mesh), 1)
+
+    def test_a_segmentation_out_of_the_pacs(self):
+        """Each segment becomes an object that says what it is by the segment's own codes."""
+        series = self.series()
+        uid, instance, data = dicom.segmentation(series)
+        self.pacs.upload([data])
+        daemon = self.daemon()
+        body = {"source": {"pacs": "main", "study": series.study, "series": uid}, "rule": "bone",
+                "parameters": {"labels": "all"}}
+        order = self.succeeded(daemon, daemon.order(body)["id"])
+        results = order["results"]
+        self.assertEqual([each["label"] for each in results], [1, 2])
+        self.assertEqual(len({each["series_uid"] for each in results}), 1)
+        self.assertEqual(sorted(self.stored(series)),
+                         sorted(each["sop_instance_uid"] for each in results))
+        for result, segment in zip(results, (dicom.SKULL, dicom.LESION)):
+            path = os.path.join(self.folder.name, f"segment-{result['label']}.dcm")
+            with open(path, "wb") as file:
+                file.write(self.pacs.file(result["sop_instance_uid"]))
+            self.assert_judged(path, ("Anatomic Region Sequence", "(0x0008,0x010"))
+            codes = self.codes(path)
+            self.assertEqual(codes["ConceptNameCodeSequence"], segment["type"])
+            self.assertEqual(codes["AnatomicRegionSequence"], segment["region"])
+            self.assertEqual(self.value(path, "0042,0010"), [f"[Bone {segment['label']}]"])
+            self.assertIn(f"[{instance}]", self.value(path, "0008,1155"))
+            self.assertIn(f"[{uid}]", self.value(path, "0020,000e"))
+
+    def codes(self, path):
+        """The codes of the sequences of the object's own: value, scheme, meaning."""
+        said = subprocess.run(["dcmdump", "+L", path], check=True, capture_output=True,
+                              text=True).stdout
+        found, name = {}, None
+        for line in said.splitlines():
+            if line.startswith("("):
+                name = line.split()[-1]
+            elif name and line.startswith("    (0008,010"):
+                value = line.split("[", 1)[1].split("]")[0]
+                found[name] = found.get(name, ()) + (value,)
+        return found
+
+    def test_simplified_to_fit(self):
+        """What is too large for the PACS is simplified within what its rule allows, and says so."""
+        rules = """
+[[rules]]
+name = "fit"
+max-error-mm = 1.0
+parameters = { iso = 500, passes = 1 }
+send = [ { pacs = "main" } ]
+"""
+        series = self.series(size=40, slices=40, radius=0.4)
+        wide = self.daemon(rules=rules)
+        whole = self.succeeded(wide, self.order(wide, series, rule="fit"))
+        size = whole["results"][0]["bytes"]
+        most = size // 3
+        daemon = self.daemon(most=most, rules=rules)
+        order = self.succeeded(daemon, self.order(daemon, series, rule="fit"))
+        result = order["results"][0]
+        self.assertLessEqual(result["bytes"], most)
+        self.assertGreater(result["bytes"], most // 2)
+        self.assertNotEqual(result["series_uid"], whole["results"][0]["series_uid"])
+        path = os.path.join(self.folder.name, "fitted.dcm")
+        with open(path, "wb") as file:
+            file.write(self.pacs.file(result["sop_instance_uid"]))
+        self.assert_judged(path)
+        job = daemon.call("GET", "/v1/jobs/" + order["job"])[2]
+        certified = job["mesh"]["certificate"]["max_mm"]
+        self.assertLessEqual(certified, 1.0)
+        said = self.value(path, "0070,0081")[0]
+        found = re.fullmatch(r"\[iso 500, scheme 6, 1 passes, within ([0-9.]+) mm\]", said)
+        self.assertTrue(found, said)
+        self.assertLess(abs(float(found.group(1)) - certified), 0.0011)
+        self.assertGreaterEqual(float(found.group(1)), certified)
+        # An order without the rule is not simplified by anybody's wish but its own.
+        failed = daemon.ended(self.order(daemon, series))
+        self.assertEqual(failed["error"]["type"], "urn:isomesh:problem:too-large")
+        # And what cannot fit fails, with the reason.
+        narrow = self.daemon(most=size // 40, rules=rules)
+        failed = narrow.ended(self.order(narrow, series, rule="fit"))
+        self.assertEqual((failed["state"], failed["error"]["type"]),
+                         ("failed", "urn:isomesh:problem:too-large"))
+        self.assertIn("max-error-mm", failed["error"]["detail"])
 
     def test_other_modalities_have_other_concepts(self):
         for modality, code in [("MR", "[85041-2]"), ("PT", None)]:
