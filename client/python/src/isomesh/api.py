@@ -788,6 +788,7 @@ class OrderResult(TypedDict):
 
 
 class OrderSource(TypedDict):
+    #: A PACS, or dimse:TITLE for what was sent to that title by C-STORE.
     pacs: str
     study: str
     series: str
