@@ -1,5 +1,7 @@
 #include "server/orders/received.h"
 
+#include <algorithm>
+
 #include <fcntl.h>
 #include <spdlog/spdlog.h>
 
@@ -124,6 +126,8 @@ store::ReceivedFate Orders::look_at_received(const store::HeldSeries& held) {
 
 void Orders::receive(const std::stop_token& stop) {
   constexpr std::chrono::milliseconds kPause{500};
+  // Nobody could send before.
+  const store::Time begun = options_.now();
   // When to look again at series whose orders are open.
   std::map<store::ReceivedSeries, store::Time> waiting;
   while (!stop.stop_requested()) {
@@ -131,7 +135,8 @@ void Orders::receive(const std::stop_token& stop) {
       const store::Time now = options_.now();
       std::erase_if(waiting, [&](const auto& each) { return each.second <= now; });
       for (const store::HeldSeries& held : services_.received.held()) {
-        if (held.last + hospital_.settle > now || waiting.contains(held.series)) continue;
+        if (std::max(held.last, begun) + hospital_.settle > now || waiting.contains(held.series))
+          continue;
         if (look_at_received(held) != store::ReceivedFate::kDone) {
           waiting[held.series] = now + hospital_.poll;
         }

@@ -281,6 +281,9 @@ class Receiving(Loop):
         file = series.files[instance]
         peer = scu.Scu(daemon.dimse_port)
         self.assertEqual(peer.store("1.2.3.4.5", file), 0xA900)
+        magnetic = dicom.CT_IMAGE_STORAGE[:-1] + "4"
+        self.assertEqual(peer.store(instance, file.replace(dicom.CT_IMAGE_STORAGE.encode(),
+                                                           magnetic.encode())), 0xA900)
         self.assertEqual(peer.store(instance, file.replace(series.study.encode(), b"x" * len(
             series.study))), 0xA900)
         self.assertIn(peer.store(instance, file[:160] + bytes(range(256)) * 8), (0xA900, 0xC000))

@@ -324,6 +324,21 @@ TEST_F(ReceivedOrdersTest, AreMadeWhenNothingMoreComesAndLeaveNothing) {
   EXPECT_EQ(all().size(), 1U);
 }
 
+// Whoever was sending could not while nothing listened.
+TEST_F(ReceivedOrdersTest, AreNotMadeAtOnceAfterAStart) {
+  receive(0, 2);
+  orders_.reset();
+  ahead_ = hours(1);
+  begin();
+  std::this_thread::sleep_for(milliseconds(700));
+  EXPECT_TRUE(all().empty());
+  receive(2, kSlices);
+  pass(minutes(2));
+  ASSERT_TRUE(finish_job());
+  ASSERT_EQ(all().size(), 1U);
+  EXPECT_EQ(all().front().source.instances, 4U);
+}
+
 TEST_F(ReceivedOrdersTest, WaitForTheRestOfWhatIsNotHeldAnyMore) {
   receive(0, 3);
   pass(minutes(2));
