@@ -1,5 +1,6 @@
 #include "server/dimse/listener.h"
 
+#include <array>
 #include <cerrno>
 #include <string_view>
 
@@ -46,7 +47,7 @@ class Lines {
       if (count <= 0) return "";
       text_.append(piece.data(), static_cast<std::size_t>(count));
     }
-    const std::string line = text_.substr(0, end + 1);
+    std::string line = text_.substr(0, end + 1);
     text_.erase(0, end + 1);
     return line;
   }
@@ -65,14 +66,13 @@ std::vector<std::string> titles_of(const orders::DimseSettings& settings) {
 }  // namespace
 
 net::Address listen_address(const orders::DimseSettings& settings) {
-  constexpr const char* kKey = "dimse.listen";
   try {
     net::Address address = net::parse_address(settings.listen);
     if (!address.is_unix()) return address;
-  } catch (const Error& error) {
-    throw invalid_parameter(kKey, error.what());
+  } catch (const Error&) {
+    // It is told below, by the name that this file has for it.
   }
-  throw invalid_parameter(kKey, "must be HOST:PORT");
+  throw invalid_parameter("dimse.listen", "must be HOST:PORT");
 }
 
 DimseListener::DimseListener(const ListenerServices& services,

@@ -2,9 +2,9 @@
 // which engines stand. The instances' files are blobs, which are stored before they are named here.
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "server/store/expiry.h"
@@ -17,7 +17,10 @@ struct ReceivedSeries {
   std::string study;
   std::string series;
 
-  auto operator<=>(const ReceivedSeries&) const = default;
+  bool operator==(const ReceivedSeries&) const = default;
+  bool operator<(const ReceivedSeries& other) const {
+    return std::tie(route, study, series) < std::tie(other.route, other.study, other.series);
+  }
 };
 
 struct ReceivedInstance {

@@ -47,7 +47,7 @@ std::vector<ReceivedInstance> SqliteReceivedStore::instances(const ReceivedSerie
 }
 
 std::vector<std::string> SqliteReceivedStore::release(const HeldSeries& series) {
-  const auto& [route, study, uid] = series.series;
+  const ReceivedSeries& of = series.series;
   return database_.freeing([&]() -> std::vector<std::string> {
     Transaction transaction(database_.writer());
     std::vector<std::string> blobs;
@@ -55,14 +55,14 @@ std::vector<std::string> SqliteReceivedStore::release(const HeldSeries& series) 
       Query rows = transaction->query(
           "SELECT blob, at FROM received WHERE route = ? AND study = ? AND series = ? AND blob IS "
           "NOT NULL",
-          route, study, uid);
+          of.route, of.study, of.series);
       while (rows.next()) {
         if (rows.integer(1) > to_us(series.last)) return {};
         blobs.push_back(rows.text(0));
       }
     }
     transaction->run("UPDATE received SET blob = NULL WHERE route = ? AND study = ? AND series = ?",
-                     route, study, uid);
+                     of.route, of.study, of.series);
     transaction.commit();
     return blobs;
   });
