@@ -10,13 +10,15 @@ import './style/jobs.css';
 import './style/compare.css';
 import './style/small.css';
 import './style/contrast.css';
-import { connected, isAlive } from './api/client';
+import { connected, isAlive, submitted } from './api/client';
 import { watchVisibility } from './api/job_events';
 import { hasOrders } from './api/orders';
 import { ApiError, asApiError } from './api/problem';
+import { surfaceInWords } from './job/parameters';
+import { WatchedJobs } from './job/watched';
 import { button, h, icon, isTyping } from './ui/dom';
 import { showHelp } from './ui/help';
-import { mountNotices, pendingRefusal, refusal } from './ui/notices';
+import { mountNotices, pendingRefusal, refusal, tell } from './ui/notices';
 import { currentRoute, go, hashOf, type Route } from './ui/route';
 import { Scope } from './ui/signal';
 import { startTheme, toggleTheme } from './ui/theme';
@@ -118,7 +120,7 @@ function shell(): HTMLElement[] {
       h('span', { class: 'grow' }),
       uploadNote(),
       ...tokenButtons(),
-      button('Keys', showHelp, { class: 'quiet', title: 'Keyboard (?)' }),
+      button('Keys', showHelp, { class: 'quiet keys', title: 'Keyboard (?)' }),
       button(icon(halfDisc), toggleTheme, { class: 'quiet', 'aria-label': 'Light or dark' }),
     ),
     banner,
@@ -240,6 +242,18 @@ function watchDrops(): void {
   });
 }
 
+// Whoever looks at something else hears of it when a job of theirs has ended.
+function watchJobs(): void {
+  const watched = new WatchedJobs(({ id, state, parameters }) => {
+    const [place, job] = currentRoute().path;
+    if (place === 'jobs' && job === id) return;
+    const what = { succeeded: 'is made', failed: 'could not be made', cancelled: 'was cancelled' }[state as string] ?? state;
+    tell(h('span', {}, h('a', { href: hashOf(['jobs', id]) }, `The surface of ${surfaceInWords(parameters)}`), ` ${what}.`));
+  });
+  submitted.subscribe((id) => watched.add(id));
+  watched.start();
+}
+
 startTheme();
 document.body.append(...shell());
 mountNotices(document.body);
@@ -248,6 +262,7 @@ watchKeys();
 watchDrops();
 watchVisibility();
 showOrders();
+watchJobs();
 watchToken(() => void show());
 window.addEventListener('hashchange', () => void show());
 void show();

@@ -154,6 +154,33 @@ describe('a surface that is not what was meant', () => {
     const [low] = kept.mesh?.bounds ?? [[0, 0, 0]];
     expect(low[0]).toBeGreaterThan(24);
   });
+
+  it('tells how large the part is that is clicked, and leaves it out', async () => {
+    const { daemon, page } = at;
+    const two = await daemon.upload(ballsNrrd(40));
+    const job = await daemon.submit({ volume: two, iso: 100, formats: ['glb'], passes: 0 }, 30);
+    await openJob(page, job);
+    await page.keyboard.press('a');
+    await still(page);
+    const box = await page.locator('.viewport canvas').boundingBox();
+    if (!box) throw new Error('there is no view');
+    const seen = await silhouette(page, page.locator('.viewport'));
+    await page.mouse.click(box.x + box.width * (0.5 + 0.4 * seen.width), box.y + box.height / 2);
+    await expect.poll(() => page.locator('.picked-part').innerText()).toMatch(/volume [\d.]+ mm³, area [\d.]+ mm², .* triangles/);
+    const told = (await page.locator('.picked-part').innerText()).replaceAll(/[\s\u202f]/g, '');
+    const [, volume, area] = /volume([\d.]+)mm³,area([\d.]+)mm²/.exec(told) ?? [];
+    // A ball of that radius, less what flat triangles cut off.
+    const radius = 0.12 * 40;
+    for (const part of [Number(volume) / ((4 / 3) * Math.PI * radius ** 3), Number(area) / (4 * Math.PI * radius ** 2)]) {
+      expect(part).toBeGreaterThan(0.9);
+      expect(part).toBeLessThan(1.02);
+    }
+    const before = page.url();
+    await page.getByRole('button', { name: 'Leave it out' }).click();
+    await expect.poll(() => page.url()).not.toBe(before);
+    await expect.poll(async () => (await openedJob(at)).mesh?.components, { timeout: 30_000 }).toBe(1);
+    expect((await openedJob(at)).mesh?.bounds[1][0]).toBeLessThan(24);
+  });
 });
 
 describe('levels of detail', () => {

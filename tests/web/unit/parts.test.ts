@@ -46,7 +46,7 @@ describe('the parts of a surface', () => {
     parts.add([square(0), square(3)], null);
     expect(new Set(colours(scene)).size).toBe(1);
     expect(parts.triangles).toBe(4);
-    expect(parts.hit(up, wholeRay)).toEqual({ at: 1, label: null });
+    expect(parts.hit(up, wholeRay)).toMatchObject({ at: 1, label: null });
     parts.setHidden(new Set([1]));
     expect(drawn(scene).length).toBe(2);
   });
@@ -62,10 +62,10 @@ describe('the parts of a surface', () => {
 
   it('are not drawn and not hit while their label is hidden', () => {
     const { parts, scene } = labelled();
-    expect(parts.hit(up, wholeRay)).toEqual({ at: 1, label: 1 });
+    expect(parts.hit(up, wholeRay)).toMatchObject({ at: 1, label: 1 });
     parts.setHidden(new Set([1, 4]));
     expect(colours(scene)).toEqual(['2040d0', '2040d0']);
-    expect(parts.hit(up, wholeRay)).toEqual({ at: 3, label: 2 });
+    expect(parts.hit(up, wholeRay)).toMatchObject({ at: 3, label: 2 });
     expect(parts.hit(up, { from: 0, to: 2.5 })).toBe(null);
     parts.add([square(8)], { label: 4, colour: '#ffffff' });
     expect(drawn(scene).length).toBe(2);
@@ -134,7 +134,7 @@ describe('the parts of a surface', () => {
   it('tell the distance where they are hit, and how far all reach', () => {
     const parts = new Parts(new Scene(), atOnce, () => undefined);
     parts.add([square(0)], null);
-    expect([parts.hit(up, wholeRay), parts.reach()]).toEqual([{ at: 1, label: null }, null]);
+    expect([parts.hit(up, wholeRay), parts.reach()]).toMatchObject([{ at: 1, label: null }, null]);
     parts.add([square(-0.5, true)], null);
     parts.add([square(9, true)], null, true);
     parts.finish();

@@ -122,16 +122,21 @@ function randomKey(): string {
 
 const submitRetries = 3;
 
+// Called with each job that this page has submitted.
+export const submitted = new Signal<string>('');
+
 // The key makes trying again safe: when only the answer was lost, it is the same job.
 export async function submitJob(request: JobRequest): Promise<Job> {
   const key = randomKey();
   for (let attempt = 1; ; attempt += 1) {
     try {
-      return await json<Job>('/v1/jobs', {
+      const job = await json<Job>('/v1/jobs', {
         method: 'POST',
         headers: { 'Content-Type': 'application/json', 'Idempotency-Key': key },
         body: JSON.stringify(request),
       });
+      submitted.value = job.id;
+      return job;
     } catch (error) {
       if (attempt > submitRetries || !asApiError(error).isUnreachable) throw error;
       await new Promise((resolve) => setTimeout(resolve, 500 * attempt));

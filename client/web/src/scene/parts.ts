@@ -16,6 +16,7 @@ import {
 } from 'three';
 import type { Block } from '../mesh/blocks';
 import type { Part } from '../mesh/glb';
+import { PartFinder } from '../mesh/part_finder';
 import { Seams } from '../mesh/seams';
 import { DistanceShader, reachOf, valueWithin, type Reach } from './distances';
 import { firstMet, type Interval } from './pick';
@@ -35,6 +36,9 @@ export interface Hit {
   at: number; // along the ray
   label: number | null;
   distance?: number; // where the surface has distances
+  // Which of the finest blocks, and the first corner of the triangle in its index; of a coarse level, -1.
+  block: number;
+  corner: number;
 }
 
 interface Look {
@@ -161,17 +165,24 @@ export class Parts {
 
   // Null where the file has no distances.
   reach(): Reach | null {
-    const finest = this.blocks.filter(({ isLevel }) => !isLevel);
-    return reachOf(finest.flatMap(({ distances }) => distances ?? []));
+    return reachOf(this.finest.flatMap(({ distances }) => distances ?? []));
   }
 
   setDistanceTop(millimetres: number): void {
     this.shader.setTop(millimetres);
   }
 
+  private get finest(): DrawnBlock[] {
+    return this.blocks.filter(({ isLevel }) => !isLevel);
+  }
+
+  // Finds which of its triangles belong together.
+  finder(): PartFinder {
+    return new PartFinder(this.finest.map(({ made }) => made));
+  }
+
   get triangles(): number {
-    const finest = this.blocks.filter(({ isLevel }) => !isLevel);
-    return finest.reduce((sum, { fine }) => sum + (fine.index?.count ?? 0) / 3, 0);
+    return this.finest.reduce((sum, { fine }) => sum + (fine.index?.count ?? 0) / 3, 0);
   }
 
   // Whether it takes other shaders.
@@ -241,11 +252,12 @@ export class Parts {
     if (!nearest) return null;
     const { block, corner } = nearest;
     const { label, distances, fine } = block;
-    if (!distances) return { at: end, label };
+    const place = { block: this.finest.indexOf(block), corner };
+    if (!distances) return { at: end, label, ...place };
     const point = ray.at(end, new Vector3()).toArray();
     const corners = [0, 1, 2].map((i) => fine.index?.array[corner + i] ?? 0) as [number, number, number];
     const distance = valueWithin(distances, fine.getAttribute('position').array, corners, point);
-    return { at: end, label, distance };
+    return { at: end, label, distance, ...place };
   }
 
   // Makes the shading go on across the seams, a block at each step: first all of them are learned, then joined. False

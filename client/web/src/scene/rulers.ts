@@ -29,6 +29,7 @@ function labelOf(ruler: Ruler): string {
 const mostRulers = 32;
 
 export class Rulers {
+  onChange: (() => void) | null = null;
   private rulers: Ruler[] = [];
   private pending: Vec3 | null = null;
   private readonly geometry = new BufferGeometry();
@@ -91,6 +92,12 @@ export class Rulers {
     this.rebuild();
   }
 
+  // Those of a link.
+  restore(rulers: readonly Ruler[]): void {
+    this.rulers = rulers.slice(-mostRulers);
+    this.rebuild();
+  }
+
   placeLabels(camera: Camera, width: number, height: number): void {
     this.rulers.forEach((ruler, index) => {
       const label = this.labels.children[index] as HTMLElement;
@@ -142,5 +149,6 @@ export class Rulers {
     this.labels.replaceChildren(
       ...this.rulers.map((ruler) => h('span', {}, labelOf(ruler))),
     );
+    this.onChange?.();
   }
 }

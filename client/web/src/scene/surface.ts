@@ -10,6 +10,7 @@ import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3, Volume } from '../api/types';
 import type { Block } from '../mesh/blocks';
 import type { Part } from '../mesh/glb';
+import type { PartFinder } from '../mesh/part_finder';
 import { OrientationCube } from './cube';
 import { compile } from './compile';
 import { Cross } from './cross';
@@ -54,6 +55,7 @@ export class Surface {
     [-1, -1, -1],
     [1, 1, 1],
   ];
+  private finder: PartFinder | null = null;
   private scheduled = 0;
   private settling = 0;
   private isMoving = false;
@@ -168,6 +170,12 @@ export class Surface {
 
   get triangles(): number {
     return this.parts.triangles;
+  }
+
+  // Which triangles belong together. To be asked for once all is there.
+  get partFinder(): PartFinder {
+    this.finder ??= this.parts.finder();
+    return this.finder;
   }
 
   setStyle(style: SurfaceStyle): void {

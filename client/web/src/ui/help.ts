@@ -6,6 +6,7 @@ const keys: [string, string][] = [
   ['g o', 'orders, where the server knows a PACS'],
   ['?', 'this list'],
   ['Ctrl Enter', 'make the surface'],
+  ['Ctrl Z', 'take the last change of parameters back; with Shift do it again'],
   ['[', 'go to the line in the histogram'],
   ['arrows', 'in a slice: next slice; on the line: iso-value; on a surface: turn'],
   ['Ctrl wheel + \u2212 0', 'in a slice: zoom; all of it'],

@@ -177,6 +177,7 @@ class Comparison {
     const pane = new SurfacePane(this.scope, job, {
       hasKeys: false,
       onSlices: null,
+      look: new URLSearchParams(),
       camera,
       volume: this.volume,
       labels: new LabelState(labelsOfMesh(job)),

@@ -172,7 +172,8 @@ function showSurface(
   const labels = new LabelState(labelsOfMesh(job));
   const slices = volume && new SlicesBeside(scope, job, volume, stageArea, route.query);
   const onSlices = slices && ((): void => slices.toggle());
-  const pane = new SurfacePane(scope, job, { hasKeys: true, camera, volume, labels, onSlices });
+  const pane = new SurfacePane(scope, job, { hasKeys: true, camera, volume, labels, onSlices, look: route.query });
+  pane.onLook = noteInAddress;
   slices?.linkTo(pane);
   let noting = 0;
   pane.onCamera = (place) => {

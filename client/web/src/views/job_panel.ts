@@ -272,7 +272,10 @@ export function againSection(job: Job): HTMLElement {
     curl: curlSnippet(origin, job.parameters, hasToken),
     library: librarySnippet(origin, job.parameters, hasToken),
   };
-  const link = `${origin}/${hashOf(['jobs', job.id])}`;
+  // With all that the address says of how it is looked at.
+  const link = (): string => window.location.href;
+  const shown = h('input', { readonly: true, value: `${origin}/${hashOf(['jobs', job.id])}`, 'aria-label': 'Link to this surface' });
+  shown.addEventListener('focus', () => (shown.value = link()));
   const block = (name: string, text: string): HTMLElement =>
     h(
       'details',
@@ -283,7 +286,7 @@ export function againSection(job: Job): HTMLElement {
     );
   return section(
     'The same again',
-    h('div', { class: 'link-row' }, h('input', { readonly: true, value: link, 'aria-label': 'Link to this surface' }), copyButton(() => link)),
+    h('div', { class: 'link-row' }, shown, copyButton(link)),
     block('With the isomesh command', texts.isomesh),
     block('With curl', texts.curl),
     block('With the C++ library', texts.library),

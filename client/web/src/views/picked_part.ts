@@ -1,37 +1,77 @@
-// The part of a surface that was clicked, where it has several: the others can be left out of a new job.
+// The part of a surface that was clicked, where it has several: how large it is, and a new job with or without it.
 import type { Job, JobParameters, Vec3 } from '../api/types';
-import { button, h } from '../ui/dom';
-import { formatCount } from '../ui/format';
+import type { PartFinder, PartSummary } from '../mesh/part_finder';
+import type { Picked } from '../scene/picked';
 import { isByLabels } from '../job/table';
+import { button, h } from '../ui/dom';
+import { formatCount, formatValue } from '../ui/format';
+import type { Scope } from '../ui/signal';
 
-// The parameters that keep that part alone. Parts that were left out before stay out: what is nearest to
-// the place is of those that are there.
-export function keepOnlyAt(point: Vec3): Partial<JobParameters> {
-  const place = point.map((value) => Number(value.toFixed(3))) as Vec3;
-  return { components: { keep: null, min_triangles: null, nearest_to: [place] } };
+const slice = 8; // milliseconds that finding parts takes at a time
+// A job is told of each part that stays.
+const mostPlaces = 1000;
+
+function placeOf(point: Vec3): Vec3 {
+  return point.map((value) => Number(value.toFixed(3))) as Vec3;
+}
+
+// The parameters that keep the parts at those places alone. Parts that were left out before stay out: what is
+// nearest to a place is of those that are there.
+export function keepOnlyAt(...points: Vec3[]): Partial<JobParameters> {
+  return { components: { keep: null, min_triangles: null, nearest_to: points.map(placeOf) } };
 }
 
 export class PickedPart {
   readonly element = h('div', { class: 'picked-part', role: 'status', hidden: true });
   private readonly parts: number;
+  private asked = 0;
 
   constructor(
-    job: Job,
-    private readonly keep: (variant: Partial<JobParameters>) => void,
+    private readonly scope: Scope,
+    private readonly job: Job,
+    private readonly make: (variant: Partial<JobParameters>) => void,
   ) {
     this.parts = isByLabels(job.parameters) ? 1 : (job.mesh?.components ?? 1);
   }
 
   // Null for nowhere.
-  show(point: Vec3 | null): void {
-    const isPart = point !== null && this.parts > 1;
+  show(picked: Picked | null, finder: () => PartFinder): void {
+    this.asked += 1;
+    const isPart = picked?.triangle != null && this.parts > 1;
     this.element.hidden = !isPart;
     if (!isPart) return;
+    this.fill(picked.point, null, []);
+    const { asked } = this;
+    const parts = finder();
+    const look = (): void => {
+      if (this.scope.isOver || asked !== this.asked) return;
+      const until = performance.now() + slice;
+      while (performance.now() < until) {
+        if (parts.step()) continue;
+        this.fill(picked.point, parts.partOf(...(picked.triangle as [number, number])), parts.all);
+        return;
+      }
+      setTimeout(look);
+    };
+    look();
+  }
+
+  private fill(point: Vec3, part: PartSummary | null, all: readonly PartSummary[]): void {
+    const others = all.filter(({ number }) => number !== part?.number);
+    const isClosed = this.job.mesh?.quality.encloses_volume ?? false;
+    const size = part
+      ? [isClosed && `volume ${formatValue(part.volume)} mm\u00b3`, `area ${formatValue(part.area)} mm\u00b2`, `${formatCount(part.triangles)} triangles`]
+      : [`at ${point.map((value) => value.toFixed(1)).join(', ')} mm`];
     this.element.replaceChildren(
-      h('span', {}, `One of ${formatCount(this.parts)} parts, at ${point.map((value) => value.toFixed(1)).join(', ')} mm`),
-      button('Keep only this part', () => this.keep(keepOnlyAt(point)), {
+      h('span', {}, `One of ${formatCount(this.parts)} parts: ${size.filter(Boolean).join(', ')}`),
+      button('Keep only this part', () => this.make(keepOnlyAt(point)), {
         class: 'link',
         title: 'Starts a job that leaves all others out',
+      }),
+      button('Leave it out', () => this.make(keepOnlyAt(...others.map((other) => other.point))), {
+        class: 'link',
+        disabled: others.length === 0 || others.length > mostPlaces,
+        title: others.length > mostPlaces ? 'There are too many others' : 'Starts a job that keeps the others',
       }),
     );
   }

@@ -1,23 +1,22 @@
 // A volume and the iso-value to be chosen in it: #/volumes/ID.
-import { estimateOf, getVolume, histogramOf, listJobs, submitJob } from '../api/client';
+import { estimateOf, getVolume, histogramOf, submitJob } from '../api/client';
 import { asApiError, type ApiError } from '../api/problem';
 import type { Estimate, JobParameters, Vec3, Volume } from '../api/types';
 import {
   changed,
   defaultParameters,
   estimateQuery,
-  inWords,
   jobRequest,
   parametersOfQuery,
   queryOfParameters,
-  surfaceInWords,
 } from '../job/parameters';
 import { trianglesOf } from '../job/labels';
 import { isByLabels, withLabels } from '../job/table';
 import { button, field, h, isTyping, segmented } from '../ui/dom';
 import { formatCount, formatValue } from '../ui/format';
+import { History } from '../ui/history';
 import { refusal } from '../ui/notices';
-import { go, hashOf, noteInAddress, type Route } from '../ui/route';
+import { go, noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { cssColour, theme } from '../ui/theme';
 import { defaultWindow, type Histogram } from '../volume/histogram';
@@ -31,12 +30,12 @@ import { estimateTexts } from './estimate_texts';
 import { HistogramView } from './histogram_view';
 import { LiveView } from './live_view';
 import { LabelChoice, type Choice } from './label_choice';
+import { madeSurfaces } from './made_surfaces';
 import { parameterForm } from './parameter_form';
 import { SliceView, type SliceHost } from './slice_view';
 
 const mostBins = 1024;
 const estimateDelay = 300;
-const shownSurfaces = 3;
 
 // Enough digits for any iso-value, and few enough to be read.
 function shortened(iso: number): number {
@@ -85,6 +84,7 @@ class Prepare {
   private readonly run: HTMLButtonElement;
   private readonly isoPart: HTMLElement;
   private readonly labelPart = h('div');
+  private readonly kind = h('div', { class: 'kind' });
   private labelChoice: LabelChoice | null = null;
   private hasLabel = true;
   // The controls in which something stands that is no value of theirs.
@@ -92,11 +92,12 @@ class Prepare {
   private readonly form = h('div');
   private readonly simplified = h('p', { class: 'hint', 'aria-live': 'polite' });
   private readonly problem = h('div');
-  private readonly surfaces = h('div', { class: 'made' });
   private readonly windowText = h('span', { class: 'window-text faint' });
   private estimating: AbortController | null = null;
   private estimateTimer = 0;
   private isStarting = false;
+  private readonly history: History<JobParameters>;
+  private readonly undoButton = button('Undo', () => this.goBack(this.history.undo()), { class: 'chip', title: 'Take the last change back (Ctrl Z)' });
 
   constructor(
     private readonly scope: Scope,
@@ -106,6 +107,7 @@ class Prepare {
   ) {
     this.defaults = defaultParameters(volume.id, shortened(volume.suggested_iso));
     this.parameters = startOfQuery(route.query, volume, this.defaults);
+    this.history = new History(this.parameters);
     const common = defaultWindow(counts, volume.suggested_iso);
     this.window = windowOfQuery(route.query) ?? common;
     this.cursor = cursorOfText(route.query.get('at') ?? '', volume);
@@ -146,8 +148,8 @@ class Prepare {
     this.run = button('Make the surface', () => void this.start(), { class: 'primary' });
     this.isoPart = h('div', { class: 'by-iso' }, this.isoRow(), this.histogram.element);
     this.element = this.layout(common);
+    this.kind.append(this.kindChoice() ?? '');
     this.showKind();
-    this.showSurfaces();
     scope.onEnd(() => {
       clearTimeout(this.estimateTimer);
       this.estimating?.abort();
@@ -175,7 +177,10 @@ class Prepare {
     scope.onEnd(theme.subscribe(() => this.update()));
     scope.listen(window, 'keydown', (event: KeyboardEvent) => {
       if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) void this.start();
-      else if (event.key === '[' && !isTyping(event)) this.histogram.element.focus();
+      else if (event.key.toLowerCase() === 'z' && (event.ctrlKey || event.metaKey) && !isTyping(event)) {
+        event.preventDefault();
+        this.goBack(event.shiftKey ? this.history.redo() : this.history.undo());
+      } else if (event.key === '[' && !isTyping(event)) this.histogram.element.focus();
     });
   }
 
@@ -278,14 +283,14 @@ class Prepare {
         'section',
         { class: 'panel', 'aria-label': 'Parameters' },
         aboutVolume(volume, () => (element.dataset.title = volumeName(volume))),
-        this.kindChoice(),
+        this.kind,
         this.isoPart,
         this.labelPart,
         this.windowRow(common),
         this.crop?.element ?? '',
         ...notedOf(volume),
         this.form,
-        this.surfaces,
+        madeSurfaces(volume.id),
         sliceHelp(),
         this.estimate,
         this.problem,
@@ -305,7 +310,7 @@ class Prepare {
       },
       { class: 'chip' },
     );
-    return h('div', { class: 'window-row' }, this.windowText, reset);
+    return h('div', { class: 'window-row' }, this.windowText, h('span', { class: 'grow' }), this.undoButton, reset);
   }
 
   private isoRow(): HTMLElement {
@@ -321,38 +326,25 @@ class Prepare {
     );
   }
 
-  // What was made of this volume lately, to go back to. Nothing is missed without it.
-  private showSurfaces(): void {
-    listJobs().then(
-      ({ jobs }) => {
-        const made = jobs.filter(({ volume, mesh }) => volume === this.volume.id && mesh).slice(0, shownSurfaces);
-        if (made.length === 0) return;
-        this.surfaces.replaceChildren(
-          h('h2', {}, 'Surfaces of it'),
-          h(
-            'ul',
-            {},
-            ...made.map(({ id, parameters }) =>
-              h(
-                'li',
-                {},
-                h('a', { href: hashOf(['jobs', id]) }, surfaceInWords(parameters)),
-                ` ${inWords(parameters)}`,
-              ),
-            ),
-          ),
-        );
-      },
-      () => undefined,
-    );
-  }
-
   private setIso(iso: number): void {
     this.parameters = { ...this.parameters, iso };
     this.changed();
   }
 
+  // Null where there is nothing to go back to.
+  private goBack(parameters: JobParameters | null): void {
+    if (!parameters) return;
+    this.parameters = parameters;
+    // These keep what was chosen in them.
+    this.labelChoice = null;
+    this.labelPart.replaceChildren();
+    this.kind.replaceChildren(this.kindChoice() ?? '');
+    this.showKind();
+    this.changed();
+  }
+
   private changed(): void {
+    this.history.change(this.parameters);
     this.run.disabled = !this.isReady || this.isStarting;
     this.update();
     if (this.isReady) this.askForEstimate();
@@ -367,6 +359,7 @@ class Prepare {
   }
 
   private update(): void {
+    this.undoButton.hidden = !this.history.canUndo;
     for (const view of this.slices) view.update();
     this.live.show(isByLabels(this.parameters) ? null : this.iso, this.cursor);
     this.live.showCrop(this.box);

@@ -1,6 +1,6 @@
 // A surface with its tools: what a job made, loaded part by part.
 import { asApiError } from '../api/problem';
-import type { Job, Vec3, Volume } from '../api/types';
+import type { Job, MeshSummary, Vec3, Volume } from '../api/types';
 import { loadMesh, viewableFile, type LoadTiming } from '../mesh/load';
 import { lengthOf } from '../scene/rulers';
 import { defaultStyle, type SurfaceStyle } from '../scene/parts';
@@ -18,6 +18,7 @@ import { cssColour } from '../ui/theme';
 import { CutTool } from './cut_tool';
 import { DistanceLook } from './distance_look';
 import { changeLink, fileNameOf, makeVariant } from './job_panel';
+import { labelsOfText, rulersOfText, rulersToText, styleOfText, styleToText } from './look_text';
 import { PickedLabel } from './picked_label';
 import { PickedPart } from './picked_part';
 
@@ -31,6 +32,8 @@ export interface PaneOptions {
   volume: Volume | null;
   // Shows slices beside the surface, or takes them away; null where there are none.
   onSlices: (() => void) | null;
+  // Of an address: cut, style, rulers, hide.
+  look: URLSearchParams;
   // Of a job by labels: which are shown and how.
   labels: LabelState;
 }
@@ -38,6 +41,8 @@ export interface PaneOptions {
 export class SurfacePane {
   readonly element: HTMLElement;
   onCamera: ((place: CameraPlace) => void) | null = null;
+  // How it is looked at has changed: for the address.
+  onLook: ((values: Record<string, string>) => void) | null = null;
   // A place of the surface was clicked.
   onPoint: ((point: Vec3) => void) | null = null;
   private surface: Surface | null = null;
@@ -49,7 +54,19 @@ export class SurfacePane {
   private readonly pickedPart: PickedPart;
   private distance: DistanceLook | null = null;
   private style: SurfaceStyle = defaultStyle;
+  private readonly opacity = h('input', {
+    type: 'range',
+    min: 0.1,
+    max: 1,
+    step: 0.05,
+    value: 1,
+    'aria-label': 'Opacity',
+    title: 'Opacity',
+  });
+  private wantsDistance = false;
   private isMeasuring = false;
+  // All of it is there.
+  private isWhole = false;
   private cut: CutTool | null = null;
   private readonly toggles = new Map<string, HTMLButtonElement>();
 
@@ -59,7 +76,7 @@ export class SurfacePane {
     private readonly options: PaneOptions,
   ) {
     this.pickedLabel = new PickedLabel(scope, options.labels);
-    this.pickedPart = new PickedPart(job, makeVariant(job));
+    this.pickedPart = new PickedPart(scope, job, makeVariant(job));
     this.element = h('div', { class: 'pane' }, this.view, this.announcement);
     this.view.append(h('div', { class: 'load' }, this.bar, this.status));
   }
@@ -67,27 +84,14 @@ export class SurfacePane {
   // Shows the mesh; resolves once all of it is there.
   async load(): Promise<LoadTiming | null> {
     const { mesh } = this.job;
-    if (!mesh) return null;
-    if (!viewableFile(this.job)) {
-      this.say('This job made no file that can be shown. Make it again as GLB or Draco.');
-      return null;
-    }
-    if (mesh.triangles === 0) {
-      this.say(emptyReason(this.job, this.options.volume), h('a', { href: changeLink(this.job) }, 'Change parameters'));
-      return null;
-    }
-    let surface: Surface;
-    try {
-      surface = new Surface(this.view);
-    } catch {
-      this.say('This browser cannot draw in 3D (WebGL 2 is missing or off). Downloads work all the same.');
-      return null;
-    }
+    const surface = mesh && this.begin(mesh);
+    if (!mesh || !surface) return null;
     this.surface = surface;
     this.scope.onEnd(() => surface.dispose());
     this.prepareSurface(surface);
     surface.setBounds(mesh.bounds);
     if (this.options.camera) surface.moveTo(this.options.camera);
+    this.restore(surface, this.options.look);
     try {
       const timing = await loadMesh(this.job, this.scope.signal, {
         onBlocks: (blocks, part, isCoarse) => {
@@ -104,8 +108,9 @@ export class SurfacePane {
       });
       if (this.scope.isOver) return null;
       surface.finish();
+      this.isWhole = true;
       // Who asked for distances wants to see them.
-      if (this.distance?.loaded()) this.distance.set(this.options.hasKeys);
+      if (this.distance?.loaded()) this.distance.set(this.options.hasKeys || this.wantsDistance);
       this.element.dataset.loaded = 'true';
       this.bar.parentElement?.remove();
       return timing;
@@ -125,6 +130,24 @@ export class SurfacePane {
     }
   }
 
+  // Null, and says why, where there is nothing to be shown.
+  private begin(mesh: MeshSummary): Surface | null {
+    if (!viewableFile(this.job)) {
+      this.say('This job made no file that can be shown. Make it again as GLB or Draco.');
+      return null;
+    }
+    if (mesh.triangles === 0) {
+      this.say(emptyReason(this.job, this.options.volume), h('a', { href: changeLink(this.job) }, 'Change parameters'));
+      return null;
+    }
+    try {
+      return new Surface(this.view);
+    } catch {
+      this.say('This browser cannot draw in 3D (WebGL 2 is missing or off). Downloads work all the same.');
+      return null;
+    }
+  }
+
   follow(place: CameraPlace): void {
     this.surface?.follow(place);
   }
@@ -136,6 +159,7 @@ export class SurfacePane {
   setStyle(change: Partial<SurfaceStyle>): void {
     this.style = { ...this.style, ...change };
     this.surface?.setStyle(this.style);
+    this.onLook?.({ style: styleToText(this.style) });
     this.press('wireframe', this.style.wireframe);
     this.press('flat', this.style.shading === 'flat');
   }
@@ -183,10 +207,28 @@ export class SurfacePane {
     }
   }
 
+  // As the address says; from now on it follows.
+  private restore(surface: Surface, look: URLSearchParams): void {
+    const note = (values: Record<string, string>): void => this.onLook?.(values);
+    const style = styleOfText(look.get('style') ?? '');
+    this.setStyle({ ...style, distance: false });
+    this.opacity.value = String(style.opacity);
+    if (style.distance) this.wantsDistance = true;
+    this.cut?.restore(look.get('cut') ?? '');
+    this.press('cut', this.cut?.isOn ?? false);
+    if (this.cut) this.cut.onChange = (cut) => note({ cut });
+    surface.rulers.restore(rulersOfText(look.get('rulers') ?? ''));
+    surface.rulers.onChange = () => note({ rulers: rulersToText(surface.rulers.all) });
+    const { hidden } = this.options.labels;
+    const gone = labelsOfText(look.get('hide') ?? '');
+    if (gone.size > 0) hidden.value = gone;
+    this.scope.onEnd(hidden.subscribe((labels) => note({ hide: [...labels].join(',') })));
+  }
+
   private picked(picked: Picked | null, surface: Surface): void {
     if (!this.isMeasuring) {
       this.options.labels.pick(picked?.label ?? null);
-      this.pickedPart.show(picked?.point ?? null);
+      this.pickedPart.show(this.isWhole ? picked : null, () => surface.partFinder);
       if (picked) this.onPoint?.(picked.point);
       return;
     }
@@ -220,15 +262,7 @@ export class SurfacePane {
   }
 
   private toolbar(surface: Surface, distance: DistanceLook): HTMLElement {
-    const opacity = h('input', {
-      type: 'range',
-      min: 0.1,
-      max: 1,
-      step: 0.05,
-      value: 1,
-      'aria-label': 'Opacity',
-      title: 'Opacity',
-    });
+    const { opacity } = this;
     opacity.addEventListener('input', () => this.setStyle({ opacity: opacity.valueAsNumber }));
     return h(
       'div',

@@ -1,17 +1,18 @@
 // The first view: upload, the volumes that are there, the last surfaces.
-import { eraseVolume, listJobs, listVolumes, slicePicture } from '../api/client';
+import { eraseVolume, listJobs, listVolumes, renameVolume, slicePicture } from '../api/client';
 import { jobEvents } from '../api/job_events';
 import type { Job, UploadedVolume, Volume } from '../api/types';
 import { inWords, surfaceInWords } from '../job/parameters';
 import { button, h } from '../ui/dom';
 import { formatBytes, formatCount, formatSpacing, formatTime } from '../ui/format';
-import { ask, tell, tellError } from '../ui/notices';
+import { ask, askText, tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { axisIndex, slicePlacement, slicePlane } from '../volume/geometry';
 import { KnownVolumes } from '../volume/known';
 import { volumeKind, volumeName } from '../volume/names';
 import { uploads } from './upload_panel';
+import { VolumeSearch } from './volume_search';
 
 const shownJobs = 8;
 const thumbnailPixels = 112;
@@ -55,7 +56,7 @@ function thumbnail(volume: Volume, scope: Scope): HTMLElement {
   return canvas;
 }
 
-function volumeCard(volume: Volume, scope: Scope, onErased: () => void): HTMLElement {
+function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChanged: () => void): HTMLElement {
   const erase = async (): Promise<void> => {
     const sure = await ask(
       'Erase this volume?',
@@ -67,6 +68,16 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void): HTMLEle
       await eraseVolume(volume.id);
       tell('The volume was erased.');
       onErased();
+    } catch (error) {
+      tellError(error);
+    }
+  };
+  const rename = async (): Promise<void> => {
+    const given = await askText('Name of this volume', volume.name ?? '', 'Rename');
+    if (given === null) return;
+    try {
+      await renameVolume(volume.id, given === '' ? null : given);
+      onChanged();
     } catch (error) {
       tellError(error);
     }
@@ -89,7 +100,12 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void): HTMLEle
         h('span', { class: 'faint' }, `${formatTime(volume.created)}, ${formatBytes(volume.bytes)}`),
       ),
     ),
-    button('Erase', () => void erase(), { class: 'quiet', 'aria-label': `Erase ${volumeName(volume)}` }),
+    h(
+      'div',
+      { class: 'card-actions' },
+      button('Rename', () => void rename(), { class: 'quiet', 'aria-label': `Rename ${volumeName(volume)}` }),
+      button('Erase', () => void erase(), { class: 'quiet', 'aria-label': `Erase ${volumeName(volume)}` }),
+    ),
   );
 }
 
@@ -133,10 +149,22 @@ class Home {
   private readonly count = h('span', { class: 'count' });
   private readonly surfaces = h('ul', { class: 'rows' });
   private readonly more = button('Older volumes', () => void this.showMore().catch(tellError), { hidden: true });
+  private readonly finding = new VolumeSearch(() => void this.search().catch(tellError));
+  private newest: readonly Volume[] = [];
   private older: Volume[] = [];
   // Where the list goes on behind the older ones.
   private next: string | null = null;
   private soon = 0;
+
+  private readonly noVolumes = h(
+    'li',
+    { class: 'empty' },
+    h('p', {}, 'No volumes yet. Drop one above to begin, or'),
+    button('try a sample', () => void import('../volume/sample').then(({ sampleHead }) => uploads.take([sampleHead()]), tellError), {
+      class: 'link',
+      title: 'Makes a simple head of 112 \u00d7 112 \u00d7 112 samples and uploads it',
+    }),
+  );
 
   constructor(private readonly scope: Scope) {
     this.element = h(
@@ -147,7 +175,7 @@ class Home {
       h(
         'section',
         { 'aria-labelledby': 'volumes-title' },
-        h('h2', { id: 'volumes-title' }, 'Volumes ', this.count),
+        h('div', { class: 'section-head' }, h('h2', { id: 'volumes-title' }, 'Volumes ', this.count), this.finding.element),
         this.list,
         h('div', { class: 'actions' }, this.more),
       ),
@@ -195,6 +223,7 @@ class Home {
     this.known.learn(page.volumes);
     const shown = jobs.slice(0, shownJobs);
     await this.known.find(shown.map(({ volume }) => volume));
+    this.newest = page.volumes;
     this.showVolumes([...page.volumes, ...this.older]);
     this.surfaces.replaceChildren(...shown.map((job) => surfaceRow(job, this.known.nameOf(job.volume))));
     if (shown.length === 0) this.surfaces.append(h('li', { class: 'empty' }, 'No surfaces yet.'));
@@ -213,24 +242,41 @@ class Home {
     }
   }
 
+  // Among all volumes, also those that were not asked for yet.
+  private async search(): Promise<void> {
+    this.showVolumes([...this.newest, ...this.older]);
+    while (this.finding.isOn && this.next !== null && !this.scope.isOver) await this.showMore();
+  }
+
   // Cards that stay as they are keep their elements, and with those their pictures and the focus.
   private showVolumes(volumes: readonly Volume[]): void {
-    const cards = volumes.map((volume) => {
+    this.finding.element.hidden = volumes.length < 2;
+    const shown = this.finding.found(volumes);
+    const cards = shown.map((volume) => {
       const text = JSON.stringify(volume);
       const known = this.cards.get(volume.id);
       if (known?.text === text) return known.card;
-      const card = volumeCard(volume, this.scope, () => this.erased(volume.id));
+      const card = volumeCard(volume, this.scope, () => this.erased(volume.id), () => void this.renewed().catch(tellError));
       this.cards.set(volume.id, { text, card });
       return card;
     });
     this.more.hidden = this.next === null;
-    this.count.textContent = volumes.length > 0 ? `${formatCount(volumes.length)}${this.next === null ? '' : '+'}` : '';
-    if (cards.length === 0) cards.push(h('li', { class: 'empty' }, 'No volumes yet. Drop one above to begin.'));
+    const all = `${formatCount(volumes.length)}${this.next === null ? '' : '+'}`;
+    this.count.textContent = volumes.length === 0 ? '' : this.finding.isOn ? `${formatCount(shown.length)} of ${all}` : all;
+    if (volumes.length === 0) cards.push(this.noVolumes);
+    else if (cards.length === 0) cards.push(h('li', { class: 'empty' }, 'No volume is called so.'));
     const isSame = cards.length === this.list.children.length && cards.every((card, at) => card === this.list.children[at]);
     if (isSame) return;
     const focused = document.activeElement;
     this.list.replaceChildren(...cards);
     if (focused instanceof HTMLElement && this.list.contains(focused)) focused.focus({ preventScroll: true });
+  }
+
+  // Older ones are asked for again, or they would stay as they were.
+  private async renewed(): Promise<void> {
+    this.older = [];
+    await this.refresh();
+    await this.search();
   }
 
   private erased(volume: string): void {

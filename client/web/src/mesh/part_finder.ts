@@ -1,0 +1,113 @@
+// The parts of a surface that do not touch each other, found in its blocks some at a time.
+import type { Vec3 } from '../api/types';
+import type { Block } from './blocks';
+
+export interface PartSummary {
+  number: number;
+  triangles: number;
+  area: number; // mm2
+  volume: number; // mm3, of a closed part
+  // A vertex of it.
+  point: Vec3;
+}
+
+type Drawn = Pick<Block, 'positions' | 'index' | 'border'>;
+
+export class PartFinder {
+  // The vertices of all blocks, one block's behind the other's; of each another one of its part, or itself.
+  private readonly parents: Uint32Array;
+  private readonly firsts: number[] = [];
+  private readonly places = new Map<string, number>();
+  private readonly parts = new Map<number, PartSummary>();
+  private done = 0;
+
+  constructor(private readonly blocks: readonly Drawn[]) {
+    let count = 0;
+    for (const { positions } of blocks) {
+      this.firsts.push(count);
+      count += positions.length / 3;
+    }
+    this.parents = new Uint32Array(count).map((_, vertex) => vertex);
+  }
+
+  // One block in one way; false when all is found.
+  step(): boolean {
+    const { blocks, done } = this;
+    const way = Math.floor(done / Math.max(1, blocks.length));
+    const at = done % Math.max(1, blocks.length);
+    const block = blocks[at];
+    if (!block || way > 2) return false;
+    const first = this.firsts[at] as number;
+    if (way === 0) this.joinTriangles(block, first);
+    else if (way === 1) this.joinBorder(block, first);
+    else this.sum(block, first);
+    this.done += 1;
+    return true;
+  }
+
+  get all(): readonly PartSummary[] {
+    return [...this.parts.values()];
+  }
+
+  // Of the triangle of that block whose first corner is there in its index.
+  partOf(block: number, corner: number): PartSummary | null {
+    const vertex = this.blocks[block]?.index[corner];
+    return vertex === undefined ? null : (this.parts.get(this.rootOf((this.firsts[block] as number) + vertex)) ?? null);
+  }
+
+  private rootOf(vertex: number): number {
+    const { parents } = this;
+    let at = vertex;
+    while (parents[at] !== at) {
+      parents[at] = parents[parents[at] as number] as number;
+      at = parents[at] as number;
+    }
+    return at;
+  }
+
+  private join(one: number, other: number): void {
+    const [a, b] = [this.rootOf(one), this.rootOf(other)];
+    if (a !== b) this.parents[Math.max(a, b)] = Math.min(a, b);
+  }
+
+  private joinTriangles({ index }: Drawn, first: number): void {
+    for (let i = 0; i + 2 < index.length; i += 3) {
+      this.join(first + (index[i] as number), first + (index[i + 1] as number));
+      this.join(first + (index[i] as number), first + (index[i + 2] as number));
+    }
+  }
+
+  // A vertex on a seam has the same bits in every block that names it.
+  private joinBorder({ border, positions }: Drawn, first: number): void {
+    for (const vertex of border) {
+      const key = positions.subarray(3 * vertex, 3 * vertex + 3).join();
+      const known = this.places.get(key);
+      if (known === undefined) this.places.set(key, first + vertex);
+      else this.join(known, first + vertex);
+    }
+  }
+
+  private sum({ index, positions }: Drawn, first: number): void {
+    const at = (vertex: number, axis: number): number => positions[3 * vertex + axis] as number;
+    for (let i = 0; i + 2 < index.length; i += 3) {
+      const [a, b, c] = [index[i] as number, index[i + 1] as number, index[i + 2] as number];
+      const part = this.partFor(this.rootOf(first + a), [at(a, 0), at(a, 1), at(a, 2)]);
+      // From one of its vertices, so that large coordinates take no digits.
+      const [ox, oy, oz] = part.point;
+      const [ux, uy, uz] = [at(b, 0) - at(a, 0), at(b, 1) - at(a, 1), at(b, 2) - at(a, 2)];
+      const [vx, vy, vz] = [at(c, 0) - at(a, 0), at(c, 1) - at(a, 1), at(c, 2) - at(a, 2)];
+      const [nx, ny, nz] = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
+      part.triangles += 1;
+      part.area += Math.hypot(nx, ny, nz) / 2;
+      part.volume += ((at(a, 0) - ox) * nx + (at(a, 1) - oy) * ny + (at(a, 2) - oz) * nz) / 6;
+    }
+  }
+
+  private partFor(root: number, point: Vec3): PartSummary {
+    const known = this.parts.get(root);
+    if (known) return known;
+    const made = { number: this.parts.size, triangles: 0, area: 0, volume: 0, point };
+    this.parts.set(root, made);
+    return made;
+  }
+}

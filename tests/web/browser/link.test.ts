@@ -1,0 +1,151 @@
+// The address keeps how a surface is looked at; changes are taken back; notes of jobs; the list of volumes.
+import { describe, expect, it } from 'vitest';
+import { smallNrrd } from './files';
+import { ballNrrd, Daemon, noiseNrrd, noted, openPage, settled, setup, silhouette, still, surfaceLoaded } from './support';
+
+const at = setup();
+
+describe('a link to a surface', () => {
+  it('carries its camera, cut, style and measurements', async () => {
+    const { page, daemon, browser } = at;
+    const volume = await daemon.upload(ballNrrd(48, 18));
+    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    await page.goto(`${daemon.url}/#/jobs/${id}`);
+    await surfaceLoaded(page);
+    const box = await page.locator('.viewport canvas').boundingBox();
+    if (!box) throw new Error('there is no canvas');
+    await page.keyboard.press('a');
+    await page.keyboard.press('m');
+    const middle = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
+    await still(page);
+    await page.mouse.click(middle.x - 60, middle.y);
+    await page.mouse.click(middle.x + 60, middle.y);
+    await expect.poll(() => page.locator('.ruler-labels span').count()).toBe(1);
+    const length = await page.locator('.ruler-labels span').innerText();
+    await page.keyboard.press('m');
+    await page.keyboard.press('t');
+    await page.getByLabel('Opacity').fill('0.6');
+    await page.keyboard.press('c');
+    await page.getByLabel('Slice of the cut').fill('20');
+    await page.getByLabel('Other side').check();
+    await still(page);
+    await expect.poll(() => [noted(page, 'cut'), noted(page, 'style')]).toEqual(['z20-', 'flat,opacity-60']);
+    expect(noted(page, 'rulers').split(',')).toHaveLength(6);
+    const address = await settled(() => page.url());
+    await page.getByLabel('Link to this surface').focus();
+    expect(await page.getByLabel('Link to this surface').inputValue()).toBe(address);
+    await page.getByLabel('Link to this surface').blur();
+    const seen = await silhouette(page, page.locator('.viewport'));
+
+    const { page: other, faults } = await openPage(browser, daemon.url);
+    await other.goto(address);
+    await surfaceLoaded(other);
+    expect(await other.locator('.ruler-labels span').innerText()).toBe(length);
+    expect(await other.locator('.cut-place').innerText()).toBe('21 / 48');
+    expect(await other.getByLabel('Other side').isChecked()).toBe(true);
+    expect(await other.getByRole('button', { name: 'Flat' }).getAttribute('aria-pressed')).toBe('true');
+    expect(await other.getByLabel('Opacity').inputValue()).toBe('0.6');
+    await expect.poll(async () => (await silhouette(other, other.locator('.viewport'))).part / seen.part).toBeCloseTo(1, 1);
+    // What is taken away leaves the address.
+    for (const key of ['c', 't', 'Delete']) await other.keyboard.press(key);
+    await expect.poll(() => [noted(other, 'cut'), noted(other, 'style'), noted(other, 'rulers')]).toEqual(['', 'opacity-60', '']);
+    await other.close();
+    expect(faults).toEqual([]);
+  });
+});
+
+describe('parameters', () => {
+  it('are taken back and done again', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(ballNrrd(32, 12));
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
+    const undo = page.getByRole('button', { name: 'Undo' });
+    await page.getByLabel('Passes').waitFor();
+    expect(await undo.isVisible()).toBe(false);
+    await page.getByLabel('Passes').fill('9');
+    await page.waitForTimeout(700);
+    await page.getByRole('radio', { name: 'Taubin' }).check({ force: true });
+    await page.waitForTimeout(700);
+    await undo.click();
+    await expect.poll(() => noted(page, 'smoothing')).toBe('');
+    expect(await page.getByLabel('Passes').inputValue()).toBe('9');
+    await page.locator('h1').click();
+    await page.keyboard.press('Control+z');
+    await expect.poll(() => noted(page, 'passes')).toBe('');
+    expect(await page.getByLabel('Passes').inputValue()).toBe('5');
+    expect(await undo.isVisible()).toBe(false);
+    await page.keyboard.press('Control+Shift+z');
+    await page.keyboard.press('Control+Shift+z');
+    await expect.poll(() => [noted(page, 'passes'), noted(page, 'smoothing')]).toEqual(['9', 'taubin']);
+  });
+});
+
+describe('a job that was left', () => {
+  it('tells when it has ended, also after the page was loaded anew', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(noiseNrrd(80));
+    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=128&passes=400`);
+    await page.getByRole('button', { name: 'Make the surface' }).click();
+    await page.waitForURL(/#\/jobs\//);
+    const id = /jobs\/([^?]+)/.exec(page.url())?.[1] ?? '';
+    await page.locator('.brand').click();
+    await page.reload();
+    const toast = page.locator('.toast', { hasText: 'iso 128' });
+    await expect.poll(() => toast.innerText()).toMatch(/The surface of iso 128 is made/);
+    await toast.getByRole('link').click();
+    await page.waitForURL(new RegExp(`#/jobs/${id}`));
+  });
+});
+
+describe('the list of volumes', () => {
+  it('is searched, sorted, and its volumes renamed', async () => {
+    const { browser } = at;
+    const other = await Daemon.start();
+    try {
+      const { page } = await openPage(browser, other.url);
+      for (let n = 0; n < 62; n += 1) {
+        const bytes = Buffer.alloc(24, 1);
+        bytes.writeUInt16LE(n + 2, 0);
+        const body = new Blob([new Uint8Array(smallNrrd([], bytes))]);
+        await fetch(`${other.url}/v1/volumes`, { method: 'POST', body, headers: { 'Content-Disposition': `attachment; filename="${n === 0 ? 'elbow' : `case ${n}`}.nrrd"` } });
+      }
+      await page.goto(other.url);
+      const names = page.locator('.cards strong');
+      await expect.poll(() => names.first().innerText()).toBe('case 61.nrrd');
+      expect(await names.count()).toBe(60);
+      // The oldest is on no page that is there yet.
+      await page.getByLabel('Search volumes').fill('ELBOW');
+      await expect.poll(() => names.allInnerTexts()).toEqual(['elbow.nrrd']);
+      expect(await page.locator('.count').innerText()).toBe('1 of 62');
+      await page.locator('.card').hover();
+      await page.getByRole('button', { name: 'Rename elbow.nrrd' }).click();
+      await page.getByLabel('Name of this volume').and(page.locator('input')).fill('a knee');
+      await page.keyboard.press('Enter');
+      await expect.poll(() => page.locator('.cards').innerText()).toContain('No volume is called so');
+      await page.getByLabel('Search volumes').fill('');
+      await page.getByLabel('Order of volumes').selectOption('name');
+      await expect.poll(async () => (await names.allInnerTexts()).slice(0, 3)).toEqual(['a knee', 'case 1.nrrd', 'case 2.nrrd']);
+      await page.close();
+    } finally {
+      await other.remove();
+    }
+  });
+
+  it('that is empty offers a sample', async () => {
+    const { browser } = at;
+    const other = await Daemon.start();
+    try {
+      const { page, faults } = await openPage(browser, other.url);
+      await page.goto(other.url);
+      await page.getByRole('button', { name: 'try a sample' }).click();
+      await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
+      await expect.poll(() => page.locator('h1').first().innerText()).toContain('Sample head');
+      await expect.poll(() => page.locator('.live[data-size] .live-picture[data-still]').count()).toBe(1);
+      expect((await silhouette(page, page.locator('.live-picture'))).part).toBeGreaterThan(0.1);
+      await page.close();
+      expect(faults).toEqual([]);
+    } finally {
+      await other.remove();
+    }
+  });
+});

@@ -1,0 +1,41 @@
+import { describe, expect, it } from 'vitest';
+import { prepare, type Block } from '@/mesh/blocks';
+import { PartFinder } from '@/mesh/part_finder';
+
+// The sides of a cube of that edge, which begins there; some of its triangles.
+function cube(edge: number, begin: number, triangles = [...Array(12).keys()]): Block {
+  const positions = Float32Array.from({ length: 24 }, (_, i) => begin + edge * ((Math.floor(i / 3) >> (i % 3)) & 1));
+  const sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+  const all = sides.flatMap(([a = 0, b = 0, c = 0, d = 0]) => [[a, b, c], [a, c, d]]);
+  return prepare({ positions, index: Uint32Array.from(triangles.flatMap((triangle) => all[triangle] ?? [])) });
+}
+
+function found(...blocks: Block[]): PartFinder {
+  const finder = new PartFinder(blocks);
+  while (finder.step());
+  return finder;
+}
+
+describe('the parts of a surface', () => {
+  it('are told apart within a block, with their sizes', () => {
+    const [small, large] = [cube(1, 0), cube(2, 100)];
+    const both = prepare({
+      positions: Float32Array.from([...small.positions, ...large.positions]),
+      index: Uint32Array.from([...small.index, ...large.index.map((vertex) => vertex + 8)]),
+    });
+    const finder = found(both);
+    expect(finder.all).toHaveLength(2);
+    expect(finder.partOf(0, 0)).toMatchObject({ triangles: 12, area: 6, point: [0, 0, 0] });
+    expect(finder.partOf(0, 36)).toMatchObject({ triangles: 12, area: 24, point: [100, 100, 100] });
+    expect([0, 36].map((corner) => Math.round(1e6 * (finder.partOf(0, corner)?.volume ?? 0)))).toEqual([1e6, 8e6]);
+    expect(finder.partOf(0, 999)).toBeNull();
+  });
+
+  it('go on across the seams of blocks', () => {
+    const finder = found(cube(1, 0, [0, 1, 2, 3, 4]), cube(1, 5), cube(1, 0, [5, 6, 7, 8, 9, 10, 11]));
+    expect(finder.all).toHaveLength(2);
+    expect(finder.partOf(0, 0)).toBe(finder.partOf(2, 3));
+    expect(finder.partOf(2, 0)?.area).toBeCloseTo(6);
+    expect(finder.partOf(2, 0)?.volume).toBeCloseTo(1);
+  });
+});

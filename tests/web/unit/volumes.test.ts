@@ -1,0 +1,34 @@
+import { describe, expect, it } from 'vitest';
+import type { Volume } from '@/api/types';
+import { foundVolumes } from '@/views/volume_search';
+import { declaredBy } from '@/volume/declared';
+import { sampleHead } from '@/volume/sample';
+import { mayBeVolume } from '@/volume/sniff';
+
+const volumes = [
+  { id: 'a', name: 'knee 10', bytes: 5, modality: 'MR', dims: [1, 2, 3] },
+  { id: 'b', name: 'Knee 9', bytes: 50, modality: 'CT', dims: [1, 2, 3] },
+  { id: 'c', name: null, bytes: 20, modality: null, format: 'nrrd', dims: [7, 8, 9] },
+] as unknown as Volume[];
+const ids = (text: string, order: string): string => foundVolumes(volumes, text, order).map(({ id }) => id).join('');
+
+describe('volumes', () => {
+  it('are found by all of the words, in name and kind', () => {
+    expect(['', 'KNEE', 'knee ct', 'nrrd', '7 × 8', 'elbow'].map((text) => ids(text, 'newest'))).toEqual(['abc', 'ab', 'b', 'c', 'c', '']);
+  });
+
+  it('are sorted', () => {
+    expect([ids('', 'newest'), ids('knee', 'name'), ids('', 'size'), ids('', 'nonsense')]).toEqual(['abc', 'ba', 'bca', 'abc']);
+  });
+});
+
+describe('the sample', () => {
+  it('is a volume that holds all that its header tells, with bone and air in it', async () => {
+    const { file } = sampleHead();
+    const bytes = new Uint8Array(await file.arrayBuffer());
+    expect(await mayBeVolume(file)).toBe(true);
+    expect(declaredBy(bytes.slice(0, 4096))).toEqual({ dims: [112, 112, 112], bytes: file.size, isElsewhere: false });
+    const samples = new Int16Array(bytes.buffer.slice(bytes.length - 2 * 112 ** 3));
+    expect([Math.min(...samples.subarray(0, 5000)), samples.reduce((most, value) => Math.max(most, value))]).toEqual([-1000, 950]);
+  });
+});
