@@ -10,6 +10,7 @@ import { tell, tellError } from '../ui/notices';
 import { go, hashOf } from '../ui/route';
 import { saveFile } from '../ui/save';
 import { fileStem } from '../volume/names';
+import { exportActions } from './export_section';
 import { certificateBody, intersectionsText, openText } from './certificate';
 import { distributionChart, stepsOf, waterfall, type Durations } from './charts';
 
@@ -192,6 +193,7 @@ export function downloads(job: Job, volume: Volume | null): HTMLElement {
           button(formatNames[format] ?? format, () => void make(format), { class: 'chip' }),
         ),
       ),
+    exportActions(job, volume, makeVariant(job), (suffix) => fileNameOf(job, volume, suffix)),
   );
 }
 

@@ -1,0 +1,21 @@
+// A surface for a printer, and what was measured of it.
+import type { Job, JobParameters } from '../api/types';
+import { withGlb } from './parameters';
+
+// Closed, in the formats of printers, and measured.
+export function printingVariant({ formats }: JobParameters): Partial<JobParameters> {
+  return { close: true, certify: true, formats: withGlb([...formats, 'stl', '3mf']) };
+}
+
+export function isForPrinting({ parameters: { formats, certify }, mesh }: Job): boolean {
+  return certify === true && (mesh?.quality.closed ?? false) && formats.includes('stl') && formats.includes('3mf');
+}
+
+// What was measured, of which files, made how: to be kept with a print.
+export function certificateFile(job: Job): string {
+  const { parameters, mesh, finished, id } = job;
+  const { certificate, quality, volume_mm3: volume, area_mm2: area, triangles: count, files } = mesh ?? {};
+  const sums = Object.fromEntries(Object.entries(files ?? {}).map(([format, { bytes, sha256 }]) => [format, { bytes, sha256 }]));
+  const told = { job: id, finished, parameters, triangles: count, volume_mm3: volume, area_mm2: area, certificate, quality, files: sums };
+  return `${JSON.stringify(told, null, 2)}\n`;
+}

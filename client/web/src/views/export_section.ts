@@ -1,0 +1,57 @@
+// What a surface is saved as beside the files of its job: for a printer, for a phone, and what was measured of it.
+import type { Job, JobParameters, Volume } from '../api/types';
+import { withGlb } from '../job/parameters';
+import { certificateFile, isForPrinting, printingVariant } from '../job/printing';
+import { isByLabels } from '../job/table';
+import { viewableFile } from '../mesh/load';
+import { button, h } from '../ui/dom';
+import { tellError } from '../ui/notices';
+import { saveBlob } from '../ui/save';
+
+// So many triangles are left where a phone could not show all.
+const triangles = 150_000;
+
+type Make = (variant: Partial<JobParameters>) => void;
+
+export function exportActions(job: Job, volume: Volume | null, make: Make, nameOf: (suffix: string) => string): HTMLElement | null {
+  const { mesh, parameters } = job;
+  if (!mesh || mesh.empty) return null;
+  const usdz = async (): Promise<void> => {
+    if (mesh.triangles > triangles) {
+      make({ triangles, formats: withGlb(parameters.formats) });
+      return;
+    }
+    phone.disabled = true;
+    try {
+      const { usdzOf } = await import('../mesh/usdz');
+      saveBlob(await usdzOf(job, new AbortController().signal), nameOf('.usdz'));
+    } catch (error) {
+      tellError(error);
+    } finally {
+      phone.disabled = false;
+    }
+  };
+  const isLarge = mesh.triangles > triangles;
+  const phone = button(isLarge ? 'For a phone: simplify first' : 'USDZ for a phone', () => void usdz(), {
+    class: 'chip',
+    title: isLarge ? 'Starts a job of fewer triangles, which then is saved as USDZ' : 'Shows it in the room (AR)',
+  });
+  const canMake = volume !== null;
+  return h(
+    'div',
+    { class: 'make exports' },
+    canMake &&
+      !isForPrinting(job) &&
+      !isByLabels(parameters) &&
+      button('For printing', () => make(printingVariant(parameters)), {
+        class: 'chip',
+        title: 'Starts a job that closes the surface, measures it, and makes STL and 3MF',
+      }),
+    viewableFile(job) !== null && (canMake || !isLarge) && phone,
+    mesh.certificate &&
+      button('Certificate', () => saveBlob(new Blob([certificateFile(job)], { type: 'application/json' }), nameOf('-certificate.json')), {
+        class: 'chip',
+        title: 'What was measured, with the digests of the files',
+      }),
+  );
+}

@@ -1,0 +1,59 @@
+// What a surface is saved as for a printer and for a phone.
+import { readFileSync } from 'node:fs';
+import type { Page } from 'playwright-core';
+import { describe, expect, it } from 'vitest';
+import { ballNrrd, openedJob, setup, surfaceLoaded } from './support';
+
+const at = setup();
+
+async function saved(page: Page, name: RegExp): Promise<{ name: string; bytes: Buffer }> {
+  const download = page.waitForEvent('download');
+  await page.getByRole('button', { name }).click();
+  const file = await download;
+  return { name: file.suggestedFilename(), bytes: readFileSync(await file.path()) };
+}
+
+describe('a surface', () => {
+  it('is made for printing, with its certificate', async () => {
+    const { page, daemon } = at;
+    // It leaves the volume on all sides.
+    const volume = await daemon.upload(ballNrrd(24, 14));
+    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    await page.goto(`${daemon.url}/#/jobs/${id}`);
+    await page.getByRole('button', { name: 'For printing' }).click();
+    await expect.poll(() => page.url()).not.toContain(id);
+    await expect.poll(() => page.locator('[data-format="3mf"]').count()).toBe(1);
+    expect(await page.locator('[data-format=stl]').count()).toBe(1);
+    expect(await page.getByRole('button', { name: 'For printing' }).count()).toBe(0);
+    const made = await openedJob(at);
+    expect(made.parameters).toMatchObject({ close: true, certify: true });
+    const { name, bytes } = await saved(page, /^Certificate$/);
+    expect(name).toMatch(/-certificate\.json$/);
+    const told = JSON.parse(bytes.toString()) as { certificate: { max_mm: number }; files: Record<string, { sha256: string }> };
+    expect(told.certificate.max_mm).toBe(made.mesh?.certificate?.max_mm);
+    expect(told.files['3mf']?.sha256).toBe(made.mesh?.files['3mf']?.sha256);
+  });
+
+  it('is saved for a phone, and simplified first where it is large', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(ballNrrd(32, 10));
+    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    await page.goto(`${daemon.url}/#/jobs/${id}`);
+    await surfaceLoaded(page);
+    const { name, bytes } = await saved(page, /^USDZ/);
+    expect(name).toMatch(/iso-100\.usdz$/);
+    // A ZIP whose files are stored as they are.
+    expect(bytes.subarray(0, 4).toString('latin1')).toBe('PK\u0003\u0004');
+    expect(bytes.includes('#usda 1.0')).toBe(true);
+    expect(bytes.includes('upAxis = "Y"')).toBe(true);
+
+    const large = await daemon.upload(ballNrrd(180, 85));
+    const job = await daemon.submit({ volume: large, iso: 100, formats: ['glb'] }, 30);
+    expect(job.mesh?.triangles).toBeGreaterThan(150_000);
+    await page.goto(`${daemon.url}/#/jobs/${job.id}`);
+    await page.getByRole('button', { name: 'For a phone' }).click();
+    await expect.poll(() => page.url()).not.toContain(job.id);
+    await expect.poll(() => page.getByRole('button', { name: /^USDZ/ }).count()).toBe(1);
+    expect((await openedJob(at)).mesh?.triangles).toBeLessThanOrEqual(150_000);
+  });
+});
