@@ -116,7 +116,6 @@ export class LiveView {
       return;
     }
     this.view.hidden = false;
-    this.surface?.canvas.setAttribute('aria-label', `Preview of the surface at iso-value ${formatValue(iso)}. Drag or use the arrow keys to turn it.`);
     const window = this.windowFor(iso);
     if (!window) {
       this.say('No sample has this value: there is no surface.');
@@ -142,6 +141,8 @@ export class LiveView {
 
   private showIso(): void {
     if (!this.surface || !this.preview || this.iso === null) return;
+    const name = `Preview of the surface at iso-value ${formatValue(this.iso)}. Drag or use the arrow keys to turn it.`;
+    this.surface.canvas.setAttribute('aria-label', name);
     this.surface.setIso(inPreview(this.preview, this.iso));
     this.surface.setCursor(toPatient(this.host.volume, this.cursor));
     this.element.dataset.iso = String(this.iso);

@@ -10,7 +10,7 @@ import type { Scope } from '../ui/signal';
 import { isOver, orderStates, saidOf } from './order_texts';
 
 const refreshEvery = 2000;
-const columns = ['State', 'What', 'Series', 'Rule', 'Created', ''];
+const columns = ['State', 'What', 'Series', 'Rule', 'Created', 'Action'];
 const dots: Partial<Record<OrderState, string>> = { waiting: 'queued', fetching: 'running', meshing: 'running', sending: 'running' };
 
 export async function ordersView(scope: Scope, route: Route): Promise<HTMLElement> {
@@ -44,7 +44,7 @@ function pacsItem({ name, last_success: success, last_failure: failure, reason }
 class Orders {
   readonly element: HTMLElement;
   private readonly pacs = h('ul', { class: 'pacs', 'aria-label': 'PACS' });
-  private readonly body = h('div', { class: 'queue-body' });
+  private readonly body = h('div', { class: 'queue-body', tabindex: '0', role: 'region', 'aria-label': 'Orders' });
   private readonly more = button('Older orders', () => void this.showMore().catch(tellError), { hidden: true });
   private orders: Order[] = [];
   private next: string | null = null;
@@ -111,7 +111,7 @@ class Orders {
     const order = focused?.closest('tr')?.dataset.order;
     const label = focused?.getAttribute('aria-label');
     const now = Date.now();
-    const heads = columns.map((name) => h('th', { scope: 'col' }, name));
+    const heads = columns.map((name) => h('th', { scope: 'col' }, h('span', { class: name === 'Action' ? 'sr-only' : '' }, name)));
     const none = this.state === '' ? 'No orders yet.' : `No orders are ${this.state}.`;
     this.body.replaceChildren(
       this.orders.length === 0

@@ -13,7 +13,9 @@ import { KnownVolumes } from '../volume/known';
 const refreshEvery = 1500;
 const mostCompared = 4;
 const mostTogether = 8;
-const columns = ['', 'State', 'Priority', 'Surface', 'Result', 'Time', 'Created', ''];
+const columns = ['Choose', 'State', 'Priority', 'Surface', 'Result', 'Time', 'Created', 'Action'];
+// For those who hear the table.
+const unseen = ['Choose', 'Action'];
 
 // As the daemon takes them: by priority, then by age.
 export function inOrder(jobs: readonly Job[]): Job[] {
@@ -54,7 +56,7 @@ function surfaceCell(job: Job, volume: string): HTMLElement {
 }
 
 function tableOf(rows: readonly HTMLElement[]): HTMLElement {
-  const heads = columns.map((name) => h('th', { scope: 'col' }, name));
+  const heads = columns.map((name) => h('th', { scope: 'col' }, h('span', { class: unseen.includes(name) ? 'sr-only' : '' }, name)));
   return h('table', { class: 'jobs' }, h('thead', {}, h('tr', {}, ...heads)), h('tbody', {}, ...rows));
 }
 
@@ -71,7 +73,7 @@ export async function queueView(scope: Scope): Promise<HTMLElement> {
 
 class Queue {
   readonly element: HTMLElement;
-  private readonly body = h('div', { class: 'queue-body' });
+  private readonly body = h('div', { class: 'queue-body', tabindex: '0', role: 'region', 'aria-label': 'Jobs' });
   private readonly compare: HTMLButtonElement;
   private readonly together: HTMLButtonElement;
   private readonly more: HTMLButtonElement;
