@@ -37,12 +37,15 @@ function valueAt(job: Record<string, unknown>, name: string): unknown {
 // Values of parameters that are lists.
 const lists: Readonly<Record<string, string>> = {
   'components.nearest_to': '1, 2, 3',
-  crop: '0, 0, 0, 100, 100, 100',
   lods: '1, 0.5',
 };
 
 // Chooses another value than the one that is there.
 async function change(element: Locator): Promise<void> {
+  if ((await element.getAttribute('data-parameter')) === 'crop') {
+    await element.getByRole('checkbox').check();
+    return;
+  }
   const number = element.locator('input[type=number]');
   if ((await number.count()) > 0) {
     const [low, high] = await Promise.all(['min', 'max'].map(async (bound) => Number(await number.getAttribute(bound))));

@@ -1,5 +1,6 @@
 // Whether a job is cropped to a box, and to which, by numbers.
 import type { Vec3, Volume } from '../api/types';
+import { parameterOf } from '../job/table';
 import { checkbox, h } from '../ui/dom';
 import { formatNumber } from '../ui/format';
 import { wholeBox, within, type Box } from '../volume/crop';
@@ -36,7 +37,7 @@ export class CropControl {
       this.size,
     );
     const toggle = checkbox('Crop to a box', box !== null, (isOn) => this.onChange(isOn ? middleOf(volume) : null));
-    this.element = h('div', { class: 'crop' }, toggle, this.numbers);
+    this.element = h('div', { class: 'crop', 'data-parameter': 'crop', title: parameterOf('crop').help }, toggle, this.numbers);
     this.show(box);
   }
 

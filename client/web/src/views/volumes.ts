@@ -155,6 +155,7 @@ class Home {
   // Where the list goes on behind the older ones.
   private next: string | null = null;
   private soon = 0;
+  private isSearching = false;
 
   private readonly noVolumes = h(
     'li',
@@ -230,22 +231,35 @@ class Home {
   }
 
   private async showMore(): Promise<void> {
-    if (this.next === null || this.more.disabled) return;
+    if (this.more.disabled) return;
     this.more.disabled = true;
     try {
-      const page = await listVolumes(this.next, this.scope.signal);
-      this.older = [...this.older, ...page.volumes];
-      this.next = page.next;
-      await this.refresh();
+      await this.loadMore();
     } finally {
       this.more.disabled = false;
     }
   }
 
+  private async loadMore(): Promise<void> {
+    if (this.next === null) return;
+    const page = await listVolumes(this.next, this.scope.signal);
+    const known = new Set(this.older.map(({ id }) => id));
+    this.older = [...this.older, ...page.volumes.filter(({ id }) => !known.has(id))];
+    this.next = page.next;
+    await this.refresh();
+  }
+
   // Among all volumes, also those that were not asked for yet.
   private async search(): Promise<void> {
     this.showVolumes([...this.newest, ...this.older]);
-    while (this.finding.isOn && this.next !== null && !this.scope.isOver) await this.showMore();
+    // One that is under way goes on for what is typed now.
+    if (this.isSearching) return;
+    this.isSearching = true;
+    try {
+      while (this.finding.isOn && this.next !== null && !this.scope.isOver) await this.loadMore();
+    } finally {
+      this.isSearching = false;
+    }
   }
 
   // Cards that stay as they are keep their elements, and with those their pictures and the focus.
