@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iostream>
 #include <mutex>
+#include <span>
 
 #include <unistd.h>
 
@@ -43,16 +44,29 @@ std::string folded(const std::string& name) {
   return text;
 }
 
+std::string files_in_words(const std::vector<PackedFile>& files) {
+  return grouped(static_cast<std::int64_t>(files.size())) +
+         (files.size() == 1 ? " file" : " files");
+}
+
 // A folder may hold more than its name lets one think.
 void tell_folders(const std::vector<std::filesystem::path>& files) {
   for (const std::filesystem::path& path : files) {
     std::error_code error;
     if (!std::filesystem::is_directory(path, error)) continue;
-    const std::vector<PackedFile> packed = files_of_upload(path);
+    const auto [sent, left_out] = files_of_folder(path);
     std::uint64_t bytes = 0;
-    for (const PackedFile& file : packed) bytes += std::filesystem::file_size(file.path, error);
-    complain("sending " + grouped(static_cast<std::int64_t>(packed.size())) + " files of " +
-             path.string() + ", " + human_bytes(bytes));
+    for (const PackedFile& file : sent) bytes += std::filesystem::file_size(file.path, error);
+    complain("sending " + files_in_words(sent) + " of " + path.string() + ", " +
+             human_bytes(bytes));
+    if (left_out.empty()) continue;
+    constexpr std::size_t kNamed = 3;
+    std::string names;
+    for (const PackedFile& file : std::span(left_out).first(std::min(kNamed, left_out.size()))) {
+      names += (names.empty() ? "" : ", ") + file.name;
+    }
+    if (left_out.size() > kNamed) names += ", ...";
+    complain("leaving out " + files_in_words(left_out) + " that can be no volume: " + names);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -23,6 +24,21 @@ constexpr std::size_t kBlock = 512;
 
 bool is_hidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
 
+// Of what lies beside scans and is none; nothing that the server reads.
+constexpr auto kOtherSuffixes = std::to_array<std::string_view>(
+    {".txt",  ".md",  ".rst",   ".log",  ".csv",  ".tsv",  ".json", ".yaml", ".yml",
+     ".toml", ".ini", ".cfg",   ".html", ".htm",  ".pdf",  ".doc",  ".docx", ".xls",
+     ".xlsx", ".ppt", ".pptx",  ".odt",  ".ods",  ".tex",  ".png",  ".jpg",  ".jpeg",
+     ".gif",  ".bmp", ".svg",   ".webp", ".tif",  ".tiff", ".mp4",  ".avi",  ".mov",
+     ".mkv",  ".py",  ".ipynb", ".sh",   ".js",   ".c",    ".cpp",  ".h",    ".exe",
+     ".dll",  ".so",  ".o",     ".bval", ".bvec", ".drc",  ".glb",  ".gltf", ".stl",
+     ".ply",  ".obj", ".mtl",   ".3mf",  ".off",  ".vtk",  ".vtp",  ".gii"});
+
+bool has_other_suffix(const fs::path& path) {
+  const std::string suffix = lower(path.extension().string());
+  return std::ranges::find(kOtherSuffixes, suffix) != kOtherSuffixes.end();
+}
+
 std::vector<PackedFile> files_below(const fs::path& folder) {
   std::vector<PackedFile> files;
   std::error_code error;
@@ -40,9 +56,6 @@ std::vector<PackedFile> files_below(const fs::path& folder) {
     }
   }
   if (error) throw Error(ErrorCode::kInvalidParameter, folder.string() + ": " + error.message());
-  if (files.empty()) {
-    throw Error(ErrorCode::kInvalidParameter, folder.string() + ": holds no files to send");
-  }
   std::ranges::sort(files, {}, &PackedFile::name);
   return files;
 }
@@ -194,8 +207,34 @@ std::string lead_of(const Member& member) {
 
 }  // namespace
 
+FolderFiles files_of_folder(const std::filesystem::path& folder) {
+  FolderFiles result;
+  std::vector<PackedFile> all = files_below(folder);
+  std::set<fs::path> data;
+  for (const PackedFile& file : all) {
+    const std::string suffix = lower(file.path.extension().string());
+    if (suffix != ".mhd" && suffix != ".nhdr") continue;
+    for (const PackedFile& named : files_of_upload(file.path)) {
+      data.insert(named.path.lexically_normal());
+    }
+  }
+  for (PackedFile& file : all) {
+    std::error_code error;
+    const bool is_data = data.contains(file.path.lexically_normal());
+    const bool is_other = has_other_suffix(file.path) || fs::file_size(file.path, error) == 0;
+    (is_other && !is_data ? result.left_out : result.sent).push_back(std::move(file));
+  }
+  if (result.sent.empty()) {
+    throw Error(
+        ErrorCode::kInvalidParameter,
+        folder.string() + (result.left_out.empty() ? ": holds no files to send"
+                                                   : ": holds no files that could be a volume"));
+  }
+  return result;
+}
+
 std::vector<PackedFile> files_of_upload(const std::filesystem::path& path) {
-  if (fs::is_directory(path)) return files_below(path);
+  if (fs::is_directory(path)) return files_of_folder(path).sent;
   const std::string suffix = lower(path.extension().string());
   if (suffix == ".mhd") return header_and_data(path, '=', "elementdatafile");
   if (suffix == ".nhdr") return header_and_data(path, ':', "datafile");
