@@ -24,6 +24,12 @@ std::string to_base64(std::span<const std::uint8_t> bytes) {
   return to_base64(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
 
+char* write_base64(std::span<const std::byte> bytes, char* out) {
+  return out + EVP_EncodeBlock(reinterpret_cast<unsigned char*>(out),
+                               reinterpret_cast<const unsigned char*>(bytes.data()),
+                               static_cast<int>(bytes.size()));
+}
+
 std::optional<std::string> from_base64(std::string_view text) {
   constexpr std::string_view kAlphabet =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

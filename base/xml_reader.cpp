@@ -47,8 +47,9 @@ struct XmlReader::Callbacks {
     if (encoding == nullptr) return;
     guard(self, [&](XmlReader& reader) { reader.handler_.encoding(encoding); });
   }
-  static void XMLCALL doctype(void* self, const XML_Char*, const XML_Char*, const XML_Char*, int) {
-    guard(self, [](XmlReader& reader) { reader.throw_unreadable("a document type is declared"); });
+  static void XMLCALL entity(void* self, const XML_Char*, int, const XML_Char*, int,
+                             const XML_Char*, const XML_Char*, const XML_Char*, const XML_Char*) {
+    guard(self, [](XmlReader& reader) { reader.throw_unreadable("an entity is declared"); });
   }
 };
 
@@ -61,7 +62,7 @@ XmlReader::XmlReader(XmlHandler& handler)
   ::XML_SetElementHandler(parser_.get(), &Callbacks::start, &Callbacks::end);
   ::XML_SetCharacterDataHandler(parser_.get(), &Callbacks::text);
   ::XML_SetXmlDeclHandler(parser_.get(), &Callbacks::declaration);
-  ::XML_SetStartDoctypeDeclHandler(parser_.get(), &Callbacks::doctype);
+  ::XML_SetEntityDeclHandler(parser_.get(), &Callbacks::entity);
 }
 
 XmlReader::~XmlReader() = default;

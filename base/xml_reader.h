@@ -47,8 +47,8 @@ struct XmlError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Nothing in a document makes it read a file or take much more memory than the longest tag: what
-// declares a document type, whose entities may grow without bounds, is an XmlError.
+// Nothing in a document makes it read a file or take much more memory than the longest tag: to
+// declare an entity, which may grow without bounds, is an XmlError.
 class XmlReader {
  public:
   explicit XmlReader(XmlHandler& handler);

@@ -11,9 +11,9 @@
 
 namespace isomesh {
 
-// kZip: one file for each label, in the other formats that are asked for, but glb and 3mf; else in
-// STL.
-enum class MeshFormat { kDrc, kGlb, kStl, kPly, kObj, k3mf, kZip };
+// kVtk: VTK's legacy file, kVtp: its XML file, kGii: GIFTI. kZip: one file for each label, in the
+// other formats that are asked for, but glb and 3mf; else in STL.
+enum class MeshFormat { kDrc, kGlb, kStl, kPly, kObj, k3mf, kOff, kVtk, kVtp, kGii, kZip };
 
 struct MeshFile {
   std::uint64_t bytes = 0;

@@ -236,7 +236,11 @@ MeshParameters parse_order_parameters(std::string_view rules, std::string_view o
   if (!merged.contains(kFormats)) merged[std::string(kFormats)] = {"stl"};
   merged["volume"] = "none";
   try {
-    return parse_job_parameters(merged.dump());
+    const JobParameters parameters = parse_job_parameters(merged.dump());
+    if (parameters.space != Space::kLps) {
+      throw invalid_parameter("space", "must be \"lps\", the space of the images");
+    }
+    return parameters;
   } catch (const Error& error) {
     std::vector<FieldError> faults = error.fields();
     for (FieldError& fault : faults) fault.field = prefix + fault.field;

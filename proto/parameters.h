@@ -337,7 +337,9 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
   parameter(Parameter{.name = "normals",
                       .title = "Put the vertices' normals into GLB",
                       .help = "Put the vertices' normals, weighted by the areas around them, into "
-                              "`glb`."},
+                              "`glb`.",
+                      .more = "Without them viewers shade every triangle flat, or compute their "
+                              "own."},
             self.normals);
   if (is_told(self, self.distances)) {
     parameter(
@@ -362,6 +364,39 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                         .maximum = 1,
                         .may_be_absent = true},
               self.lods);
+  }
+  if (is_told(self, self.merge)) {
+    parameter(Parameter{.name = "merge",
+                        .title = "One primitive in GLB",
+                        .help = "Make the surface one primitive of `glb`, or one for each label.",
+                        .more = "For programs that take a primitive for an object of its own. "
+                                "Otherwise there is one for each hundred thousand triangles or so, "
+                                "which are written and read side by side.",
+                        .may_be_absent = true},
+              self.merge);
+  }
+  if (is_told(self, self.glb_codec != GlbCodec::kDraco)) {
+    parameter(Parameter{.name = "glb_codec",
+                        .title = "Compression of GLB",
+                        .help = "What the surface in `glb` is compressed by.",
+                        .more = "`draco` is KHR_draco_mesh_compression, which makes the smaller "
+                                "files; `meshopt` is EXT_meshopt_compression, which is read "
+                                "faster. Readers have to know the one that it is.",
+                        .values = {"Smaller files", "Files that are read faster"},
+                        .may_be_absent = true},
+              self.glb_codec);
+  }
+  if (is_told(self, self.space != Space::kLps)) {
+    parameter(Parameter{.name = "space",
+                        .title = "Space of the coordinates",
+                        .help = "Which ways the coordinates in the files run: x to the patient's "
+                                "left and y to the back, or x to the right and y to the front.",
+                        .more = "z runs to the head. `gii` is always RAS, and `glb` has its own "
+                                "node, by which Y is up.",
+                        .values = {"DICOM's: left, posterior, superior",
+                                   "NIfTI's: right, anterior, superior"},
+                        .may_be_absent = true},
+              self.space);
   }
 }
 

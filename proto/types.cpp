@@ -46,7 +46,21 @@ struct Names<MeshFormat> {
       std::pair{MeshFormat::kDrc, "drc"}, std::pair{MeshFormat::kGlb, "glb"},
       std::pair{MeshFormat::kStl, "stl"}, std::pair{MeshFormat::kPly, "ply"},
       std::pair{MeshFormat::kObj, "obj"}, std::pair{MeshFormat::k3mf, "3mf"},
+      std::pair{MeshFormat::kOff, "off"}, std::pair{MeshFormat::kVtk, "vtk"},
+      std::pair{MeshFormat::kVtp, "vtp"}, std::pair{MeshFormat::kGii, "gii"},
       std::pair{MeshFormat::kZip, "zip"}};
+};
+
+template <>
+struct Names<GlbCodec> {
+  static constexpr std::array kTable = {std::pair{GlbCodec::kDraco, "draco"},
+                                        std::pair{GlbCodec::kMeshopt, "meshopt"}};
+};
+
+template <>
+struct Names<Space> {
+  static constexpr std::array kTable = {std::pair{Space::kLps, "lps"},
+                                        std::pair{Space::kRas, "ras"}};
 };
 
 template <>
@@ -137,15 +151,25 @@ JobParameters label_parameters(LabelChoice labels) {
   return parameters;
 }
 
+Space space_of(MeshFormat format, const MeshParameters& parameters) {
+  if (format == MeshFormat::kGii) return Space::kRas;
+  if (format == MeshFormat::kGlb) return Space::kLps;
+  return parameters.space;
+}
+
 bool holds_all_labels(MeshFormat format) {
   switch (format) {
     case MeshFormat::kGlb:
     case MeshFormat::kPly:
     case MeshFormat::kObj:
     case MeshFormat::k3mf:
+    case MeshFormat::kVtk:
+    case MeshFormat::kVtp:
       return true;
     case MeshFormat::kDrc:
     case MeshFormat::kStl:
+    case MeshFormat::kOff:
+    case MeshFormat::kGii:
     case MeshFormat::kZip:
       break;
   }
@@ -183,6 +207,8 @@ std::string_view to_string(NiftiForm value) { return name_of(value); }
 std::string_view to_string(Interpolation value) { return name_of(value); }
 std::string_view to_string(Smoothing value) { return name_of(value); }
 std::string_view to_string(MeshFormat value) { return name_of(value); }
+std::string_view to_string(GlbCodec value) { return name_of(value); }
+std::string_view to_string(Space value) { return name_of(value); }
 std::string_view to_string(Priority value) { return name_of(value); }
 std::string_view to_string(JobState value) { return name_of(value); }
 std::string_view to_string(Stage value) { return name_of(value); }
@@ -202,6 +228,8 @@ template std::optional<NiftiForm> from_string(std::string_view);
 template std::optional<Interpolation> from_string(std::string_view);
 template std::optional<Smoothing> from_string(std::string_view);
 template std::optional<MeshFormat> from_string(std::string_view);
+template std::optional<GlbCodec> from_string(std::string_view);
+template std::optional<Space> from_string(std::string_view);
 template std::optional<Priority> from_string(std::string_view);
 template std::optional<JobState> from_string(std::string_view);
 template std::optional<Stage> from_string(std::string_view);
@@ -219,6 +247,8 @@ template std::vector<NiftiForm> values_of();
 template std::vector<Interpolation> values_of();
 template std::vector<Smoothing> values_of();
 template std::vector<MeshFormat> values_of();
+template std::vector<GlbCodec> values_of();
+template std::vector<Space> values_of();
 template std::vector<Priority> values_of();
 
 template <class Enum>
@@ -237,6 +267,8 @@ template std::string names_of<NiftiForm>();
 template std::string names_of<Interpolation>();
 template std::string names_of<Smoothing>();
 template std::string names_of<MeshFormat>();
+template std::string names_of<GlbCodec>();
+template std::string names_of<Space>();
 template std::string names_of<Priority>();
 template std::string names_of<JobState>();
 template std::string names_of<WaitingFor>();

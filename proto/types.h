@@ -183,6 +183,8 @@ struct UploadedVolume {
 enum class Scheme { kFive = 5, kSix = 6 };  // tetrahedra per cell
 enum class Interpolation { kLinear, kMidpoint };
 enum class Smoothing { kLaplacian, kTaubin };
+enum class GlbCodec { kDraco, kMeshopt };  // KHR_draco_mesh_compression, EXT_meshopt_compression
+enum class Space { kLps, kRas };           // which ways x, y and z of a file's coordinates run
 enum class Priority { kStat, kRoutine, kBulk };  // claimed in this order
 
 struct DracoParameters {
@@ -229,7 +231,7 @@ struct MeshParameters {
   ComponentFilter components;
   std::vector<MeshFormat> formats = {MeshFormat::kDrc};
   DracoParameters draco;
-  bool normals = false;    // in glb
+  bool normals = true;     // in glb
   bool distances = false;  // in glb: each vertex's to the surface as it was extracted
   // How far the files may be from the surface as it was extracted; empty: as far as the other
   // parameters let them.
@@ -237,6 +239,9 @@ struct MeshParameters {
   std::optional<std::uint32_t> triangles = {};  // at most so many; empty: all
   std::vector<double> lods = {};  // in glb: levels of detail, as shares of the triangles
   static constexpr std::size_t kMostLods = 8;
+  bool merge = false;  // in glb: one primitive for each surface and level
+  GlbCodec glb_codec = GlbCodec::kDraco;
+  Space space = Space::kLps;     // of files whose format leaves it open
   std::optional<Box> crop = {};  // empty: the whole volume
   bool fill_cavities = false;
   // Of a job by labels, which has no iso-value and no interpolation: its vertices lie half-way.
@@ -263,6 +268,10 @@ struct JobParameters : MeshParameters {
 // A job by labels with the defaults that such a job has; those of a job at an iso-value are the
 // structure's own.
 JobParameters label_parameters(LabelChoice labels);
+
+// The space of the coordinates in a file of that format: GIFTI's is RAS, GLB has its own node for
+// it, and the others follow the parameter.
+Space space_of(MeshFormat format, const MeshParameters& parameters);
 
 // Whether one file of that format holds all labels.
 bool holds_all_labels(MeshFormat format);
@@ -381,6 +390,8 @@ std::string_view to_string(NiftiForm value);
 std::string_view to_string(Interpolation value);
 std::string_view to_string(Smoothing value);
 std::string_view to_string(MeshFormat value);
+std::string_view to_string(GlbCodec value);
+std::string_view to_string(Space value);
 std::string_view to_string(Priority value);
 std::string_view to_string(JobState value);
 std::string_view to_string(Stage value);
@@ -396,6 +407,8 @@ extern template std::optional<NiftiForm> from_string(std::string_view);
 extern template std::optional<Interpolation> from_string(std::string_view);
 extern template std::optional<Smoothing> from_string(std::string_view);
 extern template std::optional<MeshFormat> from_string(std::string_view);
+extern template std::optional<GlbCodec> from_string(std::string_view);
+extern template std::optional<Space> from_string(std::string_view);
 extern template std::optional<Priority> from_string(std::string_view);
 extern template std::optional<JobState> from_string(std::string_view);
 extern template std::optional<Stage> from_string(std::string_view);
@@ -410,6 +423,8 @@ extern template std::vector<NiftiForm> values_of();
 extern template std::vector<Interpolation> values_of();
 extern template std::vector<Smoothing> values_of();
 extern template std::vector<MeshFormat> values_of();
+extern template std::vector<GlbCodec> values_of();
+extern template std::vector<Space> values_of();
 extern template std::vector<Priority> values_of();
 
 // All names of an enumeration as a person reads them: `"stat", "routine" or "bulk"`.
@@ -421,6 +436,8 @@ extern template std::string names_of<SampleType>();
 extern template std::string names_of<Interpolation>();
 extern template std::string names_of<Smoothing>();
 extern template std::string names_of<MeshFormat>();
+extern template std::string names_of<GlbCodec>();
+extern template std::string names_of<Space>();
 extern template std::string names_of<Priority>();
 extern template std::string names_of<JobState>();
 extern template std::string names_of<WaitingFor>();

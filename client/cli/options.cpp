@@ -347,9 +347,10 @@ class Parser {
       }
       const bool holds_one = !holds_all_labels(output.format) && output.format != MeshFormat::kZip;
       if (labels && holds_one && labels->values.size() != 1) {
-        throw EarlyExit(kWrongUsage, "-o: " + file +
-                                         " would hold one label; .glb, .ply and .obj hold all, "
-                                         ".zip a file of each\n");
+        throw EarlyExit(kWrongUsage,
+                        "-o: " + file +
+                            " would hold one label; .glb, .3mf, .ply, .obj, .vtk and .vtp "
+                            "hold all, .zip a file of each\n");
       }
     }
   }

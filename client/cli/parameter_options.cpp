@@ -77,7 +77,15 @@ class ParameterOptions {
 
   CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
                         const std::string& help, bool& value) {
-    return app_.add_flag(name, value, help);
+    CLI::Option* on = app_.add_flag(name, value, help + (value ? " (default)" : ""));
+    if (value) {
+      const std::string off = "--no-" + name.substr(2);
+      app_.add_flag_callback(
+              off, [&value] { value = false; }, "The opposite of " + name)
+          ->excludes(on)
+          ->group("Job");
+    }
+    return on;
   }
 
   CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,

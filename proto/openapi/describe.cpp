@@ -372,7 +372,8 @@ std::string formats() {
   Yaml yaml(2);
   yaml.under("MeshFormat", [&] {
     yaml.text("description",
-              "A mesh file's format and suffix. STL and PLY are binary. `zip` is for labels: it "
+              "A mesh file's format and suffix. STL, PLY and VTK are binary. `vtk` is VTK's legacy "
+              "file, `vtp` its XML file, `gii` GIFTI. `zip` is for labels: it "
               "holds one file of each label, in the other formats that are asked for, `glb` "
               "and `3mf` aside, or in STL.");
     yaml.line("type: string");

@@ -99,24 +99,28 @@ DracoStream DracoEncoder::encode_block(const mesh::Mesh& mesh, const Block& bloc
 }
 
 DracoStream DracoEncoder::encode_whole(const mesh::Mesh& mesh, const DracoOptions& options,
-                                       const mesh::Context& context) {
-  const Part part = {
-      mesh.positions.span(), {}, mesh.triangles.span(), mesh.layer_vertices, mesh.layer_triangles};
-  return encode(part, options, edgebreaker::Threads::kAll, context);
+                                       const VertexData& data, const mesh::Context& context) {
+  const Part part = {mesh.positions.span(), data, mesh.triangles.span(), mesh.layer_vertices,
+                     mesh.layer_triangles};
+  DracoStream stream = encode(part, options, edgebreaker::Threads::kAll, context);
+  set_bounds(part.positions, options.grid, stream);
+  return stream;
 }
 
 // The one place that decides who encodes.
 DracoStream DracoEncoder::encode(const Part& part, const DracoOptions& options,
                                  edgebreaker::Threads threads, const mesh::Context& context) {
   most_triangles_ = std::max(most_triangles_, part.triangles.size());
-  if (is_own_draco({options.grid.bits, options.speed}) && part.data.empty()) {
-    auto encoded =
-        encoder_.encode({part.positions, part.triangles, part.layer_vertices, part.layer_triangles},
-                        options.grid, threads, context);
+  if (is_own_draco({options.grid.bits, options.speed}) && part.data.distances.empty()) {
+    auto encoded = encoder_.encode({part.positions, part.triangles, part.layer_vertices,
+                                    part.layer_triangles, part.data.normals},
+                                   options.grid, threads, context);
     if (encoded) {
       return {.bytes = std::move(encoded->bytes),
               .vertices = encoded->vertices,
               .triangles = static_cast<std::uint32_t>(part.triangles.size()),
+              .position_id = edgebreaker::kPositionId,
+              .normal_id = edgebreaker::kNormalId,
               .topology = std::move(encoded->topology)};
     }
   }

@@ -66,8 +66,8 @@ struct DracoOptions {
 
 // Encodes blocks of a mesh, or all of it, one after the other in memory that it keeps. Our own
 // encoder takes what it covers at the speeds 5 to 9: see draco/encoder.h. libdraco takes the rest:
-// the slower speeds, whose streams are smaller, speed 10, which is sequential, normals and
-// distances, finer grids, and surfaces that are no oriented manifolds. Not thread safe. Throws
+// the slower speeds, whose streams are smaller, speed 10, which is sequential, distances, finer
+// grids, and surfaces that are no oriented manifolds. Not thread safe. Throws
 // Error kInternal when libdraco refuses, and kCancelled, which libdraco does not look at.
 class DracoEncoder {
  public:
@@ -76,10 +76,10 @@ class DracoEncoder {
   DracoStream encode_block(const mesh::Mesh& mesh, const Block& block, const DracoOptions& options,
                            const VertexData& data, const mesh::Context& context);
 
-  // All triangles with the vertices they name. The stream's bounds are left out. Our own encoder
-  // takes several threads, and gives the same bytes on any number.
+  // All triangles with the vertices they name, which are all vertices. Our own encoder takes
+  // several threads, and gives the same bytes on any number.
   DracoStream encode_whole(const mesh::Mesh& mesh, const DracoOptions& options,
-                           const mesh::Context& context);
+                           const VertexData& data, const mesh::Context& context);
 
   // Of those that it has encoded at once: its memory follows from it.
   std::size_t most_triangles() const { return most_triangles_; }

@@ -17,7 +17,7 @@ std::optional<mesh::Topology> encode_drc(const mesh::Mesh& mesh, const DracoPara
   const DracoOptions options = {grid == nullptr ? grid_of(mesh, draco.position_bits) : *grid,
                                 draco.speed};
   auto encoder = Encoders::instance().take(mesh.triangles.size());
-  DracoStream stream = encoder->encode_whole(mesh, options, {context.stop, nullptr});
+  DracoStream stream = encoder->encode_whole(mesh, options, {}, {context.stop, nullptr});
   Encoders::instance().give_back(std::move(encoder));
   context.throw_if_stopped();
   sink(stream.bytes);

@@ -51,8 +51,13 @@ constexpr std::array kFormats = {
                  // vertices lie in two layers.
                  constexpr std::uint64_t kLibdracoPerTriangle = 100;
                  constexpr std::uint64_t kOwnPerTriangle = 75;
-                 return surface.triangles *
-                        (is_own_draco(parameters.draco) ? kOwnPerTriangle : kLibdracoPerTriangle);
+                 const std::uint64_t turned = parameters.space == Space::kLps
+                                                  ? 0
+                                                  : surface.triangles * sizeof(mesh::Triangle) +
+                                                        surface.vertices * sizeof(mesh::Vec3);
+                 return turned + surface.triangles * (is_own_draco(parameters.draco)
+                                                          ? kOwnPerTriangle
+                                                          : kLibdracoPerTriangle);
                },
            .shows_topology = if_ours},
     Format{.format = MeshFormat::kGlb,
@@ -63,17 +68,24 @@ constexpr std::array kFormats = {
                  // Of a vertex; measured.
                  constexpr double kNormalBytes = 1.5;
                  constexpr double kDistanceBytes = 1.5;
+                 constexpr double kMeshoptBytes = 7;
                  double more = 0;
                  if (parameters.normals) more += kNormalBytes;
                  if (parameters.distances) more += kDistanceBytes;
+                 const double surface_bytes = parameters.glb_codec == GlbCodec::kMeshopt
+                                                  ? kMeshoptBytes
+                                                  : draco_bytes_per_vertex(2.7, parameters);
                  return 2000 + as_double(surface.vertices) * levels_of(parameters) *
-                                   (draco_bytes_per_vertex(2.7, parameters) + more);
+                                   (surface_bytes + more);
                },
            .memory_bytes =
                [](const SurfaceSize& surface, const MeshParameters& parameters) {
                  // Measured: its parts and their bytes.
                  constexpr std::uint64_t kPerTriangle = 15;
                  constexpr std::uint64_t kNormalsPerTriangle = 8;
+                 // Arrays of all vertices and triangles of a primitive.
+                 constexpr std::uint64_t kMeshoptPerTriangle = 40;
+                 constexpr std::uint64_t kMergedPerTriangle = 75;
                  // A copy of the surface, and its simplification.
                  constexpr std::uint64_t kLevelsPerTriangle = 130;
                  std::uint64_t bytes = surface.triangles * kPerTriangle;
@@ -81,13 +93,18 @@ constexpr std::array kFormats = {
                    bytes += surface.vertices * sizeof(mesh::Vec3) +
                             surface.triangles * kNormalsPerTriangle;
                  }
+                 if (parameters.glb_codec == GlbCodec::kMeshopt) {
+                   bytes += surface.triangles * kMeshoptPerTriangle;
+                 }
+                 if (parameters.merge) bytes += surface.triangles * kMergedPerTriangle;
                  if (parameters.distances) bytes += surface.vertices * 2 * sizeof(float);
                  if (parameters.lods.size() > 1) bytes += surface.triangles * kLevelsPerTriangle;
                  return bytes;
                },
            .shows_topology =
                [](const MeshParameters& parameters) {
-                 return if_ours(parameters) && !parameters.normals && !parameters.distances;
+                 return parameters.glb_codec == GlbCodec::kDraco && if_ours(parameters) &&
+                        !parameters.distances;
                }},
     Format{.format = MeshFormat::kStl,
            .media_type = "model/stl",
@@ -128,6 +145,44 @@ constexpr std::array kFormats = {
                  return parameters.labels ? surface.triangles * kLabelPerTriangle : 0;
                },
            .shows_topology = always},
+    Format{.format = MeshFormat::kOff,
+           .media_type = kUnregistered,
+           .milliseconds_per_triangle = 2.0e-4,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters&) {
+                 return 100 + 28 * as_double(surface.vertices) + 24 * as_double(surface.triangles);
+               },
+           .memory_bytes = no_memory,
+           .shows_topology = never},
+    Format{.format = MeshFormat::kVtk,
+           .media_type = kUnregistered,
+           .milliseconds_per_triangle = 3.0e-5,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 return 200 + 12 * as_double(surface.vertices) +
+                        (parameters.labels ? 20 : 16) * as_double(surface.triangles);
+               },
+           .memory_bytes = no_memory,
+           .shows_topology = never},
+    Format{.format = MeshFormat::kVtp,
+           .media_type = kUnregistered,
+           .milliseconds_per_triangle = 3.0e-5,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters& parameters) {
+                 return 4000 + 12 * as_double(surface.vertices) +
+                        (parameters.labels ? 20 : 16) * as_double(surface.triangles);
+               },
+           .memory_bytes = no_memory,
+           .shows_topology = never},
+    Format{.format = MeshFormat::kGii,
+           .media_type = kUnregistered,
+           .milliseconds_per_triangle = 6.0e-5,
+           .bytes =
+               [](const SurfaceSize& surface, const MeshParameters&) {
+                 return 2500 + 16 * as_double(surface.vertices) + 16 * as_double(surface.triangles);
+               },
+           .memory_bytes = no_memory,
+           .shows_topology = never},
     Format{.format = MeshFormat::kZip,
            .media_type = "application/zip",
            .milliseconds_per_triangle = 3.0e-5,

@@ -28,7 +28,7 @@ struct Grid;  // draco/grid.h
 // Takes the encoded bytes, in order; may throw, which ends the encoding.
 using Sink = std::function<void(std::span<const std::byte>)>;
 
-// Whether oriented manifolds without normals are encoded by our own Draco encoder with these
+// Whether oriented manifolds without distances are encoded by our own Draco encoder with these
 // parameters, and not by libdraco, which takes everything else.
 bool is_own_draco(const DracoParameters& draco);
 
@@ -43,20 +43,31 @@ std::optional<mesh::Topology> encode_drc(const mesh::Mesh& mesh, const DracoPara
                                          const mesh::Context& context, const Sink& sink,
                                          const Grid* grid = nullptr);
 
-// STL, PLY and OBJ are written as they go, in some megabytes of memory, formatted side by side. The
-// bytes do not depend on the number of threads.
+// All formats but Draco, GLB and ZIP are written as they go, in some megabytes of memory, formatted
+// side by side. Their bytes do not depend on the number of threads. Positions are millimetres.
 
-// Binary STL, millimetres in LPS, normals from the winding. Throws Error kTooLarge beyond 2^32 - 1
+// Binary STL, normals from the winding. Throws Error kTooLarge beyond 2^32 - 1
 // triangles, and kCancelled.
-void encode_stl(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink);
+void encode_stl(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+                const Sink& sink);
 
-// Binary little-endian PLY, millimetres in LPS: vertices as floats, faces as lists of unsigned
-// 32-bit indices. Throws Error kCancelled.
-void encode_ply(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink);
+// Binary little-endian PLY: vertices as floats, faces as lists of unsigned 32-bit indices. Throws
+// Error kCancelled.
+void encode_ply(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+                const Sink& sink);
 
-// OBJ, millimetres in LPS: numbers as the shortest text that reads as the same float. Throws Error
-// kCancelled.
-void encode_obj(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink);
+// OBJ: numbers as the shortest text that reads as the same float. Throws Error kCancelled.
+void encode_obj(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+                const Sink& sink);
+
+// Geomview's OFF, as text: numbers as in OBJ. Throws Error kCancelled.
+void encode_off(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+                const Sink& sink);
+
+// VTK's legacy file of polygonal data, binary, which is big-endian. Throws Error kTooLarge beyond
+// 2^31 - 1 vertices or corners of triangles, and kCancelled.
+void encode_vtk(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+                const Sink& sink);
 
 // What a file says about where its mesh comes from, and all that its bytes follow from beside the
 // samples: no owner, no host, nothing of the job that asked.
@@ -68,6 +79,17 @@ struct Provenance {
   Geometry geometry;
   std::vector<Note> notes;  // of the volume, those that stand in meshes
 };
+
+// VTK's XML file of polygonal data, its arrays appended as they are; the field data has the space
+// and what asset.extras of GLB has. Throws as encode_vtk does.
+void encode_vtp(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
+                const Sink& sink);
+
+// GIFTI 1.0 (Harwell and others, "GIFTI Surface Data Format", 2011): a surface in scanner
+// coordinates, RAS, its arrays in base64; an empty surface is a file without arrays. The metadata
+// has what asset.extras of GLB has. Throws as encode_vtk does.
+void encode_gii(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
+                const Sink& sink);
 
 // Binary glTF 2.0: the mesh as one primitive for each block of some 100 000 triangles, each a Draco
 // stream of its own (KHR_draco_mesh_compression), encoded side by side. All share one quantisation

@@ -5,32 +5,19 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <set>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/codec/block_writer.h"
+#include "server/codec/faces.h"
 #include "server/codec/records.h"
 
 namespace isomesh::codec {
 namespace {
 
 constexpr std::size_t kFaceBytes = kPlyFaceBytes + sizeof(std::uint32_t);
-
-std::size_t faces_of(const LabelledSurface& surface) {
-  std::size_t faces = 0;
-  for (std::size_t n = 1; n <= surface.labels.size(); ++n) faces += surface.triangles.of(n).size();
-  return faces;
-}
-
-// Of the label's own surface, turned outward.
-mesh::Triangle face_of(const LabelledSurface& surface, std::size_t number, std::uint32_t triangle) {
-  const mesh::Triangle& wall = surface.walls.mesh.triangles[triangle];
-  const bool is_inside_out =
-      surface.walls.parts.belongs(surface.walls.sides[triangle].front, number);
-  return is_inside_out ? mesh::Triangle{wall[0], wall[2], wall[1]} : wall;
-}
 
 // One colour of the series after the other is a golden section of the circle of hues away.
 std::array<double, 3> series_color(std::int64_t label) {
@@ -79,48 +66,46 @@ std::array<double, 3> color_of(const LabelSummary& label) {
   return color;
 }
 
-void encode_labels_ply(const LabelledSurface& surface, const mesh::Context& context,
+void encode_labels_ply(const LabelledSurface& surface, Space space, const mesh::Context& context,
                        const Sink& sink) {
   context.throw_if_stopped();
   const mesh::Mesh& mesh = surface.walls.mesh;
-  const std::size_t faces = faces_of(surface);
-  const bool is_wide = !surface.labels.empty() &&
-                       surface.labels.back().label > std::numeric_limits<std::int32_t>::max();
-  const std::string header = ply_header(mesh.positions.size(), faces,
-                                        is_wide ? "property uint label\n" : "property int label\n");
+  const std::vector<FaceRun> runs = faces_of(surface);
+  const std::size_t faces = count_of(runs);
+  const std::string header =
+      ply_header(space, mesh.positions.size(), faces,
+                 has_wide_labels(surface) ? "property uint label\n" : "property int label\n");
   sink(std::as_bytes(std::span(header)));
   BlockWriter writer(context, sink, mesh.positions.size() + faces);
   writer.write(mesh.positions.size(), kPlyVertexBytes, [&](std::size_t v, std::byte* out) {
-    return write_ply_vertex(mesh.positions[v], out);
+    return write_ply_vertex(in_space(mesh.positions[v], space), out);
   });
-  for (std::size_t n = 1; n <= surface.labels.size(); ++n) {
-    const auto label = static_cast<std::uint32_t>(surface.labels[n - 1].label);  // or of an int
-    const auto own = surface.triangles.of(n);
-    writer.write(own.size(), kFaceBytes, [&](std::size_t t, std::byte* out) {
-      out = write_ply_face(face_of(surface, n, own[t]), out);
-      std::memcpy(out, &label, sizeof label);
-      return out + sizeof label;
+  for (const FaceRun& run : runs) {
+    writer.write(run.count, kFaceBytes, [&](std::size_t t, std::byte* out) {
+      out = write_ply_face(run.at(t), out);
+      std::memcpy(out, &run.label, sizeof run.label);
+      return out + sizeof run.label;
     });
   }
 }
 
-void encode_labels_obj(const LabelledSurface& surface, const mesh::Context& context,
+void encode_labels_obj(const LabelledSurface& surface, Space space, const mesh::Context& context,
                        const Sink& sink) {
   context.throw_if_stopped();
   const mesh::Mesh& mesh = surface.walls.mesh;
-  sink(std::as_bytes(std::span(kObjHeader)));
-  BlockWriter writer(context, sink, mesh.positions.size() + faces_of(surface));
+  const std::string header = obj_header(space);
+  sink(std::as_bytes(std::span(header)));
+  const std::vector<FaceRun> runs = faces_of(surface);
+  BlockWriter writer(context, sink, mesh.positions.size() + count_of(runs));
   writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
-    return write_obj_vertex(mesh.positions[v], out);
+    return write_obj_vertex(in_space(mesh.positions[v], space), out);
   });
   std::set<std::string> groups;
-  for (std::size_t n = 1; n <= surface.labels.size(); ++n) {
-    const std::string line = "g " + group_of(surface.labels[n - 1], groups) + '\n';
+  for (std::size_t n = 0; n < runs.size(); ++n) {
+    const std::string line = "g " + group_of(surface.labels[n], groups) + '\n';
     sink(std::as_bytes(std::span(line)));
-    const auto own = surface.triangles.of(n);
-    writer.write(own.size(), kMostObjFaceBytes, [&](std::size_t t, std::byte* out) {
-      return write_obj_face(face_of(surface, n, own[t]), out);
-    });
+    writer.write(runs[n].count, kMostObjFaceBytes,
+                 [&](std::size_t t, std::byte* out) { return write_obj_face(runs[n].at(t), out); });
   }
 }
 

@@ -43,14 +43,22 @@ void encode_labels_glb(const LabelledSurface& surface, const Provenance& provena
 // Binary PLY as encode_ply makes it, with an int property `label` of faces. Every label's surface
 // is there whole and turned outward: a face between two labels is there for each of them. Throws
 // Error kCancelled.
-void encode_labels_ply(const LabelledSurface& surface, const mesh::Context& context,
+void encode_labels_ply(const LabelledSurface& surface, Space space, const mesh::Context& context,
                        const Sink& sink);
 
 // OBJ as encode_obj makes it, with a group of faces for each label, which has its title, blanks
 // replaced; where titles are alike, with its value behind it. As in PLY every label's surface is
 // there whole. Throws Error kCancelled.
-void encode_labels_obj(const LabelledSurface& surface, const mesh::Context& context,
+void encode_labels_obj(const LabelledSurface& surface, Space space, const mesh::Context& context,
                        const Sink& sink);
+
+// VTK's legacy file and its XML file as encode_vtk and encode_vtp make them, with the label of each
+// triangle as the cell data `label`. As in PLY every label's surface is there whole. Throw as those
+// do.
+void encode_labels_vtk(const LabelledSurface& surface, Space space, const mesh::Context& context,
+                       const Sink& sink);
+void encode_labels_vtp(const LabelledSurface& surface, const Provenance& provenance,
+                       const mesh::Context& context, const Sink& sink);
 
 // A format's encoder of all labels, for those of which one file holds them. Throws Error kInternal
 // for others, and as that encoder does. A part of the target isomesh_zip.

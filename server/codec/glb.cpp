@@ -51,34 +51,48 @@ struct Distances {
   float most = 0;
 };
 
-std::vector<DracoStream> encode_chunks(const mesh::Mesh& mesh, const Distances& distances,
-                                       const Grid& grid, const MeshParameters& parameters,
-                                       const mesh::Context& context) {
+GlbLevel encode_level(double share, const mesh::Mesh& mesh, const Distances& distances,
+                      const Grid& grid, const MeshParameters& parameters,
+                      const mesh::Context& context) {
+  GlbLevel level = {.share = share};
+  if (mesh.triangles.size() == 0) return level;
   const DracoOptions options = {grid, parameters.draco.speed};
   const mesh::Context quiet = {context.stop, nullptr};
   // Of the whole mesh, so that they are the same on both sides of a seam.
   mesh::Buffer<mesh::Vec3> normals;
   if (parameters.normals) vertex_normals(mesh, quiet, normals);
   const VertexData data = {std::as_const(normals).span(), distances.values.span(), distances.most};
-  const std::vector<Block> blocks = cut_blocks(mesh, kTrianglesPerBlock);
-  std::vector<DracoStream> chunks(blocks.size());
+  const std::vector<Block> blocks = parameters.merge
+                                        ? std::vector<Block>{{{0, mesh.triangles.size()}}}
+                                        : cut_blocks(mesh, kTrianglesPerBlock);
+  if (parameters.glb_codec == GlbCodec::kMeshopt) {
+    level.arrays.resize(blocks.size());
+    mesh::parallel_for(context, blocks.size(), [&](std::size_t i) {
+      level.arrays[i] = encode_with_meshopt(mesh, blocks[i], grid, data);
+    });
+    return level;
+  }
+  level.streams.resize(blocks.size());
   Encoders& encoders = Encoders::instance();
   mesh::parallel_for(context, blocks.size(), [&](std::size_t i) {
-    auto encoder = encoders.take(kTrianglesPerBlock);
-    chunks[i] = encoder->encode_block(mesh, blocks[i], options, data, quiet);
+    auto encoder = encoders.take(parameters.merge ? mesh.triangles.size() : kTrianglesPerBlock);
+    level.streams[i] = parameters.merge
+                           ? encoder->encode_whole(mesh, options, data, quiet)
+                           : encoder->encode_block(mesh, blocks[i], options, data, quiet);
     encoders.give_back(std::move(encoder));
   });
-  return chunks;
+  return level;
 }
 
 void write_words(const Sink& sink, std::initializer_list<std::uint32_t> words) {
   sink(std::as_bytes(std::span(words.begin(), words.size())));
 }
 
-void write_glb(std::span<const GlbPart> parts, const Provenance& provenance, const Sink& sink) {
+void write_glb(std::span<const GlbPart> parts, const Grid& grid, const Provenance& provenance,
+               const Sink& sink) {
   const GlbLayout layout(parts);
   const std::size_t binary_bytes = layout.bytes();
-  std::string json = glb_document(parts, layout, provenance).dump();
+  std::string json = glb_document(parts, layout, grid, provenance).dump();
   json.resize(glb_padded(json.size()), ' ');
 
   constexpr std::size_t kHeaderBytes = 12;
@@ -95,10 +109,10 @@ void write_glb(std::span<const GlbPart> parts, const Provenance& provenance, con
   write_words(sink, {static_cast<std::uint32_t>(binary_bytes), kBinaryChunk});
   constexpr std::array<std::byte, kGlbAlignment> kZeros = {};
   for (const GlbLevel* level : layout.order()) {
-    for (const DracoStream& chunk : level->chunks) {
-      sink(chunk.bytes);
-      sink(std::span(kZeros).first(glb_padded(chunk.bytes.size()) - chunk.bytes.size()));
-    }
+    level->for_each_chunk([&](std::span<const std::byte> bytes) {
+      sink(bytes);
+      sink(std::span(kZeros).first(glb_padded(bytes.size()) - bytes.size()));
+    });
   }
 }
 
@@ -164,7 +178,7 @@ void add_levels(const LabelledSurface& surface, double share, const Grid& grid,
     mesh::Mesh mesh;
     extract_label(surface.walls, surface.triangles, n + 1, mesh);
     const Distances own = parameters.distances ? of_label(of_walls, surface, n + 1) : Distances();
-    parts[n].add_level({share, encode_chunks(mesh, own, grid, parameters, quiet)});
+    parts[n].add_level(encode_level(share, mesh, own, grid, parameters, quiet));
   });
 }
 
@@ -175,25 +189,25 @@ std::optional<mesh::Topology> encode_glb(const mesh::Mesh& mesh, const Provenanc
                                          const mesh::TriangleGrid* extracted) {
   const MeshParameters& parameters = provenance.parameters;
   const auto shares = coarser_shares(parameters);
-  const auto encode_level = [&](const mesh::Mesh& level, const Grid& grid,
-                                const mesh::Context& progress) {
+  const auto level_of = [&](double share, const mesh::Mesh& level, const Grid& grid,
+                            const mesh::Context& progress) {
     const Distances distances(level, parameters, extracted, progress);
-    return encode_chunks(level, distances, grid, parameters, progress);
+    return encode_level(share, level, distances, grid, parameters, progress);
   };
   const Grid grid = grid_of(mesh, parameters.draco.position_bits);
   GlbPart part = {.name = "surface", .material = "neutral"};
   const LevelProgress finest(context, 0, shares.size() + 1);
-  part.add_level({1, encode_level(mesh, grid, finest.encode)});
+  part.add_level(level_of(1, mesh, grid, finest.encode));
   mesh::Mesh coarse;
   if (!shares.empty()) coarse = copy_of(mesh);
   for (std::size_t n = 0; n < shares.size(); ++n) {
     const LevelProgress progress(context, n + 1, shares.size() + 1);
     coarsen(count_of(shares[n], mesh), progress.simplify, coarse);
-    part.add_level({shares[n], encode_level(coarse, grid, progress.encode)});
+    part.add_level(level_of(shares[n], coarse, grid, progress.encode));
   }
-  write_glb({&part, 1}, provenance, sink);
-  if (part.levels.empty()) return std::nullopt;
-  return topology_of(mesh, part.levels.front().chunks, {context.stop, nullptr});
+  write_glb({&part, 1}, grid, provenance, sink);
+  if (part.levels.empty() || part.levels.front().streams.empty()) return std::nullopt;
+  return topology_of(mesh, part.levels.front().streams, {context.stop, nullptr});
 }
 
 void encode_labels_glb(const LabelledSurface& surface, const Provenance& provenance,
@@ -214,7 +228,7 @@ void encode_labels_glb(const LabelledSurface& surface, const Provenance& provena
     add_levels({coarse, triangles, surface.labels, surface.extracted}, shares[n], grid, parameters,
                progress.encode, parts);
   }
-  write_glb(parts, provenance, sink);
+  write_glb(parts, grid, provenance, sink);
 }
 
 }  // namespace isomesh::codec

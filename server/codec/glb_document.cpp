@@ -1,6 +1,8 @@
 #include "server/codec/glb_document.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "server/codec/provenance_json.h"
 
@@ -10,12 +12,18 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
+constexpr const char* kMeshoptExtension = "EXT_meshopt_compression";
+constexpr const char* kQuantizationExtension = "KHR_mesh_quantization";
 constexpr const char* kLodExtension = "MSFT_lod";
 // Of an application's own, which glTF has begin with an underscore.
 constexpr const char* kDistanceAttribute = "_DISTANCE_MM";
 // Of glTF's specification, sections 3.4 and 3.6.2.
+constexpr int kByte = 5120;
+constexpr int kUnsignedShort = 5123;
 constexpr int kUnsignedInt = 5125;
 constexpr int kFloat = 5126;
+constexpr int kArrayBuffer = 34962;
+constexpr int kElementArrayBuffer = 34963;
 
 // One primitive of the last mesh, with the accessors and the buffer view that it names.
 void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset,
@@ -49,19 +57,114 @@ void add_primitive(Json& gltf, const DracoStream& chunk, std::size_t offset,
        {"extensions", {{kDracoExtension, {{"bufferView", view}, {"attributes", attributes}}}}}});
 }
 
+// One array of the last chunk as a view: of the second buffer, which is nowhere, for readers that
+// unpack it from the first. Returns its number.
+std::size_t add_view(Json& gltf, const MeshoptArray& array, std::size_t offset) {
+  const bool is_indices = array.kind == MeshoptArray::Kind::kIndices;
+  const std::size_t bytes = array.count * array.stride;
+  Json& unpacked = gltf["buffers"][1]["byteLength"];
+  const auto begin = unpacked.get<std::size_t>();
+  unpacked = begin + glb_padded(bytes);
+  Json packed = {{"buffer", 0},
+                 {"byteOffset", offset + array.begin},
+                 {"byteLength", array.bytes},
+                 {"byteStride", array.stride},
+                 {"count", array.count},
+                 {"mode", is_indices ? "TRIANGLES" : "ATTRIBUTES"}};
+  if (array.kind == MeshoptArray::Kind::kNormals) packed["filter"] = "OCTAHEDRAL";
+  Json view = {{"buffer", 1}, {"byteOffset", begin}, {"byteLength", bytes}};
+  if (!is_indices) view["byteStride"] = array.stride;
+  view["target"] = is_indices ? kElementArrayBuffer : kArrayBuffer;
+  view["extensions"] = {{kMeshoptExtension, packed}};
+  gltf["bufferViews"].push_back(std::move(view));
+  return gltf["bufferViews"].size() - 1;
+}
+
+// As the other, of unpacked arrays.
+void add_primitive(Json& gltf, const MeshoptChunk& chunk, std::size_t offset) {
+  Json attributes = Json::object();
+  std::size_t indices = 0;
+  for (const MeshoptArray& array : chunk.arrays) {
+    const std::size_t number = gltf["accessors"].size();
+    Json accessor = {{"bufferView", add_view(gltf, array, offset)}};
+    const auto describe = [&](int type, const char* shape) {
+      accessor["componentType"] = type;
+      accessor["count"] = array.count;
+      accessor["type"] = shape;
+    };
+    switch (array.kind) {
+      case MeshoptArray::Kind::kPositions:
+        describe(array.stride == sizeof(mesh::Vec3) ? kFloat : kUnsignedShort, "VEC3");
+        accessor["min"] = chunk.low;
+        accessor["max"] = chunk.high;
+        attributes["POSITION"] = number;
+        break;
+      case MeshoptArray::Kind::kNormals:
+        describe(kByte, "VEC3");
+        accessor["normalized"] = true;
+        attributes["NORMAL"] = number;
+        break;
+      case MeshoptArray::Kind::kDistances:
+        describe(kFloat, "SCALAR");
+        attributes[kDistanceAttribute] = number;
+        break;
+      case MeshoptArray::Kind::kIndices:
+        describe(kUnsignedInt, "SCALAR");
+        indices = number;
+        break;
+    }
+    gltf["accessors"].push_back(std::move(accessor));
+  }
+  gltf["meshes"].back()["primitives"].push_back({{"attributes", attributes},
+                                                 {"indices", indices},
+                                                 {"material", gltf["materials"].size() - 1}});
+}
+
 Json asset_of(const Provenance& provenance) {
   return {{"version", "2.0"}, {"generator", "isomesh"}, {"extras", provenance_json(provenance)}};
 }
 
 // Positions are LPS millimetres; glTF wants metres, Y up and the front towards +Z: a quarter turn
 // about x takes S to +Y and A to +Z.
+constexpr double kMetresPerMillimetre = 0.001;
+
 Json turned_node(const std::string& name) {
-  constexpr double kMetresPerMillimetre = 0.001;
   constexpr double kHalfSqrt2 = 0.70710678118654752;
   return {{"name", name},
           {"rotation", {-kHalfSqrt2, 0, 0, kHalfSqrt2}},
           {"scale", {kMetresPerMillimetre, kMetresPerMillimetre, kMetresPerMillimetre}}};
 }
+
+// Steps of a grid to LPS millimetres, where positions are that.
+class Steps {
+ public:
+  Steps(const Grid& grid, const MeshParameters& parameters)
+      : are_used_(parameters.glb_codec == GlbCodec::kMeshopt && is_on_steps(grid)),
+        low_{grid.low[0], grid.low[1], grid.low[2]},
+        step_(double{grid.side} / (std::exp2(grid.bits) - 1)) {}
+
+  // In a node that does nothing else.
+  void put_into(Json& node) const {
+    if (!are_used_) return;
+    node["translation"] = low_;
+    node["scale"] = {step_, step_, step_};
+  }
+
+  // In the turned node, before what it does.
+  void put_into_turned(Json& node) const {
+    if (!are_used_) return;
+    const double scale = step_ * kMetresPerMillimetre;
+    const auto [x, y, z] = low_;
+    node["translation"] = {x * kMetresPerMillimetre, z * kMetresPerMillimetre,
+                           -y * kMetresPerMillimetre};
+    node["scale"] = {scale, scale, scale};
+  }
+
+ private:
+  bool are_used_;
+  std::array<double, 3> low_;
+  double step_;
+};
 
 Json material_of(const GlbPart& part) {
   const auto& [red, green, blue] = part.color;
@@ -76,8 +179,12 @@ Json material_of(const GlbPart& part) {
 void add_mesh(Json& gltf, const std::string& name, const GlbLevel& level, std::size_t offset,
               const MeshParameters& parameters) {
   gltf["meshes"].push_back({{"name", name}, {"primitives", Json::array()}});
-  for (const DracoStream& chunk : level.chunks) {
+  for (const DracoStream& chunk : level.streams) {
     add_primitive(gltf, chunk, offset, parameters);
+    offset += glb_padded(chunk.bytes.size());
+  }
+  for (const MeshoptChunk& chunk : level.arrays) {
+    add_primitive(gltf, chunk, offset);
     offset += glb_padded(chunk.bytes.size());
   }
 }
@@ -149,14 +256,16 @@ GlbLayout::GlbLayout(std::span<const GlbPart> parts) : begins_(parts.size()) {
       if (level >= parts[p].levels.size()) continue;
       begins_[p][level] = bytes_;
       order_.push_back(&parts[p].levels[level]);
-      for (const DracoStream& chunk : order_.back()->chunks)
-        bytes_ += glb_padded(chunk.bytes.size());
+      order_.back()->for_each_chunk(
+          [&](std::span<const std::byte> bytes) { bytes_ += glb_padded(bytes.size()); });
     }
   }
 }
 
-Json glb_document(std::span<const GlbPart> parts, const GlbLayout& layout,
+Json glb_document(std::span<const GlbPart> parts, const GlbLayout& layout, const Grid& grid,
                   const Provenance& provenance) {
+  const bool is_draco = provenance.parameters.glb_codec == GlbCodec::kDraco;
+  const Steps steps(grid, provenance.parameters);
   Json gltf;
   gltf["asset"] = asset_of(provenance);
   gltf["scene"] = 0;
@@ -166,19 +275,30 @@ Json glb_document(std::span<const GlbPart> parts, const GlbLayout& layout,
       gltf[list] = Json::array();
     }
     gltf["buffers"] = Json::array({{{"byteLength", layout.bytes()}}});
-    gltf["extensionsUsed"] = {kDracoExtension};
-    gltf["extensionsRequired"] = {kDracoExtension};
+    Json extensions = Json::array({is_draco ? kDracoExtension : kMeshoptExtension});
+    if (!is_draco) {
+      extensions.push_back(kQuantizationExtension);
+      // Whose bytes nobody has.
+      gltf["buffers"].push_back(
+          {{"byteLength", 0}, {"extensions", {{kMeshoptExtension, {{"fallback", true}}}}}});
+    }
+    gltf["extensionsUsed"] = extensions;
+    gltf["extensionsRequired"] = extensions;
   }
   Nodes nodes(gltf, layout, provenance.parameters);
   Json all = Json::array();
   if (!provenance.parameters.labels) {
-    all.push_back(nodes.node_of(parts.front(), 0, turned_node("surface"), 1));
+    Json node = turned_node("surface");
+    steps.put_into_turned(node);
+    all.push_back(nodes.node_of(parts.front(), 0, std::move(node), 1));
   } else {
     Json root = turned_node("labels");
     all.push_back(nullptr);
     for (std::size_t n = 0; n < parts.size(); ++n) {
       root["children"].push_back(all.size());
-      all.push_back(nodes.node_of(parts[n], n, {{"name", parts[n].name}}, parts.size() + 1));
+      Json node = {{"name", parts[n].name}};
+      steps.put_into(node);
+      all.push_back(nodes.node_of(parts[n], n, std::move(node), parts.size() + 1));
     }
     all[0] = root;
   }

@@ -13,6 +13,7 @@
 
 #include "server/codec/draco_chunk.h"
 #include "server/codec/encode.h"
+#include "server/codec/meshopt_chunk.h"
 
 namespace isomesh::codec {
 
@@ -23,15 +24,24 @@ constexpr std::size_t glb_padded(std::size_t bytes) {
   return (bytes + kGlbAlignment - 1) / kGlbAlignment * kGlbAlignment;
 }
 
-// A surface with about `share` of its triangles.
+// A surface with about `share` of its triangles, in chunks of one kind or the other.
 struct GlbLevel {
   double share = 1;
-  std::vector<DracoStream> chunks = {};
+  std::vector<DracoStream> streams = {};
+  std::vector<MeshoptChunk> arrays = {};
 
   std::uint64_t triangles() const {
     std::uint64_t triangles = 0;
-    for (const DracoStream& chunk : chunks) triangles += chunk.triangles;
+    for (const DracoStream& stream : streams) triangles += stream.triangles;
+    for (const MeshoptChunk& chunk : arrays) triangles += chunk.triangles;
     return triangles;
+  }
+
+  // Calls visit(bytes) for each chunk.
+  template <class Visit>
+  void for_each_chunk(const Visit& visit) const {
+    for (const DracoStream& stream : streams) visit(std::span(stream.bytes));
+    for (const MeshoptChunk& chunk : arrays) visit(std::span(chunk.bytes));
   }
 };
 
@@ -72,8 +82,10 @@ class GlbLayout {
 };
 
 // glTF's document: of one surface, which is the turned node's own, or of one for each label, in
-// nodes below it. Coarser levels of either are nodes behind all others that MSFT_lod names.
+// nodes below it. Coarser levels of either are nodes behind all others that MSFT_lod names. Where
+// the chunks' positions are steps on the grid, the nodes that have meshes turn them into LPS
+// millimetres.
 nlohmann::ordered_json glb_document(std::span<const GlbPart> parts, const GlbLayout& layout,
-                                    const Provenance& provenance);
+                                    const Grid& grid, const Provenance& provenance);
 
 }  // namespace isomesh::codec

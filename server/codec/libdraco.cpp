@@ -13,7 +13,6 @@ namespace isomesh::codec {
 namespace {
 
 constexpr int kSequentialSpeed = 10;
-constexpr int kNormalBits = 10;  // of each octahedral coordinate: a tenth of a degree
 constexpr int kDistanceBits = 12;
 
 // Draco's entropy coder counts values in an array of all that there could be, four bytes each: 4
@@ -110,7 +109,7 @@ DracoStream encode_with_libdraco(const Arrays& arrays, const Grid& grid, int spe
   const VertexData& data = arrays.data;
   if (!data.normals.empty()) {
     stream.normal_id = add_attribute(*draco_mesh, draco::GeometryAttribute::NORMAL, data.normals);
-    encoder.SetAttributeQuantization(draco::GeometryAttribute::NORMAL, kNormalBits);
+    encoder.SetAttributeQuantization(draco::GeometryAttribute::NORMAL, edgebreaker::kNormalBits);
   }
   if (!data.distances.empty()) {
     stream.distance_id =

@@ -4,6 +4,10 @@
 
 namespace isomesh::codec {
 
+std::string obj_header(Space space) {
+  return "# isomesh, millimetres, " + std::string(letters_of(space)) + '\n';
+}
+
 std::byte* write_obj_vertex(const mesh::Vec3& position, std::byte* begin) {
   char* out = reinterpret_cast<char*>(begin);
   *out++ = 'v';
@@ -26,12 +30,14 @@ std::byte* write_obj_face(const mesh::Triangle& triangle, std::byte* begin) {
   return reinterpret_cast<std::byte*>(out);
 }
 
-void encode_obj(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink) {
+void encode_obj(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+                const Sink& sink) {
   context.throw_if_stopped();
-  sink(std::as_bytes(std::span(kObjHeader)));
+  const std::string header = obj_header(space);
+  sink(std::as_bytes(std::span(header)));
   BlockWriter writer(context, sink, mesh.positions.size() + mesh.triangles.size());
   writer.write(mesh.positions.size(), kMostObjVertexBytes, [&](std::size_t v, std::byte* out) {
-    return write_obj_vertex(mesh.positions[v], out);
+    return write_obj_vertex(in_space(mesh.positions[v], space), out);
   });
   writer.write(mesh.triangles.size(), kMostObjFaceBytes, [&](std::size_t t, std::byte* out) {
     return write_obj_face(mesh.triangles[t], out);

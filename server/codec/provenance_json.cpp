@@ -26,4 +26,20 @@ Json provenance_json(const Provenance& provenance) {
   return json;
 }
 
+std::string provenance_for_xml(const Provenance& provenance) {
+  std::string result;
+  for (const char c : provenance_json(provenance).dump()) {
+    if (c == '&') {
+      result += "\\u0026";
+    } else if (c == '<') {
+      result += "\\u003c";
+    } else if (c == '>') {
+      result += "\\u003e";
+    } else {
+      result += c;
+    }
+  }
+  return result;
+}
+
 }  // namespace isomesh::codec

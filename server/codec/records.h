@@ -7,19 +7,21 @@
 #include <string_view>
 
 #include "server/codec/number_text.h"
+#include "server/codec/space.h"
 #include "server/mesh/mesh.h"
 
 namespace isomesh::codec {
 
 // Up to and with "end_header". `of_faces`: lines of the faces' properties behind their vertices.
-std::string ply_header(std::size_t vertices, std::size_t faces, std::string_view of_faces);
+std::string ply_header(Space space, std::size_t vertices, std::size_t faces,
+                       std::string_view of_faces);
 
 inline constexpr std::size_t kPlyVertexBytes = sizeof(mesh::Vec3);
 inline constexpr std::size_t kPlyFaceBytes = 1 + sizeof(mesh::Triangle);  // without properties
 std::byte* write_ply_vertex(const mesh::Vec3& position, std::byte* out);
 std::byte* write_ply_face(const mesh::Triangle& triangle, std::byte* out);
 
-inline constexpr std::string_view kObjHeader = "# isomesh, millimetres, LPS\n";
+std::string obj_header(Space space);
 inline constexpr std::size_t kMostObjVertexBytes = 2 + 3 * (1 + kMostFloatBytes);
 inline constexpr std::size_t kMostObjFaceBytes = 2 + 3 * (1 + kMostIndexBytes);
 std::byte* write_obj_vertex(const mesh::Vec3& position, std::byte* out);

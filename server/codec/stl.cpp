@@ -3,9 +3,11 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <string>
 
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
+#include "server/codec/space.h"
 
 namespace isomesh::codec {
 namespace {
@@ -30,10 +32,11 @@ mesh::Vec3 unit_normal(const mesh::Vec3& a, const mesh::Vec3& b, const mesh::Vec
           static_cast<float>(n[2] * scale)};
 }
 
-void write_facet(const mesh::Mesh& mesh, const mesh::Triangle& triangle, std::byte* out) {
-  const mesh::Vec3& a = mesh.positions[triangle[0]];
-  const mesh::Vec3& b = mesh.positions[triangle[1]];
-  const mesh::Vec3& c = mesh.positions[triangle[2]];
+void write_facet(const mesh::Mesh& mesh, Space space, const mesh::Triangle& triangle,
+                 std::byte* out) {
+  const mesh::Vec3 a = in_space(mesh.positions[triangle[0]], space);
+  const mesh::Vec3 b = in_space(mesh.positions[triangle[1]], space);
+  const mesh::Vec3 c = in_space(mesh.positions[triangle[2]], space);
   for (const mesh::Vec3& vector : {unit_normal(a, b, c), a, b, c}) {
     std::memcpy(out, vector.data(), sizeof vector);
     out += sizeof vector;
@@ -43,22 +46,24 @@ void write_facet(const mesh::Mesh& mesh, const mesh::Triangle& triangle, std::by
 
 }  // namespace
 
-void encode_stl(const mesh::Mesh& mesh, const mesh::Context& context, const Sink& sink) {
+void encode_stl(const mesh::Mesh& mesh, Space space, const mesh::Context& context,
+                const Sink& sink) {
   const std::size_t triangles = mesh.triangles.size();
   if (triangles > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::kTooLarge, "the surface has more triangles than an STL file can hold");
   }
   // The header must not start with "solid", or readers take the file for text.
-  constexpr std::string_view kTitle = "isomesh binary STL, millimetres, SPACE=LPS";
+  const std::string title =
+      "isomesh binary STL, millimetres, SPACE=" + std::string(letters_of(space));
   std::array<std::byte, kHeaderBytes + 4> header = {};
-  std::memcpy(header.data(), kTitle.data(), kTitle.size());
+  std::memcpy(header.data(), title.data(), title.size());
   const auto count = static_cast<std::uint32_t>(triangles);
   std::memcpy(header.data() + kHeaderBytes, &count, sizeof count);
   sink(header);
 
   BlockWriter(context, sink, triangles)
       .write(triangles, kFacetBytes, [&](std::size_t t, std::byte* out) {
-        write_facet(mesh, mesh.triangles[t], out);
+        write_facet(mesh, space, mesh.triangles[t], out);
         return out + kFacetBytes;
       });
 }

@@ -16,13 +16,15 @@ namespace {
 // The files as a stranger decodes them, with their formats: those in a ZIP, format by format.
 std::vector<std::pair<MeshFormat, codec::DecodedSurface>> decoded(std::span<const std::byte> file,
                                                                   MeshFormat format,
+                                                                  const MeshParameters& parameters,
                                                                   const mesh::Context& context) {
+  const Space space = space_of(format, parameters);
   std::vector<std::pair<MeshFormat, codec::DecodedSurface>> surfaces;
   if (format != MeshFormat::kZip) {
-    surfaces.emplace_back(format, codec::decode(file, format, context));
+    surfaces.emplace_back(format, codec::decode(file, format, space, context));
     return surfaces;
   }
-  for (auto& [inner, surface] : codec::decode_zip(file, context)) {
+  for (auto& [inner, surface] : codec::decode_zip(file, space, context)) {
     surfaces.emplace_back(inner, std::move(surface));
   }
   return surfaces;
@@ -68,7 +70,8 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
   bool is_first = true;
   for (std::size_t i = 0; i < formats.size(); ++i) {
     const double begin = part * static_cast<double>(i);
-    for (const auto& [format, surface] : decoded(files.bytes(i), formats[i], progress.quiet())) {
+    for (const auto& [format, surface] :
+         decoded(files.bytes(i), formats[i], parameters, progress.quiet())) {
       const mesh::Certificate measured =
           mesh::certify(surface.view(), reference, progress.context(begin, begin + part));
       if (!is_first && measured.max_mm() <= certificate.max_mm) continue;

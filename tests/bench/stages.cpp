@@ -36,7 +36,6 @@ mesh::Lattice<T> lattice_of(const Samples& samples, const T* data) {
   return {data, samples.dims, mesh::lattice_to_space(samples.geometry)};
 }
 
-constexpr int kDefaultSpeed = DracoParameters{}.speed;
 constexpr int kSequentialSpeed = 10;
 
 }  // namespace
@@ -51,6 +50,12 @@ const char* name_of(Encoding encoding) {
       return "edgebreaker_chunks";
     case Encoding::kSequentialChunks:
       return "sequential_chunks";
+    case Encoding::kGlb:
+      return "glb";
+    case Encoding::kMergedGlb:
+      return "glb_merged";
+    case Encoding::kMeshoptGlb:
+      return "glb_meshopt";
     case Encoding::kStl:
       break;
   }
@@ -93,31 +98,44 @@ std::uint64_t Stages::smoothing_memory(int passes) const {
 
 void Stages::measure() const { mesh::measure_topology(mesh_, {}); }
 
-std::uint64_t Stages::encode_as(MeshFormat format, int speed) const {
+std::uint64_t Stages::encode_as(MeshFormat format, const MeshParameters& parameters) const {
   codec::Provenance provenance;
   provenance.iso = surface_.iso;
   provenance.dims = {samples_.dims.x, samples_.dims.y, samples_.dims.z};
   provenance.geometry = samples_.geometry;
-  provenance.parameters.draco.speed = speed;
+  provenance.parameters = parameters;
   CountingSink counting;
   codec::encode(mesh_, format, provenance, {}, counting.sink());
   return counting.bytes;
 }
 
 std::uint64_t Stages::encode(Encoding encoding) const {
+  MeshParameters parameters;
   switch (encoding) {
     case Encoding::kEdgebreakerWhole:
-      return encode_as(MeshFormat::kDrc, kDefaultSpeed);
+      return encode_as(MeshFormat::kDrc, parameters);
     case Encoding::kSequentialWhole:
-      return encode_as(MeshFormat::kDrc, kSequentialSpeed);
+      parameters.draco.speed = kSequentialSpeed;
+      return encode_as(MeshFormat::kDrc, parameters);
     case Encoding::kEdgebreakerChunks:
-      return encode_as(MeshFormat::kGlb, kDefaultSpeed);
+      parameters.normals = false;
+      return encode_as(MeshFormat::kGlb, parameters);
     case Encoding::kSequentialChunks:
-      return encode_as(MeshFormat::kGlb, kSequentialSpeed);
+      parameters.normals = false;
+      parameters.draco.speed = kSequentialSpeed;
+      return encode_as(MeshFormat::kGlb, parameters);
+    case Encoding::kMergedGlb:
+      parameters.merge = true;
+      return encode_as(MeshFormat::kGlb, parameters);
+    case Encoding::kMeshoptGlb:
+      parameters.glb_codec = GlbCodec::kMeshopt;
+      return encode_as(MeshFormat::kGlb, parameters);
+    case Encoding::kGlb:
+      return encode_as(MeshFormat::kGlb, parameters);
     case Encoding::kStl:
       break;
   }
-  return encode_as(MeshFormat::kStl, kDefaultSpeed);
+  return encode_as(MeshFormat::kStl, parameters);
 }
 
 std::string Stages::drc() const {

@@ -33,12 +33,20 @@ struct MeshSize {
 enum class Encoding {
   kEdgebreakerWhole,  // a `drc` file
   kSequentialWhole,
-  kEdgebreakerChunks,  // a `glb` file
+  kEdgebreakerChunks,  // a `glb` file without normals
   kSequentialChunks,
+  kGlb,  // as a job makes it unless it says otherwise, with normals
+  kMergedGlb,
+  kMeshoptGlb,
   kStl,
 };
-inline constexpr std::array kEncodings = {Encoding::kEdgebreakerWhole, Encoding::kSequentialWhole,
-                                          Encoding::kEdgebreakerChunks, Encoding::kSequentialChunks,
+inline constexpr std::array kEncodings = {Encoding::kEdgebreakerWhole,
+                                          Encoding::kSequentialWhole,
+                                          Encoding::kEdgebreakerChunks,
+                                          Encoding::kSequentialChunks,
+                                          Encoding::kGlb,
+                                          Encoding::kMergedGlb,
+                                          Encoding::kMeshoptGlb,
                                           Encoding::kStl};
 
 const char* name_of(Encoding encoding);
@@ -95,7 +103,7 @@ class Stages {
   std::uint64_t mesh_bytes() const;
 
  private:
-  std::uint64_t encode_as(MeshFormat format, int speed) const;
+  std::uint64_t encode_as(MeshFormat format, const MeshParameters& parameters) const;
 
   const Samples& samples_;
   Surface surface_;

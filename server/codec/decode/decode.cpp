@@ -7,6 +7,7 @@
 
 #include "proto/error.h"
 #include "server/codec/decode/formats.h"
+#include "server/codec/space.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::codec {
@@ -39,7 +40,8 @@ void check(const DecodedSurface& surface, MeshFormat format, const mesh::Context
   if (!is_there) refuse(format, "a triangle names a vertex that is not there");
 }
 
-DecodedSurface decode_unchecked(Bytes file, MeshFormat format, const mesh::Context& context) {
+DecodedSurface decode_unchecked(Bytes file, MeshFormat format, Space space,
+                                const mesh::Context& context) {
   switch (format) {
     case MeshFormat::kDrc:
       return decode_drc(file, context);
@@ -53,11 +55,20 @@ DecodedSurface decode_unchecked(Bytes file, MeshFormat format, const mesh::Conte
       return decode_obj(file, context);
     case MeshFormat::k3mf:
       return decode_3mf(file, context);
+    case MeshFormat::kOff:
+      return decode_off(file, context);
+    case MeshFormat::kVtk:
+      return decode_vtk(file, context);
+    case MeshFormat::kVtp:
+      return decode_vtp(file, context);
+    case MeshFormat::kGii:
+      return decode_gii(file, context);
     case MeshFormat::kZip:
       break;
   }
   std::vector<DecodedSurface> parts;
-  for (auto& [each, surface] : decode_zip(file, context)) parts.push_back(std::move(surface));
+  for (auto& [each, surface] : decode_zip(file, space, context))
+    parts.push_back(std::move(surface));
   return join(std::move(parts), context);
 }
 
@@ -97,12 +108,15 @@ DecodedSurface join(std::vector<DecodedSurface>&& parts, const mesh::Context& co
 
 }  // namespace decoding
 
-DecodedSurface decode(std::span<const std::byte> file, MeshFormat format,
+DecodedSurface decode(std::span<const std::byte> file, MeshFormat format, Space space,
                       const mesh::Context& context) {
   context.throw_if_stopped();
-  DecodedSurface surface = decoding::decode_unchecked(file, format, context);
-  // Of a ZIP each file was.
-  if (format != MeshFormat::kZip) decoding::check(surface, format, context);
+  DecodedSurface surface = decoding::decode_unchecked(file, format, space, context);
+  if (format == MeshFormat::kZip) return surface;  // of which each file was checked and turned
+  decoding::check(surface, format, context);
+  if (space == Space::kRas) {
+    for (mesh::Vec3& position : surface.positions) position = in_space(position, space);
+  }
   return surface;
 }
 

@@ -28,19 +28,20 @@ struct DecodedSurface {
 //  - drc, glb: what libdraco's decoder makes of it; of glb the finest level of the default scene,
 //    block by block, side by side.
 //  - stl: corners at the same place become one vertex, in the order of the file.
-//  - ply, obj, 3mf: the file's vertices and triangles; with labels those of all of them, so that a
-//    wall is there for each label that it belongs to.
+//  - ply, obj, 3mf, off, vtk, vtp, gii: the file's vertices and triangles; with labels those of all
+//    of them, so that a wall is there for each label that it belongs to.
 //  - zip: all its files, one after the other; see decode_zip.
-// Positions are finite and triangles name vertices that are there. The same for any number of
-// threads. Takes what the surface takes, and as much again for parts that are put together; of stl
-// 40 bytes a triangle and of zip the unpacked files beside it. Thread safe. Throws Error kInternal
-// with what is wrong of a file that is not as our encoders write it, kTooLarge where 32 bits cannot
-// number the vertices, and kCancelled.
-DecodedSurface decode(std::span<const std::byte> file, MeshFormat format,
+// `space` is that of the file's coordinates, of a ZIP that of the files in it for which space_of
+// does not say another one. Positions are finite and triangles name vertices that are there. The
+// same for any number of threads. Takes what the surface takes, and as much again for parts that
+// are put together; of stl 40 bytes a triangle and of zip the unpacked files beside it. Thread
+// safe. Throws Error kInternal with what is wrong of a file that is not as our encoders write it,
+// kTooLarge where 32 bits cannot number the vertices, and kCancelled.
+DecodedSurface decode(std::span<const std::byte> file, MeshFormat format, Space space,
                       const mesh::Context& context);
 
 // The files in a ZIP of labels, those of each format put together. Throws as decode does.
-std::map<MeshFormat, DecodedSurface> decode_zip(std::span<const std::byte> file,
+std::map<MeshFormat, DecodedSurface> decode_zip(std::span<const std::byte> file, Space space,
                                                 const mesh::Context& context);
 
 }  // namespace isomesh::codec

@@ -19,6 +19,10 @@ DecodedSurface decode_stl(Bytes file, const mesh::Context& context);
 DecodedSurface decode_ply(Bytes file, const mesh::Context& context);
 DecodedSurface decode_obj(Bytes file, const mesh::Context& context);
 DecodedSurface decode_3mf(Bytes file, const mesh::Context& context);
+DecodedSurface decode_off(Bytes file, const mesh::Context& context);
+DecodedSurface decode_vtk(Bytes file, const mesh::Context& context);
+DecodedSurface decode_vtp(Bytes file, const mesh::Context& context);
+DecodedSurface decode_gii(Bytes file, const mesh::Context& context);
 
 // One Draco stream; of several attributes the positions are that of the id, or the first of
 // positions where it is negative.

@@ -3,6 +3,7 @@
 #include <optional>
 #include <set>
 
+#include <meshoptimizer.h>
 #include <nlohmann/json.hpp>
 
 #include "proto/error.h"
@@ -86,9 +87,19 @@ Matrix transformation_of(const Json& node) {
   return matrix;
 }
 
+// An array of EXT_meshopt_compression.
+struct Packed {
+  Bytes bytes;
+  std::size_t stride = 0;
+  std::size_t count = 0;
+};
+
 struct Primitive {
-  Bytes stream;
+  Bytes stream;  // Draco's; empty where the arrays are there
   int position_id = 0;
+  Packed positions;
+  Packed indices;
+  Matrix to_patient = kIdentity;
   std::size_t vertices = 0;
   std::size_t triangles = 0;
 };
@@ -111,17 +122,18 @@ class Scene {
     const Json& node = gltf_.at("nodes").at(number);
     const Matrix matrix = times(above, transformation_of(node));
     if (node.contains("mesh")) {
-      expect_identity(matrix);
-      for (const Json& primitive :
+      for (const Json& json :
            gltf_.at("meshes").at(node["mesh"].get<std::size_t>()).at("primitives")) {
-        primitives_.push_back(primitive_of(primitive));
+        Primitive& primitive = primitives_.emplace_back(primitive_of(json));
+        primitive.to_patient = matrix;
+        // What Draco decodes to is looked at as it is.
+        if (!primitive.stream.empty()) expect_identity(matrix);
       }
     }
     if (!node.contains("children")) return;
     for (const Json& child : node["children"]) visit(child.get<std::size_t>(), matrix);
   }
 
-  // Positions are looked at as they are, so they have to be in the patient's space already.
   static void expect_identity(const Matrix& matrix) {
     constexpr double kNearly = 1e-9;
     for (std::size_t row = 0; row < 4; ++row) {
@@ -133,21 +145,48 @@ class Scene {
     }
   }
 
-  Primitive primitive_of(const Json& json) const {
-    const Json& draco = json.at("extensions").at("KHR_draco_mesh_compression");
-    const Json& view = gltf_.at("bufferViews").at(draco.at("bufferView").get<std::size_t>());
-    const auto offset = view.at("byteOffset").get<std::size_t>();
-    const auto bytes = view.at("byteLength").get<std::size_t>();
+  Bytes binary_at(const Json& place) const {
+    const auto offset = place.at("byteOffset").get<std::size_t>();
+    const auto bytes = place.at("byteLength").get<std::size_t>();
     if (offset > binary_.size() || bytes > binary_.size() - offset) {
       refuse_glb("a buffer view ends behind the file's binary data");
     }
-    const auto count_of = [&](const Json& accessor) {
-      return gltf_.at("accessors").at(accessor.get<std::size_t>()).at("count").get<std::size_t>();
+    return binary_.subspan(offset, bytes);
+  }
+
+  const Json& accessor(const Json& number) const {
+    return gltf_.at("accessors").at(number.get<std::size_t>());
+  }
+
+  Packed packed_of(const Json& number, std::string_view mode) const {
+    const Json& view =
+        gltf_.at("bufferViews").at(accessor(number).at("bufferView").get<std::size_t>());
+    const Json& packed = view.at("extensions").at("EXT_meshopt_compression");
+    if (packed.at("mode") != mode) refuse_glb("an array is packed in another way");
+    return {.bytes = binary_at(packed),
+            .stride = packed.at("byteStride").get<std::size_t>(),
+            .count = packed.at("count").get<std::size_t>()};
+  }
+
+  Primitive primitive_of(const Json& json) const {
+    const auto count_of = [&](const Json& number) {
+      return accessor(number).at("count").get<std::size_t>();
     };
-    return {.stream = binary_.subspan(offset, bytes),
-            .position_id = draco.at("attributes").at("POSITION").get<int>(),
-            .vertices = count_of(json.at("attributes").at("POSITION")),
-            .triangles = count_of(json.at("indices")) / 3};
+    const Json& position = json.at("attributes").at("POSITION");
+    Primitive primitive;
+    primitive.vertices = count_of(position);
+    primitive.triangles = count_of(json.at("indices")) / 3;
+    if (!json.contains("extensions")) {
+      primitive.positions = packed_of(position, "ATTRIBUTES");
+      primitive.indices = packed_of(json.at("indices"), "TRIANGLES");
+      return primitive;
+    }
+    const Json& draco = json.at("extensions").at("KHR_draco_mesh_compression");
+    const Json& view = gltf_.at("bufferViews").at(draco.at("bufferView").get<std::size_t>());
+    primitive.stream = binary_at(view);
+    if (primitive.stream.empty()) refuse_glb("a stream is empty");
+    primitive.position_id = draco.at("attributes").at("POSITION").get<int>();
+    return primitive;
   }
 
   const Json& gltf_;
@@ -166,6 +205,60 @@ std::vector<Primitive> primitives_of(Bytes file) {
   }
 }
 
+template <class Position>
+void place(const std::vector<Position>& stored, const Matrix& matrix, DecodedSurface& surface) {
+  surface.positions.resize_for_overwrite(stored.size());
+  for (std::size_t v = 0; v < stored.size(); ++v) {
+    for (std::size_t row = 0; row < 3; ++row) {
+      double coordinate = matrix[row][3];
+      for (std::size_t column = 0; column < 3; ++column) {
+        coordinate += matrix[row][column] * stored[v][column];
+      }
+      surface.positions[v][row] = static_cast<float>(coordinate);
+    }
+  }
+}
+
+template <class Position>
+void unpack_positions(const Primitive& primitive, DecodedSurface& surface) {
+  const auto& [bytes, stride, count] = primitive.positions;
+  std::vector<Position> stored(count);
+  if (meshopt_decodeVertexBuffer(stored.data(), count, stride,
+                                 reinterpret_cast<const unsigned char*>(bytes.data()),
+                                 bytes.size()) != 0) {
+    refuse_glb("meshoptimizer refuses its positions");
+  }
+  place(stored, primitive.to_patient, surface);
+}
+
+DecodedSurface unpack(const Primitive& primitive) {
+  using Steps = std::array<std::uint16_t, 4>;
+  const std::size_t stride = primitive.positions.stride;
+  constexpr std::size_t kMostPerByte = 4096;  // far more than the codec packs into one
+  if (primitive.positions.count != primitive.vertices ||
+      primitive.indices.count != 3 * primitive.triangles || primitive.indices.stride != 4 ||
+      (stride != sizeof(Steps) && stride != sizeof(mesh::Vec3)) ||
+      primitive.vertices / kMostPerByte > primitive.positions.bytes.size() ||
+      primitive.triangles / kMostPerByte > primitive.indices.bytes.size()) {
+    refuse_glb("a block's accessors do not say what is in it");
+  }
+  DecodedSurface surface;
+  if (stride == sizeof(Steps)) {
+    unpack_positions<Steps>(primitive, surface);
+  } else {
+    unpack_positions<mesh::Vec3>(primitive, surface);
+  }
+  surface.triangles.resize_for_overwrite(primitive.triangles);
+  const Bytes indices = primitive.indices.bytes;
+  if (primitive.triangles > 0 &&
+      meshopt_decodeIndexBuffer(
+          surface.triangles.data(), primitive.indices.count, sizeof(std::uint32_t),
+          reinterpret_cast<const unsigned char*>(indices.data()), indices.size()) != 0) {
+    refuse_glb("meshoptimizer refuses its triangles");
+  }
+  return surface;
+}
+
 }  // namespace
 
 DecodedSurface decode_glb(Bytes file, const mesh::Context& context) {
@@ -173,6 +266,10 @@ DecodedSurface decode_glb(Bytes file, const mesh::Context& context) {
   std::vector<DecodedSurface> parts(primitives.size());
   mesh::parallel_for(context, primitives.size(), [&](std::size_t n) {
     const Primitive& primitive = primitives[n];
+    if (primitive.stream.empty()) {
+      parts[n] = unpack(primitive);
+      return;
+    }
     parts[n] = decode_draco_stream(primitive.stream, primitive.position_id);
     if (parts[n].positions.size() != primitive.vertices ||
         parts[n].triangles.size() != primitive.triangles) {

@@ -35,13 +35,16 @@ std::vector<Packed> unpack(decoding::Bytes file, const mesh::Context& context) {
 
 }  // namespace
 
-std::map<MeshFormat, DecodedSurface> decode_zip(std::span<const std::byte> file,
+std::map<MeshFormat, DecodedSurface> decode_zip(std::span<const std::byte> file, Space space,
                                                 const mesh::Context& context) {
+  MeshParameters parameters;
+  parameters.space = space;
   std::vector<Packed> files = unpack(file, context);
   std::vector<DecodedSurface> surfaces(files.size());
   mesh::parallel_for(context, files.size(), [&](std::size_t n) {
     const std::vector<std::byte> bytes = std::move(files[n].bytes);
-    surfaces[n] = decode(bytes, files[n].format, {context.stop, nullptr});
+    const Space own = space_of(files[n].format, parameters);
+    surfaces[n] = decode(bytes, files[n].format, own, {context.stop, nullptr});
   });
   std::map<MeshFormat, std::vector<DecodedSurface>> parts;
   for (std::size_t n = 0; n < files.size(); ++n) {

@@ -8,6 +8,7 @@
 #include "server/codec/draco/chunks.h"
 #include "server/codec/draco/corners.h"
 #include "server/codec/draco/fans.h"
+#include "server/codec/draco/normal_coder.h"
 #include "server/codec/draco/opposites.h"
 #include "server/codec/draco/part_topology.h"
 #include "server/codec/draco/quantise.h"
@@ -28,7 +29,8 @@ constexpr std::size_t kMostVertices = std::size_t{1} << 31;
 bool is_covered(const Surface& surface, const Grid& grid) {
   return !surface.triangles.empty() && surface.triangles.size() <= kMostFaces &&
          surface.positions.size() < kMostVertices && grid.bits <= Encoder::kMostPositionBits &&
-         std::isfinite(grid.side) && grid.side > 0;
+         std::isfinite(grid.side) && grid.side > 0 &&
+         (surface.normals.empty() || surface.normals.size() == surface.positions.size());
 }
 
 bool has_layers(const Surface& surface) {
@@ -63,12 +65,12 @@ class Encoder::Stages {
 
  private:
   bool connect(const Surface& surface, Threads threads, const mesh::Context& context);
-  bool prepare(std::span<const mesh::Vec3> positions, const Grid& grid, Threads threads,
+  bool prepare(const Surface& surface, const Grid& grid, Threads threads,
                const mesh::Context& context);
   bool walk(Threads threads, const mesh::Context& context);
   bool traverse(const mesh::Context& context);
   void put_in_order();
-  std::vector<std::byte> stream_of(const Grid& grid);
+  std::vector<std::byte> stream_of(const Grid& grid, bool has_normals);
 
   // Predicts some values, and counts into a histogram of the caller's own.
   auto predictor(std::size_t histogram) {
@@ -87,6 +89,7 @@ class Encoder::Stages {
   Chunks chunks_;
   Residuals residuals_;
   ResidualCoder coder_;
+  NormalCoder normals_;
   std::array<Histogram, 2> histograms_;
 };
 
@@ -100,9 +103,9 @@ std::optional<Encoded> Encoder::Stages::encode(const Surface& surface, const Gri
     layered.layer_triangles = all_triangles;
   }
   if (!connect(layered, threads, context)) return std::nullopt;
-  if (!prepare(surface.positions, grid, threads, context)) return std::nullopt;
+  if (!prepare(surface, grid, threads, context)) return std::nullopt;
   if (!walk(threads, context)) return std::nullopt;
-  Encoded encoded = {stream_of(grid), order_.count(), std::nullopt};
+  Encoded encoded = {stream_of(grid, !surface.normals.empty()), order_.count(), std::nullopt};
   if (order_.count() == surface_.vertices) {
     encoded.topology = part_topology(surface_, opposites_.boundary(), fans_, traversal_);
   }
@@ -125,8 +128,10 @@ bool Encoder::Stages::connect(const Surface& surface, Threads threads,
 }
 
 // Quantises, and clears what the walks mark.
-bool Encoder::Stages::prepare(std::span<const mesh::Vec3> positions, const Grid& grid,
-                              Threads threads, const mesh::Context& context) {
+bool Encoder::Stages::prepare(const Surface& surface, const Grid& grid, Threads threads,
+                              const mesh::Context& context) {
+  const std::span<const mesh::Vec3> positions = surface.positions;
+  if (!surface.normals.empty()) normals_.reserve(surface_.vertices);
   GridPoint* const points = points_.reserve(surface_.vertices);
   constexpr std::size_t kParts = 4;
   std::array<Extent, kParts> extents;
@@ -138,10 +143,12 @@ bool Encoder::Stages::prepare(std::span<const mesh::Vec3> positions, const Grid&
     const std::size_t end = positions.size() * (task + 1) / kParts;
     on_grid[task] =
         quantise(positions.subspan(begin, end - begin), grid, points + begin, extents[task]);
+    if (!surface.normals.empty()) normals_.quantise(surface.normals, begin, end);
   });
   if (std::ranges::count(on_grid, false) != 0) return false;
   for (std::size_t i = 0; i < fans_.originals().size(); ++i) {
     points[positions.size() + i] = points[fans_.originals()[i]];
+    if (!surface.normals.empty()) normals_.copy(fans_.originals()[i], positions.size() + i);
   }
   Extent extent = extents[0];
   for (const Extent& other : extents) extent.cover(other);
@@ -186,12 +193,15 @@ void Encoder::Stages::put_in_order() {
   chunks_.end(predict);
 }
 
-std::vector<std::byte> Encoder::Stages::stream_of(const Grid& grid) {
+std::vector<std::byte> Encoder::Stages::stream_of(const Grid& grid, bool has_normals) {
   residuals_.predict_firsts(order_, histograms_[0]);
+  std::optional<CodedNormals> normals;
+  if (has_normals) normals = normals_.code(surface_, order_);
   return assemble({.traversal = traversal_,
                    .faces = surface_.faces,
                    .vertices = order_.count(),
                    .residuals = coder_.code(residuals_, order_, histograms_),
+                   .normals = std::move(normals),
                    .extent = residuals_.wrap().extent(),
                    .grid = grid});
 }

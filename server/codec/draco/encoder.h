@@ -1,7 +1,8 @@
 // Our own encoder of Draco streams, for what isomesh makes: oriented manifolds of triangles with
-// nothing but positions. It writes bitstream 2.2: standard edgebreaker (Rossignac, "Edgebreaker:
-// connectivity compression for triangle meshes", 1999), positions quantised on a grid, predicted by
-// parallelograms (Touma and Gotsman, 1998), entropy coded by rANS. Every Draco decoder reads it.
+// positions and, if need be, normals. It writes bitstream 2.2: standard edgebreaker (Rossignac,
+// "Edgebreaker: connectivity compression for triangle meshes", 1999), positions quantised on a
+// grid, predicted by parallelograms (Touma and Gotsman, 1998), entropy coded by rANS. Every Draco
+// decoder reads it.
 #pragma once
 
 #include <cstddef>
@@ -33,9 +34,17 @@ struct Surface {
   std::span<const mesh::Triangle> triangles;
   std::span<const std::uint64_t> layer_vertices;
   std::span<const std::uint64_t> layer_triangles;
+  std::span<const mesh::Vec3> normals = {};  // unit vectors, of each position; or none
 
   std::size_t layers() const { return layer_vertices.size() - 1; }
 };
+
+// Of each octahedral coordinate of a normal: a tenth of a degree.
+inline constexpr int kNormalBits = 10;
+
+// The attributes' ids within a stream.
+inline constexpr std::uint32_t kPositionId = 0;
+inline constexpr std::uint32_t kNormalId = 1;
 
 enum class Threads {
   kOne,  // only the calling one

@@ -7,53 +7,13 @@
 #include "server/codec/draco/bits.h"
 #include "server/codec/draco/bytes.h"
 #include "server/codec/draco/rans.h"
+#include "server/codec/draco/raw_symbols.h"
 
 namespace isomesh::codec::edgebreaker {
 namespace {
 
 constexpr std::uint32_t kTaggedSymbols = 0;
-constexpr std::uint32_t kRawSymbols = 1;
-
-// The precision of the probabilities goes with a number which the stream calls the bits of the
-// number of different values. Any does; the finest that is worth its table is taken.
-constexpr int kMostLengthBits = 18;
-constexpr int kLengthsTried = 3;
-constexpr int kLeastPrecision = 12;
-constexpr int kMostPrecision = 20;
-
-int precision_of(int length_bits) {
-  return std::clamp(3 * length_bits / 2, kLeastPrecision, kMostPrecision);
-}
-
-struct Choice {
-  int length_bits = 0;
-  double data_bits = 0;
-  double table_bits = 0;
-  Probabilities probabilities;
-
-  double all_bits() const { return data_bits + table_bits; }
-};
-
-Choice best_probabilities(std::span<const std::uint64_t> counts) {
-  const auto different = static_cast<std::uint64_t>(
-      std::ranges::count_if(counts, [](std::uint64_t count) { return count != 0; }));
-  const int longest = std::min(kMostLengthBits, static_cast<int>(std::bit_width(different)));
-  Choice best;
-  for (int length = longest; length >= std::max(1, longest - kLengthsTried + 1); --length) {
-    const int precision = precision_of(length);
-    if (std::uint64_t{1} << precision < 2 * different) break;
-    Probabilities probabilities = probabilities_of(counts, precision);
-    Choice choice = {length, probabilities.data_bits(counts), probabilities.table_bits(), {}};
-    if (best.length_bits == 0 || choice.all_bits() < best.all_bits()) {
-      choice.probabilities = std::move(probabilities);
-      best = std::move(choice);
-    }
-    if (precision == kLeastPrecision) break;
-  }
-  return best;
-}
-
-constexpr int kTagPrecision = kLeastPrecision;
+constexpr int kTagPrecision = 12;
 
 // The bits of a vertex's largest residual, one at least.
 std::uint32_t bits_of(const std::uint16_t* symbols) {
@@ -89,12 +49,12 @@ CodedResiduals ResidualCoder::code(const Residuals& residuals, const ValueOrder&
   for (std::uint32_t symbol = 0; symbol < counts.size(); ++symbol) {
     for (const Histogram& histogram : histograms) counts[symbol] += histogram.count(symbol);
   }
-  const Choice choice = best_probabilities(counts);
-  if (tagged_bits(residuals, order.count()) < choice.all_bits()) {
+  const RawCoding coding = best_coding(counts);
+  if (tagged_bits(residuals, order.count()) < coding.all_bits()) {
     return code_tagged(residuals, order);
   }
-  coded_.reserve(RansEncoder::most_bytes(choice.data_bits, 3 * std::uint64_t{order.count()}));
-  RansEncoder encoder(choice.probabilities, coded_.data());
+  coded_.reserve(RansEncoder::most_bytes(coding.data_bits, 3 * std::uint64_t{order.count()}));
+  RansEncoder encoder(coding.probabilities, coded_.data());
   // The decoder goes through components from the last to the first.
   for (const ValueRange& component : order.components()) {
     encoder.put_backwards(residuals.symbols() + 3 * std::size_t{component.begin},
@@ -102,12 +62,7 @@ CodedResiduals ResidualCoder::code(const Residuals& residuals, const ValueOrder&
   }
   const std::byte* const end = encoder.finish();
   const auto bytes = static_cast<std::size_t>(end - coded_.data());
-  ByteWriter out;
-  out.byte(kRawSymbols);
-  out.byte(static_cast<std::uint32_t>(choice.length_bits));
-  choice.probabilities.write(out);
-  out.varint(bytes);
-  return {out.take(), {coded_.data(), bytes}};
+  return {head_of(coding, bytes), {coded_.data(), bytes}};
 }
 
 CodedResiduals ResidualCoder::code_tagged(const Residuals& residuals, const ValueOrder& order) {

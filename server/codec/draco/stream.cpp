@@ -5,6 +5,7 @@
 
 #include "server/codec/draco/bits.h"
 #include "server/codec/draco/bytes.h"
+#include "server/codec/draco/encoder.h"
 #include "server/codec/draco/rans.h"
 
 namespace isomesh::codec::edgebreaker {
@@ -21,10 +22,15 @@ constexpr std::uint32_t kPositionConnectivity = 0xFF;
 constexpr std::uint32_t kValuePerVertex = 0;
 constexpr std::uint32_t kDepthFirst = 0;
 constexpr std::uint32_t kPositionAttribute = 0;
+constexpr std::uint32_t kNormalAttribute = 1;
 constexpr std::uint32_t kFloat32 = 9;
 constexpr std::uint32_t kQuantised = 2;
+constexpr std::uint32_t kOctahedral = 3;
+constexpr std::uint32_t kDifference = 0;
 constexpr std::uint32_t kParallelogram = 1;
 constexpr std::uint32_t kWrapTransform = 1;
+constexpr std::uint32_t kOctahedralTransform = 3;
+constexpr std::uint32_t kCompressed = 1;
 
 void write_events(const std::vector<SplitEvent>& events, ByteWriter& out) {
   out.varint(events.size());
@@ -57,6 +63,12 @@ void write_symbols(std::span<const std::uint8_t> symbols, ByteWriter& out) {
   writer.finish();
 }
 
+// Three floats.
+void write_attribute(std::uint32_t kind, std::uint32_t id, ByteWriter& out) {
+  for (const std::uint32_t byte : {kind, kFloat32, 3U, 0U}) out.byte(byte);
+  out.varint(id);
+}
+
 }  // namespace
 
 std::vector<std::byte> assemble(const StreamParts& parts) {
@@ -64,6 +76,7 @@ std::vector<std::byte> assemble(const StreamParts& parts) {
   constexpr std::size_t kUsualRest = 4096;
   constexpr std::size_t kUsualEvent = 6;
   out.reserve(parts.residuals.head.size() + parts.residuals.data.size() +
+              (parts.normals ? parts.normals->data.size() : 0) +
               parts.traversal.symbols().size() * 3 / 8 +
               kUsualEvent * parts.traversal.events().size() + kUsualRest);
   out.append(std::as_bytes(std::span(kMagic)));
@@ -85,17 +98,30 @@ std::vector<std::byte> assemble(const StreamParts& parts) {
   for (const std::uint32_t byte : {kPositionConnectivity, kValuePerVertex, kDepthFirst}) {
     out.byte(byte);
   }
-  out.varint(1);  // attributes of that decoder
-  for (const std::uint32_t byte : {kPositionAttribute, kFloat32, 3U, 0U}) out.byte(byte);
-  out.varint(0);  // its id
-  for (const std::uint32_t byte : {kQuantised, kParallelogram, kWrapTransform, 1U}) out.byte(byte);
+  out.varint(parts.normals ? 2 : 1);  // attributes of that decoder
+  write_attribute(kPositionAttribute, kPositionId, out);
+  if (parts.normals) write_attribute(kNormalAttribute, kNormalId, out);
+  out.byte(kQuantised);
+  if (parts.normals) out.byte(kOctahedral);
+  for (const std::uint32_t byte : {kParallelogram, kWrapTransform, kCompressed}) out.byte(byte);
   out.append(parts.residuals.head);
   out.append(parts.residuals.data);
   out.raw(parts.extent.least);
   out.raw(parts.extent.greatest);
+  if (parts.normals) {
+    constexpr std::int32_t kGreatest = (1 << kNormalBits) - 1;
+    for (const std::uint32_t byte : {kDifference, kOctahedralTransform, kCompressed}) {
+      out.byte(byte);
+    }
+    out.append(parts.normals->head);
+    out.append(parts.normals->data);
+    out.raw(kGreatest);
+    out.raw((kGreatest - 1) / 2);  // the middle of the square
+  }
   for (const float low : parts.grid.low) out.raw(low);
   out.raw(parts.grid.side);
   out.byte(static_cast<std::uint32_t>(parts.grid.bits));
+  if (parts.normals) out.byte(static_cast<std::uint32_t>(kNormalBits));
   return out.take();
 }
 

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "server/codec/draco/corners.h"
 #include "server/codec/draco/grid.h"
+#include "server/codec/draco/normal_coder.h"
 #include "server/codec/draco/quantise.h"
 #include "server/codec/draco/residual_coder.h"
 #include "server/codec/draco/traversal.h"
@@ -18,12 +20,13 @@ struct StreamParts {
   std::uint32_t faces = 0;
   std::uint32_t vertices = 0;  // that faces name
   CodedResiduals residuals;
+  std::optional<CodedNormals> normals;
   Extent extent;
   const Grid& grid;
 };
 
-// The whole stream: Draco's bitstream 2.2, a triangle mesh by edgebreaker with one attribute, which
-// is the position.
+// The whole stream: Draco's bitstream 2.2, a triangle mesh by edgebreaker with positions and, where
+// there are some, normals as attributes of its vertices.
 std::vector<std::byte> assemble(const StreamParts& parts);
 
 }  // namespace isomesh::codec::edgebreaker

@@ -10,6 +10,7 @@
 #include "base/text.h"
 #include "proto/error.h"
 #include "server/codec/draco/grid.h"
+#include "server/codec/space.h"
 #include "server/codec/zip/zip_writer.h"
 #include "server/mesh/label_surface.h"
 #include "server/mesh/parallel.h"
@@ -63,6 +64,13 @@ struct Encoded {
   std::string sha256;
 };
 
+// Of all labels' Draco streams.
+Grid shared_grid(const mesh::Mesh& walls, const MeshParameters& parameters) {
+  const Space space = space_of(MeshFormat::kDrc, parameters);
+  const int bits = parameters.draco.position_bits;
+  return space == Space::kLps ? grid_of(walls, bits) : grid_of(copy_in_space(walls, space), bits);
+}
+
 Encoded encode_one(const mesh::Mesh& mesh, MeshFormat format, const Grid& grid,
                    const Provenance& provenance, const mesh::Context& context) {
   Encoded encoded;
@@ -72,7 +80,15 @@ Encoded encode_one(const mesh::Mesh& mesh, MeshFormat format, const Grid& grid,
     hash.update(piece);
   };
   if (format == MeshFormat::kDrc) {
-    encode_drc(mesh, provenance.parameters.draco, context, sink, &grid);
+    const Space space = space_of(format, provenance.parameters);
+    const auto write = [&](const mesh::Mesh& placed) {
+      encode_drc(placed, provenance.parameters.draco, context, sink, &grid);
+    };
+    if (space == Space::kLps) {
+      write(mesh);
+    } else {
+      write(copy_in_space(mesh, space));
+    }
   } else {
     encode(mesh, format, provenance, context, sink);
   }
@@ -86,7 +102,7 @@ std::vector<LabelFiles> encode_labels_zip(const LabelledSurface& surface,
                                           std::span<const MeshFormat> formats,
                                           const Provenance& provenance,
                                           const mesh::Context& context, const Sink& sink) {
-  const Grid grid = grid_of(surface.walls.mesh, provenance.parameters.draco.position_bits);
+  const Grid grid = shared_grid(surface.walls.mesh, provenance.parameters);
   const mesh::Context quiet = {context.stop, nullptr};
   const std::size_t labels = surface.labels.size();
   std::vector<LabelFiles> files(labels);

@@ -6,12 +6,11 @@
 #include <string>
 #include <string_view>
 
-#include <nlohmann/json.hpp>
-
 #include "base/xml.h"
 #include "server/codec/block_writer.h"
 #include "server/codec/number_text.h"
 #include "server/codec/provenance_json.h"
+#include "server/codec/space.h"
 #include "server/codec/zip/zip_writer.h"
 
 namespace isomesh::codec {
@@ -55,23 +54,6 @@ std::byte* write_triangle(const mesh::Triangle& triangle, std::byte* begin) {
   return reinterpret_cast<std::byte*>(write_text("\"/>\n", out));
 }
 
-// JSON without what XML escapes: some readers leave the text of elements as it stands.
-std::string plain_json(const Provenance& provenance) {
-  std::string result;
-  for (const char c : provenance_json(provenance).dump()) {
-    if (c == '&') {
-      result += "\\u0026";
-    } else if (c == '<') {
-      result += "\\u003c";
-    } else if (c == '>') {
-      result += "\\u003e";
-    } else {
-      result += c;
-    }
-  }
-  return result;
-}
-
 std::string hex_color(const std::array<double, 3>& color) {
   constexpr std::string_view kDigits = "0123456789ABCDEF";
   std::string text = "#";
@@ -98,7 +80,8 @@ class Package {
     std::uint64_t vertices = 0;
   };
 
-  Package(const Sink& sink, const Size& most) : zip_(sink, kDeflated, sizes_of(most)) {
+  Package(const Sink& sink, const Size& most, Space space)
+      : zip_(sink, kDeflated, sizes_of(most)), space_(space) {
     add("[Content_Types].xml", kContentTypes);
     add("_rels/.rels", kRelationships);
     zip_.begin(kModelName);
@@ -112,7 +95,7 @@ class Package {
         "xmlns:isomesh=\"urn:isomesh:mesh\">\n");
     write("<metadata name=\"Title\">" + xml_escaped(title) + "</metadata>\n");
     write("<metadata name=\"Application\">isomesh</metadata>\n");
-    write("<metadata name=\"isomesh:provenance\">" + plain_json(provenance) +
+    write("<metadata name=\"isomesh:provenance\">" + provenance_for_xml(provenance) +
           "</metadata>\n<resources>\n");
   }
 
@@ -132,7 +115,7 @@ class Package {
           std::to_string(object.material) + "\">\n<mesh>\n<vertices>\n");
     BlockWriter writer(context, bytes_, mesh.positions.size() + mesh.triangles.size());
     writer.write(mesh.positions.size(), kMostVertexBytes, [&](std::size_t v, std::byte* out) {
-      return write_vertex(mesh.positions[v], out);
+      return write_vertex(in_space(mesh.positions[v], space_), out);
     });
     write("</vertices>\n<triangles>\n");
     writer.write(mesh.triangles.size(), kMostTriangleBytes, [&](std::size_t t, std::byte* out) {
@@ -172,6 +155,7 @@ class Package {
   void write(std::string_view text) { zip_.write(std::as_bytes(std::span(text))); }
 
   ZipWriter zip_;
+  const Space space_;
   const Sink bytes_ = [this](std::span<const std::byte> piece) { zip_.write(piece); };
   std::size_t objects_ = 0;
 };
@@ -185,7 +169,8 @@ bool is_solid(const mesh::Topology& topology) {
 std::optional<mesh::Topology> encode_3mf(const mesh::Mesh& mesh, const Provenance& provenance,
                                          const mesh::Context& context, const Sink& sink) {
   const mesh::Topology topology = measure_topology(mesh, {context.stop, nullptr});
-  Package package(sink, {mesh.triangles.size(), mesh.positions.size()});
+  Package package(sink, {mesh.triangles.size(), mesh.positions.size()},
+                  space_of(MeshFormat::k3mf, provenance.parameters));
   package.begin_model("surface", provenance);
   if (mesh.triangles.size() > 0) {
     constexpr std::array<double, 3> kNeutral = {0.9, 0.9, 0.9};
@@ -205,7 +190,8 @@ void encode_labels_3mf(const LabelledSurface& surface, const Provenance& provena
   const std::size_t labels = surface.labels.size();
   // Every wall is in the surfaces of two labels, or of one.
   const std::uint64_t walls = surface.walls.mesh.triangles.size();
-  Package package(sink, {2 * walls, 2 * 3 * walls});
+  Package package(sink, {2 * walls, 2 * 3 * walls},
+                  space_of(MeshFormat::k3mf, provenance.parameters));
   package.begin_model("labels", provenance);
   if (labels > 0) {
     package.begin_materials();

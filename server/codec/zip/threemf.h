@@ -9,13 +9,13 @@
 
 namespace isomesh::codec {
 
-// One object in millimetres, LPS; numbers as the shortest text that reads as the same float. Of the
-// type "model", which printers print, where the surface is closed, manifold and oriented; of the
-// type "surface" otherwise, since a "model" has to be all that. An empty surface is a file without
-// an object. The metadata has what asset.extras of GLB has. Formatted side by side and deflated by
-// one thread, in some megabytes of memory; the bytes do not depend on the number of threads.
-// Returns the mesh's topology, which it measures. Throws Error kInternal when the library that
-// writes ZIPs refuses, and kCancelled.
+// One object in millimetres, in the space of the parameters; numbers as the shortest text that
+// reads as the same float. Of the type "model", which printers print, where the surface is closed,
+// manifold and oriented; of the type "surface" otherwise, since a "model" has to be all that. An
+// empty surface is a file without an object. The metadata has what asset.extras of GLB has.
+// Formatted side by side and deflated by one thread, in some megabytes of memory; the bytes do not
+// depend on the number of threads. Returns the mesh's topology, which it measures. Throws Error
+// kInternal when the library that writes ZIPs refuses, and kCancelled.
 std::optional<mesh::Topology> encode_3mf(const mesh::Mesh& mesh, const Provenance& provenance,
                                          const mesh::Context& context, const Sink& sink);
 

@@ -1,5 +1,7 @@
 // Bytes as text, and their digests.
 #include <algorithm>
+#include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -51,6 +53,14 @@ TEST(Base64, IsThatOfTheStandard) {
   EXPECT_EQ(to_base64("f"), "Zg==");
   EXPECT_EQ(to_base64("fo"), "Zm8=");
   EXPECT_EQ(to_base64("foobar"), "Zm9vYmFy");
+}
+
+TEST(Base64, IsWrittenWhereItIsToBe) {
+  const std::string bytes = "any twelve b";
+  std::array<char, 20> text = {};
+  char* const end = write_base64(std::as_bytes(std::span(bytes)), text.data());
+  EXPECT_EQ(std::string(text.data(), static_cast<std::size_t>(end - text.data())),
+            to_base64(bytes));
 }
 
 TEST(Base64, IsReadBack) {

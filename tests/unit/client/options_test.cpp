@@ -63,7 +63,7 @@ TEST_F(OptionsTest, ReadsEverythingThatAMeshCanBeAskedFor) {
                                  "3",
                                  "--min-triangles",
                                  "500",
-                                 "--normals",
+                                 "--no-normals",
                                  "--position-bits",
                                  "11",
                                  "--speed",
@@ -90,7 +90,7 @@ TEST_F(OptionsTest, ReadsEverythingThatAMeshCanBeAskedFor) {
   expected.max_displacement_mm = 0.75;
   expected.close = true;
   expected.components = {.keep = 3, .min_triangles = 500, .nearest_to = {}};
-  expected.normals = true;
+  expected.normals = false;
   expected.draco = {.position_bits = 11, .speed = 0};
   expected.priority = Priority::kStat;
   EXPECT_EQ(options.parameters, expected);
@@ -274,7 +274,7 @@ TEST_F(OptionsTest, RefusesWrongUsage) {
       {"upload", file, "--dims", "1,2,3,", "--type", "int16"},
       {"upload", file, "--dims", "1,2,3", "--type", "int12"},
       {"upload", file, "--dims", "1,2,3", "--type", "int16", "--byte-order", "middle"},
-      {"submit", "abc", "--iso", "60", "--format", "drc,vtk"},
+      {"submit", "abc", "--iso", "60", "--format", "drc,xyz"},
       {"list", "--state", "melted"}};
   for (const auto& arguments : wrong) {
     const auto [status, text] = ending_of(arguments);

@@ -90,4 +90,28 @@ std::vector<GlbPrimitive> read_with_node(const std::string& glb) {
   return primitives;
 }
 
+ForeignSurface read_with_python(const std::string& bytes, MeshFormat format) {
+  const TemporaryFolder folder;
+  const std::string file = folder / ("mesh." + std::string(to_string(format)));
+  write_file(file, bytes);
+  // Debian's own, which has its packages.
+  const Finished finished = run({"/usr/bin/python3", ISOMESH_READ_SURFACE, file, folder / "out"});
+  if (finished.status != 0) throw std::runtime_error(finished.errors);
+  const std::string out = read_file(folder / "out");
+  Bytes rest(out);
+  std::array<std::uint32_t, 4> counts;
+  rest.take(std::span<std::uint32_t>(counts));
+  ForeignSurface surface;
+  surface.mesh.points.resize(counts[0]);
+  surface.mesh.triangles.resize(counts[1]);
+  surface.labels.resize(counts[2]);
+  std::string text(counts[3], '\0');
+  rest.take(std::span(surface.mesh.points));
+  rest.take(std::span(surface.mesh.triangles));
+  rest.take(std::span(surface.labels));
+  rest.take(std::span(text.data(), text.size()));
+  surface.told = nlohmann::json::parse(text);
+  return surface;
+}
+
 }  // namespace isomesh::test

@@ -2,9 +2,13 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
+#include "proto/types.h"
 #include "server/mesh/mesh.h"
 #include "tests/support/draco_decoder.h"
 
@@ -27,5 +31,16 @@ struct GlbPrimitive {
 // A GLB file's primitives as draco3d decodes them, once gltf-validator has neither an error nor a
 // warning. Both are npm's and run in node. Throws std::runtime_error with their words.
 std::vector<GlbPrimitive> read_with_node(const std::string& glb);
+
+// A surface as VTK and nibabel find it.
+struct ForeignSurface {
+  DecodedMesh mesh;
+  std::vector<std::int64_t> labels;  // of the triangles, or none
+  nlohmann::json told;               // what the file says of itself
+};
+
+// A file of the format vtk or vtp as Debian's VTK reads it, one of gii as nibabel does, in Python.
+// Throws std::runtime_error with their words.
+ForeignSurface read_with_python(const std::string& bytes, MeshFormat format);
 
 }  // namespace isomesh::test

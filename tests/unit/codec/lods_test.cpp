@@ -134,7 +134,8 @@ TEST(Lods, HaveTheirSharesOfTheTrianglesAndAreAsClosedAsTheFinest) {
 TEST(Lods, WhoDoesNotKnowThemReadsTheFinest) {
   const mesh::Mesh& mesh = sphere();
   const std::string& glb = sphere_with_lods();
-  const DecodedSurface surface = decode(std::as_bytes(std::span(glb)), MeshFormat::kGlb, {});
+  const DecodedSurface surface =
+      decode(std::as_bytes(std::span(glb)), MeshFormat::kGlb, Space::kLps, {});
   EXPECT_EQ(surface.triangles.size(), mesh.triangles.size());
 }
 

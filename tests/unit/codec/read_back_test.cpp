@@ -25,7 +25,7 @@ using test::encoded;
 
 DecodedSurface decoded(const std::string& file, MeshFormat format,
                        const mesh::Context& context = {}) {
-  return decode(std::as_bytes(std::span(file)), format, context);
+  return decode(std::as_bytes(std::span(file)), format, space_of(format, {}), context);
 }
 
 test::DecodedMesh to_test(const DecodedSurface& surface) {
@@ -203,7 +203,8 @@ Triangles turned(const Triangles& triangles) {
 
 TEST_F(ReadBackLabels, FilesOfAllLabelsHaveEachLabelsTriangles) {
   const Triangles expected = turned(labels_triangles());
-  for (const MeshFormat format : {MeshFormat::kPly, MeshFormat::kObj, MeshFormat::k3mf}) {
+  for (const MeshFormat format :
+       {MeshFormat::kPly, MeshFormat::kObj, MeshFormat::k3mf, MeshFormat::kVtk, MeshFormat::kVtp}) {
     SCOPED_TRACE(to_string(format));
     EXPECT_TRUE(turned(triangles_of(decoded(encoded(format), format))) == expected);
   }
@@ -215,7 +216,7 @@ TEST_F(ReadBackLabels, FilesOfAllLabelsHaveEachLabelsTriangles) {
 
 TEST_F(ReadBackLabels, AZipIsReadFileByFile) {
   const std::string zip = zipped({MeshFormat::kStl, MeshFormat::kPly, MeshFormat::kDrc}).bytes;
-  const auto surfaces = decode_zip(std::as_bytes(std::span(zip)), {});
+  const auto surfaces = decode_zip(std::as_bytes(std::span(zip)), Space::kLps, {});
   ASSERT_EQ(surfaces.size(), 3U);
   const Triangles expected = turned(labels_triangles());
   EXPECT_TRUE(turned(triangles_of(surfaces.at(MeshFormat::kStl))) == expected);

@@ -30,7 +30,7 @@ std::optional<Topology> shown_by_blocks(const mesh::Mesh& mesh, std::size_t tria
 
 std::optional<Topology> shown_by_whole(const mesh::Mesh& mesh) {
   std::vector<DracoStream> streams(1);
-  streams[0] = DracoEncoder().encode_whole(mesh, {grid_of(mesh, 14)}, {});
+  streams[0] = DracoEncoder().encode_whole(mesh, {grid_of(mesh, 14)}, {}, {});
   return topology_of(mesh, streams, {});
 }
 
@@ -111,7 +111,7 @@ TEST(ShownTopology, IsNoneWhereABlockCannotKnow) {
   const Topology measured = measure_topology(mesh, {});
   std::vector<DracoStream> streams(2);
   DracoEncoder encoder;
-  streams[0] = encoder.encode_whole(mesh, {grid_of(mesh, 14)}, {});
+  streams[0] = encoder.encode_whole(mesh, {grid_of(mesh, 14)}, {}, {});
   streams[1] = encoder.encode_block(mesh, {{0, 1}}, {grid_of(mesh, 14)}, {}, {});
   EXPECT_FALSE(topology_of(mesh, streams, {}));
   EXPECT_EQ(shown_by_whole(mesh), measured);

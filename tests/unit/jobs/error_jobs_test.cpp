@@ -38,7 +38,7 @@ class ErrorJobsTest : public test::JobsFixture {
 
   codec::DecodedSurface decoded(const MeshSummary& mesh, MeshFormat format) {
     const std::string bytes = blob(mesh.files.at(format).sha256);
-    return codec::decode(std::as_bytes(std::span(bytes)), format, {});
+    return codec::decode(std::as_bytes(std::span(bytes)), format, space_of(format, {}), {});
   }
 
   // The surface as it is extracted: in STL, which rounds nothing.
@@ -169,9 +169,28 @@ TEST_F(ErrorJobsTest, CropToABoxWithCapsInIt) {
   EXPECT_NEAR(mesh.bounds[1][2], 10, 1e-5);
 }
 
+// Files in another space, and of the formats for programs that have it, are held against the
+// surface where they lie.
+TEST_F(ErrorJobsTest, MeasureFilesInTheSpaceThatTheyAreIn) {
+  JobParameters parameters = parameters_of(volume_, 0);
+  parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl, MeshFormat::kOff, MeshFormat::kVtk,
+                        MeshFormat::kVtp, MeshFormat::kGii, MeshFormat::kGlb, MeshFormat::k3mf};
+  parameters.glb_codec = GlbCodec::kMeshopt;
+  parameters.max_error_mm = 0.2;
+  parameters.certify = true;
+  for (const Space space : {Space::kLps, Space::kRas}) {
+    parameters.space = space;
+    const MeshSummary mesh = run(parameters);
+    ASSERT_TRUE(mesh.certificate);
+    EXPECT_LE(mesh.certificate->max_mm, 0.2);
+    EXPECT_EQ(mesh.files.size(), parameters.formats.size());
+  }
+}
+
 TEST_F(ErrorJobsTest, SayThatThereIsNoSurface) {
   JobParameters parameters = parameters_of(volume_, 1000);
-  parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl, MeshFormat::kGlb, MeshFormat::k3mf};
+  parameters.formats = {MeshFormat::kDrc, MeshFormat::kStl, MeshFormat::kGlb, MeshFormat::k3mf,
+                        MeshFormat::kOff, MeshFormat::kVtk, MeshFormat::kVtp, MeshFormat::kGii};
   EXPECT_TRUE(run(parameters).empty);
   parameters.max_error_mm = 0.1;
   parameters.certify = true;
@@ -192,7 +211,9 @@ TEST_F(ErrorJobsTest, OfLabelsAreWithinTheErrorInEveryFile) {
   JobParameters parameters = label_parameters({});
   parameters.volume = labels.id;
   parameters.close = true;
-  parameters.formats = {MeshFormat::kGlb, MeshFormat::kStl, MeshFormat::k3mf};
+  parameters.formats = {MeshFormat::kGlb, MeshFormat::kStl, MeshFormat::k3mf, MeshFormat::kVtk,
+                        MeshFormat::kVtp, MeshFormat::kOff, MeshFormat::kGii};
+  parameters.space = Space::kRas;
   parameters.max_error_mm = 0.2;
   parameters.certify = true;
   const MeshSummary mesh = run_pipeline(labels, parameters, {}, blobs_, process_, {}, kSilent).mesh;

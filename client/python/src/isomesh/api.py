@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 SampleType = Literal['uint8', 'int8', 'uint16', 'int16', 'uint32', 'int32', 'float32', 'float64']
 
 
-MeshFormat = Literal['drc', 'glb', 'stl', 'ply', 'obj', '3mf', 'zip']
+MeshFormat = Literal['drc', 'glb', 'stl', 'ply', 'obj', '3mf', False, 'vtk', 'vtp', 'gii', 'zip']
 
 
 MeshBytes = str
@@ -360,6 +360,15 @@ Distances = bool
 Lods = Union['Sequence[float]']
 
 
+Merge = bool
+
+
+GlbCodec = Literal['draco', 'meshopt']
+
+
+Space = Literal['lps', 'ras']
+
+
 Priority = Literal['stat', 'routine', 'bulk']
 
 
@@ -421,6 +430,9 @@ JobParameters = TypedDict(
         'normals': 'NotRequired[Normals]',
         'distances': 'NotRequired[Distances]',
         'lods': 'NotRequired[Lods]',
+        'merge': 'NotRequired[Merge]',
+        'glb_codec': 'NotRequired[GlbCodec]',
+        'space': 'NotRequired[Space]',
         'priority': 'NotRequired[Priority]',
         'certify': 'NotRequired[Certify]',
         'callback': 'NotRequired[Callback]',
@@ -947,7 +959,8 @@ class JobOptions(TypedDict, total=False):
     formats: Sequence[MeshFormat]
     #: Of the drc format, and of the Draco streams inside glb.
     draco: JobParametersDraco
-    #: Put the vertices' normals, weighted by the areas around them, into glb.
+    #: Put the vertices' normals, weighted by the areas around them, into glb. Without them viewers
+    #: shade every triangle flat, or compute their own.
     normals: Normals
     #: Put each vertex's distance to the surface as it was extracted into glb, in millimetres. As
     #: the vertex attribute _DISTANCE_MM, of all levels of detail; rounded to a four thousandth of
@@ -956,6 +969,18 @@ class JobOptions(TypedDict, total=False):
     #: Levels of detail for glb, as shares of the triangles from 1 downwards. By the extension
     #: MSFT_lod, which readers that do not know it pass over. At most 8.
     lods: Lods
+    #: Make the surface one primitive of glb, or one for each label. For programs that take a
+    #: primitive for an object of its own. Otherwise there is one for each hundred thousand
+    #: triangles or so, which are written and read side by side.
+    merge: Merge
+    #: What the surface in glb is compressed by. draco is KHR_draco_mesh_compression, which makes
+    #: the smaller files; meshopt is EXT_meshopt_compression, which is read faster. Readers have to
+    #: know the one that it is.
+    glb_codec: GlbCodec
+    #: Which ways the coordinates in the files run: x to the patient's left and y to the back, or x
+    #: to the right and y to the front. z runs to the head. gii is always RAS, and glb has its own
+    #: node, by which Y is up.
+    space: Space
     #: Jobs are begun by priority, then by age.
     priority: Priority
     #: Measure how far the files are from the surface as it was extracted, and where they run

@@ -27,11 +27,13 @@ export interface LoadListener {
 const mostResumes = 5;
 const resumeDelay = 1000;
 
-// The file that the page can show; null when the job was asked for neither GLB nor Draco.
+// The file that the page can show; null when the job was asked for neither GLB nor Draco, or in a form
+// that the page does not read: GLB packed by meshoptimizer, Draco in another space than the slices'.
 export function viewableFile(job: Job): { file: MeshFile; format: 'glb' | 'drc' } | null {
   const files = job.mesh?.files;
-  if (files?.glb) return { file: files.glb, format: 'glb' };
-  if (files?.drc) return { file: files.drc, format: 'drc' };
+  const { glb_codec: codec = 'draco', space = 'lps' } = job.parameters;
+  if (files?.glb && codec === 'draco') return { file: files.glb, format: 'glb' };
+  if (files?.drc && space === 'lps') return { file: files.drc, format: 'drc' };
   return null;
 }
 

@@ -1,0 +1,63 @@
+#include "server/codec/draco/normal_coder.h"
+
+#include <draco/compression/attributes/normal_compression_utils.h>
+#include <draco/compression/attributes/prediction_schemes/prediction_scheme_normal_octahedron_canonicalized_encoding_transform.h>
+
+#include "server/codec/draco/encoder.h"
+#include "server/codec/draco/rans.h"
+#include "server/codec/draco/raw_symbols.h"
+
+namespace isomesh::codec::edgebreaker {
+namespace {
+
+constexpr std::uint32_t kSymbols = 1U << kNormalBits;
+using Transform =
+    draco::PredictionSchemeNormalOctahedronCanonicalizedEncodingTransform<std::int32_t>;
+
+}  // namespace
+
+void NormalCoder::quantise(std::span<const mesh::Vec3> normals, std::size_t begin,
+                           std::size_t end) {
+  draco::OctahedronToolBox octahedron;
+  octahedron.SetQuantizationBits(kNormalBits);
+  for (std::size_t v = begin; v < end; ++v) {
+    std::int32_t s = 0;
+    std::int32_t t = 0;
+    octahedron.FloatVectorToQuantizedOctahedralCoords(normals[v].data(), &s, &t);
+    coordinates_[v] = {static_cast<std::uint16_t>(s), static_cast<std::uint16_t>(t)};
+  }
+}
+
+CodedNormals NormalCoder::code(const Connectivity& surface, const ValueOrder& order) {
+  symbols_.reserve(order.count());
+  std::vector<std::uint64_t> counts(kSymbols);
+  const Transform transform(static_cast<std::int32_t>(kSymbols) - 1);
+  std::array<std::int32_t, 2> before = {0, 0};
+  // The decoder goes through components from the last to the first.
+  for (auto component = order.components().rbegin(); component != order.components().rend();
+       ++component) {
+    for (std::uint32_t i = component->begin; i < component->end; ++i) {
+      const Coordinates& own = coordinates_[surface.vertex(order.corners()[i] & ~kFirstValue)];
+      const std::array<std::int32_t, 2> value = {own[0], own[1]};
+      std::array<std::int32_t, 2> correction;
+      transform.ComputeCorrection(value.data(), before.data(), correction.data());
+      before = value;
+      symbols_[i] = {static_cast<std::uint16_t>(correction[0]),
+                     static_cast<std::uint16_t>(correction[1])};
+      ++counts[symbols_[i][0]];
+      ++counts[symbols_[i][1]];
+    }
+  }
+  const RawCoding coding = best_coding(counts);
+  coded_.reserve(RansEncoder::most_bytes(coding.data_bits, 2 * std::uint64_t{order.count()}));
+  RansEncoder encoder(coding.probabilities, coded_.data());
+  for (const ValueRange& component : order.components()) {
+    encoder.put_backwards(
+        symbols_[component.begin].data(),
+        symbols_[component.begin].data() + 2 * std::size_t{component.end - component.begin});
+  }
+  const auto bytes = static_cast<std::size_t>(encoder.finish() - coded_.data());
+  return {head_of(coding, bytes), {coded_.data(), bytes}};
+}
+
+}  // namespace isomesh::codec::edgebreaker

@@ -1,0 +1,29 @@
+// Symbols that are coded whole; private to this folder.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/codec/draco/rans.h"
+
+namespace isomesh::codec::edgebreaker {
+
+// How symbols that occur that often are coded in the fewest bits.
+struct RawCoding {
+  int length_bits = 0;
+  double data_bits = 0;
+  double table_bits = 0;
+  Probabilities probabilities;
+
+  double all_bits() const { return data_bits + table_bits; }
+};
+
+// At least one count is not 0.
+RawCoding best_coding(std::span<const std::uint64_t> counts);
+
+// What stands before so many bytes of coded symbols.
+std::vector<std::byte> head_of(const RawCoding& coding, std::size_t bytes);
+
+}  // namespace isomesh::codec::edgebreaker

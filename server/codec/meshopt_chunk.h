@@ -1,0 +1,43 @@
+// Blocks of triangles as the arrays of EXT_meshopt_compression, on one shared quantisation grid;
+// private to this folder.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "server/codec/draco_chunk.h"
+#include "server/mesh/mesh.h"
+
+namespace isomesh::codec {
+
+// One array in a chunk's bytes.
+struct MeshoptArray {
+  enum class Kind { kPositions, kNormals, kDistances, kIndices };
+
+  Kind kind = Kind::kPositions;
+  std::size_t begin = 0;  // a multiple of four
+  std::size_t bytes = 0;
+  std::size_t stride = 0;  // of an element, decoded
+  std::size_t count = 0;
+};
+
+struct MeshoptChunk {
+  std::vector<std::byte> bytes;
+  std::vector<MeshoptArray> arrays;
+  std::uint32_t vertices = 0;
+  std::uint32_t triangles = 0;
+  mesh::Vec3 low = {0, 0, 0};  // bounds of the positions as they are stored
+  mesh::Vec3 high = {0, 0, 0};
+};
+
+// Positions are steps on the grid, as 16-bit numbers, of grids of up to so many bits, and floats
+// otherwise.
+inline constexpr int kMostMeshoptBits = 16;
+constexpr bool is_on_steps(const Grid& grid) { return grid.bits <= kMostMeshoptBits; }
+
+// The block's triangles with the vertices they name, in an order that compresses well. `data` is of
+// the mesh's vertices: normals become octahedral ones of 8 bits, distances stay as they are.
+MeshoptChunk encode_with_meshopt(const mesh::Mesh& mesh, const Block& block, const Grid& grid,
+                                 const VertexData& data);
+
+}  // namespace isomesh::codec

@@ -1,0 +1,127 @@
+#include <bit>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "server/codec/block_writer.h"
+#include "server/codec/encode.h"
+#include "server/codec/encode_labels.h"
+#include "server/codec/faces.h"
+#include "server/codec/provenance_json.h"
+#include "server/codec/space.h"
+
+namespace isomesh::codec {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the VTP written here is little-endian");
+
+// Of a text, which stands as its characters' numbers and a zero.
+std::string text_array(const std::string& name, std::string_view text) {
+  std::string array =
+      "<Array type=\"String\" Name=\"" + name + "\" NumberOfTuples=\"1\" format=\"ascii\">";
+  for (const char c : text) array += std::to_string(static_cast<unsigned char>(c)) + ' ';
+  return array + "0</Array>\n";
+}
+
+// An array in the appended data: its element, and how many bytes it has.
+class Appended {
+ public:
+  std::string element(std::string_view type, std::string_view name, std::string_view more,
+                      std::uint64_t bytes) {
+    std::string text = "<DataArray type=\"" + std::string(type) + "\" Name=\"" + std::string(name) +
+                       "\" " + std::string(more) + "format=\"appended\" offset=\"" +
+                       std::to_string(offset_) + "\"/>\n";
+    offset_ += sizeof bytes + bytes;
+    return text;
+  }
+
+ private:
+  std::uint64_t offset_ = 0;
+};
+
+void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const char* label_type,
+                const Provenance& provenance, const mesh::Context& context, const Sink& sink) {
+  context.throw_if_stopped();
+  const Space space = space_of(MeshFormat::kVtp, provenance.parameters);
+  const std::size_t vertices = mesh.positions.size();
+  const std::size_t faces = count_of(runs);
+  check_signed_indices(vertices, faces, MeshFormat::kVtp);
+  const std::uint64_t point_bytes = vertices * sizeof(mesh::Vec3);
+  const std::uint64_t corner_bytes = faces * sizeof(mesh::Triangle);
+  const std::uint64_t face_bytes = faces * sizeof(std::uint32_t);
+  const auto text = [&](const std::string& line) { sink(std::as_bytes(std::span(line))); };
+  Appended appended;
+  std::string header =
+      "<?xml version=\"1.0\"?>\n"
+      "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
+      "header_type=\"UInt64\">\n<PolyData>\n<FieldData>\n" +
+      text_array("SPACE", letters_of(space)) +  // by which 3D Slicer goes
+      text_array("isomesh:provenance", provenance_json(provenance).dump()) +
+      "</FieldData>\n<Piece NumberOfPoints=\"" + std::to_string(vertices) +
+      "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" +
+      std::to_string(faces) + "\">\n";
+  // One after the other, as the arrays follow each other.
+  header += "<Points>\n";
+  header += appended.element("Float32", "Points", "NumberOfComponents=\"3\" ", point_bytes);
+  header += "</Points>\n<Polys>\n";
+  header += appended.element("Int32", "connectivity", "", corner_bytes);
+  header += appended.element("Int32", "offsets", "", face_bytes);
+  header += "</Polys>\n";
+  if (label_type != nullptr) {
+    header += "<CellData Scalars=\"label\">\n";
+    header += appended.element(label_type, "label", "", face_bytes);
+    header += "</CellData>\n";
+  }
+  text(header + "</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_");
+
+  const auto begin_array = [&](std::uint64_t bytes) { sink(std::as_bytes(std::span(&bytes, 1))); };
+  BlockWriter writer(context, sink, vertices + faces * (label_type == nullptr ? 2 : 3));
+  begin_array(point_bytes);
+  writer.write(vertices, sizeof(mesh::Vec3), [&](std::size_t v, std::byte* out) {
+    const mesh::Vec3 position = in_space(mesh.positions[v], space);
+    std::memcpy(out, &position, sizeof position);
+    return out + sizeof position;
+  });
+  begin_array(corner_bytes);
+  for (const FaceRun& run : runs) {
+    writer.write(run.count, sizeof(mesh::Triangle), [&](std::size_t t, std::byte* out) {
+      const mesh::Triangle face = run.at(t);
+      std::memcpy(out, &face, sizeof face);
+      return out + sizeof face;
+    });
+  }
+  const auto write_word = [](std::uint32_t word, std::byte* out) {
+    std::memcpy(out, &word, sizeof word);
+    return out + sizeof word;
+  };
+  begin_array(face_bytes);
+  writer.write(faces, sizeof(std::uint32_t), [&](std::size_t t, std::byte* out) {
+    return write_word(static_cast<std::uint32_t>(3 * (t + 1)), out);  // where the face ends
+  });
+  if (label_type != nullptr) {
+    begin_array(face_bytes);
+    for (const FaceRun& run : runs) {
+      writer.write(run.count, sizeof run.label,
+                   [&](std::size_t, std::byte* out) { return write_word(run.label, out); });
+    }
+  }
+  text("\n</AppendedData>\n</VTKFile>\n");
+}
+
+}  // namespace
+
+void encode_vtp(const mesh::Mesh& mesh, const Provenance& provenance, const mesh::Context& context,
+                const Sink& sink) {
+  write_file(mesh, faces_of(mesh), nullptr, provenance, context, sink);
+}
+
+void encode_labels_vtp(const LabelledSurface& surface, const Provenance& provenance,
+                       const mesh::Context& context, const Sink& sink) {
+  write_file(surface.walls.mesh, faces_of(surface), has_wide_labels(surface) ? "UInt32" : "Int32",
+             provenance, context, sink);
+}
+
+}  // namespace isomesh::codec
