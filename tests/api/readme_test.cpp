@@ -1,4 +1,4 @@
-// The tables in README.md and docs/ are what the programs say.
+// The tables in docs/ are what the programs say.
 #include <filesystem>
 #include <sstream>
 #include <string>
@@ -44,18 +44,19 @@ std::string table_of(const std::string& help) {
   return table;
 }
 
-TEST(Readme, ItsTableOfOptionsIsTheHelpsOwn) {
+TEST(Docs, TheirTableOfOptionsIsTheHelpsOwn) {
   const Finished help = run({ISOMESHD, "--help"});
   ASSERT_EQ(help.status, 0);
   const std::string table = table_of(help.output);
   ASSERT_NE(table.find("| `--workers` | `2` |"), std::string::npos) << table;
-  EXPECT_NE(read_file(ISOMESH_README).find("|---|---|---|\n" + table + '\n'), std::string::npos)
-      << "README.md must hold these rows and no others:\n"
+  const auto docs = std::filesystem::path(ISOMESH_README).parent_path() / "docs/operating.md";
+  EXPECT_NE(read_file(docs).find("|---|---|---|\n" + table + '\n'), std::string::npos)
+      << "docs/operating.md must hold these rows and no others:\n"
       << table;
 }
 
 // So that a new note is told of there too.
-TEST(Readme, ItsTableOfNotesIsThatOfTheProgram) {
+TEST(Docs, TheirTableOfNotesIsThatOfTheProgram) {
   std::string table = "| code | in meshes | meaning |\n|---|---|---|\n";
   for (const NoteDescription& note : note_descriptions()) {
     table += "| `" + std::string(note.name) + "` | " + (note.is_in_mesh ? "yes" : "") + " | " +
