@@ -82,18 +82,28 @@ describe('parameters', () => {
 
 describe('a job that was left', () => {
   it('tells when it has ended, also after the page was loaded anew', async () => {
-    const { page, daemon } = at;
-    const volume = await daemon.upload(noiseNrrd(80));
-    await page.goto(`${daemon.url}/#/volumes/${volume}?iso=128&passes=400`);
-    await page.getByRole('button', { name: 'Make the surface' }).click();
-    await page.waitForURL(/#\/jobs\//);
-    const id = /jobs\/([^?]+)/.exec(page.url())?.[1] ?? '';
-    await page.locator('.brand').click();
-    await page.reload();
-    const toast = page.locator('.toast', { hasText: 'iso 128' });
-    await expect.poll(() => toast.innerText()).toMatch(/The surface of iso 128 is made/);
-    await toast.getByRole('link').click();
-    await page.waitForURL(new RegExp(`#/jobs/${id}`));
+    const { browser } = at;
+    const own = await Daemon.start(undefined, '127.0.0.1:0', ['--workers', '1']);
+    try {
+      const { page } = await openPage(browser, own.url);
+      const volume = await own.upload(noiseNrrd(80));
+      // The page's job waits behind one that takes long.
+      const before = await own.submit({ volume, iso: 100, passes: 1000, max_error_mm: 0.01, formats: ['glb'] });
+      await page.goto(`${own.url}/#/volumes/${volume}?iso=128`);
+      await page.getByRole('button', { name: 'Make the surface' }).click();
+      await page.waitForURL(/#\/jobs\//);
+      const id = /jobs\/([^?]+)/.exec(page.url())?.[1] ?? '';
+      await page.locator('.brand').click();
+      await page.reload();
+      await own.json(`/v1/jobs/${before.id}`, { method: 'DELETE' });
+      const toast = page.locator('.toast', { hasText: 'iso 128' });
+      await expect.poll(() => toast.innerText()).toMatch(/The surface of iso 128 is made/);
+      await toast.getByRole('link').click();
+      await page.waitForURL(new RegExp(`#/jobs/${id}`));
+      await page.close();
+    } finally {
+      await own.remove();
+    }
   });
 });
 
