@@ -24,7 +24,7 @@ class Arrays(DaemonTest):
     def test_space_lps_takes_the_affine_as_it_is(self):
         samples, affine = ball(), turned()
         as_ras = self.client.upload(samples, affine=numpy.diag([-1.0, -1.0, 1.0, 1.0]) @ affine)
-        as_lps = self.client.upload(samples, affine=affine, space="lps")
+        as_lps = self.client.upload(samples, affine=affine, affine_space="lps")
         self.assertEqual(as_ras["id"], as_lps["id"])
 
     def test_faces_are_turned_outward(self):

@@ -67,17 +67,17 @@ class Client:
         source: Source,
         *,
         affine: Optional[Any] = None,
-        space: str = "ras",
+        affine_space: str = "ras",
         spacing: Optional[Sequence[float]] = None,
         **parameters: Unpack[api.JobOptions],
     ) -> Mesh:
         """From a volume to its surface in one call: `client.mesh("head.nii.gz", iso=60)`.
 
-        `source`, `affine`, `space` and `spacing` are as `upload` takes them; everything else is a
-        parameter of the job. Vertices are in LPS, whatever the affine is in; `mesh.in_space("ras")`
-        turns them. Raises JobFailed.
+        `source`, `affine`, `affine_space` and `spacing` are as `upload` takes them; everything else is a
+        parameter of the job. Vertices are in LPS, whatever the affine is in, unless `space` says "ras";
+        `mesh.in_space` turns them. Raises JobFailed.
         """
-        volume = self.upload(source, affine=affine, space=space, spacing=spacing)
+        volume = self.upload(source, affine=affine, affine_space=affine_space, spacing=spacing)
         formats = list(parameters.get("formats", []))
         parameters["formats"] = cast(Any, formats if "ply" in formats else [*formats, "ply"])
         return self.fetch(self.wait(self.submit(volume, **parameters)))
@@ -89,7 +89,7 @@ class Client:
         source: Source,
         *,
         affine: Optional[Any] = None,
-        space: str = "ras",
+        affine_space: str = "ras",
         spacing: Optional[Sequence[float]] = None,
         raw: Optional[Raw] = None,
         name: str = "",
@@ -106,8 +106,8 @@ class Client:
                   several paths that belong together; the bytes of a file;
                   a numpy array of three axes, the first of which is x;
                   an image of nibabel's, or anything with `dataobj` and `affine`
-        affine    of an array: the 4 x 4 matrix that takes its indices to millimetres of `space`
-        space     what `affine` is in: "ras", as nibabel's and NIfTI's, or "lps", as DICOM's and ITK's
+        affine    of an array: the 4 x 4 matrix that takes its indices to millimetres of `affine_space`
+        affine_space  what `affine` is in: "ras", as nibabel's and NIfTI's, or "lps", as DICOM's and ITK's
         spacing   of an array in place of `affine`: millimetres between samples along its axes
         raw       of a path or bytes: that they are bare samples, and of what kind
         name      what the volume is called; else as the file or its series
@@ -117,7 +117,7 @@ class Client:
         are stored nevertheless (see `upload_all`).
         """
         chosen = {"series": series, "member": member, "volume": "" if volume is None else str(int(volume))}
-        body = self._body_of(source, affine, space, spacing, raw)
+        body = self._body_of(source, affine, affine_space, spacing, raw)
         answers = self._upload(body, name, {**chosen, "accept": ",".join(accept), "nifti_form": nifti_form})
         if len(answers) == 1 and answers[0]["volume"] is not None:
             return answers[0]["volume"]

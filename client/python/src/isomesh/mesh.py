@@ -77,6 +77,7 @@ def read_ply(source: Union[bytes, bytearray, memoryview, str, Path], job: Option
         _shaped(data[begin : begin + vertex_bytes], "f", vertices, 3),
         _shaped(_columns(records, faces, 1, 12), "I", faces, 3),
         _shaped(_columns(records, faces, 13, 4), "i" if label == "int" else "I", faces) if label else None,
+        space=job["parameters"].get("space", "lps") if job else "lps",
         job=job,
     )
 
