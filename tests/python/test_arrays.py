@@ -69,7 +69,7 @@ class Arrays(DaemonTest):
             (numpy.zeros((2, 2, 2, 2)), {}, ValueError, "three axes"),
             (ball(), {"affine": numpy.eye(3)}, ValueError, "4 x 4"),
             (ball(), {"affine": numpy.diag([1.0, 0, 1, 1])}, ValueError, "no length"),
-            (ball(), {"affine": numpy.eye(4), "space": "mni"}, ValueError, "'ras' or 'lps'"),
+            (ball(), {"affine": numpy.eye(4), "affine_space": "mni"}, ValueError, "'ras' or 'lps'"),
             (ball(), {"affine": numpy.eye(4) * numpy.nan}, ValueError, "finite"),
             (ball(), {"affine": numpy.eye(4), "spacing": (1, 1, 1)}, ValueError, "either"),
             (object(), {}, TypeError, "object"),
