@@ -99,9 +99,9 @@ TEST(ResultKey, KnowsVolumeParametersAndVersionAlone) {
   parameters.callback = Callback{"https://a.example.org/"};
   EXPECT_EQ(key("1"), first);
   EXPECT_NE(key("2"), first);
-  parameters.normals = true;
+  parameters.normals = !parameters.normals;
   EXPECT_NE(key("1"), first);
-  parameters.normals = false;
+  parameters.normals = !parameters.normals;
   parameters.volume = "abd";
   EXPECT_NE(key("1"), first);
 }
