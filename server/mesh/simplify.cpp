@@ -12,6 +12,7 @@
 #include "server/mesh/parallel.h"
 #include "server/mesh/simplify_block.h"
 #include "server/mesh/simplify_layers.h"
+#include "server/mesh/simplify_lines.h"
 
 namespace isomesh::mesh {
 namespace {
@@ -126,6 +127,9 @@ class Simplifier {
 
   SimplificationEffect run() {
     effect_.triangles_before = current_.size();
+    for (int round = 0; walls_ != nullptr && round < 2 && !is_enough(); ++round) {
+      simplify_lines_of(round);
+    }
     for (int round = 0; round < kMostRounds; ++round) {
       const std::size_t before = current_.size();
       if (is_enough()) break;
@@ -156,36 +160,89 @@ class Simplifier {
     return is_left_out ? kNoBlock : cubes_.at(centre, round);
   }
 
-  void run_round(int round) {
-    std::vector<std::uint32_t> blocks(current_.size());  // of each triangle
+  // Of each triangle.
+  std::vector<std::uint32_t> cubes_of_triangles(int round) const {
+    std::vector<std::uint32_t> cubes(current_.size());
     constexpr std::size_t kPerTask = 1 << 15;
-    parallel_for(quiet_, (blocks.size() + kPerTask - 1) / kPerTask, [&](std::size_t task) {
-      const std::size_t end = std::min(blocks.size(), (task + 1) * kPerTask);
-      for (std::size_t t = task * kPerTask; t < end; ++t) blocks[t] = cube_of(t, round);
+    parallel_for(quiet_, (cubes.size() + kPerTask - 1) / kPerTask, [&](std::size_t task) {
+      const std::size_t end = std::min(cubes.size(), (task + 1) * kPerTask);
+      for (std::size_t t = task * kPerTask; t < end; ++t) cubes[t] = cube_of(t, round);
     });
-    std::size_t count = cubes_.count();
-    if (walls_ != nullptr) count = split_by_sides(blocks);
-    const Groups triangles(count, current_.size(), [&](std::size_t t) { return blocks[t]; });
-    const Groups points(count, homes_.size(), [&](std::size_t n) {
-      return homes_[n] == TriangleGrid::kNone ? kNoBlock : blocks[homes_[n]];
-    });
-    std::vector<std::uint32_t> place(current_.size());  // of a triangle within its block
-    for (std::size_t b = 0; b < count; ++b) {
-      const auto members = triangles.of(b);
-      for (std::size_t n = 0; n < members.size(); ++n) {
-        place[members[n]] = static_cast<std::uint32_t>(n);
+    return cubes;
+  }
+
+  // What stands in each block.
+  class Blocks {
+   public:
+    // `blocks`: of each triangle.
+    Blocks(const Simplifier& of, std::size_t count, std::span<const std::uint32_t> blocks)
+        : of_(of),
+          triangles_(count, blocks.size(), [&](std::size_t t) { return blocks[t]; }),
+          points_(count, of.homes_.size(),
+                  [&](std::size_t n) {
+                    const std::uint32_t home = of.homes_[n];
+                    return home == TriangleGrid::kNone ? kNoBlock : blocks[home];
+                  }),
+          place_(blocks.size()) {
+      for (std::size_t b = 0; b < count; ++b) {
+        const auto members = triangles_.of(b);
+        for (std::size_t n = 0; n < members.size(); ++n) {
+          place_[members[n]] = static_cast<std::uint32_t>(n);
+        }
       }
     }
-    const auto block_from = [&](std::size_t b) {
+
+    SurfaceBlock operator()(std::size_t b) const {
       SurfaceBlock block;
-      for (const std::uint32_t t : triangles.of(b)) block.triangles.push_back(current_[t]);
-      if (walls_ != nullptr && !block.triangles.empty()) block.sides = sides_[triangles.of(b)[0]];
-      for (const std::uint32_t point : points.of(b)) {
+      for (const std::uint32_t t : triangles_.of(b)) {
+        block.triangles.push_back(of_.current_[t]);
+        if (of_.walls_ != nullptr) block.sides.push_back(of_.sides_[t]);
+      }
+      for (const std::uint32_t point : points_.of(b)) {
         block.points.push_back(point);
-        block.homes.push_back(place[homes_[point]]);
+        block.homes.push_back(place_[of_.homes_[point]]);
       }
       return block;
-    };
+    }
+
+   private:
+    const Simplifier& of_;
+    Groups triangles_;
+    Groups points_;
+    std::vector<std::uint32_t> place_;  // of a triangle within its block
+  };
+
+  // Of lines within cubes.
+  void simplify_lines_of(int round) {
+    const std::vector<std::uint32_t> cubes = cubes_of_triangles(round);
+    const std::vector<std::uint8_t> is_free = vertices_of_one_block(cubes);
+    const Blocks block_from(*this, cubes_.count(), cubes);
+    std::vector<SurfaceBlock> results(cubes_.count());
+    parallel_for(quiet_, results.size(), [&](std::size_t b) {
+      results[b] = block_from(b);
+      simplify_lines(goal(), is_free, results[b]);
+    });
+    take(cubes, results);
+  }
+
+  // Flags of those vertices that have all their triangles in the same one.
+  std::vector<std::uint8_t> vertices_of_one_block(std::span<const std::uint32_t> blocks) const {
+    std::vector<std::uint32_t> owner(mesh_.positions.size(), kNoBlock);
+    std::vector<std::uint8_t> is_of_one(owner.size(), 1);
+    for (std::size_t t = 0; t < current_.size(); ++t) {
+      for (const std::uint32_t vertex : current_[t]) {
+        if (owner[vertex] == kNoBlock) owner[vertex] = blocks[t];
+        if (blocks[t] == kNoBlock || owner[vertex] != blocks[t]) is_of_one[vertex] = 0;
+      }
+    }
+    return is_of_one;
+  }
+
+  void run_round(int round) {
+    std::vector<std::uint32_t> blocks = cubes_of_triangles(round);
+    std::size_t count = cubes_.count();
+    if (walls_ != nullptr) count = split_by_sides(blocks);
+    const Blocks block_from(*this, count, blocks);
     std::vector<SurfaceBlock> results(count);
     simplify_blocks(round, block_from, results);
     settle_seams(block_from, edges_beside(blocks), results);
@@ -222,8 +279,7 @@ class Simplifier {
     return {mesh_, original_, grid_ ? &*grid_ : nullptr, options_.max_error_mm, share};
   }
 
-  template <class BlockFrom>
-  void simplify_blocks(int round, const BlockFrom& block_from, std::vector<SurfaceBlock>& results) {
+  void simplify_blocks(int round, const Blocks& block_from, std::vector<SurfaceBlock>& results) {
     std::atomic<std::uint64_t> blocks = 0;
     std::atomic<std::uint64_t> repeated = 0;
     std::atomic<std::uint64_t> taken_back = 0;
@@ -295,7 +351,8 @@ class Simplifier {
                  [&](std::size_t b) { of_blocks[b] = seam_edges(results[b].triangles); });
     std::vector<BlockEdge> edges = beside;
     for (std::uint32_t b = 0; b < of_blocks.size(); ++b) {
-      for (const SeamEdge& edge : of_blocks[b]) add_edge(edge, b, results[b].sides, edges);
+      const WallSides sides = results[b].sides.empty() ? WallSides{} : results[b].sides.front();
+      for (const SeamEdge& edge : of_blocks[b]) add_edge(edge, b, sides, edges);
     }
     std::ranges::stable_sort(edges, {}, &BlockEdge::key);
     std::vector<BlockEdge> crowded;
@@ -314,8 +371,7 @@ class Simplifier {
 
   // Simplifies the blocks again that made such edges, without them; in the end leaves them as they
   // were, which had none.
-  template <class BlockFrom>
-  void settle_seams(const BlockFrom& block_from, const std::vector<BlockEdge>& beside,
+  void settle_seams(const Blocks& block_from, const std::vector<BlockEdge>& beside,
                     std::vector<SurfaceBlock>& results) {
     std::vector<std::vector<std::uint32_t>> held(results.size());
     for (int attempt = 0; attempt < kMostRepairs; ++attempt) {
@@ -357,7 +413,7 @@ class Simplifier {
     for (const SurfaceBlock& block : results) {
       const auto first = static_cast<std::uint32_t>(next.size());
       next.insert(next.end(), block.triangles.begin(), block.triangles.end());
-      if (walls_ != nullptr) next_sides.resize(next.size(), block.sides);
+      next_sides.insert(next_sides.end(), block.sides.begin(), block.sides.end());
       for (std::size_t n = 0; n < block.points.size(); ++n) {
         homes_[block.points[n]] = first + block.homes[n];
       }

@@ -41,7 +41,8 @@ struct SimplificationEffect {
 };
 
 // Simplifies the mesh in place. Its vertices are some of those that it had, in the same order and
-// at the same places; those on a boundary and those of Mesh::on_line are all kept. What is an
+// at the same places; those on a boundary are all kept, and of Mesh::on_line where no walls are
+// given. What is an
 // oriented manifold stays one, of the same boundary, Euler characteristic and orientation. No
 // triangle has an area of zero that had one before. The layers are joined into fewer, deeper ones:
 // as few as let a triangle name vertices of two at most, which is what the encoders walk along.
@@ -53,8 +54,8 @@ struct SimplificationEffect {
 SimplificationEffect simplify(const SimplifyOptions& options, const Context& context, Mesh& mesh);
 
 // As above, for the walls between labels: each is simplified once, for both its sides, and keeps
-// them; the lines where walls meet stay as they are. What holds of the mesh above holds of each
-// label's own surface.
+// them, and so is each line where walls meet, for all of them; the points where lines meet stay.
+// What holds of the mesh above holds of each label's own surface.
 SimplificationEffect simplify(const SimplifyOptions& options, const Context& context,
                               SeparatingSurface& walls);
 

@@ -13,38 +13,11 @@ namespace isomesh::mesh {
 namespace {
 
 constexpr int kAttempts = 8;
-// Of the bound, what is asked for: a quadric's error is a mean, and the bound holds everywhere.
-constexpr double kFirstError = 0.5;
-
-// Who measures again in single precision finds no more than the bound.
-constexpr double kWithin = 1 - 1e-6;
-
 // Attempts after which holding vertices is not enough, and less is asked for.
 constexpr int kFullAttempts = 4;
 constexpr double kLess = 0.6;
 
 using Flags = std::vector<std::uint8_t>;
-
-// A block with vertices of its own, from 0 on.
-struct LocalMesh {
-  std::vector<std::uint32_t> origin;  // of each vertex, in the mesh; ascending
-  std::vector<Vec3> positions;
-  std::vector<Triangle> triangles;
-
-  LocalMesh(const Mesh& mesh, std::span<const Triangle> block) {
-    origin.reserve(3 * block.size());
-    for (const Triangle& triangle : block) {
-      origin.insert(origin.end(), triangle.begin(), triangle.end());
-    }
-    std::ranges::sort(origin);
-    origin.erase(std::unique(origin.begin(), origin.end()), origin.end());
-    for (const std::uint32_t vertex : origin) positions.push_back(mesh.positions[vertex]);
-    const auto number = [&](std::uint32_t vertex) {
-      return static_cast<std::uint32_t>(std::ranges::lower_bound(origin, vertex) - origin.begin());
-    };
-    for (const auto& [a, b, c] : block) triangles.push_back({number(a), number(b), number(c)});
-  }
-};
 
 // What of a surface its simplification must not change.
 struct Shape {
@@ -108,18 +81,11 @@ Shape look_at_fans(std::size_t vertices, std::span<const Triangle> triangles, co
   return {topology.boundary_edges, named - (3 * count + boundary) / 2 + count};
 }
 
-bool has_area(const LocalMesh& mesh, const Triangle& triangle) {
-  const auto& [a, b, c] = triangle;
-  return normal_of(to_point(mesh.positions[a]), to_point(mesh.positions[b]),
-                   to_point(mesh.positions[c])) != Point{0, 0, 0};
-}
-
 // Of a triangle without area, the corner that lies on the edge between the other two.
 std::size_t corner_on_edge(const LocalMesh& mesh, const Triangle& triangle) {
   std::array<double, 3> opposite;
   for (std::size_t i = 0; i < 3; ++i) {
-    const Point edge = minus(to_point(mesh.positions[triangle[(i + 2) % 3]]),
-                             to_point(mesh.positions[triangle[(i + 1) % 3]]));
+    const Point edge = minus(mesh.at(triangle[(i + 2) % 3]), mesh.at(triangle[(i + 1) % 3]));
     opposite[i] = dot(edge, edge);
   }
   return static_cast<std::size_t>(std::ranges::max_element(opposite) - opposite.begin());
@@ -136,7 +102,7 @@ void turn_flat_triangles(const LocalMesh& mesh, const Flags& left,
     std::vector<std::uint32_t> flat;
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {
       const auto is_left = [&](std::uint32_t vertex) { return left[vertex] != 0; };
-      if (has_area(mesh, triangles[t]) || std::ranges::all_of(triangles[t], is_left)) continue;
+      if (mesh.has_area(triangles[t]) || std::ranges::all_of(triangles[t], is_left)) continue;
       flat.push_back(t);
     }
     if (flat.empty()) return;
@@ -205,7 +171,7 @@ class BlockSimplifier {
     before_ = look_at_fans(exempt_.size(), mesh_.triangles, exempt_, &held_);
     exempt_ = held_;
     for (const Triangle& triangle : mesh_.triangles) {
-      if (has_area(mesh_, triangle)) continue;
+      if (mesh_.has_area(triangle)) continue;
       for (const std::uint32_t vertex : triangle) is_flat_[vertex] = held_[vertex] = 1;
     }
     faults_.assign(held_.size(), 0);
@@ -230,8 +196,8 @@ class BlockSimplifier {
       if (is_good()) {
         result.homes = homes_;
         result.triangles.clear();
-        for (const auto& [a, b, c] : proposed_) {
-          result.triangles.push_back({mesh_.origin[a], mesh_.origin[b], mesh_.origin[c]});
+        for (const Triangle& triangle : proposed_) {
+          result.triangles.push_back(mesh_.in_mesh(triangle));
         }
         return outcome;
       }
@@ -247,7 +213,7 @@ class BlockSimplifier {
     faults_.assign(held_.size(), 0);
     for (const Triangle& triangle : proposed_) {
       const auto was_flat = [&](std::uint32_t vertex) { return is_flat_[vertex] != 0; };
-      if (!has_area(mesh_, triangle) && !std::ranges::all_of(triangle, was_flat)) mark(triangle);
+      if (!mesh_.has_area(triangle) && !std::ranges::all_of(triangle, was_flat)) mark(triangle);
     }
     const Shape after = look_at_fans(held_.size(), proposed_, exempt_, &faults_);
     if (after.euler != before_.euler) mark_lost_parts();
@@ -353,6 +319,20 @@ class BlockSimplifier {
 
 }  // namespace
 
+LocalMesh::LocalMesh(const Mesh& mesh, std::span<const Triangle> block) {
+  origin.reserve(3 * block.size());
+  for (const Triangle& triangle : block) {
+    origin.insert(origin.end(), triangle.begin(), triangle.end());
+  }
+  std::ranges::sort(origin);
+  origin.erase(std::unique(origin.begin(), origin.end()), origin.end());
+  for (const std::uint32_t vertex : origin) positions.push_back(mesh.positions[vertex]);
+  const auto number = [&](std::uint32_t vertex) {
+    return static_cast<std::uint32_t>(std::ranges::lower_bound(origin, vertex) - origin.begin());
+  };
+  for (const auto& [a, b, c] : block) triangles.push_back({number(a), number(b), number(c)});
+}
+
 BlockOutcome simplify_block(const BlockGoal& goal, std::span<const std::uint32_t> held,
                             SurfaceBlock& block) {
   if (block.triangles.empty()) return {};
@@ -361,6 +341,7 @@ BlockOutcome simplify_block(const BlockGoal& goal, std::span<const std::uint32_t
   if (!result.triangles.empty()) {
     block.triangles = std::move(result.triangles);
     block.homes = std::move(result.homes);
+    if (!block.sides.empty()) block.sides.resize(block.triangles.size());
   }
   return outcome;
 }

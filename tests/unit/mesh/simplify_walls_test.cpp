@@ -1,4 +1,5 @@
 // Simplified walls between labels.
+#include <bit>
 #include <cstdint>
 #include <vector>
 
@@ -39,6 +40,27 @@ TEST(SimplifyWalls, KeepEveryLabelsSurfaceOfItsKindAndWithinTheError) {
       EXPECT_LE(certify(after, before, {}).max_mm(), kError) << number;
     }
   }
+}
+
+std::size_t count_on_line(const Mesh& mesh) {
+  std::size_t count = 0;
+  for (const std::uint64_t word : mesh.on_line)
+    count += static_cast<std::size_t>(std::popcount(word));
+  return count;
+}
+
+// Two blocks side by side meet in a rectangle: of its edges a few vertices are enough.
+TEST(SimplifyWalls, LeaveFewVerticesOnStraightLines) {
+  auto blocks = test::constant<std::uint8_t>(0, {24, 24, 24});
+  for (std::uint32_t k = 4; k < 20; ++k) {
+    for (std::uint32_t j = 4; j < 20; ++j) {
+      for (std::uint32_t i = 4; i < 20; ++i) blocks.at(i, j, k) = i < 12 ? 1 : 2;
+    }
+  }
+  SeparatingSurface surface = separated(blocks, {.labels = {1, 2}});
+  const std::size_t before = count_on_line(surface.mesh);
+  simplify({.max_error_mm = 0.9}, {}, surface);
+  EXPECT_LT(count_on_line(surface.mesh), before / 4);
 }
 
 // A value that belongs to two labels: walls between what overlaps and what does not.
