@@ -188,7 +188,7 @@ void visit(Is<DistanceSummary> auto& self, auto&& field) {
   field("histogram", self.histogram);
 }
 
-void visit(Is<MeshCertificate::Budget> auto& self, auto&& field) {
+void visit(Is<ErrorBudget> auto& self, auto&& field) {
   field("smoothing", self.smoothing);
   field("simplification", self.simplification);
   field("quantisation", self.quantisation);

@@ -113,22 +113,22 @@ struct DistanceSummary {
   bool operator==(const DistanceSummary&) const = default;
 };
 
+// How max_error_mm was shared out; the three make it up.
+struct ErrorBudget {
+  double smoothing = 0;       // the farthest that it moved a vertex
+  double quantisation = 0;    // the most that rounding a file's coordinates moves one
+  double simplification = 0;  // the rest
+
+  bool operator==(const ErrorBudget&) const = default;
+};
+
 // How far the files are from the surface as it was extracted, before it was smoothed.
 struct MeshCertificate {
-  // How max_error_mm was shared out; the three make it up.
-  struct Budget {
-    double smoothing = 0;       // the farthest that it moved a vertex
-    double quantisation = 0;    // the most that rounding a file's coordinates moves one
-    double simplification = 0;  // the rest
-
-    bool operator==(const Budget&) const = default;
-  };
-
-  MeshFormat file = MeshFormat::kDrc;    // of several the one that is farthest
-  double max_mm = 0;                     // both ways
-  DistanceSummary from_mesh;             // shows what has been added
-  DistanceSummary from_extracted;        // shows what has been left out
-  std::optional<Budget> budget_mm = {};  // where max_error_mm is given
+  MeshFormat file = MeshFormat::kDrc;         // of several the one that is farthest
+  double max_mm = 0;                          // both ways
+  DistanceSummary from_mesh;                  // shows what has been added
+  DistanceSummary from_extracted;             // shows what has been left out
+  std::optional<ErrorBudget> budget_mm = {};  // where max_error_mm is given
 
   bool operator==(const MeshCertificate&) const = default;
 };

@@ -100,7 +100,7 @@ void tell_error(const MeshSummary& mesh, Rows& rows) {
   rows.push_back({"  mesh to scan", way_of(certificate.from_mesh)});
   rows.push_back({"  scan to mesh", way_of(certificate.from_extracted)});
   if (certificate.budget_mm) {
-    const MeshCertificate::Budget& budget = *certificate.budget_mm;
+    const ErrorBudget& budget = *certificate.budget_mm;
     rows.push_back({"  shared out", fixed(budget.smoothing, 4) + " mm smoothing, " +
                                         fixed(budget.simplification, 4) + " mm simplification, " +
                                         fixed(budget.quantisation, 4) + " mm rounding"});

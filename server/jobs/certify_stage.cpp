@@ -36,10 +36,10 @@ SelfIntersections summary_of(const mesh::SelfIntersections& found) {
   return summary;
 }
 
-MeshCertificate::Budget budget_of(const MeshParameters& parameters, const mesh::Mesh& mesh,
-                                  const MeshSummary& summary) {
-  MeshCertificate::Budget budget = {.smoothing = summary.displacement_mm.max,
-                                    .quantisation = quantisation_mm(parameters, mesh)};
+ErrorBudget budget_of(const MeshParameters& parameters, const mesh::Mesh& mesh,
+                      const MeshSummary& summary) {
+  ErrorBudget budget = {.smoothing = summary.displacement_mm.max,
+                        .quantisation = quantisation_mm(parameters, mesh)};
   budget.simplification = *parameters.max_error_mm - budget.smoothing - budget.quantisation;
   return budget;
 }

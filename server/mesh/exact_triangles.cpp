@@ -22,7 +22,8 @@ Triangle3 triangle_of(std::span<const Vec3> positions, const Triangle& t) {
 // With the shared vertices first, which keeps what a triangle is as a set.
 Triangle shared_first(const Triangle& triangle, const Triangle& other) {
   Triangle result = triangle;
-  std::ranges::stable_partition(result, [&](std::uint32_t vertex) {
+  // std::ranges' returns a range of a kind that clang++ 14 cannot compile with g++ 12's library.
+  std::stable_partition(result.begin(), result.end(), [&](std::uint32_t vertex) {
     return std::ranges::find(other, vertex) != other.end();
   });
   return result;

@@ -61,7 +61,7 @@ void paint_tube(Samples& body, std::uint8_t label, std::size_t number) {
     const double share = static_cast<double>(ball) / kBalls;
     const double wave = 0.06 * std::sin(4 * std::numbers::pi * share + static_cast<double>(number));
     Point at = {0.1 + 0.8 * from[0] + wave, 0.1 + 0.8 * from[1] - wave, 0.1 + 0.8 * share};
-    std::ranges::rotate(at, at.begin() + static_cast<std::ptrdiff_t>(number % 3));
+    std::rotate(at.begin(), at.begin() + static_cast<std::ptrdiff_t>(number % 3), at.end());
     paint(body, label, {at, {kRadius, kRadius, kRadius}});
   }
 }

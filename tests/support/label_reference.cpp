@@ -218,7 +218,7 @@ using NamedTriangle = std::array<std::uint64_t, 6>;
 
 NamedTriangle named(std::array<std::uint64_t, 3> v, const mesh::WallSides& sides,
                     std::uint64_t layer) {
-  std::ranges::rotate(v, std::ranges::min_element(v));
+  std::rotate(v.begin(), std::ranges::min_element(v), v.end());
   return {v[0], v[1], v[2], sides.front, sides.back, layer};
 }
 

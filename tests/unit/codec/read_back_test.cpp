@@ -195,7 +195,7 @@ class ReadBackLabels : public test::LabelFilesTest {
 Triangles turned(const Triangles& triangles) {
   Triangles result;
   for (Corners corners : triangles) {
-    std::ranges::rotate(corners, std::ranges::min_element(corners));
+    std::rotate(corners.begin(), std::ranges::min_element(corners), corners.end());
     result.insert(corners);
   }
   return result;

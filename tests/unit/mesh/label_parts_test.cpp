@@ -33,7 +33,7 @@ std::set<std::array<Vec3, 3>> places_of(const Mesh& mesh) {
   for (const Triangle& triangle : mesh.triangles) {
     std::array<Vec3, 3> corners;
     for (std::size_t c = 0; c < 3; ++c) corners[c] = mesh.positions[triangle[c]];
-    std::ranges::rotate(corners, std::ranges::min_element(corners));
+    std::rotate(corners.begin(), std::ranges::min_element(corners), corners.end());
     places.insert(corners);
   }
   return places;

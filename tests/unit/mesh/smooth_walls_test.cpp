@@ -149,7 +149,7 @@ using Place = std::array<Vec3, 3>;
 Place place_of(const Mesh& mesh, const Triangle& triangle, bool turned) {
   Place place = {mesh.positions[triangle[0]], mesh.positions[triangle[turned ? 2 : 1]],
                  mesh.positions[triangle[turned ? 1 : 2]]};
-  std::ranges::rotate(place, std::ranges::min_element(place));
+  std::rotate(place.begin(), std::ranges::min_element(place), place.end());
   return place;
 }
 
