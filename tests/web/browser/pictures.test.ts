@@ -1,5 +1,4 @@
-// Pictures of each view, of real volumes, for README. They go to the folder ISOMESH_PICTURES, or are
-// looked at and thrown away.
+// Pictures of each view, of real volumes, for README: where ISOMESH_PICTURES names the folder that they go to.
 import { execFileSync } from 'node:child_process';
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';

@@ -1,8 +1,7 @@
 // The page never waits for its shaders: a program is asked for only after a fence behind its linking has passed. A page that
 // asks sooner stands still until it is made, 0.2 s and more where software draws.
-import { readFileSync } from 'node:fs';
 import { expect, it } from 'vitest';
-import { brain, brainHull, setup, still, surfaceLoaded } from './support';
+import { ballNrrd, setup, still, surfaceLoaded } from './support';
 
 const at = setup();
 
@@ -14,8 +13,8 @@ interface Watched {
 
 it('the page does not wait for shaders while a surface comes and is looked at', async () => {
   const { page, daemon } = at;
-  const volume = await daemon.upload(readFileSync(brain));
-  const job = await daemon.submit({ volume, iso: brainHull, formats: ['glb'] }, 30);
+  const volume = await daemon.upload(ballNrrd(48, 18));
+  const job = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
   await page.addInitScript(() => {
     const watched: Watched = { linked: 0, tooSoon: 0 };
     Object.assign(window, { watched });
