@@ -121,12 +121,12 @@ void TlsClient::send(std::string_view bytes) {
 }
 
 void TlsClient::await_receipt() {
-  constexpr std::chrono::milliseconds kLook{5};
+  constexpr std::chrono::milliseconds kLookForReceipt{5};
   const auto deadline = std::chrono::steady_clock::now() + timeout_;
   int unsent = 1;
   while (::ioctl(socket_.number(), SIOCOUTQ, &unsent) == 0 && unsent > 0) {
     if (std::chrono::steady_clock::now() >= deadline || stop_.stop_requested()) throw_lost();
-    std::this_thread::sleep_for(kLook);
+    std::this_thread::sleep_for(kLookForReceipt);
   }
   // A connection that was reset has nothing unsent either.
   if (unsent != 0 || !is_open()) throw_lost();

@@ -134,7 +134,7 @@ class OrderMetrics {
                     .Register(registry)
                     .Add({})) {}
 
-  void set(const Levels::Orders& levels) {
+  void set(const OrderLevels& levels) {
     for (Gauge* gauge : told_) gauge->Set(0);
     for (const auto& [what, count] : levels.counts.by_state_and_rule) {
       Gauge& gauge =

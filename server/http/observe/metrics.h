@@ -31,6 +31,13 @@ struct AnsweredRequest {
 
 std::string_view name_of(callbacks::CallbackOutcome outcome);
 
+// Of a service that knows a PACS.
+struct OrderLevels {
+  store::OrderCounts counts;
+  std::vector<orders::Attempts> failed;
+  double oldest_open_seconds = 0;
+};
+
 // What is measured when somebody asks.
 struct Levels {
   std::array<std::uint64_t, 3> queued = {};  // by Priority
@@ -39,13 +46,7 @@ struct Levels {
   std::uint64_t callbacks = 0;  // that wait to be delivered
   std::uint64_t disk_used_bytes = 0;
   std::uint64_t disk_free_bytes = 0;
-  // Of a service that knows a PACS.
-  struct Orders {
-    store::OrderCounts counts;
-    std::vector<orders::Attempts> failed;
-    double oldest_open_seconds = 0;
-  };
-  std::optional<Orders> orders = {};
+  std::optional<OrderLevels> orders = {};
 };
 
 // Thread safe.

@@ -19,7 +19,7 @@ Levels levels_of(const App& app) {
   const auto space = std::filesystem::space(app.services.folder.blobs(), unknown);
   if (!unknown) levels.disk_free_bytes = space.available;
   if (const orders::Orders* orders = app.services.orders) {
-    Levels::Orders& told = levels.orders.emplace();
+    OrderLevels& told = levels.orders.emplace();
     told.counts = orders->counts();
     told.failed = orders->attempts();
     if (const auto oldest = told.counts.oldest_open) {
