@@ -62,7 +62,7 @@ TEST(XmlReader, SaysWhereADocumentIsBroken) {
 }
 
 TEST(XmlReader, RefusesEntities) {
-  constexpr std::string_view kBomb =
+  static constexpr std::string_view kBomb =
       "<!DOCTYPE a [<!ENTITY x \"ha\"><!ENTITY y \"&x;&x;&x;&x;\">]><a>&y;</a>";
   EXPECT_THAT([] { notes_of(kBomb, 1000); }, ThrowsMessage<XmlError>(HasSubstr("entity")));
   EXPECT_EQ(notes_of("<!DOCTYPE a SYSTEM \"http://example.org/a.dtd\"><a/>", 1000).notes,

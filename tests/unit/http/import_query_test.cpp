@@ -131,19 +131,19 @@ TEST(ImportOptionsOf, TakesWhatChoosesAndAccepts) {
 }
 
 TEST(ImportOptionsOf, RefusesOtherValues) {
-  for (const auto& [name, value] : Pairs{{"member", ""},
-                                         {"member", "a\nb"},
-                                         {"volume", "-1"},
-                                         {"volume", "4294967296"},
-                                         {"volume", "one"},
-                                         {"accept", ""},
-                                         {"accept", "missing-slices"},
-                                         {"accept", "forms-differ"},
-                                         {"accept", "frame-of-reference,"},
-                                         {"nifti_form", "both"}}) {
-    const auto error = thrown_by([&] { import_options_of(with_query({{name, value}})); });
-    ASSERT_TRUE(error) << name << '=' << value;
-    EXPECT_THAT(fields_of(*error), ElementsAre(name)) << value;
+  for (const auto& pair : Pairs{{"member", ""},
+                                {"member", "a\nb"},
+                                {"volume", "-1"},
+                                {"volume", "4294967296"},
+                                {"volume", "one"},
+                                {"accept", ""},
+                                {"accept", "missing-slices"},
+                                {"accept", "forms-differ"},
+                                {"accept", "frame-of-reference,"},
+                                {"nifti_form", "both"}}) {
+    const auto error = thrown_by([&] { import_options_of(with_query({pair})); });
+    ASSERT_TRUE(error) << pair.first << '=' << pair.second;
+    EXPECT_THAT(fields_of(*error), ElementsAre(pair.first)) << pair.second;
   }
 }
 

@@ -58,7 +58,9 @@ TEST(Cavities, LeaveWhatIsOpen) {
 // Which samples are outside and joined to the border by edges of the lattice between outside
 // samples: brute force, without any mesh.
 std::vector<bool> open_air(const test::SampleVolume<float>& volume) {
-  const auto [nx, ny, nz] = volume.dims;
+  const auto nx = std::int64_t{volume.dims.x};
+  const auto ny = std::int64_t{volume.dims.y};
+  const auto nz = std::int64_t{volume.dims.z};
   std::vector<bool> is_open(volume.samples.size(), false);
   std::vector<std::array<std::int64_t, 3>> rest;
   const auto visit = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
