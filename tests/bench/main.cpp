@@ -184,6 +184,11 @@ int run_program(int argc, char** argv) {
   std::filesystem::path folder;
   CLI::App* report = app.add_subcommand("report", "Write the report on the paper");
   report->add_option("DIR", folder, "Where REPORT.md and its plots go")->required();
+  std::vector<std::string> sections;
+  report->add_option("--only", sections, "Sections to write; several are separated by commas")
+      ->delimiter(',')
+      ->check(
+          CLI::IsMember(std::vector<std::string>(kReportSections.begin(), kReportSections.end())));
   report->fallthrough();
 
   std::filesystem::path daemon = daemon_beside_this();
@@ -234,7 +239,7 @@ int run_program(int argc, char** argv) {
   accuracy.with_peers = !only_fast;
   if (*simplify || *certify) return run_accuracy(options, accuracy, bool(*certify));
   if (*labels) return run_labels(options, samples);
-  return *report ? write_report(folder, daemon, options.surface_nets_root) : run(options);
+  return *report ? write_report(folder, daemon, options.surface_nets_root, sections) : run(options);
 }
 
 }  // namespace

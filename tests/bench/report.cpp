@@ -62,7 +62,11 @@ void write_opening(const std::optional<Subject>& head, const std::optional<Subje
 }  // namespace
 
 int write_report(const std::filesystem::path& folder, const std::filesystem::path& daemon,
-                 const std::filesystem::path& surface_nets_root) {
+                 const std::filesystem::path& surface_nets_root,
+                 const std::vector<std::string>& only) {
+  const auto is_wanted = [&](const char* section) {
+    return only.empty() || std::ranges::find(only, section) != only.end();
+  };
   const int threads = std::min(2, processors());
   set_threads(threads);
   Peers::set_threads(threads);
@@ -80,36 +84,40 @@ int write_report(const std::filesystem::path& folder, const std::filesystem::pat
     plan.volume = real->samples;
     plan.iso = kBrainIso;
   }
-  if (real) {
+  if (real && is_wanted("service")) {
     write_service({daemon, kBrainFile, kBrainIso, threads}, report);
     write_draco_share(*real, report);
   }
-  write_goals(plan, report);
+  if (is_wanted("goals")) write_goals(plan, report);
   std::vector<Subject> subjects;
   if (head) {
     subjects.push_back(
         {resample(head->samples, {kPaperSize, kPaperSize, kPaperSize}), head->levels});
   }
   if (real) subjects.push_back(*real);
-  if (!subjects.empty()) write_table_2(subjects, report);
-  if (head) {
+  if (!subjects.empty() && is_wanted("paper")) write_table_2(subjects, report);
+  if (head && is_wanted("paper")) {
     write_table_3(*head, report);
     write_figure_4(*head, report);
     write_figures_5_and_6(*head, report);
   }
-  for (const Subject& subject : subjects) write_passes(subject, report);
-  write_growth(kSizes, report);
-  if (!subjects.empty()) {
+  if (is_wanted("passes")) {
+    for (const Subject& subject : subjects) write_passes(subject, report);
+  }
+  if (is_wanted("growth")) write_growth(kSizes, report);
+  if (!subjects.empty() && is_wanted("quality")) {
     write_choices(subjects, report);
     write_quality(subjects, report);
   }
-  write_labels(surface_nets_root, report);
+  if (is_wanted("labels")) write_labels(surface_nets_root, report);
   std::vector<AccuracySubject> scans;
   if (real) scans.push_back({real->samples, real->levels.front()});
   if (head) scans.push_back({head->samples, head->levels.back()});
-  if (!scans.empty()) write_accuracy(scans, report);
-  document.heading("Where measurement and paper differ");
-  document.bullets(report.remarks);
+  if (!scans.empty() && is_wanted("accuracy")) write_accuracy(scans, report);
+  if (!report.remarks.empty()) {
+    document.heading("Where measurement and paper differ");
+    document.bullets(report.remarks);
+  }
   document.write();
   std::cout << (folder / "REPORT.md").string() << '\n';
   return 0;

@@ -32,8 +32,6 @@ using mesh::Vec3;
 using test::LabelFilesTest;
 using Places = LabelFilesTest::Places;
 
-constexpr std::size_t kLabels = LabelFilesTest::kLabels;
-
 // The names and bytes in a ZIP, as libarchive reads them.
 std::map<std::string, std::string> unzipped(const std::string& bytes) {
   std::map<std::string, std::string> files;
