@@ -236,7 +236,8 @@ class LabelCellWriter {
     const unsigned parity = row_.parity_at(x);
     const CellSplit& split = separation_.splits[parity];
     const auto index = [&](VertexName name) {
-      return places[offsets_[edge_name(name / kSlotPlaces, 0)] + name % kSlotPlaces];
+      return places[offsets_[edge_name(name / kSlotPlaces, 0)] +
+                    static_cast<std::ptrdiff_t>(name % kSlotPlaces)];
     };
     for (std::size_t t = 0; t < split.tetrahedra; ++t) {
       const unsigned pattern = pattern_in(labels, split.corners[t]);

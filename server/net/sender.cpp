@@ -120,8 +120,9 @@ void Sender::work() {
 }
 
 void Sender::serve_event(const epoll_event& event) {
-  if (event.data.u64 == kWakeup) return wakeup_.clear();
-  const auto sending = by_id_.find(event.data.u64);  // closed within this batch of events, perhaps
+  const std::uint64_t id = event.data.u64;  // the kernel packs events
+  if (id == kWakeup) return wakeup_.clear();
+  const auto sending = by_id_.find(id);  // closed within this batch of events, perhaps
   if (sending != by_id_.end()) go_on(sending->second, event.events);
 }
 
