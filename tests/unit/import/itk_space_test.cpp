@@ -10,12 +10,6 @@
 #include "tests/unit/import/itk_reader.h"
 #include "tests/unit/import/writers.h"
 
-#if defined(__SANITIZE_ADDRESS__)
-// ITK's NrrdIO does not free what it has read of a header that it refuses.
-extern "C" const char* __lsan_default_suppressions() { return "leak:itk_airArrayNew\n"; }
-extern "C" const char* __lsan_default_options() { return "print_suppressions=0"; }
-#endif
-
 namespace isomesh::import::test {
 namespace {
 
