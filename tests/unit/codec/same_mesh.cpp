@@ -40,23 +40,42 @@ namespace {
 // vertices of the meshes here are farther apart than the coarsest grid moves them.
 std::vector<std::uint32_t> origins_of(const DecodedMesh& decoded, const mesh::Mesh& mesh,
                                       double tolerance) {
-  std::vector<std::uint32_t> origins;
-  std::vector<bool> taken(mesh.positions.size());
-  std::multimap<float, std::uint32_t> by_x;
-  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) by_x.emplace(mesh.positions[v][0], v);
-  for (const Place& point : decoded.points) {
-    const auto x = static_cast<float>(tolerance);
-    const auto is_near = [&](const auto& candidate) {
-      const mesh::Vec3& position = mesh.positions[candidate.second];
-      return !taken[candidate.second] && std::abs(position[1] - point[1]) <= tolerance &&
-             std::abs(position[2] - point[2]) <= tolerance;
-    };
-    const auto end = by_x.upper_bound(point[0] + x);
-    const auto found = std::find_if(by_x.lower_bound(point[0] - x), end, is_near);
-    if (found == end) throw std::runtime_error("a decoded vertex is none of the mesh's");
-    taken[found->second] = true;
-    origins.push_back(found->second);
+  // By cubes that are wide enough for what is near a point to be in its own or those around it.
+  using Cube = std::array<std::int64_t, 3>;
+  const double side = 2 * tolerance;
+  const auto cube_at = [&](const auto& position) {
+    Cube cube;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      cube[axis] = static_cast<std::int64_t>(std::floor(position[axis] / side));
+    }
+    return cube;
+  };
+  std::map<Cube, std::vector<std::uint32_t>> cubes;
+  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
+    cubes[cube_at(mesh.positions[v])].push_back(v);
   }
+  const auto take_near = [&](const Place& point) {
+    const Cube middle = cube_at(point);
+    for (int n = 0; n < 27; ++n) {
+      const auto cube =
+          cubes.find({middle[0] + n % 3 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n / 9 - 1});
+      if (cube == cubes.end()) continue;
+      const auto is_near = [&](std::uint32_t v) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          if (std::abs(mesh.positions[v][axis] - point[axis]) > tolerance) return false;
+        }
+        return true;
+      };
+      const auto found = std::ranges::find_if(cube->second, is_near);
+      if (found == cube->second.end()) continue;
+      const std::uint32_t vertex = *found;
+      cube->second.erase(found);
+      return vertex;
+    }
+    throw std::runtime_error("a decoded vertex is none of the mesh's");
+  };
+  std::vector<std::uint32_t> origins;
+  for (const Place& point : decoded.points) origins.push_back(take_near(point));
   return origins;
 }
 
