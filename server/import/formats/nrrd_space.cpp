@@ -171,6 +171,7 @@ std::vector<Axis> all_axes(const NrrdFields& fields, std::span<const std::uint64
     Axis& axis = axes[at];
     axis.size = sizes[at];
     axis.spacing = spacings[at];
+    if (axis.spacing == 0) throw_not_understood("spacings", "0");
     axis.min = mins[at];
     axis.max = maxs[at];
     if (!centers.empty()) set_center(axis, centers[at]);
@@ -217,7 +218,6 @@ void set_step(Geometry& geometry, std::size_t at, const Axis& axis, bool in_spac
     if (in_space) {
       throw_unusable("The NRRD header has a spacing of an axis, and a space in which it has none.");
     }
-    if (axis.spacing == 0) throw_not_understood("spacings", "0");
     geometry.spacing[at] = axis.spacing;
     return;
   }

@@ -146,6 +146,14 @@ TEST(Nrrd, RefusesSpacingsThatCannotBe) {
                          {"encoding", "raw"}};
     EXPECT_EQ(import_nrrd(lines).code, ErrorCode::kUnusableVolume) << spacings;
   }
+  // Also of an axis of one sample, beyond those of space.
+  EXPECT_EQ(import_nrrd({{"type", "uint8"},
+                         {"dimension", "4"},
+                         {"sizes", "4 3 2 1"},
+                         {"spacings", "1 1 1 0"},
+                         {"encoding", "raw"}})
+                .code,
+            ErrorCode::kUnusableVolume);
   EXPECT_FALSE(import_with("space origin", "(nan,0,0)").imported());
   EXPECT_FALSE(import_with("space origin", "(0,0,nan)").imported());
 }
