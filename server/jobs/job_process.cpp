@@ -168,9 +168,11 @@ std::optional<std::string_view> JobProcess::next_line(Talk& talk) {
 }
 
 bool JobProcess::hear(Talk& talk) {
-  std::copy(heard_.begin() + static_cast<std::ptrdiff_t>(begin_),
-            heard_.begin() + static_cast<std::ptrdiff_t>(end_), heard_.begin());
-  end_ -= std::exchange(begin_, 0);
+  if (begin_ > 0) {  // or a long line that comes in pieces would be moved for each of them
+    std::copy(heard_.begin() + static_cast<std::ptrdiff_t>(begin_),
+              heard_.begin() + static_cast<std::ptrdiff_t>(end_), heard_.begin());
+    end_ -= std::exchange(begin_, 0);
+  }
   for (;;) {
     look_at_stop(talk);
     pollfd waiting = {child_->socket().number(), POLLIN, 0};
