@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <mutex>
@@ -23,15 +22,15 @@ std::string random_hex(std::size_t bytes) {
   return to_hex(raw);
 }
 
-std::string time_ordered_id() {
+std::string time_ordered_id(std::chrono::system_clock::time_point now) {
   // Ids of the same millisecond are told apart, and put in order, by the twelve bits behind the
   // time (RFC 9562, section 6.2, method 1).
   static std::mutex mutex;
   static std::int64_t last_stamp = 0;
   constexpr int kCounterBits = 12;
-  const auto now = std::chrono::duration_cast<std::chrono::milliseconds>(
-      std::chrono::system_clock::now().time_since_epoch());
-  std::int64_t stamp = now.count() << kCounterBits;
+  const auto since_1970 =
+      std::chrono::duration_cast<std::chrono::milliseconds>(now.time_since_epoch());
+  std::int64_t stamp = since_1970.count() << kCounterBits;
   {
     const std::lock_guard lock(mutex);
     stamp = std::max(stamp, last_stamp + 1);

@@ -12,8 +12,11 @@
 #include "base/command_line/completion.h"
 #include "base/command_line/manual.h"
 #include "server/options.h"
+#include "server/records.h"
 #include "server/store/backup.h"
-#include "server/store/sqlite/audit_trail.h"
+#include "server/store/files/data_folder.h"
+#include "server/store/postgresql/connection.h"
+#include "server/store/postgresql/move.h"
 #include "server/token_command.h"
 
 namespace isomesh {
@@ -56,6 +59,7 @@ struct Commands::State {
   TokenRequest token = {};
   std::string shell = {};
   std::filesystem::path folder = {};
+  std::string target = {};  // of move
   std::uint64_t after = 0;  // of the audit trail
   std::function<void()> chosen = {};
 
@@ -100,28 +104,57 @@ struct Commands::State {
   }
 
   void add_backup_commands() {
-    CLI::App& backup = add(cli, "backup", "Copy the data folder, also while a daemon uses it",
-                           [this] { tell("copied", store::back_up(options.data, folder)); });
+    CLI::App& backup =
+        add(cli, "backup", "Copy the data folder, also while a daemon uses it", [this] {
+          refuse_database("pg_dump copies the records (docs/cluster.md)");
+          tell("copied", store::back_up(options.data, folder));
+        });
     backup.add_option("DIR", folder, "The folder to make, which must not be there")->required();
-    CLI::App& restored =
-        add(cli, "restore", "Make the data folder from a backup; it must be missing or empty",
-            [this] { tell("put back", store::restore(folder, options.data)); });
+    CLI::App& restored = add(
+        cli, "restore", "Make the data folder from a backup; it must be missing or empty", [this] {
+          refuse_database("pg_restore puts the records back (docs/cluster.md)");
+          tell("put back", store::restore(folder, options.data));
+        });
     restored.add_option("DIR", folder, "The folder that `isomeshd backup` made")->required();
+  }
+
+  void add_move_command() {
+    CLI::App& move = add(
+        cli, "move",
+        "Bring the records of the folder of --data, which no daemon may use meanwhile, to an empty "
+        "database; its files of volumes and meshes stay where they are",
+        [this] {
+          store::postgresql::check_url(target);
+          const store::DataFolder folder_of_data(options.data, options.disk_reserve);
+          const auto moved = store::postgresql::move_records(folder_of_data, target);
+          std::cout << "moved " << moved.volumes << " volumes, " << moved.jobs << " jobs and "
+                    << moved.orders << " orders" << std::endl;
+        });
+    move.add_option("--to", target, "postgresql://... of the database")->required();
   }
 
   // May be asked for while a daemon runs.
   void add_audit_command() {
     CLI::App& audit =
-        add(cli, "audit", "Print the audit trail of the folder of --data, one JSON object a line",
+        add(cli, "audit",
+            "Print the audit trail of the folder of --data, or of --store, one JSON object a line",
             [this] {
-              store::read_audit_trail(options.data, after,
-                                      [](std::string_view line) { std::cout << line << '\n'; });
+              read_audit_trail(options, after,
+                               [](std::string_view line) { std::cout << line << '\n'; });
               std::cout.flush();
               if (!std::cout) {
                 throw Error(ErrorCode::kInternal, "standard output takes no more of the trail");
               }
             });
     audit.add_option("--after", after, "Only what has a greater id")->capture_default_str();
+  }
+
+  // Half a copy is none.
+  void refuse_database(const std::string& instead) const {
+    if (options.store.empty()) return;
+    throw Error(
+        ErrorCode::kInvalidParameter,
+        "the records are in the database of --store and not in the data folder: " + instead);
   }
 
   static void tell(const char* what, const store::Copied& copied) {
@@ -153,6 +186,7 @@ Commands::Commands(CLI::App& cli, const Options& options)
     : state_(std::make_unique<State>(State{cli, options})) {
   state_->add_token_commands();
   state_->add_backup_commands();
+  state_->add_move_command();
   state_->add_audit_command();
   state_->add_description_commands();
 }

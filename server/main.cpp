@@ -45,17 +45,11 @@
 #include "server/orders/hospital.h"
 #include "server/orders/orders.h"
 #include "server/orders/received.h"
+#include "server/records.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/files/data_folder.h"
+#include "server/store/postgresql/connection.h"
 #include "server/store/retention.h"
-#include "server/store/sqlite/audit_trail.h"
-#include "server/store/sqlite/database.h"
-#include "server/store/sqlite/identity.h"
-#include "server/store/sqlite/job_store.h"
-#include "server/store/sqlite/order_store.h"
-#include "server/store/sqlite/outbox.h"
-#include "server/store/sqlite/received_store.h"
-#include "server/store/sqlite/volume_store.h"
 
 namespace {
 
@@ -63,7 +57,7 @@ using namespace isomesh;
 
 // Three quarters of the machine's memory, divided by the number of jobs that run at the same time.
 std::uint64_t default_job_memory(std::size_t workers) {
-  return jobs::usable_memory() / 4 * 3 / workers;
+  return jobs::usable_memory() / 4 * 3 / std::max<std::size_t>(workers, 1);
 }
 
 // Where a build puts it, or where an installation does.
@@ -170,6 +164,7 @@ int tell_configuration(const Options& options, const CLI::App& cli) {
   check_reach(options, address, open_files(options, address));
   const callbacks::CallbackTargets targets(options.callback_targets);
   callback_secrets(options);
+  if (!options.store.empty()) store::postgresql::check_url(options.store);
   if (!options.hospital.empty()) {
     const orders::Hospital hospital = orders::read_hospital(options.hospital);
     if (hospital.dimse) dimse::listen_address(*hospital.dimse);
@@ -270,31 +265,29 @@ int run(const Options& options, const sigset_t& signals) {
   if (options.threads > 0) mesh::set_thread_count(options.threads);
 
   const store::DataFolder folder(options.data, options.disk_reserve);
-  store::Database database(folder);
   const auto keep = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::duration<double, std::chrono::days::period>(options.keep_days));
-  store::Identity identity(database, folder, options.word, {.tolerance = clock_tolerance(keep)});
-  store::FileBlobStore blobs(folder);
-  store::SqliteVolumeStore volumes(database);
-  store::JobStoreOptions job_options = options.jobs;
-  job_options.mesher_version = jobs::kMesherVersion;
-  store::SqliteJobStore jobs(database, blobs, job_options);
+  store::FileBlobStore files_of_blobs(folder);
+  const auto records = open_records(options, folder, files_of_blobs, clock_tolerance(keep));
+  store::BlobStore& blobs = records->blobs();
+  store::VolumeStore& volumes = records->volumes();
+  store::JobStore& jobs = records->jobs();
   if (const std::size_t count = jobs.reap()) {
-    spdlog::warn("{} jobs ran when the last daemon ended; they are run again", count);
+    spdlog::warn("{} jobs ran when a daemon ended; they are run again", count);
   }
   store::RetentionOptions retention_options;
   retention_options.keep = keep;
   retention_options.max_bytes = options.max_disk;
-  retention_options.now = [&identity] { return identity.now(); };
+  retention_options.now = [&records] { return records->now(); };
   store::Retention retention(jobs, volumes, blobs, folder.scratch(), retention_options);
-  blobs.limit_room(options.max_disk,
-                   [&retention](std::uint64_t bytes) { retention.make_room(bytes); });
+  files_of_blobs.limit_room(options.max_disk,
+                            [&retention](std::uint64_t bytes) { retention.make_room(bytes); });
   jobs::RunnerOptions runner = options.runner;
   runner.bounds.time = std::chrono::seconds(options.import_seconds);
   runner.program = program_of_ours("isomesh-import");
   jobs::VolumeLibrary library(folder, blobs, volumes, retention, options.import, runner);
   http::Metrics metrics;
-  store::SqliteOutbox outbox(database);
+  store::Outbox& outbox = records->outbox();
   callbacks::Callbacks callbacks(outbox, targets, callback_options(options),
                                  http::callback_reporter(metrics));
   const jobs::JobProgram job_program = {.file = program_of_ours("isomesh-job"),
@@ -309,9 +302,10 @@ int run(const Options& options, const sigset_t& signals) {
   server_options.tls = files.tls.get();
   server_options.connections = net::connections_within(net::raise_descriptor_limit());
   const auto hospital = open_hospital(options, runner.program);
-  store::SqliteOrderStore order_store(database);
-  store::SqliteAuditTrail audit(database);
-  store::SqliteReceivedStore received(database);
+  store::OrderStore& order_store = records->orders();
+  store::AuditTrail& audit = records->audit();
+  store::ReceivedStore& received = records->received();
+  if (hospital) records->take_orders();
   const orders::PacsByName peers =
       hospital ? hospital->peers(folder.scratch(), options, received, blobs) : orders::PacsByName();
   const auto audit_sender = hospital ? send_trail(hospital->settings, audit) : nullptr;

@@ -136,9 +136,15 @@ void add_options(CLI::App& cli, Options& options) {
   cli.add_option("--data", options.data, "Folder for volumes and meshes; created when missing")
       ->envname("ISOMESH_DATA")
       ->capture_default_str();
-  cli.add_option("--workers", options.workers, "Jobs that run at the same time")
+  cli.add_option(
+         "--store", options.store,
+         "postgresql://... of the database that several daemons share; SQLite in the folder "
+         "of --data unless set")
+      ->envname("ISOMESH_STORE");
+  cli.add_option("--workers", options.workers,
+                 "Jobs that run at the same time; 0: none, this daemon only answers")
       ->envname("ISOMESH_WORKERS")
-      ->check(CLI::Range(1, 64))
+      ->check(CLI::Range(0, 64))
       ->capture_default_str();
   cli.add_option("--threads", options.threads, "Threads of each job; 0: one a processor")
       ->envname("ISOMESH_THREADS")

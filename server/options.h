@@ -13,7 +13,7 @@
 #include "server/jobs/import_runner.h"
 #include "server/process/import_message.h"
 #include "server/store/job_store.h"
-#include "server/store/sqlite/identity.h"
+#include "server/store/operators_word.h"
 
 namespace CLI {
 class App;
@@ -25,6 +25,7 @@ struct Options {
   bool check_only = false;  // tell what would be used, and end
   std::string listen = "127.0.0.1:8080";
   std::filesystem::path data = "isomesh-data";
+  std::string store;  // URL of the database that keeps the records; empty: one in the data folder
   std::size_t workers = 2;
   int threads = 0;  // of the kernels; 0: one a processor
   bool open_network = false;

@@ -68,8 +68,7 @@ std::optional<Continuation> checked_answer(App& app, Request& request, Response&
 // Hands events of jobs on to requests that wait for them, streams, the log and the metrics, until
 // the service stops.
 void watch_jobs(App& app) {
-  // What ended before this process began was logged by another.
-  std::uint64_t last = app.began_us;
+  std::uint64_t last = app.first_event;
   while (!app.stopping) {
     try {
       const auto events = app.services.jobs.events(std::nullopt, "", last, kLongestWatch);
@@ -80,7 +79,7 @@ void watch_jobs(App& app) {
         if (event.kind != store::EventKind::kDone) continue;
         app.connections.job_ended(event.job);
         if (app.services.orders != nullptr) app.services.orders->job_ended(event.job);
-        report_ended(app, event.job);
+        if (!event.is_elsewhere) report_ended(app, event.job);
       }
       if (is_heard) app.connections.wake_sources();
     } catch (const Error& error) {

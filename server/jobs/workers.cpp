@@ -26,8 +26,8 @@ constexpr milliseconds kFullDiskDelay{5000};
 constexpr milliseconds kLongestFullDiskDelay{60'000};
 // The same of one that found no descriptor or memory.
 constexpr milliseconds kExhaustedDelay{5000};
-// How long until a job's end that found the disk full is told the queue again.
-constexpr milliseconds kFullDiskRetry{500};
+// How long until a job's end that the queue could not take is told it again.
+constexpr milliseconds kEndRetry{500};
 
 // Why a run was asked to stop.
 enum class Reason { kNone, kCancelled, kLost, kTooLong, kFullDisk, kExhausted, kEnding };
@@ -194,7 +194,8 @@ void Workers::run(const store::Lease& lease, JobProcess& process) {
   conclude(*run, outcome);
 }
 
-// Tells the queue how the run ended, and again while the disk has no room for that.
+// Tells the queue how the run ended, and again while its disk has no room for that or it does not
+// answer.
 void Workers::conclude(const Run& run, store::Outcome outcome) {
   const store::Lease& lease = run.lease();
   const bool was_stopped = !outcome.mesh && !outcome.error;
@@ -225,10 +226,12 @@ void Workers::conclude(const Run& run, store::Outcome outcome) {
       if (!tell()) spdlog::warn("job {} had lost its lease: its result is dropped", lease.id);
       return;
     } catch (const Error& error) {
-      if (error.code() != ErrorCode::kOutOfSpace || running_.stop_requested()) throw;
+      const bool may_pass =
+          error.code() == ErrorCode::kOutOfSpace || error.code() == ErrorCode::kUnavailable;
+      if (!may_pass || running_.stop_requested()) throw;
       spdlog::error("job {} cannot be finished yet: {}", lease.id, error.what());
     }
-    pause(running_.get_token(), kFullDiskRetry);
+    pause(running_.get_token(), kEndRetry);
   }
 }
 

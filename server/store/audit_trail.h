@@ -47,4 +47,8 @@ class AuditTrail {
   virtual void note_sent(std::uint64_t number) = 0;
 };
 
+// For engines: what is kept of an entry, and how that is told.
+std::string audit_record(const AuditEntry& entry);
+std::string audit_line(std::uint64_t number, const std::string& at, const std::string& record);
+
 }  // namespace isomesh::store

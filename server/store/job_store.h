@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <stop_token>
@@ -93,15 +94,18 @@ enum class EventKind {
 };
 
 // What happened to a job. Queued, claimed and done are kept; what a run tells on its way is known
-// to this process only, and a reader that comes late may miss some of it.
+// to the process that runs it only, and a reader that comes late may miss some of it.
 struct Event {
-  std::uint64_t id = 0;  // grows, also over restarts
+  // Grows, also over restarts, and is the same for all processes that share the records; whoever
+  // goes on after one that it has seen misses none that is kept. It is no time.
+  std::uint64_t id = 0;
   std::string owner;
   std::string job;
   EventKind kind = EventKind::kStage;
   JobState state = JobState::kQueued;
   Stage stage = Stage::kQueue;
   double progress = 0;
+  bool is_elsewhere = false;  // another process did it, and tells its log and metrics
 
   bool operator==(const Event&) const = default;
 };
@@ -128,8 +132,15 @@ struct JobStoreOptions {
 };
 
 // Thread safe. Every verb is one transaction; nothing is held open between them. All may throw
-// Error kOutOfSpace (then nothing has changed) or kInternal. What has expired is kGone for some
-// time, and kNotFound later.
+// Error kOutOfSpace (then nothing has changed), kInternal, or kUnavailable where the records are
+// kept elsewhere and do not answer. What has expired is kGone for some time, and kNotFound later.
+//
+// Several processes may share the records, where the engine can that. What is said of one job is
+// then true over all of them: one of those alike runs, one key is one job, one end is told once. A
+// lease is held by one life of one process, and is over when the engine's clock says so, whatever
+// the process's own says. What a process remembers besides is never what decides. Every verb may be
+// interrupted between the engine and the process, and is then asked again by the store itself: a
+// second submit or finish of the same thing is the first one.
 class JobStore {
  public:
   virtual ~JobStore() = default;
@@ -193,6 +204,12 @@ class JobStore {
                                     std::uint64_t since,
                                     std::chrono::milliseconds timeout) const = 0;
 
+  // The id of the latest event, for those who want what comes after it.
+  virtual std::uint64_t last_event() const = 0;
+
+  // Whether the records can be read now.
+  virtual bool answers() const = 0;
+
   // Of the jobs that the viewer sees.
   virtual QueueDepth depth(const Viewer& viewer) const = 0;
 
@@ -214,12 +231,16 @@ class JobStore {
   // blobs themselves stay for BlobStore::sweep.
   virtual Expired expire(std::span<const Expirable> jobs, std::uint64_t enough) = 0;
 
+  // The turn to remove what is not to be kept, which one of those that share the records has at a
+  // time: it is over when what is returned goes. Null while another has it.
+  virtual std::shared_ptr<const void> turn_to_remove() = 0;
+
   // Of the blobs that meshes name, each counted once.
   virtual std::uint64_t named_bytes() const = 0;
   virtual OwnedBytes owned_bytes() const = 0;
 
-  // When the run began that lasts longest; empty when nothing runs. Blobs that were stored since
-  // then may be about to be named.
+  // When the run began that lasts longest, whoever runs it; empty when nothing runs. Blobs that
+  // were stored since then may be about to be named.
   virtual std::optional<std::chrono::steady_clock::time_point> oldest_run() const = 0;
 
   // Ids of jobs and volumes that expired before that time are not found from now on.

@@ -27,7 +27,8 @@ class Outbox {
   virtual ~Outbox() = default;
 
   // Those that are due at that time, the oldest first, at most `per_receiver` of each scheme, host
-  // and port.
+  // and port. Where several processes share the records, over all of them: what one has got here is
+  // its own for a minute from the last time, and nobody else gets it meanwhile.
   virtual std::vector<Delivery> due(Time now, std::size_t per_receiver) const = 0;
 
   // When the first of those is due that are not due yet at that time; empty when there is none.
@@ -41,5 +42,8 @@ class Outbox {
 
   virtual std::size_t count() const = 0;
 };
+
+// Scheme, host and port.
+std::string receiver_of(const std::string& url);
 
 }  // namespace isomesh::store

@@ -24,6 +24,9 @@ constexpr std::chrono::days kEventsKept{2};
 Retention::Gone Retention::enforce() {
   const Time now = options_.now();
   Gone gone;
+  sweep_scratch(now);
+  const auto turn = jobs_.turn_to_remove();
+  if (!turn) return gone;
   {
     const Lock lock(mutex_);
     expire_old(now, gone);
@@ -33,7 +36,6 @@ Retention::Gone Retention::enforce() {
   sweep_blobs(gone);
   gone.blobs += blobs_.empty_quarantine(now - options_.quarantine);
   forget(now);
-  sweep_scratch(now);
   return gone;
 }
 

@@ -52,7 +52,7 @@ TEST(Start, WrongUsageIsToldAndNotServed) {
   for (const std::vector<std::string>& wrong :
        std::vector<std::vector<std::string>>{{"--listen", "nowhere"},
                                              {"--listen", "127.0.0.1:99999"},
-                                             {"--workers", "0"},
+                                             {"--workers", "65"},
                                              {"--no-such-option"},
                                              {"--config", folder / "absent"}}) {
     std::vector<std::string> command = {ISOMESHD, "--data", data};

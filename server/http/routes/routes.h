@@ -39,10 +39,8 @@ struct App {
   net::FairPlaces streams;  // of events
   Broadcaster events;
   OriginRules rules;  // constant once the server is bound
-  const std::uint64_t began_us =
-      static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(
-                                     std::chrono::system_clock::now().time_since_epoch())
-                                     .count());
+  // What came before was told by another life.
+  const std::uint64_t first_event = services.jobs.last_event();
   std::atomic<bool> draining = false;  // running jobs are finished, others are not accepted
   std::atomic<bool> stopping = false;  // nobody is waited for any more
   Router router;

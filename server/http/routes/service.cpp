@@ -12,6 +12,9 @@ void add_service_routes(App& app) {
           [](const auto& /*request*/, auto& response) { response.set_body("ok\n", "text/plain"); });
   add_get(app, "/readyz", [&app](const auto& /*request*/, auto& response) {
     if (app.draining) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
+    if (!app.services.jobs.answers()) {
+      throw Error(ErrorCode::kUnavailable, "the database does not answer");
+    }
     if (app.services.jobs.is_full()) throw Error(ErrorCode::kUnavailable, "the queue is full");
     if (!app.services.blobs.has_room()) {
       throw Error(ErrorCode::kUnavailable, "the disk is full: nothing new is accepted");

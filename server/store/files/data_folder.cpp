@@ -7,6 +7,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include "base/files.h"
 #include "base/ids.h"
 #include "proto/error.h"
 #include "server/store/files/files.h"
@@ -43,6 +44,20 @@ DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uin
 }
 
 DataFolder::~DataFolder() { ::close(lock_); }
+
+std::string DataFolder::name() const {
+  const std::filesystem::path place = root_ / "name";
+  if (!std::filesystem::exists(place)) {
+    const std::filesystem::path draft = scratch() / random_hex(8);
+    const std::string name = random_hex(16);
+    File file = File::create(draft);
+    file.write(std::as_bytes(std::span(name)));
+    file.sync();
+    move_to(draft, place);
+    sync_folder(root_);
+  }
+  return read_whole(place);
+}
 
 ScratchFolder::ScratchFolder(const std::filesystem::path& parent) : path_(parent / random_hex(8)) {
   std::error_code error;

@@ -31,6 +31,9 @@ class DataFolder {
   std::filesystem::path scratch() const { return root_ / "scratch"; }         // unfinished files
   Reserve& reserve() const { return *reserve_; }
 
+  // A name of its own, given when it is asked for first. Throws Error kOutOfSpace or kInternal.
+  std::string name() const;
+
  private:
   std::filesystem::path root_;
   int lock_ = -1;

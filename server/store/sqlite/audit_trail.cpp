@@ -1,52 +1,10 @@
 #include "server/store/sqlite/audit_trail.h"
 
-#include <utility>
-
-#include <nlohmann/json.hpp>
-
 #include "base/clock.h"
 #include "proto/error.h"
 
 namespace isomesh::store {
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-struct Code {
-  const char* value;
-  const char* meaning;
-};
-
-Code code_of(AuditEvent event) {
-  switch (event) {
-    case AuditEvent::kStart:
-      return {"110120", "Application Start"};
-    case AuditEvent::kStop:
-      return {"110121", "Application Stop"};
-    case AuditEvent::kQuery:
-      return {"110112", "Query"};
-    case AuditEvent::kTransferred:
-      return {"110104", "DICOM Instances Transferred"};
-    case AuditEvent::kAuthenticationFailure:
-      return {"110114", "User Authentication"};
-  }
-  return {"", ""};
-}
-
-std::string line_of(const AuditEntry& entry) {
-  const Code code = code_of(entry.event);
-  Json json = {{"event", code.value},
-               {"meaning", code.meaning},
-               {"outcome", entry.success ? "success" : "failure"}};
-  for (const auto& [name, text] :
-       {std::pair{"order", &entry.order}, std::pair{"owner", &entry.owner},
-        std::pair{"pacs", &entry.pacs}, std::pair{"direction", &entry.direction},
-        std::pair{"study", &entry.study}, std::pair{"patient_id", &entry.patient_id}}) {
-    if (!text->empty()) json[name] = *text;
-  }
-  if (entry.event == AuditEvent::kTransferred) json["instances"] = entry.instances;
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
 
 // A piece at a time, so that who reads slowly holds nobody up.
 template <class Read>
@@ -61,11 +19,7 @@ void read_pieces(const Read& open, std::uint64_t after,
           "SELECT id, at, record FROM audit WHERE id > ? ORDER BY id LIMIT ?", after, kPiece);
       while (rows.next()) {
         after = static_cast<std::uint64_t>(rows.integer(0));
-        // Both stand before what the record has.
-        const Json head = {{"id", after}, {"at", rows.text(1)}};
-        std::string text = head.dump();
-        text.back() = ',';
-        lines.push_back(text + rows.text(2).substr(1));
+        lines.push_back(audit_line(after, rows.text(1), rows.text(2)));
       }
     }
     if (lines.empty()) return;
@@ -78,7 +32,8 @@ void read_pieces(const Read& open, std::uint64_t after,
 void SqliteAuditTrail::add(const AuditEntry& entry) {
   database_.freeing([&] {
     Transaction transaction(database_.writer());
-    transaction->run("INSERT INTO audit(at, record) VALUES(?, ?)", timestamp(), line_of(entry));
+    transaction->run("INSERT INTO audit(at, record) VALUES(?, ?)", timestamp(),
+                     audit_record(entry));
     transaction.commit();
   });
 }

@@ -4,7 +4,6 @@
 #include <array>
 #include <chrono>
 
-#include "base/clock.h"
 #include "proto/error.h"
 #include "server/store/files/files.h"
 
@@ -248,13 +247,5 @@ Connection& Database::reader() {
 }
 
 std::int64_t now_us() { return to_us(std::chrono::system_clock::now()); }
-
-std::int64_t to_us(Time time) {
-  return std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count();
-}
-
-Time from_us(std::int64_t us) { return Time(std::chrono::microseconds(us)); }
-
-std::int64_t us_of_timestamp(std::string_view text) { return to_us(time_of(text)); }
 
 }  // namespace isomesh::store

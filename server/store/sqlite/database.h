@@ -5,11 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <string_view>
 
 #include "base/error.h"
 #include "server/store/expiry.h"
 #include "server/store/files/data_folder.h"
+#include "server/store/microseconds.h"
 #include "server/store/sqlite/sqlite.h"
 
 namespace isomesh::store {
@@ -53,12 +53,7 @@ class Database {
   std::atomic<std::size_t> next_ = 0;  // whose turn it is when all are used
 };
 
-// Microseconds since 1970: how the tables keep time.
+// Microseconds since 1970 by this machine's clock.
 std::int64_t now_us();
-std::int64_t to_us(Time time);
-Time from_us(std::int64_t us);
-
-// The inverse of timestamp() of files.h; 0 for what is none.
-std::int64_t us_of_timestamp(std::string_view text);
 
 }  // namespace isomesh::store

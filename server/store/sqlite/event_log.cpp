@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "server/store/job_rules.h"
 #include "server/store/sqlite/database.h"
 
 namespace isomesh::store {
@@ -96,10 +97,6 @@ void EventLog::remember(Entry entry) {
   if (recent_.size() <= kMostRecent) return;
   complete_after_ = std::max(complete_after_, recent_.front().id());
   recent_.pop_front();
-}
-
-bool concerns(const Event& event, const Viewer& viewer, const std::string& job) {
-  return (!viewer || *viewer == event.owner) && (job.empty() || job == event.job);
 }
 
 }  // namespace isomesh::store

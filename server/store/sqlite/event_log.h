@@ -81,7 +81,4 @@ class EventLog {
   bool closed_ ISOMESH_GUARDED_BY(mutex_) = false;
 };
 
-// Whether that viewer, asking for that job (empty: any), sees the event.
-bool concerns(const Event& event, const Viewer& viewer, const std::string& job);
-
 }  // namespace isomesh::store

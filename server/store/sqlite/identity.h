@@ -6,15 +6,10 @@
 #include "base/mutex.h"
 #include "server/store/believed_clock.h"
 #include "server/store/files/data_folder.h"
+#include "server/store/operators_word.h"
 #include "server/store/sqlite/database.h"
 
 namespace isomesh::store {
-
-// Whether an operator takes responsibility for what looks wrong.
-struct OperatorsWord {
-  bool adopt = false;        // the database and the blobs belong together
-  bool trust_clock = false;  // the clock is right
-};
 
 // That the database and the folder of blobs beside it belong together, and which time it is. Both
 // carry one name, and a number that grows with what is stored: a sweep after a mix-up would take

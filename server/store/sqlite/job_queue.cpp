@@ -12,9 +12,6 @@
 namespace isomesh::store {
 namespace {
 
-constexpr std::chrono::milliseconds kBetweenProgressEvents{100};
-constexpr std::chrono::seconds kRetryAfter{1};
-
 std::int64_t microseconds(std::chrono::milliseconds time) {
   return std::chrono::microseconds(time).count();
 }
@@ -23,14 +20,11 @@ double milliseconds_since(std::int64_t begin_us) {
   return static_cast<double>(std::max<std::int64_t>(now_us() - begin_us, 1)) / 1000;
 }
 
-// The job's volume is not there.
-[[noreturn]] void throw_no_volume(Connection& connection, const JobSpec& spec) {
-  Query expired = connection.query("SELECT 1 FROM expired WHERE owner = ? AND id = ?", spec.owner,
-                                   spec.parameters.volume);
-  const bool is_gone = expired.next();
-  const std::string detail =
-      is_gone ? "the volume has expired: upload it again" : "there is no volume with this id";
-  throw Error(is_gone ? ErrorCode::kGone : ErrorCode::kNotFound, detail, {{"volume", detail}});
+// Whether the job's volume has expired.
+bool has_expired(Connection& connection, const JobSpec& spec) {
+  return connection
+      .query("SELECT 1 FROM expired WHERE owner = ? AND id = ?", spec.owner, spec.parameters.volume)
+      .next();
 }
 
 }  // namespace
@@ -55,7 +49,7 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
       }
     }
     const auto result_key = result_key_of(change.connection(), spec);
-    if (!result_key) throw_no_volume(change.connection(), spec);
+    if (!result_key) throw_no_volume(has_expired(change.connection(), spec));
     row.result_key = *result_key;
     row.accepted = now_us();
     row.job.id = time_ordered_id();
@@ -65,7 +59,8 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
     if (refusing_ || (!mesh && count_queued(change.connection()) >= options_.max_queued)) {
       return {Submission::Kind::kBusy, {}, kRetryAfter};
     }
-    if (!mesh && !has_share_of_queue(change.connection(), spec, options_.max_queued)) {
+    if (!mesh && !spec.owner.empty() &&
+        !has_share_of_queue(spec, share_of_queue(change.connection(), spec), options_.max_queued)) {
       return {Submission::Kind::kOwnersShare, {}, kRetryAfter};
     }
     if (!mesh && !blobs_.has_room()) {
@@ -164,7 +159,7 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
       succeed_alike(change, row, *outcome.mesh);
       has_mesh = true;
     } else if (outcome.may_retry && row.attempts < options_.attempts) {
-      queue_again(change, row, delay_after(row.attempts));
+      queue_again(change, row, delay_after(row.attempts, options_));
     } else {
       row.job.error = outcome.error;
       end(change, row, JobState::kFailed);
@@ -268,18 +263,10 @@ void SqliteJobStore::end(Change& change, Row& row, JobState state) const {
 }
 
 void SqliteJobStore::succeed(Change& change, Row& row, const MeshSummary& mesh) const {
-  row.job.mesh = mesh;
-  row.job.stage = Stage::kDone;
-  row.job.progress = 1;
-  for (auto& [format, file] : row.job.mesh->files) {
-    file.href = mesh_path(row.job.id, format);
+  give_mesh(row.job, mesh);
+  for (const auto& [format, file] : mesh.files) {
     change->run("INSERT OR IGNORE INTO meshes VALUES(?, ?, ?)", row.job.id, file.sha256,
                 file.bytes);
-  }
-  for (LabelSummary& label : row.job.mesh->labels) {
-    for (auto& [format, file] : label.files) {
-      file.href = mesh_path(row.job.id, format, label.label);
-    }
   }
   end(change, row, JobState::kSucceeded);
 }
@@ -319,13 +306,6 @@ void SqliteJobStore::queue_again(Change& change, Row& row, std::chrono::millisec
       row.attempts, now_us() + microseconds(delay), row.job.waiting_for, to_json(row.job),
       row.job.id);
   change.announce(row, EventKind::kStage);
-}
-
-std::chrono::milliseconds SqliteJobStore::delay_after(int attempts) const {
-  constexpr int kGrowth = 4;
-  std::chrono::milliseconds delay = options_.retry_delay;
-  for (int n = 1; n < attempts; ++n) delay *= kGrowth;
-  return delay;
 }
 
 SqliteJobStore::Live* SqliteJobStore::live(const Lease& lease) {

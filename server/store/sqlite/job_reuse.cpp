@@ -1,19 +1,10 @@
 // Meshes that serve more than one job, and those that are made again.
-#include <algorithm>
-
 #include "proto/json.h"
 #include "server/store/sqlite/job_rows.h"
 #include "server/store/sqlite/job_store.h"
 
 namespace isomesh::store {
 namespace {
-
-// Whether two meshes are in the same blobs.
-bool have_same_blobs(const MeshSummary& one, const MeshSummary& other) {
-  return std::ranges::equal(
-      one.files, other.files, {}, [](const auto& file) { return file.second.sha256; },
-      [](const auto& file) { return file.second.sha256; });
-}
 
 std::optional<std::vector<Note>> notes_of(Connection& connection, const std::string& owner,
                                           const std::string& volume) {
@@ -43,11 +34,7 @@ Job SqliteJobStore::remake(const std::string& id) {
     spec.parameters = row.job.parameters;
     spec.parameters.callback.reset();
     const auto key = result_key_of(reading.connection(), spec);
-    if (key && row.result_key != *key) {
-      throw Error(ErrorCode::kGone,
-                  "the stored mesh is damaged, and this version would make another one: submit the "
-                  "job again");
-    }
+    if (key && row.result_key != *key) throw_other_version();
     Query query = reading->query(std::string("SELECT ") + kRowColumns +
                                      " FROM jobs WHERE owner = ? AND result_key = ? AND id > ? "
                                      "ORDER BY id DESC LIMIT 1",
@@ -61,9 +48,7 @@ Job SqliteJobStore::remake(const std::string& id) {
     return job_of(submit(spec));
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
-    throw Error(ErrorCode::kGone,
-                "the stored mesh is damaged, and the volume that it was made of is not there any "
-                "more: upload it again");
+    throw_volume_gone();
   }
 }
 
@@ -75,11 +60,8 @@ std::optional<MeshSummary> SqliteJobStore::mesh_like(
       row.owner, row.result_key);
   if (!query.next()) return std::nullopt;
   auto mesh = job_from_record(query.text(0)).mesh;
-  const bool is_there = mesh && std::ranges::all_of(mesh->files, [&](const auto& named) {
-                          return blobs_.size(named.second.sha256) == named.second.bytes;
-                        });
   const bool is_spoilt = mesh && spoilt && have_same_blobs(*mesh, *spoilt);
-  return is_there && !is_spoilt ? std::move(mesh) : std::nullopt;
+  return mesh && is_there(*mesh, blobs_) && !is_spoilt ? std::move(mesh) : std::nullopt;
 }
 
 std::optional<MeshSummary> SqliteJobStore::spoilt_mesh_for(const JobSpec& spec) const {
@@ -93,10 +75,7 @@ std::optional<MeshSummary> SqliteJobStore::spoilt_mesh_for(const JobSpec& spec) 
     row.result_key = *key;
     mesh = mesh_like(reading.connection(), row, std::nullopt);
   }
-  const bool is_intact = !mesh || std::ranges::all_of(mesh->files, [&](const auto& named) {
-    return is_there_and_intact(blobs_, named.second.sha256, {});
-  });
-  return is_intact ? std::nullopt : std::move(mesh);
+  return !mesh || is_intact(*mesh, blobs_) ? std::nullopt : std::move(mesh);
 }
 
 }  // namespace isomesh::store

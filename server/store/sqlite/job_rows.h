@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "server/store/job_rules.h"
 #include "server/store/sqlite/job_store.h"
 
 namespace isomesh::store {
@@ -59,8 +60,7 @@ inline constexpr std::int64_t kLongestWaitUs = std::int64_t{3600} * 1'000'000;
 // How many jobs wait.
 std::size_t count_queued(Connection& connection);
 
-// Whether the queue has room for one more of that owner: a share of it (base/share.h), and for
-// urgent ones a share of an eighth of it, since everybody else's wait for those.
-bool has_share_of_queue(Connection& connection, const JobSpec& spec, std::size_t max_queued);
+// What has_share_of_queue() looks at.
+QueueShare share_of_queue(Connection& connection, const JobSpec& spec);
 
 }  // namespace isomesh::store

@@ -4,9 +4,8 @@
 
 #include <algorithm>
 
-#include "base/sha256.h"
-#include "base/share.h"
 #include "proto/json.h"
+#include "server/store/job_rules.h"
 #include "server/store/sqlite/job_rows.h"
 
 namespace isomesh::store {
@@ -24,7 +23,7 @@ Event event_of(const Query& row) {
           row.real(6)};
 }
 
-std::uint64_t last_event(Connection& connection) {
+std::uint64_t greatest_event(Connection& connection) {
   Query query = connection.query("SELECT coalesce(max(id), 0) FROM events");
   query.next();
   return static_cast<std::uint64_t>(query.integer(0));
@@ -36,7 +35,7 @@ SqliteJobStore::SqliteJobStore(Database& database, const BlobStore& blobs, JobSt
     : database_(database),
       blobs_(blobs),
       options_(std::move(options)),
-      log_(last_event(database.reader())) {}
+      log_(greatest_event(database.reader())) {}
 
 Job SqliteJobStore::get(const Viewer& viewer, const std::string& id) const {
   const Reading reading(database_.reader());
@@ -218,8 +217,7 @@ SqliteJobStore::Row SqliteJobStore::found(Connection& connection, const Viewer& 
   if (auto row = find(connection, viewer, id)) return std::move(*row);
   Query expired = connection.query(
       "SELECT 1 FROM expired WHERE id = ?1 AND (?2 IS NULL OR owner = ?2)", id, viewer);
-  if (expired.next()) throw Error(ErrorCode::kGone, "the job has expired");
-  throw Error(ErrorCode::kNotFound, "there is no job with this id");
+  throw_no_job(expired.next());
 }
 
 Job SqliteJobStore::with_progress(const Row& row) const {
@@ -258,40 +256,13 @@ std::size_t count_queued(Connection& connection) {
   return static_cast<std::size_t>(query.integer(0));
 }
 
-bool has_share_of_queue(Connection& connection, const JobSpec& spec, std::size_t max_queued) {
-  constexpr std::size_t kStatShare = 8;
-  if (spec.owner.empty()) return true;
+QueueShare share_of_queue(Connection& connection, const JobSpec& spec) {
   const bool is_stat = spec.parameters.priority == Priority::kStat;
   Query query = connection.query(
       "SELECT count(*), sum(owner = ?1) FROM jobs WHERE state = 0 AND (?2 = 0 OR priority = ?3)",
       spec.owner, is_stat, Priority::kStat);
   query.next();
-  const auto queued = static_cast<std::size_t>(query.integer(0));
-  const auto own = static_cast<std::size_t>(query.integer(1));
-  const std::size_t room = is_stat ? std::max<std::size_t>(max_queued / kStatShare, 1) : max_queued;
-  return has_share(spec.owner, own, room - std::min(room, queued));
-}
-
-const Job& job_of(const Submission& submission) {
-  if (submission.kind == Submission::Kind::kOwnersShare) {
-    throw Error(ErrorCode::kTooManyRequests, "too many of your jobs wait already");
-  }
-  if (submission.kind == Submission::Kind::kConflict) {
-    throw Error(ErrorCode::kKeyReused, "the idempotency key came with another request before");
-  }
-  if (submission.kind == Submission::Kind::kBusy) {
-    throw Error(ErrorCode::kUnavailable, "the queue is full or the service is shutting down");
-  }
-  return submission.job;
-}
-
-std::string result_key(const std::string& volume, const std::vector<Note>& notes,
-                       const JobParameters& parameters, const std::string& mesher_version) {
-  std::string text = mesher_version + '\n' + volume + '\n' +
-                     to_json(static_cast<const MeshParameters&>(parameters));
-  if (parameters.certify) text += "\ncertified";
-  for (const Note& note : notes_in_mesh(notes)) text += '\n' + note.code + ": " + note.detail;
-  return sha256_of(text);
+  return {static_cast<std::size_t>(query.integer(0)), static_cast<std::size_t>(query.integer(1))};
 }
 
 }  // namespace isomesh::store

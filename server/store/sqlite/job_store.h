@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,8 @@ class SqliteJobStore : public JobStore {
                         const std::string& after, std::size_t limit) const override;
   std::vector<Event> events(const Viewer& viewer, const std::string& job, std::uint64_t since,
                             std::chrono::milliseconds timeout) const override;
+  std::uint64_t last_event() const override { return log_.end() - 1; }
+  bool answers() const override { return true; }
   QueueDepth depth(const Viewer& viewer) const override;
   bool is_full() const override;
   void refuse_new() override;
@@ -45,6 +48,8 @@ class SqliteJobStore : public JobStore {
   std::vector<Expirable> ended(const ExpiryFilter& filter, Ended which,
                                std::size_t limit) const override;
   Expired expire(std::span<const Expirable> jobs, std::uint64_t enough) override;
+  // The data folder has one process, whose turn it always is.
+  std::shared_ptr<const void> turn_to_remove() override { return std::make_shared<char>(); }
   std::uint64_t named_bytes() const override;
   OwnedBytes owned_bytes() const override;
   std::optional<Steady> oldest_run() const override;
@@ -84,7 +89,6 @@ class SqliteJobStore : public JobStore {
   // Queues a job again whose run counts as no attempt, or ends it cancelled.
   void give_back(Change& change, Row& row, std::chrono::milliseconds delay) const;
   void queue_again(Change& change, Row& row, std::chrono::milliseconds delay) const;
-  std::chrono::milliseconds delay_after(int attempts) const;
   std::vector<Event> kept_events(const Viewer& viewer, const std::string& job, std::uint64_t since,
                                  std::uint64_t end) const;
   Live* live(const Lease& lease) ISOMESH_REQUIRES(live_mutex_);
@@ -109,10 +113,5 @@ class SqliteJobStore : public JobStore {
   // Grows whenever a job may have become ready.
   std::uint64_t work_generation_ ISOMESH_GUARDED_BY(work_mutex_) = 0;
 };
-
-// The same for all jobs that make the same bytes and say the same of them, whatever else they are.
-// `notes` are the volume's: a mesh carries some of them.
-std::string result_key(const std::string& volume, const std::vector<Note>& notes,
-                       const JobParameters& parameters, const std::string& mesher_version);
 
 }  // namespace isomesh::store

@@ -4,14 +4,11 @@
 
 #include "base/clock.h"
 #include "proto/error.h"
+#include "server/store/order_rules.h"
 #include "server/store/sqlite/outbox.h"
 
 namespace isomesh::store {
 namespace {
-
-// The first of the states that are final, which stand in the tables' conditions as a number.
-constexpr int kFirstFinal = 4;
-static_assert(static_cast<int>(OrderState::kSucceeded) == kFirstFinal);
 
 OrderRecord record_of(const Query& row) {
   return {.owner = row.text(0),
@@ -49,33 +46,17 @@ void insert(Connection& connection, const OrderSpec& spec) {
                  spec.request_digest, to_json(order), to_record(work));
 }
 
-// Whether the last order that the watch has made of the series is open, or was of that many.
-bool is_done(Connection& connection, const WatchedSeries& series) {
+std::optional<LastOrder> last_of(Connection& connection, const WatchedSeries& series) {
   Query row = connection.query(
       "SELECT w.instances, o.state, o.record FROM watched w LEFT JOIN orders o ON o.id = "
       "w.\"order\" WHERE w.rule = ? AND w.study = ? AND w.series = ?",
       series.rule, series.study, series.series);
-  if (!row.next()) return false;
-  if (row.integer(0) == series.instances) return true;
-  if (row.is_null(1)) return false;
-  if (row.integer(1) < kFirstFinal) return true;
-  return order_from_record(row.text(2)).source.instances == series.instances;
-}
-
-ReceivedFate fate_of(Connection& connection, const WatchedSeries& series, Time last) {
-  Query row = connection.query(
-      "SELECT w.instances, o.state, o.record FROM watched w LEFT JOIN orders o ON o.id = "
-      "w.\"order\" WHERE w.rule = ? AND w.study = ? AND w.series = ?",
-      series.rule, series.study, series.series);
-  if (!row.next()) return ReceivedFate::kNew;
-  const bool is_all = row.integer(0) == series.instances;
-  if (row.is_null(1)) return is_all ? ReceivedFate::kDone : ReceivedFate::kNew;
-  if (row.integer(1) < kFirstFinal) return ReceivedFate::kOpen;
-  if (!is_all) return ReceivedFate::kNew;
-  const Order order = order_from_record(row.text(2));
-  const bool is_over =
-      order.state == OrderState::kSucceeded || (order.finished && last <= time_of(*order.finished));
-  return is_over ? ReceivedFate::kDone : ReceivedFate::kNew;
+  if (!row.next()) return std::nullopt;
+  LastOrder last = {.instances = static_cast<std::uint32_t>(row.integer(0))};
+  if (row.is_null(1)) return last;
+  last.state = static_cast<OrderState>(row.integer(1));
+  last.record = row.text(2);
+  return last;
 }
 
 void insert_watched(Connection& connection, const OrderSpec& spec, const WatchedSeries& series) {
@@ -129,7 +110,8 @@ bool SqliteOrderStore::submit_watched(const OrderSpec& spec, const WatchedSeries
                                       std::size_t most_open) {
   Transaction transaction(database_.writer());
   Connection& connection = transaction.connection();
-  if (is_done(connection, series) || count_open(connection) >= most_open) return false;
+  const auto before = last_of(connection, series);
+  if ((before && is_done(*before, series)) || count_open(connection) >= most_open) return false;
   insert_watched(connection, spec, series);
   transaction.commit();
   return true;
@@ -139,7 +121,8 @@ ReceivedFate SqliteOrderStore::submit_received(const OrderSpec& spec, const Watc
                                                Time last, std::size_t most_open) {
   Transaction transaction(database_.writer());
   Connection& connection = transaction.connection();
-  const ReceivedFate fate = fate_of(connection, series, last);
+  const auto before = last_of(connection, series);
+  const ReceivedFate fate = before ? fate_of(*before, series, last) : ReceivedFate::kNew;
   if (fate != ReceivedFate::kNew) return fate;
   if (count_open(connection) >= most_open) return ReceivedFate::kOpen;
   insert_watched(connection, spec, series);
@@ -230,9 +213,7 @@ Order SqliteOrderStore::cancel(const Viewer& viewer, const std::string& id) {
     Transaction transaction(database_.writer());
     OrderRecord record = found(transaction.connection(), viewer, id);
     if (is_final(record.order.state)) return record.order;
-    record.order.state = OrderState::kCancelled;
-    record.order.finished = timestamp();
-    record.order.next_attempt.reset();
+    cancel_order(record);
     write(transaction.connection(), record, now_us());
     tell_of_end(transaction.connection(), record);
     transaction.commit();
@@ -243,31 +224,10 @@ Order SqliteOrderStore::cancel(const Viewer& viewer, const std::string& id) {
 Order SqliteOrderStore::retry(const Viewer& viewer, const std::string& id) {
   Transaction transaction(database_.writer());
   OrderRecord record = found(transaction.connection(), viewer, id);
-  if (record.order.state != OrderState::kFailed) {
-    throw Error(ErrorCode::kNotReady, "only an order that has failed is tried again");
-  }
-  Order& order = record.order;
-  order.state = OrderState::kWaiting;
-  order.finished.reset();
-  order.next_attempt.reset();
-  order.error.reset();
-  order.attempts = 0;
-  order.volume.reset();
-  order.job.reset();
-  order.results.clear();
-  order.source.instances.reset();
-  OrderWork& work = record.work;
-  work.listed.clear();
-  work.listed_since.reset();
-  work.failures = 0;
-  work.looks = 0;
-  work.begun = timestamp();
-  work.identity.reset();
-  work.blobs.clear();
-  work.triangles.reset();
+  begin_anew(record);
   write(transaction.connection(), record, now_us());
   transaction.commit();
-  return order;
+  return record.order;
 }
 
 OrderCounts SqliteOrderStore::counts() const {

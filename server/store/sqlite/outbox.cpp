@@ -3,15 +3,6 @@
 #include "proto/json.h"
 
 namespace isomesh::store {
-namespace {
-
-// Scheme, host and port.
-std::string receiver_of(const std::string& url) {
-  const std::size_t host = url.find("://");
-  return url.substr(0, host == std::string::npos ? host : url.find_first_of("/?#", host + 3));
-}
-
-}  // namespace
 
 void SqliteOutbox::add(Connection& connection, const Job& job) {
   if (!job.parameters.callback) return;

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "proto/json.h"
-#include "server/store/sqlite/job_store.h"
+#include "server/store/job_rules.h"
 #include "tests/unit/store/engine.h"
 
 namespace isomesh::store {

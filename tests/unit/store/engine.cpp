@@ -4,6 +4,14 @@
 
 #include "server/store/files/blob_store.h"
 #include "server/store/files/files.h"
+#include "server/store/postgresql/audit_trail.h"
+#include "server/store/postgresql/database.h"
+#include "server/store/postgresql/held_blobs.h"
+#include "server/store/postgresql/job_store.h"
+#include "server/store/postgresql/order_store.h"
+#include "server/store/postgresql/outbox.h"
+#include "server/store/postgresql/received_store.h"
+#include "server/store/postgresql/volume_store.h"
 #include "server/store/sqlite/audit_trail.h"
 #include "server/store/sqlite/database.h"
 #include "server/store/sqlite/job_store.h"
@@ -12,6 +20,7 @@
 #include "server/store/sqlite/received_store.h"
 #include "server/store/sqlite/volume_store.h"
 #include "tests/support/files.h"
+#include "tests/support/postgres.h"
 #include "tests/unit/store/power_cut.h"
 
 namespace isomesh::test {
@@ -102,12 +111,89 @@ class SqliteEngine : public Engine {
   std::optional<store::SqliteJobStore> jobs_;
 };
 
+// One node of a cluster, whose blobs are in a data folder.
+class PostgresEngine : public Engine {
+ public:
+  explicit PostgresEngine(const EngineOptions& options)
+      : options_(options),
+        url_(Postgres::shared().new_place()),
+        data_(folder_ / "data"),
+        files_(data_) {
+    open();
+  }
+
+  store::JobStore& jobs() override { return *jobs_; }
+  store::VolumeStore& volumes() override { return *volumes_; }
+  store::BlobStore& blobs() override { return *blobs_; }
+  store::Outbox& outbox() override { return *outbox_; }
+  store::OrderStore& orders() override { return *orders_; }
+  store::AuditTrail& audit() override { return *audit_; }
+  store::ReceivedStore& received() override { return *received_; }
+
+  void restart() override {
+    jobs_.reset();
+    open();
+    jobs_->reap();
+  }
+
+  // Of the server, as far as it can be seen without its disk: it has no time to do anything.
+  void lose_power() override {
+    jobs_.reset();
+    Postgres::shared().stop_at_once();
+    Postgres::shared().start();
+    open();
+    jobs_->reap();
+  }
+
+ private:
+  void open() {
+    database_.emplace(store::postgresql::DatabaseOptions{.url = url_, .node = "one"});
+    blobs_.emplace(files_, *database_);
+    volumes_.emplace(*database_);
+    outbox_.emplace(*database_);
+    orders_.emplace(*database_);
+    audit_.emplace(*database_);
+    received_.emplace(*database_);
+    jobs_.emplace(*database_, *blobs_,
+                  store::JobStoreOptions{.max_queued = options_.max_queued,
+                                         .retry_delay = options_.retry_delay,
+                                         .mesher_version = "test"});
+  }
+
+  const EngineOptions options_;
+  const std::string url_;
+  TemporaryFolder folder_;
+  store::DataFolder data_;
+  store::FileBlobStore files_;
+  std::optional<store::postgresql::Database> database_;
+  std::optional<store::postgresql::HeldBlobs> blobs_;
+  std::optional<store::postgresql::PostgresVolumeStore> volumes_;
+  std::optional<store::postgresql::PostgresOutbox> outbox_;
+  std::optional<store::postgresql::PostgresOrderStore> orders_;
+  std::optional<store::postgresql::PostgresAuditTrail> audit_;
+  std::optional<store::postgresql::PostgresReceivedStore> received_;
+  std::optional<store::postgresql::PostgresJobStore> jobs_;
+};
+
+template <class Kind>
+NamedEngine engine(const char* name) {
+  return {name, [](const EngineOptions& options) -> std::unique_ptr<Engine> {
+            return std::make_unique<Kind>(options);
+          }};
+}
+
 }  // namespace
 
 std::vector<NamedEngine> all_engines() {
-  return {{"Sqlite", [](const EngineOptions& options) -> std::unique_ptr<Engine> {
-             return std::make_unique<SqliteEngine>(options);
-           }}};
+  std::vector<NamedEngine> engines = {engine<SqliteEngine>("Sqlite")};
+  if (Postgres::is_here()) engines.push_back(engine<PostgresEngine>("Postgresql"));
+  return engines;
+}
+
+// So that nobody takes a suite that has run on one engine for one that has run on all.
+TEST(Engines, AreAllHere) {
+  if (!Postgres::is_here()) GTEST_SKIP() << "PostgreSQL is not installed: nothing runs on it";
+  EXPECT_EQ(all_engines().size(), 2U);
 }
 
 void EngineTest::make(const EngineOptions& options) {

@@ -1,0 +1,103 @@
+#include "server/store/job_rules.h"
+
+#include <algorithm>
+
+#include "base/sha256.h"
+#include "base/share.h"
+#include "proto/error.h"
+#include "proto/json.h"
+
+namespace isomesh::store {
+
+const Job& job_of(const Submission& submission) {
+  if (submission.kind == Submission::Kind::kOwnersShare) {
+    throw Error(ErrorCode::kTooManyRequests, "too many of your jobs wait already");
+  }
+  if (submission.kind == Submission::Kind::kConflict) {
+    throw Error(ErrorCode::kKeyReused, "the idempotency key came with another request before");
+  }
+  if (submission.kind == Submission::Kind::kBusy) {
+    throw Error(ErrorCode::kUnavailable, "the queue is full or the service is shutting down");
+  }
+  return submission.job;
+}
+
+std::string result_key(const std::string& volume, const std::vector<Note>& notes,
+                       const JobParameters& parameters, const std::string& mesher_version) {
+  std::string text = mesher_version + '\n' + volume + '\n' +
+                     to_json(static_cast<const MeshParameters&>(parameters));
+  if (parameters.certify) text += "\ncertified";
+  for (const Note& note : notes_in_mesh(notes)) text += '\n' + note.code + ": " + note.detail;
+  return sha256_of(text);
+}
+
+void throw_no_volume(bool is_gone) {
+  const std::string detail =
+      is_gone ? "the volume has expired: upload it again" : "there is no volume with this id";
+  throw Error(is_gone ? ErrorCode::kGone : ErrorCode::kNotFound, detail, {{"volume", detail}});
+}
+
+void throw_no_job(bool is_gone) {
+  if (is_gone) throw Error(ErrorCode::kGone, "the job has expired");
+  throw Error(ErrorCode::kNotFound, "there is no job with this id");
+}
+
+bool has_share_of_queue(const JobSpec& spec, const QueueShare& waiting, std::size_t max_queued) {
+  constexpr std::size_t kStatShare = 8;
+  const bool is_stat = spec.parameters.priority == Priority::kStat;
+  const std::size_t room = is_stat ? std::max<std::size_t>(max_queued / kStatShare, 1) : max_queued;
+  return has_share(spec.owner, waiting.own, room - std::min(room, waiting.queued));
+}
+
+std::chrono::milliseconds delay_after(int attempts, const JobStoreOptions& options) {
+  constexpr int kGrowth = 4;
+  std::chrono::milliseconds delay = options.retry_delay;
+  for (int n = 1; n < attempts; ++n) delay *= kGrowth;
+  return delay;
+}
+
+void give_mesh(Job& job, const MeshSummary& mesh) {
+  job.mesh = mesh;
+  job.stage = Stage::kDone;
+  job.progress = 1;
+  for (auto& [format, file] : job.mesh->files) file.href = mesh_path(job.id, format);
+  for (LabelSummary& label : job.mesh->labels) {
+    for (auto& [format, file] : label.files) file.href = mesh_path(job.id, format, label.label);
+  }
+}
+
+bool have_same_blobs(const MeshSummary& one, const MeshSummary& other) {
+  return std::ranges::equal(
+      one.files, other.files, {}, [](const auto& file) { return file.second.sha256; },
+      [](const auto& file) { return file.second.sha256; });
+}
+
+bool is_there(const MeshSummary& mesh, const BlobStore& blobs) {
+  return std::ranges::all_of(mesh.files, [&](const auto& named) {
+    return blobs.size(named.second.sha256) == named.second.bytes;
+  });
+}
+
+bool is_intact(const MeshSummary& mesh, const BlobStore& blobs) {
+  return std::ranges::all_of(mesh.files, [&](const auto& named) {
+    return is_there_and_intact(blobs, named.second.sha256, {});
+  });
+}
+
+void throw_other_version() {
+  throw Error(ErrorCode::kGone,
+              "the stored mesh is damaged, and this version would make another one: submit the job "
+              "again");
+}
+
+void throw_volume_gone() {
+  throw Error(ErrorCode::kGone,
+              "the stored mesh is damaged, and the volume that it was made of is not there any "
+              "more: upload it again");
+}
+
+bool concerns(const Event& event, const Viewer& viewer, const std::string& job) {
+  return (!viewer || *viewer == event.owner) && (job.empty() || job == event.job);
+}
+
+}  // namespace isomesh::store

@@ -1,0 +1,141 @@
+#include "server/store/postgresql/database.h"
+
+#include <cstdlib>
+#include <limits>
+#include <thread>
+
+#include "base/ids.h"
+#include "proto/error.h"
+#include "server/store/microseconds.h"
+#include "server/store/postgresql/schema.h"
+
+namespace isomesh::store::postgresql {
+namespace {
+
+constexpr std::chrono::milliseconds kBetweenQuestions{50};
+// Lives that ended longer ago, and whose runs are over, are forgotten.
+constexpr std::int64_t kNodesKeptUs = std::int64_t{7 * 24 * 3600} * 1'000'000;
+
+std::string random_uuid() {
+  const std::string hex = random_hex(16);
+  return hex.substr(0, 8) + '-' + hex.substr(8, 4) + "-4" + hex.substr(13, 3) + "-a" +
+         hex.substr(17, 3) + '-' + hex.substr(20, 12);
+}
+
+constexpr std::int64_t kToleranceUs = 1'000'000;
+
+std::int64_t to_steady_us(std::chrono::steady_clock::time_point time) {
+  return std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count();
+}
+
+std::int64_t steady_us() { return to_steady_us(std::chrono::steady_clock::now()); }
+
+// How many connections this thread has, of whatever database.
+thread_local int borrowed = 0;
+
+}  // namespace
+
+Database::Database(DatabaseOptions options) : options_(std::move(options)), node_(random_uuid()) {
+  ask([&](Connection& connection, bool) { migrate(connection); });
+  ask([&](Connection& connection, bool) {
+    connection.run(
+        "INSERT INTO nodes VALUES($1::uuid, $2::text, isomesh_now()) ON CONFLICT DO NOTHING", node_,
+        options_.node);
+    connection.run(
+        "DELETE FROM nodes n WHERE since < isomesh_now() - $1::bigint AND EXISTS (SELECT 1 FROM "
+        "nodes m WHERE m.name = n.name AND m.since > n.since) AND NOT EXISTS (SELECT 1 FROM runs r "
+        "WHERE r.node = n.id)",
+        kNodesKeptUs);
+  });
+}
+
+bool Database::answers() {
+  try {
+    const Borrowed borrowed(*this);
+    borrowed.connection().run("SELECT 1");
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+std::int64_t Database::now_us() const { return steady_us() + beyond_steady_us_; }
+
+std::int64_t Database::shift() const {
+  const std::int64_t now = now_us() - store::to_us(std::chrono::system_clock::now());
+  if (std::abs(now - shift_us_) > kToleranceUs) shift_us_ = now;
+  return shift_us_;
+}
+
+std::int64_t Database::to_us(Time time) const { return store::to_us(time) + shift(); }
+
+Time Database::from_us(std::int64_t us) const { return store::from_us(us - shift()); }
+
+std::chrono::steady_clock::time_point Database::steady_of(std::int64_t us) const {
+  return std::chrono::steady_clock::time_point(std::chrono::microseconds(us - beyond_steady_us_));
+}
+
+std::int64_t Database::us_of(std::chrono::steady_clock::time_point time) const {
+  return to_steady_us(time) + beyond_steady_us_;
+}
+
+// The answer that took the least time tells it best. It is taken for the time when that was asked
+// for, so that what the database has written is never later than now.
+void Database::look_at_clock(Connection& connection) {
+  constexpr std::int64_t kQuickUs = 5000;
+  std::int64_t quickest = std::numeric_limits<std::int64_t>::max();
+  std::int64_t beyond = 0;
+  for (int tries = 0; tries < 5 && quickest > kQuickUs; ++tries) {
+    const std::int64_t asked = steady_us();
+    Rows row = connection.run("SELECT (extract(epoch FROM clock_timestamp()) * 1000000)::bigint");
+    row.next();
+    const std::int64_t took = steady_us() - asked;
+    if (took >= quickest) continue;
+    quickest = took;
+    beyond = row.integer(0) - asked;
+  }
+  if (std::abs(beyond - beyond_steady_us_) > kToleranceUs) beyond_steady_us_ = beyond;
+}
+
+std::unique_ptr<Connection> Database::take() {
+  {
+    // Who has one already does not wait for another, or all might wait for each other.
+    const bool waits = borrowed == 0;
+    Lock lock(mutex_);
+    given_.wait(lock, [&]() ISOMESH_REQUIRES(mutex_) {
+      return !waits || !idle_.empty() || open_ < options_.connections;
+    });
+    ++borrowed;
+    if (!idle_.empty()) {
+      auto connection = std::move(idle_.back());
+      idle_.pop_back();
+      return connection;
+    }
+    ++open_;
+  }
+  try {
+    auto connection = std::make_unique<Connection>(options_.url);
+    look_at_clock(*connection);
+    return connection;
+  } catch (...) {
+    give(nullptr);
+    throw;
+  }
+}
+
+// Where one is lost the others most likely are, too.
+void Database::give(std::unique_ptr<Connection> connection) {
+  --borrowed;
+  const Lock lock(mutex_);
+  if (connection && connection->is_open()) {
+    idle_.push_back(std::move(connection));
+  } else {
+    open_ -= 1 + idle_.size();
+    idle_.clear();
+  }
+  given_.notify_all();
+}
+
+void Database::pause() { std::this_thread::sleep_for(kBetweenQuestions); }
+
+}  // namespace isomesh::store::postgresql

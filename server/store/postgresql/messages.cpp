@@ -1,0 +1,139 @@
+#include "server/store/postgresql/messages.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstdint>
+#include <utility>
+
+#include <poll.h>
+#include <spdlog/spdlog.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include "proto/error.h"
+
+namespace isomesh::store::postgresql {
+namespace {
+
+constexpr std::chrono::milliseconds kBetweenPolls{1000};
+constexpr std::chrono::milliseconds kBetweenTries{200};
+constexpr char kWork = 'w';
+constexpr char kEvents = 'e';
+constexpr char kCancelled = 'c';  // a job's id follows
+
+// Waits until one of both is readable.
+void wait_for(int first, int second, std::chrono::milliseconds longest) {
+  std::array<pollfd, 2> watched = {pollfd{first, POLLIN, 0}, pollfd{second, POLLIN, 0}};
+  ::poll(watched.data(), watched.size(), static_cast<int>(longest.count()));
+}
+
+News read(const std::vector<std::string>& messages) {
+  News news;
+  for (const std::string& message : messages) {
+    if (message.starts_with(kCancelled)) {
+      news.cancelled.insert(message.substr(1));
+      continue;
+    }
+    news.has_work |= message.find(kWork) != std::string::npos;
+    news.has_events |= message.find(kEvents) != std::string::npos;
+  }
+  return news;
+}
+
+void add(News& news, const News& more) {
+  news.has_work |= more.has_work;
+  news.has_events |= more.has_events;
+  news.cancelled.insert(more.cancelled.begin(), more.cancelled.end());
+}
+
+}  // namespace
+
+Messages::Messages(const Database& database, Hear hear)
+    : database_(database), hear_(std::move(hear)), wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  if (wake_ < 0) throw_system_error("eventfd", errno);
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+}
+
+Messages::~Messages() {
+  thread_.request_stop();
+  wake();
+  thread_.join();
+  ::close(wake_);
+}
+
+void Messages::tell(const News& news) {
+  {
+    const Lock lock(mutex_);
+    add(to_tell_, news);
+  }
+  wake();
+}
+
+void Messages::wake() const {
+  const std::uint64_t one = 1;
+  // It fails only when enough wakes are in it already.
+  if (::write(wake_, &one, sizeof one) < 0) return;
+}
+
+void Messages::run(const std::stop_token& stop) {
+  bool is_told = false;
+  while (!stop.stop_requested()) {
+    try {
+      listen(stop);
+      is_told = false;
+    } catch (const Error& error) {
+      if (!is_told) spdlog::warn("nothing is heard of other nodes: {}", error.what());
+      is_told = true;
+      hear_({.has_work = true, .has_events = true, .cancelled = {}});
+      std::uint64_t count = 0;
+      wait_for(wake_, -1, kBetweenTries);
+      if (::read(wake_, &count, sizeof count) > 0 && !stop.stop_requested()) {
+        std::this_thread::sleep_for(kBetweenTries);
+      }
+    }
+  }
+}
+
+void Messages::listen(const std::stop_token& stop) {
+  Connection connection(database_.url());
+  connection.script("LISTEN isomesh; SET synchronous_commit = off");
+  hear_({.has_work = true, .has_events = true, .cancelled = {}});
+  auto next_poll = std::chrono::steady_clock::now() + kBetweenPolls;
+  while (!stop.stop_requested()) {
+    const auto wait =
+        std::chrono::ceil<std::chrono::milliseconds>(next_poll - std::chrono::steady_clock::now());
+    wait_for(connection.socket(), wake_, std::max(wait, std::chrono::milliseconds(0)));
+    std::uint64_t count = 0;
+    // What this process tells is heard by it, too.
+    News news;
+    if (::read(wake_, &count, sizeof count) > 0) news = send(connection);
+    add(news, read(connection.take_messages()));
+    if (std::chrono::steady_clock::now() >= next_poll) {
+      next_poll += kBetweenPolls;
+      news.has_work = news.has_events = true;
+    }
+    if (news.has_work || news.has_events || !news.cancelled.empty()) hear_(news);
+  }
+}
+
+News Messages::send(Connection& connection) {
+  News news;
+  {
+    const Lock lock(mutex_);
+    news = std::exchange(to_tell_, {});
+  }
+  std::vector<std::string> messages;
+  for (const std::string& job : news.cancelled) messages.push_back(kCancelled + job);
+  std::string flags;
+  if (news.has_work) flags += kWork;
+  if (news.has_events) flags += kEvents;
+  if (!flags.empty()) messages.push_back(flags);
+  if (!messages.empty()) {
+    connection.run("SELECT pg_notify('isomesh', m) FROM unnest($1::text[]) AS m", messages);
+  }
+  return news;
+}
+
+}  // namespace isomesh::store::postgresql

@@ -1,0 +1,469 @@
+#include "server/store/postgresql/schema.h"
+
+#include <array>
+#include <string>
+
+namespace isomesh::store::postgresql {
+namespace {
+
+// What keeps processes apart that bring the tables up to date.
+constexpr std::int64_t kMigrationLock = 0x69736f6d65736831;  // "isomesh1"
+
+// The tables of the first version, then what each later one changed. Never to be edited once it is
+// released, only to be added to.
+//
+// States are the values of JobState and OrderState, times are microseconds since 1970 by the
+// database's clock. A job's record is what the API tells of it as it was submitted, and once it has
+// ended, as it ended; what changes in between stands in columns and in its run.
+constexpr std::array kTables = {R"sql(
+CREATE FUNCTION isomesh_now() RETURNS bigint LANGUAGE sql VOLATILE AS
+  $$ SELECT (extract(epoch FROM clock_timestamp()) * 1000000)::bigint $$;
+
+-- Of the open transaction; unlike row numbers it is known when the row is written.
+CREATE FUNCTION isomesh_next_in_transaction() RETURNS int LANGUAGE sql VOLATILE AS $$
+  SELECT set_config('isomesh.place', (coalesce(nullif(current_setting('isomesh.place', true), ''), '0')::int + 1)::text,
+                    true)::int $$;
+
+CREATE TABLE nodes(                    -- a row is one life of a process
+  id uuid PRIMARY KEY,
+  name text COLLATE "C" NOT NULL,      -- of its data folder, which has one process at a time
+  since bigint NOT NULL
+);
+
+CREATE TABLE volumes(
+  owner text COLLATE "C" NOT NULL,
+  id text COLLATE "C" NOT NULL,
+  created bigint NOT NULL,
+  used bigint NOT NULL,                -- when it was created or a job that needed it ended, whichever is last
+  bytes bigint NOT NULL,               -- of its blob
+  record text NOT NULL,                -- without labels
+  labelled text,                       -- with them, if there are any
+  PRIMARY KEY(owner, id)
+);
+CREATE INDEX volumes_by_blob ON volumes(id);
+CREATE INDEX volumes_by_use ON volumes(used);
+CREATE INDEX volumes_by_time ON volumes(created, id);
+
+CREATE SEQUENCE job_order CACHE 1;     -- age is one order for all nodes
+CREATE TABLE jobs(
+  id text COLLATE "C" PRIMARY KEY,
+  seq bigint NOT NULL DEFAULT nextval('job_order'),
+  owner text COLLATE "C" NOT NULL,
+  state int NOT NULL,
+  priority int NOT NULL,
+  volume text COLLATE "C" NOT NULL,
+  result_key text COLLATE "C" NOT NULL,  -- the same for jobs that make the same mesh
+  accepted bigint NOT NULL,
+  finished bigint,
+  not_before bigint NOT NULL DEFAULT 0,
+  attempts int NOT NULL DEFAULT 0,
+  fence bigint NOT NULL DEFAULT 0,     -- of its last run
+  ended_by bigint,                     -- the fence of the run that ended last: asked again, it is the same end
+  waiting_for int,                     -- of queued ones
+  receiver text,                       -- of its callback: scheme, host and port
+  url text,
+  idempotency_key text COLLATE "C",
+  request_digest text NOT NULL,
+  record text NOT NULL
+) WITH (fillfactor = 70);
+CREATE INDEX jobs_queue ON jobs(priority, seq) WHERE state = 0;
+CREATE INDEX jobs_alike ON jobs(owner, result_key, state);
+CREATE INDEX jobs_by_volume ON jobs(volume) WHERE state < 2;
+CREATE INDEX jobs_by_end ON jobs(finished) WHERE finished IS NOT NULL;
+CREATE INDEX jobs_by_owner ON jobs(owner, id);
+CREATE UNIQUE INDEX jobs_by_key ON jobs(owner, idempotency_key) WHERE idempotency_key IS NOT NULL;
+
+CREATE TABLE runs(                     -- a row is a lease
+  job text COLLATE "C" PRIMARY KEY REFERENCES jobs(id) ON DELETE CASCADE,
+  fence bigint NOT NULL,
+  owner text COLLATE "C" NOT NULL,
+  result_key text COLLATE "C" NOT NULL,
+  node uuid NOT NULL,
+  worker text NOT NULL,
+  claimed bigint NOT NULL,
+  lease_until bigint NOT NULL,
+  cancelling boolean NOT NULL DEFAULT false,
+  stage int,                           -- these three as of the last renewal
+  progress float8,
+  timing float8[],
+  CONSTRAINT runs_one_of_those_alike UNIQUE(owner, result_key)
+) WITH (fillfactor = 50);
+
+CREATE TABLE meshes(                   -- which blobs the meshes of which jobs are in
+  job text COLLATE "C" NOT NULL REFERENCES jobs(id) ON DELETE CASCADE,
+  blob text COLLATE "C" NOT NULL,
+  bytes bigint NOT NULL,
+  PRIMARY KEY(job, blob)
+);
+CREATE INDEX meshes_by_blob ON meshes(blob);
+
+CREATE TABLE events(                   -- ordered by transaction and place in it
+  tx bigint NOT NULL DEFAULT pg_current_xact_id()::text::bigint,
+  place int NOT NULL DEFAULT isomesh_next_in_transaction(),
+  node uuid NOT NULL,
+  owner text COLLATE "C" NOT NULL,
+  job text COLLATE "C" NOT NULL,
+  kind int NOT NULL,
+  state int NOT NULL,
+  stage int NOT NULL,
+  progress float8 NOT NULL,
+  at bigint NOT NULL DEFAULT isomesh_now(),
+  PRIMARY KEY(tx, place)
+);
+CREATE INDEX events_by_job ON events(job, tx, place);
+CREATE INDEX events_by_time ON events(at);
+
+CREATE TABLE callbacks(                -- of jobs that have ended, until they are delivered or given up
+  job text COLLATE "C" PRIMARY KEY,
+  receiver text NOT NULL,
+  url text NOT NULL,
+  body text NOT NULL,
+  attempts int NOT NULL,               -- that failed
+  created bigint NOT NULL,
+  next bigint NOT NULL,                -- when it is due
+  node uuid,                           -- who delivers it
+  held_until bigint NOT NULL DEFAULT 0 -- and until when nobody else does
+);
+CREATE INDEX callbacks_by_time ON callbacks(next);
+
+CREATE TABLE expired(                  -- ids of jobs and volumes that were there
+  id text COLLATE "C" NOT NULL,
+  owner text COLLATE "C" NOT NULL,
+  at bigint NOT NULL,
+  PRIMARY KEY(id, owner)
+);
+CREATE INDEX expired_by_time ON expired(at);
+
+CREATE TABLE orders(                   -- states from 4 on are final
+  id text COLLATE "C" PRIMARY KEY,
+  owner text COLLATE "C" NOT NULL,
+  state int NOT NULL,
+  rule text COLLATE "C",
+  created bigint NOT NULL,
+  finished bigint,
+  next bigint NOT NULL,                -- when it is due, while it is open
+  idempotency_key text COLLATE "C",
+  request_digest text NOT NULL,
+  record text NOT NULL,                -- the JSON of the API
+  work text NOT NULL                   -- what the API does not tell
+);
+CREATE INDEX orders_due ON orders(next) WHERE state < 4;
+CREATE INDEX orders_by_owner ON orders(owner, id);
+CREATE INDEX orders_by_end ON orders(finished) WHERE finished IS NOT NULL;
+CREATE UNIQUE INDEX orders_by_key ON orders(owner, idempotency_key) WHERE idempotency_key IS NOT NULL;
+
+CREATE TABLE order_blobs(              -- objects that are about to be sent
+  "order" text COLLATE "C" NOT NULL REFERENCES orders(id) ON DELETE CASCADE,
+  blob text COLLATE "C" NOT NULL,
+  PRIMARY KEY("order", blob)
+);
+CREATE INDEX order_blobs_by_blob ON order_blobs(blob);
+
+CREATE TABLE watched(                  -- series that rules have made orders of
+  rule text COLLATE "C" NOT NULL,
+  study text COLLATE "C" NOT NULL,
+  series text COLLATE "C" NOT NULL,
+  "order" text COLLATE "C" NOT NULL,   -- the last one
+  instances bigint NOT NULL,           -- as many as there were for that
+  seen bigint NOT NULL,
+  PRIMARY KEY(rule, study, series)
+);
+CREATE INDEX watched_by_order ON watched("order");
+CREATE INDEX watched_by_time ON watched(seen);
+
+CREATE TABLE received(                 -- instances that peers have sent; see ReceivedStore
+  route text COLLATE "C" NOT NULL,
+  study text COLLATE "C" NOT NULL,
+  series text COLLATE "C" NOT NULL,
+  instance text COLLATE "C" NOT NULL,
+  blob text COLLATE "C",               -- while it is held
+  bytes bigint NOT NULL,
+  at bigint NOT NULL,
+  PRIMARY KEY(route, study, series, instance)
+);
+CREATE INDEX received_by_blob ON received(blob) WHERE blob IS NOT NULL;
+
+CREATE TABLE audit(id bigint PRIMARY KEY, at text NOT NULL, record text NOT NULL);
+CREATE FUNCTION isomesh_keep_audit() RETURNS trigger LANGUAGE plpgsql AS $$
+  BEGIN RAISE EXCEPTION 'the audit trail is neither changed nor removed'; END $$;
+CREATE TRIGGER audit_is_kept BEFORE UPDATE OR DELETE OR TRUNCATE ON audit
+  FOR EACH STATEMENT EXECUTE FUNCTION isomesh_keep_audit();
+CREATE TABLE audit_sent(id bigint NOT NULL);  -- one row: up to which entry a collector has had the trail
+INSERT INTO audit_sent VALUES(0);
+
+CREATE TABLE holds(                    -- blobs that a node stores, and that a record is about to name
+  blob text COLLATE "C" NOT NULL,
+  node uuid NOT NULL,
+  at bigint NOT NULL,                  -- when it was stored last
+  times int NOT NULL,                  -- that it was stored and not named yet
+  PRIMARY KEY(blob, node)
+);
+CREATE INDEX holds_by_time ON holds(at);
+
+CREATE TABLE identity(                 -- one row: what the blobs that belong to it carry, too
+  id text NOT NULL,
+  seen bigint NOT NULL
+);
+)sql"};
+
+// As the newest version has them, each a verb in one round trip. Whoever changes one adds a
+// version, so that no older daemon that starts puts its own in place.
+constexpr const char* kFunctions = R"sql(
+CREATE OR REPLACE FUNCTION is_named(p_blob text) RETURNS boolean LANGUAGE sql STABLE AS $$
+  SELECT EXISTS(SELECT 1 FROM volumes WHERE id = p_blob) OR EXISTS(SELECT 1 FROM meshes WHERE blob = p_blob)
+    OR EXISTS(SELECT 1 FROM order_blobs WHERE blob = p_blob) OR EXISTS(SELECT 1 FROM received WHERE blob = p_blob) $$;
+
+-- Of those that make the same mesh: who submits one looks whether there is a mesh while nobody stores it.
+CREATE OR REPLACE FUNCTION alike_lock(p_owner text, p_key text) RETURNS bigint LANGUAGE sql IMMUTABLE AS
+  $$ SELECT hashtextextended(p_owner || chr(10) || p_key, 18) $$;
+
+-- A job that the caller has locked, or made, is over.
+CREATE OR REPLACE FUNCTION end_job(p_job text, p_state int, p_record text, p_stage int, p_ended_by bigint, p_node uuid,
+                                   p_blobs text[], p_bytes bigint[]) RETURNS void LANGUAGE plpgsql AS $$
+DECLARE j record; now_us bigint := isomesh_now();
+BEGIN
+  UPDATE jobs SET state = p_state, finished = now_us, record = p_record, waiting_for = NULL,
+                  ended_by = coalesce(p_ended_by, ended_by)
+    WHERE id = p_job RETURNING owner, volume, receiver, url INTO j;
+  UPDATE volumes SET used = greatest(used, now_us) WHERE owner = j.owner AND id = j.volume;
+  INSERT INTO meshes SELECT p_job, b, n FROM unnest(p_blobs, p_bytes) AS t(b, n) ON CONFLICT DO NOTHING;
+  IF j.url IS NOT NULL THEN
+    INSERT INTO callbacks(job, receiver, url, body, attempts, created, next)
+      VALUES(p_job, j.receiver, j.url, p_record, 0, now_us, now_us);
+  END IF;
+  INSERT INTO events(node, owner, job, kind, state, stage, progress)
+    VALUES(p_node, j.owner, p_job, 2, p_state, p_stage, CASE WHEN p_state = 2 THEN 1 ELSE 0 END);
+END $$;
+
+-- kind: 0 new, 1 known, 2 another request, 3 the queue is full, 4 no such volume, 5 look at `p_latest` again,
+-- 6 the owner has its share. `p_state` 2: with the mesh of the job p_latest.
+CREATE OR REPLACE FUNCTION submit_job(p_id text, p_owner text, p_priority int, p_volume text, p_key text,
+                                      p_idempotency text, p_digest text, p_record text, p_node uuid, p_max int,
+                                      p_has_share boolean, p_latest text, p_state int, p_blobs text[],
+                                      p_bytes bigint[], p_receiver text, p_url text, p_accepted bigint)
+RETURNS TABLE(kind int, job text) LANGUAGE plpgsql AS $$
+DECLARE old record; n int; latest text;
+BEGIN
+  IF EXISTS (SELECT 1 FROM jobs j WHERE j.id = p_id) THEN  -- asked again after a lost connection
+    RETURN QUERY SELECT 0, p_id;
+    RETURN;
+  END IF;
+  IF p_idempotency IS NOT NULL THEN
+    SELECT j.id, j.request_digest AS digest INTO old FROM jobs j
+      WHERE j.owner = p_owner AND j.idempotency_key = p_idempotency;
+    IF FOUND THEN
+      RETURN QUERY SELECT CASE WHEN old.digest = p_digest THEN 1 ELSE 2 END, old.id;
+      RETURN;
+    END IF;
+  END IF;
+  PERFORM 1 FROM volumes v WHERE v.owner = p_owner AND v.id = p_volume FOR KEY SHARE;
+  IF NOT FOUND THEN RETURN QUERY SELECT 4, NULL::text; RETURN; END IF;
+  PERFORM pg_advisory_xact_lock_shared(alike_lock(p_owner, p_key));
+  IF p_state = 2 THEN
+    -- Not to expire before this one names its blobs, too.
+    PERFORM 1 FROM jobs j WHERE j.id = p_latest AND j.state = 2 FOR KEY SHARE;
+    IF NOT FOUND THEN RETURN QUERY SELECT 5, NULL::text; RETURN; END IF;
+  ELSE
+    SELECT j.id INTO latest FROM jobs j WHERE j.owner = p_owner AND j.result_key = p_key AND j.state = 2
+      ORDER BY j.id DESC LIMIT 1;
+    IF latest IS DISTINCT FROM p_latest THEN RETURN QUERY SELECT 5, NULL::text; RETURN; END IF;
+    SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = 0 LIMIT p_max) AS q;
+    IF n > p_max - 256 THEN            -- near the limit: one at a time, counted again
+      PERFORM pg_advisory_xact_lock(hashtext('isomesh queue'), hashtext(current_schema()));
+      SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = 0 LIMIT p_max) AS q;
+      IF n >= p_max THEN RETURN QUERY SELECT 3, NULL::text; RETURN; END IF;
+    END IF;
+    IF NOT p_has_share THEN RETURN QUERY SELECT 6, NULL::text; RETURN; END IF;
+  END IF;
+  INSERT INTO jobs(id, owner, state, priority, volume, result_key, accepted, receiver, url, idempotency_key,
+                   request_digest, record)
+    VALUES(p_id, p_owner, 0, p_priority, p_volume, p_key, p_accepted, p_receiver, p_url, p_idempotency, p_digest,
+           p_record)
+    ON CONFLICT DO NOTHING;
+  IF NOT FOUND THEN                    -- two with one key
+    SELECT j.id, j.request_digest AS digest INTO old FROM jobs j
+      WHERE j.owner = p_owner AND j.idempotency_key = p_idempotency;
+    RETURN QUERY SELECT CASE WHEN old.digest = p_digest THEN 1 ELSE 2 END, old.id;
+    RETURN;
+  END IF;
+  IF p_state = 2 THEN
+    PERFORM end_job(p_id, 2, p_record, 7, NULL, p_node, p_blobs, p_bytes);
+  ELSE
+    INSERT INTO events(node, owner, job, kind, state, stage, progress) VALUES(p_node, p_owner, p_id, 0, 0, 0, 0);
+  END IF;
+  RETURN QUERY SELECT 0, p_id;
+END $$;
+
+-- A claim that is lost with the database's power is made again, so it does not wait for the disk. The fence is
+-- never one that a lost claim had: the time is in it.
+CREATE OR REPLACE FUNCTION claim_job(p_node uuid, p_worker text, p_lease bigint)
+RETURNS TABLE(id text, fence bigint, attempts int, owner text, record text, accepted bigint, claimed bigint)
+LANGUAGE plpgsql AS $$
+DECLARE c record; now_us bigint; f bigint;
+BEGIN
+  PERFORM set_config('synchronous_commit', 'off', true);
+  LOOP
+    now_us := isomesh_now();
+    SELECT j.id, j.owner, j.result_key, j.fence, j.attempts, j.record, j.accepted INTO c FROM jobs j
+      WHERE j.state = 0 AND j.not_before <= now_us
+        AND NOT EXISTS (SELECT 1 FROM runs r WHERE r.owner = j.owner AND r.result_key = j.result_key)
+      ORDER BY j.priority, j.seq LIMIT 1 FOR UPDATE OF j SKIP LOCKED;
+    IF NOT FOUND THEN RETURN; END IF;
+    f := greatest(c.fence + 1, now_us);
+    INSERT INTO runs(job, fence, owner, result_key, node, worker, claimed, lease_until)
+      VALUES(c.id, f, c.owner, c.result_key, p_node, p_worker, now_us, now_us + p_lease) ON CONFLICT DO NOTHING;
+    CONTINUE WHEN NOT FOUND;           -- its like was claimed meanwhile: that run is seen now
+    UPDATE jobs j SET state = 1, fence = f, attempts = c.attempts + 1, waiting_for = NULL WHERE j.id = c.id;
+    INSERT INTO events(node, owner, job, kind, state, stage, progress) VALUES(p_node, c.owner, c.id, 0, 1, 1, 0);
+    RETURN QUERY SELECT c.id, f, c.attempts + 1, c.owner, c.record, c.accepted, now_us;
+    RETURN;
+  END LOOP;
+END $$;
+
+-- Null when the lease is lost, otherwise whether the run is to stop.
+CREATE OR REPLACE FUNCTION renew_run(p_job text, p_fence bigint, p_lease bigint, p_stage int, p_progress float8,
+                                     p_timing float8[]) RETURNS boolean LANGUAGE plpgsql AS $$
+DECLARE stops boolean; now_us bigint := isomesh_now();
+BEGIN
+  PERFORM set_config('synchronous_commit', 'off', true);
+  UPDATE runs SET lease_until = now_us + p_lease, stage = p_stage, progress = p_progress, timing = p_timing
+    WHERE job = p_job AND fence = p_fence AND lease_until >= now_us RETURNING cancelling INTO stops;
+  RETURN stops;
+END $$;
+
+-- verdict: 0 the lease is lost, 1 done, 2 these are jobs like it, which have to be told how they end, too.
+-- p_state 0: queued again. p_ends_others: it is somebody else's lease, which is over.
+CREATE OR REPLACE FUNCTION finish_run(p_job text, p_fence bigint, p_node uuid, p_again boolean, p_ends_others boolean,
+                                      p_state int, p_record text, p_cancelled text, p_blobs text[], p_bytes bigint[],
+                                      p_delay bigint, p_waiting_for int, p_counts boolean, p_alike text[],
+                                      p_alike_records text[])
+RETURNS TABLE(verdict int, id text, record text, accepted bigint) LANGUAGE plpgsql AS $$
+DECLARE j record; r record;
+BEGIN
+  SELECT t.owner, t.result_key, t.ended_by INTO j FROM jobs t WHERE t.id = p_job FOR UPDATE;
+  SELECT t.cancelling, t.lease_until INTO r FROM runs t WHERE t.job = p_job AND t.fence = p_fence FOR UPDATE;
+  IF NOT FOUND OR (NOT p_ends_others AND r.lease_until < isomesh_now()) THEN
+    RETURN QUERY SELECT CASE WHEN p_again AND j.ended_by = p_fence THEN 1 ELSE 0 END, NULL::text, NULL::text, 0::bigint;
+    RETURN;
+  END IF;
+  IF r.cancelling THEN
+    p_state := 4;
+    p_record := p_cancelled;
+  END IF;
+  IF p_state = 2 THEN
+    PERFORM pg_advisory_xact_lock(alike_lock(j.owner, j.result_key));
+    IF EXISTS (SELECT 1 FROM jobs a WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = 0
+                 AND a.id <> ALL(p_alike)) THEN
+      RETURN QUERY SELECT 2, a.id, a.record, a.accepted FROM jobs a
+        WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = 0 ORDER BY a.id;
+      RETURN;
+    END IF;
+  END IF;
+  DELETE FROM runs t WHERE t.job = p_job;
+  IF p_state = 0 THEN
+    UPDATE jobs t SET state = 0, attempts = t.attempts - CASE WHEN p_counts THEN 0 ELSE 1 END,
+                      not_before = isomesh_now() + p_delay, waiting_for = p_waiting_for, ended_by = p_fence
+      WHERE t.id = p_job;
+    INSERT INTO events(node, owner, job, kind, state, stage, progress) VALUES(p_node, j.owner, p_job, 0, 0, 0, 0);
+  ELSE
+    PERFORM end_job(p_job, p_state, p_record, CASE WHEN p_state = 2 THEN 7 ELSE 1 END, p_fence, p_node,
+                    CASE WHEN p_state = 2 THEN p_blobs ELSE '{}' END, CASE WHEN p_state = 2 THEN p_bytes ELSE '{}' END);
+  END IF;
+  IF p_state = 2 THEN
+    FOR n IN 1 .. coalesce(array_length(p_alike, 1), 0) LOOP
+      PERFORM 1 FROM jobs a WHERE a.id = p_alike[n] AND a.state = 0 FOR UPDATE;
+      CONTINUE WHEN NOT FOUND;         -- cancelled meanwhile
+      PERFORM end_job(p_alike[n], 2, p_alike_records[n], 7, NULL, p_node, p_blobs, p_bytes);
+    END LOOP;
+  END IF;
+  RETURN QUERY SELECT 1, NULL::text, NULL::text, 0::bigint;
+END $$;
+
+-- The state that the job is in afterwards.
+CREATE OR REPLACE FUNCTION cancel_job(p_job text, p_record text, p_node uuid) RETURNS int LANGUAGE plpgsql AS $$
+DECLARE s int;
+BEGIN
+  SELECT state INTO s FROM jobs WHERE id = p_job FOR UPDATE;
+  IF s = 0 THEN
+    PERFORM end_job(p_job, 4, p_record, 0, NULL, p_node, '{}', '{}');
+    RETURN 4;
+  END IF;
+  IF s = 1 THEN UPDATE runs SET cancelling = true WHERE job = p_job; END IF;
+  RETURN s;
+END $$;
+
+-- The blobs that no record names any more; a row without one where nothing has expired.
+CREATE OR REPLACE FUNCTION expire_job(p_job text, p_owner text) RETURNS TABLE(is_gone boolean, blob text, bytes bigint)
+LANGUAGE plpgsql AS $$
+DECLARE b text[]; n bigint[];
+BEGIN
+  PERFORM 1 FROM jobs WHERE jobs.id = p_job AND finished IS NOT NULL FOR UPDATE;
+  IF NOT FOUND THEN RETURN; END IF;
+  SELECT array_agg(m.blob), array_agg(m.bytes) INTO b, n FROM meshes m WHERE m.job = p_job;
+  DELETE FROM jobs WHERE jobs.id = p_job;
+  DELETE FROM events WHERE job = p_job;
+  INSERT INTO expired VALUES(p_job, p_owner, isomesh_now()) ON CONFLICT(id, owner) DO UPDATE SET at = excluded.at;
+  RETURN QUERY SELECT true, NULL::text, 0::bigint;
+  RETURN QUERY SELECT true, t.k, t.v FROM unnest(b, n) AS t(k, v) WHERE NOT is_named(t.k);
+END $$;
+
+CREATE OR REPLACE FUNCTION expire_volume(p_owner text, p_volume text, p_used bigint)
+RETURNS TABLE(is_gone boolean, blob text, bytes bigint) LANGUAGE plpgsql AS $$
+DECLARE n bigint;
+BEGIN
+  SELECT v.bytes INTO n FROM volumes v WHERE v.owner = p_owner AND v.id = p_volume AND v.used = p_used FOR UPDATE;
+  IF NOT FOUND OR EXISTS (SELECT 1 FROM jobs j WHERE j.volume = p_volume AND j.owner = p_owner AND j.state < 2) THEN
+    RETURN;
+  END IF;
+  DELETE FROM volumes v WHERE v.owner = p_owner AND v.id = p_volume;
+  INSERT INTO expired VALUES(p_volume, p_owner, isomesh_now()) ON CONFLICT(id, owner) DO UPDATE SET at = excluded.at;
+  RETURN QUERY SELECT true, NULL::text, 0::bigint;
+  IF NOT is_named(p_volume) THEN RETURN QUERY SELECT true, p_volume, n; END IF;
+END $$;
+
+-- Takes deliveries for one node: no receiver is told more at once than `p_most`, over all nodes.
+CREATE OR REPLACE FUNCTION take_callbacks(p_node uuid, p_now bigint, p_most int, p_hold bigint)
+RETURNS TABLE(job text, url text, body text, attempts int, created bigint) LANGUAGE plpgsql AS $$
+DECLARE now_us bigint := isomesh_now();
+BEGIN
+  IF NOT EXISTS (SELECT 1 FROM callbacks c WHERE c.next <= p_now) THEN RETURN; END IF;
+  PERFORM set_config('synchronous_commit', 'off', true);
+  PERFORM pg_advisory_xact_lock(hashtext('isomesh callbacks'), hashtext(current_schema()));
+  UPDATE callbacks c SET node = p_node, held_until = now_us + p_hold FROM (
+    SELECT t.job AS id, row_number() OVER (PARTITION BY t.receiver
+             ORDER BY (t.node IS DISTINCT FROM p_node AND t.held_until > now_us) DESC, t.next, t.job) AS place,
+           t.node IS DISTINCT FROM p_node AND t.held_until > now_us AS is_others
+      FROM callbacks t WHERE t.next <= p_now) AS due
+    WHERE c.job = due.id AND due.place <= p_most AND NOT due.is_others;
+  RETURN QUERY SELECT c.job, c.url, c.body, c.attempts, c.created FROM callbacks c
+    WHERE c.node = p_node AND c.next <= p_now AND c.held_until > now_us ORDER BY c.next, c.job;
+END $$;
+)sql";
+
+constexpr auto kNewest = static_cast<std::int64_t>(kTables.size());
+
+}  // namespace
+
+void migrate(Connection& connection) {
+  Transaction transaction(connection);
+  transaction->run("SELECT pg_advisory_xact_lock($1::bigint)", kMigrationLock);
+  transaction->script("CREATE TABLE IF NOT EXISTS isomesh_version(version int NOT NULL)");
+  Rows row = transaction->run("SELECT version FROM isomesh_version");
+  const std::int64_t version = row.next() ? row.integer(0) : 0;
+  if (version > kNewest) {
+    throw Error(ErrorCode::kUnavailable,
+                "the database was made by a newer isomeshd: its records have version " +
+                    std::to_string(version) + ", this one knows 1 to " + std::to_string(kNewest));
+  }
+  if (version == 0) transaction->run("INSERT INTO isomesh_version VALUES(0)");
+  for (std::int64_t next = version; next < kNewest; ++next) {
+    transaction->script(kTables[static_cast<std::size_t>(next)]);
+  }
+  if (version < kNewest) {
+    transaction->script(kFunctions);
+    transaction->run("UPDATE isomesh_version SET version = $1::int", kNewest);
+  }
+  transaction.commit();
+}
+
+}  // namespace isomesh::store::postgresql

@@ -1,0 +1,248 @@
+// Several daemons on one PostgreSQL and one folder of blobs, of which some die, stand still or only
+// answer. ISOMESH_KILL_ROUNDS says how often they are killed, and makes the jobs 200.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <random>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "base/clock.h"
+#include "base/sha256.h"
+#include "proto/json.h"
+#include "tests/api/daemon.h"
+#include "tests/support/postgres.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using testing::HasSubstr;
+
+constexpr std::size_t kNodes = 3;
+
+class Cluster : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!Postgres::is_here()) GTEST_SKIP() << "PostgreSQL is not installed";
+    postgres_ = std::make_unique<Postgres>(Postgres::Disk::kDurable);
+    store_ = postgres_->new_place();
+    for (const std::string folder : {"blobs", "quarantine"}) {
+      std::filesystem::create_directories(folder_ / folder);
+    }
+  }
+
+  // A node's data folder is its own but for what is in the blobs' folders.
+  void start(std::size_t node, std::vector<std::string> arguments = {}) {
+    const std::filesystem::path data = folder_ / ("node" + std::to_string(node));
+    if (std::filesystem::create_directories(data)) {
+      for (const std::string folder : {"blobs", "quarantine"}) {
+        std::filesystem::create_directory_symlink(folder_ / folder, data / folder);
+      }
+    }
+    arguments.insert(arguments.begin(), {"--store", store_, "--lease-seconds", "2"});
+    nodes_[node] = std::make_unique<Daemon>(data, "127.0.0.1:0", arguments);
+  }
+  void start_all() {
+    for (std::size_t node = 0; node < kNodes; ++node) start(node, {"--workers", "1"});
+  }
+  void kill(std::size_t node) { nodes_[node].reset(); }
+  Daemon& node(std::size_t node) { return *nodes_[node]; }
+
+  std::string ask(const std::string& sql) { return Postgres::ask(store_, sql); }
+
+  bool comes_to(std::size_t node, const std::string& id, JobState state,
+                std::chrono::milliseconds longest = kLongest) {
+    const auto deadline = std::chrono::steady_clock::now() + longest;
+    while (std::chrono::steady_clock::now() < deadline) {
+      if (this->node(node).client().job(id).state == state) return true;
+      std::this_thread::sleep_for(milliseconds(20));
+    }
+    return false;
+  }
+
+  // A job that runs for longer than anybody waits.
+  Job endless_job(std::size_t node) {
+    Daemon& daemon = this->node(node);
+    const std::string id = submit(daemon, upload(daemon, long_upload()), 50 + 0.01 * ++endless_,
+                                  R"("draco": {"speed": 10}, "passes": 1000)")
+                               .id;
+    if (!comes_to(node, id, JobState::kRunning)) throw std::runtime_error("it does not run");
+    return daemon.client().job(id);
+  }
+
+  std::unique_ptr<Postgres> postgres_;
+  std::string store_;
+  TemporaryFolder folder_;
+  std::array<std::unique_ptr<Daemon>, kNodes> nodes_;
+  int endless_ = 0;
+};
+
+// Asks every node until one answers: any may be dead, and so may the database.
+template <class Act>
+auto insist(const Act& act) {
+  const auto deadline = std::chrono::steady_clock::now() + kLongest;
+  while (true) {
+    try {
+      return act();
+    } catch (const std::exception&) {
+      if (std::chrono::steady_clock::now() >= deadline) throw;
+    }
+    std::this_thread::sleep_for(milliseconds(20));
+  }
+}
+
+TEST_F(Cluster, NothingIsLostOrDoneTwiceWhenNodesAndTheDatabaseDie) {
+  const char* asked = std::getenv("ISOMESH_KILL_ROUNDS");
+  const int rounds = asked == nullptr ? 3 : std::stoi(asked);
+  const int jobs = asked == nullptr ? 24 : 200;
+  const unsigned seed = std::random_device()();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  start_all();
+  const Volume volume = upload(node(0), sphere_upload());
+  std::vector<std::string> accepted;
+  const auto submit_some = [&](int count) {
+    for (int n = 0; n < count; ++n) {
+      const std::size_t to = accepted.size() % kNodes;
+      const std::string iso = std::to_string(60 + 0.1 * static_cast<double>(accepted.size()));
+      const std::string body = "{\"volume\": \"" + volume.id + "\", \"iso\": " + iso + "}";
+      // The key makes a second try the same job.
+      accepted.push_back(insist([&] {
+        const Answer answer = node(to).send("POST", "/v1/jobs", body,
+                                            {{"Idempotency-Key", std::to_string(accepted.size())}});
+        if (answer.status != 202 && answer.status != 200) throw std::runtime_error(answer.body);
+        return job_from_json(answer.body).id;
+      }));
+    }
+  };
+  for (int round = 0; round < rounds; ++round) {
+    submit_some((jobs - static_cast<int>(accepted.size())) / (rounds - round));
+    std::this_thread::sleep_for(milliseconds(std::uniform_int_distribution(0, 300)(random)));
+    if (round % 3 == 1) {
+      postgres_->stop_at_once();
+      postgres_->start();
+    } else {
+      const std::size_t victim = std::uniform_int_distribution<std::size_t>(0, 2)(random);
+      kill(victim);
+      start(victim, {"--workers", "1"});
+    }
+  }
+  const Daemon reference;
+  upload(reference, sphere_upload());
+  for (const std::string& id : accepted) {
+    const Job job = insist([&] { return node(0).client().wait(id); });
+    ASSERT_EQ(job.state, JobState::kSucceeded) << to_json(job);
+    EXPECT_EQ(ask("SELECT count(*) FROM events WHERE kind = 2 AND job = '" + id + "'"), "1");
+    const MeshFile& file = job.mesh->files.at(MeshFormat::kDrc);
+    EXPECT_EQ(sha256_of(node(1).get(file.href).body), file.sha256);
+    if (id != accepted.front() && id != accepted.back()) continue;
+    const Job right = reference.client().wait(submit(reference, volume, *job.parameters.iso).id);
+    EXPECT_EQ(right.mesh->files.at(MeshFormat::kDrc).sha256, file.sha256);
+  }
+  EXPECT_EQ(ask("SELECT count(*) FROM jobs"), std::to_string(accepted.size()));
+  EXPECT_EQ(ask("SELECT count(*) FROM runs"), "0");
+  std::cout << rounds << " kills, " << accepted.size() << " jobs, all succeeded once" << std::endl;
+}
+
+TEST_F(Cluster, WhatIsAskedOfOneNodeIsTrueOfAll) {
+  start(0, {"--workers", "0"});  // only answers
+  start(1, {"--workers", "1"});
+  const Volume volume = upload(node(0), sphere_upload());
+  // Who waits at one node is told of the end at another. The machine may have other things to do:
+  // one prompt answer of some shows that it is possible.
+  bool is_prompt = false;
+  for (int n = 0; n < 5 && !is_prompt; ++n) {
+    const std::string body =
+        "{\"volume\": \"" + volume.id + "\", \"iso\": " + std::to_string(90 + n) + "}";
+    const Answer answer = node(0).send("POST", "/v1/jobs", body, {{"Prefer", "wait=60"}});
+    const Job job = job_from_json(answer.body);
+    ASSERT_EQ(job.state, JobState::kSucceeded) << answer.body;
+    is_prompt = std::chrono::system_clock::now() - time_of(*job.finished) < seconds(1);
+  }
+  EXPECT_TRUE(is_prompt);
+  bool is_stopped = false;
+  for (int n = 0; n < 3 && !is_stopped; ++n) {
+    const Job running = endless_job(0);
+    node(0).client().cancel(running.id);
+    is_stopped = comes_to(0, running.id, JobState::kCancelled, milliseconds(2500));
+    ASSERT_TRUE(comes_to(0, running.id, JobState::kCancelled));
+  }
+  EXPECT_TRUE(is_stopped);
+  for (const std::size_t each : {0U, 1U}) EXPECT_EQ(node(each).get("/readyz").status, 200);
+  postgres_->stop_at_once();
+  EXPECT_EQ(node(0).get("/readyz").status, 503);
+  EXPECT_EQ(node(0).get("/livez").status, 200);
+  postgres_->start();
+  EXPECT_TRUE(eventually([&] { return node(0).get("/readyz").status == 200; }));
+}
+
+TEST_F(Cluster, ANodeThatStandsStillCannotFinishAndADrainedOneGivesItsJobsBack) {
+  start(0, {"--workers", "1"});
+  const Job before = endless_job(0);
+  start(1, {"--workers", "1", "--drain-seconds", "0"});
+  node(0).send_signal(SIGSTOP);
+  ASSERT_TRUE(eventually([&] {
+    const Job now = node(1).client().job(before.id);
+    return now.state == JobState::kRunning && now.started != before.started;
+  }));
+  node(0).send_signal(SIGCONT);
+  EXPECT_TRUE(
+      eventually([&] { return node(0).errors().find("had lost its lease") != std::string::npos; }));
+  EXPECT_EQ(ask("SELECT attempts FROM jobs WHERE id = '" + before.id + "'"), "1");
+  const Job second = node(1).client().job(before.id);
+  EXPECT_EQ(second.state, JobState::kRunning);
+  EXPECT_EQ(node(1).stop(), 0);
+  // At once, and not when the lease is over.
+  EXPECT_TRUE(eventually([&] {
+    const Job now = node(0).client().job(before.id);
+    return now.state == JobState::kRunning && now.started != second.started;
+  }));
+  node(0).client().cancel(before.id);
+  EXPECT_EQ(node(0).client().wait(before.id).state, JobState::kCancelled);
+}
+
+TEST_F(Cluster, AFolderIsMovedWithAllThatItHolds) {
+  const std::filesystem::path data = folder_ / "moved";
+  Job done;
+  Job waiting;
+  Volume volume;
+  {
+    Daemon alone(data, "127.0.0.1:0", {"--workers", "1"});
+    done = finished_job(alone);
+    volume = alone.client().volumes().at(0);
+    long_job(alone);
+    waiting = submit(alone, volume, 77);
+  }
+  const auto move = [&] {
+    return run({ISOMESHD, "move", "--to", store_, "--data", data.string()});
+  };
+  const Finished moved = move();
+  EXPECT_EQ(moved.status, 0) << moved.errors;
+  EXPECT_THAT(moved.output, HasSubstr("moved 2 volumes, 3 jobs and 0 orders"));
+  EXPECT_NE(move().status, 0) << "the database is not empty";
+  nodes_[0] = std::make_unique<Daemon>(
+      data, "127.0.0.1:0", std::vector<std::string>{"--store", store_, "--workers", "2"});
+  EXPECT_EQ(node(0).client().job(done.id), done);
+  EXPECT_EQ(sha256_of(node(0).get(done.mesh->files.at(MeshFormat::kDrc).href).body),
+            done.mesh->files.at(MeshFormat::kDrc).sha256);
+  EXPECT_EQ(node(0).client().wait(waiting.id).state, JobState::kSucceeded);
+  EXPECT_EQ(node(0).client().volumes().size(), 2U);
+  const Finished copied = run({ISOMESHD, "backup", (folder_ / "copy").string(), "--store", store_,
+                               "--data", data.string()});
+  EXPECT_NE(copied.status, 0);
+  EXPECT_THAT(copied.errors, HasSubstr("pg_dump"));
+}
+
+}  // namespace
+}  // namespace isomesh
