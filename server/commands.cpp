@@ -103,16 +103,25 @@ struct Commands::State {
                        "The beginning of one token's hash; all of the name without it");
   }
 
+  void check_is_whole() const {
+    if (options.blobs.place.empty()) return;
+    throw invalid_parameter("blobs",
+                            "a backup is of a data folder that has its files in it; docs/blobs.md "
+                            "says how records and files that are apart are copied");
+  }
+
   void add_backup_commands() {
     CLI::App& backup =
         add(cli, "backup", "Copy the data folder, also while a daemon uses it", [this] {
           refuse_database("pg_dump copies the records (docs/cluster.md)");
+          check_is_whole();
           tell("copied", store::back_up(options.data, folder));
         });
     backup.add_option("DIR", folder, "The folder to make, which must not be there")->required();
     CLI::App& restored = add(
         cli, "restore", "Make the data folder from a backup; it must be missing or empty", [this] {
           refuse_database("pg_restore puts the records back (docs/cluster.md)");
+          check_is_whole();
           tell("put back", store::restore(folder, options.data));
         });
     restored.add_option("DIR", folder, "The folder that `isomeshd backup` made")->required();

@@ -19,6 +19,7 @@
 
 #include "base/log.h"
 #include "server/audit/syslog.h"
+#include "server/blobs.h"
 #include "server/callbacks/callbacks.h"
 #include "server/callbacks/signature.h"
 #include "server/callbacks/targets.h"
@@ -46,7 +47,6 @@
 #include "server/orders/orders.h"
 #include "server/orders/received.h"
 #include "server/records.h"
-#include "server/store/files/blob_store.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/postgresql/connection.h"
 #include "server/store/retention.h"
@@ -165,6 +165,7 @@ int tell_configuration(const Options& options, const CLI::App& cli) {
   const callbacks::CallbackTargets targets(options.callback_targets);
   callback_secrets(options);
   if (!options.store.empty()) store::postgresql::check_url(options.store);
+  check_blobs(options.blobs);
   if (!options.hospital.empty()) {
     const orders::Hospital hospital = orders::read_hospital(options.hospital);
     if (hospital.dimse) dimse::listen_address(*hospital.dimse);
@@ -267,9 +268,9 @@ int run(const Options& options, const sigset_t& signals) {
   const store::DataFolder folder(options.data, options.disk_reserve);
   const auto keep = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::duration<double, std::chrono::days::period>(options.keep_days));
-  store::FileBlobStore files_of_blobs(folder);
-  const auto records = open_records(options, folder, files_of_blobs, clock_tolerance(keep));
-  store::BlobStore& blobs = records->blobs();
+  const std::unique_ptr<store::BlobStore> opened_blobs = open_blobs(options.blobs, folder);
+  store::BlobStore& blobs = *opened_blobs;
+  const auto records = open_records(options, folder, blobs, clock_tolerance(keep));
   store::VolumeStore& volumes = records->volumes();
   store::JobStore& jobs = records->jobs();
   if (const std::size_t count = jobs.reap()) {
@@ -280,8 +281,8 @@ int run(const Options& options, const sigset_t& signals) {
   retention_options.max_bytes = options.max_disk;
   retention_options.now = [&records] { return records->now(); };
   store::Retention retention(jobs, volumes, blobs, folder.scratch(), retention_options);
-  files_of_blobs.limit_room(options.max_disk,
-                            [&retention](std::uint64_t bytes) { retention.make_room(bytes); });
+  blobs.limit_room(options.max_disk,
+                   [&retention](std::uint64_t bytes) { retention.make_room(bytes); });
   jobs::RunnerOptions runner = options.runner;
   runner.bounds.time = std::chrono::seconds(options.import_seconds);
   runner.program = program_of_ours("isomesh-import");

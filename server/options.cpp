@@ -99,6 +99,33 @@ void add_callback_options(CLI::App& cli, Options& options) {
       ->capture_default_str();
 }
 
+void add_blob_options(CLI::App& cli, Options& options) {
+  cli.add_option("--blobs", options.blobs.place,
+                 "Where the files of volumes and meshes are, when not in the folder of --data: "
+                 "s3://BUCKET[/PREFIX]?endpoint=URL&region=NAME, or a folder that other daemons "
+                 "may share")
+      ->envname("ISOMESH_BLOBS")
+      ->type_name("URL|DIR");
+  cli.add_option("--blob-cache", options.blobs.cache,
+                 "Bytes of copies of files in S3 that are kept in the folder of --data")
+      ->envname("ISOMESH_BLOB_CACHE")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+  cli.add_option("--blob-credentials", options.blobs.credentials,
+                 "File of the keys for S3, as AWS' tools have it, read again for each request; "
+                 "AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY otherwise")
+      ->envname("ISOMESH_BLOB_CREDENTIALS");
+  cli.add_option(
+         "--blob-ca", options.blobs.authorities,
+         "File of the certificate authorities that S3 is trusted by; the system's otherwise")
+      ->envname("ISOMESH_BLOB_CA");
+  cli.add_flag(
+         "--blob-redirect", options.http.blob_redirect,
+         "Answer downloads of meshes in S3 that say `Prefer: redirect` with an address there, "
+         "valid for a minute")
+      ->envname("ISOMESH_BLOB_REDIRECT");
+}
+
 void add_check(CLI::App& cli, Options& options) {
   constexpr const char* kMeaning = "Tell which options would be used, and end; as `isomeshd check`";
   cli.add_flag("--check-config", options.check_only, kMeaning)->configurable(false);
@@ -239,6 +266,7 @@ void add_options(CLI::App& cli, Options& options) {
   add_log_options(cli, options);
   add_security_options(cli, options);
   add_callback_options(cli, options);
+  add_blob_options(cli, options);
   add_operators_word(cli, options);
   add_check(cli, options);
 }

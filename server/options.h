@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/log.h"
+#include "server/blobs.h"
 #include "server/http/server.h"
 #include "server/jobs/import_runner.h"
 #include "server/process/import_message.h"
@@ -26,6 +27,7 @@ struct Options {
   std::string listen = "127.0.0.1:8080";
   std::filesystem::path data = "isomesh-data";
   std::string store;  // URL of the database that keeps the records; empty: one in the data folder
+  BlobOptions blobs;
   std::size_t workers = 2;
   int threads = 0;  // of the kernels; 0: one a processor
   bool open_network = false;

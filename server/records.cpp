@@ -10,7 +10,6 @@
 #include "server/jobs/pipeline.h"
 #include "server/store/postgresql/audit_trail.h"
 #include "server/store/postgresql/database.h"
-#include "server/store/postgresql/held_blobs.h"
 #include "server/store/postgresql/identity.h"
 #include "server/store/postgresql/job_store.h"
 #include "server/store/postgresql/order_store.h"
@@ -41,9 +40,8 @@ class SqliteRecords : public Records {
  public:
   SqliteRecords(const Options& options, const store::DataFolder& folder, store::BlobStore& blobs,
                 std::chrono::milliseconds tolerance)
-      : blobs_(blobs),
-        database_(folder),
-        identity_(database_, folder, options.word, {.tolerance = tolerance}),
+      : database_(folder),
+        identity_(database_, blobs, options.word, {.tolerance = tolerance}),
         volumes_(database_),
         jobs_(database_, blobs, job_options(options)),
         outbox_(database_),
@@ -57,12 +55,10 @@ class SqliteRecords : public Records {
   store::OrderStore& orders() override { return orders_; }
   store::AuditTrail& audit() override { return audit_; }
   store::ReceivedStore& received() override { return received_; }
-  store::BlobStore& blobs() override { return blobs_; }
   store::Time now() override { return identity_.now(); }
   void take_orders() override {}
 
  private:
-  store::BlobStore& blobs_;
   store::Database database_;
   store::Identity identity_;
   store::SqliteVolumeStore volumes_;
@@ -91,10 +87,9 @@ class PostgresRecords : public Records {
         database_({.url = options.store,
                    .node = folder.name() + '@' + host_of_node(),
                    .connections = kRequestConnections + options.workers}),
-        identity_(database_, folder, options.word, tolerance),
-        blobs_(blobs, database_),
+        identity_(database_, blobs, options.word, tolerance),
         volumes_(database_),
-        jobs_(database_, blobs_, job_options(options)),
+        jobs_(database_, blobs, job_options(options)),
         outbox_(database_),
         orders_(database_),
         audit_(database_),
@@ -106,7 +101,6 @@ class PostgresRecords : public Records {
   store::OrderStore& orders() override { return orders_; }
   store::AuditTrail& audit() override { return audit_; }
   store::ReceivedStore& received() override { return received_; }
-  store::BlobStore& blobs() override { return blobs_; }
   store::Time now() override { return identity_.now(); }
   void take_orders() override {
     turn_.emplace(url_, "orders");
@@ -119,7 +113,6 @@ class PostgresRecords : public Records {
   const std::string url_;
   store::postgresql::Database database_;
   store::postgresql::Identity identity_;
-  store::postgresql::HeldBlobs blobs_;
   store::postgresql::PostgresVolumeStore volumes_;
   store::postgresql::PostgresJobStore jobs_;
   store::postgresql::PostgresOutbox outbox_;

@@ -27,9 +27,6 @@ class Records {
   virtual store::OrderStore& orders() = 0;
   virtual store::AuditTrail& audit() = 0;
   virtual store::ReceivedStore& received() = 0;
-  // Those that it was opened with, safe from what others erase who share the records.
-  virtual store::BlobStore& blobs() = 0;
-
   // The time, as far as it can be believed.
   virtual store::Time now() = 0;
 

@@ -22,15 +22,19 @@ std::optional<double> number_of(std::string_view text) {
   return text.starts_with('+') ? std::nullopt : parse_double(text);
 }
 
-// The seconds of a preference `wait=N` (RFC 7240), among others in the header and before what may
-// describe it.
-std::optional<std::string_view> preferred_wait(std::string_view header) {
+// The value of a preference (RFC 7240), among others in the header and before what may describe it;
+// "" for one without a value.
+std::optional<std::string_view> preference_in(std::string_view header, std::string_view wanted) {
   for (const std::string_view preference : split(header, ',')) {
     const std::size_t equals = preference.find('=');
-    const std::string_view name = trimmed(preference.substr(0, equals));
-    if (name.size() != 4 || ::strncasecmp(name.data(), "wait", 4) != 0) continue;
-    if (equals == std::string_view::npos) return "";
-    return trimmed(split(preference.substr(equals + 1), ';').front());
+    const bool has_value = equals != std::string_view::npos;
+    const std::string_view name =
+        has_value ? trimmed(preference.substr(0, equals)) : split(preference, ';').front();
+    if (name.size() != wanted.size() ||
+        ::strncasecmp(name.data(), wanted.data(), wanted.size()) != 0) {
+      continue;
+    }
+    return has_value ? trimmed(split(preference.substr(equals + 1), ';').front()) : "";
   }
   return std::nullopt;
 }
@@ -73,6 +77,10 @@ bool names_etag(std::string_view header, std::string_view etag, Comparison compa
 
 }  // namespace
 
+bool prefers(const Request& request, std::string_view preference) {
+  return preference_in(request.header("Prefer"), preference).has_value();
+}
+
 std::optional<std::uint64_t> whole_number(std::string_view text) {
   return text.starts_with('+') ? std::nullopt : parse_uint64(text);
 }
@@ -109,7 +117,7 @@ void check_known(const Request& request, const std::set<std::string>& known) {
 std::chrono::milliseconds wait_of(const Request& request) {
   const bool in_query = request.has_parameter("wait");
   const std::optional<std::string_view> text =
-      in_query ? request.parameter("wait") : preferred_wait(request.header("Prefer"));
+      in_query ? request.parameter("wait") : preference_in(request.header("Prefer"), "wait");
   if (!text) return std::chrono::milliseconds(0);
   const auto seconds = number_of(*text);
   if (!seconds || !std::isfinite(*seconds) || *seconds < 0) {

@@ -20,6 +20,9 @@ namespace isomesh::http {
 // Refuses parameters that are not among `known`.
 void check_known(const Request& request, const std::set<std::string>& known);
 
+// Whether the client asks for that by `Prefer` (RFC 7240), whatever it says of it.
+bool prefers(const Request& request, std::string_view preference);
+
 // How long the answer may wait: `?wait=N` or `Prefer: wait=N` in seconds; more than 30 are 30.
 std::chrono::milliseconds wait_of(const Request& request);
 

@@ -37,6 +37,7 @@ struct ServerOptions {
   UploadLimits upload;
   std::vector<std::string> cors_origins;  // pages of which origins may use the service, `*` for all
   std::vector<std::string> hosts;         // names of this service beside loopback's, without ports
+  bool blob_redirect = false;             // downloads may be sent to where the bytes are
   const net::TlsFiles* tls = nullptr;     // null: connections are plain
 };
 

@@ -3,10 +3,9 @@
 #include <chrono>
 #include <exception>
 #include <memory>
+#include <span>
 
 #include <spdlog/spdlog.h>
-
-#include "base/error.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -48,14 +47,12 @@ void BlobEraser::run(const std::stop_token& stop) {
 
 void BlobEraser::erase_now(const std::string& key) {
   try {
-    // While it is open only its name goes. The disk takes long to free the bytes of a large one,
-    // and nobody is to wait for that.
-    const std::unique_ptr<store::BlobReader> held = blobs_.open(key);
+    // The disk takes long to free the bytes of a large one, and nobody is to wait for that.
+    const std::shared_ptr<const void> held = blobs_.hold_bytes(key);
     const std::scoped_lock lock(coming_);
-    if (!volumes_.names(key)) blobs_.erase(key);
-  } catch (const Error& error) {
-    if (error.code() == ErrorCode::kNotFound) return;
-    spdlog::error("the samples of an erased volume are left to be swept: {}", error.what());
+    const auto names = [this](const std::string& asked) { return volumes_.names(asked); };
+    // Whoever of another daemon has stored it, at any time, may be about to name it.
+    blobs_.erase_unnamed(std::span(&key, 1), store::Steady(), names);
   } catch (const std::exception& error) {
     spdlog::error("the samples of an erased volume are left to be swept: {}", error.what());
   }

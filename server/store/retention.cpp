@@ -34,7 +34,7 @@ Retention::Gone Retention::enforce() {
     gone.blobs += erase_garbage();
   }
   sweep_blobs(gone);
-  gone.blobs += blobs_.empty_quarantine(now - options_.quarantine);
+  gone.blobs += blobs_.empty_quarantine(now - options_.quarantine, names());
   forget(now);
   return gone;
 }
@@ -51,6 +51,10 @@ std::uint64_t Retention::named_bytes() const {
   return jobs_.named_bytes() + volumes_.named_bytes();
 }
 
+Names Retention::names() const {
+  return [this](const std::string& key) { return volumes_.names(key); };
+}
+
 void Retention::expire_old(Time now, Gone& gone) {
   const Time cutoff = now - options_.keep;
   while (true) {
@@ -64,7 +68,8 @@ bool Retention::shrink_to(std::uint64_t max_bytes, Gone& gone) {
   while (true) {
     const std::uint64_t used = blobs_.bytes();
     if (used <= max_bytes) return true;
-    if (const std::size_t erased = erase_garbage() + blobs_.empty_quarantine(Time::max())) {
+    if (const std::size_t erased =
+            erase_garbage() + blobs_.empty_quarantine(Time::max(), names())) {
       gone.blobs += erased;
       continue;
     }
@@ -135,8 +140,7 @@ Steady Retention::unsettled_since() const {
 
 std::size_t Retention::erase_garbage() {
   const std::size_t before = garbage_.size();
-  garbage_ = blobs_.erase_unnamed(garbage_, unsettled_since(),
-                                  [this](const std::string& key) { return volumes_.names(key); });
+  garbage_ = blobs_.erase_unnamed(garbage_, unsettled_since(), names());
   return before - garbage_.size();
 }
 
@@ -147,8 +151,7 @@ void Retention::sweep_blobs(Gone& gone) {
     const Lock lock(mutex_);
     if (now < next_sweep_) return;
   }
-  const Swept swept = blobs_.sweep(unsettled_since(),
-                                   [this](const std::string& key) { return volumes_.names(key); });
+  const Swept swept = blobs_.sweep(unsettled_since(), names());
   gone.quarantined = swept.quarantined;
   gone.left = swept.left;
   const Lock lock(mutex_);

@@ -65,6 +65,7 @@ class Retention {
   std::uint64_t named_bytes() const;
 
  private:
+  Names names() const;
   void expire_old(Time now, Gone& gone) ISOMESH_REQUIRES(mutex_);
   // False when what queued and running jobs need is more than that.
   bool shrink_to(std::uint64_t max_bytes, Gone& gone) ISOMESH_REQUIRES(mutex_);

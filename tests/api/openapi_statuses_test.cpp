@@ -20,8 +20,9 @@ using namespace test;
 // What every operation may answer without saying so; the description's first words name them.
 const std::set<int> kCommon = {401, 403, 404, 405, 408, 414, 429, 431, 500, 503};
 
-// What needs another daemon, a full disk or a long time; other tests see to it.
-const std::set<std::string> kElsewhere = {"401", "403", "410", "429", "503", "507", "default"};
+// What needs another daemon, S3, a full disk or a long time; other tests see to it.
+const std::set<std::string> kElsewhere = {"307", "401", "403", "410",
+                                          "429", "503", "507", "default"};
 
 // The statuses of requests, by operation.
 class Statuses {

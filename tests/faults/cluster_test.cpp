@@ -37,20 +37,14 @@ class Cluster : public testing::Test {
     if (!Postgres::is_here()) GTEST_SKIP() << "PostgreSQL is not installed";
     postgres_ = std::make_unique<Postgres>(Postgres::Disk::kDurable);
     store_ = postgres_->new_place();
-    for (const std::string folder : {"blobs", "quarantine"}) {
-      std::filesystem::create_directories(folder_ / folder);
-    }
+    std::filesystem::create_directory(folder_ / "shared");
   }
 
-  // A node's data folder is its own but for what is in the blobs' folders.
+  // Each has a data folder of its own.
   void start(std::size_t node, std::vector<std::string> arguments = {}) {
     const std::filesystem::path data = folder_ / ("node" + std::to_string(node));
-    if (std::filesystem::create_directories(data)) {
-      for (const std::string folder : {"blobs", "quarantine"}) {
-        std::filesystem::create_directory_symlink(folder_ / folder, data / folder);
-      }
-    }
-    arguments.insert(arguments.begin(), {"--store", store_, "--lease-seconds", "2"});
+    arguments.insert(arguments.begin(), {"--store", store_, "--blobs",
+                                         (folder_ / "shared").string(), "--lease-seconds", "2"});
     nodes_[node] = std::make_unique<Daemon>(data, "127.0.0.1:0", arguments);
   }
   void start_all() {

@@ -164,6 +164,19 @@ void check_intact(const App& app, const Job& job, const Stored& file) {
   throw Error(ErrorCode::kUnavailable, "the stored mesh was damaged and is made again");
 }
 
+// Where the whole of a blob can be had without this daemon, for a client that asks for that.
+std::optional<std::string> link_to(const App& app, const Request& request, const Stored& file,
+                                   MeshFormat format) {
+  if (!app.options.blob_redirect || request.method != "GET" || !prefers(request, "redirect")) {
+    return std::nullopt;
+  }
+  // Neither a part of a blob nor one that has to be made again.
+  if (app.services.blobs.size(file.blob) != file.bytes) return std::nullopt;
+  return app.services.blobs.link(
+      file.blob,
+      {.name = file.name, .media_type = std::string(codec::describe(format).media_type)});
+}
+
 }  // namespace
 
 void answer_mesh(const App& app, const Request& request, Response& response, const Job& job,
@@ -189,6 +202,13 @@ void answer_mesh(const App& app, const Request& request, Response& response, con
   response.set_header("Accept-Ranges", "bytes");
   if (unchanged) {
     response.status = 304;
+    return;
+  }
+  if (const auto link = link_to(app, request, file, which.format)) {
+    response.status = 307;
+    response.set_header("Location", *link);
+    response.set_header("Cache-Control", "no-store");
+    response.set_header("Preference-Applied", "redirect");
     return;
   }
   check_intact(app, job, file);

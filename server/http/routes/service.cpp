@@ -16,6 +16,9 @@ void add_service_routes(App& app) {
       throw Error(ErrorCode::kUnavailable, "the database does not answer");
     }
     if (app.services.jobs.is_full()) throw Error(ErrorCode::kUnavailable, "the queue is full");
+    if (!app.services.blobs.answers()) {
+      throw Error(ErrorCode::kUnavailable, "the store of volumes and meshes does not answer");
+    }
     if (!app.services.blobs.has_room()) {
       throw Error(ErrorCode::kUnavailable, "the disk is full: nothing new is accepted");
     }

@@ -1,13 +1,12 @@
 #include "server/store/files/blob_store.h"
 
 #include <algorithm>
-#include <array>
+#include <limits>
 #include <vector>
 
-#include <fcntl.h>
 #include <sys/stat.h>
-#include <time.h>
 
+#include "base/files.h"
 #include "base/hex.h"
 #include "base/ids.h"
 #include "base/sha256.h"
@@ -22,9 +21,9 @@ constexpr std::size_t kPrefix = 2;
 constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
 constexpr std::chrono::hours kBelieved{1};
 constexpr std::chrono::minutes kBetweenForgetting{5};
-// Of all blobs, what one sweep may take: a tenth, but a few always.
-constexpr std::size_t kSweptShare = 10;
-constexpr std::size_t kSweptAtLeast = 16;
+constexpr const char* kMark = "identity";
+// Of a shared folder: what is to be free.
+constexpr std::uint64_t kLeastShared = std::uint64_t{64} << 20;
 
 // What changes when somebody writes to a file or puts another in its place; empty without a file.
 std::string traits_of(const std::filesystem::path& file) {
@@ -55,20 +54,6 @@ Blob digest_of(const File& file, const std::stop_token& stop) {
   return {to_hex(digest.finish()), offset};
 }
 
-// 0 when it is not there.
-std::uint64_t size_of(const std::filesystem::path& file) {
-  std::error_code absent;
-  const std::uintmax_t bytes = std::filesystem::file_size(file, absent);
-  return absent ? 0 : bytes;
-}
-
-void touch(const std::filesystem::path& file) {
-  timespec now = {};
-  ::clock_gettime(CLOCK_REALTIME, &now);
-  const std::array<timespec, 2> times = {now, now};
-  ::utimensat(AT_FDCWD, file.c_str(), times.data(), 0);
-}
-
 class FileReader : public BlobReader {
  public:
   explicit FileReader(File file) : file_(std::move(file)) {}
@@ -88,7 +73,7 @@ class FileBlobStore::Writer : public BlobWriter {
  public:
   explicit Writer(const FileBlobStore& store)
       : store_(store),
-        path_(store.folder_.scratch() / (random_hex(8) + ".blob")),
+        path_(store.folders_.drafts / (random_hex(8) + ".blob")),
         file_(File::create(path_)) {}
 
   ~Writer() override {
@@ -102,7 +87,7 @@ class FileBlobStore::Writer : public BlobWriter {
     if (bytes_ > store_.capacity()) {
       throw Error(ErrorCode::kTooLarge, "the file takes more than all the room that there is");
     }
-    store_.folder_.reserve().check_room();  // which is there to free more, not to be filled
+    store_.reserve_.check_room();  // which is there to free more, not to be filled
     store_.room_.take(bytes.size());
     taken_ += bytes.size();
     file_.write(bytes);
@@ -148,22 +133,89 @@ Blob digest_of(const std::filesystem::path& path) {
   return digest_of(file, {});
 }
 
-FileBlobStore::FileBlobStore(const DataFolder& folder) : folder_(folder) {
-  for (const std::string& key : all_keys()) room_.take(size_of(path_of(key)));
-  for (const auto& entry : std::filesystem::directory_iterator(folder_.quarantine())) {
-    room_.take(size_of(entry.path()));
+FileBlobStore::FileBlobStore(BlobFolders folders, Reserve& reserve)
+    : folders_(std::move(folders)),
+      reserve_(reserve),
+      holds_(folders_.holds.empty() ? std::nullopt : std::optional(FolderHolds(folders_.holds))) {
+  room_.recount(counted_bytes());
+}
+
+std::uint64_t FileBlobStore::counted_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const std::string& key : keys()) bytes += size_of(path_of(key));
+  for (const auto& entry : std::filesystem::directory_iterator(folders_.quarantine)) {
+    bytes += size_of(entry.path());
   }
+  return bytes;
+}
+
+bool FileBlobStore::answers() const {
+  if (!holds_) return true;
+  constexpr std::chrono::seconds kForHowLong{2};
+  constexpr std::chrono::seconds kPatience{5};
+  return probe_.answers(kForHowLong, kPatience, [this] {
+    try {
+      holds_->held(std::chrono::nanoseconds(0));
+      return true;
+    } catch (const Error&) {
+      return false;
+    }
+  });
+}
+
+bool FileBlobStore::is_empty() const {
+  std::error_code gone;
+  for (const auto& entry : std::filesystem::directory_iterator(folders_.blobs)) {
+    if (entry.is_directory(gone) && !std::filesystem::is_empty(entry.path(), gone)) return false;
+  }
+  return true;
+}
+
+std::string FileBlobStore::mark() const {
+  const std::filesystem::path place = folders_.blobs / kMark;
+  return std::filesystem::exists(place) ? read_whole(place) : "";
+}
+
+void FileBlobStore::set_mark(const std::string& text) const {
+  const ScratchFolder scratch(folders_.drafts);
+  const std::filesystem::path draft = scratch.path() / kMark;
+  {
+    File file = File::create(draft);
+    file.write(std::as_bytes(std::span(text)));
+    file.sync();
+  }
+  move_to(draft, folders_.blobs / kMark);
+  sync_folder(folders_.blobs);
+}
+
+bool FileBlobStore::has_room() const {
+  if (!reserve_.has_room()) return false;
+  if (!holds_) return true;
+  std::error_code unknown;  // writing will tell
+  const auto space = std::filesystem::space(folders_.blobs, unknown);
+  return unknown || space.available > kLeastShared;
+}
+
+std::uint64_t FileBlobStore::disk_capacity() const {
+  if (!holds_) return reserve_.capacity();
+  std::error_code unknown;
+  const auto space = std::filesystem::space(folders_.blobs, unknown);
+  return unknown ? std::numeric_limits<std::uint64_t>::max() : space.capacity;
 }
 
 std::uint64_t FileBlobStore::capacity() const {
-  const std::uint64_t disk = folder_.reserve().capacity();
+  const std::uint64_t disk = disk_capacity();
   return room_.max_bytes() == 0 ? disk : std::min(disk, room_.max_bytes());
 }
 
 std::unique_ptr<BlobWriter> FileBlobStore::begin() const { return std::make_unique<Writer>(*this); }
 
 void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) const {
-  folder_.reserve().check_room();
+  if (holds_) {
+    copy_in(file, blob);
+    return;
+  }
+  reserve_.check_room();
   // One that is there already makes place for this one.
   const std::uint64_t more = blob.bytes - std::min(blob.bytes, size(blob.key).value_or(0));
   room_.take(more);
@@ -173,6 +225,22 @@ void FileBlobStore::adopt(const std::filesystem::path& file, const Blob& blob) c
     room_.give(more);
     throw;
   }
+}
+
+// A shared folder is on another file system, to which nothing is moved.
+void FileBlobStore::copy_in(const std::filesystem::path& file, const Blob& blob) const {
+  const File source = File::open(file);
+  const std::unique_ptr<BlobWriter> writer = begin();
+  std::vector<std::byte> block(kBlockBytes);
+  std::uint64_t offset = 0;
+  while (const std::size_t count = source.read_at(offset, block)) {
+    writer->write(std::span(block).first(count));
+    offset += count;
+  }
+  if (writer->commit().key != blob.key) {
+    throw Error(ErrorCode::kInternal, "a file was changed while it was copied");
+  }
+  std::filesystem::remove(file);
 }
 
 std::unique_ptr<BlobReader> FileBlobStore::open(const std::string& key) const {
@@ -241,86 +309,12 @@ std::filesystem::path FileBlobStore::found(const std::string& key) const {
   const std::filesystem::path place = path_of(key);
   if (std::filesystem::exists(place)) return place;
   std::error_code absent;
-  std::filesystem::rename(folder_.quarantine() / key, place, absent);
+  std::filesystem::rename(folders_.quarantine / key, place, absent);
   return place;
 }
 
 std::filesystem::path FileBlobStore::path_of(const std::string& key) const {
-  return folder_.blobs() / key.substr(0, kPrefix) / key;
-}
-
-void FileBlobStore::settle(const std::string& key) const {
-  const Lock lock(places_);
-  const auto stored = unsettled_.find(key);
-  if (stored != unsettled_.end() && --stored->second.times == 0) unsettled_.erase(stored);
-}
-
-bool FileBlobStore::is_unsettled(const std::string& key, Steady since) const {
-  const auto stored = unsettled_.find(key);
-  return stored != unsettled_.end() && stored->second.last >= since;
-}
-
-std::vector<std::string> FileBlobStore::erase_unnamed(std::span<const std::string> keys,
-                                                      Steady unsettled, const Names& names) const {
-  std::vector<std::string> left;
-  for (const std::string& key : keys) {
-    const Lock lock(places_);
-    if (names(key)) continue;
-    if (is_unsettled(key, unsettled)) {
-      left.push_back(key);
-    } else {
-      erase(key);
-    }
-  }
-  return left;
-}
-
-Swept FileBlobStore::sweep(Steady unsettled, const Names& names) const {
-  std::vector<std::string> keys = all_keys();
-  const std::size_t most = std::max(kSweptAtLeast, keys.size() / kSweptShare);
-  std::erase_if(keys, names);
-  Swept swept;
-  for (const std::string& key : keys) {
-    const Lock lock(places_);
-    if (is_unsettled(key, unsettled) || names(key)) continue;
-    if (swept.quarantined == most) {
-      ++swept.left;
-      continue;
-    }
-    touch(path_of(key));  // when it came there
-    move_to(path_of(key), folder_.quarantine() / key);
-    ++swept.quarantined;
-  }
-  const Lock lock(places_);
-  std::erase_if(unsettled_, [&](const auto& stored) { return stored.second.last < unsettled; });
-  return swept;
-}
-
-std::size_t FileBlobStore::empty_quarantine(Time before) const {
-  std::size_t removed = 0;
-  std::error_code gone;  // one that is asked for is put back while we look
-  for (const auto& entry : std::filesystem::directory_iterator(folder_.quarantine(), gone)) {
-    struct stat status = {};
-    if (::stat(entry.path().c_str(), &status) != 0) continue;
-    const auto since = std::chrono::seconds(status.st_mtim.tv_sec);
-    if (since >= before.time_since_epoch()) continue;
-    if (!std::filesystem::remove(entry.path(), gone)) continue;
-    room_.give(static_cast<std::uint64_t>(status.st_size));
-    ++removed;
-  }
-  return removed;
-}
-
-// Only what has a blob's place: the folder has other files too.
-std::vector<std::string> FileBlobStore::all_keys() const {
-  std::vector<std::string> keys;
-  std::error_code gone;  // files come and go while we look
-  std::filesystem::recursive_directory_iterator entry(folder_.blobs(), gone);
-  for (; entry != std::filesystem::recursive_directory_iterator(); entry.increment(gone)) {
-    const std::string key = entry->path().filename();
-    if (entry->is_regular_file(gone) && path_of(key) == entry->path()) keys.push_back(key);
-  }
-  return keys;
+  return folders_.blobs / key.substr(0, kPrefix) / key;
 }
 
 std::string FileBlobStore::publish_as(const std::filesystem::path& path, const File& file,
@@ -331,10 +325,11 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
   const std::filesystem::path place = path_of(key);
   make_folder_for(place);
   const std::uint64_t bytes = size_of(path);
+  const std::string hold = holds_ ? holds_->hold(key) : "";
   std::string traits;
   const auto stored = [&](std::uint64_t replaced) ISOMESH_REQUIRES(places_) {
     room_.settle(taken + replaced, bytes);
-    note_unsettled(key);
+    unsettled_.note(key, hold);
     traits = traits_of(place);
   };
   // Where nothing is there, no record that survives can name the place before both are synced. The
@@ -347,7 +342,7 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
     if (has_moved) stored(0);
   }
   try {
-    file.sync();
+    if (folders_.outlive_crashes) file.sync();
   } catch (...) {
     // It stays counted until it is swept, and whoever took the bytes gives them back.
     if (has_moved) room_.settle(0, taken);
@@ -359,14 +354,8 @@ std::string FileBlobStore::publish_as(const std::filesystem::path& path, const F
     move_to(path, place);
     stored(replaced);
   }
-  sync_folder(place.parent_path());
+  if (folders_.outlive_crashes) sync_folder(place.parent_path());
   return traits;
-}
-
-void FileBlobStore::note_unsettled(const std::string& key) const {
-  Unsettled& stored = unsettled_[key];
-  stored.times += 1;
-  stored.last = std::chrono::steady_clock::now();
 }
 
 // A folder that is there is not yet on the disk when another thread has just made it, or when the
@@ -378,16 +367,16 @@ void FileBlobStore::make_folder_for(const std::filesystem::path& place) const {
     constexpr int kFolders = 256;
     for (int first = 0; first < kFolders; ++first) {
       const auto byte = static_cast<std::uint8_t>(first);
-      std::filesystem::create_directory(folder_.blobs() / to_hex(std::span(&byte, 1)), error);
+      std::filesystem::create_directory(folders_.blobs / to_hex(std::span(&byte, 1)), error);
     }
-    sync_folder(folder_.blobs());
+    if (folders_.outlive_crashes) sync_folder(folders_.blobs);
     has_folders_ = true;
   }
   const bool is_new = std::filesystem::create_directory(place.parent_path(), error);
   if (error == std::errc::no_space_on_device) {
     throw Error(ErrorCode::kOutOfSpace, "the data folder has no space left");
   }
-  if (is_new) sync_folder(folder_.blobs());
+  if (is_new && folders_.outlive_crashes) sync_folder(folders_.blobs);
 }
 
 }  // namespace isomesh::store

@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <initializer_list>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -13,6 +14,34 @@
 #include "server/store/files/files.h"
 
 namespace isomesh::store {
+namespace {
+
+void make_folders(std::initializer_list<std::filesystem::path> folders) {
+  for (const auto& folder : folders) {
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error) throw_system_error("making a folder", error.value());
+  }
+}
+
+}  // namespace
+
+BlobFolders shared_blob_folders(const std::filesystem::path& root) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(root, error)) {
+    throw Error(ErrorCode::kUnavailable,
+                "the folder of --blobs is not there: is it mounted? It is not made");
+  }
+  const auto place = std::filesystem::canonical(root, error);
+  if (error) throw_system_error("finding the folder of --blobs", error.value());
+  const BlobFolders folders = {.blobs = place / "blobs",
+                               .quarantine = place / "quarantine",
+                               .drafts = place / "drafts",
+                               .holds = place / "holds"};
+  make_folders({folders.blobs, folders.quarantine, folders.drafts, folders.holds});
+  sync_folder(place);
+  return folders;
+}
 
 DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uint64_t> reserve)
     : root_(root) {
@@ -36,10 +65,7 @@ DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uin
   // Before anything is written: on a full disk it makes the room for that.
   reserve_ =
       std::make_unique<Reserve>(root_ / "reserve", reserve.value_or(Reserve::usual_bytes(root_)));
-  for (const auto& folder : {blobs(), quarantine(), scratch()}) {
-    std::filesystem::create_directories(folder, error);
-    if (error) throw_system_error("making a folder", error.value());
-  }
+  make_folders({blobs(), quarantine(), scratch()});
   sync_folder(root_);
 }
 
@@ -57,6 +83,16 @@ std::string DataFolder::name() const {
     sync_folder(root_);
   }
   return read_whole(place);
+}
+
+BlobFolders DataFolder::cache_folders() const {
+  const std::filesystem::path cache = root_ / "cache";
+  const BlobFolders folders = {.blobs = cache / "blobs",
+                               .quarantine = cache / "quarantine",
+                               .drafts = scratch(),
+                               .outlive_crashes = false};
+  make_folders({folders.blobs, folders.quarantine});
+  return folders;
 }
 
 ScratchFolder::ScratchFolder(const std::filesystem::path& parent) : path_(parent / random_hex(8)) {

@@ -10,6 +10,20 @@
 
 namespace isomesh::store {
 
+// Where a store of files has its blobs.
+struct BlobFolders {
+  std::filesystem::path blobs;       // finished files, by digest
+  std::filesystem::path quarantine;  // blobs that nothing names, before they are removed for good
+  std::filesystem::path drafts;      // unfinished files; on the same file system as the blobs
+  std::filesystem::path holds = {};  // of a folder that several daemons share; see FolderHolds
+  bool outlive_crashes = true;       // each file is brought to the disk before it is a blob
+};
+
+// The folders of blobs below one that several daemons may share, which is there: one that is not
+// mounted is not made. Throws Error kUnavailable when it is not there, and what making folders
+// throws.
+BlobFolders shared_blob_folders(const std::filesystem::path& root);
+
 // The one folder that a daemon keeps everything in. Holding it locks it: a second daemon on the
 // same folder is refused. Thread safe.
 class DataFolder {
@@ -23,8 +37,9 @@ class DataFolder {
   DataFolder& operator=(const DataFolder&) = delete;
 
   std::filesystem::path blobs() const { return root_ / "blobs"; }  // finished files, by digest
-  // What the folder of blobs is called; see Identity.
-  std::filesystem::path blobs_identity() const { return blobs() / "identity"; }
+  BlobFolders blob_folders() const { return {blobs(), quarantine(), scratch()}; }
+  // Copies of blobs that are elsewhere, in folders of the same form. Created when it is asked for.
+  BlobFolders cache_folders() const;
   // Blobs that nothing names, before they are removed for good.
   std::filesystem::path quarantine() const { return root_ / "quarantine"; }
   std::filesystem::path records() const { return root_ / "isomesh.sqlite"; }  // the database

@@ -1,5 +1,6 @@
 #include "server/store/files/files.h"
 
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "base/descriptor.h"
@@ -65,6 +67,19 @@ bool move_to_free_place(const std::filesystem::path& from, const std::filesystem
   // EINVAL: the file system cannot do it, so the place counts as taken.
   if (errno == EEXIST || errno == EINVAL || errno == ENOSYS) return false;
   throw_file_error("renaming a file", errno);
+}
+
+std::uint64_t size_of(const std::filesystem::path& file) {
+  std::error_code absent;
+  const std::uintmax_t bytes = std::filesystem::file_size(file, absent);
+  return absent ? 0 : bytes;
+}
+
+void touch(const std::filesystem::path& file) {
+  timespec now = {};
+  ::clock_gettime(CLOCK_REALTIME, &now);
+  const std::array<timespec, 2> times = {now, now};
+  ::utimensat(AT_FDCWD, file.c_str(), times.data(), 0);
 }
 
 void sync_folder(const std::filesystem::path& folder) {

@@ -46,6 +46,13 @@ void move_to(const std::filesystem::path& from, const std::filesystem::path& to)
 // The same where nothing is there; false, and nothing has changed, where something is.
 bool move_to_free_place(const std::filesystem::path& from, const std::filesystem::path& to);
 
+// 0 when it is not there.
+std::uint64_t size_of(const std::filesystem::path& file);
+
+// Gives a file the present time, which is a finer one than the system gives to what is written.
+// Nothing happens when it is not there.
+void touch(const std::filesystem::path& file);
+
 // Makes renames and new names in a folder survive a crash.
 void sync_folder(const std::filesystem::path& folder);
 

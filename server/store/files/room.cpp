@@ -7,7 +7,7 @@
 
 namespace isomesh::store {
 
-void Room::limit(std::uint64_t max_bytes, Make make) {
+void Room::limit(std::uint64_t max_bytes, MakeRoom make) {
   max_bytes_ = max_bytes;
   make_ = std::move(make);
 }
@@ -41,6 +41,11 @@ void Room::settle(std::uint64_t taken, std::uint64_t bytes) {
 void Room::give(std::uint64_t bytes) {
   const Lock lock(mutex_);
   used_ -= std::min(used_, bytes);
+}
+
+void Room::recount(std::uint64_t bytes) {
+  const Lock lock(mutex_);
+  used_ = bytes;
 }
 
 std::uint64_t Room::used() const {

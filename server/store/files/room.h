@@ -1,9 +1,9 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 
 #include "base/mutex.h"
+#include "server/store/blob_store.h"
 
 namespace isomesh::store {
 
@@ -11,11 +11,8 @@ namespace isomesh::store {
 // safe.
 class Room {
  public:
-  // Makes room for so many bytes, or throws Error kOutOfSpace.
-  using Make = std::function<void(std::uint64_t bytes)>;
-
   // To be called before the first take(). 0: as much as the disk holds.
-  void limit(std::uint64_t max_bytes, Make make);
+  void limit(std::uint64_t max_bytes, MakeRoom make);
 
   // Bytes that are about to be written; has room made for them where there is none. Throws Error
   // kOutOfSpace.
@@ -27,6 +24,9 @@ class Room {
   // Bytes that are not there any more.
   void give(std::uint64_t bytes);
 
+  // So many bytes are there, whoever has stored them.
+  void recount(std::uint64_t bytes);
+
   std::uint64_t used() const;
   std::uint64_t max_bytes() const { return max_bytes_; }
 
@@ -34,7 +34,7 @@ class Room {
   bool try_take(std::uint64_t bytes);
 
   std::uint64_t max_bytes_ = 0;
-  Make make_;
+  MakeRoom make_;
   mutable Mutex mutex_;
   std::uint64_t used_ ISOMESH_GUARDED_BY(mutex_) = 0;
 };

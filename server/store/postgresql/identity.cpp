@@ -1,38 +1,21 @@
 #include "server/store/postgresql/identity.h"
 
-#include <filesystem>
-#include <span>
-
 #include <spdlog/spdlog.h>
 
-#include "base/files.h"
 #include "base/ids.h"
 #include "proto/error.h"
-#include "server/store/files/files.h"
 #include "server/store/microseconds.h"
 
 namespace isomesh::store::postgresql {
 namespace {
 
 // The first word: SQLite's engine writes a number behind it.
-std::string name_of_blobs(const DataFolder& folder) {
-  if (!std::filesystem::exists(folder.blobs_identity())) return {};
-  const std::string text = read_whole(folder.blobs_identity());
-  return text.substr(0, text.find_first_of(" \n"));
+std::string name_of(const BlobStore& blobs) {
+  const std::string mark = blobs.mark();
+  return mark.substr(0, mark.find_first_of(" \n"));
 }
 
-void name_blobs(const DataFolder& folder, const std::string& name) {
-  const ScratchFolder scratch(folder.scratch());
-  const std::filesystem::path draft = scratch.path() / "identity";
-  const std::string text = name + '\n';
-  {
-    File file = File::create(draft);
-    file.write(std::as_bytes(std::span(text)));
-    file.sync();
-  }
-  move_to(draft, folder.blobs_identity());
-  sync_folder(folder.blobs());
-}
+void name(const BlobStore& blobs, const std::string& name) { blobs.set_mark(name + '\n'); }
 
 // The database's name; `proposed` where it has none yet.
 std::string name_of_database(Database& database, const std::string& proposed) {
@@ -51,25 +34,47 @@ std::string name_of_database(Database& database, const std::string& proposed) {
   });
 }
 
+// Whether anything is recorded that may be in a blob.
+bool has_records(Database& database) {
+  Rows row = database.run(
+      "SELECT EXISTS(SELECT 1 FROM volumes) OR EXISTS(SELECT 1 FROM jobs) OR EXISTS(SELECT 1 FROM "
+      "expired) OR EXISTS(SELECT 1 FROM received)");
+  row.next();
+  return row.boolean(0);
+}
+
+// Has both carry one name. Of daemons that start at once each comes to the same one; and after a
+// crash in the middle the next start goes on.
+void check(Database& database, const BlobStore& blobs, bool may_adopt) {
+  std::string mark = name_of(blobs);
+  std::string proposed = random_hex(16);
+  if (!blobs.is_shared() && blobs.is_empty()) {
+    if (mark.empty()) name(blobs, mark = proposed);
+    proposed = mark;  // nothing is lost with what it was called before
+  }
+  const std::string named = name_of_database(database, proposed);
+  if (mark == named) return;
+  const bool is_new = mark.empty() && blobs.is_shared() && !has_records(database);
+  if (!is_new && !may_adopt) {
+    throw Error(ErrorCode::kUnavailable,
+                "the database and the files of volumes and meshes do not belong together. Several "
+                "daemons name one store of them by --blobs. Name the database that belongs to the "
+                "files, or bring their records there with `isomeshd move`; or start once with "
+                "--adopt to go on with what is there: files that the database does not name are "
+                "then put into quarantine");
+  }
+  name(blobs, named);
+}
+
 }  // namespace
 
-Identity::Identity(Database& database, const DataFolder& folder, const OperatorsWord& word,
+Identity::Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
                    std::chrono::milliseconds tolerance)
     : database_(database),
       clock_(last_seen(database, word), {.tolerance = tolerance, .wall = [&database] {
                                            return store::from_us(database.now_us());
                                          }}) {
-  const std::string blobs = name_of_blobs(folder);
-  const std::string name = name_of_database(database, random_hex(16));
-  if (blobs == name) return;
-  if (!blobs.empty() && !word.adopt) {
-    throw Error(ErrorCode::kUnavailable,
-                "the database and the files of volumes and meshes do not belong together. Name the "
-                "database that belongs to them, or bring their records there with `isomeshd move`; "
-                "or start once with --adopt to go on with what is there: files that the database "
-                "does not name are then put into quarantine");
-  }
-  name_blobs(folder, name);
+  check(database, blobs, word.adopt);
 }
 
 Time Identity::now() {

@@ -4,21 +4,21 @@
 #include <string>
 
 #include "server/store/believed_clock.h"
-#include "server/store/files/data_folder.h"
+#include "server/store/blob_store.h"
 #include "server/store/operators_word.h"
 #include "server/store/postgresql/database.h"
 
 namespace isomesh::store::postgresql {
 
-// That the database and the folder of blobs belong together, and which time it is: by the
+// That the database and the store of blobs belong together, and which time it is: by the
 // database's clock, as far as that can be believed. Both carry one name: a sweep after a mix-up
-// would take everything that the database does not name. Thread safe; what it is made of must
-// outlive it.
+// would take everything that the database does not name, and a daemon with files of its own would
+// not find those of the others. Thread safe; what it is made of must outlive it.
 class Identity {
  public:
   // Throws Error kUnavailable when the one is not the other's and that was not allowed. Names both
   // where neither has a name.
-  Identity(Database& database, const DataFolder& folder, const OperatorsWord& word,
+  Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
            std::chrono::milliseconds tolerance);
 
   // By this machine's clock, as all times of the stores' interfaces are. Leaves a mark of it.

@@ -191,15 +191,6 @@ CREATE TRIGGER audit_is_kept BEFORE UPDATE OR DELETE OR TRUNCATE ON audit
 CREATE TABLE audit_sent(id bigint NOT NULL);  -- one row: up to which entry a collector has had the trail
 INSERT INTO audit_sent VALUES(0);
 
-CREATE TABLE holds(                    -- blobs that a node stores, and that a record is about to name
-  blob text COLLATE "C" NOT NULL,
-  node uuid NOT NULL,
-  at bigint NOT NULL,                  -- when it was stored last
-  times int NOT NULL,                  -- that it was stored and not named yet
-  PRIMARY KEY(blob, node)
-);
-CREATE INDEX holds_by_time ON holds(at);
-
 CREATE TABLE identity(                 -- one row: what the blobs that belong to it carry, too
   id text NOT NULL,
   seen bigint NOT NULL

@@ -3,15 +3,12 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
-#include <filesystem>
 #include <string_view>
 
 #include <spdlog/spdlog.h>
 
-#include "base/files.h"
 #include "base/ids.h"
 #include "proto/error.h"
-#include "server/store/files/files.h"
 
 namespace isomesh::store {
 namespace {
@@ -26,14 +23,6 @@ bool has_records(Connection& connection) {
       "expired)");
   query.next();
   return query.integer(0) != 0;
-}
-
-bool has_blobs(const DataFolder& folder) {
-  std::error_code gone;
-  for (const auto& entry : std::filesystem::directory_iterator(folder.blobs())) {
-    if (entry.is_directory(gone) && !std::filesystem::is_empty(entry.path(), gone)) return true;
-  }
-  return false;
 }
 
 // When the youngest record was made or used; the beginning of time without any.
@@ -55,16 +44,16 @@ std::int64_t newest_record(Connection& connection) {
 
 }  // namespace
 
-Identity::Identity(Database& database, const DataFolder& folder, const OperatorsWord& word,
+Identity::Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
                    const BelievedClock::Options& clock)
-    : database_(database), folder_(folder), clock_(last_seen(database, word), clock) {
+    : database_(database), blobs_(blobs), clock_(last_seen(database, word), clock) {
   const Mark records = mark_of_database();
-  const Mark blobs = mark_of_blobs();
-  if (!word.adopt) check(records, blobs);
+  const Mark theirs = mark_of_blobs();
+  if (!word.adopt) check(records, theirs);
   const Lock lock(mutex_);
-  const bool belong_together = !records.id.empty() && records.id == blobs.id;
+  const bool belong_together = !records.id.empty() && records.id == theirs.id;
   mark_ = belong_together ? records : Mark{random_hex(16), 0, records.seen};
-  mark_.number = std::max(mark_.number, blobs.id == mark_.id ? blobs.number : 0);
+  mark_.number = std::max(mark_.number, theirs.id == mark_.id ? theirs.number : 0);
   write_mark(clock_.now());
   if (clock_.is_doubted()) {
     spdlog::warn(
@@ -108,8 +97,7 @@ Identity::Mark Identity::mark_of_database() const {
 }
 
 Identity::Mark Identity::mark_of_blobs() const {
-  if (!std::filesystem::exists(folder_.blobs_identity())) return {};
-  const std::string text = read_whole(folder_.blobs_identity());
+  const std::string text = blobs_.mark();
   const std::size_t space = text.find(' ');
   Mark mark = {text.substr(0, space)};
   if (space != std::string::npos) {
@@ -123,7 +111,11 @@ void Identity::check(const Mark& records, const Mark& blobs) const {
     const Reading reading(database_.reader());
     return has_records(reading.connection());
   }();
-  const bool is_stored = has_blobs(folder_);
+  const bool is_stored = !blobs_.is_empty();
+  // Two databases on one store would sweep each other's blobs.
+  if (!is_recorded && blobs_.is_shared() && !blobs.id.empty() && blobs.id != records.id) {
+    refuse("the store of volumes and meshes is that of another database");
+  }
   if (!is_recorded && !is_stored) return;  // nothing can be lost
   // Written by versions that did not mark anything yet.
   if (records.id.empty() && blobs.id.empty() && is_recorded) return;
@@ -161,17 +153,7 @@ void Identity::write_mark(Time time) {
 }
 
 void Identity::write_blobs_mark() {
-  const std::filesystem::path place = folder_.blobs_identity();
-  const ScratchFolder scratch(folder_.scratch());
-  const std::filesystem::path draft = scratch.path() / "identity";
-  const std::string text = mark_.id + ' ' + std::to_string(mark_.number) + '\n';
-  {
-    File file = File::create(draft);
-    file.write(std::as_bytes(std::span(text)));
-    file.sync();
-  }
-  move_to(draft, place);
-  sync_folder(place.parent_path());
+  blobs_.set_mark(mark_.id + ' ' + std::to_string(mark_.number) + '\n');
   is_told_ = true;
 }
 

@@ -5,20 +5,20 @@
 
 #include "base/mutex.h"
 #include "server/store/believed_clock.h"
-#include "server/store/files/data_folder.h"
+#include "server/store/blob_store.h"
 #include "server/store/operators_word.h"
 #include "server/store/sqlite/database.h"
 
 namespace isomesh::store {
 
-// That the database and the folder of blobs beside it belong together, and which time it is. Both
+// That the database and the store of blobs belong together, and which time it is. Both
 // carry one name, and a number that grows with what is stored: a sweep after a mix-up would take
 // everything that the database does not name. Thread safe; what it is made of must outlive it.
 class Identity {
  public:
   // Throws Error kUnavailable when the one is not the other's, or older than it, and that was not
   // allowed. Names both anew where it was, or where there is nothing to lose yet.
-  Identity(Database& database, const DataFolder& folder, const OperatorsWord& word,
+  Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
            const BelievedClock::Options& clock);
 
   // The time as far as the clock can be believed. Leaves a mark of it and of what was stored since
@@ -44,7 +44,7 @@ class Identity {
   void write_blobs_mark() ISOMESH_REQUIRES(mutex_);
 
   Database& database_;
-  const DataFolder& folder_;
+  const BlobStore& blobs_;
   BelievedClock clock_;
   mutable Mutex mutex_;
   Mark mark_ ISOMESH_GUARDED_BY(mutex_);

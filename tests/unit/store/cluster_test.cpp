@@ -11,7 +11,6 @@
 #include "server/store/files/blob_store.h"
 #include "server/store/job_rules.h"
 #include "server/store/postgresql/database.h"
-#include "server/store/postgresql/held_blobs.h"
 #include "server/store/postgresql/identity.h"
 #include "server/store/postgresql/job_store.h"
 #include "server/store/postgresql/outbox.h"
@@ -40,16 +39,14 @@ constexpr const char* kVolume = "some-volume";
 struct Node {
   Node(const std::string& url, const std::string& name, const BlobStore& shared)
       : database({.url = url, .node = name}),
-        blobs(shared, database),
         volumes(database),
         outbox(database),
-        jobs(database, blobs, {.retry_delay = milliseconds(0), .mesher_version = "test"}) {}
+        jobs(database, shared, {.retry_delay = milliseconds(0), .mesher_version = "test"}) {}
 
   Lease claimed(milliseconds lease = kLongLease) { return jobs.claim("worker", lease).value(); }
   bool can_claim() { return jobs.wait_for_work({}, milliseconds(0)); }
 
   Database database;
-  HeldBlobs blobs;
   PostgresVolumeStore volumes;
   PostgresOutbox outbox;
   PostgresJobStore jobs;
@@ -57,7 +54,7 @@ struct Node {
 
 class ClusterTest : public testing::Test {
  protected:
-  ClusterTest() : folder_(files_ / "data"), blobs_(folder_) {}
+  ClusterTest() : folder_(files_ / "data"), blobs_(shared_folder(), folder_.reserve()) {}
 
   void SetUp() override {
     if (!Postgres::is_here()) GTEST_SKIP() << "PostgreSQL is not installed";
@@ -82,13 +79,13 @@ class ClusterTest : public testing::Test {
   Outcome mesh() {
     Outcome outcome;
     MeshFile& file = outcome.mesh.emplace().files[MeshFormat::kDrc];
-    const Blob blob = put("mesh", one().blobs);
+    const Blob blob = put("mesh");
     file.sha256 = blob.key;
     file.bytes = blob.bytes;
     return outcome;
   }
-  static Blob put(const std::string& text, const BlobStore& blobs) {
-    const auto writer = blobs.begin();
+  Blob put(const std::string& text) {
+    const auto writer = blobs_.begin();
     writer->write(test::as_span(text));
     return writer->commit();
   }
@@ -100,6 +97,11 @@ class ClusterTest : public testing::Test {
                   "pg_backend_pid() AND backend_type = 'client backend'");
   }
   std::string ask(const std::string& sql) { return Postgres::ask(url_, sql); }
+
+  BlobFolders shared_folder() const {
+    std::filesystem::create_directory(files_ / "shared");
+    return shared_blob_folders(files_ / "shared");
+  }
 
   Node& one() { return *one_; }
   Node& two() { return *two_; }
@@ -333,37 +335,6 @@ TEST_F(ClusterTest, OneRemovesAtATime) {
   EXPECT_TRUE(two().jobs.turn_to_remove());
 }
 
-TEST_F(ClusterTest, WhatOneNodeIsAboutToNameAnotherDoesNotErase) {
-  const auto unnamed = [](const std::string&) { return false; };
-  const auto long_ago = Steady::clock::now() - std::chrono::hours(1);
-  // As another process has it: its files are this one's, what it remembers is not.
-  const FileBlobStore others(folder_);
-  const HeldBlobs theirs(others, two().database);
-  const Blob blob = put("about to be named", one().blobs);
-  EXPECT_THAT(theirs.erase_unnamed(std::span(&blob.key, 1), long_ago, unnamed), SizeIs(1));
-  EXPECT_EQ(theirs.sweep(long_ago, unnamed).quarantined, 0U);
-  EXPECT_TRUE(others.size(blob.key));
-  one().blobs.settle(blob.key);
-  EXPECT_THAT(theirs.erase_unnamed(std::span(&blob.key, 1), long_ago, unnamed), IsEmpty());
-  EXPECT_FALSE(others.size(blob.key));
-}
-
-TEST_F(ClusterTest, ABlobIsStoredAfterItWasErasedAndNotMeanwhile) {
-  const Blob blob = put("stored again", one().blobs);
-  one().blobs.settle(blob.key);
-  std::optional<std::jthread> writer;
-  const auto slowly = [&](const std::string&) {
-    if (writer) return false;
-    writer.emplace([&] { put("stored again", two().blobs); });
-    std::this_thread::sleep_for(milliseconds(200));
-    return false;
-  };
-  EXPECT_THAT(one().blobs.erase_unnamed(std::span(&blob.key, 1), Steady::clock::now(), slowly),
-              IsEmpty());
-  writer->join();
-  EXPECT_TRUE(blobs_.size(blob.key));
-}
-
 // --- Callbacks
 
 TEST_F(ClusterTest, OneReceiverIsToldNoMoreAtATimeByAllNodes) {
@@ -385,13 +356,38 @@ TEST_F(ClusterTest, OneReceiverIsToldNoMoreAtATimeByAllNodes) {
 
 // --- Databases and blobs
 
+// Whether a daemon of that database starts with those blobs.
+bool belong(Database& database, const BlobStore& blobs, bool adopt = false) {
+  const auto code =
+      code_thrown_by([&] { Identity(database, blobs, {.adopt = adopt}, seconds(1)); });
+  if (code) EXPECT_EQ(*code, ErrorCode::kUnavailable);
+  return !code;
+}
+
 TEST_F(ClusterTest, ADatabaseAndBlobsThatAreNotItsOwnAreRefused) {
-  EXPECT_FALSE(code_thrown_by([&] { Identity(one().database, folder_, {}, seconds(1)); }));
-  EXPECT_FALSE(code_thrown_by([&] { Identity(two().database, folder_, {}, seconds(1)); }));
+  EXPECT_TRUE(belong(one().database, blobs_));
+  EXPECT_TRUE(belong(two().database, blobs_));
   Database other({.url = Postgres::shared().new_place(), .node = "x"});
-  EXPECT_EQ(code_thrown_by([&] { Identity(other, folder_, {}, seconds(1)); }),
-            ErrorCode::kUnavailable);
-  EXPECT_FALSE(code_thrown_by([&] { Identity(other, folder_, {.adopt = true}, seconds(1)); }));
+  EXPECT_FALSE(belong(other, blobs_));
+  EXPECT_TRUE(belong(other, blobs_, true));
+  EXPECT_FALSE(belong(one().database, blobs_));
+}
+
+TEST_F(ClusterTest, BlobsOfOneDaemonAloneAreNotThoseOfASecond) {
+  Database database({.url = Postgres::shared().new_place(), .node = "x"});
+  const DataFolder mine(files_ / "mine");
+  const DataFolder others(files_ / "others");
+  EXPECT_TRUE(belong(database, FileBlobStore(mine)));
+  EXPECT_FALSE(belong(database, FileBlobStore(others)));
+  EXPECT_TRUE(belong(database, FileBlobStore(mine)));
+}
+
+// The store's URL is wrong, or nothing is mounted there.
+TEST_F(ClusterTest, BlobsThatAreMissingAreMissed) {
+  EXPECT_TRUE(belong(one().database, blobs_));
+  std::filesystem::create_directory(files_ / "empty");
+  const FileBlobStore empty(shared_blob_folders(files_ / "empty"), folder_.reserve());
+  EXPECT_FALSE(belong(one().database, empty));
 }
 
 }  // namespace

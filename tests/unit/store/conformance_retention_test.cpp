@@ -383,7 +383,7 @@ TEST_P(RetentionConformance, SweepingAsksWhichOldBlobsToKeep) {
   const auto only_kept = [&](const std::string& key) { return key == kept.key; };
   EXPECT_EQ(blobs().sweep(now - std::chrono::hours(1), nothing).quarantined, 0U);
   EXPECT_EQ(blobs().sweep(now + std::chrono::hours(1), only_kept).quarantined, 1U);
-  EXPECT_EQ(blobs().empty_quarantine(soon() + std::chrono::hours(1)), 1U);
+  EXPECT_EQ(blobs().empty_quarantine(soon() + std::chrono::hours(1), only_kept), 1U);
   EXPECT_EQ(blobs().size(kept.key), kept.bytes);
   EXPECT_EQ(blobs().size(other.key), std::nullopt);
 }

@@ -6,7 +6,6 @@
 #include "server/store/files/files.h"
 #include "server/store/postgresql/audit_trail.h"
 #include "server/store/postgresql/database.h"
-#include "server/store/postgresql/held_blobs.h"
 #include "server/store/postgresql/job_store.h"
 #include "server/store/postgresql/order_store.h"
 #include "server/store/postgresql/outbox.h"
@@ -118,13 +117,13 @@ class PostgresEngine : public Engine {
       : options_(options),
         url_(Postgres::shared().new_place()),
         data_(folder_ / "data"),
-        files_(data_) {
+        blobs_(data_) {
     open();
   }
 
   store::JobStore& jobs() override { return *jobs_; }
   store::VolumeStore& volumes() override { return *volumes_; }
-  store::BlobStore& blobs() override { return *blobs_; }
+  store::BlobStore& blobs() override { return blobs_; }
   store::Outbox& outbox() override { return *outbox_; }
   store::OrderStore& orders() override { return *orders_; }
   store::AuditTrail& audit() override { return *audit_; }
@@ -148,13 +147,12 @@ class PostgresEngine : public Engine {
  private:
   void open() {
     database_.emplace(store::postgresql::DatabaseOptions{.url = url_, .node = "one"});
-    blobs_.emplace(files_, *database_);
     volumes_.emplace(*database_);
     outbox_.emplace(*database_);
     orders_.emplace(*database_);
     audit_.emplace(*database_);
     received_.emplace(*database_);
-    jobs_.emplace(*database_, *blobs_,
+    jobs_.emplace(*database_, blobs_,
                   store::JobStoreOptions{.max_queued = options_.max_queued,
                                          .retry_delay = options_.retry_delay,
                                          .mesher_version = "test"});
@@ -164,9 +162,8 @@ class PostgresEngine : public Engine {
   const std::string url_;
   TemporaryFolder folder_;
   store::DataFolder data_;
-  store::FileBlobStore files_;
+  store::FileBlobStore blobs_;
   std::optional<store::postgresql::Database> database_;
-  std::optional<store::postgresql::HeldBlobs> blobs_;
   std::optional<store::postgresql::PostgresVolumeStore> volumes_;
   std::optional<store::postgresql::PostgresOutbox> outbox_;
   std::optional<store::postgresql::PostgresOrderStore> orders_;

@@ -21,6 +21,7 @@ using test::code_thrown_by;
 // Of "hello".
 constexpr const char* kHello = "2cf24dba5fb0a30e26e83b2ac5b9e29e1b161e5c1fa7425e73043362938b9824";
 
+// What files do beside what every store of blobs does (conformance_blobs_test.cpp).
 class FileBlobStoreTest : public testing::Test {
  protected:
   Blob put(std::string_view text) {
@@ -44,14 +45,6 @@ class FileBlobStoreTest : public testing::Test {
   FileBlobStore blobs_{data_};
 };
 
-TEST_F(FileBlobStoreTest, ABlobIsNamedByItsBytes) {
-  const Blob blob = put("hello");
-  EXPECT_EQ(blob.key, kHello);
-  EXPECT_EQ(blob.bytes, 5U);
-  EXPECT_EQ(get(kHello), "hello");
-  EXPECT_EQ(test::read_file(blobs_.path_of(kHello)), "hello");
-}
-
 // Whoever made its folder had not come to sync it.
 TEST_F(FileBlobStoreTest, ABlobOutlivesAPowerCutInAFolderThatWasThere) {
   const test::TemporaryFolder outer;
@@ -65,16 +58,6 @@ TEST_F(FileBlobStoreTest, ABlobOutlivesAPowerCutInAFolderThatWasThere) {
   writer->commit();
   power.leave(folder_ / "left");
   EXPECT_EQ(test::read_file(folder_ / "left/data/blobs/2c" / kHello), "hello");
-}
-
-TEST_F(FileBlobStoreTest, IsThereOnlyAfterItsCommit) {
-  const auto writer = blobs_.begin();
-  writer->write(as_span("hel"));
-  writer->write(as_span("lo"));
-  EXPECT_EQ(blob_files(), 0U);
-  EXPECT_EQ(code_thrown_by([&] { blobs_.open(kHello); }), ErrorCode::kNotFound);
-  EXPECT_EQ(writer->commit().key, kHello);
-  EXPECT_EQ(get(kHello), "hello");
 }
 
 TEST_F(FileBlobStoreTest, AWriterThatIsGivenUpLeavesNothing) {
@@ -98,12 +81,6 @@ TEST_F(FileBlobStoreTest, TheSameBytesAreOneBlob) {
   EXPECT_EQ(blob_files(), 1U);
   EXPECT_NE(put("hallo").key, kHello);
   EXPECT_EQ(blob_files(), 2U);
-}
-
-TEST_F(FileBlobStoreTest, AnEmptyBlobIsABlob) {
-  const Blob blob = put("");
-  EXPECT_EQ(blob.bytes, 0U);
-  EXPECT_EQ(get(blob.key), "");
 }
 
 TEST_F(FileBlobStoreTest, WritersDoNotMeet) {
@@ -132,47 +109,6 @@ TEST_F(FileBlobStoreTest, AdoptsAFinishedFileByMovingIt) {
 
 TEST_F(FileBlobStoreTest, AdoptingWhatIsNotThereIsRefused) {
   EXPECT_EQ(code_thrown_by([&] { digest_of(data_.scratch() / "absent"); }), ErrorCode::kNotFound);
-}
-
-TEST_F(FileBlobStoreTest, ErasesABlobAndNothingElse) {
-  put("hello");
-  const std::string other = put("other").key;
-  blobs_.erase(kHello);
-  EXPECT_EQ(code_thrown_by([&] { blobs_.open(kHello); }), ErrorCode::kNotFound);
-  EXPECT_EQ(get(other), "other");
-  blobs_.erase(kHello);
-  EXPECT_EQ(blob_files(), 1U);
-}
-
-TEST_F(FileBlobStoreTest, AnOpenBlobOutlivesItsErasing) {
-  put("hello");
-  const auto blob = blobs_.open(kHello);
-  blobs_.erase(kHello);
-  std::string text(5, '\0');
-  EXPECT_EQ(blob->read_at(0, std::as_writable_bytes(std::span(text))), 5U);
-  EXPECT_EQ(text, "hello");
-}
-
-TEST_F(FileBlobStoreTest, TellsSizesAndPlaces) {
-  put("hello");
-  EXPECT_EQ(blobs_.size(kHello), 5U);
-  EXPECT_EQ(test::read_file(blobs_.local(kHello).path), "hello");
-  blobs_.erase(kHello);
-  EXPECT_EQ(blobs_.size(kHello), std::nullopt);
-  EXPECT_EQ(code_thrown_by([&] { blobs_.local(kHello); }), ErrorCode::kNotFound);
-}
-
-TEST_F(FileBlobStoreTest, KnowsBytesThatAreNotTheKeys) {
-  put("hello");
-  EXPECT_TRUE(blobs_.is_intact(kHello, {}));
-  EXPECT_TRUE(blobs_.is_intact(kHello, {}));
-  test::write_file(blobs_.path_of(kHello), "hallo");
-  EXPECT_FALSE(blobs_.is_intact(kHello, {}));
-  EXPECT_FALSE(blobs_.is_intact(kHello, {}));
-  put("hello");
-  EXPECT_TRUE(blobs_.is_intact(kHello, {}));
-  blobs_.erase(kHello);
-  EXPECT_EQ(code_thrown_by([&] { blobs_.is_intact(kHello, {}); }), ErrorCode::kNotFound);
 }
 
 // A touched file is read again even when size and time of writing are as before.
@@ -245,14 +181,6 @@ TEST_F(Sweeping, PutsWhatIsNotNamedIntoQuarantine) {
   EXPECT_EQ(get(kHello), "hello");
 }
 
-TEST_F(Sweeping, TakesAShareOfAllAtMost) {
-  for (int n = 0; n < 400; ++n) put(std::to_string(n));
-  const Swept first = sweep();
-  EXPECT_EQ(first.quarantined, 40U);
-  EXPECT_EQ(first.left, 360U);
-  EXPECT_EQ(blob_files(), 360U);
-}
-
 TEST_F(Sweeping, WhatIsAskedForComesBack) {
   const std::string other = put("other").key;
   put("hello");
@@ -261,14 +189,6 @@ TEST_F(Sweeping, WhatIsAskedForComesBack) {
   EXPECT_EQ(blobs_.size(other), 5U);
   EXPECT_EQ(in_quarantine(), 0U);
   EXPECT_EQ(blob_files(), 2U);
-}
-
-TEST_F(Sweeping, TheQuarantineHasAnEnd) {
-  put("hello");
-  sweep();
-  EXPECT_EQ(blobs_.empty_quarantine(std::chrono::system_clock::now() - std::chrono::hours(1)), 0U);
-  EXPECT_EQ(blobs_.empty_quarantine(std::chrono::system_clock::now() + std::chrono::hours(1)), 1U);
-  EXPECT_EQ(code_thrown_by([&] { blobs_.open(kHello); }), ErrorCode::kNotFound);
 }
 
 // What is about to be named, however old its bytes look.
@@ -282,17 +202,6 @@ TEST_F(Sweeping, LeavesWhatWasStoredSince) {
   EXPECT_EQ(get(kHello), "hello");
 }
 
-TEST_F(Sweeping, WhatWasNamedAndIsNotAnyMoreGoesAtOnce) {
-  put("hello");
-  put("hello");  // by another worker, which is about to name it
-  const std::vector<std::string> keys = {kHello};
-  blobs_.settle(kHello);
-  EXPECT_EQ(blobs_.erase_unnamed(keys, in(std::chrono::hours(-1)), nothing), keys);
-  blobs_.settle(kHello);
-  EXPECT_TRUE(blobs_.erase_unnamed(keys, in(std::chrono::hours(-1)), nothing).empty());
-  EXPECT_EQ(blob_files(), 0U);
-}
-
 // Nobody of this process is about to name it.
 TEST_F(Sweeping, WhatAnEarlierProcessLeftIsNotYoung) {
   put("hello");
@@ -301,9 +210,52 @@ TEST_F(Sweeping, WhatAnEarlierProcessLeftIsNotYoung) {
 }
 
 TEST_F(Sweeping, LeavesFilesThatAreNoBlobs) {
-  test::write_file(data_.blobs_identity(), "the folder's");
+  test::write_file(data_.blobs() / "identity", "the folder's");
   sweep();
-  EXPECT_EQ(test::read_file(data_.blobs_identity()), "the folder's");
+  EXPECT_EQ(test::read_file(data_.blobs() / "identity"), "the folder's");
+}
+
+// A folder that several daemons share.
+class SharedFolder : public testing::Test {
+ protected:
+  SharedFolder() { std::filesystem::create_directory(folder_ / "shared"); }
+
+  test::TemporaryFolder folder_;
+  DataFolder data_{folder_ / "data"};
+};
+
+// A mount that is missing is not to be filled in its place.
+TEST_F(SharedFolder, IsNotMade) {
+  EXPECT_EQ(code_thrown_by([&] { shared_blob_folders(folder_ / "absent"); }),
+            ErrorCode::kUnavailable);
+}
+
+TEST_F(SharedFolder, DoesNotAnswerOnceItIsGone) {
+  const FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data_.reserve());
+  std::filesystem::remove_all(folder_ / "shared");
+  EXPECT_FALSE(blobs.answers());
+}
+
+TEST_F(SharedFolder, WhatADaemonThatDiedHeldIsNotHeldForEver) {
+  const FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data_.reserve());
+  const auto writer = blobs.begin();
+  writer->write(as_span("hello"));
+  writer->commit();
+  blobs.settle(kHello);
+  const auto hold = folder_ / ("shared/holds/" + std::string(kHello) + ".0123");
+  test::write_file(hold, "");
+  const auto nothing = [](const std::string& /*key*/) { return false; };
+  const auto an_hour_ago = Steady::clock::now() - std::chrono::hours(1);
+  const auto age = [&](std::chrono::hours by) {
+    std::filesystem::last_write_time(hold, std::filesystem::file_time_type::clock::now() - by);
+  };
+  EXPECT_EQ(blobs.sweep(an_hour_ago, nothing).quarantined, 0U);
+  age(std::chrono::hours(2));
+  EXPECT_EQ(blobs.sweep(an_hour_ago, nothing).quarantined, 1U);
+  EXPECT_TRUE(std::filesystem::exists(hold));
+  age(std::chrono::hours(25));
+  blobs.sweep(an_hour_ago, nothing);
+  EXPECT_FALSE(std::filesystem::exists(hold));
 }
 
 }  // namespace

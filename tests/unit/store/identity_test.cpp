@@ -22,9 +22,9 @@ class IdentityTest : public testing::Test {
   void live(const std::string& bytes, const OperatorsWord& word = {}) {
     const DataFolder data(root());
     Database database(data);
-    Identity identity(database, data, word, {});
+    const FileBlobStore blobs(data);
+    Identity identity(database, blobs, word, {});
     if (!bytes.empty()) {
-      const FileBlobStore blobs(data);
       const auto writer = blobs.begin();
       writer->write(test::as_span(bytes));
       Volume volume;
@@ -148,18 +148,36 @@ TEST_F(IdentityTest, RemembersTheTimeThatItHasSeen) {
   }
   const DataFolder data(root());
   Database database(data);
+  const FileBlobStore blobs(data);
   const auto now = std::chrono::system_clock::now();
   {
-    Identity identity(database, data, {}, {});
+    Identity identity(database, blobs, {}, {});
     EXPECT_LT(identity.now(), now - std::chrono::days(39));
     EXPECT_TRUE(identity.doubts_clock());
   }
   {
-    Identity again(database, data, {}, {});
+    Identity again(database, blobs, {}, {});
     EXPECT_LT(again.now(), now - std::chrono::days(39)) << "a doubtful time is never marked";
   }
-  Identity told(database, data, {.trust_clock = true}, {});
+  Identity told(database, blobs, {.trust_clock = true}, {});
   EXPECT_GE(told.now(), now);
+}
+
+// Both have nothing yet; the second would sweep what the first stores.
+TEST_F(IdentityTest, ASharedStoreIsOneDatabasesFromTheBeginning) {
+  std::filesystem::create_directory(folder_ / "shared");
+  const auto start = [&](const std::string& name, const OperatorsWord& word) {
+    const DataFolder data(folder_ / name);
+    Database database(data);
+    const FileBlobStore blobs(shared_blob_folders(folder_ / "shared"), data.reserve());
+    Identity(database, blobs, word, {}).now();
+  };
+  start("one", {});
+  start("one", {});
+  const auto error = test::thrown_by([&] { start("two", {}); });
+  ASSERT_TRUE(error);
+  EXPECT_THAT(error->what(), HasSubstr("another database"));
+  start("two", {.adopt = true});
 }
 
 }  // namespace

@@ -1,0 +1,166 @@
+// How files that nothing names go: what FileBlobStore does of erasing and sweeping.
+#include <algorithm>
+#include <vector>
+
+#include <sys/stat.h>
+
+#include "proto/error.h"
+#include "server/store/files/blob_store.h"
+
+namespace isomesh::store {
+namespace {
+
+// Of all blobs, what one sweep may take: a tenth, but a few always.
+constexpr std::size_t kSweptShare = 10;
+constexpr std::size_t kSweptAtLeast = 16;
+// What a daemon that has died leaves in a shared folder.
+constexpr std::chrono::hours kLongestHold{24};
+constexpr std::chrono::hours kLongestDraft{48};
+
+}  // namespace
+
+std::shared_ptr<const void> FileBlobStore::hold_bytes(const std::string& key) const {
+  try {
+    return std::make_shared<File>(File::open(found(key)));
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kNotFound) return nullptr;
+    throw;
+  }
+}
+
+void FileBlobStore::settle(const std::string& key) const {
+  const std::string hold = [&] {
+    const Lock lock(places_);
+    return unsettled_.settle(key);
+  }();
+  if (!hold.empty()) holds_->let_go(hold);
+}
+
+std::set<std::string> FileBlobStore::held(std::chrono::nanoseconds oldest) const {
+  return holds_ ? holds_->held(oldest) : std::set<std::string>();
+}
+
+std::vector<std::string> FileBlobStore::erase_unnamed(std::span<const std::string> keys,
+                                                      Steady unsettled, const Names& names) const {
+  std::vector<std::string> left;
+  for (const std::string& key : keys) {
+    const Lock lock(places_);
+    if (names(key)) continue;
+    if (unsettled_.has_since(key, unsettled)) {
+      left.push_back(key);
+    } else if (!holds_) {
+      erase(key);
+    } else if (!take_out(key, age_of(unsettled), names)) {
+      left.push_back(key);
+    }
+  }
+  return left;
+}
+
+bool FileBlobStore::take_out(const std::string& key, std::chrono::nanoseconds oldest_hold,
+                             const Names& names) const {
+  if (held(oldest_hold).contains(key)) return false;
+  if (!put_aside(key)) return true;
+  if (look_again(std::span(&key, 1), oldest_hold, names) > 0) return false;
+  const std::filesystem::path aside = folders_.quarantine / key;
+  const std::uint64_t bytes = size_of(aside);
+  std::error_code gone;  // somebody has asked for it
+  if (std::filesystem::remove(aside, gone)) room_.give(bytes);
+  return true;
+}
+
+bool FileBlobStore::put_aside(const std::string& key) const {
+  touch(path_of(key));  // when it came there
+  try {
+    move_to(path_of(key), folders_.quarantine / key);
+  } catch (const Error& error) {
+    // Another daemon that has the folder was quicker.
+    if (holds_ && error.code() == ErrorCode::kNotFound) return false;
+    throw;
+  }
+  return true;
+}
+
+std::size_t FileBlobStore::look_again(std::span<const std::string> keys,
+                                      std::chrono::nanoseconds oldest_hold,
+                                      const Names& names) const {
+  if (!holds_ || keys.empty()) return 0;
+  const std::set<std::string> held_now = held(oldest_hold);
+  std::size_t back = 0;
+  for (const std::string& key : keys) {
+    if (!held_now.contains(key) && !names(key)) continue;
+    std::error_code absent;  // whoever asked for it has put it back already
+    std::filesystem::rename(folders_.quarantine / key, path_of(key), absent);
+    ++back;
+  }
+  return back;
+}
+
+Swept FileBlobStore::sweep(Steady unsettled, const Names& names) const {
+  std::vector<std::string> keys = this->keys();
+  const std::size_t most = std::max(kSweptAtLeast, keys.size() / kSweptShare);
+  std::erase_if(keys, names);
+  const std::set<std::string> held_by_others = held(age_of(unsettled));
+  Swept swept;
+  std::vector<std::string> aside;
+  for (const std::string& key : keys) {
+    const Lock lock(places_);
+    if (unsettled_.has_since(key, unsettled) || names(key)) continue;
+    if (held_by_others.contains(key)) continue;
+    if (aside.size() == most) {
+      ++swept.left;
+      continue;
+    }
+    if (put_aside(key)) aside.push_back(key);
+  }
+  swept.quarantined = aside.size() - look_again(aside, age_of(unsettled), names);
+  if (holds_) tidy_shared(age_of(unsettled));
+  const Lock lock(places_);
+  unsettled_.forget(unsettled);
+  return swept;
+}
+
+void FileBlobStore::tidy_shared(std::chrono::nanoseconds oldest_hold) const {
+  holds_->forget(std::max<std::chrono::nanoseconds>(oldest_hold, kLongestHold));
+  std::error_code gone;
+  const auto cutoff = std::filesystem::file_time_type::clock::now() - kLongestDraft;
+  for (const auto& entry : std::filesystem::directory_iterator(folders_.drafts, gone)) {
+    const auto written = entry.last_write_time(gone);
+    if (!gone && written < cutoff) std::filesystem::remove_all(entry.path(), gone);
+  }
+  room_.recount(counted_bytes());
+}
+
+std::size_t FileBlobStore::empty_quarantine(Time before, const Names& names) const {
+  std::size_t removed = 0;
+  std::error_code gone;  // one that is asked for is put back while we look
+  for (const auto& entry : std::filesystem::directory_iterator(folders_.quarantine, gone)) {
+    struct stat status = {};
+    if (::stat(entry.path().c_str(), &status) != 0) continue;
+    const auto since = std::chrono::seconds(status.st_mtim.tv_sec);
+    if (since >= before.time_since_epoch()) continue;
+    const Lock lock(places_);
+    if (names(entry.path().filename())) {
+      std::filesystem::rename(entry.path(), path_of(entry.path().filename()), gone);
+      continue;
+    }
+    if (!std::filesystem::remove(entry.path(), gone)) continue;
+    room_.give(static_cast<std::uint64_t>(status.st_size));
+    ++removed;
+  }
+  return removed;
+}
+
+// Only what has a blob's place: the folder has other files too.
+std::vector<std::string> FileBlobStore::keys() const {
+  std::vector<std::string> keys;
+  std::error_code gone;  // files come and go while we look
+  std::filesystem::recursive_directory_iterator entry(folders_.blobs, gone);
+  for (; entry != std::filesystem::recursive_directory_iterator(); entry.increment(gone)) {
+    const std::string key = entry->path().filename();
+    if (entry->is_regular_file(gone) && path_of(key) == entry->path()) keys.push_back(key);
+  }
+  return keys;
+}
+
+}  // namespace isomesh::store

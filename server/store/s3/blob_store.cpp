@@ -1,0 +1,212 @@
+#include "server/store/s3/blob_store.h"
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "base/ids.h"
+#include "proto/error.h"
+#include "server/store/s3/objects.h"
+
+namespace isomesh::store {
+
+class S3BlobStore::Writer : public BlobWriter {
+ public:
+  explicit Writer(const S3BlobStore& store) : store_(store), copy_(store.cache_.files().begin()) {}
+
+  void write(std::span<const std::byte> bytes) override {
+    bytes_ += bytes.size();
+    if (bytes_ > store_.capacity()) {
+      throw Error(ErrorCode::kTooLarge, "the file takes more than all the room that there is");
+    }
+    copy_->write(bytes);
+  }
+
+  Blob commit() override {
+    const Blob blob = copy_->commit();
+    store_.store(blob);
+    return blob;
+  }
+
+ private:
+  const S3BlobStore& store_;
+  const std::unique_ptr<BlobWriter> copy_;
+  std::uint64_t bytes_ = 0;
+};
+
+// One that fetches a blob; others that want it wait.
+class S3BlobStore::Fetching {
+ public:
+  Fetching(const S3BlobStore& store, const std::string& key, const std::stop_token& stop)
+      : store_(store), key_(key) {
+    Lock lock(store_.mutex_);
+    const bool is_free = store_.fetched_.wait(lock, stop, [&]() ISOMESH_REQUIRES(store_.mutex_) {
+      return !store_.coming_.contains(key);
+    });
+    if (!is_free) throw Error(ErrorCode::kCancelled, "cancelled");
+    store_.coming_.insert(key);
+  }
+  ~Fetching() {
+    const Lock lock(store_.mutex_);
+    store_.coming_.erase(key_);
+    store_.fetched_.notify_all();
+  }
+  Fetching(const Fetching&) = delete;
+  Fetching& operator=(const Fetching&) = delete;
+
+ private:
+  const S3BlobStore& store_;
+  const std::string key_;
+};
+
+S3BlobStore::S3BlobStore(const DataFolder& folder, S3Options options)
+    : options_(std::move(options)),
+      folder_(folder),
+      client_(options_.client),
+      cache_(folder.cache_folders(), folder.reserve(), options_.cache_bytes) {}
+
+bool S3BlobStore::answers() const {
+  constexpr std::chrono::seconds kForHowLong{2};
+  constexpr std::chrono::seconds kPatience{5};
+  return probe_.answers(kForHowLong, kPatience, [this] { return client_.answers(); });
+}
+
+bool S3BlobStore::is_empty() const { return !client_.has_any(kBlobObjects); }
+
+std::string S3BlobStore::mark() const { return client_.get_text(kMarkObject).value_or(""); }
+
+void S3BlobStore::set_mark(const std::string& text) const { client_.put_text(kMarkObject, text); }
+
+bool S3BlobStore::has_room() const {
+  if (folder_.reserve().has_room()) return true;
+  cache_.empty();
+  return folder_.reserve().has_room();
+}
+
+std::uint64_t S3BlobStore::capacity() const {
+  const std::uint64_t disk = folder_.reserve().capacity();
+  return room_.max_bytes() == 0 ? disk : std::min(disk, room_.max_bytes());
+}
+
+std::unique_ptr<BlobWriter> S3BlobStore::begin() const { return std::make_unique<Writer>(*this); }
+
+void S3BlobStore::adopt(const std::filesystem::path& file, const Blob& blob) const {
+  cache_.files().adopt(file, blob);
+  store(blob);
+}
+
+void S3BlobStore::store(const Blob& blob) const {
+  const auto in_use = cache_.use(blob.key);
+  cache_.files().settle(blob.key);       // who names it, names it in the bucket
+  if (!cache_.files().size(blob.key)) {  // an older copy went, and took this one's place with it
+    throw Error(ErrorCode::kUnavailable, "there was no room for a copy; there may be soon");
+  }
+  cache_.note(blob.key, blob.bytes);
+  cache_.make_room(0);
+  room_.take(blob.bytes);
+  const std::string hold = hold_object(blob.key);
+  try {
+    client_.put_text(hold, "");
+    wait_until_not_going(blob.key);
+    put(blob);
+  } catch (...) {
+    room_.give(blob.bytes);
+    client_.try_to_erase(hold);
+    throw;
+  }
+  const Lock lock(mutex_);
+  unsettled_.note(blob.key, hold);
+}
+
+void S3BlobStore::put(const Blob& blob) const {
+  const bool is_damaged = [&] {
+    const Lock lock(mutex_);
+    return damaged_.contains(blob.key);
+  }();
+  const File copy = File::open(cache_.files().local(blob.key).path);
+  const bool is_new = client_.put_file(blob_object(blob.key), copy, blob,
+                                       is_damaged ? IfThere::kReplace : IfThere::kKeep);
+  if (!is_new || is_damaged) room_.give(blob.bytes);
+  const Lock lock(mutex_);
+  damaged_.erase(blob.key);
+}
+
+void S3BlobStore::wait_until_not_going(const std::string& key) const {
+  constexpr std::chrono::milliseconds kPause{250};
+  constexpr int kTries = 40;
+  for (int n = 0; n < kTries; ++n) {
+    const S3Listing going = client_.list(going_objects(key));
+    const bool is_going = std::ranges::any_of(going.objects, [&](const S3Object& object) {
+      return going.now - object.modified < kLongestGoing;
+    });
+    if (!is_going) return;
+    std::this_thread::sleep_for(kPause);
+  }
+  throw Error(ErrorCode::kUnavailable, "the same bytes are being erased; they can be stored soon");
+}
+
+std::unique_ptr<BlobReader> S3BlobStore::open(const std::string& key) const {
+  const LocalBlob copy = local(key);
+  return cache_.files().open(key);
+}
+
+LocalBlob S3BlobStore::local(const std::string& key) const {
+  auto in_use = cache_.use(key);
+  if (!is_intact(key, {})) {
+    throw Error(ErrorCode::kInternal, "a file in the store of blobs is damaged");
+  }
+  return {cache_.files().local(key).path, std::move(in_use)};
+}
+
+bool S3BlobStore::is_intact(const std::string& key, const std::stop_token& stop) const {
+  const auto in_use = cache_.use(key);
+  const Fetching fetching(*this, key, stop);
+  if (is_there_and_intact(cache_.files(), key, stop)) return true;
+  cache_.erase(key);  // what the disk has spoilt
+  return fetch(key, stop);
+}
+
+// Twice, because the second time it may be another machine that sends it.
+bool S3BlobStore::fetch(const std::string& key, const std::stop_token& stop) const {
+  const auto bytes = client_.size(blob_object(key));
+  if (!bytes && !client_.answers()) {  // where there is no bucket nothing is there either
+    throw Error(ErrorCode::kUnavailable, "the store of volumes and meshes does not answer");
+  }
+  if (!bytes) throw Error(ErrorCode::kNotFound, "the file is not there");
+  if (fetch_once(key, *bytes, stop) || fetch_once(key, *bytes, stop)) return true;
+  spdlog::error("the store of blobs has other bytes than those of {}", key);
+  const Lock lock(mutex_);
+  damaged_.insert(key);
+  return false;
+}
+
+bool S3BlobStore::fetch_once(const std::string& key, std::uint64_t bytes,
+                             const std::stop_token& stop) const {
+  cache_.make_room(bytes);
+  if (!has_room()) throw Error(ErrorCode::kOutOfSpace, "the data folder has no space left");
+  const std::unique_ptr<BlobWriter> copy = cache_.files().begin();
+  const S3Sink sink = [&](std::span<const std::byte> piece) { copy->write(piece); };
+  client_.get(blob_object(key), bytes, sink, stop);
+  const Blob blob = copy->commit();
+  cache_.files().settle(blob.key);
+  if (blob.key == key) {
+    cache_.note(key, blob.bytes);
+    return true;
+  }
+  const auto others = cache_.use(blob.key);
+  cache_.note(blob.key, blob.bytes);
+  cache_.erase(blob.key);
+  return false;
+}
+
+std::optional<std::uint64_t> S3BlobStore::size(const std::string& key) const {
+  return client_.size(blob_object(key));
+}
+
+std::optional<std::string> S3BlobStore::link(const std::string& key, const LinkedAs& as) const {
+  return client_.link(blob_object(key), as);
+}
+
+}  // namespace isomesh::store

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/mutex.h"
+#include "server/store/blob_store.h"
+#include "server/store/files/data_folder.h"
+#include "server/store/files/room.h"
+#include "server/store/probe.h"
+#include "server/store/s3/blob_cache.h"
+#include "server/store/s3/client.h"
+#include "server/store/unsettled.h"
+
+namespace isomesh::store {
+
+struct S3Options {
+  S3ClientOptions client;
+  std::uint64_t cache_bytes = std::uint64_t{8} << 30;
+  // To sweep is to list all of the bucket.
+  std::chrono::milliseconds between_sweeps = std::chrono::minutes(10);
+};
+
+// Blobs as objects of a bucket that any number of daemons have, with copies of some on this
+// machine's disk. Below the prefix:
+//
+//   blobs/KEY            the bytes
+//   quarantine/KEY       empty: since then nothing names the blob, which stays where it is
+//   holds/KEY/RANDOM     empty: somebody stores the blob, or has stored and not named it yet
+//   going/KEY/RANDOM     empty: somebody is about to erase the blob
+//   identity             mark()
+//
+// Who stores a blob first makes a hold, and then waits until it is nobody's who is about to erase
+// it. Who erases one first says so, and then looks for holds and names. Whoever is second sees the
+// other, since what is listed is what is there (S3 promises that), so nothing that was stored under
+// a hold is erased. What somebody that died has left is too old some day, by the peer's clock. No
+// node's clock is asked.
+class S3BlobStore : public BlobStore {
+ public:
+  // The data folder must outlive it. Asks nothing of the peer yet.
+  S3BlobStore(const DataFolder& folder, S3Options options);
+
+  void limit_room(std::uint64_t max_bytes, MakeRoom make) override {
+    room_.limit(max_bytes, std::move(make));
+  }
+  bool answers() const override;
+  bool is_shared() const override { return true; }
+  bool is_empty() const override;
+  std::string mark() const override;
+  void set_mark(const std::string& text) const override;
+  std::unique_ptr<BlobWriter> begin() const override;
+  // Of the disk of this machine, from which copies are removed first.
+  bool has_room() const override;
+  std::uint64_t bytes() const override { return room_.used(); }
+  std::uint64_t capacity() const override;
+  void adopt(const std::filesystem::path& file, const Blob& blob) const override;
+  std::unique_ptr<BlobReader> open(const std::string& key) const override;
+  LocalBlob local(const std::string& key) const override;
+  // A copy that is here is asked, as FileBlobStore does; else one is fetched.
+  bool is_intact(const std::string& key, const std::stop_token& stop) const override;
+  std::optional<std::uint64_t> size(const std::string& key) const override;
+  std::optional<std::string> link(const std::string& key, const LinkedAs& as) const override;
+  std::shared_ptr<const void> hold_bytes(const std::string& /*key*/) const override {
+    return nullptr;
+  }
+  void erase(const std::string& key) const override;
+  void settle(const std::string& key) const override;
+  std::vector<std::string> erase_unnamed(std::span<const std::string> keys, Steady unsettled,
+                                         const Names& names) const override;
+  Swept sweep(Steady unsettled, const Names& names) const override;
+  std::size_t empty_quarantine(Time before, const Names& names) const override;
+
+ private:
+  class Writer;
+  class Fetching;
+
+  // The copy becomes a blob.
+  void store(const Blob& blob) const;
+  void put(const Blob& blob) const;
+  void wait_until_not_going(const std::string& key) const;
+  bool fetch(const std::string& key, const std::stop_token& stop) const;
+  bool fetch_once(const std::string& key, std::uint64_t bytes, const std::stop_token& stop) const;
+  bool is_held(const std::string& key, std::chrono::nanoseconds oldest) const;
+  bool take_out(const std::string& key, Steady unsettled, const Names& names) const;
+  bool has_unsettled(const std::string& key, Steady since) const;
+  bool is_time_to_sweep() const;
+  // The blobs that are held, but for holds that are too old.
+  std::set<std::string> tidy_holds(std::chrono::nanoseconds oldest) const;
+  void tidy_going() const;
+
+  const S3Options options_;
+  const DataFolder& folder_;
+  const S3Client client_;
+  const BlobCache cache_;
+  mutable Room room_;
+  mutable Probe probe_;
+  mutable Mutex mutex_;
+  mutable Unsettled unsettled_ ISOMESH_GUARDED_BY(mutex_);
+  mutable std::set<std::string> damaged_ ISOMESH_GUARDED_BY(mutex_);  // there, with other bytes
+  mutable Steady next_sweep_ ISOMESH_GUARDED_BY(mutex_);
+  // What the last sweep was told; everything is young before the first.
+  mutable Steady unsettled_since_ ISOMESH_GUARDED_BY(mutex_);
+  mutable Condition fetched_;
+  mutable std::set<std::string> coming_ ISOMESH_GUARDED_BY(mutex_);
+};
+
+}  // namespace isomesh::store

@@ -1,0 +1,313 @@
+#include "server/store/s3/client.h"
+
+#include <algorithm>
+#include <array>
+#include <thread>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "base/clock.h"
+#include "base/hex.h"
+#include "base/ids.h"
+#include "base/sha256.h"
+#include "base/text.h"
+#include "proto/error.h"
+#include "server/store/s3/answer_text.h"
+#include "server/store/s3/link.h"
+
+namespace isomesh::store {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::seconds kLongestPause{2};
+constexpr std::size_t kReadAtOnce = std::size_t{1} << 20;
+constexpr int kListedAtOnce = 1000;
+constexpr int kMostPages = 100'000;
+// S3 takes 10 000.
+constexpr std::uint64_t kMostParts = 9'000;
+
+[[noreturn]] void throw_silent() {
+  throw Error(ErrorCode::kUnavailable,
+              "the store of volumes and meshes does not answer; nothing is lost");
+}
+
+// The pause before a request is repeated, once more after each.
+class Pauses {
+ public:
+  Pauses(std::chrono::milliseconds first, std::chrono::milliseconds patience)
+      : first_(first), patience_(patience) {
+    start_over();
+  }
+
+  void start_over() {
+    next_ = first_;
+    end_ = Clock::now() + patience_;
+  }
+
+  // Throws when it has gone on for too long, or when `stop` is requested.
+  void wait(const std::stop_token& stop) {
+    if (Clock::now() + next_ > end_) throw_silent();
+    const auto until = Clock::now() + next_;
+    constexpr std::chrono::milliseconds kLook{20};
+    while (Clock::now() < until) {
+      if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "cancelled");
+      std::this_thread::sleep_for(std::min<Clock::duration>(kLook, until - Clock::now()));
+    }
+    next_ = std::min<std::chrono::milliseconds>(next_ * 2, kLongestPause);
+  }
+
+ private:
+  const std::chrono::milliseconds first_;
+  const std::chrono::milliseconds patience_;
+  std::chrono::milliseconds next_{0};
+  Clock::time_point end_;
+};
+
+bool is_worth_repeating(long status) {
+  constexpr std::array kPassing = {0L, 408L, kS3Conflict, 429L, 500L, 502L, 503L, 504L};
+  return std::ranges::find(kPassing, status) != kPassing.end();
+}
+
+}  // namespace
+
+S3Answer S3Client::ask(const S3Request& request, const std::stop_token& stop) const {
+  Pauses pauses(options_.first_pause, options_.patience);
+  for (int attempts = 1;; ++attempts) {
+    S3Answer answer = connections_.attempt(request, stop);
+    answer.attempts = attempts;
+    if (is_worth_repeating(answer.status)) {
+      pauses.wait(stop);
+      continue;
+    }
+    const bool is_told = answer.status == kS3NotFound || answer.status == kS3PreconditionFailed ||
+                         answer.status == kS3NotImplemented;
+    if (answer.status / 100 == 2 || is_told) return answer;
+    spdlog::error("the store of blobs refuses a request with status {} {}", answer.status,
+                  s3_error_code(answer.text));
+    if (answer.status == kS3Forbidden) {
+      throw Error(ErrorCode::kUnavailable,
+                  "the store of volumes and meshes refuses this service; nothing is lost");
+    }
+    throw Error(ErrorCode::kInternal, "the store of blobs refuses a request");
+  }
+}
+
+bool S3Client::answers() const {
+  S3Request request = listing("", "", 1);
+  request.is_quick = true;
+  try {
+    return connections_.attempt(request, {}).status == kS3Ok;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+std::optional<std::uint64_t> S3Client::size(const std::string& key) const {
+  const S3Answer answer = ask({.method = "HEAD", .key = key});
+  if (answer.status == kS3NotFound) return std::nullopt;
+  const auto bytes = parse_uint64(answer.header("content-length"));
+  if (answer.status != kS3Ok || !bytes) {
+    throw Error(ErrorCode::kInternal, "the store of blobs does not say how long a file is");
+  }
+  return bytes;
+}
+
+bool S3Client::put_file(const std::string& key, const File& file, const Blob& blob,
+                        IfThere if_there) const {
+  constexpr int kTries = 3;
+  for (int n = 0; n < kTries; ++n) {
+    bool is_stored = true;
+    if (blob.bytes > options_.multipart_above) {
+      const auto there = if_there == IfThere::kKeep ? size(key) : std::nullopt;
+      is_stored = there != blob.bytes;
+      if (is_stored) put_in_parts(key, file, blob);
+    } else {
+      const S3Answer answer = put_at_once(key, file, blob, if_there);
+      is_stored = answer.status / 100 == 2;
+    }
+    // What a peer says of a PUT is not yet that it has the object.
+    if (size(key) == blob.bytes) return is_stored;
+    if_there = IfThere::kReplace;
+  }
+  throw Error(ErrorCode::kUnavailable,
+              "the store of volumes and meshes does not keep what it is sent");
+}
+
+S3Answer S3Client::put_at_once(const std::string& key, const File& file, const Blob& blob,
+                               IfThere if_there) const {
+  S3Request request = {
+      .method = "PUT", .key = key, .file = &file, .bytes = blob.bytes, .sha256 = blob.key};
+  if (if_there == IfThere::kKeep && knows_conditions_) {
+    request.condition = "If-None-Match: *";
+    S3Answer answer = ask(request);
+    if (answer.status != kS3NotImplemented) return answer;
+    knows_conditions_ = false;
+    request.condition.clear();
+  }
+  return ask(request);
+}
+
+void S3Client::put_in_parts(const std::string& key, const File& file, const Blob& blob) const {
+  const S3Answer begun = ask({.method = "POST", .key = key, .query = "uploads="});
+  const S3Text text = read_s3_text(begun.text);
+  const std::string id(text.find("UploadId"));
+  if (begun.status != kS3Ok || id.empty()) {
+    throw Error(ErrorCode::kInternal, "the store of blobs does not take files in parts");
+  }
+  const std::string upload = "uploadId=" + uri_escaped(id);
+  try {
+    const std::uint64_t part_bytes = std::max(options_.part_bytes, blob.bytes / kMostParts + 1);
+    std::string parts;
+    int number = 0;
+    for (std::uint64_t begin = 0; begin < blob.bytes; begin += part_bytes) {
+      const std::string part = std::to_string(++number);
+      const std::string tag = put_part(key, "partNumber=" + part + '&' + upload, file, begin,
+                                       std::min(part_bytes, blob.bytes - begin));
+      parts += "<Part><PartNumber>" + part + "</PartNumber><ETag>" + tag + "</ETag></Part>";
+    }
+    const std::string whole =
+        "<CompleteMultipartUpload xmlns=\"http://s3.amazonaws.com/doc/2006-03-01/\">" + parts +
+        "</CompleteMultipartUpload>";
+    // Its status may come before it is known how it ends, and one that was repeated may be told
+    // that there is no such upload any more. What is there then says more.
+    const S3Answer ended = ask({.method = "POST", .key = key, .query = upload, .text = whole});
+    if (ended.status == kS3Ok && read_s3_text(ended.text).root == "CompleteMultipartUploadResult") {
+      return;
+    }
+  } catch (...) {
+    try {
+      connections_.attempt({.method = "DELETE", .key = key, .query = upload}, {});
+    } catch (const Error&) {
+      spdlog::debug("an upload in parts is left to the store's own rules");
+    }
+    throw;
+  }
+}
+
+std::string S3Client::put_part(const std::string& key, const std::string& query, const File& file,
+                               std::uint64_t begin, std::uint64_t bytes) const {
+  Sha256 digest;
+  std::vector<std::byte> block(kReadAtOnce);
+  for (std::uint64_t done = 0; done < bytes;) {
+    const auto wanted =
+        static_cast<std::size_t>(std::min<std::uint64_t>(kReadAtOnce, bytes - done));
+    const std::size_t count = file.read_at(begin + done, std::span(block).first(wanted));
+    if (count == 0) throw Error(ErrorCode::kInternal, "a file was cut while it was stored");
+    digest.update(std::span<const std::byte>(block).first(count));
+    done += count;
+  }
+  const S3Answer answer = ask({.method = "PUT",
+                               .key = key,
+                               .query = query,
+                               .file = &file,
+                               .begin = begin,
+                               .bytes = bytes,
+                               .sha256 = to_hex(digest.finish())});
+  const std::string tag = answer.header("etag");
+  if (answer.status != kS3Ok || tag.empty() || tag.find_first_of("<>&") != tag.npos) {
+    throw Error(ErrorCode::kUnavailable, "the store of volumes and meshes has lost an upload");
+  }
+  return tag;
+}
+
+void S3Client::put_text(const std::string& key, std::string_view text) const {
+  if (ask({.method = "PUT", .key = key, .text = text}).status / 100 != 2) {
+    throw Error(ErrorCode::kInternal, "the store of blobs does not take a text");
+  }
+}
+
+std::optional<std::string> S3Client::get_text(const std::string& key) const {
+  S3Answer answer = ask({.key = key});
+  if (answer.status == kS3NotFound) return std::nullopt;
+  return std::move(answer.text);
+}
+
+void S3Client::get(const std::string& key, std::uint64_t bytes, const S3Sink& sink,
+                   const std::stop_token& stop) const {
+  Pauses pauses(options_.first_pause, options_.patience);
+  std::uint64_t done = 0;
+  while (done < bytes) {
+    S3Request request = {.key = key, .bytes = bytes - done, .sink = &sink, .sink_begin = done};
+    if (done > 0) request.condition = "Range: bytes=" + std::to_string(done) + '-';
+    const S3Answer answer = connections_.attempt(request, stop);
+    done += answer.taken;
+    if (answer.status == kS3NotFound) throw Error(ErrorCode::kNotFound, "the file is not there");
+    if (done == bytes) return;
+    if (answer.status == kS3Forbidden) {
+      throw Error(ErrorCode::kUnavailable, "the store of volumes and meshes refuses this service");
+    }
+    if (answer.taken > 0) pauses.start_over();
+    pauses.wait(stop);
+  }
+}
+
+S3Client::Erased S3Client::erase(const std::string& key) const {
+  return ask({.method = "DELETE", .key = key}).attempts == 1 ? Erased::kAtOnce
+                                                             : Erased::kMaybeLater;
+}
+
+void S3Client::try_to_erase(const std::string& key) const {
+  try {
+    connections_.attempt({.method = "DELETE", .key = key, .is_quick = true}, {});
+  } catch (const Error& error) {
+    spdlog::debug("something is left in the store of blobs: {}", error.what());
+  }
+}
+
+S3Request S3Client::listing(const std::string& beginning, const std::string& token,
+                            int most) const {
+  std::string query;
+  if (!token.empty()) query = "continuation-token=" + uri_escaped(token) + '&';
+  query += "list-type=2&max-keys=" + std::to_string(most) +
+           "&prefix=" + uri_escaped(options_.address.prefix + beginning);
+  return {.query = std::move(query)};
+}
+
+S3Listing S3Client::list(const std::string& beginning) const {
+  S3Listing all;
+  std::string token;
+  for (int page = 0; page < kMostPages; ++page) {
+    const S3Answer answer = ask(listing(beginning, token, kListedAtOnce));
+    const S3Text text = read_s3_text(answer.text);
+    if (answer.status != kS3Ok || text.root != "ListBucketResult") {
+      throw Error(ErrorCode::kUnavailable, "the store of volumes and meshes cannot be listed");
+    }
+    all.now = answer.now();
+    for (const auto& [parent, name, value] : text.leaves) {
+      if (parent != "Contents") continue;
+      if (name == "Key") {
+        // A peer that lists what it was not asked for is not to have it swept.
+        if (!value.starts_with(options_.address.prefix + beginning)) {
+          throw Error(ErrorCode::kInternal, "the store of blobs lists what was not asked for");
+        }
+        all.objects.push_back({.key = value.substr(options_.address.prefix.size())});
+      }
+      if (all.objects.empty()) continue;
+      if (name == "LastModified") all.objects.back().modified = time_of(value);
+      if (name == "Size") all.objects.back().bytes = parse_uint64(value).value_or(0);
+    }
+    if (text.find("IsTruncated") != "true") return all;
+    const std::string next(text.find("NextContinuationToken"));
+    if (next.empty() || next == token) break;
+    token = next;
+  }
+  throw Error(ErrorCode::kInternal, "the store of blobs does not come to the end of a list");
+}
+
+bool S3Client::has_any(const std::string& beginning) const {
+  const S3Answer answer = ask(listing(beginning, "", 1));
+  const S3Text text = read_s3_text(answer.text);
+  if (answer.status != kS3Ok || text.root != "ListBucketResult") {
+    throw Error(ErrorCode::kUnavailable, "the store of volumes and meshes cannot be listed");
+  }
+  return !text.find("Key").empty();
+}
+
+std::string S3Client::link(const std::string& key, const LinkedAs& as) const {
+  return presigned_url(options_.address, read_s3_credentials(options_.credentials),
+                       options_.address.prefix + key, as, std::chrono::system_clock::now());
+}
+
+}  // namespace isomesh::store

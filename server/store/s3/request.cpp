@@ -1,0 +1,268 @@
+#include "server/store/s3/request.h"
+
+#include <algorithm>
+#include <ctime>
+#include <exception>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "base/error.h"
+#include "base/sha256.h"
+#include "base/text.h"
+
+namespace isomesh::store {
+namespace {
+
+// Of answers that are not passed on, such as a page of a list.
+constexpr std::size_t kLongestText = std::size_t{4} << 20;
+constexpr std::size_t kIdleConnections = 16;
+
+// They were there when the daemon started; a file may be about to be replaced.
+S3Credentials credentials_now(const std::filesystem::path& file) {
+  try {
+    return read_s3_credentials(file);
+  } catch (const Error& error) {
+    spdlog::error("--blob-credentials: {}", error.what());
+    throw Error(ErrorCode::kUnavailable,
+                "the store of volumes and meshes cannot be asked now; nothing is lost");
+  }
+}
+
+// A transfer under way; libcurl is given pointers to it.
+class Attempt {
+ public:
+  Attempt(const S3ClientOptions& options, const S3Request& request, std::stop_token stop,
+          CURL* easy)
+      : options_(options), request_(request), stop_(std::move(stop)), easy_(easy) {
+    set_connection();
+    set_request();
+  }
+
+  S3Answer perform() {
+    const CURLcode result = curl_easy_perform(easy_);
+    if (thrown_) std::rethrow_exception(thrown_);
+    if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "cancelled");
+    if (result == CURLE_OK) {
+      curl_easy_getinfo(easy_, CURLINFO_RESPONSE_CODE, &answer_.status);
+    } else {
+      spdlog::debug("the store of blobs: {}", curl_easy_strerror(result));
+      answer_.status = 0;
+    }
+    return std::move(answer_);
+  }
+
+ private:
+  void set_connection() {
+    curl_easy_setopt(easy_, CURLOPT_PROTOCOLS_STR, "http,https");
+    curl_easy_setopt(easy_, CURLOPT_HTTP_VERSION, static_cast<long>(CURL_HTTP_VERSION_1_1));
+    curl_easy_setopt(easy_, CURLOPT_FOLLOWLOCATION, 0L);
+    curl_easy_setopt(easy_, CURLOPT_PROXY, "");
+    curl_easy_setopt(easy_, CURLOPT_NOSIGNAL, 1L);
+    curl_easy_setopt(easy_, CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
+    if (!options_.authorities.empty()) {
+      curl_easy_setopt(easy_, CURLOPT_CAINFO, options_.authorities.c_str());
+    }
+    constexpr long kQuick = 2'000;
+    const auto connect = static_cast<long>(options_.connect.count());
+    curl_easy_setopt(easy_, CURLOPT_CONNECTTIMEOUT_MS,
+                     request_.is_quick ? std::min(kQuick, connect) : connect);
+    if (request_.is_quick) curl_easy_setopt(easy_, CURLOPT_TIMEOUT_MS, kQuick);
+    curl_easy_setopt(easy_, CURLOPT_LOW_SPEED_LIMIT, 1024L);
+    curl_easy_setopt(easy_, CURLOPT_LOW_SPEED_TIME, static_cast<long>(options_.stall.count()));
+    curl_easy_setopt(easy_, CURLOPT_BUFFERSIZE, 512L * 1024);
+    curl_easy_setopt(easy_, CURLOPT_UPLOAD_BUFFERSIZE, 512L * 1024);
+    curl_easy_setopt(easy_, CURLOPT_USERAGENT, "isomesh");
+  }
+
+  void set_request() {
+    const S3Address& address = options_.address;
+    const S3Credentials credentials = credentials_now(options_.credentials);
+    const std::string key = request_.key.empty() ? "" : address.prefix + request_.key;
+    const std::string url = address.endpoint + address.path + '/' + key +
+                            (request_.query.empty() ? "" : '?' + request_.query);
+    curl_easy_setopt(easy_, CURLOPT_URL, url.c_str());
+    curl_easy_setopt(easy_, CURLOPT_AWS_SIGV4, ("aws:amz:" + address.region + ":s3").c_str());
+    curl_easy_setopt(easy_, CURLOPT_USERNAME, credentials.access_key.c_str());
+    curl_easy_setopt(easy_, CURLOPT_PASSWORD, credentials.secret_key.c_str());
+    curl::append(headers_,
+                 "x-amz-content-sha256: " +
+                     (request_.sha256.empty() ? sha256_of(request_.text) : request_.sha256));
+    if (!credentials.session_token.empty()) {
+      curl::append(headers_, "x-amz-security-token: " + credentials.session_token);
+    }
+    if (!request_.condition.empty()) curl::append(headers_, request_.condition);
+    set_method();
+    curl_easy_setopt(easy_, CURLOPT_HTTPHEADER, headers_.get());
+    curl_easy_setopt(easy_, CURLOPT_WRITEFUNCTION, take);
+    curl_easy_setopt(easy_, CURLOPT_WRITEDATA, this);
+    curl_easy_setopt(easy_, CURLOPT_HEADERFUNCTION, take_header);
+    curl_easy_setopt(easy_, CURLOPT_HEADERDATA, this);
+    curl_easy_setopt(easy_, CURLOPT_NOPROGRESS, 0L);
+    curl_easy_setopt(easy_, CURLOPT_XFERINFOFUNCTION, is_over);
+    curl_easy_setopt(easy_, CURLOPT_XFERINFODATA, this);
+  }
+
+  void set_method() {
+    const std::string_view method = request_.method;
+    if (method == "HEAD") {
+      curl_easy_setopt(easy_, CURLOPT_NOBODY, 1L);
+    } else if (method == "PUT") {
+      curl_easy_setopt(easy_, CURLOPT_UPLOAD, 1L);
+      curl_easy_setopt(easy_, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(body_bytes()));
+      curl_easy_setopt(easy_, CURLOPT_READFUNCTION, give);
+      curl_easy_setopt(easy_, CURLOPT_READDATA, this);
+      curl_easy_setopt(easy_, CURLOPT_SEEKFUNCTION, seek);
+      curl_easy_setopt(easy_, CURLOPT_SEEKDATA, this);
+    } else if (method == "POST") {
+      curl::append(headers_, "Content-Type: application/xml");
+      curl_easy_setopt(easy_, CURLOPT_POST, 1L);
+      curl_easy_setopt(easy_, CURLOPT_POSTFIELDSIZE_LARGE,
+                       static_cast<curl_off_t>(request_.text.size()));
+      // Without a text it would be asked for one.
+      curl_easy_setopt(easy_, CURLOPT_POSTFIELDS,
+                       request_.text.empty() ? "" : request_.text.data());
+    } else if (method != "GET") {
+      curl_easy_setopt(easy_, CURLOPT_CUSTOMREQUEST, request_.method);
+    }
+  }
+
+  std::uint64_t body_bytes() const {
+    return request_.file == nullptr ? request_.text.size() : request_.bytes;
+  }
+
+  // Exceptions do not cross libcurl: they are kept, and end the transfer.
+  template <class Run>
+  std::size_t guarded(std::size_t on_failure, const Run& run) {
+    try {
+      return run();
+    } catch (...) {
+      thrown_ = std::current_exception();
+      return on_failure;
+    }
+  }
+
+  static std::size_t give(char* buffer, std::size_t size, std::size_t count, void* self) {
+    auto& attempt = *static_cast<Attempt*>(self);
+    return attempt.guarded(CURL_READFUNC_ABORT, [&] {
+      const auto left = std::min<std::uint64_t>(size * count, attempt.body_bytes() - attempt.sent_);
+      const auto target = std::as_writable_bytes(std::span(buffer, static_cast<std::size_t>(left)));
+      std::size_t read = target.size();
+      if (attempt.request_.file != nullptr) {
+        read = attempt.request_.file->read_at(attempt.request_.begin + attempt.sent_, target);
+      } else {
+        attempt.request_.text.copy(buffer, target.size(), static_cast<std::size_t>(attempt.sent_));
+      }
+      attempt.sent_ += read;
+      return read;
+    });
+  }
+
+  static int seek(void* self, curl_off_t offset, int /*origin*/) {
+    static_cast<Attempt*>(self)->sent_ = static_cast<std::uint64_t>(offset);
+    return CURL_SEEKFUNC_OK;
+  }
+
+  static std::size_t take(char* data, std::size_t size, std::size_t count, void* self) {
+    auto& attempt = *static_cast<Attempt*>(self);
+    return attempt.guarded(0, [&] {
+      const std::span<const char> bytes(data, size * count);
+      long status = 0;
+      curl_easy_getinfo(attempt.easy_, CURLINFO_RESPONSE_CODE, &status);
+      const bool is_wanted = status == kS3Ok || status == kS3Partial;
+      if (attempt.request_.sink != nullptr && is_wanted) {
+        attempt.pass_on(std::as_bytes(bytes), status == kS3Partial);
+      } else if (attempt.answer_.text.size() + bytes.size() <= kLongestText) {
+        attempt.answer_.text.append(bytes.data(), bytes.size());
+      } else {
+        return std::size_t{0};
+      }
+      return bytes.size();
+    });
+  }
+
+  // A peer that does not know ranges sends all of it again.
+  void pass_on(std::span<const std::byte> bytes, bool is_part) {
+    const std::uint64_t unwanted = is_part ? 0 : request_.sink_begin;
+    const std::uint64_t skipped = std::min<std::uint64_t>(
+        bytes.size(), unwanted - std::min<std::uint64_t>(unwanted, received_));
+    received_ += bytes.size();
+    bytes = bytes.subspan(static_cast<std::size_t>(skipped));
+    // More than the object has is nothing of it.
+    bytes = bytes.first(static_cast<std::size_t>(
+        std::min<std::uint64_t>(bytes.size(), request_.bytes - answer_.taken)));
+    if (!bytes.empty()) (*request_.sink)(bytes);
+    answer_.taken += bytes.size();
+  }
+
+  static std::size_t take_header(char* data, std::size_t size, std::size_t count, void* self) {
+    auto& attempt = *static_cast<Attempt*>(self);
+    return attempt.guarded(0, [&] {
+      const std::string_view line(data, size * count);
+      const std::size_t colon = line.find(':');
+      // "100 Continue" comes before, with headers of its own.
+      if (line.starts_with("HTTP/")) attempt.answer_.headers.clear();
+      constexpr std::size_t kMostHeaders = 100;
+      if (colon != line.npos && attempt.answer_.headers.size() < kMostHeaders) {
+        attempt.answer_.headers[lower(line.substr(0, colon))] = trimmed(line.substr(colon + 1));
+      }
+      return line.size();
+    });
+  }
+
+  static int is_over(void* self, curl_off_t /*all*/, curl_off_t /*now*/, curl_off_t /*up_all*/,
+                     curl_off_t /*up_now*/) {
+    return static_cast<Attempt*>(self)->stop_.stop_requested() ? 1 : 0;
+  }
+
+  const S3ClientOptions& options_;
+  const S3Request& request_;
+  const std::stop_token stop_;
+  CURL* const easy_;
+  curl::Headers headers_;
+  S3Answer answer_;
+  std::exception_ptr thrown_;
+  std::uint64_t sent_ = 0;
+  std::uint64_t received_ = 0;
+};
+
+}  // namespace
+
+std::string S3Answer::header(const std::string& name) const {
+  const auto found = headers.find(name);
+  return found == headers.end() ? "" : found->second;
+}
+
+Time S3Answer::now() const {
+  const std::time_t time = curl_getdate(header("date").c_str(), nullptr);
+  return time < 0 ? std::chrono::system_clock::now() : Time(std::chrono::seconds(time));
+}
+
+curl::Easy S3Connections::take() const {
+  {
+    const Lock lock(mutex_);
+    if (!idle_.empty()) {
+      curl::Easy connection = std::move(idle_.back());
+      idle_.pop_back();
+      return connection;
+    }
+  }
+  return curl::make_easy();
+}
+
+// With its open connection, and nothing else of what it was used for.
+void S3Connections::give_back(curl::Easy connection) const {
+  curl_easy_reset(connection.get());
+  const Lock lock(mutex_);
+  if (idle_.size() < kIdleConnections) idle_.push_back(std::move(connection));
+}
+
+S3Answer S3Connections::attempt(const S3Request& request, const std::stop_token& stop) const {
+  curl::Easy connection = take();
+  S3Answer answer = Attempt(options_, request, stop, connection.get()).perform();
+  // A connection on which a transfer was cut off may still have bytes of it.
+  if (answer.status != 0) give_back(std::move(connection));
+  return answer;
+}
+
+}  // namespace isomesh::store

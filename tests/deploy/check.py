@@ -1,0 +1,88 @@
+#!/usr/bin/env python3
+"""What has to be true of the files in docker/ by which several daemons are run.
+
+  check.py compose FILE          of a compose file
+  check.py chart < MANIFESTS     of a chart's manifests, as `helm template` renders them
+"""
+import sys
+
+import yaml
+
+checks = 0
+
+
+def check(is_true, what):
+    global checks
+    if not is_true:
+        sys.exit(f"tests/deploy: {what}")
+    checks += 1
+
+
+def check_compose(file):
+    with open(file, encoding="utf-8") as text:
+        compose = yaml.safe_load(text)
+    services = compose["services"]
+    daemons = {name: service for name, service in services.items() if service["image"] == "isomesh"}
+    check(daemons, "no daemon")
+    for name, service in daemons.items():
+        check(service["read_only"], f"{name} may write to its root")
+        check(service["cap_drop"] == ["ALL"], f"{name} has capabilities")
+        check("no-new-privileges:true" in service["security_opt"], f"{name} may get privileges")
+        check("/readyz" in service["healthcheck"]["test"][-1], f"{name} is not asked whether it is ready")
+        check(service["stop_grace_period"] == "45s", f"{name} is not given the time to drain")
+    for name, service in services.items():
+        for place in service.get("volumes", []):
+            source = place.split(":")[0]
+            check(source.startswith((".", "/")) or source in compose["volumes"],
+                  f"{name} has the volume {source}, which nobody declares")
+        for needed in service.get("depends_on", []):
+            check(needed in services, f"{name} depends on {needed}, which is not there")
+    stores = {name: {key: value for key, value in service["environment"].items()
+                     if key in ("ISOMESH_STORE", "ISOMESH_BLOBS")} for name, service in daemons.items()}
+    check(len({str(sorted(store.items())) for store in stores.values()}) == 1,
+          "the daemons have not the same stores")
+    if len(daemons) > 1:
+        check(all(len(store) == 2 for store in stores.values()), "daemons have stores of their own")
+
+
+def check_chart():
+    kinds = {}
+    for manifest in yaml.safe_load_all(sys.stdin):
+        if manifest:
+            kinds.setdefault(manifest["kind"], []).append(manifest)
+    deployment = kinds["Deployment"][0]["spec"]
+    pod = deployment["template"]["spec"]
+    container = pod["containers"][0]
+    labels = deployment["template"]["metadata"]["labels"]
+    matched = [deployment["selector"]["matchLabels"], kinds["Service"][0]["spec"]["selector"],
+               kinds["PodDisruptionBudget"][0]["spec"]["selector"]["matchLabels"]]
+    check(all(selector.items() <= labels.items() for selector in matched), "selectors find no pod")
+    check(container["readinessProbe"]["httpGet"]["path"] == "/readyz", "readiness")
+    check(container["livenessProbe"]["httpGet"]["path"] == "/livez", "liveness")
+    check("exec" in container["lifecycle"]["preStop"], "preStop")
+    environment = {entry["name"]: entry for entry in container["env"]}
+    drain = int(environment["ISOMESH_DRAIN_SECONDS"]["value"])
+    check(pod["terminationGracePeriodSeconds"] > drain + 5, "a pod is killed while it drains")
+    check(pod["securityContext"]["runAsNonRoot"], "root")
+    security = container["securityContext"]
+    check(security["readOnlyRootFilesystem"], "the root may be written to")
+    check(not security["allowPrivilegeEscalation"], "privileges")
+    check(security["capabilities"]["drop"] == ["ALL"], "capabilities")
+    check("secretKeyRef" in environment["ISOMESH_STORE"]["valueFrom"], "the password is no secret")
+    volumes = {volume["name"] for volume in pod["volumes"]}
+    mounts = {mount["name"]: mount["mountPath"] for mount in container["volumeMounts"]}
+    check(set(mounts) == volumes, "volumes and mounts differ")
+    check("/var/lib/isomesh" in mounts.values(), "there is no room for data")
+    if "HorizontalPodAutoscaler" in kinds:
+        check("replicas" not in deployment, "two things say how many daemons there are")
+        metric = kinds["HorizontalPodAutoscaler"][0]["spec"]["metrics"][0]["object"]["metric"]["name"]
+        check(metric == "isomesh_queued_jobs", "the autoscaler asks for another metric")
+    else:
+        check(deployment["replicas"] == 3, "replicas")
+
+
+if sys.argv[1] == "compose":
+    check_compose(sys.argv[2])
+else:
+    check_chart()
+print(f"{checks} checks")

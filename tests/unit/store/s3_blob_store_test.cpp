@@ -1,0 +1,394 @@
+// What blobs in S3 do that no file does: a peer that fails, copies, and what is said in objects.
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <httplib.h>
+
+#include "server/store/s3/blob_store.h"
+#include "tests/support/errors.h"
+#include "tests/support/files.h"
+#include "tests/support/s3_peer.h"
+
+namespace isomesh::store {
+namespace {
+
+using test::as_span;
+using test::code_thrown_by;
+using test::S3Peer;
+using test::thrown_by;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::Not;
+
+class S3Blobs : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (const std::string missing = S3Peer::missing(); !missing.empty()) {
+      GTEST_SKIP() << missing;
+    }
+    peer().reset();
+    test::write_file(folder_ / "credentials", S3Peer::credentials());
+    options_.client.address = parse_s3_url(peer().url());
+    options_.client.credentials = folder_ / "credentials";
+    options_.client.patience = std::chrono::milliseconds(500);
+    options_.client.first_pause = std::chrono::milliseconds(5);
+    options_.between_sweeps = std::chrono::milliseconds(0);
+    open();
+  }
+
+  // As after a start of the daemon.
+  void open() {
+    blobs_.reset();
+    data_.reset();
+    data_ = std::make_unique<DataFolder>(folder_ / "data");
+    blobs_ = std::make_unique<S3BlobStore>(*data_, options_);
+  }
+
+  static S3Peer& peer() {
+    static S3Peer only;
+    return only;
+  }
+
+  std::string put(std::string_view text) {
+    const auto writer = blobs_->begin();
+    writer->write(as_span(text));
+    std::string key = writer->commit().key;
+    blobs_->settle(key);
+    return key;
+  }
+
+  // One of which there is no copy here.
+  std::string put_elsewhere(std::string_view text) {
+    std::string key = put(text);
+    std::filesystem::remove(copy_of(key));
+    return key;
+  }
+
+  std::filesystem::path copy_of(const std::string& key) {
+    return folder_ / ("data/cache/blobs/" + key.substr(0, 2) + '/' + key);
+  }
+
+  std::string get(const std::string& key) {
+    const auto blob = blobs_->open(key);
+    std::string text(blob->size(), '\0');
+    blob->read_at(0, std::as_writable_bytes(std::span(text)));
+    return text;
+  }
+
+  std::string text_of(std::size_t bytes) {
+    std::string text;
+    while (text.size() < bytes) text += std::to_string(text.size()) + ' ';
+    text.resize(bytes);
+    return text;
+  }
+
+  test::TemporaryFolder folder_;
+  S3Options options_;
+  std::unique_ptr<DataFolder> data_;
+  std::unique_ptr<S3BlobStore> blobs_;
+};
+
+TEST_F(S3Blobs, AnAnswerThatThePeerIsBusyIsAskedAgain) {
+  peer().fail("status-503", 3);
+  const std::string key = put_elsewhere("hello");
+  peer().fail("status-500", 2, "GET", key);
+  EXPECT_EQ(get(key), "hello");
+}
+
+TEST_F(S3Blobs, AConnectionThatBreaksIsMadeAgain) {
+  peer().fail("drop", 2);
+  const std::string key = put_elsewhere("hello");
+  peer().fail("drop", 2, "GET", key);
+  EXPECT_EQ(get(key), "hello");
+}
+
+TEST_F(S3Blobs, APeerThatIsDownIsUnavailableAndNothingIsStored) {
+  peer().fail("drop");
+  EXPECT_EQ(code_thrown_by([&] { put("hello"); }), ErrorCode::kUnavailable);
+  EXPECT_EQ(code_thrown_by([&] { blobs_->mark(); }), ErrorCode::kUnavailable);
+  EXPECT_EQ(code_thrown_by([&] { blobs_->sweep({}, {}); }), ErrorCode::kUnavailable);
+  EXPECT_FALSE(blobs_->answers());
+  peer().recover();
+  EXPECT_TRUE(peer().keys().empty());
+  EXPECT_EQ(get(put("hello")), "hello");
+}
+
+TEST_F(S3Blobs, APeerThatIsSilentIsGivenUp) {
+  options_.client.stall = std::chrono::seconds(1);
+  open();
+  const std::string key = put_elsewhere("hello");
+  peer().fail("hang", 1, "GET", key);
+  options_.client.patience = std::chrono::seconds(5);
+  open();
+  EXPECT_EQ(get(key), "hello");
+}
+
+TEST_F(S3Blobs, ADownloadThatIsCutOffGoesOnWhereItWas) {
+  const std::string text = text_of(1'000'000);
+  const std::string key = put_elsewhere(text);
+  peer().fail("cut", 3, "GET", key);
+  EXPECT_TRUE(get(key) == text);
+  EXPECT_EQ(peer().count("GET", "/blobs/"), 4);
+}
+
+TEST_F(S3Blobs, APeerWithoutRangesSendsAllAgain) {
+  const std::string text = text_of(1'000'000);
+  const std::string key = put_elsewhere(text);
+  peer().fail("cut", 1, "GET", key);
+  peer().fail("ignore-range", 1, "GET", key);
+  EXPECT_TRUE(get(key) == text);
+}
+
+TEST_F(S3Blobs, BytesBehindTheEndAreNoneOfIt) {
+  const std::string key = put_elsewhere("hello");
+  peer().fail("more", 1, "GET", key);
+  EXPECT_EQ(get(key), "hello");
+}
+
+TEST_F(S3Blobs, OtherBytesThanTheKeysAreReadTwiceAndThenRefused) {
+  const std::string key = put_elsewhere("hello");
+  peer().fail("flip", 1, "GET", key);
+  EXPECT_EQ(get(key), "hello");
+  std::filesystem::remove(copy_of(key));
+  peer().fail("flip", 0, "GET", key);
+  EXPECT_FALSE(blobs_->is_intact(key, {}));
+  EXPECT_EQ(code_thrown_by([&] { blobs_->open(key); }), ErrorCode::kInternal);
+  EXPECT_EQ(code_thrown_by([&] { blobs_->local(key); }), ErrorCode::kInternal);
+}
+
+// Never a record before its blob.
+TEST_F(S3Blobs, APeerThatStoresNothingIsFoundOut) {
+  peer().fail("forget", 0, "PUT", "/blobs/");
+  EXPECT_EQ(code_thrown_by([&] { put("hello"); }), ErrorCode::kUnavailable);
+}
+
+TEST_F(S3Blobs, AnUploadWhoseAnswerIsLostIsNotAnError) {
+  peer().fail("late", 1, "PUT", "/blobs/");
+  EXPECT_EQ(get(put_elsewhere("hello")), "hello");
+}
+
+TEST_F(S3Blobs, WhatIsThereIsNotReplaced) {
+  const std::string key = put("hello");
+  put("hello");
+  EXPECT_EQ(peer().count("PUT", "/blobs/" + key), 2);  // of which the peer refuses one
+  EXPECT_EQ(blobs_->bytes(), 5U);
+  peer().put("blobs/" + key, "cut");
+  put("hello");
+  std::filesystem::remove(copy_of(key));
+  EXPECT_EQ(get(key), "hello") << "what is there with another size is no blob";
+}
+
+TEST_F(S3Blobs, APeerWithoutConditionsIsAskedWithoutThem) {
+  peer().forget_conditions();
+  EXPECT_EQ(get(put_elsewhere("hello")), "hello");
+  EXPECT_EQ(get(put_elsewhere("hello")), "hello");
+}
+
+class InParts : public S3Blobs {
+ protected:
+  InParts() {
+    options_.client.multipart_above = 1'000;
+    options_.client.part_bytes = 400;
+  }
+};
+
+TEST_F(InParts, WhatIsLargeIsSentInParts) {
+  const std::string text = text_of(1'500);
+  const std::string key = put_elsewhere(text);
+  EXPECT_EQ(peer().count("PUT", "partNumber="), 4);
+  EXPECT_TRUE(get(key) == text);
+  put(text);
+  EXPECT_EQ(peer().count("PUT", "partNumber="), 4) << "it is there already";
+  put_elsewhere(text_of(1'000));
+  EXPECT_EQ(peer().count("PUT", "partNumber="), 4) << "that is not large";
+}
+
+TEST_F(InParts, APartThatFailsIsSentAgain) {
+  peer().fail("status-503", 2, "PUT", "partNumber=3");
+  const std::string text = text_of(1'500);
+  EXPECT_TRUE(get(put_elsewhere(text)) == text);
+}
+
+TEST_F(InParts, AnUploadThatCannotGoOnIsGivenUp) {
+  peer().fail("status-403", 0, "PUT", "partNumber=3");
+  EXPECT_EQ(code_thrown_by([&] { put(text_of(1'500)); }), ErrorCode::kUnavailable);
+  EXPECT_EQ(peer().open_uploads(), 0);
+}
+
+TEST_F(S3Blobs, AWrongKeyIsRefusedAndNotTold) {
+  test::write_file(folder_ / "credentials", S3Peer::credentials(false));
+  const auto error = thrown_by([&] { put("hello"); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
+  EXPECT_THAT(error->what(), Not(HasSubstr("another")));
+  EXPECT_FALSE(blobs_->answers());
+  test::write_file(folder_ / "credentials", S3Peer::credentials());
+  EXPECT_EQ(get(put("hello")), "hello") << "the file is read again";
+}
+
+TEST_F(S3Blobs, ALongListComesInPages) {
+  peer().list_in_pages_of(3);
+  for (int n = 0; n < 10; ++n) put(std::to_string(n));
+  const auto nothing = [](const std::string& /*key*/) { return false; };
+  const auto later = Steady::clock::now() + std::chrono::hours(1);
+  EXPECT_EQ(blobs_->sweep(later, nothing).quarantined, 10U);
+  EXPECT_EQ(blobs_->bytes(), 10U);
+  EXPECT_EQ(blobs_->empty_quarantine(Time::max(), nothing), 10U);
+  EXPECT_TRUE(peer().keys().empty());
+}
+
+TEST_F(S3Blobs, ARequestThatMayBeLateKeepsOthersFromStoringIt) {
+  const std::string key = put("hello");
+  peer().fail("late", 1, "DELETE", "/blobs/");
+  const auto nothing = [](const std::string& /*key*/) { return false; };
+  EXPECT_TRUE(blobs_->erase_unnamed(std::span(&key, 1), Steady::clock::now(), nothing).empty());
+  ASSERT_EQ(peer().keys().size(), 1U);
+  EXPECT_THAT(peer().keys().front(), HasSubstr("going/" + key));
+  peer().age(peer().keys().front(), std::chrono::minutes(21));
+  EXPECT_EQ(get(put("hello")), "hello");
+}
+
+TEST_F(S3Blobs, WhatADaemonThatDiedHeldIsNotHeldForEver) {
+  const std::string key = put("hello");
+  peer().put("holds/" + key + "/0123456789abcdef", "");
+  const auto nothing = [](const std::string& /*key*/) { return false; };
+  const auto an_hour_ago = Steady::clock::now() - std::chrono::hours(1);
+  EXPECT_EQ(blobs_->sweep(an_hour_ago, nothing).quarantined, 0U);
+  peer().age("holds/" + key + "/0123456789abcdef", std::chrono::hours(2));
+  EXPECT_EQ(blobs_->sweep(an_hour_ago, nothing).quarantined, 1U);
+  peer().age("holds/" + key + "/0123456789abcdef", std::chrono::hours(24));
+  blobs_->sweep(an_hour_ago, nothing);
+  EXPECT_THAT(peer().keys(), Not(Contains(HasSubstr("holds/"))));
+}
+
+TEST_F(S3Blobs, WhatIsHereIsNotFetched) {
+  const std::string key = put("hello");
+  EXPECT_EQ(get(key), "hello");
+  EXPECT_EQ(test::read_file(blobs_->local(key).path), "hello");
+  peer().fail("drop");
+  EXPECT_EQ(get(key), "hello");
+  peer().recover();
+  open();
+  EXPECT_EQ(get(key), "hello") << "a copy outlives the daemon";
+  EXPECT_EQ(peer().count("GET", "/blobs/"), 0);
+}
+
+TEST_F(S3Blobs, ACopyThatADiskHasSpoiltIsFetchedAnew) {
+  const std::string key = put("hello");
+  test::write_file(copy_of(key), "hallo");
+  EXPECT_EQ(get(key), "hello");
+  EXPECT_EQ(peer().count("GET", "/blobs/"), 1);
+}
+
+class SmallCache : public S3Blobs {
+ protected:
+  SmallCache() { options_.cache_bytes = 100; }
+};
+
+TEST_F(SmallCache, WhatWasNotUsedForLongestGoes) {
+  const std::string first = put(std::string(40, '1'));
+  const std::string second = put(std::string(40, '2'));
+  get(first);
+  const std::string third = put(std::string(40, '3'));
+  EXPECT_TRUE(std::filesystem::exists(copy_of(first)));
+  EXPECT_FALSE(std::filesystem::exists(copy_of(second)));
+  EXPECT_EQ(get(second), std::string(40, '2'));
+}
+
+TEST_F(SmallCache, WhatIsInUseStays) {
+  const std::string first = put(std::string(80, '1'));
+  const LocalBlob in_use = blobs_->local(first);
+  put(std::string(80, '2'));
+  EXPECT_EQ(test::read_file(in_use.path), std::string(80, '1'));
+}
+
+TEST_F(SmallCache, WhatIsLargerThanAllOfItCanBeUsed) {
+  const std::string key = put(std::string(200, '1'));
+  std::filesystem::remove(copy_of(key));
+  EXPECT_TRUE(blobs_->is_intact(key, {}));
+  EXPECT_EQ(test::read_file(blobs_->local(key).path), std::string(200, '1'));
+  EXPECT_EQ(peer().count("GET", "/blobs/"), 1) << "once for both";
+  put("another");
+  EXPECT_FALSE(std::filesystem::exists(copy_of(key)));
+}
+
+TEST_F(S3Blobs, CopiesOfWhatNothingNamesGoWithASweep) {
+  const std::string key = put("hello");
+  const std::string other = put("other");
+  blobs_->sweep({}, [&](const std::string& asked) { return asked == other; });
+  EXPECT_FALSE(std::filesystem::exists(copy_of(key)));
+  EXPECT_TRUE(std::filesystem::exists(copy_of(other)));
+}
+
+TEST_F(S3Blobs, ALinkIsGoodForWhoeverHasIt) {
+  const std::string key = put("hello");
+  const LinkedAs as = {.name = "mesh 1.drc", .media_type = "application/octet-stream"};
+  const std::string link = blobs_->link(key, as).value();
+  const auto fetched = [&](const std::string& url) {
+    httplib::Client client(peer().endpoint());
+    return client.Get(url.substr(peer().endpoint().size()));
+  };
+  const auto answer = fetched(link);
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->status, 200);
+  EXPECT_EQ(answer->body, "hello");
+  EXPECT_EQ(answer->get_header_value("Content-Disposition"), "attachment; filename=\"mesh 1.drc\"");
+  EXPECT_THAT(link, Not(HasSubstr("secret")));
+  std::string changed = link;
+  changed.replace(changed.find("mesh"), 4, "mess");
+  EXPECT_EQ(fetched(changed)->status, 403);
+}
+
+TEST(S3Address, NamesBucketPrefixAndService) {
+  const S3Address own =
+      parse_s3_url("s3://meshes/of/us?endpoint=https://s3.example:9000&region=x-1");
+  EXPECT_EQ(own.endpoint, "https://s3.example:9000");
+  EXPECT_EQ(own.path, "/meshes");
+  EXPECT_EQ(own.prefix, "of/us/");
+  EXPECT_EQ(own.region, "x-1");
+  const S3Address aws = parse_s3_url("s3://meshes?region=eu-central-1");
+  EXPECT_EQ(aws.endpoint, "https://meshes.s3.eu-central-1.amazonaws.com");
+  EXPECT_EQ(aws.path, "");
+  EXPECT_EQ(aws.prefix, "");
+  EXPECT_EQ(parse_s3_url("s3://abc?endpoint=http://h&style=host").endpoint, "http://abc.h");
+  EXPECT_EQ(parse_s3_url("s3://abc").region, "us-east-1");
+}
+
+TEST(S3Address, IsRefusedWhereItMakesNoSense) {
+  for (const char* text :
+       {"s3://", "s3://ab", "s3://UPPER", "s3://a b c", "s3://bucket/a//b", "s3://bucket/%41",
+        "s3://bucket?", "s3://bucket?region", "s3://bucket?key=1", "s3://bucket?region=a&region=b",
+        "s3://bucket?endpoint=s3.example", "s3://bucket?endpoint=http://",
+        "s3://bucket?endpoint=http://user:secret@host", "s3://bucket?endpoint=http://host/path",
+        "s3://bucket?style=other", "s3://bucket?region=a/b"}) {
+    EXPECT_EQ(code_thrown_by([&] { parse_s3_url(text); }), ErrorCode::kInvalidParameter) << text;
+  }
+}
+
+TEST(S3Credentials, ComeFromTheDefaultSectionOfAFile) {
+  const test::TemporaryFolder folder;
+  test::write_file(folder / "keys",
+                   "[other]\naws_access_key_id = wrong\n[default]\n# mine\naws_access_key_id = id\n"
+                   "aws_secret_access_key=a=b/c+d\naws_session_token = t\n");
+  const S3Credentials keys = read_s3_credentials(folder / "keys");
+  EXPECT_EQ(keys.access_key, "id");
+  EXPECT_EQ(keys.secret_key, "a=b/c+d");
+  EXPECT_EQ(keys.session_token, "t");
+}
+
+TEST(S3Credentials, AreNeverRepeated) {
+  const test::TemporaryFolder folder;
+  test::write_file(folder / "keys", "aws_secret_access_key = geheim\n");
+  const auto error = thrown_by([&] { read_s3_credentials(folder / "keys"); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(test::fields_of(*error), std::vector<std::string>{"blob-credentials"});
+  EXPECT_THAT(error->what(), Not(HasSubstr("geheim")));
+  EXPECT_EQ(code_thrown_by([&] { read_s3_credentials(folder / "absent"); }),
+            ErrorCode::kInvalidParameter);
+}
+
+}  // namespace
+}  // namespace isomesh::store
