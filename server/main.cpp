@@ -301,6 +301,7 @@ int run(const Options& options, const sigset_t& signals) {
   jobs::Estimator estimator(volumes, blobs, jobs, limits, job_program);
   http::ServerOptions server_options = options.http;
   server_options.tls = files.tls.get();
+  server_options.part_bytes = options.max_disk / 4;
   server_options.connections = net::connections_within(net::raise_descriptor_limit());
   const auto hospital = open_hospital(options, runner.program);
   store::OrderStore& order_store = records->orders();

@@ -131,7 +131,8 @@ std::vector<UploadedVolume> Client::upload_all(const std::vector<std::filesystem
     }
   };
   constexpr int kMultiStatus = 207;
-  const HttpAnswer answer = impl_->answer(request);
+  const bool is_resumable = file.size() >= options.resumable_bytes;
+  const HttpAnswer answer = is_resumable ? impl_->resumed(request) : impl_->answer(request);
   if (answer.status == kMultiStatus) return uploaded_volumes_from_json(answer.body);
   return {{.member = {}, .status = answer.status, .volume = volume_from_json(answer.body)}};
 }

@@ -61,6 +61,10 @@ struct UploadOptions {
   // Sends the file's SHA-256 ahead, so that the server refuses a body that changed on the way.
   // Costs a second reading of the file.
   bool digest = false;
+  // A body of so many bytes or more goes on where its connection broke, if it is not broken for
+  // longer than a minute. Fewer are sent in one request, which is not repeated.
+  std::uint64_t resumable_bytes = std::uint64_t{8} << 20;
+  // Is told less than before when an upload goes on.
   TransferProgress progress = {};
 };
 
@@ -100,7 +104,8 @@ struct JobPage {
 // Every request has a connection of its own, so a Client may be used from several threads. It goes
 // straight to the server: the environment's proxies are not used. No signals are raised. Callbacks
 // run on the calling thread. A GET, or the submission of a job, whose connection broke is tried
-// again, three times at most; nothing else is, and neither is a server that cannot be connected to.
+// again, three times at most, and a large upload goes on where it broke; nothing else is, and
+// neither is a server that cannot be connected to.
 class Client {
  public:
   // Throws Error kInvalidParameter when the server's address or the token is malformed. Connects to

@@ -76,6 +76,8 @@ ErrorCode code_of_status(int status) {
   }
 }
 
+}  // namespace
+
 Error refusal(const HttpAnswer& answer) {
   const std::string status = "the server answered with status " + std::to_string(answer.status);
   if (!answer.content_type.starts_with("application/problem+json")) {
@@ -94,23 +96,21 @@ Error refusal(const HttpAnswer& answer) {
       .with_remedy(problem.remedy);
 }
 
-}  // namespace
-
 Client::Impl::Impl(ClientOptions&& options)
     : stop_(options.stop), transport_(transport_options(std::move(options))) {}
 
 HttpAnswer Client::Impl::answer(const HttpRequest& request) const {
   HttpAnswer answer = transport_.send(request);
-  if (answer.status < 200 || answer.status >= 300) throw refusal(answer);
+  if (!is_success(answer)) throw refusal(answer);
   return answer;
 }
 
-std::string Client::Impl::repeat(const HttpRequest& request,
-                                 const std::function<void()>& before) const {
+HttpAnswer Client::Impl::repeated(const HttpRequest& request,
+                                  const std::function<void()>& before) const {
   for (int attempt = 1;; ++attempt) {
     try {
       if (before) before();
-      return send(request);
+      return answer(request);
     } catch (const NoAnswer& lost) {
       if (!lost.broken() || attempt == kTries) throw;
     }

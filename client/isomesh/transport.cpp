@@ -147,6 +147,8 @@ class Transfer {
     } else if (request_.method == "POST" || request_.method == "PATCH") {
       set(CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(request_.body.size()));
       set(CURLOPT_POSTFIELDS, request_.body.data());
+    } else if (request_.method == "HEAD") {
+      set(CURLOPT_NOBODY, 1L);
     }
     set(CURLOPT_CUSTOMREQUEST, request_.method.c_str());
     set(CURLOPT_UPLOAD_BUFFERSIZE, kPieceBytes);
@@ -218,9 +220,11 @@ class Transfer {
     auto& transfer = *static_cast<Transfer*>(self);
     const std::string_view text(line, size);
     transfer.head_bytes_ += size;
-    if (text.starts_with("HTTP/")) transfer.head_is_whole_ = false;
-    if (trimmed(text).empty()) transfer.head_is_whole_ = true;
-    return transfer.head_bytes_ <= kLongestHead ? size : 0;
+    if (transfer.head_bytes_ > kLongestHead) return 0;
+    return transfer.guarded(0, [&] {
+      transfer.take_head(trimmed(text));
+      return size;
+    });
   }
 
   static std::size_t on_body(char* bytes, std::size_t, std::size_t size, void* self) {
@@ -234,6 +238,19 @@ class Transfer {
   static std::size_t on_source(char* bytes, std::size_t, std::size_t size, void* self) {
     auto& transfer = *static_cast<Transfer*>(self);
     return transfer.guarded(CURL_READFUNC_ABORT, [&] { return transfer.provide({bytes, size}); });
+  }
+
+  void take_head(std::string_view line) {
+    if (line.starts_with("HTTP/")) {
+      head_is_whole_ = false;
+      answer_.headers.clear();
+    } else if (line.empty()) {
+      head_is_whole_ = true;
+    } else {
+      const std::size_t colon = std::min(line.find(':'), line.size());
+      const std::string_view value = line.substr(std::min(colon + 1, line.size()));
+      answer_.headers.emplace_back(lower(line.substr(0, colon)), trimmed(value));
+    }
   }
 
   void take(std::string_view piece) {
@@ -286,6 +303,11 @@ class Transfer {
 };
 
 }  // namespace
+
+std::string HttpAnswer::header(std::string_view name) const {
+  const auto found = std::ranges::find(headers, name, &std::pair<std::string, std::string>::first);
+  return found == headers.end() ? std::string() : found->second;
+}
 
 HttpAnswer Transport::send(const HttpRequest& request) const {
   return Transfer(options_, request).answer();

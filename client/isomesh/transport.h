@@ -42,6 +42,10 @@ struct HttpAnswer {
   int status = 0;
   std::string content_type;
   std::string body;
+  std::vector<std::pair<std::string, std::string>> headers;  // names in lower case
+
+  // The first of that name, which is in lower case; empty without one.
+  std::string header(std::string_view name) const;
 };
 
 // kUnreachable, and whether the connection was there and broke: then trying again can help.

@@ -1,62 +1,217 @@
 #include "server/http/kept_uploads.h"
 
 #include <algorithm>
+#include <map>
+#include <set>
 #include <utility>
+#include <vector>
+
+#include <spdlog/spdlog.h>
 
 #include "base/ids.h"
 #include "proto/error.h"
 
 namespace isomesh::http {
+namespace {
 
-KeptUploads::KeptUploads(const KeptLimits& limits)
-    : limits_(limits), thread_([this](const std::stop_token& stop) { run(stop); }) {}
+constexpr std::size_t kNameBytes = 16;
+
+Error gone() { return {ErrorCode::kGone, "this upload is not kept any more; send it again"}; }
+
+}  // namespace
+
+KeptUploads::KeptUploads(const KeptLimits& limits, std::filesystem::path folder)
+    : limits_(limits),
+      folder_(std::move(folder)),
+      thread_([this](const std::stop_token& stop) { run(stop); }) {
+  if (!folder_.empty()) find_left();
+}
+
+void KeptUploads::find_left() {
+  namespace fs = std::filesystem;
+  std::error_code absent;
+  std::vector<Partial> left;
+  std::set<fs::path> unknown;
+  for (const auto& entry : fs::directory_iterator(folder_, absent)) {
+    unknown.insert(entry.path());
+  }
+  const std::set<fs::path> files = unknown;
+  for (const fs::path& file : files) {
+    if (file.extension() != ".json") continue;
+    try {
+      left.push_back(std::make_shared<PartialUpload>(folder_, file.stem().string()));
+      unknown.erase(file);
+      unknown.erase(folder_ / file.stem());
+    } catch (const Error& error) {
+      spdlog::info("an upload that has not come whole is let go: {}", error.what());
+    }
+  }
+  for (const fs::path& file : unknown) fs::remove(file, absent);
+  std::ranges::sort(left, {}, [](const Partial& each) { return each->written_at(); });
+  const Lock lock(mutex_);
+  for (Partial& each : left) {
+    const auto age = fs::file_time_type::clock::now() - each->written_at();
+    Entry entry{each->note().owner, each->name(), nullptr, std::move(each), {}};
+    entry.until = end_of(entry) - std::chrono::duration_cast<Clock::duration>(age);
+    kept_.push_back(std::move(entry));
+  }
+  make_room();
+  changed_.notify_all();
+}
+
+KeptUploads::Clock::time_point KeptUploads::end_of(const Entry& entry) const {
+  const bool comes = entry.partial && !entry.partial->note().is_complete;
+  return Clock::now() + (comes ? limits_.part_time : limits_.time);
+}
 
 std::string KeptUploads::keep(const std::string& owner, Kept upload) {
-  constexpr std::size_t kNameBytes = 16;
   std::string name = random_hex(kNameBytes);
   const Lock lock(mutex_);
-  const auto is_owners = [&owner](const Entry& entry) { return entry.owner == owner; };
-  const auto count = static_cast<std::size_t>(std::ranges::count_if(kept_, is_owners));
-  if (count >= limits_.each) {
+  const auto is_whole = [](const Entry& entry) { return !entry.partial; };
+  const auto is_owners = [&](const Entry& entry) {
+    return is_whole(entry) && entry.owner == owner;
+  };
+  if (std::cmp_greater_equal(std::ranges::count_if(kept_, is_owners), limits_.each)) {
     kept_.erase(std::ranges::find_if(kept_, is_owners));
-  } else if (kept_.size() >= limits_.all) {
-    kept_.pop_front();
+  } else if (std::cmp_greater_equal(std::ranges::count_if(kept_, is_whole), limits_.all)) {
+    kept_.erase(std::ranges::find_if(kept_, is_whole));
   }
-  kept_.push_back({owner, name, std::move(upload), Clock::now() + limits_.time});
+  kept_.push_back({owner, name, std::move(upload), nullptr, Clock::now() + limits_.time});
   changed_.notify_all();
   return name;
 }
 
+KeptUploads::Partial KeptUploads::begin(PartialNote note) {
+  std::filesystem::create_directories(folder_);
+  const std::string owner = note.owner;
+  auto upload = std::make_shared<PartialUpload>(folder_, random_hex(kNameBytes), std::move(note));
+  const Lock lock(mutex_);
+  kept_.push_back({owner, upload->name(), nullptr, upload, Clock::now() + limits_.part_time});
+  make_room();
+  changed_.notify_all();
+  return upload;
+}
+
 KeptUploads::Kept KeptUploads::find(const std::string& owner, const std::string& name) {
   const Lock lock(mutex_);
-  const auto found = std::ranges::find_if(
-      kept_, [&](const Entry& entry) { return entry.owner == owner && entry.name == name; });
-  if (found == kept_.end()) {
-    throw Error(ErrorCode::kGone, "this upload is not kept any more; send it again");
+  const auto entry = found(owner, name);
+  if (!entry->partial) return entry->upload;
+  if (!entry->partial->note().is_complete) {
+    throw Error(ErrorCode::kNotReady, "this upload has not come whole yet");
   }
-  found->until = Clock::now() + limits_.time;
-  kept_.splice(kept_.end(), kept_, found);
-  return found->upload;
+  Kept body = entry->partial->body();
+  if (!body) throw gone();
+  return body;
+}
+
+KeptUploads::Partial KeptUploads::find_partial(const std::string& owner, const std::string& name) {
+  const Lock lock(mutex_);
+  const auto entry = found(owner, name);
+  if (!entry->partial) throw gone();
+  return entry->partial;
+}
+
+std::string KeptUploads::became(const std::string& owner, const std::string& name) {
+  const Lock lock(mutex_);
+  const auto entry = found(owner, name);
+  return entry->partial ? entry->partial->note().volume : std::string();
+}
+
+KeptUploads::Entries::iterator KeptUploads::look_up(const std::string& owner,
+                                                    const std::string& name) {
+  return std::ranges::find_if(
+      kept_, [&](const Entry& each) { return each.owner == owner && each.name == name; });
+}
+
+KeptUploads::Entries::iterator KeptUploads::found(const std::string& owner,
+                                                  const std::string& name) {
+  const auto entry = look_up(owner, name);
+  if (entry == kept_.end()) throw gone();
+  entry->until = end_of(*entry);
+  kept_.splice(kept_.end(), kept_, entry);
+  return entry;
+}
+
+void KeptUploads::settle(const std::string& owner, const std::string& name,
+                         const std::string& volume) {
+  const Lock lock(mutex_);
+  const auto entry = look_up(owner, name);
+  if (entry == kept_.end()) return;
+  if (!entry->partial) return erase(entry);
+  if (!volume.empty()) entry->partial->become(volume);
 }
 
 void KeptUploads::let_go(const std::string& owner, const std::string& name) {
   const Lock lock(mutex_);
-  std::erase_if(kept_,
-                [&](const Entry& entry) { return entry.owner == owner && entry.name == name; });
+  const auto entry = look_up(owner, name);
+  if (entry != kept_.end()) erase(entry);
 }
 
 void KeptUploads::let_all_go() {
   const Lock lock(mutex_);
-  kept_.clear();
+  for (auto entry = kept_.begin(); entry != kept_.end();) {
+    const auto next = std::next(entry);
+    if (!entry->partial || entry->is_idle()) erase(entry);
+    entry = next;
+  }
+}
+
+void KeptUploads::erase(Entries::iterator entry) {
+  if (entry->partial) entry->partial->let_go();
+  kept_.erase(entry);
+}
+
+void KeptUploads::make_room() {
+  const auto one = [](const Entry&) { return std::uint64_t{1}; };
+  const auto bytes = [](const Entry& entry) { return entry.partial->bytes(); };
+  const auto make = [&](const std::function<std::uint64_t(const Entry&)>& weight,
+                        std::uint64_t most) ISOMESH_REQUIRES(mutex_) {
+    while (true) {
+      std::uint64_t all = 0;
+      for (const Entry& entry : kept_) all += entry.partial ? weight(entry) : 0;
+      const auto next = all > most ? next_to_go(weight) : kept_.end();
+      if (next == kept_.end()) return;
+      erase(next);
+    }
+  };
+  make(one, limits_.parts);
+  make(bytes, limits_.part_bytes);
+}
+
+KeptUploads::Entries::iterator KeptUploads::next_to_go(
+    const std::function<std::uint64_t(const Entry&)>& weight) {
+  std::map<std::string, std::uint64_t> of_owner;
+  for (const Entry& entry : kept_) {
+    if (entry.is_idle()) of_owner[entry.owner] += weight(entry);
+  }
+  const auto most =
+      std::ranges::max_element(of_owner, {}, [](const auto& owner) { return owner.second; });
+  if (most == of_owner.end()) return kept_.end();
+  return std::ranges::find_if(
+      kept_, [&](const Entry& entry) { return entry.is_idle() && entry.owner == most->first; });
 }
 
 void KeptUploads::run(const std::stop_token& stop) {
   Lock lock(mutex_);
   while (!stop.stop_requested()) {
-    std::erase_if(kept_, [](const Entry& entry) { return entry.until <= Clock::now(); });
+    const Clock::time_point now = Clock::now();
+    // Whatever comes meanwhile stays for longer than that.
+    Clock::time_point next = now + std::min(limits_.time, limits_.part_time);
+    for (auto entry = kept_.begin(); entry != kept_.end();) {
+      const auto after = std::next(entry);
+      // One that somebody sends just now is not waited for.
+      if (entry->partial && !entry->is_idle())
+        entry->until = std::max(entry->until, end_of(*entry));
+      if (entry->until <= now) {
+        erase(entry);
+      } else {
+        next = std::min(next, entry->until);
+      }
+      entry = after;
+    }
+    make_room();
     const auto is_there = [this]() ISOMESH_REQUIRES(mutex_) { return !kept_.empty(); };
     if (!changed_.wait(lock, stop, is_there)) return;
-    const Clock::time_point next = kept_.front().until;
     changed_.wait_until(lock, stop, next, [] { return false; });
   }
 }

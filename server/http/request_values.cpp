@@ -39,16 +39,17 @@ std::optional<std::string_view> preference_in(std::string_view header, std::stri
   return std::nullopt;
 }
 
-std::string hex_of_base64(std::string_view text) {
+std::string hex_of_base64(std::string_view text, const std::string& header) {
   const auto digest = from_base64(text);
   if (!digest || digest->size() != Sha256::kBytes) {
-    throw invalid_parameter("Content-Digest", "sha-256 must be 32 bytes in base64 between colons");
+    throw invalid_parameter(header, "sha-256 must be 32 bytes in base64 between colons");
   }
   return to_hex(*digest);
 }
 
 // A member of a digest header: an algorithm's name and bytes in base64 between colons (RFC 9530).
-std::pair<std::string_view, std::string_view> digest_member(std::string_view member) {
+std::pair<std::string_view, std::string_view> digest_member(std::string_view member,
+                                                            const std::string& header) {
   const std::size_t equals = member.find('=');
   const std::string_view name = member.substr(0, equals);
   const std::string_view value = equals == std::string_view::npos ? "" : member.substr(equals + 1);
@@ -58,7 +59,7 @@ std::pair<std::string_view, std::string_view> digest_member(std::string_view mem
       value.size() >= 2 && value.front() == ':' && value.back() == ':' &&
       value.substr(1, value.size() - 2).find_first_not_of(kBase64) == std::string_view::npos;
   if (name.empty() || !is_bytes) {
-    throw invalid_parameter("Content-Digest", "must be NAME=:BASE64:, such as sha-256=:...:");
+    throw invalid_parameter(header, "must be NAME=:BASE64:, such as sha-256=:...:");
   }
   return {name, value.substr(1, value.size() - 2)};
 }
@@ -141,15 +142,14 @@ std::string idempotency_key_of(const Request& request) {
   return key;
 }
 
-std::optional<std::string> sha256_of_content_digest(const Request& request) {
-  if (!request.has_header("Content-Digest")) return std::nullopt;
-  const std::string_view header = request.header("Content-Digest");
+std::optional<std::string> sha256_of_digest(const Request& request, const std::string& header) {
+  if (!request.has_header(header)) return std::nullopt;
   std::optional<std::string> sha256;
-  for (const std::string_view member : split(header, ',')) {
-    const auto [name, value] = digest_member(member);
+  for (const std::string_view member : split(request.header(header), ',')) {
+    const auto [name, value] = digest_member(member, header);
     if (name != "sha-256") continue;
-    if (sha256) throw invalid_parameter("Content-Digest", "names sha-256 twice");
-    sha256 = hex_of_base64(value);
+    if (sha256) throw invalid_parameter(header, "names sha-256 twice");
+    sha256 = hex_of_base64(value, header);
   }
   return sha256;
 }

@@ -29,9 +29,12 @@ std::chrono::milliseconds wait_of(const Request& request);
 // The Idempotency-Key header, as it is; empty without one. At most 255 printable characters.
 std::string idempotency_key_of(const Request& request);
 
-// The SHA-256 that Content-Digest names (RFC 9530), as hex; empty when it names none, but only
-// other algorithms.
-std::optional<std::string> sha256_of_content_digest(const Request& request);
+// The SHA-256 that a header such as Content-Digest names (RFC 9530), as hex; empty when it names
+// none, but only other algorithms.
+std::optional<std::string> sha256_of_digest(const Request& request, const std::string& header);
+inline std::optional<std::string> sha256_of_content_digest(const Request& request) {
+  return sha256_of_digest(request, "Content-Digest");
+}
 
 // What Repr-Digest holds for that SHA-256 in hex.
 std::string digest_header(std::string_view sha256);

@@ -125,6 +125,7 @@ struct Server::State {
 Server::Server(const Services& services, const ServerOptions& options)
     : state_(std::make_unique<State>(services, options)) {
   add_volume_routes(state_->app);
+  add_upload_routes(state_->app);
   add_job_routes(state_->app);
   add_mesh_routes(state_->app);
   add_inspect_routes(state_->app);

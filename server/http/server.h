@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -35,6 +36,8 @@ struct ServerOptions {
   std::chrono::milliseconds request_time{10'000};
   std::size_t event_streams = 512;
   UploadLimits upload;
+  // That uploads which come in parts may take together; 0: a quarter of the disk.
+  std::uint64_t part_bytes = 0;
   std::vector<std::string> cors_origins;  // pages of which origins may use the service, `*` for all
   std::vector<std::string> hosts;         // names of this service beside loopback's, without ports
   bool blob_redirect = false;             // downloads may be sent to where the bytes are

@@ -1,11 +1,16 @@
 #include "server/http/upload.h"
 
+#include <algorithm>
 #include <exception>
+#include <functional>
 #include <optional>
+#include <span>
+#include <utility>
 
 #include "base/hex.h"
 #include "base/sha256.h"
 #include "server/http/import_query.h"
+#include "server/http/partial_upload.h"
 #include "server/http/request_values.h"
 
 namespace isomesh::http {
@@ -24,8 +29,9 @@ Error too_large(std::uint64_t max_bytes) {
   return {ErrorCode::kTooLarge, "the body exceeds " + std::to_string(max_bytes) + " bytes"};
 }
 
-void check_length(const Request& request, std::uint64_t max_bytes) {
-  if (request.content_length.value_or(0) > max_bytes) throw too_large(max_bytes);
+void check_length(const Request& request, std::uint64_t max_bytes, std::uint64_t offset = 0) {
+  const std::uint64_t left = max_bytes - std::min(offset, max_bytes);
+  if (request.content_length.value_or(0) > left) throw too_large(max_bytes);
 }
 
 Error other_digest() {
@@ -58,13 +64,17 @@ void check_room(const store::DataFolder& folder, const Request& request) {
 // through, so that it is kept and ends the reading.
 class Receiver {
  public:
-  Receiver(ScratchFile& file, store::Reserve& reserve, const UploadLimits& limits,
-           const std::atomic<bool>& stopping, bool is_digested)
-      : file_(file),
+  using Write = std::function<void(std::span<const std::byte> piece)>;
+
+  // With `offset` bytes that were there before.
+  Receiver(Write write, store::Reserve& reserve, const UploadLimits& limits,
+           const std::atomic<bool>& stopping, bool is_digested, std::uint64_t offset = 0)
+      : write_(std::move(write)),
         reserve_(reserve),
         limits_(limits),
         stopping_(stopping),
-        is_digested_(is_digested) {}
+        is_digested_(is_digested),
+        bytes_(offset) {}
 
   bool take(std::string_view data) {
     try {
@@ -109,6 +119,12 @@ class Receiver {
     write_held();
   }
 
+  // The same of a part, of which what has come stays.
+  void finish_part(const BodyReader& body, bool complete) {
+    if (!failure_) write_held();
+    if (failure_ || !complete) finish(body, complete, false);
+  }
+
   const std::string& file_name() const { return file_name_; }
   std::string digest() { return to_hex(digest_.finish()); }
 
@@ -118,21 +134,21 @@ class Receiver {
   void write_held() {
     const auto piece = std::as_bytes(std::span(held_));
     reserve_.check_room();
-    file_.write(piece);
+    write_(piece);
     if (is_digested_) digest_.update(piece);
     held_.clear();
   }
 
-  ScratchFile& file_;
+  const Write write_;
   store::Reserve& reserve_;
   const UploadLimits& limits_;
   const std::atomic<bool>& stopping_;
   const bool is_digested_;
+  std::uint64_t bytes_;
   std::string held_;  // what is not written yet
   const std::chrono::steady_clock::time_point deadline_ =
       std::chrono::steady_clock::now() + limits_.max_time;
   Sha256 digest_;
-  std::uint64_t bytes_ = 0;
   int fields_ = 0;
   std::string file_name_;
   std::exception_ptr failure_;
@@ -151,7 +167,8 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
   if (is_form && expected) {
     throw invalid_parameter("Content-Digest", "is not supported with a form: send the bare file");
   }
-  Receiver receiver(file_, folder.reserve(), limits, stopping, expected.has_value());
+  const auto write = [this](std::span<const std::byte> piece) { file_.write(piece); };
+  Receiver receiver(write, folder.reserve(), limits, stopping, expected.has_value());
   const auto take = [&](std::string_view piece) { return receiver.take(piece); };
   const bool complete = is_form ? request.body->read_form(
                                       [&](const std::string& name, const std::string& file_name) {
@@ -161,7 +178,26 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
                                 : request.body->read(take);
   receiver.finish(*request.body, complete, is_form);
   if (expected && receiver.digest() != *expected) throw other_digest();
-  name_ = is_form ? receiver.file_name() : file_name_of(request.header("Content-Disposition"));
+  body_ = {file_.path(),
+           is_form ? receiver.file_name() : file_name_of(request.header("Content-Disposition"))};
+}
+
+void receive_part(PartialUpload& upload, const PartialTurn& turn, const store::DataFolder& folder,
+                  const UploadLimits& limits, const std::atomic<bool>& stopping,
+                  const Request& request) {
+  refuse_encoded(request);
+  check_length(request, limits.max_bytes, turn.offset);
+  check_room(folder, request);
+  const std::optional<std::string> expected = sha256_of_content_digest(request);
+  const auto write = [&](std::span<const std::byte> piece) { upload.write(turn, piece); };
+  Receiver receiver(write, folder.reserve(), limits, stopping, expected.has_value(), turn.offset);
+  const bool complete =
+      request.body->read([&](std::string_view piece) { return receiver.take(piece); });
+  receiver.finish_part(*request.body, complete);
+  if (expected && receiver.digest() != *expected) {
+    upload.take_back(turn);
+    throw other_digest();
+  }
 }
 
 std::string read_text(const Request& request, std::size_t max_bytes) {

@@ -18,6 +18,14 @@ struct UploadLimits {
   std::chrono::seconds max_time = std::chrono::hours(1);  // in all; each read has its own limit
 };
 
+// A body that has come whole.
+struct ReceivedBody {
+  std::filesystem::path path;
+  // What the client calls the file, without folders: the name in the form, or in the header
+  // Content-Disposition. May be empty, and may name a patient.
+  std::string name;
+};
+
 // A request's body in a file: written as it comes, counted, checked against its Content-Digest. The
 // destructor removes the file. Not thread safe.
 class Upload {
@@ -28,15 +36,22 @@ class Upload {
   Upload(const store::DataFolder& folder, const UploadLimits& limits,
          const std::atomic<bool>& stopping, const Request& request);
 
-  const std::filesystem::path& path() const { return file_.path(); }
-  // What the client calls the file, without folders: the name in the form, or in the header
-  // Content-Disposition. May be empty, and may name a patient.
-  const std::string& name() const { return name_; }
+  const ReceivedBody& body() const { return body_; }
 
  private:
   ScratchFile file_;
-  std::string name_;
+  ReceivedBody body_;
 };
+
+class PartialUpload;
+struct PartialTurn;
+
+// Appends the request's body. What came stays, also where the rest does not, unless it is not what
+// Content-Digest says. Throws as Upload does but for an empty body, and as PartialUpload's
+// functions do.
+void receive_part(PartialUpload& upload, const PartialTurn& turn, const store::DataFolder& folder,
+                  const UploadLimits& limits, const std::atomic<bool>& stopping,
+                  const Request& request);
 
 // A small body, whole in memory. Throws Error kTooLarge beyond `max_bytes`, kUnsupportedMedia,
 // kInvalidParameter, kRequestTimeout.

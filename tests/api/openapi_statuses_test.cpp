@@ -109,6 +109,40 @@ void probe_volumes(Statuses& statuses, const Job& running, const std::string& id
   statuses.probe(erase, "/v1/volumes/" + id);
 }
 
+void probe_uploads(Statuses& statuses, const Daemon& daemon) {
+  const std::string post = "POST /v1/volumes";
+  const Headers begin = {{"Upload-Complete", "?0"}};
+  const auto place_for = [&](const std::string& query) {
+    return daemon.send("POST", "/v1/volumes" + query, {}, begin).header("location");
+  };
+  const auto part = [](bool is_last, const Headers& more = {}) {
+    Headers headers = {{"Content-Type", "application/partial-upload"},
+                       {"Upload-Offset", "0"},
+                       {"Upload-Complete", is_last ? "?1" : "?0"}};
+    headers.insert(headers.end(), more.begin(), more.end());
+    return headers;
+  };
+  const std::string patch = "PATCH /v1/uploads/{id}";
+  const RawUpload sphere = sphere_upload();
+  const std::string place = place_for('?' + sphere.query);
+  statuses.probe(post, "/v1/volumes?upload=" + place.substr(place.rfind('/') + 1));
+  statuses.probe(patch, place, sphere.bytes, part(true));
+  statuses.probe(patch, place_for("?dims=2,2,1&type=uint8"), "1234", part(true));
+  statuses.probe(patch, place_for(""), two_volumes(), part(true));
+  statuses.probe(patch, place_for(""), "garbage", part(true));
+  statuses.probe(patch, place_for(""), read_file(kBrainFile).substr(0, 5000), part(true));
+  const std::string open = place_for("");
+  statuses.probe(patch, open, "begin", part(false));
+  statuses.probe(patch, open, "begin", part(false));
+  statuses.probe(patch, open, "begin", part(false, {{"Upload-Length", "99999999999999"}}));
+  statuses.probe(patch, open + "?x=1", "begin", part(false));
+  statuses.see(patch, "PATCH " + open + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  for (const std::string method : {"GET", "DELETE"}) {
+    statuses.probe(method + " /v1/uploads/{id}", open + "?x=1");
+    statuses.probe(method + " /v1/uploads/{id}", open);
+  }
+}
+
 void probe_jobs(Statuses& statuses, const Job& job) {
   const std::string post = "POST /v1/jobs";
   const std::string body = "{\"volume\": \"" + job.parameters.volume + "\", \"iso\": 100}";
@@ -228,6 +262,7 @@ TEST_F(OpenApiTest, TheStatusesAreThoseOfTheServer) {
   probe_jobs(statuses, job_);
   probe_meshes(statuses, job_, running);
   probe_volumes(statuses, running, job_.parameters.volume);
+  probe_uploads(statuses, daemon_);
   probe_damaged(statuses, daemon_);
   probe_orders(statuses, order_, kOrder);
   for (const auto& path : api_.paths()) {

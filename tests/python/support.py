@@ -100,6 +100,68 @@ class Relay:
             passed += len(piece)
 
 
+class UploadRelay:
+    """Passes connections on to a server, and cuts the first `cuts` requests that grow beyond `after`
+    bytes there."""
+
+    def __init__(self, url, cuts, after):
+        host, port = url.removeprefix("http://").rsplit(":", 1)
+        self.target = host, int(port)
+        self.cuts, self.after = cuts, after
+        self.requests = []
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.url = f"http://127.0.0.1:{self.listener.getsockname()[1]}"
+        self.thread = threading.Thread(target=self.serve, daemon=True)
+        self.thread.start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.listener.shutdown(socket.SHUT_RDWR)
+        self.listener.close()
+        self.thread.join(60)
+
+    def serve(self):
+        while True:
+            try:
+                client, _ = self.listener.accept()
+            except OSError:
+                return
+            with client, socket.create_connection(self.target) as server:
+                answer = threading.Thread(target=self.answer, args=(client, server))
+                answer.start()
+                self.send(client, server)
+                answer.join(60)
+
+    @staticmethod
+    def answer(client, server):
+        try:
+            while piece := server.recv(65536):
+                client.sendall(piece)
+            client.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass  # it was cut
+
+    def send(self, client, server):
+        passed = 0
+        try:
+            while piece := client.recv(65536):
+                if passed == 0:
+                    self.requests.append(piece.split(b" HTTP", 1)[0].decode())
+                passed += len(piece)
+                server.sendall(piece)
+                if self.cuts > 0 and passed > self.after:
+                    self.cuts -= 1
+                    break
+            else:
+                return
+        except OSError:
+            return
+        for side in (client, server):
+            side.shutdown(socket.SHUT_RDWR)
+
+
 def ball(size=(40, 32, 24), radius=9.0, spacing=(1.0, 1.0, 1.0)):
     """Samples of distance from the middle, negated: the iso-value -r is a ball of the radius r."""
     axes = [(numpy.arange(n) - (n - 1) / 2) * step for n, step in zip(size, spacing)]

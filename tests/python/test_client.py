@@ -8,7 +8,7 @@ from unittest import mock
 
 import isomesh
 import numpy
-from support import DAEMON, DaemonTest, Relay, ball
+from support import DAEMON, DaemonTest, Relay, UploadRelay, ball
 
 
 class Files(DaemonTest):
@@ -197,6 +197,20 @@ class Connections(DaemonTest):
         with Relay(self.url, cuts=100, after=1000) as relay, self.assertRaises(isomesh.Unreachable):
             isomesh.Client(relay.url).download(job, target)
         self.assertEqual([each.name for each in self.folder.iterdir() if "never" in each.name], [])
+
+    def test_a_broken_upload_goes_on_where_it_broke(self):
+        samples = numpy.random.default_rng(1).integers(0, 100, (256, 256, 160), dtype=numpy.uint8)
+        with UploadRelay(self.url, cuts=2, after=3_000_000) as relay:
+            volume = isomesh.Client(relay.url).upload(samples)
+        self.assertEqual(volume["id"], self.client.upload(samples)["id"])
+        methods = [each.split()[0] for each in relay.requests]
+        self.assertEqual(methods, ["POST", "PATCH", "HEAD", "PATCH", "HEAD", "PATCH"])
+
+    def test_an_upload_that_is_refused_is_not_tried_again(self):
+        with UploadRelay(self.url, cuts=0, after=0) as relay, self.assertRaises(isomesh.Refused) as refused:
+            isomesh.Client(relay.url).upload(bytes(9 << 20))
+        self.assertEqual(refused.exception.status, 415)
+        self.assertEqual([each.split()[0] for each in relay.requests], ["POST", "PATCH", "DELETE"])
 
     def test_a_mesh_of_other_bytes_is_refused(self):
         job = self.client.mesh(ball(), iso=-8).job

@@ -72,7 +72,8 @@ void allow_reading(const OriginRules& rules, const Request& request, Response& r
   response.set_header(
       "Access-Control-Expose-Headers",
       "Accept-Ranges, Allow, Content-Disposition, Content-Range, ETag, "
-      "Isomesh-Upload, Location, Repr-Digest, Retry-After, Server-Timing, X-Request-Id");
+      "Isomesh-Upload, Location, Repr-Digest, Retry-After, Server-Timing, Upload-Complete, "
+      "Upload-Length, Upload-Limit, Upload-Offset, X-Request-Id");
 }
 
 bool is_preflight(const OriginRules& rules, const Request& request) {
@@ -83,10 +84,11 @@ bool is_preflight(const OriginRules& rules, const Request& request) {
 void answer_preflight(const std::string& methods, Response& response) {
   response.status = 204;
   response.set_header("Access-Control-Allow-Methods", methods);
-  response.set_header("Access-Control-Allow-Headers",
-                      "Authorization, Content-Digest, Content-Disposition, Content-Type, "
-                      "Idempotency-Key, If-Match, If-None-Match, If-Range, Last-Event-ID, Prefer, "
-                      "Range, traceparent");
+  response.set_header(
+      "Access-Control-Allow-Headers",
+      "Authorization, Content-Digest, Content-Disposition, Content-Type, "
+      "Idempotency-Key, If-Match, If-None-Match, If-Range, Last-Event-ID, Prefer, "
+      "Range, Repr-Digest, Upload-Complete, Upload-Length, Upload-Offset, traceparent");
   response.set_header("Access-Control-Max-Age", "600");
 }
 

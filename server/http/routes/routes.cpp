@@ -1,6 +1,7 @@
 #include "server/http/routes/routes.h"
 
 #include <exception>
+#include <filesystem>
 #include <new>
 
 #include <spdlog/spdlog.h>
@@ -26,6 +27,18 @@ ConnectionOptions connection_options(const ServerOptions& options) {
     connections.stream_of = [tls](int socket) { return tls->accept(socket); };
   }
   return connections;
+}
+
+KeptLimits kept_limits(const Services& services, const ServerOptions& options) {
+  KeptLimits limits;
+  limits.part_bytes =
+      options.part_bytes > 0 ? options.part_bytes : services.folder.reserve().capacity() / 4;
+  return limits;
+}
+
+// Beside the folder of what does not outlive the process.
+std::filesystem::path uploads_folder(const store::DataFolder& folder) {
+  return folder.scratch().parent_path() / "uploads";
 }
 
 void report_refused(Metrics& metrics, const std::string& address, const Error& error) {
@@ -65,6 +78,7 @@ App::App(const Services& the_services, const ServerOptions& the_options)
     : services(the_services),
       options(the_options),
       uploads(the_options.upload_places, "uploads"),
+      kept(kept_limits(the_services, the_options), uploads_folder(the_services.folder)),
       streams(the_options.event_streams, "streams of events"),
       rules{.cors_origins = the_options.cors_origins,
             .check_host = false,

@@ -145,6 +145,7 @@ void answer_mesh(const App& app, const Request& request, Response& response, con
                  const WhichMesh& which);
 
 void add_volume_routes(App& app);
+void add_upload_routes(App& app);
 void add_job_routes(App& app);
 void add_mesh_routes(App& app);
 void add_inspect_routes(App& app);

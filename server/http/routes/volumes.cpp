@@ -3,6 +3,7 @@
 #include "server/http/observe/outcomes.h"
 #include "server/http/request_values.h"
 #include "server/http/routes/routes.h"
+#include "server/http/routes/uploads.h"
 
 namespace isomesh::http {
 namespace {
@@ -22,19 +23,18 @@ bool is_to_be_kept(const Request& request) {
 }
 
 // The request's body, or one that came before and is kept.
-KeptUploads::Kept upload_of(App& app, const Request& request) {
+KeptBody body_of(App& app, const Request& request) {
   if (request.has_parameter("upload")) {
     if (request.content_length.value_or(1) != 0) {
       throw invalid_parameter("upload", "names a body that is here already: send none");
     }
-    return app.kept.find(owner_of(request), std::string(request.parameter("upload")));
+    std::string name(request.parameter("upload"));
+    return {app.kept.find(owner_of(request), name), std::move(name)};
   }
-  const store::DataFolder& folder = app.services.folder;
-  const std::uint64_t free = folder.reserve().free_bytes();
-  if (!folder.reserve().has_room() || request.content_length.value_or(0) > free) {
-    app.kept.let_all_go();
-  }
-  return std::make_shared<const Upload>(folder, app.options.upload, app.stopping, request);
+  make_room_for(app, request.content_length.value_or(0));
+  const auto upload = std::make_shared<const Upload>(app.services.folder, app.options.upload,
+                                                     app.stopping, request);
+  return {{upload, &upload->body()}, {}};
 }
 
 // What another request can have read otherwise: it leaves something to be chosen, or raw samples to
@@ -43,19 +43,19 @@ bool may_be_helped(const Error& error) {
   return error.code() == ErrorCode::kUnsupportedMedia || error.remedy() != Remedy();
 }
 
-void keep(App& app, const Request& request, Response& response, const KeptUploads::Kept& file) {
-  response.set_header(kUploadHeader, request.has_parameter("upload")
-                                         ? std::string(request.parameter("upload"))
-                                         : app.kept.keep(owner_of(request), file));
+void keep(App& app, const Request& request, Response& response, const KeptBody& body) {
+  response.set_header(kUploadHeader,
+                      body.name.empty() ? app.kept.keep(owner_of(request), body.file) : body.name);
 }
 
 std::vector<UploadedVolume> imported(App& app, const Request& request, Response& response,
-                                     const process::ImportOptions& options) {
+                                     const KeptBody& body) {
+  const process::ImportOptions options = import_options_of(request);
   const bool is_kept = is_to_be_kept(request);
-  const KeptUploads::Kept file = upload_of(app, request);
   try {
     std::vector<UploadedVolume> volumes = counting_refusals(app, request, [&] {
-      return app.services.library.add_all(owner_of(request), file->path(), options, file->name());
+      return app.services.library.add_all(owner_of(request), body.file->path, options,
+                                          body.file->name);
     });
     bool is_helped = false;
     for (const UploadedVolume& each : volumes) {
@@ -64,10 +64,10 @@ std::vector<UploadedVolume> imported(App& app, const Request& request, Response&
       report_import_refused(app, request, error);
       is_helped = is_helped || may_be_helped(error);
     }
-    if (is_kept && is_helped) keep(app, request, response, file);
+    if (is_kept && is_helped) keep(app, request, response, body);
     return volumes;
   } catch (const Error& error) {
-    if (is_kept && may_be_helped(error)) keep(app, request, response, file);
+    if (is_kept && may_be_helped(error)) keep(app, request, response, body);
     throw;
   }
 }
@@ -78,23 +78,25 @@ std::set<std::string> upload_parameters() {
   return names;
 }
 
+// Whoever did not hear the answer to the last part of an upload asks by its name.
+bool answer_what_it_became(App& app, const Request& request, Response& response) {
+  if (!request.has_parameter("upload")) return false;
+  const std::string volume =
+      app.kept.became(owner_of(request), std::string(request.parameter("upload")));
+  if (volume.empty()) return false;
+  response.set_header("Location", kVolumes + '/' + volume_from_json(volume).id);
+  answer_json(response, 200, volume);
+  return true;
+}
+
 void upload(App& app, const Request& request, Response& response) {
   check_known(request, upload_parameters());
-  const process::ImportOptions options = import_options_of(request);
+  import_options_of(request);
+  is_to_be_kept(request);
+  if (begins_upload(request)) return begin_upload(app, request, response);
+  if (answer_what_it_became(app, request, response)) return;
   const auto place = place_for_upload(app, request);
-  const std::vector<UploadedVolume> volumes = imported(app, request, response, options);
-  // Of an archive of several volumes another one may be wanted.
-  if (volumes.front().volume && request.has_parameter("upload") &&
-      !request.has_parameter("member")) {
-    app.kept.let_go(owner_of(request), std::string(request.parameter("upload")));
-  }
-  if (volumes.size() != 1 || !volumes.front().volume) {
-    constexpr int kMultiStatus = 207;
-    return answer_json(response, kMultiStatus, to_json(volumes));
-  }
-  const UploadedVolume& only = volumes.front();
-  response.set_header("Location", kVolumes + '/' + only.volume->id);
-  answer_json(response, only.status, to_json(*only.volume));
+  answer_volumes(app, request, response, body_of(app, request));
 }
 
 // Whether that has the form of what store::cursor_of makes: a time, a space and an id.
@@ -163,6 +165,27 @@ void erase(App& app, const Request& request, Response& response) {
 }
 
 }  // namespace
+
+void make_room_for(App& app, std::uint64_t bytes) {
+  store::Reserve& reserve = app.services.folder.reserve();
+  if (!reserve.has_room() || bytes > reserve.free_bytes()) app.kept.let_all_go();
+}
+
+void answer_volumes(App& app, const Request& request, Response& response, const KeptBody& body) {
+  const std::vector<UploadedVolume> volumes = imported(app, request, response, body);
+  const UploadedVolume& only = volumes.front();
+  const bool is_one = volumes.size() == 1 && only.volume;
+  // Of an archive of several volumes another one may be wanted.
+  if (only.volume && !body.name.empty() && !request.has_parameter("member")) {
+    app.kept.settle(owner_of(request), body.name, is_one ? to_json(*only.volume) : std::string());
+  }
+  if (!is_one) {
+    constexpr int kMultiStatus = 207;
+    return answer_json(response, kMultiStatus, to_json(volumes));
+  }
+  response.set_header("Location", kVolumes + '/' + only.volume->id);
+  answer_json(response, only.status, to_json(*only.volume));
+}
 
 void add_volume_routes(App& app) {
   add_post(app, kVolumes,

@@ -27,6 +27,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 constexpr const char* kJson = "application/json";
+const UploadOptions kInOnePiece = {.resumable_bytes = UINT64_MAX};
 
 TEST(Upload, SendsTheFileInPiecesWithItsLengthAndReportsEachOfThem) {
   const std::string content = pattern(3'000'001);
@@ -143,7 +144,8 @@ TEST(Upload, SendsNothingOfALargeBodyThatIsRefusedByItsHead) {
   TemporaryFolder folder;
   test::write_file(folder / "large", pattern(20'000'000));
   Client client({.server = server.url()});
-  EXPECT_EQ(error_of([&] { client.upload(folder / "large"); }).code(), ErrorCode::kUnauthorized);
+  EXPECT_EQ(error_of([&] { client.upload(folder / "large", kInOnePiece); }).code(),
+            ErrorCode::kUnauthorized);
   EXPECT_EQ(received.get_future().get(), 0U);
 }
 
@@ -161,8 +163,86 @@ TEST(Upload, StopsWhereARefusalComesInTheMiddle) {
   TemporaryFolder folder;
   test::write_file(folder / "large", pattern(kBytes));
   Client client({.server = server.url()});
-  EXPECT_EQ(error_of([&] { client.upload(folder / "large"); }).code(), ErrorCode::kOutOfSpace);
+  EXPECT_EQ(error_of([&] { client.upload(folder / "large", kInOnePiece); }).code(),
+            ErrorCode::kOutOfSpace);
   EXPECT_LT(received.get_future().get(), kBytes / 2);
+}
+
+TEST(Upload, InPartsIsInOnePieceForAServerThatKnowsNoParts) {
+  FakeServer server;
+  const std::string content = pattern(100'000);
+  std::vector<std::string> bodies;
+  server.http.Post(
+      "/v1/volumes", [&](const httplib::Request& request, httplib::Response& response) {
+        bodies.push_back(request.body);
+        if (request.body.empty()) {
+          return answer_with(response, Error(ErrorCode::kInvalidParameter, "the body is empty"));
+        }
+        response.set_content(to_json(some_volume()), kJson);
+      });
+  TemporaryFolder folder;
+  test::write_file(folder / "file", content);
+  Client client({.server = server.start()});
+  EXPECT_EQ(client.upload(folder / "file", {.resumable_bytes = 1000}), some_volume());
+  EXPECT_THAT(bodies, ElementsAre("", content));
+}
+
+TEST(Upload, GoesOnWhereTheConnectionBrokeAndAsksForAnAnswerThatItDidNotHear) {
+  const std::string content = pattern(200'000);
+  std::string received;
+  std::vector<std::string> asked;
+  const test::SocketServer server([&](int socket) {
+    const std::string head = test::read_head(socket);
+    asked.push_back(head.substr(0, head.find(" HTTP")));
+    const auto answer = [&](const std::string& text, const std::string& body = {}) {
+      test::send_text(socket, "HTTP/1.1 " + text + "\r\nContent-Length: " +
+                                  std::to_string(body.size()) + "\r\n\r\n" + body);
+    };
+    if (head.starts_with("POST") && head.find("upload=") == std::string::npos) {
+      EXPECT_THAT(head, HasSubstr("Upload-Length: 200000\r\n"));
+      EXPECT_THAT(head, HasSubstr("Repr-Digest: sha-256=:"));
+      return answer("201 Created\r\nLocation: /v1/uploads/7");
+    }
+    if (head.starts_with("POST")) return answer("200 OK", to_json(some_volume()));
+    if (head.starts_with("HEAD")) {
+      const bool is_whole = received.size() == content.size();
+      return test::send_text(
+          socket, "HTTP/1.1 204 No Content\r\nUpload-Offset: " + std::to_string(received.size()) +
+                      "\r\nUpload-Complete: " + (is_whole ? "?1" : "?0") + "\r\n\r\n");
+    }
+    EXPECT_THAT(head, HasSubstr("Upload-Offset: " + std::to_string(received.size()) + "\r\n"));
+    std::string part(std::min<std::size_t>(120'000, content.size() - received.size()), ' ');
+    ::recv(socket, part.data(), part.size(), MSG_WAITALL);
+    received += part;
+  });
+  TemporaryFolder folder;
+  test::write_file(folder / "file", content);
+  Client client({.server = server.url()});
+  EXPECT_EQ(client.upload(folder / "file", {.digest = true, .resumable_bytes = 1000}),
+            some_volume());
+  EXPECT_TRUE(received == content);
+  EXPECT_THAT(
+      asked, ElementsAre("POST /v1/volumes", "PATCH /v1/uploads/7", "HEAD /v1/uploads/7",
+                         "PATCH /v1/uploads/7", "HEAD /v1/uploads/7", "POST /v1/volumes?upload=7"));
+}
+
+TEST(Upload, InPartsIsGivenUpWhenItIsNotKeptAnyMore) {
+  std::vector<std::string> asked;
+  const test::SocketServer server([&](int socket) {
+    const std::string head = test::read_head(socket);
+    asked.push_back(head.substr(0, head.find(' ')));
+    if (asked.size() == 2) return;
+    test::send_text(socket, asked.size() == 1
+                                ? "HTTP/1.1 201 Created\r\nLocation: /v1/uploads/7\r\n"
+                                  "Content-Length: 0\r\n\r\n"
+                                : "HTTP/1.1 410 Gone\r\nContent-Length: 0\r\n\r\n");
+  });
+  TemporaryFolder folder;
+  test::write_file(folder / "file", pattern(2000));
+  Client client({.server = server.url()});
+  EXPECT_EQ(error_of([&] { client.upload(folder / "file", {.resumable_bytes = 1000}); }).code(),
+            ErrorCode::kGone);
+  EXPECT_THAT(asked, ElementsAre("POST", "PATCH", "HEAD", "DELETE"));
 }
 
 TEST(Upload, IsNotRepeatedWhenTheConnectionBreaks) {

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/error.h"
+#include "tests/support/files.h"
 
 namespace isomesh::http {
 namespace {
@@ -85,6 +86,103 @@ TEST(KeptUploads, AreFewForEachOwnerAndInAll) {
   kept.keep("c", things[4].give());
   EXPECT_FALSE(things[0].is_there());
   EXPECT_TRUE(things[2].is_there() && things[3].is_there() && things[4].is_there());
+}
+
+// Uploads that come in parts.
+class KeptParts : public testing::Test {
+ protected:
+  // One of so many bytes.
+  static KeptUploads::Partial begun(KeptUploads& kept, const std::string& owner,
+                                    std::size_t bytes = 0) {
+    KeptUploads::Partial upload =
+        kept.begin({.owner = owner, .query = {}, .file_name = "a.nii", .sha256 = {}});
+    upload->write(*upload->begin_turn(0), std::vector<std::byte>(bytes));
+    return upload;
+  }
+
+  std::size_t files() const { return test::files_below(folder_.path()).size(); }
+
+  const test::TemporaryFolder folder_;
+};
+
+TEST_F(KeptParts, AreTheirOwnersAloneAndAreReadWhenTheyAreWhole) {
+  KeptUploads kept({}, folder_.path());
+  const KeptUploads::Partial upload = begun(kept, "a", 10);
+  EXPECT_EQ(kept.find_partial("a", upload->name()), upload);
+  EXPECT_THROW(kept.find_partial("b", upload->name()), Error);
+  EXPECT_EQ(code_of(kept, "b", upload->name()), ErrorCode::kGone);
+  EXPECT_EQ(code_of(kept, "a", upload->name()), ErrorCode::kNotReady);
+  upload->complete(*upload->begin_turn(10));
+  const KeptUploads::Kept body = kept.find("a", upload->name());
+  EXPECT_EQ(body->name, "a.nii");
+  EXPECT_EQ(std::filesystem::file_size(body->path), 10U);
+}
+
+TEST_F(KeptParts, OnlyTheLatestTurnWrites) {
+  KeptUploads kept({}, folder_.path());
+  const KeptUploads::Partial upload = begun(kept, "a", 10);
+  const PartialTurn old = *upload->begin_turn(10);
+  EXPECT_FALSE(upload->begin_turn(9));
+  EXPECT_THROW(upload->write(old, std::vector<std::byte>(1)), Error);
+  const PartialTurn turn = *upload->begin_turn(10);
+  EXPECT_EQ(upload->end_turns(), 10U);
+  EXPECT_THROW(upload->write(turn, std::vector<std::byte>(1)), Error);
+  EXPECT_EQ(upload->bytes(), 10U);
+}
+
+TEST_F(KeptParts, OutliveTheProcess) {
+  std::string name;
+  std::string volume;
+  {
+    KeptUploads kept({}, folder_.path());
+    const KeptUploads::Partial upload = begun(kept, "a", 10);
+    name = upload->name();
+    const KeptUploads::Partial done = begun(kept, "a", 20);
+    done->complete(*done->begin_turn(20));
+    kept.settle("a", done->name(), "{}");
+    volume = done->name();
+  }
+  KeptUploads kept({}, folder_.path());
+  EXPECT_EQ(kept.find_partial("a", name)->end_turns(), 10U);
+  EXPECT_EQ(kept.became("a", volume), "{}");
+  EXPECT_EQ(kept.find_partial("a", volume)->end_turns(), 20U);
+  EXPECT_EQ(code_of(kept, "a", volume), ErrorCode::kGone);
+  kept.let_go("a", name);
+  kept.let_go("a", volume);
+  EXPECT_EQ(files(), 0U);
+}
+
+TEST_F(KeptParts, GoWhenNothingMoreComes) {
+  KeptUploads kept({.part_time = 200ms}, folder_.path());
+  begun(kept, "a", 10);
+  const KeptUploads::Partial sent = begun(kept, "a", 10);
+  for (int i = 0; i < 500 && files() > 2; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_EQ(files(), 2U);
+  EXPECT_NO_THROW(kept.find_partial("a", sent->name()));
+}
+
+TEST_F(KeptParts, OfWhoHasMostTheLongestIdleGivesWay) {
+  KeptUploads kept({.parts = 3, .part_bytes = 1000}, folder_.path());
+  const std::string greedy = begun(kept, "a", 400)->name();
+  const std::string second = begun(kept, "a", 100)->name();
+  const std::string modest = begun(kept, "b", 300)->name();
+  const KeptUploads::Partial sent = begun(kept, "c", 900);
+  EXPECT_THROW(kept.find_partial("a", greedy), Error);
+  begun(kept, "c");
+  EXPECT_THROW(kept.find_partial("a", second), Error);
+  EXPECT_THROW(kept.find_partial("b", modest), Error);
+  EXPECT_NO_THROW(kept.find_partial("c", sent->name()));
+}
+
+TEST_F(KeptParts, AreReadToTheEndWhenTheyHaveToGo) {
+  KeptUploads kept({}, folder_.path());
+  const std::string name = begun(kept, "a", 10)->name();
+  kept.find_partial("a", name)->complete(*kept.find_partial("a", name)->begin_turn(10));
+  KeptUploads::Kept reader = kept.find("a", name);
+  kept.let_all_go();
+  EXPECT_TRUE(std::filesystem::exists(reader->path));
+  reader.reset();
+  EXPECT_EQ(files(), 0U);
 }
 
 }  // namespace

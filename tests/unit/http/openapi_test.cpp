@@ -24,6 +24,7 @@ class OpenApi : public testing::Test {
  protected:
   OpenApi() {
     add_volume_routes(app_);
+    add_upload_routes(app_);
     add_job_routes(app_);
     add_mesh_routes(app_);
     add_inspect_routes(app_);

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, List, Optional, Sequence, Union, cast
 from urllib.parse import quote, urlencode
 
-from . import uploads
+from . import resume, uploads
 from .errors import JobFailed, Refused, WrongAnswer
 from .mesh import Mesh, read_ply
 from .transport import Answer, Broken, Request, Transport, pause
@@ -45,7 +45,8 @@ class Client:
 
     Raises Refused with the server's reason, Unreachable when no answer came, WrongAnswer for one that
     is not what the API says, and ValueError or TypeError for arguments that cannot be sent. What can
-    be repeated safely is sent again when its connection breaks: reading, and submitting a job.
+    be repeated safely is sent again when its connection breaks: reading, and submitting a job. Uploads
+    of 8 MiB or more go on where theirs broke, if it is not broken for longer than a minute.
     """
 
     def __init__(
@@ -300,7 +301,10 @@ class Client:
             # Names may name patients: they go in a header, because logs hold targets.
             headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(name or body.name, safe='')}"
         target = "/v1/volumes" + ("?" + urlencode(query) if query else "")
-        answer = self._transport.send(Request("POST", target, headers, body))
+        if body.size >= resume.RESUMABLE_BYTES:
+            answer = resume.send(self._transport, target, headers, body)
+        else:
+            answer = self._transport.send(Request("POST", target, headers, body))
         parsed = _parsed(answer.text())
         if answer.status == _MULTI_STATUS:
             return cast("List[api.UploadedVolumesVolumes]", parsed["volumes"])

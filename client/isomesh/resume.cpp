@@ -1,0 +1,159 @@
+// Uploads that go on where their connection broke: "Resumable Uploads for HTTP"
+// (draft-ietf-httpbis-resumable-upload), of which docs/uploads.md tells what the server knows.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "base/text.h"
+#include "client/isomesh/impl.h"
+#include "client/isomesh/transport.h"
+
+namespace isomesh {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+// How long no byte gets through before an upload is given up. A daemon that is started anew takes
+// some seconds.
+constexpr milliseconds kLongestCut{60'000};
+constexpr milliseconds kFirstPause{100};
+constexpr milliseconds kLongestPause{3'000};
+
+constexpr const char* kPlaces = "/v1/uploads/";
+
+// That the whole body has a digest is told with its beginning, which is empty.
+HttpRequest beginning_of(const HttpRequest& upload) {
+  HttpRequest request{.method = upload.method, .target = upload.target};
+  for (const auto& [name, value] : upload.headers) {
+    request.headers.emplace_back(name == "Content-Digest" ? "Repr-Digest" : name, value);
+  }
+  request.headers.emplace_back("Upload-Complete", "?0");
+  request.headers.emplace_back("Upload-Length", std::to_string(upload.source_bytes));
+  return request;
+}
+
+HttpRequest rest_of(const HttpRequest& upload, const std::string& place, std::uint64_t offset) {
+  HttpRequest request{.method = "PATCH", .target = place};
+  request.headers = {{"Content-Type", "application/partial-upload"},
+                     {"Upload-Complete", "?1"},
+                     {"Upload-Offset", std::to_string(offset)}};
+  request.source = [&upload, offset](std::uint64_t at, std::span<char> piece) {
+    upload.source(offset + at, piece);
+  };
+  request.source_bytes = upload.source_bytes - offset;
+  return request;
+}
+
+// All of it is there, and whoever asks like this hears what has become of it.
+HttpRequest reading_of(const HttpRequest& upload, const std::string& place) {
+  const char* sign = upload.target.find('?') == std::string::npos ? "?" : "&";
+  return {.method = upload.method,
+          .target = upload.target + sign + "upload=" + place.substr(place.rfind('/') + 1),
+          .headers = {{"Content-Type", "application/octet-stream"}}};
+}
+
+// Whether asking again may help: the server is busy, or ends, or still has the connection that
+// broke.
+bool may_pass(int status) {
+  constexpr std::array kPassing = {408, 409, 429, 502, 503, 504};
+  return std::ranges::count(kPassing, status) > 0;
+}
+
+// How far an upload has come, as the server says.
+struct Progress {
+  std::uint64_t offset = 0;
+  bool is_whole = false;
+};
+
+Progress progress_of(const HttpAnswer& answer, std::uint64_t bytes) {
+  const auto offset = parse_uint64(answer.header("upload-offset"));
+  if (!offset || *offset > bytes) {
+    throw Error(ErrorCode::kInternal, "the server's answer is not what the API describes");
+  }
+  return {*offset, answer.header("upload-complete") == "?1"};
+}
+
+// How long to go on trying.
+class Patience {
+ public:
+  // A byte has got through.
+  void renew() {
+    is_cut_ = false;
+    pause_ = kFirstPause;
+  }
+  // Asked after each failure.
+  bool is_over() {
+    if (!std::exchange(is_cut_, true)) since_ = Clock::now();
+    return Clock::now() - since_ >= kLongestCut;
+  }
+  milliseconds next_pause() { return std::exchange(pause_, std::min(2 * pause_, kLongestPause)); }
+
+ private:
+  bool is_cut_ = false;
+  Clock::time_point since_;
+  milliseconds pause_ = kFirstPause;
+};
+
+}  // namespace
+
+std::string Client::Impl::begin_upload(const HttpRequest& request) const {
+  try {
+    std::string place = repeated(beginning_of(request)).header("location");
+    return place.starts_with(kPlaces) ? place : std::string();
+  } catch (const Error& error) {
+    // A server of an earlier version does not take an empty body. If it is anything else that is
+    // wrong, it says so again.
+    if (error.code() != ErrorCode::kInvalidParameter) throw;
+    return {};
+  }
+}
+
+HttpAnswer Client::Impl::resumed(const HttpRequest& request) const {
+  const std::string place = begin_upload(request);
+  if (place.empty()) return answer(request);
+  try {
+    return finish_upload(request, place);
+  } catch (const NoAnswer&) {
+    throw;  // nobody is there who could be told
+  } catch (...) {
+    try {
+      transport_.send({.method = "DELETE", .target = place});
+    } catch (const Error&) {
+      // What is left there expires.
+    }
+    throw;
+  }
+}
+
+HttpAnswer Client::Impl::finish_upload(const HttpRequest& request, const std::string& place) const {
+  std::optional<Progress> known = Progress();
+  std::uint64_t reached = 0;
+  Patience patience;
+  while (true) {
+    try {
+      HttpAnswer heard;
+      if (!known) heard = transport_.send({.method = "HEAD", .target = place});
+      if (!known && is_success(heard)) {
+        known = progress_of(heard, request.source_bytes);
+        if (known->offset > reached) patience.renew();
+        reached = known->offset;
+      }
+      if (known) {
+        heard = transport_.send(known->is_whole ? reading_of(request, place)
+                                                : rest_of(request, place, known->offset));
+        if (is_success(heard)) return heard;
+      }
+      if (!may_pass(heard.status) || patience.is_over()) throw refusal(heard);
+    } catch (const NoAnswer&) {
+      if (patience.is_over()) throw;
+    }
+    known.reset();
+    pause(patience.next_pause());
+  }
+}
+
+}  // namespace isomesh

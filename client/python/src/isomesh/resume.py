@@ -1,0 +1,108 @@
+"""Uploads that go on where their connection broke: "Resumable Uploads for HTTP"
+(draft-ietf-httpbis-resumable-upload), of which docs/uploads.md tells what the server knows."""
+
+from __future__ import annotations
+
+import time
+from typing import Dict, Iterator, Optional
+
+from .errors import IsomeshError, Refused, Unreachable, WrongAnswer
+from .transport import Answer, Request, Transport
+from .uploads import Body
+
+RESUMABLE_BYTES = 8 << 20  # fewer are sent in one request
+_PLACES = "/v1/uploads/"
+_LONGEST_CUT = 60.0  # seconds that no byte gets through before an upload is given up
+_FIRST_PAUSE = 0.1
+_LONGEST_PAUSE = 3.0
+# The server is busy, or ends, or still has the connection that broke.
+_PASSING = (408, 409, 429, 502, 503, 504)
+
+
+def send(transport: Transport, target: str, headers: Dict[str, str], body: Body) -> Answer:
+    """The answer to `POST target` with that body. Raises as Transport.send does."""
+    place = _begin(transport, target, headers, body)
+    if not place:
+        return transport.send(Request("POST", target, headers, body))
+    try:
+        return _finish(transport, target, body, place)
+    except Unreachable:
+        raise  # nobody is there who could be told
+    except BaseException:
+        try:
+            transport.send(Request("DELETE", place)).text()
+        except IsomeshError:
+            pass  # what is left there expires
+        raise
+
+
+def _begin(transport: Transport, target: str, headers: Dict[str, str], body: Body) -> str:
+    """Where the body is to go; empty for a server of an earlier version."""
+    told = {**headers, "Upload-Complete": "?0", "Upload-Length": str(body.size)}
+    try:
+        answer = transport.send(Request("POST", target, told, Body(0, lambda: iter(()))))
+    except Refused as error:
+        # Such a server does not take an empty body. If it is anything else, it says so again.
+        if error.status != 400:
+            raise
+        return ""
+    answer.text()
+    place = answer.header("Location")
+    return place if place.startswith(_PLACES) else ""
+
+
+def _finish(transport: Transport, target: str, body: Body, place: str) -> Answer:
+    offset: Optional[int] = 0  # None: not known
+    reached = 0
+    is_whole = False
+    cut: Optional[float] = None  # when it broke, if no byte has got through since then
+    wait = _FIRST_PAUSE
+    while True:
+        try:
+            if offset is None:
+                state = transport.send(Request("HEAD", place))
+                state.text()
+                offset, is_whole = _offset_in(state, body.size), state.header("Upload-Complete") == "?1"
+                if offset > reached:
+                    cut, wait, reached = None, _FIRST_PAUSE, offset
+            if is_whole:
+                # Whoever asks like this hears what has become of it.
+                sign = "&" if "?" in target else "?"
+                target_again = f"{target}{sign}upload={place.rpartition('/')[2]}"
+                return transport.send(Request("POST", target_again, {}, Body(0, lambda: iter(()))))
+            return transport.send(Request("PATCH", place, _part(offset), _after(body, offset)))
+        except (Refused, Unreachable) as error:
+            if isinstance(error, Refused) and error.status not in _PASSING:
+                raise
+            cut = time.monotonic() if cut is None else cut
+            if time.monotonic() - cut >= _LONGEST_CUT:
+                raise
+        offset = None
+        time.sleep(wait)
+        wait = min(2 * wait, _LONGEST_PAUSE)
+
+
+def _part(offset: int) -> Dict[str, str]:
+    return {
+        "Content-Type": "application/partial-upload",
+        "Upload-Complete": "?1",
+        "Upload-Offset": str(offset),
+    }
+
+
+def _offset_in(state: Answer, size: int) -> int:
+    text = state.header("Upload-Offset")
+    if not text.isdigit() or int(text) > size:
+        raise WrongAnswer("the server's answer is not what the API says")
+    return int(text)
+
+
+def _after(body: Body, offset: int) -> Body:
+    def pieces() -> Iterator[bytes]:
+        left = offset
+        for piece in body.pieces():
+            if left < len(piece):
+                yield piece[left:]
+            left = max(0, left - len(piece))
+
+    return Body(body.size - offset, pieces)

@@ -1,0 +1,175 @@
+// Uploads that come in parts: "Resumable Uploads for HTTP" (draft-ietf-httpbis-resumable-upload).
+#include "server/http/routes/uploads.h"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "base/text.h"
+#include "proto/json.h"
+#include "server/http/import_query.h"
+#include "server/http/request_values.h"
+#include "server/http/routes/routes.h"
+
+namespace isomesh::http {
+namespace {
+
+const std::string kUploads = "/v1/uploads";
+constexpr const char* kComplete = "Upload-Complete";
+constexpr const char* kOffset = "Upload-Offset";
+constexpr const char* kLength = "Upload-Length";
+constexpr const char* kPartType = "application/partial-upload";
+
+// Structured fields (RFC 9651); whatever is none counts as absent, as the draft wants it.
+std::optional<bool> boolean_in(const Request& request, std::string_view header) {
+  const std::string_view text = trimmed(request.header(header));
+  if (text == "?1") return true;
+  if (text == "?0") return false;
+  return std::nullopt;
+}
+
+std::optional<std::uint64_t> number_in(const Request& request, std::string_view header) {
+  return whole_number(trimmed(request.header(header)));
+}
+
+void tell_limits(const App& app, Response& response) {
+  const auto age = std::chrono::duration_cast<std::chrono::seconds>(app.kept.limits().part_time);
+  response.set_header("Upload-Limit", "max-size=" + std::to_string(app.options.upload.max_bytes) +
+                                          ", max-age=" + std::to_string(age.count()));
+}
+
+// How far it has come, which ends the turn of whoever sends.
+void tell_state(const App& app, Response& response, PartialUpload& upload) {
+  response.set_header(kOffset, std::to_string(upload.end_turns()));
+  const PartialNote note = upload.note();
+  response.set_header(kComplete, note.is_complete ? "?1" : "?0");
+  if (note.length) response.set_header(kLength, std::to_string(*note.length));
+  response.set_header("Cache-Control", "no-store");
+  tell_limits(app, response);
+}
+
+// The type of this problem is the draft's, by which any client of it knows what to do.
+void answer_other_offset(const App& app, const Request& request, Response& response,
+                         PartialUpload& upload) {
+  tell_state(app, response, upload);
+  response.status = 409;
+  response.set_body(
+      to_json(Problem{
+          .type = "https://iana.org/assignments/http-problem-types#mismatching-upload-offset",
+          .title = "Another offset",
+          .status = response.status,
+          .detail = "the upload goes on elsewhere: the header Upload-Offset tells where",
+          .instance = request.path,
+          .errors = {}}),
+      "application/problem+json");
+}
+
+void check_length(const App& app, std::optional<std::uint64_t> length, Response& response) {
+  if (length.value_or(0) <= app.options.upload.max_bytes) return;
+  tell_limits(app, response);
+  throw Error(ErrorCode::kTooLarge,
+              "the upload exceeds " + std::to_string(app.options.upload.max_bytes) + " bytes");
+}
+
+// One part of the body, which may be the first and may be empty.
+void receive(App& app, const Request& request, PartialUpload& upload, const PartialTurn& turn) {
+  if (const auto length = number_in(request, kLength)) upload.tell_length(turn, *length);
+  if (request.content_length && boolean_in(request, kComplete).value_or(false)) {
+    upload.tell_length(turn, turn.offset + *request.content_length);
+  }
+  receive_part(upload, turn, app.services.folder, app.options.upload, app.stopping, request);
+}
+
+void check_digest(const PartialUpload& upload) {
+  const std::string expected = upload.note().sha256;
+  if (expected.empty() || store::digest_of(upload.body()->path).key == expected) return;
+  throw Error(ErrorCode::kDigestMismatch,
+              "the upload's SHA-256 is not the one that Repr-Digest names");
+}
+
+KeptUploads::Partial upload_of(App& app, const Request& request) {
+  check_known(request, {});
+  return app.kept.find_partial(owner_of(request), request.path_parameter("id"));
+}
+
+void look(App& app, const Request& request, Response& response) {
+  tell_state(app, response, *upload_of(app, request));
+  response.status = 204;
+}
+
+void append(App& app, const Request& request, Response& response) {
+  if (lower(trimmed(split(request.header("Content-Type"), ';').front())) != kPartType) {
+    throw Error(ErrorCode::kUnsupportedMedia,
+                std::string("the body's Content-Type must be ") + kPartType);
+  }
+  const auto is_last = boolean_in(request, kComplete);
+  if (!is_last) throw invalid_parameter(kComplete, "must be ?0 or ?1");
+  const auto offset = number_in(request, kOffset);
+  if (!offset) throw invalid_parameter(kOffset, "must be a number of bytes");
+  check_length(app, number_in(request, kLength), response);
+  const KeptUploads::Partial upload = upload_of(app, request);
+  const auto place = place_for_upload(app, request);
+  const std::optional<PartialTurn> turn = upload->begin_turn(*offset);
+  if (!turn) return answer_other_offset(app, request, response, *upload);
+  receive(app, request, *upload, *turn);
+  if (!*is_last) {
+    tell_state(app, response, *upload);
+    response.status = 204;
+    return;
+  }
+  upload->complete(*turn);
+  response.set_header(kComplete, "?1");
+  check_digest(*upload);
+  Request asked = request;
+  asked.query = upload->note().query;
+  answer_volumes(app, asked, response, {upload->body(), upload->name()});
+}
+
+void cancel(App& app, const Request& request, Response& response) {
+  app.kept.let_go(owner_of(request), upload_of(app, request)->name());
+  response.status = 204;
+}
+
+}  // namespace
+
+bool begins_upload(const Request& request) { return boolean_in(request, kComplete) == false; }
+
+void begin_upload(App& app, const Request& request, Response& response) {
+  if (request.has_parameter("upload")) {
+    throw invalid_parameter("upload", "names a body that is here already");
+  }
+  if (request.is_form()) {
+    throw Error(ErrorCode::kUnsupportedMedia, "a form cannot come in parts: send the bare file");
+  }
+  const auto length = number_in(request, kLength);
+  check_length(app, length, response);
+  make_room_for(app, length.value_or(0));
+  const auto place = place_for_upload(app, request);
+  const KeptUploads::Partial upload =
+      app.kept.begin({.owner = owner_of(request),
+                      .query = request.query,
+                      .file_name = file_name_of(request.header("Content-Disposition")),
+                      .sha256 = sha256_of_digest(request, "Repr-Digest").value_or("")});
+  try {
+    receive(app, request, *upload, *upload->begin_turn(0));
+  } catch (...) {
+    // The client has not been told of it.
+    app.kept.let_go(owner_of(request), upload->name());
+    throw;
+  }
+  tell_state(app, response, *upload);
+  response.set_header("Location", kUploads + '/' + upload->name());
+  response.status = 201;
+}
+
+void add_upload_routes(App& app) {
+  const std::string one = kUploads + "/{id}";
+  add_get(app, one, [&app](const auto& request, auto& response) { look(app, request, response); });
+  add_patch(app, one,
+            [&app](const auto& request, auto& response) { append(app, request, response); });
+  add_delete(app, one,
+             [&app](const auto& request, auto& response) { cancel(app, request, response); });
+}
+
+}  // namespace isomesh::http

@@ -1,0 +1,300 @@
+// Uploads that come in parts, over cut connections and a killed daemon.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/json.h"
+#include "tests/api/daemon.h"
+#include "tests/api/digest.h"
+#include "tests/api/problems.h"
+
+namespace isomesh {
+namespace {
+
+using namespace test;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::MatchesRegex;
+
+const Headers kBegin = {{"Upload-Complete", "?0"}};
+
+Headers part(std::size_t offset, bool is_last) {
+  return {{"Content-Type", "application/partial-upload"},
+          {"Upload-Offset", std::to_string(offset)},
+          {"Upload-Complete", is_last ? "?1" : "?0"}};
+}
+
+Headers with(Headers headers, const Headers& more) {
+  headers.insert(headers.end(), more.begin(), more.end());
+  return headers;
+}
+
+std::vector<std::string> files_of_uploads(const std::filesystem::path& data) {
+  std::vector<std::string> files = files_below(data);
+  std::erase_if(files, [](const std::string& file) { return !file.starts_with("uploads/"); });
+  return files;
+}
+
+class ResumeTest : public testing::Test {
+ protected:
+  Answer begin(const Headers& headers = kBegin, const std::string& body = {}) {
+    return daemon_->send("POST", "/v1/volumes?" + sphere_.query, body, headers);
+  }
+  std::string begun() { return begin().header("location"); }
+  std::string offset_of(const std::string& place) {
+    return daemon_->send("HEAD", place).header("upload-offset");
+  }
+
+  // Sends the head of a part and some of its body, and ends the connection.
+  void send_cut(const std::string& place, std::size_t from, std::size_t to) {
+    const std::string whole = request("PATCH", place, sphere_.bytes.substr(from), part(from, true));
+    const std::size_t body = sphere_.bytes.size() - from;
+    const Connection connection(daemon_->url());
+    connection.send(whole.substr(0, whole.size() - body + (to - from)));
+    connection.finish_sending();
+    EXPECT_EQ(connection.receive().status, 400);
+  }
+
+  const TemporaryFolder folder_;
+  std::optional<Daemon> daemon_{std::in_place, folder_ / "data", "127.0.0.1:0"};
+  const RawUpload sphere_ = sphere_upload();
+};
+
+TEST_F(ResumeTest, PartsBecomeTheVolumeThatTheyAreTogether) {
+  const Answer first = begin({{"Upload-Complete", "?0"},
+                              {"Upload-Length", std::to_string(sphere_.bytes.size())},
+                              {"Content-Disposition", "attachment; filename=\"ball.raw\""}});
+  EXPECT_EQ(first.status, 201);
+  EXPECT_EQ(first.body, "");
+  EXPECT_EQ(first.header("upload-offset"), "0");
+  EXPECT_EQ(first.header("upload-complete"), "?0");
+  EXPECT_EQ(first.header("upload-limit"), "max-size=8589934592, max-age=3600");
+  const std::string place = first.header("location");
+  ASSERT_THAT(place, MatchesRegex("/v1/uploads/[0-9a-f]{32}"));
+
+  const Answer middle =
+      daemon_->send("PATCH", place, sphere_.bytes.substr(0, 1000), part(0, false));
+  EXPECT_EQ(middle.status, 204) << middle.body;
+  EXPECT_EQ(middle.header("upload-offset"), "1000");
+  const Answer state = daemon_->send("HEAD", place);
+  EXPECT_EQ(state.status, 204);
+  EXPECT_EQ(state.header("upload-offset"), "1000");
+  EXPECT_EQ(state.header("upload-length"), std::to_string(sphere_.bytes.size()));
+  EXPECT_EQ(state.header("cache-control"), "no-store");
+
+  const Answer last = daemon_->send("PATCH", place, sphere_.bytes.substr(1000), part(1000, true));
+  ASSERT_EQ(last.status, 201) << last.body;
+  EXPECT_EQ(last.header("upload-complete"), "?1");
+  const Volume volume = volume_from_json(last.body);
+  EXPECT_EQ(last.header("location"), "/v1/volumes/" + volume.id);
+  EXPECT_EQ(volume.name, "ball.raw");
+  EXPECT_EQ(upload(*daemon_, sphere_).id, volume.id);
+}
+
+TEST_F(ResumeTest, TheFirstPartMayComeWithTheBeginning) {
+  const Answer first = begin(kBegin, sphere_.bytes.substr(0, 500));
+  EXPECT_EQ(first.header("upload-offset"), "500");
+  const std::string rest = sphere_.bytes.substr(500);
+  EXPECT_EQ(daemon_->send("PATCH", first.header("location"), rest, part(500, true)).status, 201);
+}
+
+TEST_F(ResumeTest, WhatCameBeforeAConnectionBrokeStays) {
+  const std::string place = begun();
+  send_cut(place, 0, 3000);
+  ASSERT_EQ(offset_of(place), "3000");
+  send_cut(place, 3000, 3001);
+  ASSERT_EQ(offset_of(place), "3001");
+  const Answer last = daemon_->send("PATCH", place, sphere_.bytes.substr(3001), part(3001, true));
+  EXPECT_EQ(last.status, 201) << last.body;
+  EXPECT_THAT(files_of_uploads(daemon_->data()), ElementsAre(testing::EndsWith(".json")));
+}
+
+TEST_F(ResumeTest, WhoAsksHowFarItIsEndsTheOneThatSends) {
+  const std::string place = begun();
+  const std::string whole = request("PATCH", place, std::string(900'000, 'a'), part(0, true));
+  const Connection old(daemon_->url());
+  old.send(whole.substr(0, 600'000));
+  const std::filesystem::path file = daemon_->data() / place.substr(std::string("/v1/").size());
+  ASSERT_TRUE(eventually([&] { return std::filesystem::file_size(file) > 0; }));
+  const std::string told = offset_of(place);
+  EXPECT_NE(told, "0");
+  old.send(whole.substr(600'000));
+  EXPECT_EQ(old.receive().status, 503);
+  EXPECT_EQ(offset_of(place), told);
+}
+
+TEST_F(ResumeTest, AnotherOffsetIsRefusedAndToldTheRightOne) {
+  const std::string place = begun();
+  daemon_->send("PATCH", place, sphere_.bytes.substr(0, 1000), part(0, false));
+  for (const std::size_t wrong : {0U, 999U, 1001U}) {
+    const Answer answer = daemon_->send("PATCH", place, "bytes", part(wrong, false));
+    EXPECT_EQ(answer.status, 409);
+    EXPECT_EQ(answer.header("upload-offset"), "1000");
+    EXPECT_THAT(answer.body, HasSubstr("http-problem-types#mismatching-upload-offset"));
+  }
+}
+
+TEST_F(ResumeTest, WhatIsNoPartIsRefusedByName) {
+  const std::string place = begun();
+  const auto patch = [&](const Headers& headers) {
+    return daemon_->send("PATCH", place, "bytes", headers);
+  };
+  const std::pair<std::string, std::string> type = {"Content-Type", "application/partial-upload"};
+  EXPECT_TRUE(is_problem(patch({{"Upload-Offset", "0"}, {"Upload-Complete", "?0"}}),
+                         ErrorCode::kUnsupportedMedia));
+  EXPECT_TRUE(blames(patch({type, {"Upload-Complete", "?0"}}), "Upload-Offset"));
+  EXPECT_TRUE(blames(patch({type, {"Upload-Offset", "0"}}), "Upload-Complete"));
+  EXPECT_TRUE(
+      blames(patch({type, {"Upload-Offset", "0"}, {"Upload-Complete", "yes"}}), "Upload-Complete"));
+  EXPECT_TRUE(is_problem(patch(with(part(0, true), {{"Upload-Length", "6"}})),
+                         ErrorCode::kInvalidParameter));
+  EXPECT_EQ(offset_of(place), "0");
+  EXPECT_TRUE(
+      is_problem(begin(with(kBegin, {{"Upload-Length", "8589934593"}})), ErrorCode::kTooLarge));
+  EXPECT_TRUE(blames(daemon_->send("POST", "/v1/volumes?dims=1", {}, kBegin), "dims"));
+}
+
+TEST_F(ResumeTest, TheLengthHolds) {
+  const std::string place = begin(with(kBegin, {{"Upload-Length", "10"}})).header("location");
+  EXPECT_TRUE(
+      blames(daemon_->send("PATCH", place, "0123456789a", part(0, false)), "Upload-Length"));
+  EXPECT_TRUE(blames(daemon_->send("PATCH", place, "012345678", part(0, true)), "Upload-Length"));
+  EXPECT_TRUE(blames(daemon_->send("PATCH", place, "", part(0, true)), "Upload-Length"));
+}
+
+TEST_F(ResumeTest, DigestsAreChecked) {
+  const std::string wrong =
+      begin(with(kBegin, {{"Repr-Digest", digest_of("other")}})).header("location");
+  EXPECT_TRUE(is_problem(daemon_->send("PATCH", wrong, sphere_.bytes, part(0, true)),
+                         ErrorCode::kDigestMismatch));
+  const std::string right =
+      begin(with(kBegin, {{"Repr-Digest", digest_of(sphere_.bytes)}})).header("location");
+  const std::string half = sphere_.bytes.substr(0, 2000);
+  EXPECT_TRUE(
+      is_problem(daemon_->send("PATCH", right, half,
+                               with(part(0, false), {{"Content-Digest", digest_of("other")}})),
+                 ErrorCode::kDigestMismatch));
+  EXPECT_EQ(offset_of(right), "0");
+  daemon_->send("PATCH", right, half, with(part(0, false), {{"Content-Digest", digest_of(half)}}));
+  EXPECT_EQ(daemon_->send("PATCH", right, sphere_.bytes.substr(2000), part(2000, true)).status,
+            201);
+}
+
+TEST_F(ResumeTest, WhoDidNotHearTheAnswerAsksAgain) {
+  const std::string place = begun();
+  const std::string again =
+      "/v1/volumes?" + sphere_.query + "&upload=" + place.substr(place.rfind('/') + 1);
+  EXPECT_TRUE(is_problem(daemon_->send("POST", again), ErrorCode::kNotReady));
+  const Answer last = daemon_->send("PATCH", place, sphere_.bytes, part(0, true));
+  ASSERT_EQ(last.status, 201) << last.body;
+  EXPECT_EQ(daemon_->send("HEAD", place).header("upload-complete"), "?1");
+  for (const bool is_killed : {false, true}) {
+    if (is_killed) daemon_.emplace(folder_ / "data", "127.0.0.1:0");
+    const Answer heard = daemon_->send("POST", again);
+    EXPECT_EQ(heard.status, 200);
+    EXPECT_EQ(volume_from_json(heard.body), volume_from_json(last.body));
+    EXPECT_EQ(daemon_->send("PATCH", place, "more", part(sphere_.bytes.size(), true)).status, 400);
+  }
+}
+
+TEST_F(ResumeTest, WhatLeavesSomethingToBeChosenIsReadAgain) {
+  const std::string place =
+      daemon_->send("POST", "/v1/volumes?keep=true", {}, kBegin).header("location");
+  const Answer open = daemon_->send("PATCH", place, std::string(24, 'a'), part(0, true));
+  EXPECT_EQ(open.status, 415);
+  EXPECT_EQ(open.header("upload-complete"), "?1");
+  const std::string name = open.header("isomesh-upload");
+  EXPECT_EQ("/v1/uploads/" + name, place);
+  const std::string described = "/v1/volumes?dims=4,3,2&type=uint8&upload=" + name;
+  EXPECT_EQ(daemon_->send("POST", described).status, 201);
+}
+
+TEST_F(ResumeTest, OneThatIsGivenUpLeavesNothing) {
+  const std::string place = begun();
+  daemon_->send("PATCH", place, sphere_.bytes.substr(0, 1000), part(0, false));
+  EXPECT_EQ(files_of_uploads(daemon_->data()).size(), 2U);
+  EXPECT_EQ(daemon_->send("DELETE", place).status, 204);
+  EXPECT_EQ(daemon_->send("HEAD", place).status, 410);
+  EXPECT_EQ(daemon_->send("DELETE", place).status, 410);
+  EXPECT_THAT(files_of_uploads(daemon_->data()), IsEmpty());
+}
+
+TEST_F(ResumeTest, AKilledDaemonGoesOnWhereItWas) {
+  const std::string place = begun();
+  daemon_->send("PATCH", place, sphere_.bytes.substr(0, 5000), part(0, false));
+  daemon_->send_signal(SIGKILL);
+  daemon_->wait();
+  write_file(folder_ / "data/uploads/0123.json", "no note");
+  write_file(folder_ / "data/uploads/4567", "no upload");
+  daemon_.emplace(folder_ / "data", "127.0.0.1:0");
+  EXPECT_EQ(files_of_uploads(daemon_->data()).size(), 2U);
+  ASSERT_EQ(offset_of(place), "5000");
+  const Answer last = daemon_->send("PATCH", place, sphere_.bytes.substr(5000), part(5000, true));
+  ASSERT_EQ(last.status, 201) << last.body;
+  EXPECT_EQ(upload(*daemon_, sphere_).id, volume_from_json(last.body).id);
+}
+
+TEST_F(ResumeTest, WhatAnotherStartOfTheMachineLeftIsNotBelieved) {
+  const std::string place = begun();
+  daemon_->stop();
+  const std::string note =
+      folder_ / "data" / ("uploads/" + place.substr(place.rfind('/') + 1) + ".json");
+  const std::string text = read_file(note);
+  const std::size_t boot = text.find("\"boot\":\"") + 8;
+  write_file(note, text.substr(0, boot) + (text[boot] == '0' ? '1' : '0') + text.substr(boot + 1));
+  daemon_.emplace(folder_ / "data", "127.0.0.1:0");
+  EXPECT_EQ(daemon_->send("HEAD", place).status, 410);
+  EXPECT_THAT(files_of_uploads(daemon_->data()), IsEmpty());
+}
+
+TEST_F(ResumeTest, BelongsToItsOwnerAlone) {
+  const std::string file = folder_ / "tokens";
+  const auto bearer = [&](const std::string& name) {
+    const std::string token =
+        run({ISOMESHD, "token", "add", name, "--role", "user", "--into", file}).output;
+    return Headers{{"Authorization", "Bearer " + token.substr(0, token.find('\n'))}};
+  };
+  const Headers ct = bearer("ct");
+  const Headers mr = bearer("mr");
+  const Daemon guarded{std::vector<std::string>{"--tokens", file}};
+  const std::string place =
+      guarded.send("POST", "/v1/volumes?" + sphere_.query, {}, with(kBegin, ct)).header("location");
+  EXPECT_EQ(guarded.send("HEAD", place, {}, mr).status, 410);
+  EXPECT_EQ(guarded.send("PATCH", place, "bytes", with(part(0, false), mr)).status, 410);
+  EXPECT_EQ(guarded.send("DELETE", place, {}, mr).status, 410);
+  EXPECT_EQ(guarded.send("HEAD", place).status, 401);
+  EXPECT_EQ(guarded.send("HEAD", place, {}, ct).header("upload-offset"), "0");
+}
+
+// The real client under a daemon that is killed in the middle, on a socket that is the same after.
+TEST_F(ResumeTest, TheClientGoesOnByItselfOverAKilledDaemon) {
+  const RawUpload large = raw_upload(noise<std::uint8_t>({0, 100}, {320, 256, 200}, 3));
+  write_file(folder_ / "large.raw", large.bytes);
+  const std::string listen = "unix:" + (folder_ / "socket").string();
+  daemon_.emplace(folder_ / "data", listen);
+  Client client({.server = listen});
+  int kills = 0;
+  std::uint64_t least = large.bytes.size();  // that was sent after the kill
+  UploadOptions options;
+  options.raw.emplace().dims = {320, 256, 200};
+  options.progress = [&](std::uint64_t done, std::uint64_t total) {
+    if (kills > 0) least = std::min(least, done);
+    if (kills > 0 || done < total / 2) return;
+    ++kills;
+    daemon_->send_signal(SIGKILL);
+    daemon_->wait();
+    daemon_.emplace(folder_ / "data", listen);
+  };
+  const Volume volume = client.upload(folder_ / "large.raw", options);
+  EXPECT_EQ(kills, 1);
+  EXPECT_GT(least, large.bytes.size() / 4);
+  EXPECT_EQ(volume.bytes, large.bytes.size());
+  EXPECT_EQ(upload(*daemon_, large).id, volume.id);
+}
+
+}  // namespace
+}  // namespace isomesh
