@@ -1,5 +1,6 @@
 import { fileURLToPath } from 'node:url';
 import { defineConfig } from 'vite';
+import { thirdParty } from './third_party.mjs';
 
 const nothing = fileURLToPath(new URL('src/mesh/nothing.ts', import.meta.url));
 
@@ -14,5 +15,6 @@ export default defineConfig({
     modulePreload: { polyfill: false },
     chunkSizeWarningLimit: 900,
   },
-  worker: { format: 'es' },
+  plugins: [thirdParty()],
+  worker: { format: 'es', plugins: () => [thirdParty()] },
 });

@@ -10,6 +10,7 @@ import './style/jobs.css';
 import './style/compare.css';
 import './style/small.css';
 import './style/contrast.css';
+import './ui/kept_token';
 import { connected, isAlive, submitted } from './api/client';
 import { watchVisibility } from './api/job_events';
 import { hasOrders } from './api/orders';

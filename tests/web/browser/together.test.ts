@@ -1,6 +1,6 @@
 // Several surfaces in one scene.
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, hues, noted, settled, setup, silhouette, surfaceLoaded } from './support';
+import { ballNrrd, hues, labelsNrrd, noted, settled, setup, silhouette, surfaceLoaded } from './support';
 
 const at = setup();
 
@@ -41,6 +41,24 @@ describe('surfaces in one scene', () => {
     expect((await hues(page, view)).red).toBeGreaterThan(1000);
     await large.getByRole('link', { name: 'alone' }).click();
     await page.waitForURL(new RegExp(`#/jobs/${jobs[0]?.id ?? ''}`));
+  });
+
+  it('show each label of a job in its own colour until they get one together', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(labelsNrrd(32));
+    const job = await daemon.submit({ volume, labels: 'all', label_colors: { 1: '#d02020', 2: '#2040e0' }, formats: ['glb'] }, 30);
+    await page.goto(`${daemon.url}/#/together?jobs=${job.id}`);
+    await surfaceLoaded(page);
+    const view = page.locator('.viewport');
+    const own = await hues(page, view);
+    expect(own.red).toBeGreaterThan(1000);
+    expect(own.blue).toBeGreaterThan(1000);
+    await page.getByRole('checkbox', { name: /labels.* colours/ }).uncheck();
+    await page.getByLabel(/^Colour/).fill('#2040e0');
+    await surfaceLoaded(page);
+    await expect.poll(async () => (await hues(page, view)).red).toBe(0);
+    await page.getByRole('checkbox', { name: /labels.* colours/ }).check();
+    await expect.poll(async () => (await hues(page, view)).red).toBeGreaterThan(1000);
   });
 
   it('have to be some', async () => {

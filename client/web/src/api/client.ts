@@ -1,17 +1,24 @@
-// The daemon's routes as functions. Failures are thrown as ApiError.
+// The daemon's routes as functions, on a page and in Node. Failures are thrown as ApiError.
 import { asApiError, errorOf } from './problem';
 import { Signal } from '../ui/signal';
-import type { Axis, Estimate, Histogram, Job, JobList, JobRequest, Volume, VolumeLabels, VolumeList } from './types';
+import type { Axis, Estimate, Histogram, Job, JobList, JobRequest, MeshFormat, Volume, VolumeLabels, VolumeList } from './types';
 
-const tokenKey = 'isomesh.token';
 const volumesPerPage = 60;
 
-// The token that requests carry; empty without one. It lives as long as the tab.
-export const token = new Signal<string>(sessionStorage.getItem(tokenKey) ?? '');
-token.subscribe((value) => {
-  if (value === '') sessionStorage.removeItem(tokenKey);
-  else sessionStorage.setItem(tokenKey, value);
-});
+// The token that requests carry; empty without one.
+export const token = new Signal<string>('');
+let server = '';
+
+// Says where the daemon is, such as http://127.0.0.1:8080, and the token that it wants. Without a server it
+// is where the page comes from.
+export function connect(to: { server?: string; token?: string }): void {
+  server = (to.server ?? '').replace(/\/+$/, '');
+  token.value = to.token ?? '';
+}
+
+export function addressOf(path: string): string {
+  return server + path;
+}
 
 // Whether the last request got through.
 export const connected = new Signal<boolean>(true);
@@ -22,21 +29,24 @@ export function headers(more: Record<string, string> = {}): Record<string, strin
   return token.value === '' ? more : { ...more, Authorization: `Bearer ${token.value}` };
 }
 
-export async function send(path: string, init: RequestInit = {}): Promise<Response> {
+// Any answer, refusals too.
+export async function ask(path: string, init: RequestInit = {}): Promise<Response> {
   let answer: Response;
   try {
-    answer = await fetch(path, { ...init, headers: headers(init.headers as Record<string, string>) });
+    answer = await fetch(addressOf(path), { ...init, headers: headers(init.headers as Record<string, string>) });
   } catch (error) {
     if (error instanceof DOMException && error.name === 'AbortError') throw error;
     connected.value = false;
     throw asApiError(error);
   }
   connected.value = true;
-  if (!answer.ok) {
-    const error = errorOf(answer.status, await answer.text());
-    if (error.status === 401) unauthorized.value = true;
-    throw error;
-  }
+  if (answer.status === 401) unauthorized.value = true;
+  return answer;
+}
+
+export async function send(path: string, init: RequestInit = {}): Promise<Response> {
+  const answer = await ask(path, init);
+  if (!answer.ok) throw errorOf(answer.status, await answer.text());
   return answer;
 }
 
@@ -148,9 +158,16 @@ export function cancelJob(id: string): Promise<Job> {
   return json(`/v1/jobs/${encodeURIComponent(id)}`, { method: 'DELETE' });
 }
 
+// The bytes of a finished job's mesh in one of its formats.
+export async function meshOf(job: Job, format: MeshFormat, signal?: AbortSignal): Promise<ArrayBuffer> {
+  const file = job.mesh?.files[format];
+  if (!file) throw new RangeError(`job ${job.id} has no file of the format ${format}`);
+  return (await send(file.href, { signal })).arrayBuffer();
+}
+
 export async function isAlive(): Promise<boolean> {
   try {
-    return (await fetch('/livez', { cache: 'no-store' })).ok;
+    return (await fetch(addressOf('/livez'), { cache: 'no-store' })).ok;
   } catch {
     return false;
   }

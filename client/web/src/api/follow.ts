@@ -1,7 +1,7 @@
 // A job's way to its end: told by the stream of all jobs, asked for where there is none. A lost connection
 // is waited for.
 import { getJob } from './client';
-import { jobEvents } from './job_events';
+import { isHidden, jobEvents } from './job_events';
 import { asApiError } from './problem';
 import { isFinal, type Job, type JobChange } from './types';
 
@@ -24,7 +24,7 @@ class Follower {
   private current: Job | null = null;
   private isAsking = false;
   private asksAgain = false;
-  private timer = 0;
+  private timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(
     private readonly id: string,
@@ -58,7 +58,7 @@ class Follower {
 
   private askLater(): void {
     clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => void this.ask(), document.hidden ? askHidden : askEvery);
+    this.timer = setTimeout(() => void this.ask(), isHidden() ? askHidden : askEvery);
   }
 
   private async ask(): Promise<void> {

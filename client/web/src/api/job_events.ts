@@ -41,7 +41,7 @@ export class JobEvents {
 
   // A page that nobody sees leaves its connection to the others.
   start(): void {
-    if (this.running || this.listeners.size === 0 || document.hidden) return;
+    if (this.running || this.listeners.size === 0 || isHidden()) return;
     const running = new AbortController();
     this.running = running;
     void this.run(running.signal);
@@ -98,6 +98,11 @@ export class JobEvents {
 
 export const jobEvents = new JobEvents();
 
+// Where there is no page, somebody waits.
+export function isHidden(): boolean {
+  return typeof document !== 'undefined' && document.hidden;
+}
+
 export function watchVisibility(): void {
   document.addEventListener('visibilitychange', () => {
     if (document.hidden) jobEvents.stop();
@@ -105,10 +110,10 @@ export function watchVisibility(): void {
   });
 }
 
-function sleep(milliseconds: number, signal: AbortSignal): Promise<void> {
+export function sleep(milliseconds: number, signal?: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
     const timer = setTimeout(resolve, milliseconds);
-    signal.addEventListener('abort', () => {
+    signal?.addEventListener('abort', () => {
       clearTimeout(timer);
       resolve();
     });

@@ -1,6 +1,7 @@
-// Uploads with their progress, which fetch cannot tell.
-import { connected, headers, unauthorized } from './client';
+// Uploads with their progress.
+import { addressOf, connected, headers, unauthorized } from './client';
 import { ApiError, errorOf, unreachable } from './problem';
+import { answerInParts } from './resume';
 import type { SampleType, UploadedVolume, Volume } from './types';
 
 export interface RawDescription {
@@ -18,9 +19,9 @@ export interface UploadOptions {
   name?: string;
   // The name by which the daemon keeps the body, which is not sent again then.
   kept?: string;
-  signal: AbortSignal;
+  signal?: AbortSignal;
   // Bytes that are sent; all of them while the daemon reads the volume.
-  onProgress: (sent: number, total: number) => void;
+  onProgress?: (sent: number, total: number) => void;
 }
 
 export interface Uploaded {
@@ -55,20 +56,40 @@ export function uploadedOf(status: number, body: string): UploadedVolume[] {
   return [{ member: '', status, volume: answer as Volume, problem: null }];
 }
 
-export function upload(whole: Blob, options: UploadOptions): Promise<Uploaded> {
+// What fewer bytes are is sent in one request.
+const resumableBytes = 8 << 20;
+
+// A large body goes on where its connection broke.
+export function upload(whole: Blob, options: UploadOptions = {}): Promise<Uploaded> {
+  const isSmall = whole.size < resumableBytes || options.kept !== undefined;
+  // Of a request's body XMLHttpRequest tells the progress, which fetch does not. Node has only that.
+  return isSmall && typeof XMLHttpRequest !== 'undefined' ? uploadInOne(whole, options) : uploadInParts(whole, options);
+}
+
+async function uploadInParts(whole: Blob, options: UploadOptions): Promise<Uploaded> {
+  const name: Record<string, string> =
+    options.name === undefined ? {} : { 'Content-Disposition': dispositionOf(options.name) };
+  const answer = await answerInParts(uploadPath(options), name, whole, options);
+  const kept = answer.headers.get('Isomesh-Upload') ?? undefined;
+  const text = await answer.text();
+  if (!answer.ok) throw errorOf(answer.status, text, kept);
+  return { volumes: uploadedOf(answer.status, text), kept };
+}
+
+function uploadInOne(whole: Blob, options: UploadOptions): Promise<Uploaded> {
   const body = options.kept === undefined ? whole : new Blob();
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
-    request.open('POST', uploadPath(options));
+    request.open('POST', addressOf(uploadPath(options)));
     for (const [name, value] of Object.entries(headers())) request.setRequestHeader(name, value);
     request.setRequestHeader('Content-Type', 'application/octet-stream');
     if (options.name !== undefined) request.setRequestHeader('Content-Disposition', dispositionOf(options.name));
     let sent = 0;
     request.upload.onprogress = (event) => {
       sent = event.loaded;
-      options.onProgress(event.loaded, body.size);
+      options.onProgress?.(event.loaded, body.size);
     };
-    request.upload.onload = () => options.onProgress(body.size, body.size);
+    request.upload.onload = () => options.onProgress?.(body.size, body.size);
     request.onload = () => {
       connected.value = true;
       const kept = request.getResponseHeader('Isomesh-Upload') ?? undefined;
@@ -97,7 +118,7 @@ export function upload(whole: Blob, options: UploadOptions): Promise<Uploaded> {
       }
     };
     request.onabort = () => reject(new DOMException('The upload was cancelled', 'AbortError'));
-    options.signal.addEventListener('abort', () => request.abort());
+    options.signal?.addEventListener('abort', () => request.abort());
     request.send(body);
   });
 }

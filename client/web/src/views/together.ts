@@ -4,6 +4,7 @@ import { ApiError } from '../api/problem';
 import type { Job, Vec3 } from '../api/types';
 import { differences } from '../job/differences';
 import { surfaceInWords } from '../job/parameters';
+import type { Part } from '../mesh/glb';
 import { loadMesh, viewableFile } from '../mesh/load';
 import { Surface } from '../scene/surface';
 import { placeOfText, placeToText, viewNames, viewTitles } from '../scene/views';
@@ -13,7 +14,7 @@ import { tellError } from '../ui/notices';
 import { hashOf, noteInAddress, type Route } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { volumeName } from '../volume/names';
-import { looksOfText, looksToText, type SurfaceLook } from './together_look';
+import { looksOfText, looksToText, usual, type SurfaceLook } from './together_look';
 
 const most = 8;
 const noteDelay = 300;
@@ -51,6 +52,8 @@ class Together {
   private readonly view = h('div', { class: 'viewport' });
   private readonly status = h('p', { class: 'hint', role: 'status' });
   private readonly looks: SurfaceLook[];
+  // Of which job and label, and the number and colour of that in the scene.
+  private readonly parts: { at: number; label: number | undefined; id: number; colour: string }[] = [];
   private surface: Surface | null = null;
   private noting = 0;
 
@@ -60,7 +63,7 @@ class Together {
     titles: readonly string[],
     private readonly query: URLSearchParams,
   ) {
-    this.looks = looksOfText(query.get('looks') ?? '', jobs.length);
+    this.looks = looksOfText(query.get('looks') ?? '', jobs.map(hasLabels));
     this.element = h(
       'div',
       { class: 'job together', 'data-title': `Together: ${titles.join(', ')}` },
@@ -106,8 +109,13 @@ class Together {
       this.show(at);
       noteInAddress({ looks: looksToText(this.looks) });
     };
-    const colour = h('input', { type: 'color', value: look.colour, 'aria-label': `Colour of ${title}` });
+    const colour = h('input', { type: 'color', value: look.colour || usual(at), 'aria-label': `Colour of ${title}` });
     colour.addEventListener('input', () => change({ colour: colour.value }));
+    colour.disabled = look.colour === '';
+    const own = checkbox('its labels\u2019 colours', look.colour === '', (isOwn) => {
+      colour.disabled = isOwn;
+      change({ colour: isOwn ? '' : colour.value });
+    });
     const opacity = h('input', { type: 'range', min: 0.1, max: 1, step: 0.05, value: look.opacity, 'aria-label': `Opacity of ${title}` });
     opacity.addEventListener('input', () => change({ opacity: opacity.valueAsNumber }));
     return h(
@@ -118,20 +126,34 @@ class Together {
         'div',
         { class: 'surface-row' },
         checkbox(title, look.isShown, (isShown) => change({ isShown })),
+        hasLabels(job) ? own : null,
         h('label', { class: 'surface-opacity' }, h('span', {}, 'Opacity'), opacity),
         h('span', { class: 'faint' }, h('a', { href: hashOf(['jobs', job.id]) }, 'alone'), ` ${formatCount(job.mesh?.triangles ?? 0)} triangles`),
       ),
     );
   }
 
-  // Each surface is a part of its own; the labels of one job share its look.
+  // Each surface is a part of its own, and of a job by labels each label is; they share its look, but for colours.
   private show(at: number): void {
     const { surface, looks } = this;
     const look = looks[at];
     if (!surface || !look) return;
-    surface.setColour(at, look.colour);
-    surface.setOpacity(at, look.opacity);
-    surface.setHidden(new Set(looks.flatMap(({ isShown }, place) => (isShown ? [] : [place]))));
+    for (const part of this.parts.filter((each) => each.at === at)) {
+      surface.setColour(part.id, look.colour || part.colour);
+      surface.setOpacity(part.id, look.opacity);
+    }
+    surface.setHidden(new Set(this.parts.filter((each) => looks[each.at]?.isShown === false).map(({ id }) => id)));
+  }
+
+  // What a label of a job is in the scene; a job without labels is one.
+  private partOf(at: number, label: Part | null): Part {
+    const found = this.parts.find((each) => each.at === at && each.label === label?.label);
+    const { id, colour } = found ?? { at, label: label?.label, id: this.parts.length, colour: label?.colour ?? usual(at) };
+    if (!found) {
+      this.parts.push({ at, label: label?.label, id, colour });
+      this.show(at);
+    }
+    return { label: id, colour: this.looks[at]?.colour || colour };
   }
 
   private async begin(): Promise<void> {
@@ -147,16 +169,14 @@ class Together {
       clearTimeout(this.noting);
       this.noting = window.setTimeout(() => noteInAddress({ cam: placeToText(surface.place) }), noteDelay);
     };
-    this.jobs.forEach((_, at) => this.show(at));
     const done = this.jobs.map(() => 0);
     const total = this.jobs.reduce((sum, { mesh }) => sum + (mesh?.triangles ?? 0), 0);
     await Promise.all(
       this.jobs.map((job, at) =>
         loadMesh(job, this.scope.signal, {
           // The finest alone: a coarse level of one would stand for all.
-          onBlocks: (blocks, _, isCoarse) => {
-            const colour = this.looks[at]?.colour ?? '';
-            if (!isCoarse) surface.addBlocks(blocks, { label: at, colour });
+          onBlocks: (blocks, label, isCoarse) => {
+            if (!isCoarse) surface.addBlocks(blocks, this.partOf(at, label));
           },
           onProgress: ({ triangles }) => {
             done[at] = triangles;
@@ -169,6 +189,10 @@ class Together {
     surface.finish();
     this.view.parentElement?.setAttribute('data-loaded', 'true');
   }
+}
+
+function hasLabels({ mesh }: Job): boolean {
+  return (mesh?.labels ?? []).length > 1;
 }
 
 function around(jobs: readonly Job[]): [Vec3, Vec3] {

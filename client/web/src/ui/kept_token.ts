@@ -1,0 +1,10 @@
+// The token lives as long as the tab.
+import { token } from '../api/client';
+
+const key = 'isomesh.token';
+
+token.value = sessionStorage.getItem(key) ?? '';
+token.subscribe((value) => {
+  if (value === '') sessionStorage.removeItem(key);
+  else sessionStorage.setItem(key, value);
+});

@@ -1,0 +1,104 @@
+// Uploads that go on where their connection broke, against a daemon as openapi.yaml describes it.
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { connect, upload } from '@/api/index';
+import { ApiError } from '@/api/problem';
+
+const place = '/v1/uploads/0123';
+const whole = new Blob([Uint8Array.from({ length: 10_000_000 }, (_, at) => (at * 7919) >> 8)]);
+
+class Daemon {
+  readonly asked: string[] = [];
+  bytes = new Uint8Array();
+  isWhole = false;
+  // Of so many parts the connection breaks after some of their bytes have come.
+  cuts = 0;
+  isLastUnheard = false;
+  refusal: Response | null = null;
+
+  async answer(address: string, init: RequestInit): Promise<Response> {
+    init.signal?.throwIfAborted();
+    const url = new URL(address);
+    const method = init.method ?? 'GET';
+    this.asked.push(`${method} ${url.pathname}${url.searchParams.has('upload') ? '?upload' : ''}`);
+    const headers = new Headers(init.headers);
+    if (method === 'HEAD') return new Response(null, { status: 204, headers: this.state() });
+    if (method === 'DELETE') return new Response(null, { status: 204 });
+    if (method === 'PATCH') return this.append(headers, new Uint8Array(await (init.body as Blob).arrayBuffer()));
+    if (url.searchParams.has('upload')) return this.volume(200);
+    expect(headers.get('Upload-Length')).toBe(String(whole.size));
+    return new Response(null, { status: 201, headers: { Location: place } });
+  }
+
+  private append(headers: Headers, part: Uint8Array): Response {
+    if (this.refusal) return this.refusal;
+    expect(headers.get('Upload-Offset')).toBe(String(this.bytes.length));
+    const isCut = this.cuts > 0;
+    if (isCut) this.cuts -= 1;
+    const came = isCut ? part.subarray(0, part.length >> 1) : part;
+    const bytes = new Uint8Array(this.bytes.length + came.length);
+    bytes.set(this.bytes);
+    bytes.set(came, this.bytes.length);
+    this.bytes = bytes;
+    this.isWhole = !isCut && headers.get('Upload-Complete') === '?1';
+    if (isCut || (this.isWhole && this.isLastUnheard)) throw new TypeError('fetch failed');
+    return this.isWhole ? this.volume(201) : new Response(null, { status: 204, headers: this.state() });
+  }
+
+  private state(): Record<string, string> {
+    return { 'Upload-Offset': String(this.bytes.length), 'Upload-Complete': this.isWhole ? '?1' : '?0' };
+  }
+
+  private volume(status: number): Response {
+    return new Response(JSON.stringify({ id: 'abc' }), { status, headers: { 'Upload-Complete': '?1' } });
+  }
+}
+
+describe('upload in parts', () => {
+  let daemon: Daemon;
+
+  beforeEach(() => {
+    daemon = new Daemon();
+    vi.stubGlobal('fetch', (address: string, init: RequestInit) => daemon.answer(address, init));
+    connect({ server: 'http://127.0.0.1:8080/' });
+  });
+  afterEach(() => {
+    vi.unstubAllGlobals();
+    connect({});
+  });
+
+  it('goes on where it broke, and tells how far it is', async () => {
+    daemon.cuts = 2;
+    const told: number[] = [];
+    const { volumes } = await upload(whole, { onProgress: (sent) => told.push(sent) });
+    expect(volumes).toEqual([{ member: '', status: 201, volume: { id: 'abc' }, problem: null }]);
+    expect(Buffer.compare(daemon.bytes, new Uint8Array(await whole.arrayBuffer()))).toBe(0);
+    expect(daemon.asked.filter((each) => each.startsWith('HEAD'))).toHaveLength(2);
+    expect(told).toEqual([...told].sort((a, b) => a - b));
+    expect(told.length).toBeGreaterThan(3);
+  });
+
+  it('asks for the answer that was not heard', async () => {
+    daemon.isLastUnheard = true;
+    const { volumes } = await upload(whole);
+    expect(volumes[0]?.volume).toEqual({ id: 'abc' });
+    expect(daemon.asked.at(-1)).toBe('POST /v1/volumes?upload');
+  });
+
+  it('gives back what the daemon refuses', async () => {
+    const problem = { title: 'The volume cannot be used', status: 422, detail: 'slice 41 of 93 is missing' };
+    daemon.refusal = new Response(JSON.stringify(problem), { status: 422, headers: { 'Isomesh-Upload': '0123' } });
+    const refused = await upload(whole).catch((error: unknown) => error);
+    expect(refused).toBeInstanceOf(ApiError);
+    expect(refused).toMatchObject({ status: 422, detail: problem.detail, remedy: { kept: '0123' } });
+  });
+
+  it('is given up by who does not want it any more', async () => {
+    const over = new AbortController();
+    daemon.cuts = 1000;
+    const refused = upload(whole, { signal: over.signal }).catch((error: unknown) => error);
+    await vi.waitFor(() => expect(daemon.asked).toContain(`HEAD ${place}`));
+    over.abort();
+    expect(await refused).toBeInstanceOf(DOMException);
+    await vi.waitFor(() => expect(daemon.asked.at(-1)).toBe(`DELETE ${place}`));
+  });
+});
