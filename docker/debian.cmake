@@ -1,14 +1,22 @@
 # The Debian packages, by CPack: isomeshd, isomesh and libisomesh-dev, of a build that was configured with
 # -D CMAKE_INSTALL_PREFIX=/usr. Whom they need is found from the binaries.
+string(TIMESTAMP ISOMESH_BUILT "%a, %d %b %Y %H:%M:%S +0000" UTC)
+set(changelog ${PROJECT_BINARY_DIR}/changelog)
+configure_file(${PROJECT_SOURCE_DIR}/server/install/changelog.in ${changelog} @ONLY)
+execute_process(COMMAND gzip --best --no-name --keep --force ${changelog} COMMAND_ERROR_IS_FATAL ANY)
 foreach(pair daemon:isomeshd client:isomesh dev:libisomesh-dev)
   string(REPLACE ":" ";" pair ${pair})
   list(GET pair 0 component)
   list(GET pair 1 package)
-  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package}
-    RENAME copyright COMPONENT ${component})
+  install(FILES ${PROJECT_SOURCE_DIR}/server/install/copyright
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package} COMPONENT ${component})
+  install(FILES ${changelog}.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package} RENAME changelog.Debian.gz
+    COMPONENT ${component})
   string(TOUPPER ${component} upper)
   set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${package})
 endforeach()
+
+include(${PROJECT_SOURCE_DIR}/server/install/sbom.cmake)
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_COMPONENTS_ALL daemon client dev)

@@ -1,0 +1,33 @@
+# What each component is made of, and the licences of others in it, beside its documents. Told by ninja, so it is
+# made when a build is installed; on other systems than Debian there is none.
+find_program(ISOMESH_DPKG_QUERY dpkg-query)
+find_program(ISOMESH_PYTHON python3)
+if(NOT ISOMESH_DPKG_QUERY OR NOT ISOMESH_PYTHON OR NOT CMAKE_GENERATOR STREQUAL "Ninja")
+  message(STATUS "No SBOM: that takes Debian, Ninja and python3.")
+  return()
+endif()
+
+# isomesh_sbom(COMPONENT PACKAGE [PAGE] TARGET..): PAGE where the component has the page.
+function(isomesh_sbom component package)
+  set(targets ${ARGN})
+  set(page)
+  list(REMOVE_ITEM targets PAGE)
+  if("PAGE" IN_LIST ARGN AND ISOMESH_WEB)
+    set(page "--page \"${PROJECT_BINARY_DIR}/client/web/third_party.json\"")
+  endif()
+  list(JOIN targets " " targets)
+  set(into ${PROJECT_BINARY_DIR}/sbom/${package})
+  install(CODE "execute_process(COMMAND \"${ISOMESH_PYTHON}\" \"${PROJECT_SOURCE_DIR}/server/install/sbom\"
+    --build \"${PROJECT_BINARY_DIR}\" ${page} --version ${PROJECT_VERSION} --into \"${into}\" ${package} ${targets}
+    COMMAND_ERROR_IS_FATAL ANY)" COMPONENT ${component})
+  install(FILES ${into}/sbom.cdx.json ${into}/third-party-licenses.gz
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package} COMPONENT ${component})
+endfunction()
+
+if(ISOMESH_DAEMON)
+  isomesh_sbom(daemon isomeshd PAGE bin/isomeshd bin/isomesh-dimse bin/isomesh-import bin/isomesh-job)
+endif()
+if(ISOMESH_COMMAND)
+  isomesh_sbom(client isomesh bin/isomesh)
+endif()
+isomesh_sbom(dev libisomesh-dev base/libisomesh_base.a proto/libisomesh_proto.a client/isomesh/libisomesh_client.a)
