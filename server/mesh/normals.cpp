@@ -8,7 +8,8 @@
 namespace isomesh::mesh {
 namespace {
 
-constexpr std::size_t kLayersPerSlab = 4;
+// The triangles of one more layer are looked at twice.
+constexpr std::size_t kLayersPerSlab = 16;
 
 Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
@@ -21,10 +22,14 @@ Vec3 normal_of(const Mesh& mesh, const Triangle& triangle) {
 }
 
 Vec3 unit(const Vec3& v) {
-  const double length = std::hypot(double{v[0]}, double{v[1]}, double{v[2]});
+  const double x = v[0];
+  const double y = v[1];
+  const double z = v[2];
+  // What single precision holds has squares that double precision holds.
+  const double length = std::sqrt(x * x + y * y + z * z);
   if (length == 0) return {0, 0, 1};
-  return {static_cast<float>(v[0] / length), static_cast<float>(v[1] / length),
-          static_cast<float>(v[2] / length)};
+  return {static_cast<float>(x / length), static_cast<float>(y / length),
+          static_cast<float>(z / length)};
 }
 
 // Of the vertices of these layers, which only triangles of the same layers and of the one below can

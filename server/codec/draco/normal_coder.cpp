@@ -1,5 +1,8 @@
 #include "server/codec/draco/normal_coder.h"
 
+#include <cmath>
+#include <cstdlib>
+
 #include <draco/compression/attributes/normal_compression_utils.h>
 #include <draco/compression/attributes/prediction_schemes/prediction_scheme_normal_octahedron_canonicalized_encoding_transform.h>
 
@@ -14,6 +17,29 @@ constexpr std::uint32_t kSymbols = 1U << kNormalBits;
 using Transform =
     draco::PredictionSchemeNormalOctahedronCanonicalizedEncodingTransform<std::int32_t>;
 
+// As std::floor, which is a function of a library on processors that are not known to have it.
+std::int32_t rounded_down(double x) {
+  const auto whole = static_cast<std::int32_t>(x);
+  return whole - (x < whole ? 1 : 0);
+}
+
+// Where the octahedron is met whose corners are `center` from its middle. The same to the bit as
+// libdraco's FloatVectorToQuantizedOctahedralCoords.
+std::array<std::int32_t, 3> on_octahedron(const mesh::Vec3& normal, std::int32_t center) {
+  const double x = normal[0];
+  const double y = normal[1];
+  const double z = normal[2];
+  const double sum = std::abs(x) + std::abs(y) + std::abs(z);
+  if (!(sum > 1e-6)) return {center, 0, 0};
+  const double scale = 1.0 / sum;
+  const std::int32_t a = rounded_down(x * scale * center + 0.5);
+  const std::int32_t b = rounded_down(y * scale * center + 0.5);
+  // Rounding may have made the first two too long together.
+  const std::int32_t c = center - std::abs(a) - std::abs(b);
+  if (c < 0) return {a, b > 0 ? b + c : b - c, 0};
+  return {a, b, z * scale < 0 ? -c : c};
+}
+
 }  // namespace
 
 void NormalCoder::quantise(std::span<const mesh::Vec3> normals, std::size_t begin,
@@ -23,7 +49,8 @@ void NormalCoder::quantise(std::span<const mesh::Vec3> normals, std::size_t begi
   for (std::size_t v = begin; v < end; ++v) {
     std::int32_t s = 0;
     std::int32_t t = 0;
-    octahedron.FloatVectorToQuantizedOctahedralCoords(normals[v].data(), &s, &t);
+    const auto place = on_octahedron(normals[v], octahedron.center_value());
+    octahedron.IntegerVectorToQuantizedOctahedralCoords(place.data(), &s, &t);
     coordinates_[v] = {static_cast<std::uint16_t>(s), static_cast<std::uint16_t>(t)};
   }
 }
