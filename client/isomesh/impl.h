@@ -52,6 +52,7 @@ class Client::Impl {
  private:
   std::string begin_upload(const HttpRequest& request) const;
   HttpAnswer finish_upload(const HttpRequest& request, const std::string& place) const;
+  void give_up(const std::string& place) const;
 
   std::stop_token stop_;
   Transport transport_;

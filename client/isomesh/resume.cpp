@@ -119,13 +119,22 @@ HttpAnswer Client::Impl::resumed(const HttpRequest& request) const {
     return finish_upload(request, place);
   } catch (const NoAnswer&) {
     throw;  // nobody is there who could be told
-  } catch (...) {
-    try {
-      transport_.send({.method = "DELETE", .target = place});
-    } catch (const Error&) {
-      // What is left there expires.
-    }
+  } catch (const Error& error) {
+    // It has expired, or another daemon answers than the one that has it.
+    if (error.code() == ErrorCode::kGone) return answer(request);
+    give_up(place);
     throw;
+  } catch (...) {
+    give_up(place);
+    throw;
+  }
+}
+
+void Client::Impl::give_up(const std::string& place) const {
+  try {
+    transport_.send({.method = "DELETE", .target = place});
+  } catch (const Error&) {
+    return;  // what is left there expires
   }
 }
 

@@ -36,11 +36,6 @@ KeptLimits kept_limits(const Services& services, const ServerOptions& options) {
   return limits;
 }
 
-// Beside the folder of what does not outlive the process.
-std::filesystem::path uploads_folder(const store::DataFolder& folder) {
-  return folder.scratch().parent_path() / "uploads";
-}
-
 void report_refused(Metrics& metrics, const std::string& address, const Error& error) {
   const int status = describe(error.code()).status;
   metrics.count({.method = "", .route = kNoRoute, .status = status});
@@ -78,7 +73,7 @@ App::App(const Services& the_services, const ServerOptions& the_options)
     : services(the_services),
       options(the_options),
       uploads(the_options.upload_places, "uploads"),
-      kept(kept_limits(the_services, the_options), uploads_folder(the_services.folder)),
+      kept(kept_limits(the_services, the_options), the_services.folder.uploads()),
       streams(the_options.event_streams, "streams of events"),
       rules{.cors_origins = the_options.cors_origins,
             .check_host = false,

@@ -44,6 +44,8 @@ class DataFolder {
   std::filesystem::path quarantine() const { return root_ / "quarantine"; }
   std::filesystem::path records() const { return root_ / "isomesh.sqlite"; }  // the database
   std::filesystem::path scratch() const { return root_ / "scratch"; }         // unfinished files
+  // Bodies that come in parts, which outlive the process. Made by who keeps them.
+  std::filesystem::path uploads() const { return root_ / "uploads"; }
   Reserve& reserve() const { return *reserve_; }
 
   // A name of its own, given when it is asked for first. Throws Error kOutOfSpace or kInternal.

@@ -25,6 +25,7 @@ using test::TemporaryFolder;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 constexpr const char* kJson = "application/json";
 const UploadOptions kInOnePiece = {.resumable_bytes = UINT64_MAX};
@@ -226,23 +227,30 @@ TEST(Upload, GoesOnWhereTheConnectionBrokeAndAsksForAnAnswerThatItDidNotHear) {
                          "PATCH /v1/uploads/7", "HEAD /v1/uploads/7", "POST /v1/volumes?upload=7"));
 }
 
-TEST(Upload, InPartsIsGivenUpWhenItIsNotKeptAnyMore) {
+// As of another daemon of a cluster, or when it has expired.
+TEST(Upload, InPartsIsSentInOnePieceWhereItIsNotKept) {
   std::vector<std::string> asked;
   const test::SocketServer server([&](int socket) {
     const std::string head = test::read_head(socket);
     asked.push_back(head.substr(0, head.find(' ')));
-    if (asked.size() == 2) return;
-    test::send_text(socket, asked.size() == 1
-                                ? "HTTP/1.1 201 Created\r\nLocation: /v1/uploads/7\r\n"
-                                  "Content-Length: 0\r\n\r\n"
-                                : "HTTP/1.1 410 Gone\r\nContent-Length: 0\r\n\r\n");
+    const auto answer = [&](const std::string& text, const std::string& body = {}) {
+      test::send_text(socket, "HTTP/1.1 " + text + "\r\nContent-Length: " +
+                                  std::to_string(body.size()) + "\r\n\r\n" + body);
+    };
+    if (asked.size() == 1) return answer("201 Created\r\nLocation: /v1/uploads/7");
+    if (asked.size() == 2) return;  // the connection breaks
+    if (asked.size() == 3) return answer("410 Gone");
+    EXPECT_THAT(head, Not(HasSubstr("Upload-Complete")));
+    std::string body(2000, ' ');
+    ::recv(socket, body.data(), body.size(), MSG_WAITALL);
+    EXPECT_TRUE(body == pattern(2000));
+    answer("201 Created", to_json(some_volume()));
   });
   TemporaryFolder folder;
   test::write_file(folder / "file", pattern(2000));
   Client client({.server = server.url()});
-  EXPECT_EQ(error_of([&] { client.upload(folder / "file", {.resumable_bytes = 1000}); }).code(),
-            ErrorCode::kGone);
-  EXPECT_THAT(asked, ElementsAre("POST", "PATCH", "HEAD", "DELETE"));
+  EXPECT_EQ(client.upload(folder / "file", {.resumable_bytes = 1000}), some_volume());
+  EXPECT_THAT(asked, ElementsAre("POST", "PATCH", "HEAD", "POST"));
 }
 
 TEST(Upload, IsNotRepeatedWhenTheConnectionBreaks) {

@@ -25,6 +25,10 @@ class Daemon {
     if (method === 'DELETE') return new Response(null, { status: 204 });
     if (method === 'PATCH') return this.append(headers, new Uint8Array(await (init.body as Blob).arrayBuffer()));
     if (url.searchParams.has('upload')) return this.volume(200);
+    if (init.body) {
+      expect((init.body as Blob).size).toBe(whole.size);
+      return this.volume(201);
+    }
     expect(headers.get('Upload-Length')).toBe(String(whole.size));
     return new Response(null, { status: 201, headers: { Location: place } });
   }
@@ -90,6 +94,13 @@ describe('upload in parts', () => {
     const refused = await upload(whole).catch((error: unknown) => error);
     expect(refused).toBeInstanceOf(ApiError);
     expect(refused).toMatchObject({ status: 422, detail: problem.detail, remedy: { kept: '0123' } });
+  });
+
+  it('comes in one piece where its parts are not known', async () => {
+    daemon.refusal = new Response('{}', { status: 410 });
+    const { volumes } = await upload(whole);
+    expect(volumes[0]?.volume).toEqual({ id: 'abc' });
+    expect(daemon.asked).toEqual(['POST /v1/volumes', `PATCH ${place}`, 'POST /v1/volumes']);
   });
 
   it('is given up by who does not want it any more', async () => {

@@ -28,7 +28,10 @@ def send(transport: Transport, target: str, headers: Dict[str, str], body: Body)
         return _finish(transport, target, body, place)
     except Unreachable:
         raise  # nobody is there who could be told
-    except BaseException:
+    except BaseException as error:
+        if isinstance(error, Refused) and error.status == 410:
+            # It has expired, or another daemon answers than the one that has it.
+            return transport.send(Request("POST", target, headers, body))
         try:
             transport.send(Request("DELETE", place)).text()
         except IsomeshError:

@@ -136,7 +136,10 @@ export async function answerInParts(
   const place = begun.headers.get('Location');
   if (!begun.ok || place === null) throw errorOf(begun.status, await begun.text());
   try {
-    return await new Parts(path, place, whole, options).answer();
+    const answer = await new Parts(path, place, whole, options).answer();
+    if (answer.status !== 410) return answer;
+    // It has expired, or another daemon answers than the one that has it.
+    return await ask(path, { method: 'POST', signal: options.signal, body: whole, headers });
   } catch (error) {
     // What is left there expires, where nobody can be told.
     if (options.signal?.aborted) void ask(place, { method: 'DELETE' }).catch(() => undefined);
