@@ -15,6 +15,7 @@
 #include "server/jobs/memory.h"
 #include "tests/bench/accuracy.h"
 #include "tests/bench/benchmarks.h"
+#include "tests/bench/cluster.h"
 #include "tests/bench/label_stages.h"
 #include "tests/bench/labels.h"
 #include "tests/bench/machine.h"
@@ -198,6 +199,12 @@ int run_program(int argc, char** argv) {
       ->check(CLI::ExistingFile);
   service->fallthrough();  // --volume, --iso and --threads may stand behind it
 
+  CLI::App* cluster = app.add_subcommand(
+      "cluster", "Start daemons on a PostgreSQL of their own and measure queue and jobs");
+  cluster->add_option("--daemon", daemon, "The program; isomeshd beside this one unless given")
+      ->check(CLI::ExistingFile);
+  cluster->fallthrough();
+
   std::uint32_t samples = 300;
   CLI::App* labels = app.add_subcommand(
       "labels",
@@ -236,6 +243,10 @@ int run_program(int argc, char** argv) {
   if (*memory) return run_memory_command(stage, size, threads);
   warn_when_busy();
   if (*service) return run_service(options, daemon);
+  if (*cluster) {
+    std::cout << to_table(measure_cluster(daemon));
+    return 0;
+  }
   accuracy.with_peers = !only_fast;
   if (*simplify || *certify) return run_accuracy(options, accuracy, bool(*certify));
   if (*labels) return run_labels(options, samples);

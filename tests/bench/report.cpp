@@ -88,6 +88,7 @@ int write_report(const std::filesystem::path& folder, const std::filesystem::pat
     write_service({daemon, kBrainFile, kBrainIso, threads}, report);
     write_draco_share(*real, report);
   }
+  if (is_wanted("cluster")) write_cluster(daemon, report);
   if (is_wanted("goals")) write_goals(plan, report);
   std::vector<Subject> subjects;
   if (head) {

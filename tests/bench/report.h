@@ -19,7 +19,7 @@ int write_report(const std::filesystem::path& folder, const std::filesystem::pat
                  const std::vector<std::string>& only);
 
 // What sections are called.
-inline constexpr std::array<const char*, 8> kReportSections = {
-    "service", "goals", "paper", "passes", "growth", "quality", "labels", "accuracy"};
+inline constexpr std::array<const char*, 9> kReportSections = {
+    "service", "cluster", "goals", "paper", "passes", "growth", "quality", "labels", "accuracy"};
 
 }  // namespace isomesh::bench

@@ -48,6 +48,8 @@ void write_quality(const std::vector<Subject>& subjects, Report& report);
 void write_goals(const Plan& plan, Report& report);
 // What a daemon reports of its jobs, and how long requests take.
 void write_service(const ServicePlan& plan, Report& report);
+// Several daemons on one PostgreSQL; left out, saying so, where that is not installed.
+void write_cluster(const std::filesystem::path& daemon, Report& report);
 // All labels of a segmentation beside the peers. The root: see surface_nets.h.
 void write_labels(const std::filesystem::path& surface_nets_root, Report& report);
 // A volume at its own resolution, and the surface that is simplified.

@@ -10,12 +10,12 @@
 
 #include "client/isomesh/client.h"
 #include "tests/api/http.h"
+#include "tests/bench/daemon.h"
 #include "tests/bench/numbers.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/stages.h"
 #include "tests/bench/timing.h"
-#include "tests/support/process.h"
 
 namespace isomesh::bench {
 namespace {
@@ -29,28 +29,6 @@ constexpr Goal kUploadGoal = {10};   // milliseconds
 constexpr std::uint32_t kSmallSize = 32;
 constexpr std::uint32_t kUploadSize = 128;  // 2 MiB of uint8
 constexpr int kSmallRuns = 51;
-
-class Daemon {
- public:
-  explicit Daemon(const ServicePlan& plan)
-      : process_({plan.daemon.string(), "--listen", "127.0.0.1:0", "--data",
-                  (folder_ / "data").string(), "--workers", "1", "--threads",
-                  std::to_string(plan.threads), "--log-level", "warn"}) {
-    constexpr std::string_view kBegin = "listening on ";
-    const std::string line = process_.first_line();
-    if (!line.starts_with(kBegin)) {
-      throw std::runtime_error("the daemon does not listen: " + process_.errors());
-    }
-    url_ = line.substr(kBegin.size());
-  }
-
-  const std::string& url() const { return url_; }
-
- private:
-  test::TemporaryFolder folder_;
-  test::Process process_;
-  std::string url_;
-};
 
 double wall_ms(const std::function<void()>& run) { return time_ms({run}); }
 
@@ -203,7 +181,7 @@ std::vector<Finding> measure_service(const ServicePlan& plan) {
                                : static_cast<int>(std::thread::hardware_concurrency()));
   if (plan.threads > 0) Peers::set_threads(plan.threads);
   std::vector<Finding> findings;
-  const Daemon daemon(plan);
+  const Daemon daemon(plan.daemon, {"--workers", "1", "--threads", std::to_string(plan.threads)});
   if (peers_available()) compare_with_peers(daemon, plan, findings);
   findings.push_back(small_request(daemon));
   findings.push_back(small_upload(daemon));

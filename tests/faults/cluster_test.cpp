@@ -149,6 +149,50 @@ TEST_F(Cluster, NothingIsLostOrDoneTwiceWhenNodesAndTheDatabaseDie) {
   std::cout << rounds << " kills, " << accepted.size() << " jobs, all succeeded once" << std::endl;
 }
 
+// Each time the server that takes writes is lost with its disk, and its standby takes its place.
+TEST_F(Cluster, AStandbyThatTakesOverHasEveryAcceptedJob) {
+  const char* asked = std::getenv("ISOMESH_KILL_ROUNDS");
+  const int rounds = asked == nullptr ? 2 : std::stoi(asked);
+  constexpr int kJobsOfARound = 12;
+  postgres_ = std::make_unique<Postgres>(Postgres::Disk::kReplicated);
+  Postgres standby(*postgres_);
+  store_ = postgres_->or_on(standby, postgres_->new_place());
+  std::array<Postgres*, 2> servers = {postgres_.get(), &standby};
+  start_all();
+  const Volume volume = upload(node(0), sphere_upload());
+  std::vector<std::string> accepted;
+  std::mt19937 random(std::random_device{}());
+  for (int round = 0; round < rounds; ++round) {
+    std::jthread submitter([&] {
+      for (int n = 0; n < kJobsOfARound; ++n) {
+        const int number = round * kJobsOfARound + n;
+        const std::string body = "{\"volume\": \"" + volume.id +
+                                 "\", \"iso\": " + std::to_string(60 + 0.1 * number) + "}";
+        accepted.push_back(insist([&] {
+          const Answer answer =
+              node(static_cast<std::size_t>(number) % kNodes)
+                  .send("POST", "/v1/jobs", body, {{"Idempotency-Key", std::to_string(number)}});
+          if (answer.status != 202 && answer.status != 200) throw std::runtime_error(answer.body);
+          return job_from_json(answer.body).id;
+        }));
+      }
+    });
+    std::this_thread::sleep_for(milliseconds(std::uniform_int_distribution(0, 200)(random)));
+    servers[0]->stop_at_once();
+    servers[1]->promote();
+    servers[0]->follow(*servers[1]);
+    std::swap(servers[0], servers[1]);
+  }
+  ASSERT_EQ(accepted.size(), static_cast<std::size_t>(rounds * kJobsOfARound));
+  for (const std::string& id : accepted) {
+    const Job job = insist([&] { return node(0).client().wait(id); });
+    EXPECT_EQ(job.state, JobState::kSucceeded) << to_json(job);
+  }
+  EXPECT_EQ(ask("SELECT count(*) FROM jobs"), std::to_string(accepted.size()));
+  std::cout << rounds << " servers lost, " << accepted.size() << " jobs, all succeeded"
+            << std::endl;
+}
+
 TEST_F(Cluster, WhatIsAskedOfOneNodeIsTrueOfAll) {
   start(0, {"--workers", "0"});  // only answers
   start(1, {"--workers", "1"});

@@ -38,14 +38,27 @@ Postgres& Postgres::shared() {
 }
 
 Postgres::Postgres(Disk disk) : disk_(disk) {
+  give_folder();
+  run_program("initdb", {"--pgdata", folder_ / "data", "--username", "isomesh", "--auth", "trust",
+                         "--encoding", "UTF8", "--locale", "C", "--no-sync", "--no-instructions"});
+  start();
+}
+
+Postgres::Postgres(const Postgres& primary) : disk_(primary.disk_) {
+  give_folder();
+  follow(primary);
+}
+
+void Postgres::give_folder() const {
   if (::geteuid() == 0 && ::chown(folder_.path().c_str(), kNobody, kNobody) != 0) {
     throw std::runtime_error("a folder for PostgreSQL");
   }
-  const Finished made = run(
-      command("initdb", {"--pgdata", folder_ / "data", "--username", "isomesh", "--auth", "trust",
-                         "--encoding", "UTF8", "--locale", "C", "--no-sync", "--no-instructions"}));
-  if (made.status != 0) throw std::runtime_error("initdb: " + made.errors);
-  start();
+}
+
+void Postgres::run_program(const std::string& program,
+                           const std::vector<std::string>& arguments) const {
+  const Finished done = run(command(program, arguments));
+  if (done.status != 0) throw std::runtime_error(program + ": " + done.errors);
 }
 
 Postgres::~Postgres() { stop_at_once(); }
@@ -69,6 +82,7 @@ void Postgres::start() {
                                        "max_connections=300", "jit=off",
                                        // It would hold back events for as long as it counts rows.
                                        "autovacuum=off", "log_min_messages=fatal"};
+  if (disk_ == Disk::kReplicated) settings.emplace_back("synchronous_standby_names=*");
   if (disk_ == Disk::kFast) {
     settings.insert(settings.end(), {"fsync=off", "full_page_writes=off"});
   }
@@ -89,6 +103,23 @@ void Postgres::stop_at_once() {
   server_->send_signal(SIGQUIT);
   server_->wait();
   server_.reset();
+}
+
+void Postgres::follow(const Postgres& primary) {
+  std::filesystem::remove_all(folder_ / "data");
+  run_program("pg_basebackup",
+              {"--host", primary.folder_.path().string(), "--username", "isomesh", "--pgdata",
+               folder_ / "data", "--write-recovery-conf", "--checkpoint", "fast", "--no-sync"});
+  start();
+}
+
+void Postgres::promote() { run_program("pg_ctl", {"promote", "--pgdata", folder_ / "data"}); }
+
+std::string Postgres::or_on(const Postgres& other, const std::string& place) const {
+  const std::string mine = "host=" + folder_.path().string();
+  std::string both = place;
+  both.replace(both.find(mine), mine.size(), mine + ',' + other.folder_.path().string());
+  return both + "&target_session_attrs=read-write";
 }
 
 std::string Postgres::url_of(const std::string& options) const {

@@ -21,14 +21,20 @@ class Postgres {
   // cuts its power.
   static Postgres& shared();
 
-  enum class Disk { kFast, kDurable };
+  // kReplicated: nothing is committed before a standby has it, too.
+  enum class Disk { kFast, kDurable, kReplicated };
   explicit Postgres(Disk disk = Disk::kFast);
+  // The standby of a replicated one.
+  explicit Postgres(const Postgres& primary);
   ~Postgres();
   Postgres(const Postgres&) = delete;
   Postgres& operator=(const Postgres&) = delete;
 
   // A new place for tables that nobody else uses, as a URL for --store.
   std::string new_place();
+
+  // The same place on whichever of the two takes writes.
+  std::string or_on(const Postgres& other, const std::string& place) const;
 
   // Runs SQL there; the first column of the last row, empty without one. Throws
   // std::runtime_error.
@@ -38,10 +44,18 @@ class Postgres {
   void stop_at_once();
   void start();
 
+  // One that was stopped starts anew as the standby of that one.
+  void follow(const Postgres& primary);
+  // The standby takes writes from now on.
+  void promote();
+
  private:
   std::vector<std::string> command(const std::string& program,
                                    const std::vector<std::string>& arguments) const;
   std::string url_of(const std::string& options) const;
+  // Runs one of PostgreSQL's programs. Throws std::runtime_error when it fails.
+  void run_program(const std::string& program, const std::vector<std::string>& arguments) const;
+  void give_folder() const;
 
   const Disk disk_;
   TemporaryFolder folder_;
