@@ -9,8 +9,10 @@ export default defineConfig({
   test: {
     dir: here('../../tests/web'),
     include: ['**/browser/**/*.test.ts'],
-    // What it looks at is large volumes of what other tests see in small ones: only for who wants the pictures.
-    exclude: process.env.ISOMESH_PICTURES === undefined ? ['**/browser/pictures.test.ts'] : [],
+    // They look at large volumes of what other tests see in small ones: only for who wants the pictures or the times.
+    exclude: ['pictures', 'times']
+      .filter((name) => process.env[`ISOMESH_${name.toUpperCase()}`] === undefined)
+      .map((name) => `**/browser/${name}.test.ts`),
     fileParallelism: false,
     // Software draws, on machines that have other things to do.
     expect: { poll: { timeout: 60_000, interval: 100 } },

@@ -155,7 +155,7 @@ TEST_F(Cluster, AStandbyThatTakesOverHasEveryAcceptedJob) {
   const int rounds = asked == nullptr ? 2 : std::stoi(asked);
   constexpr int kJobsOfARound = 12;
   postgres_ = std::make_unique<Postgres>(Postgres::Disk::kReplicated);
-  Postgres standby(*postgres_);
+  Postgres standby(Postgres::StandbyOf{*postgres_});
   store_ = postgres_->or_on(standby, postgres_->new_place());
   std::array<Postgres*, 2> servers = {postgres_.get(), &standby};
   start_all();

@@ -44,9 +44,9 @@ Postgres::Postgres(Disk disk) : disk_(disk) {
   start();
 }
 
-Postgres::Postgres(const Postgres& primary) : disk_(primary.disk_) {
+Postgres::Postgres(const StandbyOf& standby) : disk_(standby.primary.disk_) {
   give_folder();
-  follow(primary);
+  follow(standby.primary);
 }
 
 void Postgres::give_folder() const {

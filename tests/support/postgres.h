@@ -24,8 +24,10 @@ class Postgres {
   // kReplicated: nothing is committed before a standby has it, too.
   enum class Disk { kFast, kDurable, kReplicated };
   explicit Postgres(Disk disk = Disk::kFast);
-  // The standby of a replicated one.
-  explicit Postgres(const Postgres& primary);
+  struct StandbyOf {
+    const Postgres& primary;  // a replicated one
+  };
+  explicit Postgres(const StandbyOf& standby);
   ~Postgres();
   Postgres(const Postgres&) = delete;
   Postgres& operator=(const Postgres&) = delete;

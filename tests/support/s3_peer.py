@@ -74,6 +74,11 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def log_message(self, *arguments):
         pass
 
+    def handle_expect_100(self):
+        go_on = super().handle_expect_100()
+        self.wfile.flush()  # or the client waits for it
+        return go_on
+
     # --- signatures
 
     def check_signature(self, body):

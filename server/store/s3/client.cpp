@@ -244,8 +244,8 @@ void S3Client::get(const std::string& key, std::uint64_t bytes, const S3Sink& si
 }
 
 S3Client::Erased S3Client::erase(const std::string& key) const {
-  return ask({.method = "DELETE", .key = key}).attempts == 1 ? Erased::kAtOnce
-                                                             : Erased::kMaybeLater;
+  const auto asked = ask({.method = "DELETE", .key = key, .is_sent_once = true});
+  return asked.attempts == 1 ? Erased::kAtOnce : Erased::kMaybeLater;
 }
 
 void S3Client::try_to_erase(const std::string& key) const {

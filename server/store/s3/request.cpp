@@ -15,6 +15,7 @@ namespace isomesh::store {
 namespace {
 
 // Of answers that are not passed on, such as a page of a list.
+constexpr std::uint64_t kAskedFor = 1 << 20;  // bytes, for which the peer is asked first
 constexpr std::size_t kLongestText = std::size_t{4} << 20;
 constexpr std::size_t kIdleConnections = 16;
 
@@ -68,6 +69,7 @@ class Attempt {
     curl_easy_setopt(easy_, CURLOPT_CONNECTTIMEOUT_MS,
                      request_.is_quick ? std::min(kQuick, connect) : connect);
     if (request_.is_quick) curl_easy_setopt(easy_, CURLOPT_TIMEOUT_MS, kQuick);
+    if (request_.is_sent_once) curl_easy_setopt(easy_, CURLOPT_FRESH_CONNECT, 1L);
     curl_easy_setopt(easy_, CURLOPT_LOW_SPEED_LIMIT, 1024L);
     curl_easy_setopt(easy_, CURLOPT_LOW_SPEED_TIME, static_cast<long>(options_.stall.count()));
     curl_easy_setopt(easy_, CURLOPT_BUFFERSIZE, 512L * 1024);
@@ -108,6 +110,9 @@ class Attempt {
     if (method == "HEAD") {
       curl_easy_setopt(easy_, CURLOPT_NOBODY, 1L);
     } else if (method == "PUT") {
+      // To ask first whether a small body is wanted takes longer than to send it. (A removed header
+      // "Expect" would be signed by libcurl as an empty one.)
+      if (body_bytes() < kAskedFor) curl_easy_setopt(easy_, CURLOPT_EXPECT_100_TIMEOUT_MS, 1L);
       curl_easy_setopt(easy_, CURLOPT_UPLOAD, 1L);
       curl_easy_setopt(easy_, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(body_bytes()));
       curl_easy_setopt(easy_, CURLOPT_READFUNCTION, give);

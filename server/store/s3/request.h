@@ -52,6 +52,9 @@ struct S3Request {
   const S3Sink* sink = nullptr;  // takes the body of an answer 200 or 206
   std::uint64_t sink_begin = 0;  // where the first byte that the sink wants lies in the object
   bool is_quick = false;         // no more than two seconds
+  // Over a connection of its own: what fails on one that was used before, libcurl sends again and
+  // does not say so.
+  bool is_sent_once = false;
 };
 
 // Statuses of answers that mean something of their own.
