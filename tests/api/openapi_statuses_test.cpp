@@ -127,6 +127,7 @@ void probe_uploads(Statuses& statuses, const Daemon& daemon) {
   const std::string place = place_for('?' + sphere.query);
   statuses.probe(post, "/v1/volumes?upload=" + place.substr(place.rfind('/') + 1));
   statuses.probe(patch, place, sphere.bytes, part(true));
+  statuses.probe(patch, place_for('?' + sphere.query), sphere.bytes, part(true));
   statuses.probe(patch, place_for("?dims=2,2,1&type=uint8"), "1234", part(true));
   statuses.probe(patch, place_for(""), two_volumes(), part(true));
   statuses.probe(patch, place_for(""), "garbage", part(true));

@@ -47,7 +47,7 @@ describe('the labels of a volume', () => {
   it('are all meshed unless some are picked', async () => {
     const { page } = at;
     const rows = await openForm(page);
-    expect(await rows.allInnerTexts()).toEqual([
+    await expect.poll(() => rows.allInnerTexts()).toEqual([
       expect.stringMatching(/label 1[^]*voxels/),
       expect.stringMatching(/label 2[^]*voxels/),
       expect.stringMatching(/label 5[^]*200 voxels/),
