@@ -54,7 +54,8 @@ void work(const JobOrder& order) {
     say(to_line(JobPiece{.file = 0, .bytes = 1000}) + "some");
     die();
   }
-  while (order.iso == test::kTalksForEver) say("and ");
+  while (order.iso == test::kTalksForEver)
+    say("and so on, and on, and on, and on, and on, and on, and ");
   const bool is_mesh = order.work == JobOrder::Work::kMesh;
   const bool is_other = order.iso == test::kAnswersAnotherOrder;
   say(to_line(empty_answer(is_mesh != is_other ? JobOrder::Work::kMesh : JobOrder::Work::kCount)));

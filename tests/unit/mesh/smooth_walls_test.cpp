@@ -30,8 +30,8 @@ std::vector<NamedWalls> walls() {
       all.push_back({name + ", " + describe(volume.dims, options), separated(volume, options)});
     }
   };
-  add("noise", label_noise(6, {20, 9, 40}, 101), 5);
-  add("cells", label_cells(12, {40, 21, 50}, 12, 102), 12);
+  add("noise", label_noise(6, {9, 7, 40}, 101), 5);
+  add("cells", label_cells(12, {20, 13, 50}, 12, 102), 12);
   add("oblique", label_noise(3, {14, 12, 11}, 103, test::oblique_left_handed_geometry()), 2);
   return all;
 }
