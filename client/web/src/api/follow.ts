@@ -46,9 +46,10 @@ class Follower {
   }
 
   private told(change: JobChange): void {
-    if (change.id !== this.id || !this.current) return;
+    if (change.id !== this.id) return;
+    // The end may overtake the first answer, which does not know of it.
     if (isFinal(change.state)) void this.ask();
-    else this.show(merged(this.current, change));
+    else if (this.current) this.show(merged(this.current, change));
   }
 
   private show(job: Job): void {

@@ -1,0 +1,88 @@
+// A job that is followed to its end, told by a daemon whose answers come in the order that a test chooses.
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { connect, follow } from '@/api/index';
+import type { Job } from '@/api/types';
+
+const id = '0123456789abcdef';
+
+class Daemon {
+  private state = 'running';
+  private readonly held: (() => void)[] = [];
+  private stream: ReadableStreamDefaultController<Uint8Array> | null = null;
+  questions = 0;
+  holds = false;
+
+  answer(address: string): Promise<Response> {
+    if (new URL(address).pathname === '/v1/events') {
+      const body = new ReadableStream<Uint8Array>({ start: (controller) => void (this.stream = controller) });
+      return Promise.resolve(new Response(body));
+    }
+    this.questions += 1;
+    const answer = Response.json({ id, state: this.state });
+    if (!this.holds) return Promise.resolve(answer);
+    return new Promise((resolve) => this.held.push(() => resolve(answer)));
+  }
+
+  release(): void {
+    for (const give of this.held.splice(0)) give();
+  }
+
+  end(): void {
+    this.state = 'succeeded';
+    this.stream?.enqueue(new TextEncoder().encode(`data: ${JSON.stringify({ id, state: 'succeeded' })}\n\n`));
+  }
+}
+
+let daemon: Daemon;
+let over: AbortController;
+
+beforeEach(() => {
+  daemon = new Daemon();
+  over = new AbortController();
+  vi.stubGlobal('fetch', (address: string) => daemon.answer(address));
+  connect({ server: 'http://127.0.0.1:8080' });
+});
+
+afterEach(() => {
+  over.abort();
+  vi.unstubAllGlobals();
+  connect({});
+});
+
+// What has been begun goes on as far as it can.
+async function settled(): Promise<void> {
+  for (let turn = 0; turn < 20; turn += 1) await new Promise((resolve) => setImmediate(resolve));
+}
+
+describe('a job that is followed', () => {
+  it('ends when the stream says so', async () => {
+    const seen: string[] = [];
+    const job = follow(id, over.signal, ({ state }: Job) => seen.push(state));
+    await settled();
+    daemon.end();
+    expect((await job).state).toBe('succeeded');
+    expect(seen[0]).toBe('running');
+  });
+
+  it('ends where its end is told before the first answer, which still calls it running', async () => {
+    // The stream is there already, as on a page that has shown other things before.
+    void follow('another', over.signal, () => undefined);
+    await settled();
+    daemon.holds = true;
+    const job = follow(id, over.signal, () => undefined);
+    await settled();
+    daemon.end();
+    await settled();
+    daemon.holds = false;
+    daemon.release();
+    expect((await job).state).toBe('succeeded');
+  });
+
+  it('is asked for once where nothing more is told', async () => {
+    void follow(id, over.signal, () => undefined);
+    await settled();
+    const { questions } = daemon;
+    await settled();
+    expect(daemon.questions).toBe(questions);
+  });
+});
