@@ -18,6 +18,7 @@
 #include <unistd.h>
 
 #include "base/log.h"
+#include "base/niceness.h"
 #include "server/audit/syslog.h"
 #include "server/blobs.h"
 #include "server/callbacks/callbacks.h"
@@ -369,6 +370,7 @@ int main(int argc, char** argv) {
   try {
     const sigset_t signals = block_signals();
     jobs::keep_freed_memory();
+    be_prompt();
     start_log(LogFormat::kText, LogLevel::kInfo);
     Options options;
     CLI::App cli("isomeshd turns medical volumes into surface meshes over HTTP", "isomeshd");

@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/niceness.h"
 #include "server/net/descriptors.h"
 #include "tests/faults/fixture.h"
 
@@ -27,6 +28,9 @@ using std::chrono::seconds;
 // Who comes without a token is told apart by the address.
 constexpr const char* kStranger = "127.0.0.2";
 constexpr const char* kSilentStranger = "127.0.0.3";
+
+// Their own work would be done by their own machines: here it gets what the daemon leaves.
+constexpr int kStrangersNiceness = 19;
 
 struct Kind {
   const char* name;
@@ -164,7 +168,10 @@ class StrangersSoak : public FaultTest {
   void serve_beside_strangers(std::vector<Kind>& kinds, seconds length) {
     std::vector<std::jthread> strangers;
     for (const Deed& deed : deeds()) {
-      strangers.emplace_back([deed](const std::stop_token& stop) { try_again(deed, stop); });
+      strangers.emplace_back([deed](const std::stop_token& stop) {
+        be_nicer(kStrangersNiceness);
+        try_again(deed, stop);
+      });
     }
     serve(kinds, length, &Kind::disturbed_ms);
   }
@@ -176,6 +183,7 @@ class StrangersSoak : public FaultTest {
 };
 
 TEST_F(StrangersSoak, HonestClientsAreServedBesideStrangers) {
+  be_prompt();  // as an honest client's own machine would be
   net::raise_descriptor_limit();  // the strangers' connections are this process's
   start({"--log-level", "error"});
   job_ = finished_job(daemon()).id;
