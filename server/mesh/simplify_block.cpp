@@ -12,10 +12,13 @@
 namespace isomesh::mesh {
 namespace {
 
-constexpr int kAttempts = 8;
-// Attempts after which holding vertices is not enough, and less is asked for.
-constexpr int kFullAttempts = 4;
-constexpr double kLess = 0.6;
+// Attempts with more and more vertices held, after which less is asked for, and how often.
+constexpr int kAttempts = 6;
+constexpr int kLevels = 4;
+constexpr double kLess = 0.5;
+// Where more attempts than this were wrong, much is held, or less was asked for: what is left then is
+// simplified once more.
+constexpr std::uint32_t kFewRepeated = 1;
 
 using Flags = std::vector<std::uint8_t>;
 
@@ -155,7 +158,7 @@ std::vector<Triangle> propose(const LocalMesh& mesh, const Flags& held, double e
 class BlockSimplifier {
  public:
   BlockSimplifier(const BlockGoal& goal, std::span<const std::uint32_t> held,
-                  const SurfaceBlock& block)
+                  SurfaceBlock& block)
       : goal_(goal),
         block_(block),
         squared_bound_(std::pow(kWithin * goal.max_error_mm, 2)),
@@ -183,31 +186,41 @@ class BlockSimplifier {
     if (!held.empty()) hold_faults();
   }
 
-  BlockOutcome run(SurfaceBlock& result) {
+  // Once.
+  BlockOutcome run() {
     BlockOutcome outcome;
-    const auto wanted = static_cast<std::size_t>(
-        std::floor(goal_.share * static_cast<double>(mesh_.triangles.size())));
+    const auto all = static_cast<double>(mesh_.triangles.size());
+    const Flags held_first = held_;
+    double kept = goal_.share;
     double error = kFirstError * goal_.max_error_mm;
-    for (int attempt = 0; attempt < kAttempts; ++attempt) {
-      if (attempt >= kFullAttempts) error *= kLess;
-      proposed_ = propose(mesh_, held_, error, wanted);
-      if (proposed_.size() == mesh_.triangles.size()) break;
-      turn_flat_triangles(mesh_, is_flat_, proposed_);
-      if (is_good()) {
-        result.homes = homes_;
-        result.triangles.clear();
-        for (const Triangle& triangle : proposed_) {
-          result.triangles.push_back(mesh_.in_mesh(triangle));
+    for (int level = 0; level < kLevels; ++level) {
+      // What had to be held for more may go for less.
+      held_ = held_first;
+      for (int attempt = 0; attempt < kAttempts; ++attempt) {
+        proposed_ = propose(mesh_, held_, error, static_cast<std::size_t>(std::floor(kept * all)));
+        if (proposed_.size() == mesh_.triangles.size()) break;
+        turn_flat_triangles(mesh_, is_flat_, proposed_);
+        if (is_good()) {
+          replace_block();
+          return outcome;
         }
-        return outcome;
+        ++outcome.repeated;
       }
-      ++outcome.repeated;
+      error *= kLess;
+      kept = 1 - kLess * (1 - kept);
     }
     outcome.is_taken_back = outcome.repeated > 0;
     return outcome;
   }
 
  private:
+  void replace_block() {
+    block_.homes = std::move(homes_);
+    block_.triangles.clear();
+    for (const Triangle& triangle : proposed_) block_.triangles.push_back(mesh_.in_mesh(triangle));
+    if (!block_.sides.empty()) block_.sides.resize(block_.triangles.size());
+  }
+
   // Holds what is wrong with the proposal.
   bool is_good() {
     faults_.assign(held_.size(), 0);
@@ -305,7 +318,7 @@ class BlockSimplifier {
   }
 
   const BlockGoal& goal_;
-  const SurfaceBlock& block_;
+  SurfaceBlock& block_;
   const double squared_bound_;
   const LocalMesh mesh_;
   Shape before_;
@@ -336,12 +349,11 @@ LocalMesh::LocalMesh(const Mesh& mesh, std::span<const Triangle> block) {
 BlockOutcome simplify_block(const BlockGoal& goal, std::span<const std::uint32_t> held,
                             SurfaceBlock& block) {
   if (block.triangles.empty()) return {};
-  SurfaceBlock result;
-  const BlockOutcome outcome = BlockSimplifier(goal, held, block).run(result);
-  if (!result.triangles.empty()) {
-    block.triangles = std::move(result.triangles);
-    block.homes = std::move(result.homes);
-    if (!block.sides.empty()) block.sides.resize(block.triangles.size());
+  BlockOutcome outcome = BlockSimplifier(goal, held, block).run();
+  // A second time would take the share that is aimed at from what is left.
+  const bool is_done = goal.share > 0 || outcome.is_taken_back;
+  if (!is_done && outcome.repeated > kFewRepeated) {
+    outcome.repeated += BlockSimplifier(goal, held, block).run().repeated;
   }
   return outcome;
 }

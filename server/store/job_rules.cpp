@@ -56,6 +56,14 @@ std::chrono::milliseconds delay_after(int attempts, const JobStoreOptions& optio
   return delay;
 }
 
+void give_progress(Job& job, const Progress& progress) {
+  const double queue = job.timing.queue;
+  job.stage = progress.stage;
+  job.progress = progress.share;
+  job.timing = progress.timing;
+  job.timing.queue = queue;
+}
+
 void give_mesh(Job& job, const MeshSummary& mesh) {
   job.mesh = mesh;
   job.stage = Stage::kDone;

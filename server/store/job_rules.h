@@ -40,6 +40,9 @@ bool has_share_of_queue(const JobSpec& spec, const QueueShare& waiting, std::siz
 // How long a job that has failed so often waits until it is run again.
 std::chrono::milliseconds delay_after(int attempts, const JobStoreOptions& options);
 
+// The job is so far.
+void give_progress(Job& job, const Progress& progress);
+
 // The job has that mesh.
 void give_mesh(Job& job, const MeshSummary& mesh);
 

@@ -205,12 +205,7 @@ Job PostgresJobStore::with_progress(const Row& row) const {
   const bool is_told = job.state == JobState::kRunning && live != live_.end() &&
                        live->second.fence == row.fence && live->second.progress;
   if (!is_told) return job;
-  const Progress& progress = *live->second.progress;
-  const double queue = job.timing.queue;
-  job.stage = progress.stage;
-  job.progress = progress.share;
-  job.timing = progress.timing;
-  job.timing.queue = queue;
+  give_progress(job, *live->second.progress);
   return job;
 }
 

@@ -6,6 +6,7 @@ import { isFinal, type Job, type Volume } from '../api/types';
 import { differences } from '../job/differences';
 import { LabelState, labelsOfMesh } from '../job/labels';
 import type { SurfaceStyle } from '../scene/parts';
+import { graphicsStarted } from '../scene/graphics';
 import { placeOfText, placeToText, viewNames, viewTitles, type CameraPlace } from '../scene/views';
 import { button, h } from '../ui/dom';
 import { formatCount, formatMilliseconds, formatNumber, formatValue } from '../ui/format';
@@ -166,6 +167,8 @@ class Comparison {
       cell.show(refusal(reason));
       return;
     }
+    await graphicsStarted();
+    if (this.scope.isOver) return;
     const pane = this.addPane(job);
     cell.show(pane.element);
     await pane.load();

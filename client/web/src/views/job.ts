@@ -6,6 +6,7 @@ import { isFinal, type Job, type JobParameters, type Volume } from '../api/types
 import { emptyReason } from '../job/empty';
 import { LabelState, labelsOfMesh } from '../job/labels';
 import { inWords, surfaceInWords } from '../job/parameters';
+import { graphicsStarted } from '../scene/graphics';
 import { placeOfText, placeToText } from '../scene/views';
 import { button, h } from '../ui/dom';
 import { formatIso, shortId } from '../ui/format';
@@ -105,6 +106,8 @@ class ProgressPanel {
 }
 
 export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> {
+  // While the daemon is asked.
+  void graphicsStarted();
   const first = await getJob(route.path[1] ?? '');
   const volume = await volumeOf(first);
   const stageArea = h('div', { class: 'stage-area' });
@@ -194,13 +197,14 @@ function showSurface(
     compareSection(job),
     againSection(job),
   );
-  // The canvas takes its size from the page, so the view has to be in it first.
-  requestAnimationFrame(() => {
+  const show = (): void => {
     if (scope.isOver) return;
     const loading = pane.load();
     slices?.restore();
     void loading.then((timing) => {
       if (timing && !scope.isOver) times.replaceWith(timings(job, { ...timing }));
     });
-  });
+  };
+  // The canvas takes its size from the page, so the view has to be in it first.
+  void graphicsStarted().then(() => requestAnimationFrame(show));
 }

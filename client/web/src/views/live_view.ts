@@ -2,6 +2,7 @@
 import { connected, previewFile } from '../api/client';
 import { asApiError } from '../api/problem';
 import type { Vec3, Volume } from '../api/types';
+import { graphicsStarted } from '../scene/graphics';
 import type { LiveSurface } from '../scene/live';
 import { h } from '../ui/dom';
 import { formatValue } from '../ui/format';
@@ -169,7 +170,11 @@ export class LiveView {
 
   private async run(signal: AbortSignal): Promise<void> {
     if (!this.preview) this.say('Loading the preview');
-    const [first, { LiveSurface }] = await Promise.all([this.fetch(firstSize, signal), import('../scene/live')]);
+    const [first, { LiveSurface }] = await Promise.all([
+      this.fetch(firstSize, signal),
+      import('../scene/live'),
+      graphicsStarted(),
+    ]);
     if (signal.aborted) return;
     try {
       this.surface ??= this.begin(new LiveSurface(this.view));

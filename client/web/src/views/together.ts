@@ -6,6 +6,7 @@ import { differences } from '../job/differences';
 import { surfaceInWords } from '../job/parameters';
 import type { Part } from '../mesh/glb';
 import { loadMesh, viewableFile } from '../mesh/load';
+import { graphicsStarted } from '../scene/graphics';
 import { Surface } from '../scene/surface';
 import { placeOfText, placeToText, viewNames, viewTitles } from '../scene/views';
 import { button, checkbox, h } from '../ui/dom';
@@ -157,6 +158,7 @@ class Together {
   }
 
   private async begin(): Promise<void> {
+    await graphicsStarted();
     if (this.scope.isOver) return;
     const surface = new Surface(this.view);
     this.surface = surface;
