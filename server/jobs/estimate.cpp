@@ -46,8 +46,8 @@ double smooth_ms(const SurfaceSize& surface, const MeshParameters& parameters) {
 // What share of the triangles is left within an error: few of them where it is much of a sample's
 // spacing. A curve through what was seen on heads of 1 mm; jobs that have finished correct it.
 double share_within(double error_mm, double spacing_mm) {
-  constexpr double kHalf = 0.07;  // of the spacing, the error that leaves half of the triangles
-  constexpr double kSteepness = 1.2;
+  constexpr double kHalf = 0.06;  // of the spacing, the error that leaves half of the triangles
+  constexpr double kSteepness = 1.16;
   return 1 / (1 + std::pow(error_mm / spacing_mm / kHalf, kSteepness));
 }
 

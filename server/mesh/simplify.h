@@ -4,7 +4,7 @@
 // and out; its error is a quadric's (M. Garland, P. S. Heckbert, "Surface simplification using
 // quadric error metrics", SIGGRAPH 1997), not a distance. So each proposal is measured against the
 // surface as it was, both ways, and looked at as a surface; where it is too far off or no manifold,
-// its vertices are held and it is made again.
+// its vertices are held and it is made again, in the end for less.
 #pragma once
 
 #include <cstdint>
