@@ -25,8 +25,8 @@ struct SchedulingAttributes {
 constexpr std::uint64_t kPromptSlice_ns = 100'000;
 constexpr std::uint64_t kUsualSlice_ns = 0;
 
-// The C library has names for these calls since glibc 2.41. All else stays as it is. A kernel that does not
-// know slices, or a sandbox that allows neither call, leaves the usual ones.
+// The C library has names for these calls since glibc 2.41. All else stays as it is. A kernel that
+// does not know slices, or a sandbox that allows neither call, leaves the usual ones.
 void set_slice(std::uint64_t slice_ns) {
   SchedulingAttributes attributes;
   if (::syscall(SYS_sched_getattr, 0, &attributes, sizeof(attributes), 0) != 0) return;

@@ -11,13 +11,15 @@ inline constexpr int kComputingNiceness = 7;
 // Of meshes.
 inline constexpr int kJobNiceness = 10;
 
-// Makes the calling thread nicer by that, if by anything, and with it the threads and processes that it starts from
-// now on, whose slices are the usual ones again. It cannot be undone. Thread safe.
+// Makes the calling thread nicer by that, if by anything, and with it the threads and processes
+// that it starts from now on, whose slices are the usual ones again. It cannot be undone. Thread
+// safe.
 void be_nicer(int by);
 
-// Of a busy machine the calling thread, and the threads and processes that it starts from now on, get short
-// slices, so that they wait less for whoever runs when they wake: for those who answer much and compute little.
-// Linux 6.12 and later; before, and where the kernel refuses, it does nothing. Thread safe.
+// Of a busy machine the calling thread, and the threads and processes that it starts from now on,
+// get short slices, so that they wait less for whoever runs when they wake: for those who answer
+// much and compute little. Linux 6.12 and later; before, and where the kernel refuses, it does
+// nothing. Thread safe.
 void be_prompt();
 
 }  // namespace isomesh

@@ -16,8 +16,8 @@ namespace {
 constexpr int kAttempts = 6;
 constexpr int kLevels = 4;
 constexpr double kLess = 0.5;
-// Where more attempts than this were wrong, much is held, or less was asked for: what is left then is
-// simplified once more.
+// Where more attempts than this were wrong, much is held, or less was asked for: what is left then
+// is simplified once more.
 constexpr std::uint32_t kFewRepeated = 1;
 
 using Flags = std::vector<std::uint8_t>;
@@ -157,8 +157,7 @@ std::vector<Triangle> propose(const LocalMesh& mesh, const Flags& held, double e
 
 class BlockSimplifier {
  public:
-  BlockSimplifier(const BlockGoal& goal, std::span<const std::uint32_t> held,
-                  SurfaceBlock& block)
+  BlockSimplifier(const BlockGoal& goal, std::span<const std::uint32_t> held, SurfaceBlock& block)
       : goal_(goal),
         block_(block),
         squared_bound_(std::pow(kWithin * goal.max_error_mm, 2)),

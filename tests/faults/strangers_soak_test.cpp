@@ -183,7 +183,7 @@ class StrangersSoak : public FaultTest {
 };
 
 TEST_F(StrangersSoak, HonestClientsAreServedBesideStrangers) {
-  be_prompt();  // as an honest client's own machine would be
+  be_prompt();                    // as an honest client's own machine would be
   net::raise_descriptor_limit();  // the strangers' connections are this process's
   start({"--log-level", "error"});
   job_ = finished_job(daemon()).id;

@@ -23,7 +23,8 @@ std::uint64_t slice() {
 int niceness() { return ::getpriority(PRIO_PROCESS, 0); }
 
 TEST(Niceness, APromptThreadAndThoseThatItStartsHaveShortSlices) {
-  if (slice() == 0) GTEST_SKIP() << "this kernel gives no thread slices of its own (Linux 6.12 does)";
+  if (slice() == 0)
+    GTEST_SKIP() << "this kernel gives no thread slices of its own (Linux 6.12 does)";
   std::thread([] {
     const std::uint64_t usual = slice();
     const int before = niceness();
@@ -38,7 +39,8 @@ TEST(Niceness, APromptThreadAndThoseThatItStartsHaveShortSlices) {
 }
 
 TEST(Niceness, WhoIsNicerHasTheUsualSlices) {
-  if (slice() == 0) GTEST_SKIP() << "this kernel gives no thread slices of its own (Linux 6.12 does)";
+  if (slice() == 0)
+    GTEST_SKIP() << "this kernel gives no thread slices of its own (Linux 6.12 does)";
   std::thread([] {
     const std::uint64_t usual = slice();
     be_prompt();
