@@ -176,7 +176,7 @@ async function show(): Promise<void> {
     const home = h('a', { class: 'button', href: hashOf([]) }, 'All volumes');
     const way = failure.link ? h('a', { class: 'button', href: failure.link.href }, failure.link.text) : home;
     const shown = failure.isUnreachable ? pendingRefusal(failure, again, way) : refusal(failure, again, way);
-    main.replaceChildren(h('div', { class: 'page-problem' }, shown));
+    main.replaceChildren(h('h1', { class: 'sr-only' }, 'This view cannot be shown'), h('div', { class: 'page-problem' }, shown));
     // What failed because nobody answered is tried again when somebody does.
     if (failure.isUnreachable) {
       const stop = connected.subscribe((isConnected) => {

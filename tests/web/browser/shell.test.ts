@@ -24,6 +24,9 @@ describe('the page', () => {
     }
     expect(new Set(titles).size).toBe(titles.length);
     expect(titles[2]).toContain('Surface at 100');
+    await page.goto(`${daemon.url}/#/jobs/gone`);
+    await expect.poll(() => page.locator('.page-problem').count()).toBe(1);
+    expect(await page.locator('main h1').count()).toBe(1);
     await page.goto(`${daemon.url}/#/compare`);
     await page.getByRole('link', { name: 'To the list of jobs' }).click();
     await page.waitForURL(/#\/jobs$/);
