@@ -1,6 +1,8 @@
 """The audit trail over syslog-TLS (IHE ITI-20), to a collector that may be down."""
+import contextlib
 import os
 import socket
+import sqlite3
 import ssl
 import subprocess
 import threading
@@ -104,6 +106,13 @@ class Syslog(Loop):
         return self.daemon(rules=f'[audit]\nsyslog = "tls://localhost:{collector.port}"\n'
                            f'ca-file = "{collector.certificate}"\n{more}\n')
 
+    def noted(self, daemon):
+        """Waits until the daemon has noted that all has been sent: what is not noted comes again."""
+        database = f"file:{os.path.join(daemon.data, 'isomesh.sqlite')}?mode=ro"
+        with contextlib.closing(sqlite3.connect(database, uri=True)) as records:
+            peers.until(lambda: records.execute(
+                "SELECT (SELECT max(id) FROM audit) = (SELECT id FROM audit_sent)").fetchone()[0])
+
     def test_every_event_comes(self):
         collector = self.collector().start()
         daemon = self.audited(collector)
@@ -130,12 +139,14 @@ class Syslog(Loop):
         peers.until(lambda: len(collector.messages) >= 5)
         self.assertEqual([kind or event for event, kind, _ in collector.events()],
                          ["110120", "110112", "110104", "110104", "110120"])
+        self.noted(daemon)
         collector.stop()
         self.succeeded(daemon, self.order(daemon, self.series()))
         collector.start()
         peers.until(lambda: len(collector.messages) >= 8, 90)
         self.assertEqual([kind or event for event, kind, _ in collector.events()[5:]],
                          ["110112", "110104", "110104"])
+        self.noted(daemon)
         daemon.kill()
         daemon.start()
         peers.until(lambda: len(collector.messages) >= 9)
