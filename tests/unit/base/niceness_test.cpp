@@ -14,7 +14,7 @@ namespace {
 
 // The length of the calling thread's slices, in nanoseconds; 0 where the kernel does not say.
 std::uint64_t slice() {
-  // sched_attr, whose third word of eight bytes after size, policy and flags is the length.
+  // sched_attr, whose fourth word of eight bytes is the length.
   std::array<std::uint64_t, 6> attributes = {};
   EXPECT_EQ(::syscall(SYS_sched_getattr, 0, attributes.data(), sizeof(attributes), 0), 0);
   return attributes[3];

@@ -2,6 +2,7 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { connect, follow } from '@/api/index';
 import type { Job } from '@/api/types';
+import { WatchedJobs } from '@/job/watched';
 
 const id = '0123456789abcdef';
 
@@ -76,6 +77,17 @@ describe('a job that is followed', () => {
     daemon.holds = false;
     daemon.release();
     expect((await job).state).toBe('succeeded');
+  });
+
+  it('is told of where it had ended before anybody knew its id', async () => {
+    void follow('another', over.signal, () => undefined);
+    await settled();
+    daemon.end();
+    await settled();
+    const told: Job[] = [];
+    new WatchedJobs((job) => told.push(job)).add(id);
+    await settled();
+    expect(told.map(({ state }) => state)).toEqual(['succeeded']);
   });
 
   it('is asked for once where nothing more is told', async () => {

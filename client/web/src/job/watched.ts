@@ -21,6 +21,8 @@ export class WatchedJobs {
   add(id: string): void {
     this.ids = [...this.ids.filter((other) => other !== id), id].slice(-most);
     this.listen();
+    // Its end may have been told before its id was known.
+    void this.look(id);
   }
 
   private get ids(): string[] {

@@ -2,7 +2,7 @@
 // where software draws. A worker waits instead of the page.
 let started: Promise<void> | null = null;
 
-// Resolves when a context is to be had without that wait; also where no worker can ask for one.
+// Resolves when that has been waited for; also where no worker can ask for one.
 export function graphicsStarted(): Promise<void> {
   started ??= new Promise((resolve) => {
     const worker = new Worker(new URL('./graphics.worker.ts', import.meta.url), { type: 'module' });
