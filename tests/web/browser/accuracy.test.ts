@@ -25,14 +25,14 @@ describe('the largest error', () => {
     const { page } = at;
     await open(page, `volumes/${ball}?iso=100`);
     const slider = page.getByRole('slider', { name: 'Largest error' });
-    expect(await slider.getAttribute('aria-valuetext')).toBe('off');
+    await expect.poll(() => slider.getAttribute('aria-valuetext')).toBe('off');
     const certify = page.getByLabel('Measure the error');
-    expect(await certify.isChecked()).toBe(false);
+    await expect.poll(() => certify.isChecked()).toBe(false);
     await slider.focus();
     await page.keyboard.press('End');
-    expect(await slider.getAttribute('aria-valuetext')).toBe('2 mm, 2 of the spacing of 1 mm');
+    await expect.poll(() => slider.getAttribute('aria-valuetext')).toBe('2 mm, 2 of the spacing of 1 mm');
     await slider.fill('22');
-    expect(await slider.getAttribute('aria-valuetext')).toBe('0.1 mm, 0.1 of the spacing of 1 mm');
+    await expect.poll(() => slider.getAttribute('aria-valuetext')).toBe('0.1 mm, 0.1 of the spacing of 1 mm');
     expect([await certify.isChecked(), await certify.isDisabled()]).toEqual([true, true]);
     await expect.poll(() => page.url()).toContain('max_error_mm=0.1');
     await page.getByRole('button', { name: 'Make the surface' }).click();
@@ -46,8 +46,8 @@ describe('the largest error', () => {
     expect(text).toMatch(/Of 0\.1 mm: smoothing 0\.0\d+, fewer triangles 0\.0\d+, rounding/);
     expect(text).toMatch(/Run through themselves\s+none/);
     expect(text).toMatch(/simplify\s/);
-    expect(await page.locator('.both-ways td').count()).toBe(6);
-    expect(await page.locator('.distances path').count()).toBe(2);
+    await expect.poll(() => page.locator('.both-ways td').count()).toBe(6);
+    await expect.poll(() => page.locator('.distances path').count()).toBe(2);
   });
 });
 
@@ -61,7 +61,7 @@ describe('distances', () => {
     await openJob(page, job);
     const legend = page.getByRole('group', { name: 'Distance from the scan' }).first();
     await legend.waitFor();
-    expect(await legend.innerText()).toMatch(/0\s+[\d.]+\s+[\d.]+ mm or more/);
+    await expect.poll(() => legend.innerText()).toMatch(/0\s+[\d.]+\s+[\d.]+ mm or more/);
     const view = page.locator('.viewport');
     const coloured = await silhouette(page, view);
     await legend.getByRole('radio', { name: 'Largest' }).check({ force: true });
@@ -82,7 +82,7 @@ describe('distances', () => {
 
     await page.keyboard.press('d');
     await still(page);
-    expect(await legend.isVisible()).toBe(false);
+    await expect.poll(() => legend.isVisible()).toBe(false);
     const plain = await hues(page, view);
     expect([plain.blue, plain.green].every((count) => count < 200)).toBe(true);
     const after = await silhouette(page, view);
@@ -93,7 +93,7 @@ describe('distances', () => {
   it('are offered where an error was measured without them', async () => {
     const { daemon, page } = at;
     await openJob(page, await daemon.submit({ volume: ball, iso: 100, passes: 3, formats: ['glb'], certify: true }, 30));
-    expect(await page.getByRole('button', { name: 'Distance', exact: true }).isVisible()).toBe(false);
+    await expect.poll(() => page.getByRole('button', { name: 'Distance', exact: true }).isVisible()).toBe(false);
     const before = page.url();
     await page.getByRole('button', { name: 'Show it as colour' }).click();
     await expect.poll(() => page.url()).not.toBe(before);
@@ -119,7 +119,7 @@ describe('a surface that is not what was meant', () => {
     const cut = await daemon.upload(ballNrrd(24, 14));
     await openJob(page, await daemon.submit({ volume: cut, iso: 100, formats: ['glb'] }, 30));
     const panel = page.getByLabel('The job');
-    expect(await panel.innerText()).toMatch(/Volume\s+none: the surface is open/);
+    await expect.poll(() => panel.innerText()).toMatch(/Volume\s+none: the surface is open/);
     const before = page.url();
     await panel.getByRole('button', { name: 'Close it' }).click();
     await expect.poll(() => page.url()).not.toBe(before);
@@ -138,7 +138,7 @@ describe('a surface that is not what was meant', () => {
     const box = await page.locator('.viewport canvas').boundingBox();
     if (!box) throw new Error('there is no view');
     await page.mouse.click(box.x + 4, box.y + box.height / 2);
-    expect(await page.locator('.picked-part').isVisible()).toBe(false);
+    await expect.poll(() => page.locator('.picked-part').isVisible()).toBe(false);
     // From the front the patient's left, where x grows, is on the right: the smaller ball.
     const disc = await page.locator('.viewport').boundingBox();
     if (!disc) throw new Error('there is no view');
@@ -210,7 +210,7 @@ describe('levels of detail', () => {
       return (await silhouette(page, page.locator('.viewport'))).filling;
     };
     await expect.poll(filling).toBeGreaterThan(Math.PI / 4 - 0.06);
-    expect(await page.locator('.pane[data-loaded]').count()).toBe(0);
+    await expect.poll(() => page.locator('.pane[data-loaded]').count()).toBe(0);
     release();
     await surfaceLoaded(page);
     expect((await silhouette(page, page.locator('.viewport'))).filling).toBeGreaterThan(Math.PI / 4 - 0.03);

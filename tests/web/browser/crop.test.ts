@@ -35,7 +35,7 @@ describe('a slice', () => {
     await expect.poll(() => chip.innerText()).toMatch(/^7\.4 ×$/);
     // The contour is outside of what is seen, and no slice was left for another one.
     await expect.poll(() => contourPixels(page, 'axial')).toBeLessThan(before / 4);
-    expect(await page.locator('[data-plane=axial] .slice-place').innerText()).toBe('25 / 48');
+    await expect.poll(() => page.locator('[data-plane=axial] .slice-place').innerText()).toBe('25 / 48');
     const side = (Math.min(box.width, box.height) - 28) / size; // of a sample
     await page.mouse.click(middle.x + 2.5 * 7.389 * side, middle.y);
     await expect.poll(() => noted(page, 'at')).toMatch(/^2[67],2[34],24$/);

@@ -23,8 +23,8 @@ describe('a surface', () => {
     await page.getByRole('button', { name: 'For printing' }).click();
     await expect.poll(() => page.url()).not.toContain(id);
     await expect.poll(() => page.locator('[data-format="3mf"]').count()).toBe(1);
-    expect(await page.locator('[data-format=stl]').count()).toBe(1);
-    expect(await page.getByRole('button', { name: 'For printing' }).count()).toBe(0);
+    await expect.poll(() => page.locator('[data-format=stl]').count()).toBe(1);
+    await expect.poll(() => page.getByRole('button', { name: 'For printing' }).count()).toBe(0);
     const made = await openedJob(at);
     expect(made.parameters).toMatchObject({ close: true, certify: true });
     const { name, bytes } = await saved(page, /^Certificate$/);

@@ -53,8 +53,8 @@ describe('the labels of a volume', () => {
       expect.stringMatching(/label 5[^]*200 voxels/),
     ]);
     const all = await estimated(page);
-    expect(await page.locator('[data-parameter=interpolation]').count()).toBe(0);
-    expect(await page.getByRole('slider', { name: 'Iso-value' }).isVisible()).toBe(false);
+    await expect.poll(() => page.locator('[data-parameter=interpolation]').count()).toBe(0);
+    await expect.poll(() => page.getByRole('slider', { name: 'Iso-value' }).isVisible()).toBe(false);
     const job = await make(page);
     expect(job.parameters).toMatchObject({ labels: 'all', passes: 10 });
     expect(job.parameters).not.toHaveProperty('iso');
@@ -70,7 +70,7 @@ describe('the labels of a volume', () => {
     await expect.poll(() => rows.count()).toBe(1);
     await page.getByRole('button', { name: 'None', exact: true }).click();
     await page.getByLabel('Search the labels').fill('');
-    expect(await rows.locator('input:checked').count()).toBe(2);
+    await expect.poll(() => rows.locator('input:checked').count()).toBe(2);
     await expect.poll(() => page.url()).toMatch(/labels=1%2C2|labels=1,2/);
     await page.reload();
     await expect.poll(() => rows.locator('input:checked').count()).toBe(2);
@@ -84,8 +84,8 @@ describe('the labels of a volume', () => {
     await openForm(page);
     await page.getByRole('button', { name: 'None', exact: true }).click();
     const run = page.getByRole('button', { name: 'Make the surface' });
-    expect(await run.isDisabled()).toBe(true);
-    expect(await page.locator('.estimate').innerText()).toContain('Choose a label');
+    await expect.poll(() => run.isDisabled()).toBe(true);
+    await expect.poll(() => page.locator('.estimate').innerText()).toContain('Choose a label');
     await page.getByRole('radio', { name: 'One surface' }).check();
     await expect.poll(() => run.isDisabled()).toBe(false);
     const { parameters } = await make(page);
@@ -104,7 +104,7 @@ describe('more labels than are listed', () => {
     const rows = page.locator('.label-choice .labels li');
     await expect.poll(() => rows.count()).toBe(500);
     const count = page.locator('.label-choice .hint[role=status]');
-    expect(await count.innerText()).toBe('600 of 600 labels; the first 500 are listed');
+    await expect.poll(() => count.innerText()).toBe('600 of 600 labels; the first 500 are listed');
     await page.getByLabel('Search the labels').fill('577');
     // Rows that are scrolled to are laid out, and have a text, when the page comes to it.
     await expect.poll(() => rows.allInnerTexts()).toEqual([expect.stringMatching(/label 577[^]*1 voxels/)]);
@@ -115,7 +115,7 @@ describe('more labels than are listed', () => {
     const { id } = await daemon.submit({ volume: many, labels: 'all', passes: 0, formats: ['glb'] }, 30);
     await page.goto(`${daemon.url}/#/jobs/${id}`);
     await expect.poll(() => page.locator('.label-list .labels li').count()).toBe(500);
-    expect(await page.locator('.label-list .hint[role=status]').innerText()).toContain('the first 500 are listed');
+    await expect.poll(() => page.locator('.label-list .hint[role=status]').innerText()).toContain('the first 500 are listed');
   });
 });
 
@@ -140,8 +140,9 @@ describe('a segmentation that names its labels', () => {
     await page.goto(`${daemon.url}/#/volumes/${id}`);
     const rows = page.locator('.label-choice .labels li');
     await expect.poll(() => rows.count()).toBe(3);
-    expect(await page.getByRole('radio', { name: 'Each label' }).isChecked()).toBe(true);
-    expect((await rows.locator('label').allInnerTexts()).map((text) => text.trim())).toEqual([hostile, 'Left half', 'label 5']);
+    await expect.poll(() => page.getByRole('radio', { name: 'Each label' }).isChecked()).toBe(true);
+    // Rows are laid out, and have a text, when the page comes to them.
+    await expect.poll(async () => (await rows.locator('label').allInnerTexts()).map((text) => text.trim())).toEqual([hostile, 'Left half', 'label 5']);
     const swatches = await rows.locator('.swatch').evaluateAll((all) => all.map((one) => getComputedStyle(one).backgroundColor));
     expect(swatches.slice(0, 2)).toEqual(['rgb(255, 0, 0)', 'rgb(0, 0, 255)']);
     await expect.poll(() => rows.first().innerText()).toMatch(/voxels, .*triangles/);
@@ -152,8 +153,8 @@ describe('a segmentation that names its labels', () => {
     await still(page);
     const seen = await hues(page, page.locator('.viewport'));
     expect([seen.red > 1000, seen.blue > 1000]).toEqual([true, true]);
-    expect(await page.locator('.label-list .check').allTextContents()).toEqual([hostile, 'Left half', 'label 5']);
-    expect(await page.locator('img[src=x]').count()).toBe(0);
+    await expect.poll(() => page.locator('.label-list .check').allTextContents()).toEqual([hostile, 'Left half', 'label 5']);
+    await expect.poll(() => page.locator('img[src=x]').count()).toBe(0);
     expect(await page.title()).not.toBe('1');
 
     // By keyboard alone, and with a name for every control.
@@ -172,7 +173,7 @@ describe('a segmentation that names its labels', () => {
     await still(page);
     const alone = await hues(page, page.locator('.viewport'));
     expect([alone.red, alone.blue > 1000]).toEqual([0, true]);
-    expect(await page.getByRole('status').filter({ hasText: 'Left half' }).innerText()).toMatch(/volume .* area/);
+    await expect.poll(() => page.getByRole('status').filter({ hasText: 'Left half' }).innerText()).toMatch(/volume .* area/);
   });
 });
 
@@ -209,8 +210,8 @@ describe('the surfaces of labels', () => {
     now = await seen(view);
     expect(now.red).toBeGreaterThan(1000);
     expect(now.blue).toBe(0);
-    expect(await page.getByRole('checkbox', { name: 'Show Left half' }).isChecked()).toBe(false);
-    expect(await page.getByRole('button', { name: 'Show only Right half' }).getAttribute('aria-pressed')).toBe('true');
+    await expect.poll(() => page.getByRole('checkbox', { name: 'Show Left half' }).isChecked()).toBe(false);
+    await expect.poll(() => page.getByRole('button', { name: 'Show only Right half' }).getAttribute('aria-pressed')).toBe('true');
 
     await page.getByRole('button', { name: 'Hide all' }).click();
     now = await seen(view);
@@ -237,7 +238,7 @@ describe('the surfaces of labels', () => {
     const digits = (await picked.innerText()).replace(/[\u202f\s]/g, '');
     expect(digits).toContain(`volume${Math.round(label?.volume_mm3 ?? 0)}mm`);
     expect(digits).toContain(`area${Math.round(label?.area_mm2 ?? 0)}mm`);
-    expect(await page.locator('.label-list li[aria-current]').innerText()).toContain('Right half');
+    await expect.poll(() => page.locator('.label-list li[aria-current]').innerText()).toContain('Right half');
 
     await page.keyboard.press('o');
     expect((await seen(view)).blue).toBe(0);
@@ -247,7 +248,7 @@ describe('the surfaces of labels', () => {
     expect([now.red, await picked.isVisible()]).toEqual([0, false]);
     expect(now.blue).toBeGreaterThan(1000);
     await page.mouse.click(place.x + 5, place.y + 0.8 * place.height);
-    expect(await picked.isVisible()).toBe(false);
+    await expect.poll(() => picked.isVisible()).toBe(false);
   });
 
   it('are cut like any surface', async () => {
@@ -272,7 +273,7 @@ describe('the surfaces of labels', () => {
     const rows = page.locator('.label-list li');
     await page.getByLabel('Search the labels').fill('half right');
     await expect.poll(() => rows.count()).toBe(1);
-    expect(await rows.textContent()).toMatch(/Right half/);
+    await expect.poll(() => rows.textContent()).toMatch(/Right half/);
     const label = made.mesh?.labels?.find((one) => one.label === 1);
 
     const one = page.waitForEvent('download');

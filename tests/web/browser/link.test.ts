@@ -33,18 +33,18 @@ describe('a link to a surface', () => {
     expect(noted(page, 'rulers').split(',')).toHaveLength(6);
     const address = await settled(() => page.url());
     await page.getByLabel('Link to this surface').focus();
-    expect(await page.getByLabel('Link to this surface').inputValue()).toBe(address);
+    await expect.poll(() => page.getByLabel('Link to this surface').inputValue()).toBe(address);
     await page.getByLabel('Link to this surface').blur();
     const seen = await silhouette(page, page.locator('.viewport'));
 
     const { page: other, faults } = await openPage(browser, daemon.url);
     await other.goto(address);
     await surfaceLoaded(other);
-    expect(await other.locator('.ruler-labels span').innerText()).toBe(length);
-    expect(await other.locator('.cut-place').innerText()).toBe('21 / 48');
-    expect(await other.getByLabel('Other side').isChecked()).toBe(true);
-    expect(await other.getByRole('button', { name: 'Flat' }).getAttribute('aria-pressed')).toBe('true');
-    expect(await other.getByLabel('Opacity').inputValue()).toBe('0.6');
+    await expect.poll(() => other.locator('.ruler-labels span').innerText()).toBe(length);
+    await expect.poll(() => other.locator('.cut-place').innerText()).toBe('21 / 48');
+    await expect.poll(() => other.getByLabel('Other side').isChecked()).toBe(true);
+    await expect.poll(() => other.getByRole('button', { name: 'Flat' }).getAttribute('aria-pressed')).toBe('true');
+    await expect.poll(() => other.getByLabel('Opacity').inputValue()).toBe('0.6');
     await expect.poll(async () => (await silhouette(other, other.locator('.viewport'))).part / seen.part).toBeCloseTo(1, 1);
     // What is taken away leaves the address.
     for (const key of ['c', 't', 'Delete']) await other.keyboard.press(key);
@@ -61,19 +61,19 @@ describe('parameters', () => {
     await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
     const undo = page.getByRole('button', { name: 'Undo' });
     await page.getByLabel('Passes').waitFor();
-    expect(await undo.isVisible()).toBe(false);
+    await expect.poll(() => undo.isVisible()).toBe(false);
     await page.getByLabel('Passes').fill('9');
     await page.waitForTimeout(700);
     await page.getByRole('radio', { name: 'Taubin' }).check({ force: true });
     await page.waitForTimeout(700);
     await undo.click();
     await expect.poll(() => noted(page, 'smoothing')).toBe('');
-    expect(await page.getByLabel('Passes').inputValue()).toBe('9');
+    await expect.poll(() => page.getByLabel('Passes').inputValue()).toBe('9');
     await page.locator('h1').click();
     await page.keyboard.press('Control+z');
     await expect.poll(() => noted(page, 'passes')).toBe('');
-    expect(await page.getByLabel('Passes').inputValue()).toBe('5');
-    expect(await undo.isVisible()).toBe(false);
+    await expect.poll(() => page.getByLabel('Passes').inputValue()).toBe('5');
+    await expect.poll(() => undo.isVisible()).toBe(false);
     await page.keyboard.press('Control+Shift+z');
     await page.keyboard.press('Control+Shift+z');
     await expect.poll(() => [noted(page, 'passes'), noted(page, 'smoothing')]).toEqual(['9', 'taubin']);
@@ -122,12 +122,12 @@ describe('the list of volumes', () => {
       await page.goto(other.url);
       const names = page.locator('.cards strong');
       await expect.poll(() => names.first().innerText()).toBe('case 61.nrrd');
-      expect(await names.count()).toBe(60);
+      await expect.poll(() => names.count()).toBe(60);
       // The oldest is on no page that is there yet.
       // Letter by letter, faster than the others come.
       await page.getByLabel('Search volumes').pressSequentially('ELBOW');
       await expect.poll(() => names.allInnerTexts()).toEqual(['elbow.nrrd']);
-      expect(await page.locator('.count').innerText()).toBe('1 of 62');
+      await expect.poll(() => page.locator('.count').innerText()).toBe('1 of 62');
       await page.locator('.card').hover();
       await page.getByRole('button', { name: 'Rename elbow.nrrd' }).click();
       await page.getByLabel('Name of this volume').and(page.locator('input')).fill('a knee');

@@ -100,7 +100,7 @@ describe('the surface beside the slices', () => {
     await open(page, 'iso=100');
     await page.getByLabel('Iso-value', { exact: true }).nth(0).fill('9999');
     await expect.poll(() => page.locator('.live .slice-state').innerText()).toMatch(/No sample/);
-    expect(await page.locator('.live-picture').isVisible()).toBe(false);
+    await expect.poll(() => page.locator('.live-picture').isVisible()).toBe(false);
     await page.getByLabel('Iso-value', { exact: true }).nth(0).fill('100');
     await expect.poll(() => page.locator('.live-picture').isVisible()).toBe(true);
     const labels = await daemon.upload(labelsNrrd(24));
@@ -116,6 +116,6 @@ describe('the surface beside the slices', () => {
     await expect.poll(() => contourPixels(page, 'axial')).toBeGreaterThan(50);
     await page.unroute('**/preview?*');
     await rested(page);
-    expect(await page.locator('.live .slice-state').innerText()).toBe('');
+    await expect.poll(() => page.locator('.live .slice-state').innerText()).toBe('');
   });
 });

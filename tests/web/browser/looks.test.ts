@@ -25,7 +25,7 @@ describe('a look through the volume', () => {
     const view = page.locator('.live-picture');
     const surface = await silhouette(page, view);
     const choice = page.getByLabel('What is drawn');
-    expect(await choice.locator('option').allInnerTexts()).toEqual(['Surface', 'MR']);
+    await expect.poll(() => choice.locator('option').allInnerTexts()).toEqual(['Surface', 'MR']);
     await choice.selectOption('MR');
     await rested(page);
     // Values far below the iso-value are seen as well.
@@ -62,7 +62,7 @@ describe('slices beside a surface', () => {
     await page.mouse.click(canvas.x + canvas.width / 2, canvas.y + canvas.height / 2);
     // From the front the middle of the ball is its foremost point.
     await expect.poll(() => noted(page, 'at')).toMatch(/^2[34],[56],2[34]$/);
-    expect(await page.locator('[data-plane=coronal] .slice-place').innerText()).toMatch(/^[67] \/ 48$/);
+    await expect.poll(() => page.locator('[data-plane=coronal] .slice-place').innerText()).toMatch(/^[67] \/ 48$/);
 
     await still(page);
     const before = await page.locator('.viewport').screenshot();
@@ -76,7 +76,7 @@ describe('slices beside a surface', () => {
 
     await open(page, `?slices=on&at=${place}`);
     await expect.poll(() => contourPixels(page, 'sagittal')).toBeGreaterThan(20);
-    expect(await page.getByRole('button', { name: 'Slices' }).getAttribute('aria-pressed')).toBe('true');
+    await expect.poll(() => page.getByRole('button', { name: 'Slices' }).getAttribute('aria-pressed')).toBe('true');
     await page.keyboard.press('x');
     await expect.poll(() => page.locator('[data-plane]').count()).toBe(0);
     await still(page);
@@ -90,7 +90,7 @@ describe('slices beside a surface', () => {
     await fetch(`${daemon.url}/v1/volumes/${volume}`, { method: 'DELETE' });
     await page.goto(`${daemon.url}/#/jobs/${id}`);
     await surfaceLoaded(page);
-    expect(await page.getByRole('button', { name: 'Slices' }).count()).toBe(0);
-    expect(await page.getByRole('button', { name: 'Measure' }).count()).toBe(1);
+    await expect.poll(() => page.getByRole('button', { name: 'Slices' }).count()).toBe(0);
+    await expect.poll(() => page.getByRole('button', { name: 'Measure' }).count()).toBe(1);
   });
 });

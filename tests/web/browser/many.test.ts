@@ -22,14 +22,14 @@ describe('the first view', () => {
     await daemon.submit({ volume: first, iso: 1.5, formats: ['stl'] }, 30);
     const newest = await daemon.upload(ballNrrd(12, 4, 5));
     await page.goto(daemon.url);
-    expect(await page.locator('.cards > li').first().getAttribute('data-volume')).toBe(newest);
-    expect(await page.locator(`[data-volume="${first}"]`).count()).toBe(0);
+    await expect.poll(() => page.locator('.cards > li').first().getAttribute('data-volume')).toBe(newest);
+    await expect.poll(() => page.locator(`[data-volume="${first}"]`).count()).toBe(0);
     // A surface of a volume that is not among them has its name all the same.
     expect(await page.locator('.rows').innerText()).not.toContain('erased');
     for (let page_ = 0; page_ < 2; page_ += 1) await page.getByRole('button', { name: 'Older volumes' }).click();
     await expect.poll(() => page.locator('.cards > li').count()).toBe(many + 1);
-    expect(await page.getByRole('button', { name: 'Older volumes' }).isVisible()).toBe(false);
-    expect(await page.locator('.cards > li').last().getAttribute('data-volume')).toBe(first);
+    await expect.poll(() => page.getByRole('button', { name: 'Older volumes' }).isVisible()).toBe(false);
+    await expect.poll(() => page.locator('.cards > li').last().getAttribute('data-volume')).toBe(first);
     await page.goto(`${daemon.url}/#/jobs`);
     await page.locator('table.jobs').waitFor();
     expect(await page.locator('table.jobs').innerText()).not.toContain('erased');

@@ -11,7 +11,7 @@ const hostile = '<img src=x onerror="document.title=1">';
 async function expectText(text: string): Promise<void> {
   const { page } = at;
   await expect.poll(() => page.locator('body').innerText()).toContain(text);
-  expect(await page.locator('img[src=x]').count()).toBe(0);
+  await expect.poll(() => page.locator('img[src=x]').count()).toBe(0);
   expect(await page.title()).not.toBe('1');
 }
 
@@ -42,8 +42,8 @@ describe('an upload of several volumes', () => {
     const rows = page.locator('.outcomes > li');
     await expect.poll(() => rows.count()).toBe(3);
     await expectText(hostileName);
-    expect(await page.locator('.drop h2').innerText()).toBe('1 of the 3 volumes in the upload were stored');
-    expect(await page.locator('[data-member="cut.nrrd"]').innerText()).toContain('truncated');
+    await expect.poll(() => page.locator('.drop h2').innerText()).toBe('1 of the 3 volumes in the upload were stored');
+    await expect.poll(() => page.locator('[data-member="cut.nrrd"]').innerText()).toContain('truncated');
     await expect.poll(() => page.locator('[data-volume]').count()).toBe(1);
 
     const times = page.locator('[data-member="times.nii"]');
@@ -52,12 +52,12 @@ describe('an upload of several volumes', () => {
     await expect.poll(() => page.locator('.outcomes .stored').count()).toBe(2);
     const [kept = ''] = /upload=\w{32}/.exec(queries[1] ?? '') ?? [];
     expect(queries).toEqual(['?keep=true', `?keep=true&${kept}&member=times.nii&volume=1`]);
-    expect(await page.locator('[data-member="cut.nrrd"]').getAttribute('class')).toBe('refused');
+    await expect.poll(() => page.locator('[data-member="cut.nrrd"]').getAttribute('class')).toBe('refused');
     await expect.poll(() => page.locator('[data-volume]').count()).toBe(2);
 
     await times.getByRole('link').click();
     await page.waitForURL(volumePage);
-    expect(await page.locator('[data-note="volume-chosen"]').innerText()).toContain('Volume 1');
+    await expect.poll(() => page.locator('[data-note="volume-chosen"]').innerText()).toContain('Volume 1');
     await page.goto(daemon.url);
     await expectText(hostileName);
   });
@@ -72,7 +72,7 @@ describe('a refusal', () => {
     await page.getByLabel('Volume to read').selectOption('0');
     await page.getByRole('button', { name: 'Take this volume' }).click();
     await page.waitForURL(volumePage);
-    expect(await page.locator('[data-note="volume-chosen"]').innerText()).toContain('Volume 0');
+    await expect.poll(() => page.locator('[data-note="volume-chosen"]').innerText()).toContain('Volume 0');
   });
 
   it('that a person may overrule is taken in spite of it, and says so', async () => {
@@ -105,7 +105,7 @@ describe('notes and what was left out', () => {
     ];
     await drop(page, [{ name: 'unit.nrrd', bytes: smallNrrd(fields) }]);
     await page.waitForURL(volumePage);
-    expect(await page.locator('[data-note="unit-unknown"]').innerText()).toContain('pixel');
+    await expect.poll(() => page.locator('[data-note="unit-unknown"]').innerText()).toContain('pixel');
     // Details repeat little of a file, and no page should rely on that.
     await page.route('**/v1/volumes/*', async (route) => {
       const answer = await route.fetch();
@@ -115,7 +115,7 @@ describe('notes and what was left out', () => {
     });
     await page.reload();
     await expectText(hostile);
-    expect(await page.locator('.notes img').count()).toBe(0);
+    await expect.poll(() => page.locator('.notes img').count()).toBe(0);
     await page.unroute('**/v1/volumes/*');
 
     await page.goto(daemon.url);
@@ -139,7 +139,7 @@ describe('a volume', () => {
     await drop(page, [{ name: 'longer.nrrd', bytes: Buffer.concat([smallNrrd(fields), Buffer.from('more')]) }]);
     await page.waitForURL(volumePage);
     await expect.poll(() => page.locator('.toast').innerText()).toMatch(/there already.*4 bytes more/);
-    expect(await page.locator('[data-note]').count()).toBe(0);
+    await expect.poll(() => page.locator('[data-note]').count()).toBe(0);
   });
 
   it('is renamed, by the button and by the Enter key, and keeps a name that is no HTML', async () => {
@@ -159,7 +159,7 @@ describe('a volume', () => {
     await rename('skull', byButton('Rename'));
     await expect.poll(() => title.innerText()).toBe('skull');
     await rename('head', byButton('Cancel'));
-    expect(await title.innerText()).toBe('skull');
+    await expect.poll(() => title.innerText()).toBe('skull');
     await rename(hostile, () => page.keyboard.press('Enter'));
     await expect.poll(() => title.innerText()).toBe(hostile);
     await page.reload();

@@ -52,13 +52,13 @@ describe('orders', () => {
     await expect.poll(() => page.locator('[data-pacs=main]').innerText()).toMatch(/does not answer as it should/);
     await row.getByRole('button', { name: /Cancel/ }).click();
     await expect.poll(() => row.locator('td').first().innerText()).toBe('cancelled');
-    expect(await row.getByRole('button').count()).toBe(0);
+    await expect.poll(() => row.getByRole('button').count()).toBe(0);
 
     status = 400;
     const { id: failed } = await order('1.2.3.5');
     const other = page.locator(`tr[data-order="${failed}"]`);
     await expect.poll(() => other.locator('td').first().innerText()).toBe('failed');
-    expect(await other.innerText()).toContain('400');
+    await expect.poll(() => other.innerText()).toContain('400');
     await page.getByLabel('State').selectOption('failed');
     await expect.poll(() => page.locator('tr[data-order]').count()).toBe(1);
     await page.reload();
@@ -82,7 +82,7 @@ describe('orders', () => {
     await page.goto(daemon.url);
     await (await asked).finished();
     await page.getByRole('heading', { name: 'Last surfaces' }).waitFor();
-    expect(await page.getByRole('link', { name: 'Orders', exact: true }).isVisible()).toBe(false);
+    await expect.poll(() => page.getByRole('link', { name: 'Orders', exact: true }).isVisible()).toBe(false);
     expect(missing).toEqual([]);
     await page.goto(`${daemon.url}/#/orders`);
     await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/knows no PACS/);

@@ -139,7 +139,7 @@ describe('a surface', () => {
     // those of the background.
     await expect.poll(async () => (await silhouette(page, page.locator('.viewport'))).filling).toBeGreaterThan(0.9);
     expect((await silhouette(page, page.locator('.viewport'))).part).toBeGreaterThan(whole.part);
-    expect(await page.locator('.cut-place').innerText()).toBe('25 / 48');
+    await expect.poll(() => page.locator('.cut-place').innerText()).toBe('25 / 48');
 
     // The slice can be measured as well: across the volume, of which the ball is only a part.
     const seen = await silhouette(page, page.locator('.viewport'));
@@ -242,7 +242,7 @@ describe('a job', () => {
     await expect.poll(() => page.locator('.progress-text').innerText()).toMatch(/%/);
     await page.getByRole('button', { name: 'Cancel' }).click();
     await expect.poll(() => page.locator('.job').getAttribute('data-state')).toBe('cancelled');
-    expect(await page.locator('.refusal').innerText()).toMatch(/Cancelled/);
+    await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/Cancelled/);
     expect((await openedJob(at)).state).toBe('cancelled');
   });
 

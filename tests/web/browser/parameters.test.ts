@@ -91,8 +91,8 @@ describe('the form', () => {
     expect(names.length).toBeGreaterThan(13);
     for (const name of names) {
       const element = control(page, name);
-      expect(await element.count(), name).toBe(1);
-      expect(await element.isVisible(), name).toBe(true);
+      await expect.poll(() => element.count(), { message: name }).toBe(1);
+      await expect.poll(() => element.isVisible(), { message: name }).toBe(true);
       expect(await element.getAttribute('title'), name).not.toBe('');
       if (name !== 'smoothing') await change(element);
     }
@@ -116,8 +116,8 @@ describe('the form', () => {
     const lambda = control(page, 'lambda').locator('input');
     for (const [text, isBad] of [['0', true], ['1.5', true], ['0.123', false]] as const) {
       await lambda.fill(text);
-      expect(await lambda.getAttribute('aria-invalid'), text).toBe(String(isBad));
-      expect(await page.getByRole('button', { name: 'Make the surface' }).isDisabled(), text).toBe(isBad);
+      await expect.poll(() => lambda.getAttribute('aria-invalid'), { message: text }).toBe(String(isBad));
+      await expect.poll(() => page.getByRole('button', { name: 'Make the surface' }).isDisabled(), { message: text }).toBe(isBad);
     }
     expect(valueAt(await make(page), 'lambda')).toBe(0.123);
   });
@@ -148,7 +148,7 @@ describe('the kind of smoothing', () => {
     expect([await lambda.inputValue(), await band.inputValue()]).toEqual(['0.5', '0.2']);
     await control(page, 'smoothing').getByLabel('Laplacian').check();
     expect([await lambda.inputValue(), await lambda.getAttribute('placeholder')]).toEqual(['', '1']);
-    expect(await band.isDisabled()).toBe(true);
+    await expect.poll(() => band.isDisabled()).toBe(true);
     await control(page, 'smoothing').getByLabel('Taubin').check();
     expect([await lambda.inputValue(), await lambda.getAttribute('placeholder')]).toEqual(['', '0.33']);
     expect([await band.inputValue(), await band.isDisabled()]).toEqual(['0.1', false]);

@@ -26,7 +26,7 @@ describe('the page', () => {
     expect(titles[2]).toContain('Surface at 100');
     await page.goto(`${daemon.url}/#/jobs/gone`);
     await expect.poll(() => page.locator('.page-problem').count()).toBe(1);
-    expect(await page.locator('main h1').count()).toBe(1);
+    await expect.poll(() => page.locator('main h1').count()).toBe(1);
     await page.goto(`${daemon.url}/#/compare`);
     await page.getByRole('link', { name: 'To the list of jobs' }).click();
     await page.waitForURL(/#\/jobs$/);
@@ -132,7 +132,7 @@ describe('the token', () => {
       await field.fill(token);
       await page.getByRole('button', { name: 'Continue' }).click();
       await expect.poll(() => page.getByRole('heading', { name: 'Jobs' }).count()).toBe(1);
-      expect(await page.getByRole('button', { name: 'Enter a token' }).isVisible()).toBe(false);
+      await expect.poll(() => page.getByRole('button', { name: 'Enter a token' }).isVisible()).toBe(false);
       await page.close();
     });
   });

@@ -32,19 +32,19 @@ describe('a slice', () => {
   it('that fails is not another one, and comes by itself later', async () => {
     const { page } = at;
     await open(page);
-    expect(await greyPixels(page, 'axial')).toBeGreaterThan(500);
+    await expect.poll(() => greyPixels(page, 'axial')).toBeGreaterThan(500);
     await page.route('**/slice.png?axis=z*', (route) => route.abort());
     await page.locator('[data-plane=axial] canvas').press('PageUp');
     const state = page.locator('[data-plane=axial] .slice-state');
     await expect.poll(() => state.innerText()).toBe('Slice 35 could not be loaded');
-    expect(await page.locator('[data-plane=axial] .slice-place').innerText()).toBe('35 / 48');
-    expect(await greyPixels(page, 'axial')).toBe(0);
-    expect(await contourPixels(page, 'axial')).toBe(0);
+    await expect.poll(() => page.locator('[data-plane=axial] .slice-place').innerText()).toBe('35 / 48');
+    await expect.poll(() => greyPixels(page, 'axial')).toBe(0);
+    await expect.poll(() => contourPixels(page, 'axial')).toBe(0);
     // The others are not touched by it.
-    expect(await greyPixels(page, 'coronal')).toBeGreaterThan(500);
+    await expect.poll(() => greyPixels(page, 'coronal')).toBeGreaterThan(500);
     await page.unroute('**/slice.png?axis=z*');
     await expect.poll(() => greyPixels(page, 'axial')).toBeGreaterThan(500);
-    expect(await state.innerText()).toBe('');
+    await expect.poll(() => state.innerText()).toBe('');
   });
 
   it('that fails at first comes by itself as well', async () => {
@@ -90,7 +90,7 @@ describe('a slice', () => {
     expect(Math.abs(told - 132)).toBeLessThan(12);
     await canvas.dblclick({ position });
     await expect.poll(() => noted(page, 'iso')).toBe(String(told));
-    expect(await page.locator('.iso-input').inputValue()).toBe(String(told));
+    await expect.poll(() => page.locator('.iso-input').inputValue()).toBe(String(told));
   });
 
   it('of a tilted gantry leans as the slices lie', async () => {
@@ -144,7 +144,7 @@ describe('parameters', () => {
     expect(page.url()).toContain('#/volumes/');
     await passes.fill('7');
     await expect.poll(() => run.isEnabled()).toBe(true);
-    expect(await page.locator('[data-parameter=passes] .fault').isVisible()).toBe(false);
+    await expect.poll(() => page.locator('[data-parameter=passes] .fault').isVisible()).toBe(false);
     await run.click();
     await page.waitForURL(/#\/jobs\//);
     expect((await openedJob(at)).parameters['passes']).toBe(7);
@@ -157,9 +157,9 @@ describe('parameters', () => {
     await page.getByRole('link', { name: 'Change parameters' }).click();
     await page.waitForURL(/#\/volumes\//);
     await page.locator('.parameters summary').click();
-    expect(await page.locator('[data-parameter=lambda] input').inputValue()).toBe('0.9');
+    await expect.poll(() => page.locator('[data-parameter=lambda] input').inputValue()).toBe('0.9');
     await page.locator('[data-parameter=smoothing] label', { hasText: 'Taubin' }).click();
-    expect(await page.locator('[data-parameter=lambda] input').inputValue()).toBe('');
+    await expect.poll(() => page.locator('[data-parameter=lambda] input').inputValue()).toBe('');
     await page.getByRole('button', { name: 'Make the surface' }).click();
     await page.waitForURL(/#\/jobs\//);
     expect((await openedJob(at)).parameters).toMatchObject({ smoothing: 'taubin', lambda: 0.33 });

@@ -116,7 +116,7 @@ describe('fingers', () => {
     ]);
     const iso = Number(await settled(() => noted(page, 'iso')));
     expect(iso).toBeGreaterThan(100);
-    expect(await page.locator('.iso-input').inputValue()).toBe(String(iso));
+    await expect.poll(() => page.locator('.iso-input').inputValue()).toBe(String(iso));
 
     const slice = await middleOf(page, '[data-plane=axial] canvas');
     const width = async (): Promise<number> => {

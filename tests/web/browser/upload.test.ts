@@ -32,7 +32,7 @@ describe('several files', () => {
       { name: 'ball.raw', bytes: ballNrrd(20, 7).subarray(-8000) },
     ]);
     await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
-    expect(await page.locator('.facts').innerText()).toMatch(/MetaImage.*20 \u00d7 20 \u00d7 20.*1 \u00d7 1 \u00d7 2 mm/);
+    await expect.poll(() => page.locator('.facts').innerText()).toMatch(/MetaImage.*20 \u00d7 20 \u00d7 20.*1 \u00d7 1 \u00d7 2 mm/);
   });
 
   it('of more than one series let a person choose', async () => {
@@ -120,7 +120,7 @@ describe('a refused file', () => {
     await drop(page, [{ name: 'samples.raw', bytes: ballNrrd(20, 7).subarray(-8000) }]);
     const submit = page.getByRole('button', { name: 'Upload as raw samples' });
     await expect.poll(() => submit.count()).toBe(1);
-    expect(await submit.isDisabled()).toBe(true);
+    await expect.poll(() => submit.isDisabled()).toBe(true);
     for (const axis of ['x', 'y', 'z']) await page.getByLabel(`Samples along ${axis}`).fill('20');
     await page.getByLabel('Type').selectOption('uint8');
     await submit.click();

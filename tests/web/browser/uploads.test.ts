@@ -73,7 +73,7 @@ describe('an upload', () => {
     const junk = Buffer.from(Array.from({ length: 4_000_000 }, (_, n) => (n * 7919) % 251));
     await drop(page, [{ name: 'junk.bin', bytes: junk }]);
     await expect.poll(() => page.locator('.refusal').innerText()).toContain('Nothing was sent');
-    expect(await page.getByRole('button', { name: 'Upload as raw samples' }).count()).toBe(1);
+    await expect.poll(() => page.getByRole('button', { name: 'Upload as raw samples' }).count()).toBe(1);
     expect(sent).toEqual([]);
     await page.getByRole('button', { name: 'Upload it anyway' }).click();
     await expect.poll(() => page.locator('.refusal').innerText()).not.toContain('Nothing was sent');
@@ -97,7 +97,7 @@ describe('an upload', () => {
     await choice.selectOption({ index: (await choice.locator('option').allInnerTexts()).findIndex((text) => text.startsWith('none')) });
     await page.getByRole('button', { name: 'Take this series' }).click();
     await page.waitForURL(volumePage);
-    expect(await page.locator('.facts').innerText()).toContain('4 \u00d7 4 \u00d7 2');
+    await expect.poll(() => page.locator('.facts').innerText()).toContain('4 \u00d7 4 \u00d7 2');
     const bytes = slices.reduce((sum, slice) => sum + slice.bytes.length, 0);
     expect(sent).toEqual([expect.any(Number), 0]);
     expect(sent[0]).toBeGreaterThan(bytes);
