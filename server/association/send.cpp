@@ -28,6 +28,15 @@ struct EndAssociation {
 using Network = std::unique_ptr<T_ASC_Network, EndNetwork>;
 using Association = std::unique_ptr<T_ASC_Association, EndAssociation>;
 
+// DCMTK 3.6.9 wants to be told how long connecting may take; talk.cpp has connected.
+OFCondition make_parameters(T_ASC_Parameters** parameters) {
+#if PACKAGE_VERSION_NUMBER >= 369
+  return ASC_createAssociationParameters(parameters, ASC_DEFAULTMAXPDU, dcmConnectionTimeout.get());
+#else
+  return ASC_createAssociationParameters(parameters, ASC_DEFAULTMAXPDU);
+#endif
+}
+
 DimseEnd end_of(const OFCondition& condition) {
   if (condition == DIMSE_NODATAAVAILABLE || condition == DUL_READTIMEOUT) return DimseEnd::kTimeout;
   if (condition == DUL_PEERABORTEDASSOCIATION || condition == DUL_NETWORKCLOSED ||
@@ -91,7 +100,7 @@ DimseSent send_object(const process::DimseSending& order) {
   if (ASC_initializeNetwork(NET_REQUESTOR, 0, timeout, &network).bad()) return {};
   const Network held_network(network);
   T_ASC_Parameters* parameters = nullptr;
-  OFCondition done = ASC_createAssociationParameters(&parameters, ASC_DEFAULTMAXPDU);
+  OFCondition done = make_parameters(&parameters);
   if (done.good()) {
     done = ASC_setAPTitles(parameters, order.calling.c_str(), order.called.c_str(), nullptr);
   }
