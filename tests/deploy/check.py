@@ -4,6 +4,9 @@
   check.py compose FILE          of a compose file
   check.py chart < MANIFESTS     of a chart's manifests, as `helm template` renders them
 """
+import json
+import os
+import re
 import sys
 
 import yaml
@@ -18,6 +21,13 @@ def check(is_true, what):
     checks += 1
 
 
+def health_of_image(compose):
+    with open(os.path.join(os.path.dirname(compose), "Dockerfile"), encoding="utf-8") as text:
+        command = re.search(r"^HEALTHCHECK [^[]*CMD (\[.*\])$", text.read(), re.MULTILINE)
+    check(command, "the image says nothing of its health")
+    return json.loads(command[1])
+
+
 def check_compose(file):
     with open(file, encoding="utf-8") as text:
         compose = yaml.safe_load(text)
@@ -28,7 +38,9 @@ def check_compose(file):
         check(service["read_only"], f"{name} may write to its root")
         check(service["cap_drop"] == ["ALL"], f"{name} has capabilities")
         check("no-new-privileges:true" in service["security_opt"], f"{name} may get privileges")
-        check("/readyz" in service["healthcheck"]["test"][-1], f"{name} is not asked whether it is ready")
+        # Without one of its own it has the image's.
+        asked = service["healthcheck"]["test"] if "healthcheck" in service else health_of_image(file)
+        check("/readyz" in asked[-1], f"{name} is not asked whether it is ready")
         check(service["stop_grace_period"] == "45s", f"{name} is not given the time to drain")
     for name, service in services.items():
         for place in service.get("volumes", []):
