@@ -1,6 +1,7 @@
 #include "server/orders/requests.h"
 
 #include <algorithm>
+#include <string_view>
 
 #include "base/clock.h"
 #include "base/ids.h"
@@ -24,9 +25,9 @@ const Rule* rule_of(const Hospital& hospital, const Orderer& orderer, const Orde
 
 // Only names are taken from a request, never addresses.
 const PacsSettings& pacs_of(const Hospital& hospital, const std::string& name,
-                            const std::string& field) {
+                            std::string_view field) {
   const PacsSettings* pacs = hospital.find_pacs(name);
-  if (pacs == nullptr) throw invalid_parameter(field, "is not one that is configured");
+  if (pacs == nullptr) throw invalid_parameter(std::string(field), "is not one that is configured");
   return *pacs;
 }
 
