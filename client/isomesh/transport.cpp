@@ -23,6 +23,7 @@ constexpr std::size_t kLongestHead = 64 * 1024;
 // A list of some ten thousand jobs has this size.
 constexpr std::size_t kLongestBody = 64 * 1024 * 1024;
 
+constexpr int kLastStatus = 599;  // RFC 9110, 15
 constexpr long kPieceBytes = 256 * 1024;
 constexpr milliseconds kLongestSleep{60'000};
 
@@ -100,6 +101,8 @@ class Transfer {
     // libcurl accepts a head that the end of the connection cuts off.
     if (!head_is_whole_) throw no_answer(reason_of(CURLE_PARTIAL_FILE), true);
     answer_.status = static_cast<int>(info<long>(CURLINFO_RESPONSE_CODE));
+    // libcurl 8.14 takes the first three digits of what is no status for one.
+    if (answer_.status > kLastStatus) throw no_answer(reason_of(CURLE_WEIRD_SERVER_REPLY), false);
     const char* type = info<char*>(CURLINFO_CONTENT_TYPE);
     if (type != nullptr) answer_.content_type = type;
     return std::move(answer_);

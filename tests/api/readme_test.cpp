@@ -1,5 +1,6 @@
 // The tables in docs/ are what the programs say.
 #include <filesystem>
+#include <regex>
 #include <sstream>
 #include <string>
 
@@ -14,14 +15,11 @@ namespace {
 
 using namespace test;
 
-// Of "  --workers UINT:INT in [1 - 64]=2 (Env:ISOMESH_WORKERS)".
-std::string default_of(const std::string& line) {
-  const std::size_t end = std::min(line.find(" (Env:"), line.size());
-  const std::size_t begin = line.rfind('=', end);
-  const bool is_of_a_unit = begin != std::string::npos && line.find(')', begin) < end;
-  return begin == std::string::npos || is_of_a_unit
-             ? ""
-             : '`' + line.substr(begin + 1, end - begin - 1) + '`';
+// Of "  --workers UINT:INT in [1 - 64]=2" or, of CLI11 2.4, "  --workers UINT:INT in [1 - 64] [2]".
+std::string default_of(const std::string& option) {
+  static const std::regex form(R"((?:=|(?:[A-Z]|\]) \[)([^=\[\]()]+)\]?$)");
+  std::smatch found;
+  return std::regex_search(option, found, form) ? '`' + found[1].str() + '`' : "";
 }
 
 // The rows of the table, as Markdown.
@@ -35,11 +33,15 @@ std::string table_of(const std::string& help) {
     const std::string name = line.substr(begin, line.find_first_of(" \n", begin) - begin);
     if (name == "--version" || name == "--config") continue;
     // Beside a short name, or on the next line.
+    const std::size_t variable = line.find(" (Env:");
     const std::size_t beside = line.find("  ", begin);
-    std::string meaning = beside == std::string::npos ? "" : line.substr(beside);
+    const bool is_beside = variable == std::string::npos && beside != std::string::npos;
+    std::string meaning = is_beside ? line.substr(beside) : "";
+    std::string option = line.substr(0, is_beside ? beside : variable);
+    option.erase(option.find_last_not_of(' ') + 1);
     if (meaning.empty()) std::getline(lines, meaning);
     meaning.erase(0, meaning.find_first_not_of(' '));
-    table += "| `" + name + "` | " + default_of(line.substr(0, beside)) + " | " + meaning + " |\n";
+    table += "| `" + name + "` | " + default_of(option) + " | " + meaning + " |\n";
   }
   return table;
 }

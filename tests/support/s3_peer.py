@@ -18,7 +18,6 @@ Kinds: status-503 and other numbers; cut: half of the body, then the end; flip: 
 answer, the connection ends; hang: no answer for long; forget: answered as if it were stored; ignore-range; more:
 bytes behind the object's; late: done, and then no answer.
 """
-import base64
 import datetime
 import email.utils
 import hashlib
@@ -264,9 +263,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         prefix = query.get("prefix", "")
         with state.lock:
             keys = sorted(key for key in state.objects if key.startswith(prefix))
-            after = base64.b64decode(query["continuation-token"]).decode() \
-                if "continuation-token" in query else ""
-            keys = [key for key in keys if key > after]
+            keys = [key for key in keys if key > query.get("start-after", "")]
             most = min(state.page, int(query.get("max-keys", 1000)))
             shown = [(key, *state.objects[key]) for key in keys[:most]]
         text = "".join(
@@ -275,9 +272,6 @@ class Handler(http.server.BaseHTTPRequestHandler):
                 datetime.datetime.utcfromtimestamp(changed).strftime("%Y-%m-%dT%H:%M:%S.000Z"),
                 len(content)) for key, content, changed in shown)
         rest = len(keys) > most
-        if rest:
-            token = base64.b64encode(keys[most - 1].encode()).decode()
-            text += f"<NextContinuationToken>{token}</NextContinuationToken>"
         self.answer_xml('<ListBucketResult xmlns="http://s3.amazonaws.com/doc/2006-03-01/">'
                         f"<IsTruncated>{'true' if rest else 'false'}</IsTruncated>{text}"
                         "</ListBucketResult>")
@@ -326,7 +320,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def post(self, key, query, body):
         if "uploads" in query:
             with state.lock:
-                number = "upload+%d/=" % (len(state.uploads) + 1)
+                number = "upload~%d/=" % (len(state.uploads) + 1)
                 state.uploads[number] = (key, {})
             self.answer_xml("<InitiateMultipartUploadResult><UploadId>%s</UploadId>"
                             "</InitiateMultipartUploadResult>" % number)

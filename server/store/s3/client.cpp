@@ -256,20 +256,20 @@ void S3Client::try_to_erase(const std::string& key) const {
   }
 }
 
-S3Request S3Client::listing(const std::string& beginning, const std::string& token,
-                            int most) const {
-  std::string query;
-  if (!token.empty()) query = "continuation-token=" + uri_escaped(token) + '&';
-  query += "list-type=2&max-keys=" + std::to_string(most) +
-           "&prefix=" + uri_escaped(options_.address.prefix + beginning);
+// By the last key of the page before, not by the token that came with it: tokens have "+", which
+// libcurl 8.14 signs as a space.
+S3Request S3Client::listing(const std::string& beginning, const std::string& last, int most) const {
+  std::string query = "list-type=2&max-keys=" + std::to_string(most) +
+                      "&prefix=" + uri_escaped(options_.address.prefix + beginning);
+  if (!last.empty()) query += "&start-after=" + uri_escaped(options_.address.prefix + last);
   return {.query = std::move(query)};
 }
 
 S3Listing S3Client::list(const std::string& beginning) const {
   S3Listing all;
-  std::string token;
+  std::string last;
   for (int page = 0; page < kMostPages; ++page) {
-    const S3Answer answer = ask(listing(beginning, token, kListedAtOnce));
+    const S3Answer answer = ask(listing(beginning, last, kListedAtOnce));
     const S3Text text = read_s3_text(answer.text);
     if (answer.status != kS3Ok || text.root != "ListBucketResult") {
       throw Error(ErrorCode::kUnavailable, "the store of volumes and meshes cannot be listed");
@@ -289,9 +289,8 @@ S3Listing S3Client::list(const std::string& beginning) const {
       if (name == "Size") all.objects.back().bytes = parse_uint64(value).value_or(0);
     }
     if (text.find("IsTruncated") != "true") return all;
-    const std::string next(text.find("NextContinuationToken"));
-    if (next.empty() || next == token) break;
-    token = next;
+    if (all.objects.empty() || all.objects.back().key == last) break;
+    last = all.objects.back().key;
   }
   throw Error(ErrorCode::kInternal, "the store of blobs does not come to the end of a list");
 }

@@ -76,7 +76,7 @@ class S3Client {
 
  private:
   S3Answer ask(const S3Request& request, const std::stop_token& stop = {}) const;
-  S3Request listing(const std::string& beginning, const std::string& token, int most) const;
+  S3Request listing(const std::string& beginning, const std::string& last, int most) const;
   S3Answer put_at_once(const std::string& key, const File& file, const Blob& blob,
                        IfThere if_there) const;
   void put_in_parts(const std::string& key, const File& file, const Blob& blob) const;

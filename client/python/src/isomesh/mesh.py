@@ -118,6 +118,8 @@ def _shaped(data: memoryview, kind: str, *shape: int) -> Any:
         pass
     else:
         return numpy.frombuffer(data.tobytes(), numpy.dtype(kind)).reshape(shape).copy()
+    # Newer stubs want the kind as a literal.
+    view: Any = memoryview(data.tobytes())
     if 0 in shape:  # which a memoryview cannot have
-        return memoryview(b"").cast(kind)
-    return memoryview(data.tobytes()).cast(kind, shape)
+        return view[:0].cast(kind)
+    return view.cast(kind, shape)
