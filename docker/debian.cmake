@@ -1,5 +1,6 @@
 # The Debian packages, by CPack: isomeshd, isomesh and libisomesh-dev, of a build that was configured with
 # -D CMAKE_INSTALL_PREFIX=/usr. Whom they need is found from the binaries.
+set(ISOMESH_MAINTAINER "isomesh <isomesh@localhost>" CACHE STRING "Who answers for the packages: NAME <ADDRESS>")
 string(TIMESTAMP ISOMESH_BUILT "%a, %d %b %Y %H:%M:%S +0000" UTC)
 set(changelog ${PROJECT_BINARY_DIR}/changelog)
 configure_file(${PROJECT_SOURCE_DIR}/server/install/changelog.in ${changelog} @ONLY)
@@ -25,7 +26,8 @@ set(CPACK_SET_DESTDIR ON)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_PACKAGE_NAME isomesh)
 set(CPACK_PACKAGE_VENDOR isomesh)
-set(CPACK_PACKAGE_CONTACT "isomesh <isomesh@localhost>")
+set(CPACK_PACKAGE_CONTACT ${ISOMESH_MAINTAINER})
+set(CPACK_PRE_BUILD_SCRIPTS ${PROJECT_SOURCE_DIR}/server/install/compress_manuals.cmake)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_RELEASE 1 CACHE STRING "The packages' revision")
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
