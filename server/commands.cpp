@@ -62,6 +62,7 @@ struct Commands::State {
   std::string target = {};  // of move
   std::uint64_t after = 0;  // of the audit trail
   std::function<void()> chosen = {};
+  int status = 0;
 
   // Later options of the program itself may follow a subcommand.
   CLI::App& add(CLI::App& parent, const std::string& name, const std::string& help,
@@ -99,8 +100,12 @@ struct Commands::State {
     CLI::App& revoked = add(tokens, "revoke", "Take tokens of a name out of the file",
                             [this] { revoke_tokens(with_file()); });
     revoked.add_option("NAME", token.name, "Whose")->required();
-    revoked.add_option("HASH", token.hash,
-                       "The beginning of one token's hash; all of the name without it");
+    revoked
+        .add_option("HASH", token.hash,
+                    "The beginning of one token's hash; all of the name without it")
+        ->check(CLI::Validator(
+            [](const std::string& text) { return text.empty() ? "it must not be empty" : ""; },
+            ""));
   }
 
   void check_is_whole() const {
@@ -166,13 +171,14 @@ struct Commands::State {
         "the records are in the database of --store and not in the data folder: " + instead);
   }
 
-  static void tell(const char* what, const store::Copied& copied) {
+  void tell(const char* what, const store::Copied& copied) {
     std::cout << what << ' ' << copied.blobs << " files of volumes and meshes, " << copied.bytes
               << " bytes" << std::endl;
-    if (copied.damaged > 0) {
-      spdlog::warn("{} of them are damaged: their bytes are not what they were", copied.damaged);
+    for (const std::string& lost : copied.damaged) {
+      spdlog::warn("damaged: {}; its bytes are not what they were", lost);
     }
-    if (copied.missing > 0) spdlog::warn("{} more are named and not there", copied.missing);
+    for (const std::string& lost : copied.missing) spdlog::warn("missing: {}", lost);
+    if (!copied.damaged.empty() || !copied.missing.empty()) status = 1;
   }
 
   void add_description_commands() {
@@ -204,6 +210,9 @@ Commands::~Commands() = default;
 
 bool Commands::asked() const { return state_->chosen != nullptr; }
 
-void Commands::run() { state_->chosen(); }
+int Commands::run() {
+  state_->chosen();
+  return state_->status;
+}
 
 }  // namespace isomesh

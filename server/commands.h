@@ -22,8 +22,9 @@ class Commands {
   // Whether one of them was asked for, after `cli` has parsed.
   bool asked() const;
 
-  // Runs it. Throws what it throws: Error.
-  void run();
+  // Runs it, and returns the status to end with: 1 where it did what it could, and has told what is
+  // lost. Throws what it throws: Error.
+  int run();
 
  private:
   struct State;

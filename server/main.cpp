@@ -104,9 +104,10 @@ struct Files {
   std::unique_ptr<net::TlsFiles> tls;
 };
 
-Files open_files(const Options& options, const net::Address& address) {
+Files open_files(const Options& options, const net::Address& address, http::ReadBy reader) {
   Files files;
-  if (!options.tokens.empty()) files.tokens = std::make_unique<http::Tokens>(options.tokens);
+  if (!options.tokens.empty())
+    files.tokens = std::make_unique<http::Tokens>(options.tokens, reader);
   if (!options.tls_certificate.empty() && !address.is_unix()) {
     files.tls = std::make_unique<net::TlsFiles>(options.tls_certificate, options.tls_key);
   }
@@ -158,11 +159,26 @@ void reload(const Options& options, const Files& files, callbacks::Callbacks& ca
   reload_one([&] { callbacks.set_secrets(callback_secrets(options)); });
 }
 
+// What a start would make of the places of files. Makes none.
+void check_places(const Options& options) {
+  std::error_code absent;
+  if (options.data.empty()) throw invalid_parameter("data", "must name a folder");
+  if (std::filesystem::exists(options.data, absent) &&
+      !std::filesystem::is_directory(options.data, absent)) {
+    throw invalid_parameter("data", options.data.string() + " is no folder");
+  }
+  const auto& authorities = options.callback_authorities;
+  if (!authorities.empty() && ::access(authorities.c_str(), R_OK) != 0) {
+    throw invalid_parameter("callback-ca", authorities.string() + " cannot be read");
+  }
+}
+
 // Tells what would be used. Throws what a start would that finds a mistake in it; touches neither
 // the data folder nor the address.
 int tell_configuration(const Options& options, const CLI::App& cli) {
   const net::Address address = net::parse_address(options.listen);
-  check_reach(options, address, open_files(options, address));
+  check_reach(options, address, open_files(options, address, http::ReadBy::kAdministrator));
+  check_places(options);
   const callbacks::CallbackTargets targets(options.callback_targets);
   callback_secrets(options);
   if (!options.store.empty()) store::postgresql::check_url(options.store);
@@ -261,7 +277,7 @@ std::unique_ptr<audit::SyslogSender> send_trail(const orders::Hospital& hospital
 
 int run(const Options& options, const sigset_t& signals) {
   const net::Address address = net::parse_address(options.listen);
-  const Files files = open_files(options, address);
+  const Files files = open_files(options, address, http::ReadBy::kService);
   check_reach(options, address, files);
   const callbacks::CallbackTargets targets(options.callback_targets);
   if (options.threads > 0) mesh::set_thread_count(options.threads);
@@ -385,8 +401,10 @@ int main(int argc, char** argv) {
       return cli.exit(error) == 0 ? 0 : kWrongUsage;  // 0 for --help and --version
     }
     if (commands.asked()) {
-      commands.run();
-      return 0;
+      const int status = commands.run();
+      std::cout.flush();
+      if (!std::cout) throw Error(ErrorCode::kInternal, "standard output cannot be written to");
+      return status;
     }
     start_log(options.log_format, options.log_level);
     if (options.check_only) return tell_configuration(options, cli);

@@ -1,6 +1,8 @@
 #include "server/options.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdlib>
 #include <map>
 #include <string_view>
@@ -51,6 +53,47 @@ std::string value_of(const CLI::Option& option) {
   return value;
 }
 
+// CLI::Range lets NaN through.
+CLI::Validator number_between(double least, double most) {
+  const CLI::Range range(least, most);
+  return {[range](std::string& text) {
+            double number = 0;
+            const bool is_nan = CLI::detail::lexical_cast(text, number) && std::isnan(number);
+            return is_nan ? text + " is no number" : range(text);
+          },
+          range.get_description()};
+}
+
+// Bytes with their unit. CLI::AsSizeValue takes what is negative or has more than 64 bits for
+// another number.
+CLI::Validator size_of_bytes(std::uint64_t least = 0) {
+  const CLI::AsSizeValue with_unit(false);
+  return {
+      [with_unit, least](std::string& text) {
+        const std::string given = text;
+        std::uint64_t number = 0;
+        if (std::from_chars(given.data(), given.data() + given.size(), number).ec != std::errc()) {
+          return given + " is no number of bytes";
+        }
+        std::string wrong = with_unit(text);
+        if (!wrong.empty()) return wrong;
+        CLI::detail::lexical_cast(text, number);
+        return number < least ? given + " is too small" : "";
+      },
+      with_unit.get_description()};
+}
+
+// Of a page: "https://viewer.example", or all of them.
+std::string wrong_origin(const std::string& text) {
+  const bool is_origin = text == "*" || text.starts_with("http://") || text.starts_with("https://");
+  return is_origin ? "" : text + " is no origin, such as https://viewer.example";
+}
+
+std::string wrong_host(const std::string& text) {
+  const bool is_name = !text.empty() && text.find_first_of(" \t/") == std::string::npos;
+  return is_name ? "" : '"' + text + "\" is no name of a host";
+}
+
 void add_log_options(CLI::App& cli, Options& options) {
   cli.add_option("--log-level", options.log_level, "debug, info, warn, error or off")
       ->envname("ISOMESH_LOG_LEVEL")
@@ -95,7 +138,7 @@ void add_callback_options(CLI::App& cli, Options& options) {
   cli.add_option("--callback-retry-seconds", options.callback_retry_seconds,
                  "Pause after a callback's first failure; it doubles up to an hour")
       ->envname("ISOMESH_CALLBACK_RETRY_SECONDS")
-      ->check(CLI::Range(0.01, 3600.0))
+      ->check(number_between(0.01, 3600.0))
       ->capture_default_str();
 }
 
@@ -109,7 +152,7 @@ void add_blob_options(CLI::App& cli, Options& options) {
   cli.add_option("--blob-cache", options.blobs.cache,
                  "Bytes of copies of files in S3 that are kept in the folder of --data")
       ->envname("ISOMESH_BLOB_CACHE")
-      ->transform(CLI::AsSizeValue(false))
+      ->transform(size_of_bytes())
       ->capture_default_str();
   cli.add_option("--blob-credentials", options.blobs.credentials,
                  "File of the keys for S3, as AWS' tools have it, read again for each request; "
@@ -184,20 +227,20 @@ void add_options(CLI::App& cli, Options& options) {
   cli.add_option("--keep-days", options.keep_days,
                  "How long finished jobs are kept with their meshes, and volumes that none used")
       ->envname("ISOMESH_KEEP_DAYS")
-      ->check(CLI::Range(0.0, 100000.0))
+      ->check(number_between(0.0, 100000.0))
       ->capture_default_str();
   cli.add_option(
          "--max-disk", options.max_disk,
          "Bytes of all volumes and meshes; the oldest of whoever has most go first; 0: what the "
          "disk holds")
       ->envname("ISOMESH_MAX_DISK")
-      ->transform(CLI::AsSizeValue(false))
+      ->transform(size_of_bytes())
       ->capture_default_str();
   cli.add_option("--disk-reserve", options.disk_reserve,
                  "Bytes kept on the disk so that a full one can be freed; a 32nd of it, 64 MiB at "
                  "most, unless set")
       ->envname("ISOMESH_DISK_RESERVE")
-      ->transform(CLI::AsSizeValue(false));
+      ->transform(size_of_bytes());
   cli.add_option("--lease-seconds", options.lease_seconds,
                  "How long a job stays with a worker that shows no sign of life")
       ->envname("ISOMESH_LEASE_SECONDS")
@@ -210,7 +253,7 @@ void add_options(CLI::App& cli, Options& options) {
       ->capture_default_str();
   cli.add_option("--max-upload", options.http.upload.max_bytes, "Bytes of one upload")
       ->envname("ISOMESH_MAX_UPLOAD")
-      ->transform(CLI::AsSizeValue(false))
+      ->transform(size_of_bytes(1))
       ->capture_default_str();
   cli.add_option("--upload-places", options.http.upload_places,
                  "Uploads at the same time; one owner or address has a share of them")
@@ -221,15 +264,17 @@ void add_options(CLI::App& cli, Options& options) {
          "--cors-origin", options.http.cors_origins,
          "Origins whose pages may use the service, such as https://viewer.example; * for all")
       ->envname("ISOMESH_CORS_ORIGIN")
+      ->check(CLI::Validator(wrong_origin, ""))
       ->delimiter(',');
   cli.add_option("--allow-host", options.http.hosts,
                  "Names of this service beside those of loopback, for requests without tokens")
       ->envname("ISOMESH_ALLOW_HOST")
+      ->check(CLI::Validator(wrong_host, ""))
       ->delimiter(',');
   cli.add_option("--max-volume", options.import.max_sample_bytes,
                  "Bytes of one volume's samples, unpacked")
       ->envname("ISOMESH_MAX_VOLUME")
-      ->transform(CLI::AsSizeValue(false))
+      ->transform(size_of_bytes(1))
       ->capture_default_str();
   cli.add_option("--imports", options.runner.at_once,
                  "Uploads that are read at the same time; others wait")
@@ -239,7 +284,7 @@ void add_options(CLI::App& cli, Options& options) {
   cli.add_option("--import-memory", options.runner.bounds.memory_bytes,
                  "Bytes of memory that reading one upload may take, beside the volume itself")
       ->envname("ISOMESH_IMPORT_MEMORY")
-      ->transform(CLI::AsSizeValue(false))
+      ->transform(size_of_bytes())
       ->check(CLI::Range(std::uint64_t{64} << 20, std::uint64_t{1} << 50))
       ->capture_default_str();
   cli.add_option("--import-seconds", options.import_seconds, "How long reading one upload may take")
@@ -251,7 +296,7 @@ void add_options(CLI::App& cli, Options& options) {
          "Bytes of memory one job may take; 0: its share of three quarters of what the machine, "
          "or its control group, has")
       ->envname("ISOMESH_JOB_MEMORY")
-      ->transform(CLI::AsSizeValue(false));
+      ->transform(size_of_bytes());
   cli.add_option("--drain-seconds", options.drain_seconds,
                  "How long running jobs may finish after SIGTERM")
       ->envname("ISOMESH_DRAIN_SECONDS")

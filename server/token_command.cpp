@@ -1,5 +1,6 @@
 #include "server/token_command.h"
 
+#include <algorithm>
 #include <iostream>
 #include <sstream>
 #include <string_view>
@@ -87,6 +88,11 @@ TokenLine parsed(const std::string& line) {
   return token.name.starts_with('#') ? TokenLine{} : token;
 }
 
+void tell(const std::string& text) {
+  std::cout << text << std::endl;
+  if (!std::cout) throw Error(ErrorCode::kInternal, "standard output cannot be written to");
+}
+
 }  // namespace
 
 void add_token(const TokenRequest& request) {
@@ -97,10 +103,11 @@ void add_token(const TokenRequest& request) {
   if (!request.file.empty()) {
     const Descriptor lock = lock_folder_of(request.file);
     std::vector<std::string> lines;
-    if (fs::exists(request.file)) {
-      const http::Tokens readable(request.file);  // the next start would refuse it otherwise
-      lines = lines_of(request.file);
-    }
+    if (fs::exists(request.file)) lines = lines_of(request.file);
+    const bool has_tokens = std::ranges::any_of(
+        lines, [](const std::string& each) { return !parsed(each).name.empty(); });
+    // The next start would refuse it otherwise.
+    if (has_tokens) const http::Tokens readable(request.file, http::ReadBy::kAdministrator);
     for (const std::string& each : lines) {
       const TokenLine other = parsed(each);
       if (other.name == request.name && other.role != request.role) {
@@ -109,16 +116,16 @@ void add_token(const TokenRequest& request) {
       }
     }
     lines.push_back(line);
+    tell(token);  // first: one that nobody has seen is of no use, and its hash would stay
     replace(request.file, lines);
+    return;
   }
-  std::cout << token << '\n';
-  if (request.file.empty()) std::cout << line << '\n';
-  std::cout.flush();
+  tell(token + '\n' + line);
 }
 
 void list_tokens(const TokenRequest& request) {
   check_is_given(request.file);
-  const http::Tokens readable(request.file);
+  const http::Tokens readable(request.file, http::ReadBy::kAdministrator);
   for (const std::string& line : lines_of(request.file)) {
     const TokenLine token = parsed(line);
     if (token.name.empty()) continue;
@@ -131,7 +138,7 @@ void list_tokens(const TokenRequest& request) {
 void revoke_tokens(const TokenRequest& request) {
   check_is_given(request.file);
   const Descriptor lock = lock_folder_of(request.file);
-  const http::Tokens readable(request.file);
+  const http::Tokens readable(request.file, http::ReadBy::kAdministrator);
   std::vector<std::string> kept;
   std::size_t revoked = 0;
   std::size_t left = 0;

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "base/text.h"
+#include "client/cli/options.h"
 #include "client/isomesh/package.h"
 #include "proto/error.h"
 
@@ -61,8 +62,8 @@ std::vector<Input> inputs_of(const Options& options) {
     if (belongs_to_another(sent, n)) continue;
     inputs.push_back({{files[n]}, name_of_input(files[n])});
     if (!names.insert(inputs.back().name).second) {
-      throw Error(ErrorCode::kInvalidParameter, "two inputs are called " + inputs.back().name +
-                                                    ", so one mesh would replace the other");
+      throw EarlyExit(kWrongUsage, "isomesh: two inputs are called " + inputs.back().name +
+                                       ", so one mesh would replace the other\n");
     }
   }
   return inputs;

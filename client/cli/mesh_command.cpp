@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -33,14 +34,19 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// After an interrupt the job is no longer wanted, which the server must learn. The user does not
-// wait long for that.
-void cancel_after_stop(const Options& options, const std::string& id) {
-  Client client({.server = options.server,
+// For what the server must learn at the end, also after an interrupt: the user does not wait long
+// for that.
+Client parting_client(const Options& options) {
+  return Client({.server = options.server,
                  .token = options.token,
                  .authorities = options.authorities,
                  .connect_timeout = std::chrono::seconds{2},
                  .silence_timeout = std::chrono::seconds{5}});
+}
+
+// After an interrupt the job is no longer wanted.
+void cancel_after_stop(const Options& options, const std::string& id) {
+  Client client = parting_client(options);
   try {
     client.cancel(id);
     complain("interrupted; the job " + id + " is cancelled");
@@ -72,12 +78,46 @@ std::unique_ptr<ScratchFile> stdin_as_file() {
   return file;
 }
 
+// The volumes that a dry run has stored: erased when all of it has ended, because inputs may be the
+// same volume.
+class Leftovers {
+ public:
+  explicit Leftovers(const Options& options) : options_(options) {}
+  Leftovers(const Leftovers&) = delete;
+  Leftovers& operator=(const Leftovers&) = delete;
+
+  void add(const std::vector<UploadedVolume>& uploaded) {
+    constexpr int kCreated = 201;
+    const std::scoped_lock lock(mutex_);
+    for (const UploadedVolume& each : uploaded) {
+      if (each.volume && each.status == kCreated) ids_.insert(each.volume->id);
+    }
+  }
+
+  ~Leftovers() {
+    for (const std::string& id : ids_) {
+      try {
+        parting_client(options_).erase_volume(id);
+      } catch (const Error& error) {
+        complain("the volume " + id + " could not be erased: " + error.what());
+      }
+    }
+  }
+
+ private:
+  const Options& options_;
+  std::mutex mutex_;
+  std::set<std::string> ids_;
+};
+
 // One input's way: up, meshed, down. Made for each thread.
 class Run {
  public:
-  Run(const Options& options, const std::stop_token& stop, bool is_one_of_many)
+  Run(const Options& options, const std::stop_token& stop, bool is_one_of_many,
+      Leftovers& leftovers)
       : options_(options),
         stop_(stop),
+        leftovers_(leftovers),
         is_one_of_many_(is_one_of_many),
         client_(client_of(options, stop)),
         bar_(!options.quiet && (!is_one_of_many || options.jobs == 1)) {}
@@ -97,6 +137,7 @@ class Run {
     const Stopwatch uploading;
     const std::vector<UploadedVolume> volumes = upload_all(client_, options_, files, how, bar_);
     seen_.upload = uploading.milliseconds();
+    if (options_.dry_run) leftovers_.add(volumes);
     if (volumes.size() == 1 && volumes.front().volume) {
       return volume(volumes.front(), input.name, input.name);
     }
@@ -121,7 +162,7 @@ class Run {
     parameters.volume = volume.id;
     if (!outputs.empty()) parameters.formats = formats_of(outputs);
     if (!options_.preset.empty()) parameters.iso = preset_of(volume, options_.preset);
-    if (options_.dry_run) return dry_run(uploaded, parameters, name);
+    if (options_.dry_run) return dry_run(parameters, name);
 
     const std::optional<Job> job = made(parameters);
     if (!job) return kRefused;
@@ -169,12 +210,9 @@ class Run {
     }
   }
 
-  // What a job would make and take; what was not there before is gone again.
-  int dry_run(const UploadedVolume& uploaded, const JobParameters& parameters,
-              const std::string& name) {
-    constexpr int kCreated = 201;
+  // What a job would make and take.
+  int dry_run(const JobParameters& parameters, const std::string& name) {
     const Estimate estimate = client_.estimate(parameters);
-    if (uploaded.status == kCreated) client_.erase_volume(uploaded.volume->id);
     print(options_.json ? to_json(estimate) + '\n'
                         : (is_one_of_many_ ? name + '\n' : "") + estimate_report(estimate));
     return kDone;
@@ -201,6 +239,7 @@ class Run {
 
   const Options& options_;
   const std::stop_token stop_;
+  Leftovers& leftovers_;
   const bool is_one_of_many_;
   Client client_;
   ProgressBar bar_;
@@ -208,13 +247,13 @@ class Run {
 };
 
 // Some at a time, each told of by itself.
-int mesh_all(const Options& options, const std::vector<Input>& inputs,
-             const std::stop_token& stop) {
+int mesh_all(const Options& options, const std::vector<Input>& inputs, const std::stop_token& stop,
+             Leftovers& leftovers) {
   std::atomic<std::size_t> next = 0;
   std::atomic<int> worst = kDone;
   std::atomic<std::size_t> failed = 0;
   const auto work = [&] {
-    Run run(options, stop, true);
+    Run run(options, stop, true, leftovers);
     for (std::size_t at = next++; at < inputs.size() && !stop.stop_requested(); at = next++) {
       int status = kDone;
       try {
@@ -246,8 +285,9 @@ int mesh_all(const Options& options, const std::vector<Input>& inputs,
 
 int mesh(const Options& options, const std::stop_token& stop) {
   const std::vector<Input> inputs = inputs_of(options);
-  if (inputs.size() > 1) return mesh_all(options, inputs, stop);
-  return Run(options, stop, false).input(inputs.front());
+  Leftovers leftovers(options);
+  if (inputs.size() > 1) return mesh_all(options, inputs, stop, leftovers);
+  return Run(options, stop, false, leftovers).input(inputs.front());
 }
 
 }  // namespace isomesh::cli

@@ -1,6 +1,8 @@
 #include "client/cli/options.h"
 
 #include <algorithm>
+#include <cctype>
+#include <cmath>
 #include <sstream>
 #include <string_view>
 #include <utility>
@@ -98,6 +100,8 @@ void add_raw(CLI::App& app, Options& options) {
   auto* dims = add(app, "--dims", "X,Y,Z", "Samples along x, y and z; x runs fastest",
                    [raw](const std::string& text) {
                      raw().dims = numbers_from<std::uint32_t, 3>("--dims", text);
+                     if (std::ranges::count(raw().dims, 0U) > 0)
+                       refuse("--dims", "must be 1 or more");
                    });
   auto* type = add_name<SampleType>(app, "--type", "Such as uint8, int16, float32",
                                     [raw](SampleType value) { raw().type = value; });
@@ -107,6 +111,12 @@ void add_raw(CLI::App& app, Options& options) {
       add(app, "--spacing", "X,Y,Z", "Millimetres between samples",
           [raw](const std::string& text) {
             raw().geometry.spacing = numbers_from<double, 3>("--spacing", text);
+            const auto is_length = [](double length) {
+              return length > 0 && std::isfinite(length);
+            };
+            if (!std::ranges::all_of(raw().geometry.spacing, is_length)) {
+              refuse("--spacing", "must be greater than 0");
+            }
           }),
       add(app, "--origin", "X,Y,Z", "Where the first sample lies, in millimetres (LPS)",
           [raw](const std::string& text) {
@@ -228,6 +238,7 @@ class Parser {
   }
 
   Options parse(int argc, const char* const* argv) {
+    check_names(argc, argv);
     try {
       app_.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
@@ -255,6 +266,40 @@ class Parser {
     CLI::App* app = app_.add_subcommand(name, help);
     app->callback([this, value] { options_.command = value; });
     return *app;
+  }
+
+  // Ahead of the library, which would tell "FILE: 30 is not there" of "--isoo 30".
+  void check_names(int argc, const char* const* argv) const {
+    const CLI::App* command = &app_;
+    for (int n = 1; n < argc && std::string_view(argv[n]) != "--"; ++n) {
+      const std::string word = argv[n];
+      const bool is_option = word.starts_with("--") ||
+                             (word.size() == 2 && word[0] == '-' && std::isalpha(word[1]) != 0);
+      if (!is_option) {
+        if (command != &app_ || word.starts_with('-')) continue;
+        command = subcommand(word);
+        continue;
+      }
+      const std::string name = word.substr(0, word.find('='));
+      const CLI::Option* option = command->get_option_no_throw(name);
+      if (option == nullptr) option = std::as_const(app_).get_option_no_throw(name);
+      if (option == nullptr) {
+        throw EarlyExit(kWrongUsage, "isomesh: there is no option " + name + "; `isomesh" +
+                                         (command == &app_ ? "" : ' ' + command->get_name()) +
+                                         " --help` lists them\n");
+      }
+      const bool has_value_behind =
+          option->get_items_expected_max() > 0 && name.size() == word.size();
+      if (has_value_behind) ++n;
+    }
+  }
+
+  const CLI::App* subcommand(const std::string& name) const {
+    for (const CLI::App* each : app_.get_subcommands([](const CLI::App*) { return true; })) {
+      if (each->check_name(name)) return each;
+    }
+    throw EarlyExit(kWrongUsage,
+                    "isomesh: there is no command " + name + "; `isomesh --help` lists them\n");
   }
 
   void add_descriptions() {
@@ -330,6 +375,10 @@ class Parser {
     JobParameters parameters = options_.parameters;
     parameters.volume = "any";
     if (!options_.preset.empty()) parameters.iso = 0;
+    const std::string url = parameters.callback ? lower(parameters.callback->url) : "http://";
+    if (!url.starts_with("http://") && !url.starts_with("https://")) {
+      throw EarlyExit(kWrongUsage, "isomesh: --callback: must begin with http:// or https://\n");
+    }
     try {
       parse_job_parameters(to_json(parameters));
     } catch (const Error& error) {

@@ -112,21 +112,22 @@ class ParameterOptions {
     const bool is_iso = std::string_view(parameter) == "iso";
     std::vector<std::string> words = {word};
     if (is_iso) words.insert(words.end(), kPresetNames.begin(), kPresetNames.end());
+    std::vector<std::string> shown = words;
     std::string type = "N";
-    for (std::string each : words) {
+    for (std::string& each : shown) {
       std::ranges::replace(each, ' ', '-');
       type += '|' + each;
     }
     const std::string more = is_iso ? "; or a preset, where the volume has one" : "";
     return isomesh::cli::add(app_, name, type, help + more,
-                             [this, &value, name, word, words](const std::string& text) {
+                             [this, &value, name, word, words, shown](const std::string& text) {
                                value = number_from<Number>(text);
                                preset_.clear();
-                               if (value || text == word) return;
                                std::string plain = lower(text);
+                               if (value || plain == word) return;
                                std::ranges::replace(plain, '-', ' ');
                                if (std::ranges::find(words, plain) == words.end()) {
-                                 refuse(name, "must be a number, " + listed(words));
+                                 refuse(name, "must be a number, " + listed(shown));
                                }
                                preset_ = plain;
                              });

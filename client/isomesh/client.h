@@ -38,6 +38,8 @@ struct ClientOptions {
   // The longest silence of the server once it is connected to. After the last byte of an upload the
   // server reads and checks the volume before it answers, so this is minutes rather than seconds.
   std::chrono::milliseconds silence_timeout{300'000};
+  // Of an upload: how long none of it may get through before its connection is taken for broken.
+  std::chrono::milliseconds stall_timeout{60'000};
 
   // When asked to stop, the request under way ends at once with Error kCancelled. Jobs on the
   // server go on.

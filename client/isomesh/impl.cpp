@@ -26,6 +26,7 @@ TransportOptions transport_options(ClientOptions&& options) {
           .authorities = std::move(options.authorities),
           .connect_timeout = options.connect_timeout,
           .silence_timeout = options.silence_timeout,
+          .stall_timeout = options.stall_timeout,
           .stop = std::move(options.stop)};
 }
 

@@ -95,7 +95,7 @@ class Transfer {
     if (failure_) std::rethrow_exception(failure_);
     if (!end) {
       if (options_.stop.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
-      throw no_answer("the server was silent for too long", false);
+      throw no_answer("the server was silent for too long", is_sending());
     }
     if (*end != CURLE_OK) throw no_answer(reason_of(*end), is_broken(*end));
     // libcurl accepts a head that the end of the connection cuts off.
@@ -198,8 +198,15 @@ class Transfer {
       moved_ = moved;
       moved_at_ = now;
     }
-    const milliseconds allowed = options_.silence_timeout + request_.patience;
+    milliseconds allowed = options_.silence_timeout + request_.patience;
+    if (is_sending()) allowed = std::min(allowed, options_.stall_timeout);
     return allowed - std::chrono::duration_cast<milliseconds>(now - moved_at_);
+  }
+
+  // Whether bytes of the source are still to get through.
+  bool is_sending() const {
+    return request_.source && info<curl_off_t>(CURLINFO_SIZE_UPLOAD_T) <
+                                  static_cast<curl_off_t>(request_.source_bytes);
   }
 
   NoAnswer no_answer(const std::string& reason, bool broken) const {

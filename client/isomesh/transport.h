@@ -64,9 +64,10 @@ struct TransportOptions {
   ServerAddress server;
   std::string server_url;  // as messages name it
   std::string token;
-  std::filesystem::path authorities;             // empty: the system's
-  std::chrono::milliseconds connect_timeout{0};  // 0: five minutes, which is libcurl's
-  std::chrono::milliseconds silence_timeout{0};  // from the connection on
+  std::filesystem::path authorities;                // empty: the system's
+  std::chrono::milliseconds connect_timeout{0};     // 0: five minutes, which is libcurl's
+  std::chrono::milliseconds silence_timeout{0};     // from the connection on
+  std::chrono::milliseconds stall_timeout{60'000};  // the same while a source is sent
   std::stop_token stop;
 };
 

@@ -63,7 +63,8 @@ std::string percent_encode(std::string_view text) {
 }
 
 std::string path_segment(std::string_view text) {
-  if (text.empty() || text == "." || text == "..") {
+  // Servers take an encoded slash for one that divides.
+  if (text.empty() || text == "." || text == ".." || text.find('/') != text.npos) {
     throw invalid_parameter("id", "\"" + std::string(text) + "\" is not an identifier");
   }
   return percent_encode(text);

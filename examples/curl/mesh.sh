@@ -6,6 +6,10 @@
 # ISOMESH_SERVER says where the daemon is, ISOMESH_TOKEN who asks.
 set -euo pipefail
 
+if [[ $# -ne 3 ]]; then
+  echo "Usage: mesh.sh VOLUME ISO OUT.stl" >&2
+  exit 2
+fi
 file="$1"
 iso="$2"
 output="$3"
@@ -33,7 +37,7 @@ member() {
 answer="$(ask --request POST --upload-file "$file" "$server/v1/volumes")"
 volume="$(member id "$answer")"
 answer="$(ask "$server/v1/jobs" --header 'Content-Type: application/json' \
-  --header "Idempotency-Key: $(basename "$file")-$iso" \
+  --header "Idempotency-Key: $volume-$iso" \
   --data "{\"volume\": \"$volume\", \"iso\": $iso, \"formats\": [\"stl\"]}")"
 job="$(member id "$answer")"
 state=queued

@@ -25,13 +25,15 @@ def main() -> int:
     arguments = parser.parse_args()
 
     client = isomesh.Client(arguments.server)
-    arguments.meshes.mkdir(exist_ok=True)
+    if not arguments.scans.is_dir():
+        parser.error(f"{arguments.scans} is no folder")
+    arguments.meshes.mkdir(parents=True, exist_ok=True)
 
     def mesh(scan: Path):
         volume = client.upload(scan)
         job = client.submit(volume, iso=arguments.iso, formats=["glb"], close=True, priority="bulk")
         job = client.wait(job)
-        client.download(job, arguments.meshes / f"{scan.name.split('.')[0]}.glb")
+        client.download(job, arguments.meshes / f"{scan.name}.glb")
         return job["mesh"]
 
     table = csv.writer(sys.stdout)

@@ -1,5 +1,6 @@
 #include "server/store/backup.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <optional>
 #include <set>
@@ -18,6 +19,7 @@
 #include "base/hex.h"
 #include "base/sha256.h"
 #include "proto/error.h"
+#include "server/store/files/data_folder.h"
 #include "server/store/files/files.h"
 #include "server/store/sqlite/sqlite.h"
 
@@ -44,8 +46,14 @@ void make_folder(const fs::path& folder) {
   }
 }
 
+struct Amount {
+  std::uint64_t blobs = 0;
+  std::uint64_t bytes = 0;
+  std::set<std::string> damaged;  // keys
+};
+
 // Copies one file and brings it to the disk. False, and nothing is there, where there is none.
-bool copy_file(const fs::path& from, const fs::path& to, Copied& copied) {
+bool copy_file(const fs::path& from, const fs::path& to, Amount& copied) {
   std::optional<File> source;
   try {
     source.emplace(File::open(from));
@@ -68,7 +76,8 @@ bool copy_file(const fs::path& from, const fs::path& to, Copied& copied) {
   target.sync();
   ++copied.blobs;
   copied.bytes += offset;
-  if (to_hex(digest.finish()) != from.filename().string()) ++copied.damaged;
+  const std::string name = from.filename().string();
+  if (to_hex(digest.finish()) != name) copied.damaged.insert(name);
   return true;
 }
 
@@ -115,6 +124,7 @@ class Copy {
       }
       const fs::path file = to_ / kBlobs / *blob;
       --copied_.blobs;
+      copied_.damaged.erase(file.filename().string());
       copied_.bytes -= fs::file_size(file);
       fs::remove(file);
       blob = taken_.erase(blob);
@@ -130,13 +140,13 @@ class Copy {
     sync_folder(to_);
   }
 
-  const Copied& copied() const { return copied_; }
+  const Amount& copied() const { return copied_; }
 
  private:
   const fs::path from_;
   const fs::path to_;
   std::set<std::string> taken_;
-  Copied copied_;
+  Amount copied_;
 };
 
 // The records as they are at one moment.
@@ -158,6 +168,32 @@ std::set<std::string> named_blobs(const fs::path& records) {
   return blobs;
 }
 
+// What these blobs are to whoever has lost them.
+std::vector<std::string> told(const fs::path& records, const std::set<std::string>& keys) {
+  Connection connection(records, Connection::Mode::kRead);
+  std::vector<std::string> lost;
+  for (const auto& [sql, what] :
+       {std::pair("SELECT id FROM volumes WHERE id = ?", "the volume "),
+        std::pair("SELECT job FROM meshes WHERE blob = ?", "a mesh of the job ")}) {
+    for (const std::string& key : keys) {
+      Query query = connection.query(sql, key);
+      while (query.next()) lost.push_back(what + query.text(0));
+    }
+  }
+  return lost;
+}
+
+Copied described(const Amount& amount, const std::set<std::string>& missing_places,
+                 const fs::path& records) {
+  std::set<std::string> missing;
+  for (const std::string& place : missing_places)
+    missing.insert(fs::path(place).filename().string());
+  return {.blobs = amount.blobs,
+          .bytes = amount.bytes,
+          .damaged = told(records, amount.damaged),
+          .missing = told(records, missing)};
+}
+
 // What says that the blobs belong to those records (Identity): they do, as far as these name any.
 void mark_blobs(const fs::path& folder) {
   Connection connection(folder / kRecords, Connection::Mode::kRead);
@@ -167,6 +203,16 @@ void mark_blobs(const fs::path& folder) {
   File file = File::create(folder / kBlobs / kIdentity);
   file.write(std::as_bytes(std::span(text)));
   file.sync();
+}
+
+bool is_in(const fs::path& path, const fs::path& folder) {
+  const auto whole = [](const fs::path& given) {
+    const fs::path found = fs::weakly_canonical(fs::absolute(given));
+    return found.has_filename() ? found : found.parent_path();
+  };
+  const fs::path inner = whole(path);
+  const fs::path outer = whole(folder);
+  return std::ranges::mismatch(inner, outer).in2 == outer.end();
 }
 
 void check_is_data_folder(const fs::path& folder) {
@@ -194,14 +240,30 @@ Copied copy_consistently(const fs::path& data, const fs::path& target) {
     copy.drop_all_but(named);
     mark_blobs(target);
     copy.sync();
-    Copied copied = copy.copied();
-    copied.missing = missed.size();
-    return copied;
+    return described(copy.copied(), missed, target / kRecords);
   }
   throw Error(ErrorCode::kUnavailable, "too much changed while it was copied; try again");
 }
 
 // --- Putting back --------------------------------------------------------------------------------
+
+// Into an empty folder.
+Copied put_back(const fs::path& backup, const fs::path& data) {
+  File::create(data / kUnfinishedRestore).sync();
+  sync_folder(data);
+  Copy copy(backup, data);
+  std::set<std::string> missing;
+  for (const std::string& blob : named_blobs(backup / kRecords)) {
+    if (!copy.take(blob)) missing.insert(blob);
+  }
+  Amount records;
+  copy_file(backup / kRecords, data / kRecords, records);
+  mark_blobs(data);
+  copy.sync();
+  fs::remove(data / kUnfinishedRestore);
+  sync_folder(data);
+  return described(copy.copied(), missing, data / kRecords);
+}
 
 void give_to(uid_t user, gid_t group, const fs::path& folder) {
   const auto give = [&](const fs::path& path) {
@@ -215,9 +277,12 @@ void give_to(uid_t user, gid_t group, const fs::path& folder) {
 
 }  // namespace
 
-Copied back_up(const fs::path& data, const fs::path& target) {
+Copied back_up(const fs::path& data, const fs::path& named) {
   check_is_data_folder(data);
   std::error_code error;
+  // Shells complete the name of a folder with a slash.
+  const fs::path target = named.has_filename() ? named : named.parent_path();
+  if (is_in(target, data)) refuse(target, "is in the data folder, and would be gone with it");
   if (fs::exists(fs::symlink_status(target, error))) refuse(target, "is there already");
   const fs::path part = target.string() + ".part";
   if (fs::exists(fs::symlink_status(part, error))) {
@@ -236,6 +301,7 @@ Copied back_up(const fs::path& data, const fs::path& target) {
 
 Copied restore(const fs::path& backup, const fs::path& data) {
   check_is_data_folder(backup);
+  if (is_in(data, backup)) refuse(data, "is in the backup");
   std::error_code error;
   const bool is_there = fs::exists(data, error);
   if (is_there && (!fs::is_directory(data, error) || !fs::is_empty(data, error))) {
@@ -250,21 +316,17 @@ Copied restore(const fs::path& backup, const fs::path& data) {
   }
   struct stat owner = {};
   const bool has_owner = is_there && ::stat(data.c_str(), &owner) == 0;
-
-  Copy copy(backup, data);
-  std::uint64_t missing = 0;
-  for (const std::string& blob : named_blobs(backup / kRecords)) {
-    if (!copy.take(blob)) ++missing;
+  try {
+    const Copied copied = put_back(backup, data);
+    if (has_owner && ::geteuid() == 0) give_to(owner.st_uid, owner.st_gid, data);
+    return copied;
+  } catch (...) {
+    // Why it failed is what counts. The lock goes last: until then no daemon starts there.
+    for (const char* made : {kBlobs, kRecords, kUnfinishedRestore, "lock"})
+      fs::remove_all(data / made, error);
+    if (!is_there) fs::remove(data, error);
+    throw;
   }
-  // Last, because without them this is no data folder.
-  Copied records;
-  copy_file(backup / kRecords, data / kRecords, records);
-  mark_blobs(data);
-  copy.sync();
-  if (has_owner && ::geteuid() == 0) give_to(owner.st_uid, owner.st_gid, data);
-  Copied copied = copy.copied();
-  copied.missing = missing;
-  return copied;
 }
 
 }  // namespace isomesh::store

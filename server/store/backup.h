@@ -3,14 +3,16 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 namespace isomesh::store {
 
 struct Copied {
-  std::uint64_t blobs = 0;    // files of volumes and meshes
-  std::uint64_t bytes = 0;    // of them
-  std::uint64_t damaged = 0;  // of them, those whose bytes are not what their name says
-  std::uint64_t missing = 0;  // files that records name and that are not there
+  std::uint64_t blobs = 0;           // files of volumes and meshes
+  std::uint64_t bytes = 0;           // of them
+  std::vector<std::string> damaged;  // whose bytes are not what their name says: "the volume ID"
+  std::vector<std::string> missing;  // whose files are not there: "a mesh of the job ID"
 
   bool operator==(const Copied&) const = default;
 };
@@ -22,8 +24,8 @@ struct Copied {
 Copied back_up(const std::filesystem::path& data, const std::filesystem::path& target);
 
 // Copies what back_up made to `data`, which must be missing or empty. Where root does that, the
-// files belong to whom an empty `data` belonged. No daemon can start there before it is whole.
-// Throws as back_up.
+// files belong to whom an empty `data` belonged. No daemon starts there before it is whole, also
+// where this was killed; where it fails, `data` is as before. Throws as back_up.
 Copied restore(const std::filesystem::path& backup, const std::filesystem::path& data);
 
 }  // namespace isomesh::store

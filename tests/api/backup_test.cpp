@@ -100,10 +100,39 @@ TEST(Backup, SaysWhatIsDamagedOrMissing) {
   write_file(blobs / damaged.substr(0, 2) / damaged, "spoilt");
   std::filesystem::remove(blobs / missing.substr(0, 2) / missing);
   const Finished made = isomeshd("backup", folder / "backup", folder / "data");
-  EXPECT_EQ(made.status, 0);
+  EXPECT_EQ(made.status, 1);
   EXPECT_THAT(made.output, HasSubstr("copied 2 files"));
-  EXPECT_THAT(made.errors, HasSubstr("1 of them are damaged"));
-  EXPECT_THAT(made.errors, HasSubstr("1 more are named and not there"));
+  EXPECT_THAT(made.errors, HasSubstr("damaged: the volume " + damaged));
+  EXPECT_THAT(made.errors, HasSubstr("missing: the volume " + missing));
+  const Finished restored = isomeshd("restore", folder / "backup", folder / "restored");
+  EXPECT_EQ(restored.status, 1);
+  EXPECT_THAT(restored.errors, HasSubstr("missing: the volume " + missing));
+}
+
+TEST(Backup, ARestoreThatFailsLeavesNothing) {
+  const TemporaryFolder folder;
+  {
+    Daemon daemon(folder / "data", "127.0.0.1:0");
+    upload(daemon, 1);
+    EXPECT_EQ(daemon.stop(), 0);
+  }
+  ASSERT_EQ(isomeshd("backup", (folder / "backup").string() + '/', folder / "data").status, 0);
+  const std::filesystem::path records = folder / "backup/isomesh.sqlite";
+  const std::string whole = read_file(records);
+  write_file(records, whole.substr(0, whole.size() / 2));
+  std::filesystem::create_directory(folder / "empty");
+  for (const std::filesystem::path& target : {folder / "new", folder / "empty"}) {
+    EXPECT_EQ(isomeshd("restore", folder / "backup", target).status, 1);
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "new"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "empty"));
+  write_file(records, whole);
+  EXPECT_EQ(isomeshd("restore", folder / "backup", folder / "empty").status, 0);
+  // As one that was killed leaves it.
+  write_file(folder / "empty/restoring", "");
+  const Finished refused = run({ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder / "empty"});
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.errors, HasSubstr("restore again"));
 }
 
 TEST(Backup, RefusesWhatWouldLoseSomething) {
@@ -120,6 +149,8 @@ TEST(Backup, RefusesWhatWouldLoseSomething) {
       {"backup", folder / "no/such/folder", folder / "data", "no/such/folder.part"},
       {"restore", folder / "backup", folder / "data", "is not empty"},
       {"restore", folder / "nothing", folder / "new", "is no data folder"},
+      {"backup", folder / "data/inside", folder / "data", "is in the data folder"},
+      {"restore", folder / "backup", folder / "backup/inside", "is in the backup"},
   };
   for (const auto& each : wrong) {
     const Finished refused = isomeshd(each[0], each[1], each[2]);

@@ -276,6 +276,36 @@ TEST_F(CommandTest, ADryRunLeavesNothingBehind) {
   EXPECT_EQ(daemon_.client().volumes().size(), 1U) << "it was there before";
 }
 
+TEST_F(CommandTest, ADryRunThatIsRefusedLeavesNothingBehindEither) {
+  EXPECT_EQ(
+      daemon_.command(raw({"mesh", folder_ / "sphere.raw", "--iso", "bone", "--dry-run"})).status,
+      1);
+  EXPECT_TRUE(daemon_.client().volumes().empty());
+  // Twice the same volume, which one of them stores and both of them need.
+  std::filesystem::copy(folder_ / "sphere.raw", folder_ / "again.raw");
+  const Finished both =
+      daemon_.command(raw({"mesh", folder_ / "sphere.raw", folder_ / "again.raw", "--iso", "100",
+                           "--dry-run", "--jobs", "2", "-o", folder_ / "{name}.stl"}));
+  EXPECT_EQ(both.status, 0) << both.errors;
+  EXPECT_TRUE(daemon_.client().volumes().empty());
+}
+
+TEST_F(CommandTest, NamesWhatItDoesNotKnow) {
+  const std::string file = folder_ / "sphere.raw";
+  const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
+      {{"mesh", file, "--isoo", "100", "-o", "x.stl"}, "no option --isoo; `isomesh mesh --help`"},
+      {{"mehs", file}, "no command mehs;"},
+      {{"mesh", file, "--callback", "ris.example", "--iso", "1", "-o", "x.stl"}, "--callback"},
+      {{"mesh", file, "--dims", "0,1,1", "--type", "uint8", "--iso", "1", "-o", "x.stl"}, "--dims"},
+      {{"info", "1/histogram"}, "is not an identifier"},
+  };
+  for (const auto& [arguments, told] : wrong) {
+    const Finished refused = daemon_.command(arguments);
+    EXPECT_NE(refused.status, 0) << told;
+    EXPECT_THAT(refused.errors, HasSubstr(told));
+  }
+}
+
 TEST_F(CommandTest, EraseTakesVolumesAndTellsOfThoseThatAreNone) {
   const std::string volume = upload();
   const Finished erased = daemon_.command({"erase", "0123", volume});

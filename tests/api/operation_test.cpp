@@ -53,6 +53,14 @@ TEST(Start, WrongUsageIsToldAndNotServed) {
        std::vector<std::vector<std::string>>{{"--listen", "nowhere"},
                                              {"--listen", "127.0.0.1:99999"},
                                              {"--workers", "65"},
+                                             {"--keep-days", "nan"},
+                                             {"--callback-retry-seconds", "nan"},
+                                             {"--max-disk=-1"},
+                                             {"--disk-reserve=-1"},
+                                             {"--max-disk", "99999999999999999999"},
+                                             {"--max-upload", "0"},
+                                             {"--cors-origin", "viewer.example"},
+                                             {"--allow-host", "a b"},
                                              {"--no-such-option"},
                                              {"--config", folder / "absent"}}) {
     std::vector<std::string> command = {ISOMESHD, "--data", data};

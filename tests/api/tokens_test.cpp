@@ -173,13 +173,22 @@ Finished token_command(std::vector<std::string> arguments, const std::string& fi
   return run(command);
 }
 
+// A token that nobody has seen would stay in the file.
+TEST(TokenCommand, StoresNothingThatItCannotTell) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "tokens";
+  EXPECT_NE(run({"/bin/sh", "-c", ISOMESHD " token add ct --into " + file + " > /dev/full"}).status,
+            0);
+  EXPECT_FALSE(std::filesystem::exists(file));
+}
+
 TEST(TokenCommand, ListsAndRevokes) {
   const TemporaryFolder folder;
   const std::string file = folder / "tokens";
   write_file(file, "# of the ward\n");
+  std::filesystem::permissions(file, std::filesystem::perms(0600));
   EXPECT_EQ(token_command({"list"}, file).status, 1) << "the file holds no token";
-  ASSERT_EQ(run({ISOMESHD, "token", "add", "ct", "--into", folder / "new"}).status, 0);
-  std::filesystem::rename(folder / "new", file);
+  ASSERT_EQ(token_command({"add", "ct"}, file).status, 0);
   ASSERT_EQ(token_command({"add", "ct"}, file).status, 0);
   ASSERT_EQ(token_command({"add", "boss", "--role", "admin"}, file).status, 0);
   const Finished two_roles = token_command({"add", "boss"}, file);
@@ -194,6 +203,7 @@ TEST(TokenCommand, ListsAndRevokes) {
   EXPECT_THAT(token_command({"revoke", "ct", first}, file).output, HasSubstr("revoked 1 token;"));
   EXPECT_THAT(token_command({"list"}, file).output, Not(HasSubstr(first)));
   EXPECT_EQ(token_command({"revoke", "ct", first}, file).status, 1);
+  EXPECT_EQ(token_command({"revoke", "ct", ""}, file).status, 2) << "as a script's unset variable";
   EXPECT_EQ(token_command({"revoke", "nobody"}, file).status, 1);
   EXPECT_EQ(token_command({"revoke", "ct"}, file).status, 0);
   const Finished last = token_command({"revoke", "boss"}, file);

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import signal
 import threading
 import unittest
 from unittest import mock
@@ -162,6 +163,20 @@ class Jobs(DaemonTest):
         self.assertEqual(failed.exception.job["state"], "cancelled")
         with self.assertRaises(isomesh.JobFailed):
             self.client.fetch(job["id"])
+
+    def test_an_upload_in_one_call_may_be_described(self):
+        mesh = self.client.mesh(ball(), iso=-5, name="from mesh")
+        self.assertEqual(self.client.volume(mesh.job["parameters"]["volume"])["name"], "from mesh")
+
+    def test_an_interrupt_cancels_the_job(self):
+        noise = numpy.random.default_rng(2).random((128, 128, 96), "float32")
+        before = {job["id"] for job in self.client.jobs()}
+        threading.Timer(1.0, signal.raise_signal, [signal.SIGINT]).start()
+        with self.assertRaises(KeyboardInterrupt):
+            self.client.mesh(noise, iso=0.5, passes=1000)
+        (made,) = (job for job in self.client.jobs() if job["id"] not in before)
+        with self.assertRaisesRegex(isomesh.JobFailed, "cancelled"):
+            self.client.wait(made)
 
     def test_a_client_serves_several_threads(self):
         volume = self.client.upload(ball())

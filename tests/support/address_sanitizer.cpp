@@ -9,5 +9,5 @@ const char* __lsan_default_options();
 
 // Strangers read our files. lib3mf leaves some of libzip's sources to nobody, and ITK's NrrdIO does
 // not free what it has read of a header that it refuses.
-const char* __lsan_default_suppressions() { return "leak:libzip.so\nleak:itk_airArrayNew\n"; }
+const char* __lsan_default_suppressions() { return "leak:libzip.so\nleak:libITKNrrdIO\n"; }
 const char* __lsan_default_options() { return "print_suppressions=0"; }

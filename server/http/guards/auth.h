@@ -33,6 +33,10 @@ struct Caller {
   bool operator==(const Caller&) const = default;
 };
 
+// Who reads a file of tokens: the service, or somebody who looks after it and may be root, while
+// the service runs as another user, to whom the file may belong.
+enum class ReadBy { kService, kAdministrator };
+
 // The tokens of a file, one a line: NAME ROLE HASH. Blank lines and those that begin with # are
 // skipped; several lines of one name and one role are several tokens of one owner, so that a token
 // can be replaced without a gap. HASH is the token's SHA-256 in hexadecimal: a token has 256 random
@@ -43,7 +47,7 @@ class Tokens {
  public:
   // Throws Error kInvalidParameter that names the line at fault (never its text), or says that
   // somebody else than the owner may write to the file.
-  explicit Tokens(const std::filesystem::path& file);
+  explicit Tokens(const std::filesystem::path& file, ReadBy reader = ReadBy::kService);
 
   // Reads the file again. When that throws, the tokens stay as they were.
   void reload();
@@ -61,9 +65,10 @@ class Tokens {
   };
   using Entries = std::vector<Entry>;
 
-  static Entries read(const std::filesystem::path& file);
+  Entries read() const;
 
   const std::filesystem::path file_;
+  const ReadBy reader_;
   mutable Mutex mutex_;
   std::shared_ptr<const Entries> entries_ ISOMESH_GUARDED_BY(mutex_);
 };

@@ -53,6 +53,12 @@ DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uin
   if (!error) root_ = std::filesystem::canonical(root_, error);
   if (error) throw Error(ErrorCode::kInternal, "the data folder: " + error.message());
 
+  if (std::filesystem::exists(root_ / kUnfinishedRestore, error)) {
+    throw Error(ErrorCode::kUnavailable,
+                root_.string() +
+                    " was being restored, and did not become whole: empty it and "
+                    "restore again");
+  }
   lock_ = ::open((root_ / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock_ < 0) {
     throw Error(ErrorCode::kInternal, std::string("the data folder: ") + std::strerror(errno));

@@ -10,6 +10,9 @@
 
 namespace isomesh::store {
 
+// A file in a data folder that is being put back from a backup.
+inline constexpr const char* kUnfinishedRestore = "restoring";
+
 // Where a store of files has its blobs.
 struct BlobFolders {
   std::filesystem::path blobs;       // finished files, by digest
@@ -30,7 +33,8 @@ class DataFolder {
  public:
   // Creates what is missing and empties the scratch folder, which holds what a crash cut short.
   // Keeps so many bytes in reserve; by default as many as are usual on a disk of that size. Throws
-  // Error kUnavailable when another process holds the folder, kOutOfSpace or kInternal otherwise.
+  // Error kUnavailable when another process holds the folder or its restore did not end,
+  // kOutOfSpace or kInternal otherwise.
   explicit DataFolder(const std::filesystem::path& root, std::optional<std::uint64_t> reserve = 0);
   ~DataFolder();
   DataFolder(const DataFolder&) = delete;

@@ -65,9 +65,13 @@ TEST_F(Batch, WhatAnotherInputSendsIsNoInput) {
 }
 
 TEST_F(Batch, TwoOfOneNameAreRefused) {
-  const Error error = test::error_of([&] { names_of({file("x/a.nii"), file("y/a.nrrd")}); });
-  EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
-  EXPECT_THAT(error.what(), HasSubstr("two inputs are called a"));
+  try {
+    names_of({file("x/a.nii"), file("y/a.nrrd")});
+    FAIL() << "they are not refused";
+  } catch (const EarlyExit& refused) {
+    EXPECT_EQ(refused.status(), kWrongUsage);
+    EXPECT_THAT(refused.what(), HasSubstr("two inputs are called a"));
+  }
 }
 
 TEST_F(Batch, NamesFillOutputsAndStayInTheirFolder) {

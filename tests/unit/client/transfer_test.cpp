@@ -227,6 +227,38 @@ TEST(Upload, GoesOnWhereTheConnectionBrokeAndAsksForAnAnswerThatItDidNotHear) {
                          "PATCH /v1/uploads/7", "HEAD /v1/uploads/7", "POST /v1/volumes?upload=7"));
 }
 
+TEST(Upload, GoesOnWhereTheConnectionStalls) {
+  const std::string content = pattern(20'000'000);
+  int stalled = -1;
+  bool is_whole = false;
+  const test::SocketServer server([&](int socket) {
+    const std::string head = test::read_head(socket);
+    const auto answer = [&](const std::string& text, const std::string& body = {}) {
+      test::send_text(socket, "HTTP/1.1 " + text + "\r\nContent-Length: " +
+                                  std::to_string(body.size()) + "\r\n\r\n" + body);
+    };
+    if (head.starts_with("HEAD")) {
+      return test::send_text(
+          socket, "HTTP/1.1 204 No Content\r\nUpload-Offset: 0\r\nUpload-Complete: ?0\r\n\r\n");
+    }
+    if (head.starts_with("POST")) return answer("201 Created\r\nLocation: /v1/uploads/7");
+    if (stalled < 0) {
+      stalled = ::dup(socket);  // open, and nobody reads what comes
+      return;
+    }
+    std::string body(content.size(), ' ');
+    ::recv(socket, body.data(), body.size(), MSG_WAITALL);
+    is_whole = body == content;
+    answer("201 Created", to_json(some_volume()));
+  });
+  TemporaryFolder folder;
+  test::write_file(folder / "file", content);
+  Client client({.server = server.url(), .stall_timeout = std::chrono::milliseconds{1500}});
+  EXPECT_EQ(client.upload(folder / "file"), some_volume());
+  EXPECT_TRUE(is_whole);
+  ::close(stalled);
+}
+
 // As of another daemon of a cluster, or when it has expired.
 TEST(Upload, InPartsIsSentInOnePieceWhereItIsNotKept) {
   std::vector<std::string> asked;

@@ -70,18 +70,43 @@ class Client:
         affine: Optional[Any] = None,
         affine_space: str = "ras",
         spacing: Optional[Sequence[float]] = None,
+        raw: Optional[Raw] = None,
+        name: str = "",
+        series: str = "",
+        member: str = "",
+        volume: Optional[int] = None,
+        accept: Sequence[str] = (),
+        nifti_form: str = "",
         **parameters: Unpack[api.JobOptions],
     ) -> Mesh:
         """From a volume to its surface in one call: `client.mesh("head.nii.gz", iso=60)`.
 
-        `source`, `affine`, `affine_space` and `spacing` are as `upload` takes them; everything else is a
+        `source` and the other named arguments are as `upload` takes them; everything else is a
         parameter of the job. Vertices are in LPS, whatever the affine is in, unless `space` says "ras";
-        `mesh.in_space` turns them. Raises JobFailed.
+        `mesh.in_space` turns them. Raises JobFailed. Interrupted, it cancels the job.
         """
-        volume = self.upload(source, affine=affine, affine_space=affine_space, spacing=spacing)
+        stored = self.upload(
+            source,
+            affine=affine,
+            affine_space=affine_space,
+            spacing=spacing,
+            raw=raw,
+            name=name,
+            series=series,
+            member=member,
+            volume=volume,
+            accept=accept,
+            nifti_form=nifti_form,
+        )
         formats = list(parameters.get("formats", []))
         parameters["formats"] = cast(Any, formats if "ply" in formats else [*formats, "ply"])
-        return self.fetch(self.wait(self.submit(volume, **parameters)))
+        job = self.submit(stored, **parameters)
+        try:
+            job = self.wait(job)
+        except KeyboardInterrupt:
+            self.cancel(job)
+            raise
+        return self.fetch(job)
 
     # --- Volumes ---------------------------------------------------------------------------------
 

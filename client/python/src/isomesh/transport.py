@@ -17,6 +17,7 @@ from .uploads import Body
 _TRIES = 4
 _FIRST_PAUSE = 0.1
 _PIECE = 1 << 18
+_LONGEST_STALL = 60.0  # seconds that none of a body gets through before its connection is taken for broken
 # A server never refuses or describes in more.
 _LONGEST_TEXT = 64 << 20
 
@@ -146,6 +147,8 @@ class Transport:
         if request.body is not None:
             headers["Content-Length"] = str(request.body.size)
         pieces = None if request.body is None else request.body.pieces()
+        if pieces is not None and connection.timeout is not None:
+            connection.sock.settimeout(min(connection.timeout, _LONGEST_STALL))
         try:
             connection.request(request.method, request.target, pieces, headers)
         except (BrokenPipeError, ConnectionResetError):
@@ -155,6 +158,7 @@ class Transport:
             except (OSError, http.client.HTTPException):
                 pass
             raise
+        connection.sock.settimeout(connection.timeout)
         return connection.getresponse()
 
 
