@@ -165,7 +165,7 @@ class Jobs(DaemonTest):
             self.client.fetch(job["id"])
 
     def test_an_upload_in_one_call_may_be_described(self):
-        mesh = self.client.mesh(ball(), iso=-5, name="from mesh")
+        mesh = self.client.mesh(ball(), iso=-5, name="from mesh", spacing=(1, 1, 3))
         self.assertEqual(self.client.volume(mesh.job["parameters"]["volume"])["name"], "from mesh")
 
     def test_an_interrupt_cancels_the_job(self):
