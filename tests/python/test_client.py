@@ -171,7 +171,7 @@ class Jobs(DaemonTest):
     def test_an_interrupt_cancels_the_job(self):
         noise = numpy.random.default_rng(2).random((128, 128, 96), "float32")
         before = {job["id"] for job in self.client.jobs()}
-        threading.Timer(1.0, signal.raise_signal, [signal.SIGINT]).start()
+        threading.Timer(1.0, os.kill, [os.getpid(), signal.SIGINT]).start()
         with self.assertRaises(KeyboardInterrupt):
             self.client.mesh(noise, iso=0.5, passes=1000)
         (made,) = (job for job in self.client.jobs() if job["id"] not in before)
