@@ -4,6 +4,7 @@ import os
 import subprocess
 import signal
 import threading
+import time
 import unittest
 from unittest import mock
 
@@ -171,12 +172,21 @@ class Jobs(DaemonTest):
     def test_an_interrupt_cancels_the_job(self):
         noise = numpy.random.default_rng(2).random((128, 128, 96), "float32")
         before = {job["id"] for job in self.client.jobs()}
-        threading.Timer(1.0, os.kill, [os.getpid(), signal.SIGINT]).start()
+
+        def made():
+            return [job for job in self.client.jobs() if job["id"] not in before]
+
+        def interrupt():
+            while not any(job["state"] == "running" for job in made()):
+                time.sleep(0.05)
+            os.kill(os.getpid(), signal.SIGINT)
+
+        threading.Thread(target=interrupt, daemon=True).start()
         with self.assertRaises(KeyboardInterrupt):
             self.client.mesh(noise, iso=0.5, passes=1000)
-        (made,) = (job for job in self.client.jobs() if job["id"] not in before)
+        (interrupted,) = made()
         with self.assertRaisesRegex(isomesh.JobFailed, "cancelled"):
-            self.client.wait(made)
+            self.client.wait(interrupted)
 
     def test_a_client_serves_several_threads(self):
         volume = self.client.upload(ball())
