@@ -4,24 +4,39 @@
 #include <exception>
 #include <iostream>
 
+#include <poll.h>
+#include <unistd.h>
+
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/options.h"
+
+namespace {
+
+// As `head` does when it has seen enough, which nobody has to be told.
+bool reader_has_left() {
+  pollfd output{.fd = STDOUT_FILENO, .events = POLLOUT, .revents = 0};
+  return ::poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace isomesh::cli;
   // A reader of the output that went away is an error of std::cout, and no sudden end.
   std::signal(SIGPIPE, SIG_IGN);
   const Interrupt interrupt;
+  int status = kRefused;
   try {
-    const int status = run(parse_options(argc, argv), interrupt.token());
-    std::cout.flush();
-    return status == kDone && !std::cout ? kRefused : status;
+    status = run(parse_options(argc, argv), interrupt.token());
   } catch (const EarlyExit& exit) {
     (exit.status() == 0 ? std::cout : std::cerr) << exit.what();
-    return exit.status();
+    status = exit.status();
   } catch (const std::exception& error) {
     std::cerr << "isomesh: " << error.what() << '\n';
-    return kRefused;
   }
+  std::cout.flush();
+  if (std::cout || status != kDone) return status;
+  if (!reader_has_left()) std::cerr << "isomesh: standard output cannot be written to\n";
+  return kRefused;
 }

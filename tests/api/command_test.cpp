@@ -290,6 +290,15 @@ TEST_F(CommandTest, ADryRunThatIsRefusedLeavesNothingBehindEither) {
   EXPECT_TRUE(daemon_.client().volumes().empty());
 }
 
+TEST_F(CommandTest, SaysWhenItsOutputCannotBeWritten) {
+  for (const std::string program :
+       {ISOMESH " --help", ISOMESH " completion bash", ISOMESHD " config"}) {
+    const Finished full = run({"/bin/sh", "-c", program + " > /dev/full"});
+    EXPECT_EQ(full.status, 1) << program;
+    EXPECT_THAT(full.errors, HasSubstr("standard output cannot be written to"));
+  }
+}
+
 TEST_F(CommandTest, NamesWhatItDoesNotKnow) {
   const std::string file = folder_ / "sphere.raw";
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {

@@ -256,8 +256,8 @@ void S3Client::try_to_erase(const std::string& key) const {
   }
 }
 
-// By the last key of the page before, not by the token that came with it: tokens have "+", which
-// libcurl 8.14 signs as a space.
+// By the last key of the page before, not by the token that came with it: tokens may have "+",
+// which libcurl 8.14 signs as a space.
 S3Request S3Client::listing(const std::string& beginning, const std::string& last, int most) const {
   std::string query = "list-type=2&max-keys=" + std::to_string(most) +
                       "&prefix=" + uri_escaped(options_.address.prefix + beginning);
