@@ -1,6 +1,6 @@
-# The Debian packages, by CPack: isomeshd, isomesh and libisomesh-dev, of a build that was configured with
-# -D CMAKE_INSTALL_PREFIX=/usr. Whom they need is found from the binaries.
-set(ISOMESH_MAINTAINER "isomesh <isomesh@localhost>" CACHE STRING "Who answers for the packages: NAME <ADDRESS>")
+# CPack makes the Debian packages isomeshd, isomesh and libisomesh-dev from a build that was configured with
+# -D CMAKE_INSTALL_PREFIX=/usr. Their dependencies are read from the binaries.
+set(ISOMESH_MAINTAINER "isomesh <isomesh@localhost>" CACHE STRING "Maintainer of the packages: NAME <ADDRESS>")
 string(TIMESTAMP ISOMESH_BUILT "%a, %d %b %Y %H:%M:%S +0000" UTC)
 set(changelog ${PROJECT_BINARY_DIR}/changelog)
 configure_file(${PROJECT_SOURCE_DIR}/server/install/changelog.in ${changelog} @ONLY)
@@ -29,7 +29,7 @@ set(CPACK_PACKAGE_VENDOR isomesh)
 set(CPACK_PACKAGE_CONTACT ${ISOMESH_MAINTAINER})
 set(CPACK_PRE_BUILD_SCRIPTS ${PROJECT_SOURCE_DIR}/server/install/compress_manuals.cmake)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_PACKAGE_RELEASE 1 CACHE STRING "The packages' revision")
+set(CPACK_DEBIAN_PACKAGE_RELEASE 1 CACHE STRING "Revision of the packages")
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 
 set(scripts ${PROJECT_SOURCE_DIR}/server/install)
@@ -38,15 +38,15 @@ set(CPACK_DEBIAN_DAEMON_PACKAGE_DEPENDS "adduser")
 set(CPACK_DEBIAN_DAEMON_PACKAGE_CONTROL_EXTRA
   ${scripts}/postinst ${scripts}/prerm ${scripts}/postrm ${scripts}/conffiles)
 set(CPACK_COMPONENT_DAEMON_DESCRIPTION
-  "daemon that turns medical volumes into surface meshes\nReads NIfTI, NRRD, MetaImage, VTK images and DICOM over HTTP, extracts and\nsmooths iso-surfaces and labels, and sends Draco, GLB, STL, PLY and OBJ.\nIt has a web page.")
+  "daemon that turns medical volumes into surface meshes\nReads NIfTI, NRRD, MetaImage, VTK images, DICOM and raw samples over HTTP,\nextracts and smooths iso-surfaces and labels, and sends Draco, GLB, STL, 3MF,\nPLY, OBJ, OFF, VTK and GIFTI. It has a web page.")
 
 set(CPACK_DEBIAN_CLIENT_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_CLIENT_PACKAGE_SUGGESTS isomeshd)
 set(CPACK_COMPONENT_CLIENT_DESCRIPTION
-  "command that asks an isomesh daemon for meshes\nFrom a file of a volume to files of its surface, in one step or in many.")
+  "command that makes meshes with an isomesh daemon\nSends a medical volume to the daemon and downloads its surface, in one step or\nin several.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libcurl4-openssl-dev | libcurl4-gnutls-dev, libssl-dev")
 set(CPACK_COMPONENT_DEV_DESCRIPTION
-  "C++ library that asks an isomesh daemon for meshes\nHeaders, static libraries, and what CMake and pkg-config look for.")
+  "C++ library that makes meshes with an isomesh daemon\nHeaders, static libraries, and files for CMake and pkg-config.")
 include(CPack)

@@ -1,5 +1,5 @@
-// explore SERVER VOLUME OUT.glb: looks for an iso-value whose surface has at most a million
-// triangles, beginning with the one that the server suggests, before it asks for the mesh.
+// explore SERVER VOLUME OUT.glb: finds an iso-value whose surface has at most a million triangles,
+// and then requests the mesh. The search begins with the iso-value that the server suggests.
 #include <cstdio>
 #include <string>
 
@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
     std::printf("%s: %u x %u x %u, values from %g to %g\n", volume.name.value_or("?").c_str(),
                 volume.dims[0], volume.dims[1], volume.dims[2], volume.range[0], volume.range[1]);
 
-    // Estimates are exact, and take a fraction of a job's time.
+    // Estimates are exact, and need a fraction of a job's time.
     isomesh::JobParameters parameters;
     parameters.volume = volume.id;
     parameters.formats = {isomesh::MeshFormat::kGlb};
@@ -32,7 +32,8 @@ int main(int argc, char** argv) {
       iso = (iso + volume.range[1]) / 2;
     }
     if (estimate.triangles > kMost) {
-      std::fprintf(stderr, "every surface has more\n");
+      std::fprintf(stderr, "no surface with at most %llu triangles was found\n",
+                   static_cast<unsigned long long>(kMost));
       return 1;
     }
 

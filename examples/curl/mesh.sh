@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# From a volume to an STL with curl alone, step by step: so a job can be left and come back to.
+# Makes an STL of a volume with curl alone, step by step. So you can leave a job and come back to it.
 #
 #   examples/curl/mesh.sh head.nii.gz 60 head.stl
 #
-# ISOMESH_SERVER says where the daemon is, ISOMESH_TOKEN who asks.
+# ISOMESH_SERVER names the daemon. ISOMESH_TOKEN is the token, if the daemon requires one.
 set -euo pipefail
 
 if [[ $# -ne 3 ]]; then
@@ -15,7 +15,7 @@ iso="$2"
 output="$3"
 server="${ISOMESH_SERVER:-http://127.0.0.1:8080}"
 
-# ask ARGUMENT..: the answer's body; a refusal ends the script with the server's reason.
+# ask ARGUMENT..: prints the body of the response. An error ends the script with the server's reason.
 ask() {
   local token=() answer status
   [[ -z "${ISOMESH_TOKEN:-}" ]] || token=(--header "Authorization: Bearer $ISOMESH_TOKEN")
@@ -29,7 +29,7 @@ ask() {
   printf '%s' "$answer"
 }
 
-# member NAME JSON: the first text of that name; jq does this better where it is at hand.
+# member NAME JSON: prints the first text with that name. jq does this better, if it is installed.
 member() {
   sed -n "s/.*\"$1\":\"\([^\"]*\)\".*/\1/p" <<<"${2//,\"/$'\n'\"}" | head -n 1
 }
@@ -46,7 +46,7 @@ while [[ "$state" == queued || "$state" == running ]]; do
   state="$(member state "$answer")"
 done
 if [[ "$state" != succeeded ]]; then
-  echo "mesh.sh: the job $job was $state: $(member detail "$answer")" >&2
+  echo "mesh.sh: job $job: $state: $(member detail "$answer")" >&2
   exit 1
 fi
 curl --silent --show-error --fail ${ISOMESH_TOKEN:+--header "Authorization: Bearer $ISOMESH_TOKEN"} \

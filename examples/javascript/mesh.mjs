@@ -1,5 +1,5 @@
-// From a volume to its surface: node mesh.mjs FILE ISO OUT, the format as the suffix of OUT says. The server is
-// ISOMESH_SERVER or the one of this machine.
+// Makes the surface of a volume: node mesh.mjs FILE ISO OUT. The suffix of OUT chooses the format. ISOMESH_SERVER names the
+// server; by default it is http://127.0.0.1:8080.
 import { openAsBlob } from 'node:fs';
 import { writeFile } from 'node:fs/promises';
 import { basename, extname } from 'node:path';
@@ -7,7 +7,7 @@ import { ApiError, choicesOf, connect, follow, meshOf, submitJob, upload } from 
 
 const [file, iso, target] = process.argv.slice(2);
 if (!target) {
-  console.error('node mesh.mjs FILE ISO OUT');
+  console.error('Usage: node mesh.mjs FILE ISO OUT');
   process.exit(2);
 }
 const { ISOMESH_SERVER: server = 'http://127.0.0.1:8080', ISOMESH_TOKEN: token } = process.env;
@@ -28,7 +28,7 @@ try {
   await mesh();
 } catch (error) {
   console.error(error.message);
-  // What the file leaves open, as the server names it.
+  // If the file is ambiguous, the server lists the choices.
   if (error instanceof ApiError) {
     for (const [parameter, choices] of choicesOf(error)) {
       for (const { value, title } of choices) console.error(`  ${parameter}=${value}: ${title}`);

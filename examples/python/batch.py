@@ -4,7 +4,7 @@
     pip install client/python
     examples/python/batch.py scans/ meshes/ --iso 60 > surfaces.csv
 
-What is no volume is told on standard error and left out.
+Files that cannot be meshed are listed on standard error, and the others continue.
 """
 
 import argparse
@@ -26,7 +26,7 @@ def main() -> int:
 
     client = isomesh.Client(arguments.server)
     if not arguments.scans.is_dir():
-        parser.error(f"{arguments.scans} is no folder")
+        parser.error(f"{arguments.scans} is not a folder")
     arguments.meshes.mkdir(parents=True, exist_ok=True)
 
     def mesh(scan: Path):
@@ -39,7 +39,7 @@ def main() -> int:
     table = csv.writer(sys.stdout)
     table.writerow(["scan", "triangles", "closed", "area_mm2", "volume_mm3"])
     failed = 0
-    # A Client may be used from several threads; the server's queue keeps them in order.
+    # Several threads may use one Client; the server queues their jobs.
     with ThreadPoolExecutor(max_workers=4) as pool:
         scans = sorted(each for each in arguments.scans.iterdir() if not each.name.startswith("."))
         for scan, result in [(scan, pool.submit(mesh, scan)) for scan in scans]:

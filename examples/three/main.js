@@ -1,6 +1,6 @@
-// A volume goes up, and its surface comes back as GLB, in one request; three.js shows it.
+// Uploads a volume and receives its surface as GLB, in one request. three.js shows it.
 //
-// The daemon has to allow this page's origin: isomeshd --cors-origin http://localhost:8000
+// The daemon must allow the origin of this page: isomeshd --cors-origin http://localhost:8000
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { DRACOLoader } from 'three/addons/loaders/DRACOLoader.js';
@@ -21,7 +21,7 @@ const lamp = new THREE.DirectionalLight(0xffffff, 1.5);
 camera.add(lamp);
 scene.add(camera);
 
-// The surface in the file is compressed by Draco, which three.js decodes in workers.
+// Draco compresses the surface in the file; three.js decodes it in workers.
 const draco = new DRACOLoader();
 draco.setDecoderPath('./node_modules/three/examples/jsm/libs/draco/gltf/');
 const loader = new GLTFLoader();
@@ -29,7 +29,7 @@ loader.setDRACOLoader(draco);
 
 let surface;
 
-// POST /v1/mesh takes the volume as its body and answers with the mesh, or with the reason.
+// The body of POST /v1/mesh is the volume. The response is the mesh, or a problem with the reason.
 async function meshOf(file, iso) {
   const query = new URLSearchParams({ iso, format: 'glb' });
   const answer = await fetch(`${server}/v1/mesh?${query}`, { method: 'POST', body: file });
@@ -61,7 +61,7 @@ async function show(glb) {
 form.addEventListener('submit', async (event) => {
   event.preventDefault();
   const { file, iso } = form.elements;
-  output.textContent = 'The surface is being made ...';
+  output.textContent = 'Making the surface ...';
   try {
     output.textContent = await show(await meshOf(file.files[0], iso.value));
   } catch (error) {
