@@ -1,4 +1,4 @@
-// Pictures of each view, of real volumes, for README: where ISOMESH_PICTURES names the folder that they go to.
+// Pictures of each view, of real volumes, for README and docs/page.md. ISOMESH_PICTURES names their folder.
 import { execFileSync } from 'node:child_process';
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
