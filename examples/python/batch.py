@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Meshes every volume of a folder, and prints a table of what the surfaces measure.
+"""Meshes every volume of a folder and prints a table of the surfaces' measurements.
 
-    pip install client/python
-    examples/python/batch.py scans/ meshes/ --iso 60 > surfaces.csv
+    python3 -m venv isomesh-env && . isomesh-env/bin/activate && pip install ./client/python
+    python3 examples/python/batch.py scans/ meshes/ --iso 60 > surfaces.csv
 
-What is no volume is told on standard error and left out.
+Files that are not volumes are listed on standard error and skipped.
 """
 
 import argparse
@@ -21,25 +21,25 @@ def main() -> int:
     parser.add_argument("scans", type=Path)
     parser.add_argument("meshes", type=Path)
     parser.add_argument("--iso", type=float, required=True)
-    parser.add_argument("--server", help="default: ISOMESH_SERVER, or http://127.0.0.1:8080")
+    parser.add_argument("--server", help="default: $ISOMESH_SERVER, or http://127.0.0.1:8080")
     arguments = parser.parse_args()
 
     client = isomesh.Client(arguments.server)
     if not arguments.scans.is_dir():
-        parser.error(f"{arguments.scans} is no folder")
+        parser.error(f"there is no folder {arguments.scans}")
     arguments.meshes.mkdir(parents=True, exist_ok=True)
 
     def mesh(scan: Path):
         volume = client.upload(scan)
         job = client.submit(volume, iso=arguments.iso, formats=["glb"], close=True, priority="bulk")
-        job = client.wait(job)
-        client.download(job, arguments.meshes / f"{scan.name}.glb")
-        return job["mesh"]
+        done = client.wait(job)
+        client.download(done, arguments.meshes / f"{scan.name}.glb")
+        return done["mesh"]
 
     table = csv.writer(sys.stdout)
     table.writerow(["scan", "triangles", "closed", "area_mm2", "volume_mm3"])
     failed = 0
-    # A Client may be used from several threads; the server's queue keeps them in order.
+    # Several threads may share one Client; the server's queue keeps the jobs in order.
     with ThreadPoolExecutor(max_workers=4) as pool:
         scans = sorted(each for each in arguments.scans.iterdir() if not each.name.startswith("."))
         for scan, result in [(scan, pool.submit(mesh, scan)) for scan in scans]:
