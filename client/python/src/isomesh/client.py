@@ -339,7 +339,7 @@ class Client:
             found = cast("api.Volume", source)  # its owner has seen the notes
         elif isinstance(source, str) and re.fullmatch("[0-9a-f]{64}", source) and not os.path.exists(source):
             found = self.volume(source)
-            warn_of(found["notes"], found["name"] or "")
+            warn_of(found["notes"], source[:12])  # the name may name a patient
         else:
             return None
         if of_upload:

@@ -39,7 +39,7 @@ def warn_of(notes: Sequence[api.Note], name: str) -> None:
         warnings.warn(f"{name}: {text}" if name else text, VolumeWarning, stacklevel=level)
 
 
-_HERE = os.path.dirname(os.path.abspath(__file__)) + os.sep
+_HERE = os.path.dirname(__file__) + os.sep
 
 
 class Refused(IsomeshError):
