@@ -189,11 +189,12 @@ class Jobs(DaemonTest):
         in_ras = self.client.mesh(ball(), iso=-8, formats=["stl"], space="ras")
         self.assertTrue(numpy.array_equal(in_ras.vertices, mesh.in_space("ras").vertices))
         in_ras.save(self.folder / "ras.stl")
+        original = mesh.vertices.copy()
         mesh.vertices += 1
         with self.assertRaisesRegex(ValueError, "the mesh was changed, and the server's .stl file was not"):
             mesh.save(self.folder / "changed.stl")
         self.assertEqual([each.name for each in self.folder.glob("*.stl")], ["ras.stl"])
-        mesh.vertices -= 1
+        mesh.vertices = original
         mesh.save(self.folder / "restored.stl")
 
     def test_labels_are_saved(self):
