@@ -97,7 +97,11 @@ class Arrays(DaemonTest):
         self.assertEqual(set(self.client.mesh(samples, labels="all").labels.tolist()), {4294967295})
 
     def test_an_empty_surface_is_an_empty_mesh(self):
-        mesh = self.client.mesh(ball(), iso=5)
+        range_of = r"the iso-value 5 is outside the samples' range, -\d+\.?\d* to -0\.8"
+        with self.assertWarnsRegex(isomesh.VolumeWarning, "the surface is empty: " + range_of):
+            mesh = self.client.mesh(ball(), iso=5)
+        with self.assertWarnsRegex(isomesh.VolumeWarning, "the surface is empty: no connected component was kept"):
+            self.client.mesh(ball(), iso=-8, components={"min_triangles": 10**8})
         self.assertEqual(mesh.vertices.shape, (0, 3))
         self.assertEqual(mesh.in_space("ras").faces.shape, (0, 3))
 

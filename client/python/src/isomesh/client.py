@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Callable, Iterator, List, Mapping, Option
 from urllib.parse import quote, urlencode
 
 from . import ply, uploads
-from .errors import IsomeshError, JobFailed, Refused, warn_of
+from .errors import IsomeshError, JobFailed, Refused, warn, warn_of_notes
 from .exchange import Exchange
 from .files import FINAL_STATES, file_of, format_of, written
 from .mesh import Mesh
@@ -105,8 +105,8 @@ class Client:
         besides `.ply`.
 
         Vertices are in LPS, unless `space="ras"` is given; `mesh.in_space` converts them. The volume's
-        notes are in `mesh.notes`, and each gives a VolumeWarning. Raises JobFailed if the job fails.
-        An interrupt (Ctrl-C) cancels the job.
+        notes are in `mesh.notes`. Each of them gives a VolumeWarning, and so does an empty surface. Raises
+        JobFailed if the job fails. An interrupt (Ctrl-C) cancels the job.
         """
         keywords = locals()
         parameters = given(keywords)
@@ -127,6 +127,8 @@ class Client:
             with contextlib.suppress(IsomeshError):
                 self.cancel(job)
             raise
+        if done["mesh"]["empty"]:
+            warn(f"the surface is empty: {_why_empty(done, stored)}")
         return self._fetch(done, stored["notes"])
 
     # --- Volumes ---------------------------------------------------------------------------------
@@ -176,7 +178,7 @@ class Client:
         answers = self._exchange.upload(body, name, {"accept": ",".join(accept), "nifti_form": nifti_form})
         for each in answers:
             if each["volume"]:
-                warn_of(each["volume"]["notes"], each["member"] or body.name)
+                warn_of_notes(each["volume"]["notes"], each["member"] or body.name)
         return answers
 
     def volume(self, volume: Union[str, api.Volume]) -> api.Volume:
@@ -339,7 +341,7 @@ class Client:
             found = cast("api.Volume", source)  # its owner has seen the notes
         elif isinstance(source, str) and re.fullmatch("[0-9a-f]{64}", source) and not os.path.exists(source):
             found = self.volume(source)
-            warn_of(found["notes"], source[:12])  # the name may name a patient
+            warn_of_notes(found["notes"], source[:12])  # the name may name a patient
         else:
             return None
         if of_upload:
@@ -362,7 +364,7 @@ class Client:
             found = answers[0]["volume"]
             # This note advises what a job by labels does.
             notes = [each for each in found["notes"] if not (is_by_labels and each["code"] == _LOOKS_LIKE_LABELS)]
-            warn_of(notes, body.name)
+            warn_of_notes(notes, body.name)
             return found
         choices = [
             {
@@ -385,6 +387,17 @@ class Client:
         return Mesh(*ply.parse(data), job=job, notes=notes, download=self.download)
 
 _UPLOAD_KEYWORDS = ("affine", "spacing", "raw", "name", "series", "member", "volume", "accept", "nifti_form")
+
+
+def _why_empty(job: api.SucceededJob, volume: api.Volume) -> str:
+    iso, (low, high) = job["mesh"].get("iso"), volume["range"]
+    if job["mesh"]["dropped"]["components"] > 0:
+        return "no connected component was kept"
+    if iso is None:
+        return "the labels have no surface"
+    if not low <= iso <= high:
+        return f"the iso-value {iso:g} is outside the samples' range, {low:g} to {high:g}"
+    return f"there is none at the iso-value {iso:g}"
 
 
 def _is_empty(value: Any) -> bool:

@@ -25,18 +25,23 @@ class WrongAnswer(IsomeshError):
 
 
 class VolumeWarning(UserWarning):
-    """A note about a volume: something that the server decided or corrected when it read the file."""
+    """A note about a volume: something that the server decided or corrected when it read the file.
+    Also: the surface is empty."""
 
 
-def warn_of(notes: Sequence[api.Note], name: str) -> None:
-    """Warns of each note, at the line that called this package."""
+def warn_of_notes(notes: Sequence[api.Note], name: str) -> None:
+    """Warns of each note about the volume that is called `name`; it may be empty."""
+    for note in notes:
+        warn((f"{name}: " if name else "") + f"{note['detail']} ({note['code']})")
+
+
+def warn(text: str) -> None:
+    """A VolumeWarning at the line that called this package."""
     frame: Any = sys._getframe()
     level = 1
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
         frame, level = frame.f_back, level + 1
-    for note in notes:
-        text = f"{note['detail']} ({note['code']})"
-        warnings.warn(f"{name}: {text}" if name else text, VolumeWarning, stacklevel=level)
+    warnings.warn(text, VolumeWarning, stacklevel=level)
 
 
 _HERE = os.path.dirname(__file__) + os.sep

@@ -91,14 +91,15 @@ class Mesh:
         label's normals use that label's faces alone: `Mesh(mesh.vertices, mesh.faces[mesh.labels == 1])`.
         """
         numpy = _package("numpy", "mesh.normals", "numpy")
-        points = numpy.asarray(self.vertices, "float64")
-        faces = numpy.asarray(self.faces)
-        first, second, third = (points[faces[:, corner]] for corner in range(3))
-        of_faces = numpy.cross(second - first, third - first)
-        sums = numpy.zeros_like(points)
-        for axis in range(3):
-            for corner in range(3):
-                sums[:, axis] += numpy.bincount(faces[:, corner], of_faces[:, axis], len(points))
+        points = numpy.asarray(self.vertices)
+        corners = [numpy.asarray(self.faces)[:, corner].astype("intp") for corner in range(3)]
+        first = points[corners[0]].astype("float64")
+        along, across = points[corners[1]] - first, points[corners[2]] - first
+        sums = numpy.zeros((len(points), 3))
+        for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            of_faces = along[:, y] * across[:, z] - along[:, z] * across[:, y]
+            for corner in corners:
+                sums[:, x] += numpy.bincount(corner, of_faces, len(points))
         lengths = numpy.linalg.norm(sums, axis=1, keepdims=True)
         return numpy.divide(sums, lengths, out=numpy.zeros_like(sums), where=lengths > 0).astype("float32")
 
