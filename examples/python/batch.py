@@ -18,9 +18,9 @@ import isomesh
 
 def main() -> int:
     parser = argparse.ArgumentParser(description="Mesh every volume of a folder")
-    parser.add_argument("scans", type=Path)
-    parser.add_argument("meshes", type=Path)
-    parser.add_argument("--iso", type=float, required=True)
+    parser.add_argument("scans", type=Path, help="folder of volumes: files, or folders of DICOM slices")
+    parser.add_argument("meshes", type=Path, help="folder for the meshes; it is created if needed")
+    parser.add_argument("--iso", type=float, required=True, help="the iso-value of the surfaces")
     parser.add_argument("--server", help="default: $ISOMESH_SERVER, or http://127.0.0.1:8080")
     arguments = parser.parse_args()
 
