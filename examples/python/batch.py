@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Meshes every volume of a folder, and prints a table of what the surfaces measure.
+"""Meshes every volume of a folder and prints a table of the surfaces' measurements.
 
-    pip install client/python
-    examples/python/batch.py scans/ meshes/ --iso 60 > surfaces.csv
+    python3 -m venv isomesh-env && . isomesh-env/bin/activate && pip install ./client/python
+    python3 examples/python/batch.py scans/ meshes/ --iso 60 > surfaces.csv
 
-Files that cannot be meshed are listed on standard error, and the others continue.
+Files that are not volumes are listed on standard error and skipped.
 """
 
 import argparse
@@ -18,28 +18,28 @@ import isomesh
 
 def main() -> int:
     parser = argparse.ArgumentParser(description="Mesh every volume of a folder")
-    parser.add_argument("scans", type=Path)
-    parser.add_argument("meshes", type=Path)
-    parser.add_argument("--iso", type=float, required=True)
-    parser.add_argument("--server", help="default: ISOMESH_SERVER, or http://127.0.0.1:8080")
+    parser.add_argument("scans", type=Path, help="folder of volumes: files, or folders of DICOM slices")
+    parser.add_argument("meshes", type=Path, help="folder for the meshes; it is created if needed")
+    parser.add_argument("--iso", type=float, required=True, help="the iso-value of the surfaces")
+    parser.add_argument("--server", help="default: $ISOMESH_SERVER, or http://127.0.0.1:8080")
     arguments = parser.parse_args()
 
     client = isomesh.Client(arguments.server)
     if not arguments.scans.is_dir():
-        parser.error(f"{arguments.scans} is not a folder")
+        parser.error(f"there is no folder {arguments.scans}")
     arguments.meshes.mkdir(parents=True, exist_ok=True)
 
     def mesh(scan: Path):
         volume = client.upload(scan)
         job = client.submit(volume, iso=arguments.iso, formats=["glb"], close=True, priority="bulk")
-        job = client.wait(job)
-        client.download(job, arguments.meshes / f"{scan.name}.glb")
-        return job["mesh"]
+        done = client.wait(job)
+        client.download(done, arguments.meshes / f"{scan.name}.glb")
+        return done["mesh"]
 
     table = csv.writer(sys.stdout)
     table.writerow(["scan", "triangles", "closed", "area_mm2", "volume_mm3"])
     failed = 0
-    # Several threads may use one Client; the server queues their jobs.
+    # Several threads may share one Client; the server's queue keeps the jobs in order.
     with ThreadPoolExecutor(max_workers=4) as pool:
         scans = sorted(each for each in arguments.scans.iterdir() if not each.name.startswith("."))
         for scan, result in [(scan, pool.submit(mesh, scan)) for scan in scans]:

@@ -6,24 +6,29 @@ import socket
 import subprocess
 import tempfile
 import threading
-import unittest
 from pathlib import Path
 
 import isomesh
 import numpy
+from limits import LimitedTest, limited
 
 ROOT = Path(__file__).resolve().parents[2]
 DAEMON = Path(os.environ.get("ISOMESHD", ROOT / "build" / "release" / "bin" / "isomeshd"))
 
 
-class DaemonTest(unittest.TestCase):
-    """Every class has a daemon of its own; `options` are more of its options."""
+class DaemonTest(LimitedTest):
+    """Every class has a daemon of its own; `options` are added to its command line."""
 
     options = ()
     listen = "127.0.0.1:0"
 
     @classmethod
     def setUpClass(cls):
+        with limited(cls.limit_s, f"setUpClass of {cls.__qualname__}"):
+            cls.start()
+
+    @classmethod
+    def start(cls):
         cls.folder = Path(tempfile.mkdtemp(prefix="isomesh-python-"))
         cls.addClassCleanup(shutil.rmtree, cls.folder)
         environment = {name: value for name, value in os.environ.items() if not name.startswith("ISOMESH")}
@@ -47,12 +52,17 @@ class DaemonTest(unittest.TestCase):
     def end(cls):
         cls.daemon.terminate()
         cls.daemon.stdout.close()
-        cls.daemon.wait(60)
+        try:
+            cls.daemon.wait(60)
+        except subprocess.TimeoutExpired:
+            cls.daemon.kill()
+            cls.daemon.wait(10)
+            raise
 
 
 class Relay:
-    """Passes connections on to a server, and cuts the first `cuts` answers that grow beyond
-    `after` bytes there."""
+    """Passes connections on to a server. The first `cuts` responses that are longer than `after`
+    bytes are cut there."""
 
     def __init__(self, url, cuts, after):
         self.target = url.removeprefix("http://").rsplit(":", 1)
@@ -81,10 +91,10 @@ class Relay:
                 try:
                     self.pass_on(client, server)
                 except OSError:
-                    pass  # one of both ended the connection, and the other one sees it end
+                    pass  # one side ended the connection, and the other side sees its end
 
     def pass_on(self, client, server):
-        """Requests without a long body, as they are here."""
+        """For requests without a long body."""
         request = b""
         while b"\r\n\r\n" not in request:
             request += client.recv(65536)
@@ -101,7 +111,7 @@ class Relay:
 
 
 class UploadRelay(Relay):
-    """The same of requests, which are noted without their headers."""
+    """The same for requests, which are recorded without their headers."""
 
     def pass_on(self, client, server):
         answer = threading.Thread(target=self.answer, args=(client, server))
@@ -138,14 +148,14 @@ class UploadRelay(Relay):
 
 
 def ball(size=(40, 32, 24), radius=9.0, spacing=(1.0, 1.0, 1.0)):
-    """Samples of distance from the middle, negated: the iso-value -r is a ball of the radius r."""
+    """The negative distances from the centre: the iso-value -r gives a ball of radius r."""
     axes = [(numpy.arange(n) - (n - 1) / 2) * step for n, step in zip(size, spacing)]
     x, y, z = numpy.meshgrid(*axes, indexing="ij")
     return -numpy.sqrt(x * x + y * y + z * z).astype("float32")
 
 
 def turned(spacing=(0.5, 0.75, 1.25), origin=(12.0, -40.0, 7.5), angle=0.4):
-    """An affine that turns about z."""
+    """An affine with a rotation about z."""
     affine = numpy.eye(4)
     turn = numpy.array(
         [[numpy.cos(angle), -numpy.sin(angle), 0], [numpy.sin(angle), numpy.cos(angle), 0], [0, 0, 1]]

@@ -1,5 +1,6 @@
-"""Arrays and images up, arrays down."""
+"""Uploads of arrays and images, and meshes as arrays."""
 
+import json
 import subprocess
 import sys
 import unittest
@@ -68,7 +69,7 @@ class Arrays(DaemonTest):
             (numpy.zeros((2, 2)), {}, ValueError, "three axes"),
             (numpy.zeros((2, 2, 2, 2)), {}, ValueError, "three axes"),
             (ball(), {"affine": numpy.eye(3)}, ValueError, "4 x 4"),
-            (ball(), {"affine": numpy.diag([1.0, 0, 1, 1])}, ValueError, "no length"),
+            (ball(), {"affine": numpy.diag([1.0, 0, 1, 1])}, ValueError, "length zero"),
             (ball(), {"affine": numpy.eye(4), "affine_space": "mni"}, ValueError, "'ras' or 'lps'"),
             (ball(), {"affine": numpy.eye(4) * numpy.nan}, ValueError, "finite"),
             (ball(), {"affine": numpy.eye(4), "spacing": (1, 1, 1)}, ValueError, "either"),
@@ -96,7 +97,11 @@ class Arrays(DaemonTest):
         self.assertEqual(set(self.client.mesh(samples, labels="all").labels.tolist()), {4294967295})
 
     def test_an_empty_surface_is_an_empty_mesh(self):
-        mesh = self.client.mesh(ball(), iso=5)
+        range_of = r"the iso-value 5 is outside the samples' range, -\d+\.?\d* to -0\.8"
+        with self.assertWarnsRegex(isomesh.VolumeWarning, "the surface is empty: " + range_of):
+            mesh = self.client.mesh(ball(), iso=5)
+        with self.assertWarnsRegex(isomesh.VolumeWarning, "the surface is empty: no connected component was kept"):
+            self.client.mesh(ball(), iso=-8, components={"min_triangles": 10**8})
         self.assertEqual(mesh.vertices.shape, (0, 3))
         self.assertEqual(mesh.in_space("ras").faces.shape, (0, 3))
 
@@ -110,16 +115,27 @@ import isomesh, json
 mesh = isomesh.read_ply(sys.argv[1])
 ras = mesh.in_space("ras")
 empty = isomesh.Client(sys.argv[2]).mesh(sys.argv[3], iso=1000)
-print(json.dumps([mesh.vertices.tolist(), ras.vertices.tolist(), mesh.faces.tolist(), len(empty.faces)]))
+bounds = [mesh.bounds.tolist(), empty.bounds.tolist()]
+mesh.save(sys.argv[4])
+try:
+    mesh.normals
+except ImportError as error:
+    print(error, file=sys.stderr)
+print(json.dumps([mesh.vertices.tolist(), ras.vertices.tolist(), mesh.faces.tolist(), len(empty.faces), bounds]))
 """
         volume = self.folder / "volume.nii"
         nibabel.save(nibabel.Nifti1Image(ball(), numpy.eye(4)), volume)
-        text = subprocess.check_output([sys.executable, "-c", script, path, self.url, volume], text=True)
-        vertices, ras, faces, empty = __import__("json").loads(text)
+        saved = self.folder / "saved.ply"
+        command = [sys.executable, "-W", "ignore", "-c", script, path, self.url, volume, saved]
+        found = subprocess.run(command, check=True, capture_output=True, text=True)
+        vertices, ras, faces, empty, bounds = json.loads(found.stdout)
         self.assertTrue(numpy.array_equal(numpy.array(vertices, "float32"), mesh.vertices))
         self.assertTrue(numpy.array_equal(numpy.array(ras, "float32"), mesh.in_space("ras").vertices))
         self.assertTrue(numpy.array_equal(faces, mesh.faces))
         self.assertEqual(empty, 0)
+        self.assertEqual(bounds, [mesh.bounds.tolist(), [[0, 0, 0], [0, 0, 0]]])
+        self.assertEqual(saved.read_bytes(), path.read_bytes())
+        self.assertIn("mesh.normals needs the package numpy", found.stderr)
 
     def test_a_damaged_ply_is_refused(self):
         path = self.client.download(self.client.mesh(ball(), iso=-8).job, self.folder / "whole.ply")

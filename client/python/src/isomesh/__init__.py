@@ -1,4 +1,4 @@
-"""isomesh turns medical volumes into surface meshes; this is the client of its server.
+"""isomesh turns medical volumes into surface meshes. This package is the client of its server.
 
     import isomesh
 
@@ -7,12 +7,13 @@
     mesh.vertices  # (n, 3), millimetres, LPS
     mesh.faces     # (m, 3)
 
-It needs nothing but the standard library. With numpy, meshes are its arrays and arrays can be
-uploaded. `isomesh.api` has the types of what the server takes and answers.
+The package needs the standard library only. With numpy, meshes are numpy arrays, and arrays can be
+uploaded. `isomesh.api` has the types of the server's requests and responses.
 """
 
+from . import api
 from .client import Client
-from .errors import IsomeshError, JobFailed, Refused, Unreachable, WrongAnswer
+from .errors import IsomeshError, JobFailed, Refused, Unreachable, VolumeWarning, WrongAnswer
 from .mesh import Mesh, read_ply
 from .uploads import Raw
 from .version import __version__
@@ -25,7 +26,9 @@ __all__ = [
     "Raw",
     "Refused",
     "Unreachable",
+    "VolumeWarning",
     "WrongAnswer",
     "__version__",
+    "api",
     "read_ply",
 ]

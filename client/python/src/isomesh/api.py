@@ -1,6 +1,6 @@
-"""What the server takes and answers, as types; made by `generate` from openapi.yaml.
+"""The types of the server's requests and responses. `generate` makes this file from openapi.yaml.
 
-They are the members of its JSON and exist for type checkers alone: an answer is a plain dict.
+The types describe JSON objects and are for type checkers: at run time every response is a plain dict.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 SampleType = Literal['uint8', 'int8', 'uint16', 'int16', 'uint32', 'int32', 'float32', 'float64']
 
 
-MeshFormat = Literal['drc', 'glb', 'stl', 'ply', 'obj', '3mf', False, 'vtk', 'vtp', 'gii', 'zip']
+MeshFormat = Literal['drc', 'glb', 'stl', 'ply', 'obj', '3mf', 'off', 'vtk', 'vtp', 'gii', 'zip']
 
 
 MeshBytes = str
@@ -886,108 +886,205 @@ class Problem(TypedDict):
     choices: NotRequired[Sequence[ProblemChoices]]
 
 
-class JobOptions(TypedDict, total=False):
-    """Parameters of a job, as keywords. What a job is asked to do. The same volume and
-    parameters give the same bytes."""
+class SucceededJob(TypedDict):
+    """A job that has succeeded: its mesh is never None."""
 
-    #: The iso-value, in the volume's units, or Otsu's threshold. A sample is inside when its value
-    #: is >= iso.
-    iso: Iso
-    #: In place of an iso-value: the labels of a segmentation, each with a surface of its own, or
-    #: all of them. Neighbours share the wall between them. All other values, and those that are
-    #: not listed, are background. Vertices lie half-way between two samples. Unless the request
-    #: says, there are 10 passes with a lambda of 0.33, and no vertex moves farther than half the
-    #: smallest spacing.
-    labels: Labels
-    #: The value of samples without a label.
-    background: Background
-    #: What labels are called, by their values. Those that are left out are called as the volume's
-    #: file says.
-    label_names: LabelNames
-    #: The colours of labels, as #rrggbb, by their values. Those that are left out have the colour
-    #: that the volume's file says, or one of a fixed series.
-    label_colors: LabelColors
-    #: Labels that are made of the samples of several values, by their own. A value may belong to
-    #: several labels, which then overlap there. Those that are left out are as the volume's file
-    #: says.
-    label_values: LabelValues
-    #: Tetrahedra per cell. With 5 every second cell is mirrored; the cell (0,0,0) is not.
-    scheme: Scheme
-    #: Where a vertex lies on its edge. midpoint puts all half-way.
-    interpolation: Interpolation
-    #: How often the surface is smoothed. Vertices on its boundary stay. By labels the default is
-    #: 10.
-    passes: Passes
-    #: How a pass moves the vertices. laplacian: every pass moves each vertex by lambda of the way
-    #: to the mean of its neighbours; what the surface encloses shrinks. taubin: every pass does so
-    #: and then moves the vertices back by mu, the same for all, with 1/lambda + 1/mu = pass_band;
-    #: so a pass is two steps, and noise goes while shape and volume stay.
-    smoothing: Smoothing
-    #: How far a pass moves a vertex; 1 moves it onto the mean of its neighbours. Null: 1 for
-    #: laplacian, 0.33 for taubin, which takes at most 0.66.
-    lambda_: Lambda
-    #: Of taubin: what varies along the surface more slowly than this is kept. From 0 for a
-    #: constant to 2 for what changes sign from each vertex to the next.
-    pass_band: PassBand
-    #: Smoothing moves no vertex farther than this from where it was extracted. Millimetres; null:
-    #: as far as it goes, and of labels half the smallest spacing.
-    max_displacement_mm: MaxDisplacement
-    #: Cap the surface where it meets the volume's border, as if the samples beyond it were
-    #: outside. The result has no boundary. Caps lie in the border, stay flat and are not smoothed;
-    #: the rest is smoothed as if the surface were open.
-    close: Close
-    #: Which parts of the surface are kept; the others are dropped before smoothing. With several
-    #: members, the largest of those that are large enough. Parts are compared by their triangles,
-    #: equal ones by their first vertex. Without members all are kept. Not for labels.
-    components: JobParametersComponents
-    #: Leave out the walls of cavities, which no opening leads to, and what floats in them.
-    fill_cavities: FillCavities
-    #: Only what is in this box: its smallest and its largest corner, in millimetres, LPS. The
-    #: volume's samples within the box are taken as if they were all; of one that lies askew, those
-    #: between the box's extents along its axes. The surface is closed by caps: close is true.
-    crop: Crop
-    #: No part of a file is farther than this from the surface as it was extracted, nor that from
-    #: it. Millimetres. Half of it is what smoothing may take; then the surface gets as few
-    #: triangles as the rest allows, and Draco's coordinates as many bits as it takes. It is
-    #: measured on the files' own bytes: see certify, which comes with it.
-    max_error_mm: MaxError
-    #: Simplify the surface to so many triangles, or fewer. With max_error_mm, what binds first;
-    #: the answer says which. What it costs is measured: see certify, which comes with it unless it
-    #: is false.
-    triangles: Triangles
-    #: The files to make, each named once.
-    formats: Sequence[MeshFormat]
-    #: Of the drc format, and of the Draco streams inside glb.
-    draco: JobParametersDraco
-    #: Put the vertices' normals, weighted by the areas around them, into glb. Without them viewers
-    #: shade every triangle flat, or compute their own.
-    normals: Normals
-    #: Put each vertex's distance to the surface as it was extracted into glb, in millimetres. As
-    #: the vertex attribute _DISTANCE_MM, of all levels of detail; rounded to a four thousandth of
-    #: the largest. The page shows it as colour.
-    distances: Distances
-    #: Levels of detail for glb, as shares of the triangles from 1 downwards. By the extension
-    #: MSFT_lod, which readers that do not know it pass over. At most 8.
-    lods: Lods
-    #: Make the surface one primitive of glb, or one for each label. For programs that take a
-    #: primitive for an object of its own. Otherwise there is one for each hundred thousand
-    #: triangles or so, which are written and read side by side.
-    merge: Merge
-    #: What the surface in glb is compressed by. draco is KHR_draco_mesh_compression, which makes
-    #: the smaller files; meshopt is EXT_meshopt_compression, which is read faster. Readers have to
-    #: know the one that it is.
-    glb_codec: GlbCodec
-    #: Which ways the coordinates in the files run: x to the patient's left and y to the back, or x
-    #: to the right and y to the front. z runs to the head. gii is always RAS, and glb has its own
-    #: node, by which Y is up.
-    space: Space
+    #: A UUID; younger jobs have greater ones.
+    id: str
+    state: Literal['succeeded']
+    #: What a job does at the moment, or did last.
+    stage: Stage
+    #: Of the whole job.
+    progress: float
+    #: All of them, with the defaults of those that were left out.
+    parameters: CompleteJobParameters
+    #: The volume's id, as in the parameters.
+    volume: str
     #: Jobs are begun by priority, then by age.
     priority: Priority
-    #: Measure how far the files are from the surface as it was extracted, and where they run
-    #: through themselves.
+    created: str
+    started: str
+    finished: str
+    #: Milliseconds of each stage; 0 for one that has not ended yet.
+    timing: Timing
+    mesh: MeshSummary
+    #: Null unless the job has failed.
+    error: Optional[Problem]
+    #: Whether the job took the mesh of an earlier job with the same volume and parameters instead
+    #: of making it again; priority and callback may differ.
+    reused: bool
+    #: What a queued job waits for besides a worker: disk is room for its files, and it is run when
+    #: there is some. Null otherwise.
+    waiting_for: Optional[Literal['disk']]
+
+
+class JobOptions(TypedDict, total=False):
+    """The parameters of a job.
+
+    Every member is a keyword of Client.mesh, Client.submit and Client.estimate.
+
+    iso
+        The iso-value, in the volume's units, or Otsu's threshold. A sample is inside when its
+        value is >= iso.
+
+    labels
+        In place of an iso-value: the labels of a segmentation, each with a surface of its own,
+        or all of them. Neighbours share the wall between them. All other values, and those that
+        are not listed, are background. Vertices lie half-way between two samples. Unless the
+        request says, there are 10 passes with a lambda of 0.33, and no vertex moves farther
+        than half the smallest spacing.
+
+    background
+        The value of samples without a label.
+
+    label_names
+        What labels are called, by their values. Those that are left out are called as the
+        volume's file says.
+
+    label_colors
+        The colours of labels, as #rrggbb, by their values. Those that are left out have the
+        colour that the volume's file says, or one of a fixed series.
+
+    label_values
+        Labels that are made of the samples of several values, by their own. A value may belong
+        to several labels, which then overlap there. Those that are left out are as the volume's
+        file says.
+
+    scheme
+        Tetrahedra per cell. With 5 every second cell is mirrored; the cell (0,0,0) is not.
+
+    interpolation
+        Where a vertex lies on its edge. midpoint puts all half-way.
+
+    passes
+        How often the surface is smoothed. Vertices on its boundary stay. By labels the default
+        is 10.
+
+    smoothing
+        How a pass moves the vertices. laplacian: every pass moves each vertex by lambda of the
+        way to the mean of its neighbours; what the surface encloses shrinks. taubin: every pass
+        does so and then moves the vertices back by mu, the same for all, with 1/lambda + 1/mu =
+        pass_band; so a pass is two steps, and noise goes while shape and volume stay.
+
+    lambda_
+        How far a pass moves a vertex; 1 moves it onto the mean of its neighbours. Null: 1 for
+        laplacian, 0.33 for taubin, which takes at most 0.66.
+
+    pass_band
+        Of taubin: what varies along the surface more slowly than this is kept. From 0 for a
+        constant to 2 for what changes sign from each vertex to the next.
+
+    max_displacement_mm
+        Smoothing moves no vertex farther than this from where it was extracted. Millimetres;
+        null: as far as it goes, and of labels half the smallest spacing.
+
+    close
+        Cap the surface where it meets the volume's border, as if the samples beyond it were
+        outside. The result has no boundary. Caps lie in the border, stay flat and are not
+        smoothed; the rest is smoothed as if the surface were open.
+
+    components
+        Which parts of the surface are kept; the others are dropped before smoothing. With
+        several members, the largest of those that are large enough. Parts are compared by their
+        triangles, equal ones by their first vertex. Without members all are kept. Not for
+        labels.
+
+    fill_cavities
+        Leave out the walls of cavities, which no opening leads to, and what floats in them.
+
+    crop
+        Only what is in this box: its smallest and its largest corner, in millimetres, LPS. The
+        volume's samples within the box are taken as if they were all; of one that lies askew,
+        those between the box's extents along its axes. The surface is closed by caps: close is
+        true.
+
+    max_error_mm
+        No part of a file is farther than this from the surface as it was extracted, nor that
+        from it. Millimetres. Half of it is what smoothing may take; then the surface gets as
+        few triangles as the rest allows, and Draco's coordinates as many bits as it takes. It
+        is measured on the files' own bytes: see certify, which comes with it.
+
+    triangles
+        Simplify the surface to so many triangles, or fewer. With max_error_mm, what binds
+        first; the answer says which. What it costs is measured: see certify, which comes with
+        it unless it is false.
+
+    formats
+        The files to make, each named once.
+
+    draco
+        Of the drc format, and of the Draco streams inside glb.
+
+    normals
+        Put the vertices' normals, weighted by the areas around them, into glb. Without them
+        viewers shade every triangle flat, or compute their own.
+
+    distances
+        Put each vertex's distance to the surface as it was extracted into glb, in millimetres.
+        As the vertex attribute _DISTANCE_MM, of all levels of detail; rounded to a four
+        thousandth of the largest. The page shows it as colour.
+
+    lods
+        Levels of detail for glb, as shares of the triangles from 1 downwards. By the extension
+        MSFT_lod, which readers that do not know it pass over. At most 8.
+
+    merge
+        Make the surface one primitive of glb, or one for each label. For programs that take a
+        primitive for an object of its own. Otherwise there is one for each hundred thousand
+        triangles or so, which are written and read side by side.
+
+    glb_codec
+        What the surface in glb is compressed by. draco is KHR_draco_mesh_compression, which
+        makes the smaller files; meshopt is EXT_meshopt_compression, which is read faster.
+        Readers have to know the one that it is.
+
+    space
+        Which ways the coordinates in the files run: x to the patient's left and y to the back,
+        or x to the right and y to the front. z runs to the head. gii is always RAS, and glb has
+        its own node, by which Y is up.
+
+    priority
+        Jobs are begun by priority, then by age.
+
+    certify
+        Measure how far the files are from the surface as it was extracted, and where they run
+        through themselves.
+
+    callback
+        Whom to tell that the job has ended, whichever way: a POST of the job, as GET gives it.
+        Only addresses that the operator has listed are called. It is signed as the Standard
+        Webhooks specification says (webhook-id, webhook-timestamp, webhook-signature), repeated
+        until it is answered with success, for a day, and may come more than once with the same
+        webhook-id.
+    """
+
+    iso: Iso
+    labels: Labels
+    background: Background
+    label_names: LabelNames
+    label_colors: LabelColors
+    label_values: LabelValues
+    scheme: Scheme
+    interpolation: Interpolation
+    passes: Passes
+    smoothing: Smoothing
+    lambda_: Lambda
+    pass_band: PassBand
+    max_displacement_mm: MaxDisplacement
+    close: Close
+    components: JobParametersComponents
+    fill_cavities: FillCavities
+    crop: Crop
+    max_error_mm: MaxError
+    triangles: Triangles
+    formats: Sequence[MeshFormat]
+    draco: JobParametersDraco
+    normals: Normals
+    distances: Distances
+    lods: Lods
+    merge: Merge
+    glb_codec: GlbCodec
+    space: Space
+    priority: Priority
     certify: Certify
-    #: Whom to tell that the job has ended, whichever way: a POST of the job, as GET gives it. Only
-    #: addresses that the operator has listed are called. It is signed as the Standard Webhooks
-    #: specification says (webhook-id, webhook-timestamp, webhook-signature), repeated until it is
-    #: answered with success, for a day, and may come more than once with the same webhook-id.
     callback: Callback

@@ -2,51 +2,51 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
+import contextlib
 import os
-import tempfile
+import re
 import time
 import uuid
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, List, Optional, Sequence, Union, cast
+from typing import TYPE_CHECKING, Any, Callable, Iterator, List, Mapping, Optional, Sequence, Union, cast
 from urllib.parse import quote, urlencode
 
-from . import resume, uploads
-from .errors import JobFailed, Refused, WrongAnswer
-from .mesh import Mesh, read_ply
-from .transport import Answer, Broken, Request, Transport, pause
+from . import ply, uploads
+from .errors import IsomeshError, JobFailed, Refused, warn, warn_of_notes
+from .exchange import Exchange
+from .files import FINAL_STATES, file_of, format_of, written
+from .mesh import Mesh
+from .parameters import OMITTED, as_query, by_keywords, given
+from .transport import Transport
 
 if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
     from . import api
-    from .uploads import Body, Raw
+    from .files import AnyJob
+    from .uploads import Raw
 
     Source = Union[str, os.PathLike[str], Sequence[Union[str, os.PathLike[str]]], bytes, bytearray, memoryview, Any]
+    Progress = Callable[[api.Job], None]
 
-_TRIES = 4
 _LONGEST_WAIT = 30.0  # seconds, the server's
 _SHORTEST_LOOK = 0.2
-_MULTI_STATUS = 207
-_FINAL = ("succeeded", "failed", "cancelled")
+_LOOKS_LIKE_LABELS = "looks-like-labels"
 
 
 class Client:
-    """A client of one server. Constant after construction: it may be used from several threads.
+    """A client of one server. It is constant after construction: several threads may share it.
 
-    server       http://HOST:PORT, https://HOST:PORT or unix:PATH; else of ISOMESH_SERVER, else
-                 http://127.0.0.1:8080
-    token        the bearer token, where the server wants one; else of ISOMESH_TOKEN
-    authorities  a file of the certificate authorities to trust; else of ISOMESH_CA, else the system's
-    timeout      seconds that the server may be silent
+    server       http://HOST:PORT, https://HOST:PORT or unix:PATH. Default: ISOMESH_SERVER of the
+                 environment, or http://127.0.0.1:8080
+    token        the bearer token, if the server needs one. Default: ISOMESH_TOKEN
+    authorities  a file of trusted certificate authorities. Default: ISOMESH_CA, or the system's
+    timeout      the longest silence of the server, in seconds
 
-    Wherever a volume or a job is asked for, its id does as well as what the server answered about it.
+    A method that takes a volume or a job takes its id, or the dict that another method returned.
 
-    Raises Refused with the server's reason, Unreachable when no answer came, WrongAnswer for one that
-    is not what the API says, and ValueError or TypeError for arguments that cannot be sent. What can
-    be repeated safely is sent again when its connection breaks: reading, and submitting a job. Uploads
-    of 8 MiB or more go on where theirs broke, if it is not broken for longer than a minute.
+    Methods raise Refused if the server rejects the request, Unreachable if no response arrives,
+    WrongAnswer if a response does not follow the API, and ValueError or TypeError for wrong arguments.
+    If a connection breaks, safe requests are repeated: reading, and submitting a job. Uploads of
+    8 MiB or more resume where they broke; they fail after a minute without progress.
     """
 
     def __init__(
@@ -61,8 +61,9 @@ class Client:
         self.server = server or environment("ISOMESH_SERVER") or "http://127.0.0.1:8080"
         token = token if token is not None else environment("ISOMESH_TOKEN", "")
         authorities = authorities or environment("ISOMESH_CA") or None
-        self._transport = Transport(self.server, token, authorities, timeout)
+        self._exchange = Exchange(Transport(self.server, token, authorities, timeout))
 
+    @by_keywords
     def mesh(
         self,
         source: Source,
@@ -77,36 +78,58 @@ class Client:
         volume: Optional[int] = None,
         accept: Sequence[str] = (),
         nifti_form: str = "",
-        **parameters: Unpack[api.JobOptions],
+        progress: Optional[Progress] = None,
+        # `generate` writes these lines: the parameters of a job.
+        iso: api.Iso = OMITTED, labels: api.Labels = OMITTED, background: api.Background = OMITTED,
+        label_names: api.LabelNames = OMITTED, label_colors: api.LabelColors = OMITTED,
+        label_values: api.LabelValues = OMITTED, scheme: api.Scheme = OMITTED,
+        interpolation: api.Interpolation = OMITTED, passes: api.Passes = OMITTED,
+        smoothing: api.Smoothing = OMITTED, lambda_: api.Lambda = OMITTED,
+        pass_band: api.PassBand = OMITTED, max_displacement_mm: api.MaxDisplacement = OMITTED,
+        close: api.Close = OMITTED, components: api.JobParametersComponents = OMITTED,
+        fill_cavities: api.FillCavities = OMITTED, crop: api.Crop = OMITTED,
+        max_error_mm: api.MaxError = OMITTED, triangles: api.Triangles = OMITTED,
+        formats: Sequence[api.MeshFormat] = OMITTED, draco: api.JobParametersDraco = OMITTED,
+        normals: api.Normals = OMITTED, distances: api.Distances = OMITTED, lods: api.Lods = OMITTED,
+        merge: api.Merge = OMITTED, glb_codec: api.GlbCodec = OMITTED, space: api.Space = OMITTED,
+        priority: api.Priority = OMITTED, certify: api.Certify = OMITTED, callback: api.Callback = OMITTED,
+        # End of the parameters.
     ) -> Mesh:
-        """From a volume to its surface in one call: `client.mesh("head.nii.gz", iso=60)`.
+        """Makes a mesh of a volume in one call: `client.mesh("head.nii.gz", iso=60)`.
 
-        `source` and the other named arguments are as `upload` takes them; everything else is a
-        parameter of the job. Vertices are in LPS, whatever the affine is in, unless `space` says "ras";
-        `mesh.in_space` turns them. Raises JobFailed. Interrupted, it cancels the job.
+        source    everything that `upload` takes, or a stored volume: its id or its dict
+        progress  a function that is called with the job about once a second
+
+        `affine` to `nifti_form` are as for `upload`. All other keywords are parameters of the job;
+        `help(isomesh.api.JobOptions)` describes them. `formats` names the files that `mesh.save` needs
+        besides `.ply`.
+
+        Vertices are in LPS, unless `space="ras"` is given; `mesh.in_space` converts them. The volume's
+        notes are in `mesh.notes`. Each of them gives a VolumeWarning, and so does an empty surface. Raises
+        JobFailed if the job fails. An interrupt (Ctrl-C) cancels the job.
         """
-        stored = self.upload(
-            source,
-            affine=affine,
-            affine_space=affine_space,
-            spacing=spacing,
-            raw=raw,
-            name=name,
-            series=series,
-            member=member,
-            volume=volume,
-            accept=accept,
-            nifti_form=nifti_form,
-        )
-        formats = list(parameters.get("formats", []))
-        parameters["formats"] = cast(Any, formats if "ply" in formats else [*formats, "ply"])
-        job = self.submit(stored, **parameters)
+        keywords = locals()
+        parameters = given(keywords)
+        of_upload = {each: keywords[each] for each in _UPLOAD_KEYWORDS if not _is_empty(keywords[each])}
+        if affine_space != "ras":
+            of_upload["affine_space"] = affine_space
+        stored = self._stored(source, of_upload)
+        if stored is None:
+            stored = self._upload_one(source, "labels" in parameters, of_upload)
+        formats = parameters.get("formats", [])
+        parameters["formats"] = formats if "ply" in formats else [*formats, "ply"]
+        job = self._submit(stored, "", parameters)
         try:
-            job = self.wait(job)
-        except KeyboardInterrupt:
-            self.cancel(job)
+            done = self.wait(job, progress=progress)
+        except IsomeshError:
             raise
-        return self.fetch(job)
+        except BaseException:  # an interrupt, or an exception of `progress`
+            with contextlib.suppress(IsomeshError):
+                self.cancel(job)
+            raise
+        if done["mesh"]["empty"]:
+            warn(f"the surface is empty: {_why_empty(done, stored)}")
+        return self._fetch(done, stored["notes"])
 
     # --- Volumes ---------------------------------------------------------------------------------
 
@@ -125,28 +148,224 @@ class Client:
         accept: Sequence[str] = (),
         nifti_form: str = "",
     ) -> api.Volume:
-        """Stores a volume and returns what the server says of it. The same samples and geometry
-        again are the same volume.
+        """Stores a volume and returns the server's description of it. The same samples and geometry
+        always get the same id.
 
-        source    a path: of a file, of a folder of DICOM slices, of a header with its data beside it;
-                  several paths that belong together; the bytes of a file;
-                  a numpy array of three axes, the first of which is x;
-                  an image of nibabel's, or anything with `dataobj` and `affine`
-        affine    of an array: the 4 x 4 matrix that takes its indices to millimetres of `affine_space`
-        affine_space  what `affine` is in: "ras", as nibabel's and NIfTI's, or "lps", as DICOM's and ITK's
-        spacing   of an array in place of `affine`: millimetres between samples along its axes
-        raw       of a path or bytes: that they are bare samples, and of what kind
-        name      what the volume is called; else as the file or its series
+        source    one of: a path of a file, of a folder of DICOM slices, or of a header with its data
+                  beside it; a list of paths that belong together; the bytes of a file; a numpy array
+                  with the axes x, y and z; a nibabel image, or any object with `dataobj` and `affine`
+        affine    for an array: the 4 x 4 matrix that maps its indices to millimetres
+        affine_space  the space of `affine`: "ras" (nibabel, NIfTI) or "lps" (DICOM, ITK)
+        spacing   for an array, instead of `affine`: millimetres between samples along each axis
+        raw       for a path or bytes: describes them as raw samples
+        name      the volume's name. Default: the name of the file or of its series
 
-        The others choose among what a file holds, or accept what it lacks, as the server's refusal
-        names them. An upload of several volumes raises Refused with their names as `choices`; they
-        are stored nevertheless (see `upload_all`).
+        `series`, `member` and `volume` select one volume of several, `accept` and `nifti_form` settle
+        what a file leaves open. An error names the one that helps. If the upload has several volumes,
+        all are stored, and Refused lists their names in `choices`; see `upload_all`.
+
+        Each note about the volume gives a VolumeWarning.
         """
-        chosen = {"series": series, "member": member, "volume": "" if volume is None else str(int(volume))}
-        body = self._body_of(source, affine, affine_space, spacing, raw)
-        answers = self._upload(body, name, {**chosen, "accept": ",".join(accept), "nifti_form": nifti_form})
+        keywords = locals()
+        return self._upload_one(source, False, {name: keywords[name] for name in (*_UPLOAD_KEYWORDS, "affine_space")})
+
+    def upload_all(
+        self, source: Source, *, name: str = "", accept: Sequence[str] = (), nifti_form: str = ""
+    ) -> List[api.UploadedVolumesVolumes]:
+        """Stores every volume of a file, folder or archive. Each item of the result has the `volume`,
+        or the `problem` for which the server rejected it."""
+        body = uploads.of_source(source, None, "ras", None, None)
+        answers = self._exchange.upload(body, name, {"accept": ",".join(accept), "nifti_form": nifti_form})
+        for each in answers:
+            if each["volume"]:
+                warn_of_notes(each["volume"]["notes"], each["member"] or body.name)
+        return answers
+
+    def volume(self, volume: Union[str, api.Volume]) -> api.Volume:
+        """The server's description of a stored volume."""
+        return cast("api.Volume", self._exchange.get(_volume_path(volume)))
+
+    def volumes(self) -> Iterator[api.Volume]:
+        """All stored volumes, the oldest first."""
+        return cast("Iterator[api.Volume]", self._exchange.pages("/v1/volumes", "volumes", {}))
+
+    def rename(self, volume: Union[str, api.Volume], name: Optional[str]) -> api.Volume:
+        """Gives a volume another name; None removes its name."""
+        return cast("api.Volume", self._exchange.send_json("PATCH", _volume_path(volume), {"name": name}))
+
+    def erase(self, volume: Union[str, api.Volume]) -> None:
+        """Deletes a volume from the server."""
+        self._exchange.delete(_volume_path(volume))
+
+    def histogram(self, volume: Union[str, api.Volume], bins: int = 256) -> api.Histogram:
+        """How many samples have a value in each of `bins` equal intervals."""
+        return cast("api.Histogram", self._exchange.get(f"{_volume_path(volume)}/histogram?bins={int(bins)}"))
+
+    def labels(self, volume: Union[str, api.Volume], background: int = 0) -> api.VolumeLabels:
+        """The labels of a segmentation, with their voxels, volumes, names and colours."""
+        return cast("api.VolumeLabels", self._exchange.get(f"{_volume_path(volume)}/labels?background={int(background)}"))
+
+    # --- Jobs ------------------------------------------------------------------------------------
+
+    @by_keywords
+    def submit(
+        self,
+        volume: Union[str, api.Volume],
+        *,
+        idempotency_key: str = "",
+        # `generate` writes these lines: the parameters of a job.
+        iso: api.Iso = OMITTED, labels: api.Labels = OMITTED, background: api.Background = OMITTED,
+        label_names: api.LabelNames = OMITTED, label_colors: api.LabelColors = OMITTED,
+        label_values: api.LabelValues = OMITTED, scheme: api.Scheme = OMITTED,
+        interpolation: api.Interpolation = OMITTED, passes: api.Passes = OMITTED,
+        smoothing: api.Smoothing = OMITTED, lambda_: api.Lambda = OMITTED,
+        pass_band: api.PassBand = OMITTED, max_displacement_mm: api.MaxDisplacement = OMITTED,
+        close: api.Close = OMITTED, components: api.JobParametersComponents = OMITTED,
+        fill_cavities: api.FillCavities = OMITTED, crop: api.Crop = OMITTED,
+        max_error_mm: api.MaxError = OMITTED, triangles: api.Triangles = OMITTED,
+        formats: Sequence[api.MeshFormat] = OMITTED, draco: api.JobParametersDraco = OMITTED,
+        normals: api.Normals = OMITTED, distances: api.Distances = OMITTED, lods: api.Lods = OMITTED,
+        merge: api.Merge = OMITTED, glb_codec: api.GlbCodec = OMITTED, space: api.Space = OMITTED,
+        priority: api.Priority = OMITTED, certify: api.Certify = OMITTED, callback: api.Callback = OMITTED,
+        # End of the parameters.
+    ) -> api.Job:
+        """Starts a job and returns at once: `client.submit(volume, iso=60, formats=["glb", "stl"])`.
+
+        The keywords are parameters of the job; `help(isomesh.api.JobOptions)` describes them. The same
+        `idempotency_key` always returns the same job, also in another process.
+        """
+        return self._submit(volume, idempotency_key, given(locals()))
+
+    def job(self, job: Union[str, AnyJob]) -> api.Job:
+        """The job as it is now."""
+        return cast("api.Job", self._exchange.get(_job_path(job)))
+
+    def jobs(self, state: Optional[api.JobState] = None) -> Iterator[api.Job]:
+        """All jobs, or all jobs in one state, the newest first."""
+        return cast("Iterator[api.Job]", self._exchange.pages("/v1/jobs", "jobs", {"state": state} if state else {}))
+
+    def wait(
+        self,
+        job: Union[str, AnyJob],
+        *,
+        timeout: Optional[float] = None,
+        progress: Optional[Progress] = None,
+    ) -> api.SucceededJob:
+        """Waits until the job has succeeded and returns it. Raises JobFailed if it failed or was
+        cancelled, and TimeoutError after `timeout` seconds. `progress` is called with the job about
+        once a second."""
+        end = None if timeout is None else time.monotonic() + timeout
+        while True:
+            asked = time.monotonic()
+            longest = 1.0 if progress else _LONGEST_WAIT
+            if end is not None:
+                longest = max(0, min(longest, end - asked))
+            seen = cast("api.Job", self._exchange.get(f"{_job_path(job)}?wait={longest:.3f}", patience=longest))
+            if progress:
+                progress(seen)
+            if seen["state"] == "succeeded":
+                return cast("api.SucceededJob", seen)
+            if seen["state"] in FINAL_STATES:
+                raise JobFailed(seen)
+            if end is not None and time.monotonic() >= end:
+                raise TimeoutError(f"job {seen['id']} is {seen['state']} after {timeout} s")
+            # A server that responds at once does not make this a busy loop.
+            time.sleep(max(0.0, min(longest, _SHORTEST_LOOK) - (time.monotonic() - asked)))
+
+    def cancel(self, job: Union[str, AnyJob]) -> api.Job:
+        """Cancels a job. A job that has ended stays as it is."""
+        return cast("api.Job", self._exchange.delete(_job_path(job)))
+
+    @by_keywords
+    def estimate(
+        self,
+        volume: Union[str, api.Volume],
+        *,
+        # `generate` writes these lines: the parameters of a job.
+        iso: api.Iso = OMITTED, labels: api.Labels = OMITTED, background: api.Background = OMITTED,
+        label_names: api.LabelNames = OMITTED, label_colors: api.LabelColors = OMITTED,
+        label_values: api.LabelValues = OMITTED, scheme: api.Scheme = OMITTED,
+        interpolation: api.Interpolation = OMITTED, passes: api.Passes = OMITTED,
+        smoothing: api.Smoothing = OMITTED, lambda_: api.Lambda = OMITTED,
+        pass_band: api.PassBand = OMITTED, max_displacement_mm: api.MaxDisplacement = OMITTED,
+        close: api.Close = OMITTED, components: api.JobParametersComponents = OMITTED,
+        fill_cavities: api.FillCavities = OMITTED, crop: api.Crop = OMITTED,
+        max_error_mm: api.MaxError = OMITTED, triangles: api.Triangles = OMITTED,
+        formats: Sequence[api.MeshFormat] = OMITTED, draco: api.JobParametersDraco = OMITTED,
+        normals: api.Normals = OMITTED, distances: api.Distances = OMITTED, lods: api.Lods = OMITTED,
+        merge: api.Merge = OMITTED, glb_codec: api.GlbCodec = OMITTED, space: api.Space = OMITTED,
+        priority: api.Priority = OMITTED, certify: api.Certify = OMITTED, callback: api.Callback = OMITTED,
+        # End of the parameters.
+    ) -> api.Estimate:
+        """The exact numbers of triangles and vertices of a job, and what it takes, without running it."""
+        query = {"volume": _id_of(volume), **as_query(given(locals()))}
+        return cast("api.Estimate", self._exchange.get("/v1/estimate?" + urlencode(query)))
+
+    # --- Meshes ----------------------------------------------------------------------------------
+
+    def fetch(self, job: Union[str, AnyJob]) -> Mesh:
+        """The mesh of a succeeded job as arrays. The job's `formats` must include "ply". `mesh.notes`
+        is empty if the volume is no longer stored."""
+        done = self.job(job) if isinstance(job, str) else job
+        file_of(done, "ply")
+        notes: Sequence[api.Note] = ()
+        with contextlib.suppress(Refused):
+            notes = self.volume(done["volume"])["notes"]
+        return self._fetch(cast("api.SucceededJob", done), notes)
+
+    def download(
+        self, job: Union[str, AnyJob], path: Union[str, os.PathLike[str]], *, label: Optional[int] = None
+    ) -> Path:
+        """Writes a file of the job to `path` and returns that path. The suffix selects the format.
+        `label` selects one label's own surface. The file appears only when it is complete and matches
+        the job's SHA-256."""
+        target = Path(path)
+        done = self.job(job) if isinstance(job, str) else job
+        announced = file_of(done, format_of(target), label)
+        with written(target) as file:
+
+            def write(at: int, piece: bytes) -> None:
+                file.seek(at)
+                file.write(piece)
+
+            self._exchange.download(announced, write)
+        return target
+
+    # --- How -------------------------------------------------------------------------------------
+
+    def _stored(self, source: Any, of_upload: Mapping[str, Any]) -> Optional[api.Volume]:
+        """The stored volume that `source` names; None for a source to upload."""
+        if isinstance(source, Mapping):
+            if not isinstance(source.get("notes"), list):
+                raise TypeError("this dict is not a volume: give one that upload, volume or volumes returned")
+            found = cast("api.Volume", source)  # its owner has seen the notes
+        elif isinstance(source, str) and re.fullmatch("[0-9a-f]{64}", source) and not os.path.exists(source):
+            found = self.volume(source)
+            warn_of_notes(found["notes"], source[:12])  # the name may name a patient
+        else:
+            return None
+        if of_upload:
+            raise ValueError(f"{', '.join(of_upload)}: for uploads only, and this volume is stored already")
+        return found
+
+    def _upload_one(self, source: Any, is_by_labels: bool, keywords: Mapping[str, Any]) -> api.Volume:
+        get = keywords.get
+        number = get("volume")
+        chosen = {
+            "series": get("series", ""),
+            "member": get("member", ""),
+            "volume": "" if number is None else str(int(number)),
+            "accept": ",".join(get("accept", ())),
+            "nifti_form": get("nifti_form", ""),
+        }
+        body = uploads.of_source(source, get("affine"), get("affine_space", "ras"), get("spacing"), get("raw"))
+        answers = self._exchange.upload(body, get("name", ""), chosen)
         if len(answers) == 1 and answers[0]["volume"] is not None:
-            return answers[0]["volume"]
+            found = answers[0]["volume"]
+            # This note advises what a job by labels does.
+            notes = [each for each in found["notes"] if not (is_by_labels and each["code"] == _LOOKS_LIKE_LABELS)]
+            warn_of_notes(notes, body.name)
+            return found
         choices = [
             {
                 "parameter": "member",
@@ -155,234 +374,40 @@ class Client:
             }
             for each in answers
         ]
-        detail = f"the upload holds {len(answers)} volumes, where one is needed"
+        detail = f"the upload has {len(answers)} volumes; select one of them"
         raise Refused(422, {"detail": detail, "choices": choices})
 
-    def upload_all(
-        self, source: Source, *, name: str = "", accept: Sequence[str] = (), nifti_form: str = ""
-    ) -> List[api.UploadedVolumesVolumes]:
-        """As `upload`, for a file, folder or archive that may hold several volumes: each is answered
-        for by `volume`, or by the `problem` for which it was refused."""
-        body = self._body_of(source, None, "ras", None, None)
-        return self._upload(body, name, {"accept": ",".join(accept), "nifti_form": nifti_form})
+    def _submit(self, volume: Union[str, api.Volume], idempotency_key: str, parameters: Mapping[str, Any]) -> api.Job:
+        value = {"volume": _id_of(volume), **parameters}
+        return cast("api.Job", self._exchange.send_json("POST", "/v1/jobs", value, idempotency_key or uuid.uuid4().hex))
 
-    def volume(self, volume: Union[str, api.Volume]) -> api.Volume:
-        return cast("api.Volume", self._get(_volume_path(volume)))
-
-    def volumes(self) -> Iterator[api.Volume]:
-        """All of them, the oldest first."""
-        return cast("Iterator[api.Volume]", self._pages("/v1/volumes", "volumes", {}))
-
-    def rename(self, volume: Union[str, api.Volume], name: Optional[str]) -> api.Volume:
-        """Gives a volume another name, or none."""
-        return cast("api.Volume", self._send_json("PATCH", _volume_path(volume), {"name": name}))
-
-    def erase(self, volume: Union[str, api.Volume]) -> None:
-        self._transport.send(Request("DELETE", _volume_path(volume))).text()
-
-    def histogram(self, volume: Union[str, api.Volume], bins: int = 256) -> api.Histogram:
-        return cast("api.Histogram", self._get(f"{_volume_path(volume)}/histogram?bins={int(bins)}"))
-
-    def labels(self, volume: Union[str, api.Volume], background: int = 0) -> api.VolumeLabels:
-        """The labels that a volume of whole numbers has: voxels, mm3, names and colours."""
-        return cast("api.VolumeLabels", self._get(f"{_volume_path(volume)}/labels?background={int(background)}"))
-
-    # --- Jobs ------------------------------------------------------------------------------------
-
-    def submit(
-        self,
-        volume: Union[str, api.Volume],
-        *,
-        idempotency_key: str = "",
-        **parameters: Unpack[api.JobOptions],
-    ) -> api.Job:
-        """Starts a job: `client.submit(volume, iso=60, formats=["glb", "stl"])`.
-
-        The parameters are those of the API, all but `volume`; `lambda_` is `lambda`. The same
-        `idempotency_key` gives the same job again, also to another process.
-        """
-        asked: Dict[str, object] = {"volume": _id_of(volume)}
-        asked.update((name.rstrip("_"), value) for name, value in parameters.items())
-        key = idempotency_key or uuid.uuid4().hex
-        body = self._json_request("POST", "/v1/jobs", asked, {"Idempotency-Key": key})
-        return cast("api.Job", _parsed(self._transport.repeat(body)))
-
-    def job(self, job: Union[str, api.Job]) -> api.Job:
-        return cast("api.Job", self._get(_job_path(job)))
-
-    def jobs(self, state: Optional[api.JobState] = None) -> Iterator[api.Job]:
-        """All of them, or those in one state, the newest first."""
-        return cast("Iterator[api.Job]", self._pages("/v1/jobs", "jobs", {"state": state} if state else {}))
-
-    def wait(
-        self,
-        job: Union[str, api.Job],
-        *,
-        timeout: Optional[float] = None,
-        progress: Optional[Callable[[api.Job], None]] = None,
-    ) -> api.Job:
-        """The job when it has succeeded. Raises JobFailed when it failed or was cancelled, and
-        TimeoutError after `timeout` seconds. `progress` is called with the job about once a second."""
-        end = None if timeout is None else time.monotonic() + timeout
-        while True:
-            asked = time.monotonic()
-            longest = 1.0 if progress else _LONGEST_WAIT
-            if end is not None:
-                longest = max(0, min(longest, end - asked))
-            path = f"{_job_path(job)}?wait={longest:.3f}"
-            seen = cast("api.Job", _parsed(self._transport.repeat(Request("GET", path, patience=longest))))
-            if progress:
-                progress(seen)
-            if seen["state"] == "succeeded":
-                return seen
-            if seen["state"] in _FINAL:
-                raise JobFailed(seen)
-            if end is not None and time.monotonic() >= end:
-                raise TimeoutError(f"job {seen['id']} is {seen['state']} after {timeout} s")
-            # A server that answers at once is not asked without end.
-            time.sleep(max(0.0, min(longest, _SHORTEST_LOOK) - (time.monotonic() - asked)))
-
-    def cancel(self, job: Union[str, api.Job]) -> api.Job:
-        """Asks a job to end; one that has ended stays as it is."""
-        return cast("api.Job", _parsed(self._transport.send(Request("DELETE", _job_path(job))).text()))
-
-    def estimate(self, volume: Union[str, api.Volume], **parameters: Unpack[api.JobOptions]) -> api.Estimate:
-        """What a job would make and take, without running it: exact triangles and vertices."""
-        query = {"volume": _id_of(volume), **_as_query(cast("Dict[str, object]", parameters))}
-        return cast("api.Estimate", self._get("/v1/estimate?" + urlencode(query)))
-
-    # --- Meshes ----------------------------------------------------------------------------------
-
-    def fetch(self, job: Union[str, api.Job]) -> Mesh:
-        """The mesh of a job that was asked for the format "ply", as arrays."""
-        done = self.job(job) if isinstance(job, str) else job
-        announced = _file_of(done, "ply", None)
+    def _fetch(self, job: api.SucceededJob, notes: Sequence[api.Note]) -> Mesh:
         data = bytearray()
-        self._download(announced, lambda at, piece: _put(data, at, piece))
-        return read_ply(data, done)
+        self._exchange.download(file_of(job, "ply"), lambda at, piece: _put(data, at, piece))
+        return Mesh(*ply.parse(data), job=job, notes=notes, download=self.download)
 
-    def download(
-        self, job: Union[str, api.Job], path: Union[str, os.PathLike[str]], *, label: Optional[int] = None
-    ) -> Path:
-        """Writes a job's mesh to `path`, whose suffix says the format, and returns that path. The
-        file appears only when all of its bytes have come and are those that the job describes. Of a
-        job by labels, with `label`, one label's own surface."""
-        target = Path(path)
-        done = self.job(job) if isinstance(job, str) else job
-        announced = _file_of(done, target.suffix.lower().lstrip("."), label)
-        number, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-        try:
-            with os.fdopen(number, "wb") as file:
+_UPLOAD_KEYWORDS = ("affine", "spacing", "raw", "name", "series", "member", "volume", "accept", "nifti_form")
 
-                def write(at: int, piece: bytes) -> None:
-                    file.seek(at)
-                    file.write(piece)
 
-                self._download(announced, write)
-                file.flush()
-                os.fsync(file.fileno())
-            # As any new file; mkstemp's are for their owner alone.
-            mask = os.umask(0)
-            os.umask(mask)
-            os.chmod(part, 0o666 & ~mask)
-            os.replace(part, target)
-        except BaseException:
-            os.unlink(part)
-            raise
-        return target
+def _why_empty(job: api.SucceededJob, volume: api.Volume) -> str:
+    iso, (low, high) = job["mesh"].get("iso"), volume["range"]
+    if job["mesh"]["dropped"]["components"] > 0:
+        return "no connected component was kept"
+    if iso is None:
+        return "the labels have no surface"
+    if not low <= iso <= high:
+        return f"the iso-value {iso:g} is outside the samples' range, {low:g} to {high:g}"
+    return f"there is none at the iso-value {iso:g}"
 
-    # --- How -------------------------------------------------------------------------------------
 
-    def _body_of(
-        self, source: Any, affine: Any, space: str, spacing: Optional[Sequence[float]], raw: Optional[Raw]
-    ) -> Body:
-        is_array = False
-        if isinstance(source, (str, os.PathLike)):
-            body = uploads.of_paths([Path(source)])
-        elif isinstance(source, (bytes, bytearray)) or type(source) is memoryview:
-            body = uploads.of_bytes(source)
-        elif isinstance(source, (list, tuple)) and source and all(isinstance(p, (str, os.PathLike)) for p in source):
-            body = uploads.of_paths([Path(each) for each in source])
-        else:
-            is_array = True
-            if hasattr(source, "dataobj") and hasattr(source, "affine"):
-                affine = source.affine if affine is None and spacing is None else affine
-                source = source.dataobj
-            elif not hasattr(source, "__array__"):
-                raise TypeError(f"cannot upload {type(source).__name__}: give a path, bytes, an array or an image")
-            body = uploads.of_array(source, affine, space, spacing)
-        if is_array and raw is not None:
-            raise ValueError("raw describes files and bytes; an array says itself what it is")
-        if not is_array and (affine is not None or spacing is not None):
-            raise ValueError("affine and spacing are for arrays; a file says itself where its samples lie")
-        if raw is not None:
-            body.query = raw.query()
-        return body
-
-    def _upload(self, body: Body, name: str, chosen: Dict[str, str]) -> List[api.UploadedVolumesVolumes]:
-        query = {**body.query, **{key: value for key, value in chosen.items() if value}}
-        headers = {"Content-Type": "application/octet-stream"}
-        if name or body.name:
-            # Names may name patients: they go in a header, because logs hold targets.
-            headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(name or body.name, safe='')}"
-        target = "/v1/volumes" + ("?" + urlencode(query) if query else "")
-        if body.size >= resume.RESUMABLE_BYTES:
-            answer = resume.send(self._transport, target, headers, body)
-        else:
-            answer = self._transport.send(Request("POST", target, headers, body))
-        parsed = _parsed(answer.text())
-        if answer.status == _MULTI_STATUS:
-            return cast("List[api.UploadedVolumesVolumes]", parsed["volumes"])
-        volume = cast("api.Volume", parsed)
-        return [{"member": "", "status": answer.status, "volume": volume, "problem": None}]
-
-    def _download(self, announced: api.MeshFile, write: Callable[[int, bytes], None]) -> None:
-        """Takes a broken download up where it broke."""
-        size, digest, at = announced["bytes"], hashlib.sha256(), 0
-        for attempt in range(1, _TRIES + 1):
-            headers = {"Range": f"bytes={at}-", "If-Range": f'"{announced["sha256"]}"'} if at else {}
-            try:
-                answer = self._transport.send(Request("GET", announced["href"], headers))
-                if at and not _goes_on(answer, at):
-                    digest, at = hashlib.sha256(), 0
-                for piece in answer.pieces():
-                    write(at, piece)
-                    digest.update(piece)
-                    at += len(piece)
-                break
-            except Broken:
-                if attempt == _TRIES:
-                    raise
-            pause(attempt)
-        if at != size or digest.hexdigest() != announced["sha256"]:
-            raise WrongAnswer("the mesh that arrived is not the one that the job describes")
-
-    def _get(self, target: str) -> Dict[str, Any]:
-        return _parsed(self._transport.repeat(Request("GET", target)))
-
-    def _pages(self, path: str, member: str, query: Dict[str, str]) -> Iterator[Any]:
-        while True:
-            page = self._get(path + ("?" + urlencode(query) if query else ""))
-            yield from page[member]
-            if not page["next"] or not page[member]:
-                return
-            query = {**query, "cursor": page["next"]}
-
-    def _json_request(self, method: str, target: str, value: object, headers: Dict[str, str]) -> Request:
-        try:
-            text = json.dumps(value, allow_nan=False, default=_as_plain).encode()
-        except ValueError as error:
-            raise ValueError(f"a parameter cannot be sent: {error}") from error
-        return Request(method, target, {"Content-Type": "application/json", **headers}, uploads.of_bytes(text))
-
-    def _send_json(self, method: str, target: str, value: object) -> Dict[str, Any]:
-        return _parsed(self._transport.send(self._json_request(method, target, value, {})).text())
+def _is_empty(value: Any) -> bool:
+    return value is None or isinstance(value, (str, tuple, list)) and not value
 
 
 def _id_of(thing: Any) -> str:
     found = thing if isinstance(thing, str) else thing["id"]
     if not isinstance(found, str) or found in ("", ".", ".."):
-        raise ValueError(f"{found!r} is no id")
+        raise ValueError(f"{found!r} is not an id")
     return found
 
 
@@ -392,61 +417,6 @@ def _volume_path(volume: Any) -> str:
 
 def _job_path(job: Any) -> str:
     return "/v1/jobs/" + quote(_id_of(job), safe="")
-
-
-def _parsed(body: bytes) -> Dict[str, Any]:
-    try:
-        value = json.loads(body)
-    except ValueError as error:
-        raise WrongAnswer("the server's answer is no JSON") from error
-    if not isinstance(value, dict):
-        raise WrongAnswer("the server's answer is no object")
-    return value
-
-
-def _as_plain(value: Any) -> Any:
-    """Numbers and lists of numpy as those of JSON."""
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} cannot be sent as a parameter")
-
-
-def _as_query(parameters: Dict[str, object]) -> Dict[str, str]:
-    """As the table of parameters spells them in a query: groups by their members, lists with
-    commas."""
-    query: Dict[str, str] = {}
-    for name, value in parameters.items():
-        key = {"formats": "format"}.get(name, name.rstrip("_"))
-        value = value.tolist() if hasattr(value, "tolist") else value
-        if isinstance(value, dict):
-            query.update(_as_query(value))
-        elif isinstance(value, bool):
-            query[key] = "true" if value else "false"
-        elif isinstance(value, (list, tuple)):
-            query[key] = ",".join(str(each) for each in value)
-        elif value is not None:
-            query[key] = str(value)
-    return query
-
-
-def _file_of(job: api.Job, form: str, label: Optional[int]) -> api.MeshFile:
-    mesh = job["mesh"]
-    if mesh is None:
-        if job["state"] in _FINAL:
-            raise JobFailed(job)
-        raise ValueError(f"job {job['id']} is {job['state']}: `wait` for it first")
-    files: Any = mesh["files"]
-    if label is not None:
-        files = next((each["files"] for each in mesh.get("labels", []) if each["label"] == label), {})
-    if form in files:
-        return cast("api.MeshFile", files[form])
-    of_label = "" if label is None else f" of the label {label}"
-    has = ", ".join(files) or "none"
-    raise ValueError(f"job {job['id']} has no file of the format {form!r}{of_label}; it has {has}")
-
-
-def _goes_on(answer: Answer, at: int) -> bool:
-    return answer.status == 206 and answer.header("Content-Range").startswith(f"bytes {at}-")
 
 
 def _put(data: bytearray, at: int, piece: bytes) -> None:

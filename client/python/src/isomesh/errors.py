@@ -1,47 +1,73 @@
-"""What can go wrong, as exceptions; all of them are IsomeshError."""
+"""The package's exceptions, all of them IsomeshError, and its warning."""
 
 from __future__ import annotations
 
 import json
+import os
+import sys
+import warnings
 from typing import TYPE_CHECKING, Any, Mapping, Optional, Sequence, cast
 
 if TYPE_CHECKING:
-    from .api import Job
+    from . import api
 
 
 class IsomeshError(Exception):
-    """Anything that this package raises, but for ValueError and TypeError of wrong arguments."""
+    """The base class of this package's exceptions. Wrong arguments raise ValueError or TypeError."""
 
 
 class Unreachable(IsomeshError):
-    """No answer of a server came: it is not there, or the connection broke."""
+    """No response arrived: there is no server, or the connection broke."""
 
 
 class WrongAnswer(IsomeshError):
-    """What came is not what the API says, or a mesh is not the one that its job describes."""
+    """A response does not follow the API, or a mesh is not the one that its job describes."""
+
+
+class VolumeWarning(UserWarning):
+    """A note about a volume: something that the server decided or corrected when it read the file.
+    Also: the surface is empty."""
+
+
+def warn_of_notes(notes: Sequence[api.Note], name: str) -> None:
+    """Warns of each note about the volume that is called `name`; it may be empty."""
+    for note in notes:
+        warn((f"{name}: " if name else "") + f"{note['detail']} ({note['code']})")
+
+
+def warn(text: str) -> None:
+    """A VolumeWarning at the line that called this package."""
+    frame: Any = sys._getframe()
+    level = 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, VolumeWarning, stacklevel=level)
+
+
+_HERE = os.path.dirname(__file__) + os.sep
 
 
 class Refused(IsomeshError):
-    """The server's refusal.
+    """The server rejected a request.
 
-    `status` is its HTTP status and `problem` the document that says why (RFC 9457); `choices` and
-    `overridable` of it tell what would help, where something does.
+    `status` is the HTTP status, and `problem` is the server's explanation (RFC 9457). `choices` and
+    `overridable` say how to repeat an upload so that the server accepts it, if there is a way.
     """
 
     def __init__(self, status: int, problem: Mapping[str, Any]) -> None:
-        text = str(problem.get("detail") or problem.get("title") or f"the server answered {status}")
+        text = str(problem.get("detail") or problem.get("title") or f"the server responded with status {status}")
         super().__init__(text + _remedy(self._list(problem, "choices"), problem.get("overridable")))
         self.status = status
         self.problem = problem
 
     @property
     def choices(self) -> Sequence[Mapping[str, str]]:
-        """What an upload may be asked for, as `{"parameter", "value", "title"}`."""
+        """The arguments of `upload` to choose from, each as {"parameter", "value", "title"}."""
         return self._list(self.problem, "choices")
 
     @property
     def overridable(self) -> Optional[str]:
-        """The note that `accept` would have the upload taken with."""
+        """The code of a note: with it in `accept`, the server accepts the upload."""
         return cast(Optional[str], self.problem.get("overridable"))
 
     @staticmethod
@@ -51,9 +77,9 @@ class Refused(IsomeshError):
 
 
 class JobFailed(IsomeshError):
-    """A job that was waited for has failed or was cancelled; `job` is that job."""
+    """A job has failed or was cancelled. `job` is the job."""
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: api.Job) -> None:
         problem: Mapping[str, Any] = cast("Mapping[str, Any]", job.get("error") or {})
         reason = problem.get("detail") or f"the job was {job['state']}"
         super().__init__(f"job {job['id']}: {reason}")
@@ -61,8 +87,7 @@ class JobFailed(IsomeshError):
 
 
 def refusal(status: int, content_type: str, body: bytes) -> Refused:
-    """The exception for an answer that is no success; something in front of the server may send
-    other than problem documents."""
+    """The exception for an unsuccessful response. A proxy's response may have no problem document."""
     problem: object = None
     if content_type.startswith(("application/problem+json", "application/json")):
         try:
@@ -78,4 +103,4 @@ def _remedy(choices: Sequence[Mapping[str, str]], overridable: object) -> str:
         text += f"\n  {choice.get('parameter')}={choice.get('value')!r}: {choice.get('title')}"
     if len(choices) > 20:
         text += f"\n  and {len(choices) - 20} more"
-    return text + (f"\n  accept=[{overridable!r}] takes it nevertheless" if overridable else "")
+    return text + (f"\n  accept=[{overridable!r}] accepts the volume as it is" if overridable else "")

@@ -2,124 +2,236 @@
 
 from __future__ import annotations
 
-import sys
+import hashlib
+import importlib
 from array import array
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Dict, Optional, Union
+from typing import TYPE_CHECKING, Any, Callable, Dict, Optional, Sequence, Union
 
-from .errors import WrongAnswer
+from . import files, ply
 
 if TYPE_CHECKING:
-    from .api import Job
+    import os
 
-_HEADER_END = b"end_header\n"
-_LONGEST_HEADER = 4096
+    from . import api
+
+    Download = Callable[[api.SucceededJob, Path], Path]
 
 
-@dataclass(frozen=True)
 class Mesh:
     """A surface of triangles, in millimetres.
 
     vertices  float32, shape (n, 3)
     faces     uint32, shape (m, 3): indices of vertices, counter-clockwise seen from outside
-    labels    int32 or uint32, shape (m,): the label of each face; None unless the job was by labels
-    space     "lps" (DICOM's patient space), or "ras" (NIfTI's and nibabel's)
-    job       the job that made it, with all that the server measured; None when read from a file
+    labels    int32 or uint32, shape (m,): the label of each face; None unless the job had labels
+    normals   float32, shape (n, 3): the unit normal of each vertex
+    bounds    float32, shape (2, 3): the smallest and the largest corner
+    space     "lps" (DICOM's patient space), or "ras" (NIfTI's and nibabel's); see `in_space`
+    job       the job that made the mesh, with everything that the server measured
+    notes     what the server decided or corrected when it read the volume, as {"code", "detail"}
 
-    The arrays are numpy's where numpy is installed. Without it they are memoryviews of the same
-    shapes: `vertices[7, 0]`, `len(faces)`, `faces.tolist()`, and anything that takes buffers.
+    The arrays belong to you: change them or assign others, as in `mesh.vertices += 1`. `job` and
+    `notes` then still describe the mesh that the server made.
+
+    The arrays are numpy arrays. Without numpy they are read-only memoryviews of the same shapes, and
+    `normals` is not available: `vertices[7, 0]`, `len(faces)` and `faces.tolist()` work in both cases.
     """
 
     vertices: Any
     faces: Any
-    labels: Optional[Any] = None
-    space: str = "lps"
-    job: Optional[Job] = None
+    labels: Any
+    notes: Sequence[api.Note]
+
+    def __init__(
+        self,
+        vertices: Any,
+        faces: Any,
+        labels: Optional[Any] = None,
+        space: str = "lps",
+        job: Optional[api.SucceededJob] = None,
+        notes: Sequence[api.Note] = (),
+        download: Optional[Download] = None,
+    ) -> None:
+        self.vertices = vertices
+        self.faces = faces
+        self.labels = labels
+        self.notes = notes
+        self._space = _checked(space)
+        self._job = job
+        self._download = download
+
+    @property
+    def space(self) -> str:
+        return self._space
+
+    @property
+    def job(self) -> api.SucceededJob:
+        if self._job is None:
+            raise AttributeError("this mesh has no job: it was not fetched from a server")
+        return self._job
+
+    @property
+    def bounds(self) -> Any:
+        """The smallest and the largest corner, shape (2, 3); zeros for an empty mesh."""
+        if not isinstance(self.vertices, memoryview):
+            import numpy
+
+            points = numpy.asarray(self.vertices)
+            return numpy.stack([points.min(0), points.max(0)]) if len(points) else numpy.zeros((2, 3), "float32")
+        numbers = array("f", self.vertices.tobytes()) or array("f", [0, 0, 0])
+        corners = [pick(numbers[axis::3]) for pick in (min, max) for axis in range(3)]
+        return memoryview(array("f", corners)).cast("B").cast("f", [2, 3])
+
+    @property
+    def normals(self) -> Any:
+        """The unit normal of each vertex, outward: the mean of its faces, weighted by their areas.
+
+        The normals are computed from `vertices` and `faces` on every access. A normal is zero if the
+        vertex has no faces, or if its faces cancel out, as on the wall between two labels. For one
+        label's normals use that label's faces alone: `Mesh(mesh.vertices, mesh.faces[mesh.labels == 1])`.
+        """
+        numpy = _package("numpy", "mesh.normals", "numpy")
+        points = numpy.asarray(self.vertices)
+        corners = [numpy.asarray(self.faces)[:, corner].astype("intp") for corner in range(3)]
+        first = points[corners[0]].astype("float64")
+        along, across = points[corners[1]] - first, points[corners[2]] - first
+        sums = numpy.zeros((len(points), 3))
+        for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            of_faces = along[:, y] * across[:, z] - along[:, z] * across[:, y]
+            for corner in corners:
+                sums[:, x] += numpy.bincount(corner, of_faces, len(points))
+        lengths = numpy.linalg.norm(sums, axis=1, keepdims=True)
+        return numpy.divide(sums, lengths, out=numpy.zeros_like(sums), where=lengths > 0).astype("float32")
 
     def in_space(self, space: str) -> Mesh:
-        """The same surface in "ras" or "lps": x and y change their signs, nothing else does."""
-        if space not in ("ras", "lps"):
-            raise ValueError("space must be 'ras' or 'lps'")
-        if space == self.space:
-            return self
-        return Mesh(_turned(self.vertices), self.faces, self.labels, space, self.job)
+        """A copy of the mesh in "ras" or "lps". x and y change their signs between the two."""
+        turned = _turned if _checked(space) != self.space else _copied
+        labels = None if self.labels is None else _copied(self.labels)
+        return Mesh(
+            turned(self.vertices), _copied(self.faces), labels, space, self._job, self.notes, self._download
+        )
+
+    def save(self, path: Union[str, os.PathLike[str]]) -> Path:
+        """Writes the mesh to a file and returns the file's path. The suffix selects the format.
+
+        `.ply` is written from the arrays. Every other format is a file of the job and is downloaded:
+        `client.mesh("head.nii.gz", iso=60, formats=["glb", "stl"])` makes the files for `.glb` and
+        `.stl`. Raises ValueError if the job has no file of the format, or if the mesh is not the one
+        that the server made: its arrays were changed, or `in_space` has turned it.
+        """
+        target = Path(path)
+        form = files.format_of(target)
+        if form == "ply":
+            data = ply.pieces(self.vertices, self.faces, self.labels, self.space)
+            first = next(data)  # raises for arrays that cannot be written, before there is a file
+            with files.written(target) as file:
+                file.write(first)
+                file.writelines(data)
+            return target
+        if self._job is None:
+            raise ValueError("this mesh has no job, so it can be saved as .ply only")
+        files.file_of(self._job, form)
+        self._expect_unchanged(form)
+        if self._download is None:
+            raise ValueError("this mesh has no connection to a server; use client.download(mesh.job, path)")
+        return self._download(self._job, target)
+
+    def to_trimesh(self) -> Any:
+        """The mesh as a trimesh.Trimesh with the same vertices and faces (int64). Labels become the
+        face attribute "label"; metadata says the units and the space. Needs the package trimesh."""
+        trimesh = _package("trimesh", "mesh.to_trimesh()", "trimesh")
+        numpy = _package("numpy", "mesh.to_trimesh()", "numpy")
+        labels = {} if self.labels is None else {"label": numpy.array(self.labels)}
+        return trimesh.Trimesh(
+            vertices=numpy.array(self.vertices, "float64"),
+            faces=numpy.array(self.faces, "int64"),
+            face_attributes=labels,
+            metadata={"units": "mm", "space": self.space},
+            process=False,  # which would merge and reorder vertices
+        )
+
+    def to_vtk(self) -> Any:
+        """The mesh as a vtkPolyData with the same points (float32) and cells (int64). Labels become
+        the cell data "label". The arrays are copied. Needs the package vtk."""
+        numpy = _package("numpy", "mesh.to_vtk()", "numpy")
+        package = "vtk (on Debian: apt install python3-vtk9)"
+        core = _package("vtkmodules.vtkCommonCore", "mesh.to_vtk()", package)
+        model = _package("vtkmodules.vtkCommonDataModel", "mesh.to_vtk()", package)
+        support = _package("vtkmodules.util.numpy_support", "mesh.to_vtk()", package)
+
+        points = core.vtkPoints()
+        points.SetData(support.numpy_to_vtk(numpy.ascontiguousarray(self.vertices, "float32"), deep=True))
+        ends = numpy.arange(0, 3 * len(self.faces) + 1, 3, "int64")
+        corners = numpy.ravel(self.faces).astype("int64")
+        cells = model.vtkCellArray()
+        cells.SetData(*(support.numpy_to_vtkIdTypeArray(each, deep=True) for each in (ends, corners)))
+        surface = model.vtkPolyData()
+        surface.SetPoints(points)
+        surface.SetPolys(cells)
+        if self.labels is not None:
+            labels = support.numpy_to_vtk(numpy.ascontiguousarray(self.labels), deep=True)
+            labels.SetName("label")
+            surface.GetCellData().SetScalars(labels)
+        return surface
 
     def __repr__(self) -> str:
         return f"<Mesh of {len(self.faces)} triangles and {len(self.vertices)} vertices, mm, {self.space.upper()}>"
 
+    def __getstate__(self) -> Dict[str, Any]:
+        # A connection and its token belong to this process; copies of the mesh do without.
+        return {**self.__dict__, "_download": None}
+
+    def _expect_unchanged(self, form: str) -> None:
+        """Raises ValueError unless the arrays are those that the server sent."""
+        made_in = self.job["parameters"].get("space", "lps")
+        if self.space != made_in:
+            raise ValueError(
+                f"the mesh is in {self.space.upper()}, and the server's .{form} file in {made_in.upper()}: "
+                f"add space={self.space!r} to the call that starts the job, or save the mesh as .ply"
+            )
+        digest = hashlib.sha256()
+        for piece in ply.pieces(self.vertices, self.faces, self.labels, self.space):
+            digest.update(piece)
+        if digest.hexdigest() != files.file_of(self.job, "ply")["sha256"]:
+            raise ValueError(
+                f"the mesh was changed, and the server's .{form} file was not: save the mesh as .ply, "
+                "or download the server's file with client.download(mesh.job, path)"
+            )
+
+
+def read_ply(source: Union[bytes, bytearray, memoryview, str, os.PathLike[str]]) -> Mesh:
+    """The mesh of a PLY file that isomesh wrote. Raises WrongAnswer for any other file."""
+    data = source if isinstance(source, (bytes, bytearray, memoryview)) else Path(source).read_bytes()
+    return Mesh(*ply.parse(data))
+
+
+def _checked(space: str) -> str:
+    if space not in ("ras", "lps"):
+        raise ValueError(f"space must be 'ras' or 'lps', not {space!r}")
+    return space
+
+
+def _package(name: str, what: str, package: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise ImportError(f"{what} needs the package {package}; install it with pip install {package.split()[0]}") from error
+
+
+def _copied(values: Any) -> Any:
+    if isinstance(values, memoryview):  # which is read-only
+        return values
+    import numpy
+
+    return numpy.array(values)
+
 
 def _turned(vertices: Any) -> Any:
     if not isinstance(vertices, memoryview):
-        turned = vertices.copy()
+        turned = _copied(vertices)
         turned[:, :2] *= -1
         return turned
     numbers = array("f", vertices.tobytes())
     for axis in (0, 1):
         numbers[axis::3] = array("f", [-number for number in numbers[axis::3]])
     return memoryview(numbers).cast("B").cast("f", [len(vertices), 3]) if numbers else vertices
-
-
-def read_ply(source: Union[bytes, bytearray, memoryview, str, Path], job: Optional[Job] = None) -> Mesh:
-    """The mesh of a PLY file that isomesh wrote. Raises WrongAnswer for any other file."""
-    data = memoryview(Path(source).read_bytes() if isinstance(source, (str, Path)) else source).cast("B")
-    elements = _header_of(bytes(data[:_LONGEST_HEADER]))
-    label = elements.pop("label", "")
-    vertices, faces = int(elements["vertex"]), int(elements["face"])
-    begin = int(elements["begin"])
-    vertex_bytes, face_bytes = 12 * vertices, (17 if label else 13) * faces
-    if len(data) != begin + vertex_bytes + face_bytes:
-        raise WrongAnswer("the PLY file has another size than its header tells")
-    records = data[begin + vertex_bytes :]
-    if bytes(records[:: 17 if label else 13]).strip(b"\x03"):
-        raise WrongAnswer("the PLY file has a face that is no triangle")
-    return Mesh(
-        _shaped(data[begin : begin + vertex_bytes], "f", vertices, 3),
-        _shaped(_columns(records, faces, 1, 12), "I", faces, 3),
-        _shaped(_columns(records, faces, 13, 4), "i" if label == "int" else "I", faces) if label else None,
-        space=job["parameters"].get("space", "lps") if job else "lps",
-        job=job,
-    )
-
-
-def _header_of(text: bytes) -> Dict[str, str]:
-    """The counts of elements, where the data begins, and the type of the faces' labels."""
-    end = text.find(_HEADER_END)
-    lines = text[: max(end, 0)].decode("ascii", "replace").splitlines()
-    if lines[:2] != ["ply", "format binary_little_endian 1.0"]:
-        raise WrongAnswer("not a binary PLY file")
-    properties = [line for line in lines if line.startswith("property ")]
-    known = [f"property float {axis}" for axis in "xyz"] + ["property list uchar uint vertex_indices"]
-    labels = [line.split()[1] for line in properties[4:] if line.split()[2:] == ["label"]]
-    counts = dict(line.split()[1:3] for line in lines if line.startswith("element "))
-    if properties[:4] != known or len(properties) != 4 + len(labels) or list(counts) != ["vertex", "face"]:
-        raise WrongAnswer("not a PLY file of isomesh's")
-    return {**counts, "begin": str(end + len(_HEADER_END)), **({"label": labels[0]} if labels else {})}
-
-
-def _columns(records: memoryview, count: int, begin: int, width: int) -> memoryview:
-    """So many bytes from `begin` on of each record, one record's after the other's."""
-    size = len(records) // count if count else 1
-    out = bytearray(width * count)
-    for byte in range(width):
-        out[byte::width] = records[begin + byte :: size]
-    return memoryview(out)
-
-
-def _shaped(data: memoryview, kind: str, *shape: int) -> Any:
-    """Little-endian bytes as an array of that shape: numpy's, or a memoryview."""
-    if sys.byteorder != "little":
-        swapped = array(kind, data.tobytes())
-        swapped.byteswap()
-        data = memoryview(swapped).cast("B")
-    try:
-        import numpy
-    except ImportError:
-        pass
-    else:
-        return numpy.frombuffer(data.tobytes(), numpy.dtype(kind)).reshape(shape).copy()
-    # Newer stubs want the kind as a literal.
-    view: Any = memoryview(data.tobytes())
-    if 0 in shape:  # which a memoryview cannot have
-        return view[:0].cast(kind)
-    return view.cast(kind, shape)

@@ -1,5 +1,5 @@
-"""Uploads that go on where their connection broke: "Resumable Uploads for HTTP"
-(draft-ietf-httpbis-resumable-upload), of which docs/uploads.md tells what the server knows."""
+"""Uploads that resume where their connection broke: "Resumable Uploads for HTTP"
+(draft-ietf-httpbis-resumable-upload). docs/uploads.md describes the part that the server supports."""
 
 from __future__ import annotations
 
@@ -10,42 +10,42 @@ from .errors import IsomeshError, Refused, Unreachable, WrongAnswer
 from .transport import Answer, Request, Transport
 from .uploads import Body
 
-RESUMABLE_BYTES = 8 << 20  # fewer are sent in one request
+RESUMABLE_BYTES = 8 << 20  # smaller bodies are sent in one request
 _PLACES = "/v1/uploads/"
-_LONGEST_CUT = 60.0  # seconds that no byte gets through before an upload is given up
+_LONGEST_CUT = 60.0  # seconds without progress, then the upload fails
 _FIRST_PAUSE = 0.1
 _LONGEST_PAUSE = 3.0
-# The server is busy, or ends, or still has the connection that broke.
+# Temporary: the server is busy, stops, or has not yet noticed the broken connection.
 _PASSING = (408, 409, 429, 502, 503, 504)
 
 
 def send(transport: Transport, target: str, headers: Dict[str, str], body: Body) -> Answer:
-    """The answer to `POST target` with that body. Raises as Transport.send does."""
+    """The response to `POST target` with this body. Raises as Transport.send does."""
     place = _begin(transport, target, headers, body)
     if not place:
         return transport.send(Request("POST", target, headers, body))
     try:
         return _finish(transport, target, body, place)
     except Unreachable:
-        raise  # nobody is there who could be told
+        raise  # there is no server to tell
     except BaseException as error:
         if isinstance(error, Refused) and error.status == 410:
-            # It has expired, or another daemon answers than the one that has it.
+            # The upload has expired, or another daemon than the one that holds it responds.
             return transport.send(Request("POST", target, headers, body))
         try:
             transport.send(Request("DELETE", place)).text()
         except IsomeshError:
-            pass  # what is left there expires
+            pass  # the server deletes the upload when it expires
         raise
 
 
 def _begin(transport: Transport, target: str, headers: Dict[str, str], body: Body) -> str:
-    """Where the body is to go; empty for a server of an earlier version."""
+    """The address of the upload; empty for a server of an earlier version."""
     told = {**headers, "Upload-Complete": "?0", "Upload-Length": str(body.size)}
     try:
         answer = transport.send(Request("POST", target, told, Body(0, lambda: iter(()))))
     except Refused as error:
-        # Such a server does not take an empty body. If it is anything else, it says so again.
+        # An earlier server rejects an empty body. It repeats any other error for the whole body.
         if error.status != 400:
             raise
         return ""
@@ -55,10 +55,10 @@ def _begin(transport: Transport, target: str, headers: Dict[str, str], body: Bod
 
 
 def _finish(transport: Transport, target: str, body: Body, place: str) -> Answer:
-    offset: Optional[int] = 0  # None: not known
+    offset: Optional[int] = 0  # None: unknown
     reached = 0
     is_whole = False
-    cut: Optional[float] = None  # when it broke, if no byte has got through since then
+    cut: Optional[float] = None  # when it broke, if there was no progress since then
     wait = _FIRST_PAUSE
     while True:
         try:
@@ -69,7 +69,7 @@ def _finish(transport: Transport, target: str, body: Body, place: str) -> Answer
                 if offset > reached:
                     cut, wait, reached = None, _FIRST_PAUSE, offset
             if is_whole:
-                # Whoever asks like this hears what has become of it.
+                # The body has arrived: this asks for the response that was lost.
                 sign = "&" if "?" in target else "?"
                 target_again = f"{target}{sign}upload={place.rpartition('/')[2]}"
                 return transport.send(Request("POST", target_again, {}, Body(0, lambda: iter(()))))
@@ -96,7 +96,7 @@ def _part(offset: int) -> Dict[str, str]:
 def _offset_in(state: Answer, size: int) -> int:
     text = state.header("Upload-Offset")
     if not text.isdigit() or int(text) > size:
-        raise WrongAnswer("the server's answer is not what the API says")
+        raise WrongAnswer("the server's response does not follow the API")
     return int(text)
 
 

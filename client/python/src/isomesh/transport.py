@@ -1,4 +1,4 @@
-"""One HTTP request at a time, with the standard library."""
+"""HTTP requests with the standard library, one connection each."""
 
 from __future__ import annotations
 
@@ -17,9 +17,8 @@ from .uploads import Body
 _TRIES = 4
 _FIRST_PAUSE = 0.1
 _PIECE = 1 << 18
-_LONGEST_STALL = 60.0  # seconds that none of a body gets through before its connection is taken for broken
-# A server never refuses or describes in more.
-_LONGEST_TEXT = 64 << 20
+_LONGEST_STALL = 60.0  # seconds without progress of a body, then the connection counts as broken
+_LONGEST_TEXT = 64 << 20  # more than any error response has
 
 
 class _UnixConnection(http.client.HTTPConnection):
@@ -34,7 +33,7 @@ class _UnixConnection(http.client.HTTPConnection):
 
 
 class Broken(Unreachable):
-    """The connection was there and broke: trying again can help."""
+    """The connection broke: a retry may succeed."""
 
 
 @dataclass
@@ -47,7 +46,7 @@ class Request:
 
 
 class Answer:
-    """A successful answer; its body is read once, whole or in pieces."""
+    """A successful response. Its body is read once, whole or in pieces."""
 
     def __init__(self, connection: http.client.HTTPConnection, response: http.client.HTTPResponse) -> None:
         self._connection = connection
@@ -58,29 +57,29 @@ class Answer:
         return self._response.getheader(name) or ""
 
     def pieces(self) -> Iterator[bytes]:
-        """The body's bytes as they come. Raises Broken when it ends too early."""
+        """The body's bytes as they arrive. Raises Broken if the body ends too early."""
         with contextlib.closing(self._connection):
             try:
                 while piece := self._response.read(_PIECE):
                     yield piece
             except (OSError, http.client.HTTPException) as error:
                 raise Broken(f"the connection broke: {error}") from error
-            # `read` with a size ends quietly where the connection does.
+            # `read` with a size reports no error when the connection ends.
             if self._response.length:
-                raise Broken("the connection broke: the answer is not complete")
+                raise Broken("the connection broke: the response is incomplete")
 
     def text(self) -> bytes:
         return b"".join(self.pieces())
 
 
 class Transport:
-    """Constant after construction, so it may be used from several threads. Every request has a
-    connection of its own, straight to the server: proxies of the environment are not used and
-    redirects not followed, because volumes and tokens are for the named machine only."""
+    """Constant after construction, so several threads may share it. Every request has its own
+    connection, directly to the server. Proxies of the environment are not used and redirects are not
+    followed, because volumes and tokens are for the named machine only."""
 
     def __init__(self, server: str, token: str, authorities: Optional[str], timeout: float) -> None:
         if not token.isascii() or any(c <= " " or c == "\x7f" for c in token):
-            raise ValueError("the token must be letters, digits and signs of ASCII")
+            raise ValueError("the token must be printable ASCII characters without spaces")
         self._server = server
         self._token = token
         self._timeout = timeout
@@ -96,11 +95,11 @@ class Transport:
         ):
             raise ValueError(f"{server!r} must be http://HOST:PORT, https://HOST:PORT or unix:PATH")
         self._host = parts.hostname
-        self._port = parts.port  # raises ValueError for what is no port
+        self._port = parts.port  # raises ValueError for an invalid port
         self._tls = ssl.create_default_context(cafile=authorities) if parts.scheme == "https" else None
 
     def send(self, request: Request) -> Answer:
-        """A successful answer. Raises Refused for any other, and Unreachable without one."""
+        """A successful response. Raises Refused for any other, and Unreachable without a response."""
         connection = self._connection(request)
         try:
             connection.connect()
@@ -122,7 +121,7 @@ class Transport:
         raise refusal(response.status, response.getheader("Content-Type") or "", body)
 
     def repeat(self, request: Request) -> bytes:
-        """The body of the answer to a request that may be sent again when its connection breaks."""
+        """The response body of a request that may be repeated; it is, if its connection breaks."""
         for attempt in range(1, _TRIES + 1):
             try:
                 return self.send(request).text()
@@ -152,7 +151,7 @@ class Transport:
         try:
             connection.request(request.method, request.target, pieces, headers)
         except (BrokenPipeError, ConnectionResetError):
-            # A server that refuses an upload may say so before it has all of it, and close.
+            # A server may reject an upload before it has all of it, and close the connection.
             try:
                 return connection.getresponse()
             except (OSError, http.client.HTTPException):
@@ -163,5 +162,5 @@ class Transport:
 
 
 def pause(attempt: int) -> None:
-    """Before a request is tried again, the `attempt`-th time."""
+    """Waits before the `attempt`-th retry."""
     time.sleep(_FIRST_PAUSE * 2 ** (attempt - 1))

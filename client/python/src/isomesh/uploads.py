@@ -1,4 +1,4 @@
-"""What an upload's body is made of: a file, several of them as one TAR, or samples in memory."""
+"""The body of an upload: a file, several files as one TAR archive, or samples in memory."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LONGEST_HEADER = 1 << 20
 
 @dataclass
 class Body:
-    """Bytes of known number that are made while they are sent, so they are never held whole."""
+    """A body of known size. Its bytes are read while they are sent, never held whole in memory."""
 
     size: int
     pieces: Callable[[], Iterator[bytes]]
@@ -37,13 +37,13 @@ def of_bytes(data: Union[bytes, bytearray, memoryview], name: str = "") -> Body:
 
 
 def of_paths(paths: Sequence[Path]) -> Body:
-    """The files that belong to an upload: of a folder all below it but hidden ones and links, of a
-    header the data beside it that it names, of several paths all of theirs."""
+    """The files of all paths. A folder means every file below it except hidden files and links; a
+    header brings the data files that it names."""
     members: Dict[str, Path] = {}
     for path in paths:
         for name, file in _files_of(path):
             if name in members and not members[name].samefile(file):
-                raise ValueError(f"{file}: another file of that name is sent with it")
+                raise ValueError(f"{file}: two files of this upload have the same name")
             members[name] = file
     name = Path(os.path.abspath(paths[0])).name
     if len(members) == 1 and not paths[0].is_dir():
@@ -57,7 +57,7 @@ def _files_of(path: Path) -> List[Tuple[str, Path]]:
     if path.is_dir():
         return _files_below(path)
     if not path.is_file():
-        raise FileNotFoundError(f"{path} is no file or folder")
+        raise FileNotFoundError(f"there is no file or folder {path}")
     suffix = path.suffix.lower()
     if suffix == ".mhd":
         return _header_and_data(path, "=", "elementdatafile")
@@ -79,9 +79,9 @@ def _files_below(folder: Path) -> List[Tuple[str, Path]]:
                 continue
             found.append((file.relative_to(folder).as_posix(), file))
     if not found:
-        raise ValueError(f"{folder} holds no files to send")
+        raise ValueError(f"{folder} has no files to upload")
     if len(found) > _MOST_FILES:
-        raise ValueError(f"{folder} holds more than {_MOST_FILES} files")
+        raise ValueError(f"{folder} has more than {_MOST_FILES} files")
     return sorted(found)
 
 
@@ -100,7 +100,7 @@ def _header_and_data(path: Path, sign: str, wanted: str) -> List[Tuple[str, Path
         break
     files = [(path.name, path)]
     for name in names:
-        # Data outside of the header's folder is not sent: the server refuses such a header.
+        # Data outside of the header's folder is not sent: the server rejects such a header.
         below = os.path.normpath(name)
         if name and not os.path.isabs(below) and not below.startswith("..") and below != path.name:
             files.append((Path(below).as_posix(), path.parent / below))
@@ -108,7 +108,7 @@ def _header_and_data(path: Path, sign: str, wanted: str) -> List[Tuple[str, Path
 
 
 def _names_like(folder: Path, pattern: str) -> List[str]:
-    """The names that a pattern such as slice%03d.raw may mean; the server takes those that it does."""
+    """The files that a pattern such as slice%03d.raw may mean; the server selects among them."""
     parts = re.fullmatch(r"([^%]*)%\d*[a-z](.*)", pattern)
     if parts is None:
         return []
@@ -117,7 +117,7 @@ def _names_like(folder: Path, pattern: str) -> List[str]:
 
 
 def _tar(members: Dict[str, Path], name: str) -> Body:
-    """A TAR in which nothing but names and bytes counts, so the same files make the same one."""
+    """A TAR archive without owners and times, so the same files make the same archive."""
     parts: List[Tuple[bytes, Path, int]] = []
     for member, path in members.items():
         info = tarfile.TarInfo(member)
@@ -143,7 +143,7 @@ def _read(path: Path, size: int) -> Iterator[bytes]:
         while size > 0:
             piece = file.read(min(_PIECE, size))
             if not piece:
-                raise ValueError(f"{path} was cut while it was sent")
+                raise ValueError(f"{path} became shorter during the upload")
             size -= len(piece)
             yield piece
 
@@ -153,8 +153,8 @@ def _read(path: Path, size: int) -> Iterator[bytes]:
 
 @dataclass(frozen=True)
 class Raw:
-    """What raw samples do not say of themselves; x runs fastest. Lengths in millimetres, origin and
-    direction in LPS; `direction` has nine numbers, row by row, its columns are the axes."""
+    """Describes raw samples, of which x runs fastest. Lengths are in millimetres, `origin` and
+    `direction` in LPS. `direction` has nine numbers, row by row; its columns are the axes."""
 
     dims: Tuple[int, int, int]
     type: SampleType
@@ -178,23 +178,23 @@ class Raw:
 
 
 def placed(affine: Any, space: str) -> Dict[str, Any]:
-    """Spacing, origin and direction (LPS) of a 4 x 4 or 3 x 4 matrix that takes indices to
-    millimetres of `space`."""
+    """Spacing, origin and direction (LPS) of a 4 x 4 or 3 x 4 matrix that maps indices to
+    millimetres in `space`."""
     rows = [[float(number) for number in row] for row in affine]
     if len(rows) not in (3, 4) or any(len(row) != 4 for row in rows):
         raise ValueError("the affine must be a 4 x 4 matrix")
     if not all(math.isfinite(number) for row in rows for number in row):
-        raise ValueError("the affine holds a number that is not finite")
+        raise ValueError("the affine has a number that is not finite")
     if space not in ("ras", "lps"):
-        raise ValueError("space must be 'ras' or 'lps'")
-    # RAS is LPS with x and y turned round.
+        raise ValueError(f"affine_space must be 'ras' or 'lps', not {space!r}")
+    # RAS and LPS differ in the signs of x and y.
     signs = (-1, -1, 1) if space == "ras" else (1, 1, 1)
     rows = [[sign * number for number in row] for sign, row in zip(signs, rows)]
     spacing = [math.sqrt(sum(row[axis] ** 2 for row in rows)) for axis in range(3)]
     if min(spacing) == 0:
-        raise ValueError("the affine has an axis of no length")
+        raise ValueError("the affine has an axis of length zero")
     direction = [row[axis] / spacing[axis] for row in rows for axis in range(3)]
-    # 0.0 of -0.0: the same place has one spelling.
+    # -0.0 becomes 0.0: the same place has one spelling.
     return {
         "spacing": tuple(spacing),
         "origin": tuple(row[3] + 0.0 for row in rows),
@@ -202,18 +202,46 @@ def placed(affine: Any, space: str) -> Dict[str, Any]:
     }
 
 
+def of_source(
+    source: Any, affine: Optional[Any], space: str, spacing: Optional[Sequence[float]], raw: Optional[Raw]
+) -> Body:
+    """The body for anything that `Client.upload` accepts."""
+    is_array = False
+    if isinstance(source, (str, os.PathLike)):
+        body = of_paths([Path(source)])
+    elif isinstance(source, (bytes, bytearray)) or type(source) is memoryview:
+        body = of_bytes(source)
+    elif isinstance(source, (list, tuple)) and source and all(isinstance(p, (str, os.PathLike)) for p in source):
+        body = of_paths([Path(each) for each in source])
+    else:
+        is_array = True
+        if hasattr(source, "dataobj") and hasattr(source, "affine"):
+            affine = source.affine if affine is None and spacing is None else affine
+            source = source.dataobj
+        elif not hasattr(source, "__array__"):
+            raise TypeError(f"cannot upload a {type(source).__name__}: give a path, bytes, an array or an image")
+        body = of_array(source, affine, space, spacing)
+    if is_array and raw is not None:
+        raise ValueError("raw is for files and bytes; an array needs no description")
+    if not is_array and (affine is not None or spacing is not None):
+        raise ValueError("affine and spacing are for arrays; a file has its own geometry")
+    if raw is not None:
+        body.query = raw.query()
+    return body
+
+
 def of_array(array: Any, affine: Optional[Any], space: str, spacing: Optional[Sequence[float]]) -> Body:
-    """The samples of a numpy array of three axes, of which the first is x, sent plane by plane."""
+    """The samples of a numpy array with the axes x, y and z, sent plane by plane."""
     import numpy
 
     samples = numpy.asanyarray(array)
     while samples.ndim > 3 and samples.shape[-1] == 1:
         samples = samples[..., 0]
     if samples.ndim != 3 or samples.size == 0:
-        raise ValueError(f"the array must have three axes, and has the shape {samples.shape}")
+        raise ValueError(f"the array must have three axes and no empty one; its shape is {samples.shape}")
     target = _sendable(numpy, samples)
     if affine is not None and spacing is not None:
-        raise ValueError("give either affine or spacing")
+        raise ValueError("give either affine or spacing, not both")
     if affine is None:
         steps = spacing or (1, 1, 1)
         affine = [[float(steps[row]) if row == column else 0.0 for column in range(4)] for row in range(3)]
@@ -231,7 +259,7 @@ def of_array(array: Any, affine: Optional[Any], space: str, spacing: Optional[Se
 
 
 def _sendable(numpy: Any, samples: Any) -> Any:
-    """The type to send samples as: their own where the server knows it, else one that holds all."""
+    """The type to send samples in: their own if the server knows it, else one that holds all values."""
     kind, size = samples.dtype.kind, samples.dtype.itemsize
     if kind in "iu" and size <= 4 or kind == "f" and size in (4, 8):
         return samples.dtype.newbyteorder("=")
@@ -245,5 +273,5 @@ def _sendable(numpy: Any, samples: Any) -> Any:
             limits = numpy.iinfo(name)
             if limits.min <= low and high <= limits.max:
                 return numpy.dtype(name)
-        raise ValueError(f"the samples, from {low} to {high}, do not fit into 32 bits; convert them to float64")
-    raise TypeError(f"samples of the type {samples.dtype} cannot be sent; integers and floats can")
+        raise ValueError(f"the samples, from {low} to {high}, do not fit into 32 bits; convert the array to float64")
+    raise TypeError(f"samples of type {samples.dtype} cannot be uploaded; convert the array to integers or floats")

@@ -1,0 +1,106 @@
+"""The API's requests over a transport: JSON, pages of lists, uploads and downloads."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import TYPE_CHECKING, Any, Callable, Dict, Iterator, List, cast
+from urllib.parse import quote, urlencode
+
+from . import resume, uploads
+from .errors import WrongAnswer
+from .parameters import as_plain
+from .transport import Answer, Broken, Request, Transport, pause
+
+if TYPE_CHECKING:
+    from . import api
+    from .uploads import Body
+
+_TRIES = 4
+_MULTI_STATUS = 207
+
+
+class Exchange:
+    """Constant after construction, so several threads may share it."""
+
+    def __init__(self, transport: Transport) -> None:
+        self._transport = transport
+
+    def get(self, target: str, patience: float = 0) -> Dict[str, Any]:
+        return _parsed(self._transport.repeat(Request("GET", target, patience=patience)))
+
+    def pages(self, path: str, member: str, query: Dict[str, str]) -> Iterator[Any]:
+        """The items of all pages of a list."""
+        while True:
+            page = self.get(path + ("?" + urlencode(query) if query else ""))
+            yield from page[member]
+            if not page["next"] or not page[member]:
+                return
+            query = {**query, "cursor": page["next"]}
+
+    def delete(self, target: str) -> Dict[str, Any]:
+        text = self._transport.send(Request("DELETE", target)).text()
+        return _parsed(text) if text else {}
+
+    def send_json(self, method: str, target: str, value: object, key: str = "") -> Dict[str, Any]:
+        """With an idempotency key, the request is repeated when its connection breaks."""
+        try:
+            text = json.dumps(value, allow_nan=False, default=as_plain).encode()
+        except ValueError as error:
+            raise ValueError(f"a parameter cannot be sent: {error}") from error
+        headers = {"Content-Type": "application/json", **({"Idempotency-Key": key} if key else {})}
+        request = Request(method, target, headers, uploads.of_bytes(text))
+        return _parsed(self._transport.repeat(request) if key else self._transport.send(request).text())
+
+    def upload(self, body: Body, name: str, chosen: Dict[str, str]) -> List[api.UploadedVolumesVolumes]:
+        """One item for each volume of the upload. `chosen` are query parameters, left out if empty."""
+        query = {**body.query, **{key: value for key, value in chosen.items() if value}}
+        headers = {"Content-Type": "application/octet-stream"}
+        if name or body.name:
+            # A name may name a patient: it goes in a header, because logs hold the target.
+            headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(name or body.name, safe='')}"
+        target = "/v1/volumes" + ("?" + urlencode(query) if query else "")
+        if body.size >= resume.RESUMABLE_BYTES:
+            answer = resume.send(self._transport, target, headers, body)
+        else:
+            answer = self._transport.send(Request("POST", target, headers, body))
+        parsed = _parsed(answer.text())
+        if answer.status == _MULTI_STATUS:
+            return cast("List[api.UploadedVolumesVolumes]", parsed["volumes"])
+        volume = cast("api.Volume", parsed)
+        return [{"member": "", "status": answer.status, "volume": volume, "problem": None}]
+
+    def download(self, announced: api.MeshFile, write: Callable[[int, bytes], None]) -> None:
+        """Downloads a file and resumes where its connection breaks."""
+        size, digest, at = announced["bytes"], hashlib.sha256(), 0
+        for attempt in range(1, _TRIES + 1):
+            headers = {"Range": f"bytes={at}-", "If-Range": f'"{announced["sha256"]}"'} if at else {}
+            try:
+                answer = self._transport.send(Request("GET", announced["href"], headers))
+                if at and not _goes_on(answer, at):
+                    digest, at = hashlib.sha256(), 0
+                for piece in answer.pieces():
+                    write(at, piece)
+                    digest.update(piece)
+                    at += len(piece)
+                break
+            except Broken:
+                if attempt == _TRIES:
+                    raise
+            pause(attempt)
+        if at != size or digest.hexdigest() != announced["sha256"]:
+            raise WrongAnswer("the downloaded mesh does not match the job's SHA-256")
+
+
+def _parsed(body: bytes) -> Dict[str, Any]:
+    try:
+        value = json.loads(body)
+    except ValueError as error:
+        raise WrongAnswer("the server's response is not JSON") from error
+    if not isinstance(value, dict):
+        raise WrongAnswer("the server's response is not a JSON object")
+    return value
+
+
+def _goes_on(answer: Answer, at: int) -> bool:
+    return answer.status == 206 and answer.header("Content-Range").startswith(f"bytes {at}-")

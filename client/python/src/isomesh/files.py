@@ -1,0 +1,66 @@
+"""Files of meshes: which ones a job has, and writing one so that it appears whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, Iterator, Optional, Union, cast, get_args
+
+from . import api
+from .errors import JobFailed
+
+if TYPE_CHECKING:
+    AnyJob = Union[api.Job, api.SucceededJob]
+
+FINAL_STATES = ("succeeded", "failed", "cancelled")
+
+
+def format_of(path: Path) -> str:
+    """The format that a path's suffix names. Raises ValueError for any other suffix."""
+    form = path.suffix.lower().lstrip(".")
+    known = get_args(api.MeshFormat)
+    if form not in known:
+        raise ValueError(f"the suffix of {path.name!r} is not a mesh format; the formats are {', '.join(known)}")
+    return form
+
+
+def file_of(job: AnyJob, form: str, label: Optional[int] = None) -> api.MeshFile:
+    """The job's file of that format. Raises JobFailed for a job that failed or was cancelled, and
+    ValueError if the job is not done or was not asked for the format."""
+    mesh = job["mesh"]
+    if mesh is None:
+        if job["state"] in FINAL_STATES:
+            raise JobFailed(cast(api.Job, job))
+        raise ValueError(f"job {job['id']} is {job['state']}; call wait(job) first")
+    files: Any = mesh["files"]
+    if label is not None:
+        files = next((each["files"] for each in mesh.get("labels", []) if each["label"] == label), {})
+    if form in files:
+        return cast(api.MeshFile, files[form])
+    of_label = "" if label is None else f" of the label {label}"
+    has = ", ".join(files) or "none"
+    raise ValueError(
+        f"job {job['id']} has no file of the format {form!r}{of_label}; it has {has}. "
+        f"Add formats=[{form!r}] to the call that starts the job."
+    )
+
+
+@contextlib.contextmanager
+def written(target: Path) -> Iterator[IO[bytes]]:
+    """A file to write to, which takes the place of `target` at the end, and is removed on errors."""
+    number, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    try:
+        with os.fdopen(number, "wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        # mkstemp's files are for their owner alone; this one gets the mode of any new file.
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(part, 0o666 & ~mask)
+        os.replace(part, target)
+    except BaseException:
+        os.unlink(part)
+        raise
