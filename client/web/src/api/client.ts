@@ -48,14 +48,14 @@ function orderPath(id: string): string {
   return `/v1/orders/${encodeURIComponent(id)}`;
 }
 
-// Clients share nothing, so one process can use several servers at once.
+/** A client of one server. Clients share nothing, so one process can use several servers at once. */
 export class Client {
   /** @internal The state of the connection, which the page shows, and requests beside the routes. */
   readonly connection: Connection;
   /** @internal The stream of what happens to jobs. */
   readonly events: JobEvents;
 
-  // Outside a page `server` is required. On a page it may be left out, which means the server that the page comes from.
+  /** Outside a page `server` is required. On a page it may be left out, which means the server that the page comes from. */
   constructor({ server, token = '' }: ClientOptions = {}) {
     this.connection = new Connection(server, token);
     this.events = new JobEvents(this.connection);
@@ -63,13 +63,15 @@ export class Client {
 
   // --- Volumes ---
 
-  // Uploads a file, an archive of files, or raw samples. An upload of 8 MiB or more continues after its connection
-  // broke. Rejects with a TypeError if `whole` is something else than bytes, such as a file's name.
+  /**
+   * Uploads a file, an archive of files, or raw samples. An upload of 8 MiB or more continues after its connection
+   * broke. Rejects with a TypeError if `whole` is something else than bytes, such as a file's name.
+   */
   upload(whole: GlobalBlob | ArrayBuffer | ArrayBufferView, options: UploadOptions = {}): Promise<Uploaded> {
     return upload(this.connection, whole, options);
   }
 
-  // Lists the newest first, in pages.
+  /** Lists the newest first, in pages. */
   listVolumes(cursor = '', signal?: GlobalAbortSignal): Promise<VolumeList> {
     const query = new URLSearchParams({ order: 'newest', limit: String(volumesPerPage) });
     if (cursor !== '') query.set('cursor', cursor);
@@ -80,7 +82,7 @@ export class Client {
     return this.connection.json(volumePath(id));
   }
 
-  // Changes the volume's name, or removes it with null.
+  /** Changes the volume's name, or removes it with null. */
   renameVolume(id: string, name: string | null): Promise<Volume> {
     return this.connection.json(volumePath(id), {
       method: 'PATCH',
@@ -112,7 +114,7 @@ export class Client {
     return (await this.connection.send(`${volumePath(id)}/slice.png?${query}`, { signal })).blob();
   }
 
-  // The volume as NRRD, reduced to at most `size` samples along each axis.
+  /** The volume as NRRD, reduced to at most `size` samples along each axis. */
   async previewFile(id: string, size: number, window: [number, number], signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
     const query = `size=${size}&window=${window[0]},${window[1]}`;
     return (await this.connection.send(`${volumePath(id)}/preview?${query}`, { signal })).arrayBuffer();
@@ -120,13 +122,15 @@ export class Client {
 
   // --- Jobs ---
 
-  // Estimates the mesh that a job with these parameters would make.
+  /** Estimates the mesh that a job with these parameters would make. */
   estimateOf(query: GlobalURLSearchParams, signal?: GlobalAbortSignal): Promise<Estimate> {
     return this.connection.json(`/v1/estimate?${query.toString()}`, { signal });
   }
 
-  // Retries when the server cannot be reached. Its key makes that safe: if only the response was lost, the retry
-  // returns the same job.
+  /**
+   * Retries when the server cannot be reached. Its key makes that safe: if only the response was lost, the retry
+   * returns the same job.
+   */
   async submitJob(request: JobRequest): Promise<Job> {
     const key = randomKey();
     for (let attempt = 1; ; attempt += 1) {
@@ -143,9 +147,11 @@ export class Client {
     }
   }
 
-  // Calls `onChange` with every change of the job, and resolves with the finished job. It waits while the server
-  // cannot be reached. Rejects with an ApiError if the job no longer exists, and with the signal's reason as soon as
-  // the signal is aborted.
+  /**
+   * Calls `onChange` with every change of the job, and resolves with the finished job. It waits while the server
+   * cannot be reached. Rejects with an ApiError if the job no longer exists, and with the signal's reason as soon as
+   * the signal is aborted.
+   */
   follow(id: string, signal?: GlobalAbortSignal, onChange: (job: Job) => void = () => undefined): Promise<Job> {
     return follow(this, id, signal, onChange);
   }
@@ -154,7 +160,7 @@ export class Client {
     return this.connection.json(`/v1/jobs${cursor === '' ? '' : `?cursor=${encodeURIComponent(cursor)}`}`);
   }
 
-  // Returns at once, or with `waitSeconds` when the job has finished or the time is over.
+  /** Returns at once, or with `waitSeconds` when the job has finished or the time is over. */
   getJob(id: string, waitSeconds = 0, signal?: GlobalAbortSignal): Promise<Job> {
     return this.connection.json(`${jobPath(id)}${waitSeconds > 0 ? `?wait=${waitSeconds}` : ''}`, { signal });
   }
@@ -163,7 +169,7 @@ export class Client {
     return this.connection.json(jobPath(id), { method: 'DELETE' });
   }
 
-  // Downloads a finished job's mesh in one of the formats that the job was asked for.
+  /** Downloads a finished job's mesh in one of the formats that the job was asked for. */
   async meshOf(job: Job, format: MeshFormat, signal?: GlobalAbortSignal): Promise<ArrayBuffer> {
     const file = job.mesh?.files[format];
     if (!file) throw new RangeError(`job ${job.id} has no file of the format ${format}`);
@@ -172,7 +178,7 @@ export class Client {
 
   // --- Orders of a hospital: only a server with a PACS has these routes ---
 
-  // Stays the same while the server runs.
+  /** Stays the same while the server runs. */
   async hasOrders(): Promise<boolean> {
     return (await this.connection.json<{ orders: boolean }>('/version')).orders;
   }
@@ -181,7 +187,7 @@ export class Client {
     return this.connection.json('/v1/pacs', { signal });
   }
 
-  // Lists the newest first, in pages. An empty state lists all.
+  /** Lists the newest first, in pages. An empty state lists all. */
   listOrders(state: OrderState | '', cursor = '', signal?: GlobalAbortSignal): Promise<OrderList> {
     const query = new URLSearchParams(Object.entries({ state, cursor }).filter(([, value]) => value !== ''));
     const text = query.toString();
@@ -192,7 +198,7 @@ export class Client {
     return this.connection.json(orderPath(id), { method: 'DELETE' });
   }
 
-  // Starts a failed order again from its beginning.
+  /** Starts a failed order again from its beginning. */
   retryOrder(id: string): Promise<Order> {
     return this.connection.json(`${orderPath(id)}/retry`, { method: 'POST' });
   }

@@ -2,20 +2,20 @@ import type { Choice, FieldFault, Problem } from './types';
 
 // How a request may succeed: by accepting a note, or by choosing one of several.
 export type Remedy = Pick<Problem, 'overridable' | 'choices'> & {
-  // The server keeps the uploaded bytes under this name.
+  /** The server keeps the uploaded bytes under this name. */
   kept?: string;
 };
 
-// A request failed. `status` is the HTTP status, or 0 if there was no response.
+/** A request failed. `status` is the HTTP status, or 0 if there was no response. */
 export class ApiError extends Error {
   constructor(
     readonly status: number,
     readonly title: string,
     readonly detail: string,
     readonly faults: FieldFault[] = [],
-    // What to add to the request so that it succeeds.
+    /** What to add to the request so that it succeeds. */
     readonly remedy: Remedy = {},
-    // A link that helps.
+    /** A link that helps. */
     readonly link: { href: string; text: string } | null = null,
   ) {
     super(detail || title);
@@ -70,7 +70,7 @@ export function asApiError(error: unknown): ApiError {
   return new ApiError(-1, 'An unexpected error occurred', String(error));
 }
 
-// Says in one sentence what a person can do. Empty if the error's detail already does.
+/** Says in one sentence what a person can do. Empty if the error's detail already does. */
 export function adviceFor(error: ApiError): string {
   if (error.remedy.overridable !== undefined || choicesOf(error).size > 0) return '';
   switch (error.status) {
@@ -103,7 +103,7 @@ export function mayPass({ status }: ApiError): boolean {
   return ![400, 404, 410, 413, 415, 422].includes(status);
 }
 
-// Groups the choices by their parameter. The next request may name one of each group.
+/** Groups the choices by their parameter. The next request may name one of each group. */
 export function choicesOf({ remedy }: ApiError): Map<Choice['parameter'], Choice[]> {
   const byParameter = new Map<Choice['parameter'], Choice[]>();
   for (const choice of remedy.choices ?? []) {

@@ -14,9 +14,9 @@ export type GlobalBlob = Global<'Blob', { readonly size: number; arrayBuffer(): 
 export type GlobalURLSearchParams = Global<'URLSearchParams', { toString(): string }>;
 
 export interface ClientOptions {
-  // The server's address, such as http://127.0.0.1:8080.
+  /** The server's address, such as http://127.0.0.1:8080. */
   server?: string;
-  // The access token, if the server requires one.
+  /** The access token, if the server requires one. */
   token?: string;
 }
 
@@ -66,23 +66,23 @@ export interface RawDescription {
 }
 
 export interface UploadOptions {
-  // Describes raw samples. A file of a known format needs no description.
+  /** Describes raw samples. A file of a known format needs no description. */
   raw?: RawDescription;
-  // Further query parameters of POST /v1/volumes, such as { series: '1.2.3' } or { accept: 'CODE' }.
+  /** Further query parameters of POST /v1/volumes, such as { series: '1.2.3' } or { accept: 'CODE' }. */
   choices?: Readonly<Record<string, string>>;
-  // The file's name.
+  /** The file's name. */
   name?: string;
-  // Names an earlier upload that the server still keeps (`kept` of Uploaded or ApiError). Its bytes are not sent again.
+  /** Names an earlier upload that the server still keeps (`kept` of Uploaded or ApiError). Its bytes are not sent again. */
   kept?: string;
   signal?: GlobalAbortSignal;
-  // Bytes sent so far. All of them are sent while the server reads the volume.
+  /** Bytes sent so far. All of them are sent while the server reads the volume. */
   onProgress?: (sent: number, total: number) => void;
 }
 
 export interface Uploaded {
-  // One entry for each volume of the file or archive.
+  /** One entry for each volume of the file or archive. */
   volumes: UploadedVolume[];
-  // The server keeps the upload under this name while a choice is open.
+  /** The server keeps the upload under this name while a choice is open. */
   kept?: string;
 }
 
