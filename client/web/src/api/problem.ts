@@ -81,7 +81,7 @@ export function adviceFor(error: ApiError): string {
       return 'Enter an access token that has this permission.';
     case 404:
     case 410:
-      return 'It may have been deleted. Choose another one from the list.';
+      return 'It may have been erased. Choose another one from the list.';
     case 413:
       return 'Crop or resample the volume, or ask the administrator to raise the limit.';
     case 415:
@@ -92,7 +92,7 @@ export function adviceFor(error: ApiError): string {
     case 503:
       return 'The server is busy. Try again in a moment.';
     case 507:
-      return 'Delete volumes that you no longer need, then try again.';
+      return 'Erase volumes that you no longer need, then try again.';
     default:
       return '';
   }
