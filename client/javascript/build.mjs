@@ -1,11 +1,12 @@
-// npm --prefix client/web run module: the page's api folder as a module of its own, in dist/ beside this file.
-// Its source is the page's; only the endings that Node wants are added to the imports.
+// npm --prefix client/web run module: makes the module from the page's api folder. The output goes to dist/ beside
+// this file, or to the folder that is given. Node wants file endings in imports, so these are added.
 import { cpSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
-import { fileURLToPath } from 'node:url';
+import { fileURLToPath, pathToFileURL } from 'node:url';
 
 const web = new URL('../web/', import.meta.url);
-const dist = new URL('dist/', import.meta.url);
+const [, , folder] = process.argv;
+const dist = folder === undefined ? new URL('dist/', import.meta.url) : pathToFileURL(`${folder}/`);
 const ts = createRequire(web)('typescript');
 
 const host = ts.formatDiagnosticsWithColorAndContext;
@@ -19,6 +20,8 @@ const program = ts.createProgram([`${root}src/api/index.ts`], {
   strict: true,
   noUncheckedIndexedAccess: true,
   declaration: true,
+  // What is only for the page has types of "dom", which a project in Node may lack.
+  stripInternal: true,
   rootDir: root,
   outDir: fileURLToPath(dist),
 });

@@ -1,9 +1,8 @@
-// Makes the surface of a volume: node mesh.mjs FILE ISO OUT. The suffix of OUT chooses the format. ISOMESH_SERVER names the
-// server; by default it is http://127.0.0.1:8080.
-import { openAsBlob } from 'node:fs';
-import { writeFile } from 'node:fs/promises';
+// Turns a volume into a surface: node mesh.mjs FILE ISO OUT. The suffix of OUT chooses the format.
+// ISOMESH_SERVER is the server's address, by default http://127.0.0.1:8080.
+import { readFile, writeFile } from 'node:fs/promises';
 import { basename, extname } from 'node:path';
-import { ApiError, choicesOf, connect, follow, meshOf, submitJob, upload } from 'isomesh';
+import { ApiError, choicesOf, Client } from 'isomesh';
 
 const [file, iso, target] = process.argv.slice(2);
 if (!target) {
@@ -11,16 +10,16 @@ if (!target) {
   process.exit(2);
 }
 const { ISOMESH_SERVER: server = 'http://127.0.0.1:8080', ISOMESH_TOKEN: token } = process.env;
-connect({ server, token });
 
 async function mesh() {
-  const { volumes } = await upload(await openAsBlob(file), { name: basename(file) });
+  const client = new Client({ server, token });
+  const { volumes } = await client.upload(await readFile(file), { name: basename(file) });
   const [{ volume }] = volumes;
   const format = extname(target).slice(1).toLowerCase();
-  const submitted = await submitJob({ volume: volume.id, iso: Number(iso), formats: [format] });
-  const job = await follow(submitted.id, new AbortController().signal, () => {});
-  if (job.state !== 'succeeded') throw new Error(job.error?.detail ?? job.state);
-  await writeFile(target, new Uint8Array(await meshOf(job, format)));
+  const submitted = await client.submitJob({ volume: volume.id, iso: Number(iso), formats: [format] });
+  const job = await client.follow(submitted.id);
+  if (job.state !== 'succeeded') throw new Error(job.error?.detail ?? `The job is ${job.state}.`);
+  await writeFile(target, new Uint8Array(await client.meshOf(job, format)));
   console.log(`${target}: ${job.mesh.triangles} triangles, ${Math.round(job.mesh.area_mm2)} mm2`);
 }
 
@@ -28,7 +27,7 @@ try {
   await mesh();
 } catch (error) {
   console.error(error.message);
-  // If the file is ambiguous, the server lists the choices.
+  // If the file leaves a choice open, the server lists the choices.
   if (error instanceof ApiError) {
     for (const [parameter, choices] of choicesOf(error)) {
       for (const { value, title } of choices) console.error(`  ${parameter}=${value}: ${title}`);

@@ -1,6 +1,6 @@
-// Uploads a volume and receives its surface as GLB, in one request. three.js shows it.
+// Uploads a volume, receives its surface as GLB in the same request, and shows it with three.js.
 //
-// The daemon must allow the origin of this page: isomeshd --cors-origin http://localhost:8000
+// The server must allow this page's origin: isomeshd --cors-origin http://localhost:8000
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { DRACOLoader } from 'three/addons/loaders/DRACOLoader.js';
@@ -21,7 +21,7 @@ const lamp = new THREE.DirectionalLight(0xffffff, 1.5);
 camera.add(lamp);
 scene.add(camera);
 
-// Draco compresses the surface in the file; three.js decodes it in workers.
+// The surface is compressed with Draco. three.js decodes it in workers.
 const draco = new DRACOLoader();
 draco.setDecoderPath('./node_modules/three/examples/jsm/libs/draco/gltf/');
 const loader = new GLTFLoader();
@@ -29,7 +29,7 @@ loader.setDRACOLoader(draco);
 
 let surface;
 
-// The body of POST /v1/mesh is the volume. The response is the mesh, or a problem with the reason.
+// POST /v1/mesh takes the volume as its body. The response is the mesh, or a problem object.
 async function meshOf(file, iso) {
   const query = new URLSearchParams({ iso, format: 'glb' });
   const answer = await fetch(`${server}/v1/mesh?${query}`, { method: 'POST', body: file });
@@ -43,7 +43,7 @@ async function meshOf(file, iso) {
 async function show(glb) {
   const gltf = await loader.parseAsync(glb, '');
   if (surface) scene.remove(surface);
-  surface = gltf.scene; // metres, Y up, the patient looks towards +Z
+  surface = gltf.scene; // in metres, Y is up, the patient looks towards +Z
   scene.add(surface);
   const box = new THREE.Box3().setFromObject(surface);
   const size = box.getSize(new THREE.Vector3());

@@ -11,9 +11,7 @@ import './style/compare.css';
 import './style/small.css';
 import './style/contrast.css';
 import './ui/kept_token';
-import { connected, isAlive, submitted } from './api/client';
-import { watchVisibility } from './api/job_events';
-import { hasOrders } from './api/orders';
+import { client, connected } from './client';
 import { ApiError, asApiError } from './api/problem';
 import { surfaceInWords } from './job/parameters';
 import { WatchedJobs } from './job/watched';
@@ -82,7 +80,7 @@ const links = [
 // Only where the daemon knows a PACS.
 function showOrders(): void {
   const link = links.find(({ dataset }) => dataset.place === 'orders');
-  hasOrders().then(
+  client.hasOrders().then(
     (isOn) => {
       if (link) link.hidden = !isOn;
     },
@@ -198,10 +196,18 @@ function watchConnection(): void {
     if (isConnected) return;
     banner.textContent = 'The connection to the server is lost. This page goes on as soon as it is back.';
     timer = window.setInterval(() => {
-      void isAlive().then((alive) => {
+      void client.connection.isAlive().then((alive) => {
         if (alive) connected.value = true;
       });
     }, retryEvery);
+  });
+}
+
+// A hidden page leaves its stream of jobs to others.
+function watchVisibility(): void {
+  document.addEventListener('visibilitychange', () => {
+    if (document.hidden) client.events.stop();
+    else client.events.start();
   });
 }
 
@@ -251,7 +257,7 @@ function watchJobs(): void {
     const what = { succeeded: 'is made', failed: 'could not be made', cancelled: 'was cancelled' }[state as string] ?? state;
     tell(h('span', {}, h('a', { href: hashOf(['jobs', id]) }, `The surface of ${surfaceInWords(parameters)}`), ` ${what}.`));
   });
-  submitted.subscribe((id) => watched.add(id));
+  client.submitted.subscribe((id) => watched.add(id));
   watched.start();
 }
 

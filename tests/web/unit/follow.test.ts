@@ -1,7 +1,7 @@
-// A job that is followed to its end, told by a daemon whose answers come in the order that a test chooses.
+// Following a job to its end. The stubbed daemon sends its responses in the order that a test chooses.
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
-import { connect, follow } from '@/api/index';
 import type { Job } from '@/api/types';
+import { client } from '@/client';
 import { WatchedJobs } from '@/job/watched';
 
 const id = '0123456789abcdef';
@@ -14,7 +14,7 @@ class Daemon {
   holds = false;
 
   answer(address: string): Promise<Response> {
-    if (new URL(address).pathname === '/v1/events') {
+    if (new URL(address, 'http://127.0.0.1:8080').pathname === '/v1/events') {
       const body = new ReadableStream<Uint8Array>({ start: (controller) => void (this.stream = controller) });
       return Promise.resolve(new Response(body));
     }
@@ -41,13 +41,11 @@ beforeEach(() => {
   daemon = new Daemon();
   over = new AbortController();
   vi.stubGlobal('fetch', (address: string) => daemon.answer(address));
-  connect({ server: 'http://127.0.0.1:8080' });
 });
 
 afterEach(() => {
   over.abort();
   vi.unstubAllGlobals();
-  connect({});
 });
 
 // What has been begun goes on as far as it can.
@@ -58,7 +56,7 @@ async function settled(): Promise<void> {
 describe('a job that is followed', () => {
   it('ends when the stream says so', async () => {
     const seen: string[] = [];
-    const job = follow(id, over.signal, ({ state }: Job) => seen.push(state));
+    const job = client.follow(id, over.signal, ({ state }: Job) => seen.push(state));
     await settled();
     daemon.end();
     expect((await job).state).toBe('succeeded');
@@ -67,10 +65,10 @@ describe('a job that is followed', () => {
 
   it('ends where its end is told before the first answer, which still calls it running', async () => {
     // The stream is there already, as on a page that has shown other things before.
-    void follow('another', over.signal, () => undefined);
+    client.follow('another', over.signal).catch(() => undefined);
     await settled();
     daemon.holds = true;
-    const job = follow(id, over.signal, () => undefined);
+    const job = client.follow(id, over.signal, () => undefined);
     await settled();
     daemon.end();
     await settled();
@@ -80,7 +78,7 @@ describe('a job that is followed', () => {
   });
 
   it('is told of where it had ended before anybody knew its id', async () => {
-    void follow('another', over.signal, () => undefined);
+    client.follow('another', over.signal).catch(() => undefined);
     await settled();
     daemon.end();
     await settled();
@@ -91,7 +89,7 @@ describe('a job that is followed', () => {
   });
 
   it('is asked for once where nothing more is told', async () => {
-    void follow(id, over.signal, () => undefined);
+    client.follow(id, over.signal).catch(() => undefined);
     await settled();
     const { questions } = daemon;
     await settled();

@@ -1,7 +1,6 @@
-// Uploads that go on where their connection broke, against a daemon as openapi.yaml describes it.
+// Uploads that continue after their connection broke, against a daemon as openapi.yaml describes it.
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
-import { connect, upload } from '@/api/index';
-import { ApiError } from '@/api/problem';
+import { ApiError, Client } from '@/api/index';
 
 const place = '/v1/uploads/0123';
 const whole = new Blob([Uint8Array.from({ length: 10_000_000 }, (_, at) => (at * 7919) >> 8)]);
@@ -58,32 +57,32 @@ class Daemon {
 }
 
 describe('upload in parts', () => {
+  const client = new Client({ server: 'http://127.0.0.1:8080/' });
   let daemon: Daemon;
 
   beforeEach(() => {
     daemon = new Daemon();
     vi.stubGlobal('fetch', (address: string, init: RequestInit) => daemon.answer(address, init));
-    connect({ server: 'http://127.0.0.1:8080/' });
   });
   afterEach(() => {
     vi.unstubAllGlobals();
-    connect({});
   });
 
   it('goes on where it broke, and tells how far it is', async () => {
     daemon.cuts = 2;
     const told: number[] = [];
-    const { volumes } = await upload(whole, { onProgress: (sent) => told.push(sent) });
+    const { volumes } = await client.upload(whole, { onProgress: (sent) => told.push(sent) });
     expect(volumes).toEqual([{ member: '', status: 201, volume: { id: 'abc' }, problem: null }]);
     expect(Buffer.compare(daemon.bytes, new Uint8Array(await whole.arrayBuffer()))).toBe(0);
     expect(daemon.asked.filter((each) => each.startsWith('HEAD'))).toHaveLength(2);
     expect(told).toEqual([...told].sort((a, b) => a - b));
     expect(told.length).toBeGreaterThan(3);
+    expect(told.at(-1)).toBe(whole.size);
   });
 
   it('asks for the answer that was not heard', async () => {
     daemon.isLastUnheard = true;
-    const { volumes } = await upload(whole);
+    const { volumes } = await client.upload(whole);
     expect(volumes[0]?.volume).toEqual({ id: 'abc' });
     expect(daemon.asked.at(-1)).toBe('POST /v1/volumes?upload');
   });
@@ -91,14 +90,14 @@ describe('upload in parts', () => {
   it('gives back what the daemon refuses', async () => {
     const problem = { title: 'The volume cannot be used', status: 422, detail: 'slice 41 of 93 is missing' };
     daemon.refusal = new Response(JSON.stringify(problem), { status: 422, headers: { 'Isomesh-Upload': '0123' } });
-    const refused = await upload(whole).catch((error: unknown) => error);
+    const refused = await client.upload(whole).catch((error: unknown) => error);
     expect(refused).toBeInstanceOf(ApiError);
     expect(refused).toMatchObject({ status: 422, detail: problem.detail, remedy: { kept: '0123' } });
   });
 
   it('comes in one piece where its parts are not known', async () => {
     daemon.refusal = new Response('{}', { status: 410 });
-    const { volumes } = await upload(whole);
+    const { volumes } = await client.upload(whole);
     expect(volumes[0]?.volume).toEqual({ id: 'abc' });
     expect(daemon.asked).toEqual(['POST /v1/volumes', `PATCH ${place}`, 'POST /v1/volumes']);
   });
@@ -106,7 +105,7 @@ describe('upload in parts', () => {
   it('is given up by who does not want it any more', async () => {
     const over = new AbortController();
     daemon.cuts = 1000;
-    const refused = upload(whole, { signal: over.signal }).catch((error: unknown) => error);
+    const refused = client.upload(whole, { signal: over.signal }).catch((error: unknown) => error);
     await vi.waitFor(() => expect(daemon.asked).toContain(`HEAD ${place}`));
     over.abort();
     expect(await refused).toBeInstanceOf(DOMException);

@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { ApiError, unreachable } from '@/api/problem';
-import { connected } from '@/api/client';
+import { connected } from '@/client';
 import { Scope } from '@/ui/signal';
 import { SliceLoader } from '@/volume/slice_loader';
 import type { Slice, Window } from '@/volume/slices';

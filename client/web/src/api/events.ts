@@ -1,4 +1,4 @@
-// Server-sent events out of a response's body (WHATWG HTML, 9.2.6). Not EventSource, because that
+// Reads server-sent events from a response's body (WHATWG HTML, 9.2.6). EventSource is not used because it
 // cannot carry a token.
 export interface ServerEvent {
   name: string;
@@ -10,11 +10,11 @@ export class EventParser {
   private name = '';
   private data: string[] = [];
 
-  // The events that this piece of text completes.
+  // Returns the events that this piece of text completes.
   take(text: string): ServerEvent[] {
     this.pending += text;
     const events: ServerEvent[] = [];
-    // A carriage return at the end may be half of a line's end.
+    // A carriage return at the end may be the first half of a line's end.
     for (;;) {
       const match = /\r\n|\n|\r(?!$)/.exec(this.pending);
       if (match === null) return events;

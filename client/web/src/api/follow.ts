@@ -1,15 +1,14 @@
-// A job's way to its end: told by the stream of all jobs, asked for where there is none. A lost connection
-// is waited for.
-import { getJob } from './client';
-import { isHidden, jobEvents } from './job_events';
+// Follows a job to its end: by the stream of all jobs, and by requests while there is no stream.
+import type { Client } from './client';
+import { isHidden } from './job_events';
 import { asApiError } from './problem';
 import { isFinal, type Job, type JobChange } from './types';
 
-// Between two questions while nothing is told; a page that nobody sees asks less often.
+// The time between two requests while there is no stream. A hidden page asks less often.
 const askEvery = 1000;
 const askHidden = 4000;
 
-// What is told adds to the job; what is told of another one is none of it.
+// The job with what the change says. A change of another job changes nothing.
 export function merged(job: Job, change: JobChange): Job {
   return change.id === job.id ? { ...job, ...change } : job;
 }
@@ -27,34 +26,51 @@ class Follower {
   private timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(
+    private readonly client: Client,
     private readonly id: string,
-    signal: AbortSignal,
     private readonly onChange: (job: Job) => void,
     private readonly end: End,
-  ) {
-    signal.addEventListener('abort', () => this.over.abort());
+  ) {}
+
+  start(signal: AbortSignal | undefined): void {
+    if (signal?.aborted) {
+      this.fail(signal.reason);
+      return;
+    }
+    // The listener goes with the follower, since the caller's signal may live much longer.
+    signal?.addEventListener('abort', () => this.fail(signal.reason), { signal: this.over.signal });
     this.over.signal.addEventListener('abort', () => clearTimeout(this.timer));
-    jobEvents.listen(
+    this.client.events.listen(
       {
         onBegin: () => void this.ask(),
         onPause: () => this.askLater(),
-        onChange: (change) => this.told(change),
+        onChange: (change) => this.take(change),
       },
       this.over.signal,
     );
     void this.ask();
   }
 
-  private told(change: JobChange): void {
+  private fail(reason: unknown): void {
+    this.end.reject(reason);
+    this.over.abort();
+  }
+
+  private take(change: JobChange): void {
     if (change.id !== this.id) return;
-    // The end may overtake the first answer, which does not know of it.
+    // The change may overtake the response to the first request, which still calls the job running.
     if (isFinal(change.state)) void this.ask();
     else if (this.current) this.show(merged(this.current, change));
   }
 
   private show(job: Job): void {
     this.current = job;
-    this.onChange(job);
+    try {
+      this.onChange(job);
+    } catch (error) {
+      // Otherwise the caller's fault would look like one of the connection, and be retried.
+      this.fail(error);
+    }
   }
 
   private askLater(): void {
@@ -64,41 +80,43 @@ class Follower {
 
   private async ask(): Promise<void> {
     const { signal } = this.over;
-    // What happens meanwhile may not be in the answer.
+    // The response may be older than what happens while it is on its way.
     this.asksAgain = this.isAsking;
     if (this.isAsking || signal.aborted) return;
     this.isAsking = true;
     let hasFailed = false;
     try {
-      const job = await getJob(this.id, 0, signal);
+      const job = await this.client.getJob(this.id, 0, signal);
       if (signal.aborted) return;
       this.show(job);
       if (isFinal(job.state)) {
-        this.over.abort();
         this.end.resolve(job);
+        this.over.abort();
       }
     } catch (error) {
       hasFailed = true;
-      if (!signal.aborted) this.failed(error);
+      if (!signal.aborted) this.takeError(error);
     } finally {
       this.isAsking = false;
       if (this.asksAgain) void this.ask();
-      else if (!signal.aborted && (hasFailed || !jobEvents.isTelling)) this.askLater();
+      else if (!signal.aborted && (hasFailed || !this.client.events.isTelling)) this.askLater();
     }
   }
 
-  private failed(error: unknown): void {
-    const refusal = asApiError(error);
-    if (refusal.isUnreachable || refusal.status === 503 || refusal.status === 429) return;
-    this.over.abort();
-    this.end.reject(refusal);
+  private takeError(error: unknown): void {
+    const failure = asApiError(error);
+    if (failure.isUnreachable || failure.status === 503 || failure.status === 429) return;
+    this.fail(failure);
   }
 }
 
-// Calls back with every change, the end included, and resolves with the job as it ended. Rejects with
-// ApiError when the job is gone; never does either once the signal has ended.
-export function follow(id: string, signal: AbortSignal, onChange: (job: Job) => void): Promise<Job> {
+export function follow(
+  client: Client,
+  id: string,
+  signal: AbortSignal | undefined,
+  onChange: (job: Job) => void,
+): Promise<Job> {
   return new Promise((resolve, reject) => {
-    new Follower(id, signal, onChange, { resolve, reject });
+    new Follower(client, id, onChange, { resolve, reject }).start(signal);
   });
 }

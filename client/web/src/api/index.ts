@@ -1,25 +1,5 @@
-// What other projects get of this folder, as the module `isomesh` (client/javascript).
-export {
-  cancelJob,
-  connect,
-  eraseVolume,
-  estimateOf,
-  getJob,
-  getVolume,
-  histogramOf,
-  labelsOf,
-  listJobs,
-  listVolumes,
-  meshOf,
-  previewFile,
-  renameVolume,
-  slicePicture,
-  submitJob,
-} from './client';
-export { follow } from './follow';
-export { cancelOrder, hasOrders, listOrders, listPacs, retryOrder } from './orders';
+// The module `isomesh` (client/javascript) exports this.
+export { Client } from './client';
 export { adviceFor, ApiError, choicesOf } from './problem';
 export { isFinal } from './types';
 export type * from './types';
-export { upload } from './upload';
-export type { RawDescription, Uploaded, UploadOptions } from './upload';

@@ -1,22 +1,22 @@
-// What happens to jobs, in one stream for the whole page: a browser makes only six connections to a server
-// over HTTP/1.1, and a stream keeps one.
-import { send } from './client';
+// What happens to jobs, in one stream for the whole client: a browser makes only six connections to a server over
+// HTTP/1.1, and each stream keeps one.
+import type { Connection } from './connection';
 import { EventParser } from './events';
 import { asApiError } from './problem';
 import type { JobChange } from './types';
 
 export interface JobListener {
   onChange: (change: JobChange) => void;
-  // The stream begins, for the first time or after a pause in which nothing was told.
+  // The stream begins, for the first time or after a pause.
   onBegin: () => void;
-  // Nothing is told for the time being: who wants to know has to ask.
+  // The stream has ended or failed. Until it begins again, the listener has to ask.
   onPause: () => void;
 }
 
 const retryDelays = [500, 1000, 2000, 4000];
-// When the daemon has no stream, or none to spare.
+// If the daemon rejects the stream: it may be an old one, or all its streams are taken.
 const refusedDelay = 15_000;
-// The daemon says something every 15 seconds at least.
+// The daemon sends something at least every 15 seconds.
 const longestSilence = 40_000;
 
 export class JobEvents {
@@ -24,7 +24,9 @@ export class JobEvents {
   private running: AbortController | null = null;
   private isOpen = false;
 
-  // Tells the listener until the signal ends.
+  constructor(private readonly connection: Connection) {}
+
+  // Calls the listener until the signal is aborted.
   listen(listener: JobListener, signal: AbortSignal): void {
     if (signal.aborted) return;
     this.listeners.add(listener);
@@ -39,7 +41,7 @@ export class JobEvents {
     return this.isOpen;
   }
 
-  // A page that nobody sees leaves its connection to the others.
+  // A hidden page leaves its connection to others, and calls this when it is seen again.
   start(): void {
     if (this.running || this.listeners.size === 0 || isHidden()) return;
     const running = new AbortController();
@@ -77,7 +79,7 @@ export class JobEvents {
   }
 
   private async read(signal: AbortSignal): Promise<void> {
-    const answer = await send('/v1/events', { signal, headers: { Accept: 'text/event-stream' } });
+    const answer = await this.connection.send('/v1/events', { signal, headers: { Accept: 'text/event-stream' } });
     const reader = answer.body?.getReader();
     if (!reader) return;
     this.isOpen = true;
@@ -96,26 +98,20 @@ export class JobEvents {
   }
 }
 
-export const jobEvents = new JobEvents();
-
-// Where there is no page, somebody waits.
+// Always false in Node, which has no page.
 export function isHidden(): boolean {
   return typeof document !== 'undefined' && document.hidden;
 }
 
-export function watchVisibility(): void {
-  document.addEventListener('visibilitychange', () => {
-    if (document.hidden) jobEvents.stop();
-    else jobEvents.start();
-  });
-}
-
+// Ends early when the signal is aborted, without an error.
 export function sleep(milliseconds: number, signal?: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
-    const timer = setTimeout(resolve, milliseconds);
-    signal?.addEventListener('abort', () => {
+    const end = (): void => {
       clearTimeout(timer);
+      signal?.removeEventListener('abort', end);
       resolve();
-    });
+    };
+    const timer = setTimeout(end, signal?.aborted ? 0 : milliseconds);
+    signal?.addEventListener('abort', end);
   });
 }

@@ -1,21 +1,21 @@
 import type { Choice, FieldFault, Problem } from './types';
 
-// Of a refusal: the note that a person may accept, and what there is to choose from.
+// How a request may succeed: by accepting a note, or by choosing one of several.
 export type Remedy = Pick<Problem, 'overridable' | 'choices'> & {
-  // The name by which the daemon keeps what was uploaded.
+  /** The server keeps the uploaded bytes under this name. */
   kept?: string;
 };
 
-// A request that the daemon refused, or (status 0) that never reached it.
+/** A request failed. `status` is the HTTP status, or 0 if there was no response. */
 export class ApiError extends Error {
   constructor(
     readonly status: number,
     readonly title: string,
     readonly detail: string,
     readonly faults: FieldFault[] = [],
-    // What can be added to the request so that it is not refused again.
+    /** What to add to the request so that it succeeds. */
     readonly remedy: Remedy = {},
-    // Where a person finds what is missing.
+    /** A link that helps. */
     readonly link: { href: string; text: string } | null = null,
   ) {
     super(detail || title);
@@ -42,66 +42,68 @@ export function errorOfProblem(problem: Problem, kept?: string): ApiError {
   );
 }
 
-// What a refusal's body says; a proxy before the daemon may answer with anything.
+// Reads an error response. A proxy before the daemon may send any body.
 export function errorOf(status: number, body: string, kept?: string): ApiError {
   try {
     const problem: unknown = JSON.parse(body);
     if (isProblem(problem)) return errorOfProblem({ ...problem, status }, kept);
   } catch {
-    // Not JSON: the status has to do.
+    // The body is not JSON. Only the status is known.
   }
   return new ApiError(status, `HTTP status ${status}`, `The server answered with status ${status}.`);
 }
 
-export function unreachable(): ApiError {
-  return new ApiError(
+export function unreachable(cause?: unknown): ApiError {
+  const error = new ApiError(
     0,
     'The server cannot be reached',
-    'The connection was lost. Is isomeshd running, and is the network there?',
+    'The server did not respond. Check that isomeshd is running and that the network works.',
   );
+  error.cause = cause;
+  return error;
 }
 
 export function asApiError(error: unknown): ApiError {
   if (error instanceof ApiError) return error;
-  // fetch tells nothing more about a connection that failed.
-  if (error instanceof TypeError) return unreachable();
-  return new ApiError(-1, 'Something went wrong in this page', String(error));
+  // fetch throws a TypeError when a connection fails. Only Node says more, in its cause.
+  if (error instanceof TypeError) return unreachable(error.cause ?? error);
+  return new ApiError(-1, 'An unexpected error occurred', String(error));
 }
 
-// What a person can do about it, in one sentence; empty when the detail says all.
+/** Says in one sentence what a person can do. Empty if the error's detail already does. */
 export function adviceFor(error: ApiError): string {
   if (error.remedy.overridable !== undefined || choicesOf(error).size > 0) return '';
   switch (error.status) {
     case 0:
-      return 'Try again when the connection is back.';
+      return 'Try again when the server responds.';
     case 401:
     case 403:
-      return 'Enter a token that may do this.';
+      return 'Enter an access token that has this permission.';
     case 404:
     case 410:
-      return 'It may have been erased; choose another one from the list.';
+      return 'It may have been erased. Choose another one from the list.';
     case 413:
-      return 'Crop or resample it, or ask the administrator to raise the limit.';
+      return 'Crop or resample the volume, or ask the administrator to raise the limit.';
     case 415:
-      return 'NIfTI, NRRD, MetaImage, VTK images and DICOM are read; raw samples need a description.';
+      return 'The server reads NIfTI, NRRD, MetaImage, VTK images and DICOM. Raw samples need a description.';
     case 422:
-      return 'Export it again from its source, or choose another one.';
+      return 'Export the volume again from its source, or choose another one.';
     case 429:
     case 503:
-      return 'The server is busy; try again in a moment.';
+      return 'The server is busy. Try again in a moment.';
     case 507:
-      return 'Erase volumes that are not needed any more, then try again.';
+      return 'Erase volumes that you no longer need, then try again.';
     default:
       return '';
   }
 }
 
-// Whether the same request may be taken another time.
+// Returns whether the same request may succeed later.
 export function mayPass({ status }: ApiError): boolean {
   return ![400, 404, 410, 413, 415, 422].includes(status);
 }
 
-// The choices by their parameters: one of each can be taken.
+/** Groups the choices by their parameter. The next request may name one of each group. */
 export function choicesOf({ remedy }: ApiError): Map<Choice['parameter'], Choice[]> {
   const byParameter = new Map<Choice['parameter'], Choice[]>();
   for (const choice of remedy.choices ?? []) {

@@ -1,6 +1,6 @@
-// Uploads that go on where their connection broke: "Resumable Uploads for HTTP"
-// (draft-ietf-httpbis-resumable-upload), of which docs/uploads.md tells what the daemon knows.
-import { ask } from './client';
+// Uploads that continue after their connection broke, by "Resumable Uploads for HTTP"
+// (draft-ietf-httpbis-resumable-upload). docs/uploads.md says what the daemon supports.
+import type { Connection } from './connection';
 import { sleep } from './job_events';
 import { errorOf } from './problem';
 
@@ -14,20 +14,20 @@ interface Reached {
   isWhole: boolean;
 }
 
-// Parts are as large as a connection takes in about a second, so that their progress is seen.
+// A part takes about a second, so that the progress is seen to move.
 const leastPart = 1 << 20;
 const mostPart = 32 << 20;
 const shortTime = 500;
 const longTime = 2000;
 
-// How long no byte gets through before an upload is given up.
+// The upload fails after this time without progress.
 const longestCut = 60_000;
 const firstPause = 100;
 const longestPause = 3000;
-// The daemon is busy, or ends, or still has the connection that broke.
+// The daemon is busy, shuts down, or still holds the broken connection.
 const passing = [408, 409, 429, 502, 503, 504];
 
-// Whether there is still patience, and the pause before the next try.
+// Counts the time without progress, and makes the pauses between retries longer.
 class Patience {
   private cut: number | null = null;
   private pause = firstPause;
@@ -55,13 +55,14 @@ class Parts {
   private reached: Reached | null = { offset: 0, isWhole: false };
 
   constructor(
+    private readonly connection: Connection,
     private readonly path: string,
     private readonly place: string,
     private readonly whole: Blob,
     private readonly options: Options,
   ) {}
 
-  // The answer to the last part, or a refusal.
+  // Sends all parts. Returns the response to the last one, or the first error response that a retry cannot help.
   async answer(): Promise<Response> {
     const { signal } = this.options;
     for (;;) {
@@ -77,24 +78,26 @@ class Parts {
     }
   }
 
-  // Finds out how much the daemon has; its answer where that is a refusal.
+  // Asks how much the daemon has. Returns null, or an error response.
   private async look(): Promise<Response | null> {
-    const answer = await ask(this.place, { method: 'HEAD', signal: this.options.signal });
+    const answer = await this.connection.ask(this.place, { method: 'HEAD', signal: this.options.signal });
     if (!answer.ok) return answer;
     const offset = Number(answer.headers.get('Upload-Offset'));
     this.goTo({ offset, isWhole: answer.headers.get('Upload-Complete') === '?1' });
     return null;
   }
 
-  // Sends one part; the answer where it was the last one or is refused.
+  // Sends one part. Returns null, the response to the last part, or an error response.
   private async send({ offset, isWhole }: Reached): Promise<Response | null> {
     const { signal } = this.options;
-    // Who asks like this hears what has become of it.
-    if (isWhole) return ask(`${this.path}&upload=${this.place.split('/').at(-1)}`, { method: 'POST', signal });
+    // All bytes are there, but the response was lost. This request repeats it.
+    if (isWhole) {
+      return this.connection.ask(`${this.path}&upload=${this.place.split('/').at(-1)}`, { method: 'POST', signal });
+    }
     const end = Math.min(this.whole.size, offset + this.size);
     const isLast = end === this.whole.size;
     const began = Date.now();
-    const answer = await ask(this.place, {
+    const answer = await this.connection.ask(this.place, {
       method: 'PATCH',
       signal,
       body: this.whole.slice(offset, end),
@@ -116,19 +119,20 @@ class Parts {
     this.reached = reached;
     if (reached.offset > this.furthest) this.patience.gotOn();
     this.furthest = Math.max(this.furthest, reached.offset);
-    // While the last part is on its way the daemon is not reading the volume yet.
+    // The last part is reported by the caller: until its response, nobody knows that all of it was sent.
     this.options.onProgress?.(reached.offset, this.whole.size);
   }
 }
 
-// The daemon's answer to `POST path` with that body, whatever it says.
+// Returns the daemon's response to `POST path` with that body, also an error response.
 export async function answerInParts(
+  connection: Connection,
   path: string,
   headers: Record<string, string>,
   whole: Blob,
   options: Options,
 ): Promise<Response> {
-  const begun = await ask(path, {
+  const begun = await connection.ask(path, {
     method: 'POST',
     signal: options.signal,
     headers: { ...headers, 'Upload-Complete': '?0', 'Upload-Length': String(whole.size) },
@@ -136,13 +140,13 @@ export async function answerInParts(
   const place = begun.headers.get('Location');
   if (!begun.ok || place === null) throw errorOf(begun.status, await begun.text());
   try {
-    const answer = await new Parts(path, place, whole, options).answer();
+    const answer = await new Parts(connection, path, place, whole, options).answer();
     if (answer.status !== 410) return answer;
-    // It has expired, or another daemon answers than the one that has it.
-    return await ask(path, { method: 'POST', signal: options.signal, body: whole, headers });
+    // The upload has expired, or another daemon has it.
+    return await connection.ask(path, { method: 'POST', signal: options.signal, body: whole, headers });
   } catch (error) {
-    // What is left there expires, where nobody can be told.
-    if (options.signal?.aborted) void ask(place, { method: 'DELETE' }).catch(() => undefined);
+    // If this request fails, too, the daemon deletes the upload when it expires.
+    if (options.signal?.aborted) void connection.ask(place, { method: 'DELETE' }).catch(() => undefined);
     throw error;
   }
 }

@@ -1,8 +1,24 @@
-// What the daemon answers and is asked, by the names that the page uses. The types themselves are made of
-// proto/openapi.yaml (generate.mjs).
+// The types of requests and responses. generate.mjs makes them from proto/openapi.yaml.
 import type { components, operations } from '../../generated/api';
 
 type Schemas = components['schemas'];
+
+// The type of a global class, from the "dom" library or @types/node. A project with neither gets `Otherwise`, so that
+// it can compile the module's types, too.
+type Global<Name extends string, Otherwise> = typeof globalThis extends Record<Name, { prototype: infer Instance }>
+  ? Instance
+  : Otherwise;
+
+export type GlobalAbortSignal = Global<'AbortSignal', { readonly aborted: boolean; readonly reason: unknown }>;
+export type GlobalBlob = Global<'Blob', { readonly size: number; arrayBuffer(): Promise<ArrayBuffer> }>;
+export type GlobalURLSearchParams = Global<'URLSearchParams', { toString(): string }>;
+
+export interface ClientOptions {
+  /** The server's address, such as http://127.0.0.1:8080. */
+  server?: string;
+  /** The access token, if the server requires one. */
+  token?: string;
+}
 
 export type Vec3 = Schemas['Vector'];
 export type SampleType = Schemas['SampleType'];
@@ -18,7 +34,7 @@ export type JobRequest = Schemas['JobRequest'];
 export type Job = Schemas['Job'];
 export type JobList = Schemas['JobList'];
 export type JobChange = Schemas['AnyJobEvent'];
-// All of them, as a job has them; a request names only some.
+// All parameters, as a job has them. A request may name only some.
 export type JobParameters = Job['parameters'];
 export type JobState = Schemas['JobState'];
 
@@ -41,6 +57,34 @@ export type FieldFault = NonNullable<Problem['errors']>[number];
 
 export type Choice = NonNullable<Problem['choices']>[number];
 export type UploadedVolume = Schemas['UploadedVolumes']['volumes'][number];
+
+export interface RawDescription {
+  dims: [number, number, number];
+  type: SampleType;
+  spacing: [number, number, number];
+  byteOrder: 'little' | 'big';
+}
+
+export interface UploadOptions {
+  /** Describes raw samples. A file of a known format needs no description. */
+  raw?: RawDescription;
+  /** Further query parameters of POST /v1/volumes, such as { series: '1.2.3' } or { accept: 'CODE' }. */
+  choices?: Readonly<Record<string, string>>;
+  /** The file's name. */
+  name?: string;
+  /** Names an earlier upload that the server still keeps (`kept` of Uploaded or ApiError). Its bytes are not sent again. */
+  kept?: string;
+  signal?: GlobalAbortSignal;
+  /** Bytes sent so far. All of them are sent while the server reads the volume. */
+  onProgress?: (sent: number, total: number) => void;
+}
+
+export interface Uploaded {
+  /** One entry for each volume of the file or archive. */
+  volumes: UploadedVolume[];
+  /** The server keeps the upload under this name while a choice is open. */
+  kept?: string;
+}
 
 export function isFinal(state: JobState): boolean {
   return state === 'succeeded' || state === 'failed' || state === 'cancelled';

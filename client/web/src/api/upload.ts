@@ -1,36 +1,10 @@
 // Uploads with their progress.
-import { addressOf, connected, headers, unauthorized } from './client';
+import type { Connection } from './connection';
 import { ApiError, errorOf, unreachable } from './problem';
 import { answerInParts } from './resume';
-import type { SampleType, UploadedVolume, Volume } from './types';
+import type { Uploaded, UploadedVolume, UploadOptions, Volume } from './types';
 
-export interface RawDescription {
-  dims: [number, number, number];
-  type: SampleType;
-  spacing: [number, number, number];
-  byteOrder: 'little' | 'big';
-}
-
-export interface UploadOptions {
-  raw?: RawDescription;
-  // What chooses and accepts, by its parameter of the query.
-  choices?: Readonly<Record<string, string>>;
-  // What the file is called.
-  name?: string;
-  // The name by which the daemon keeps the body, which is not sent again then.
-  kept?: string;
-  signal?: AbortSignal;
-  // Bytes that are sent; all of them while the daemon reads the volume.
-  onProgress?: (sent: number, total: number) => void;
-}
-
-export interface Uploaded {
-  volumes: UploadedVolume[];
-  // Under which the daemon keeps the body, as long as something of it may be chosen.
-  kept?: string;
-}
-
-// What is refused stays with the daemon until a person has chosen what of it to read.
+// `keep`: the daemon keeps a file that leaves a choice open until a person has chosen.
 export function uploadPath(options: Pick<UploadOptions, 'raw' | 'choices' | 'kept'>): string {
   const query = new URLSearchParams({ keep: 'true' });
   if (options.kept !== undefined) query.set('upload', options.kept);
@@ -44,44 +18,61 @@ export function uploadPath(options: Pick<UploadOptions, 'raw' | 'choices' | 'kep
   return `/v1/volumes?${query.toString()}`;
 }
 
-// The header that tells a file's name, which is in no address because logs hold those.
+// The header with the file's name. The address does not contain it, because logs contain addresses.
 export function dispositionOf(name: string): string {
   return `attachment; filename*=UTF-8''${encodeURIComponent(name).replaceAll("'", '%27')}`;
 }
 
-// What became of each volume of the body; the only one has an empty member.
+// The result for each volume of the body. If there is only one, its `member` is empty.
 export function uploadedOf(status: number, body: string): UploadedVolume[] {
   const answer: unknown = JSON.parse(body);
   if (status === 207) return (answer as { volumes: UploadedVolume[] }).volumes;
   return [{ member: '', status, volume: answer as Volume, problem: null }];
 }
 
-// What fewer bytes are is sent in one request.
-const resumableBytes = 8 << 20;
-
-// A large body goes on where its connection broke.
-export function upload(whole: Blob, options: UploadOptions = {}): Promise<Uploaded> {
-  const isSmall = whole.size < resumableBytes || options.kept !== undefined;
-  // Of a request's body XMLHttpRequest tells the progress, which fetch does not. Node has only that.
-  return isSmall && typeof XMLHttpRequest !== 'undefined' ? uploadInOne(whole, options) : uploadInParts(whole, options);
+function bytesOf(whole: unknown): Blob {
+  if (whole instanceof Blob) return whole;
+  if (whole instanceof ArrayBuffer || ArrayBuffer.isView(whole)) return new Blob([whole as BlobPart]);
+  const isText = typeof whole === 'string';
+  const given = isText ? 'a string' : ((whole as object | null)?.constructor?.name ?? String(whole));
+  throw new TypeError(
+    `upload takes a Blob, a File, an ArrayBuffer or a Uint8Array, not ${given}. ` +
+      (isText ? 'It does not open files. ' : '') +
+      "To upload a file in Node: upload(await readFile('head.nii.gz')), with readFile from 'node:fs/promises'.",
+  );
 }
 
-async function uploadInParts(whole: Blob, options: UploadOptions): Promise<Uploaded> {
+// Smaller uploads are sent in one request.
+const resumableBytes = 8 << 20;
+
+// A large upload continues after its connection broke.
+export async function upload(connection: Connection, given: unknown, options: UploadOptions): Promise<Uploaded> {
+  const whole = bytesOf(given);
+  options.signal?.throwIfAborted();
+  const isSmall = whole.size < resumableBytes || options.kept !== undefined;
+  // XMLHttpRequest reports the progress of a request's body, and fetch does not. Node has only fetch.
+  return isSmall && typeof XMLHttpRequest !== 'undefined'
+    ? uploadInOne(connection, whole, options)
+    : uploadInParts(connection, whole, options);
+}
+
+async function uploadInParts(connection: Connection, whole: Blob, options: UploadOptions): Promise<Uploaded> {
   const name: Record<string, string> =
     options.name === undefined ? {} : { 'Content-Disposition': dispositionOf(options.name) };
-  const answer = await answerInParts(uploadPath(options), name, whole, options);
+  const answer = await answerInParts(connection, uploadPath(options), name, whole, options);
   const kept = answer.headers.get('Isomesh-Upload') ?? undefined;
   const text = await answer.text();
   if (!answer.ok) throw errorOf(answer.status, text, kept);
+  options.onProgress?.(whole.size, whole.size);
   return { volumes: uploadedOf(answer.status, text), kept };
 }
 
-function uploadInOne(whole: Blob, options: UploadOptions): Promise<Uploaded> {
+function uploadInOne(connection: Connection, whole: Blob, options: UploadOptions): Promise<Uploaded> {
   const body = options.kept === undefined ? whole : new Blob();
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
-    request.open('POST', addressOf(uploadPath(options)));
-    for (const [name, value] of Object.entries(headers())) request.setRequestHeader(name, value);
+    request.open('POST', connection.addressOf(uploadPath(options)));
+    for (const [name, value] of Object.entries(connection.headers())) request.setRequestHeader(name, value);
     request.setRequestHeader('Content-Type', 'application/octet-stream');
     if (options.name !== undefined) request.setRequestHeader('Content-Disposition', dispositionOf(options.name));
     let sent = 0;
@@ -91,33 +82,32 @@ function uploadInOne(whole: Blob, options: UploadOptions): Promise<Uploaded> {
     };
     request.upload.onload = () => options.onProgress?.(body.size, body.size);
     request.onload = () => {
-      connected.value = true;
+      connection.connected.value = true;
       const kept = request.getResponseHeader('Isomesh-Upload') ?? undefined;
       if ([200, 201, 207].includes(request.status)) {
         resolve({ volumes: uploadedOf(request.status, request.responseText), kept });
         return;
       }
-      if (request.status === 401) unauthorized.value = true;
+      if (request.status === 401) connection.unauthorized.value = true;
       reject(errorOf(request.status, request.responseText, kept));
     };
     request.onerror = () => {
-      // A server that refuses early closes the connection while the body is still on its way, which
-      // looks the same from here.
+      // This may also be a server that rejects the upload early: it closes the connection while the body is sent.
       if (sent > 0 && sent < body.size) {
         reject(
           new ApiError(
             0,
-            'The upload was cut off',
-            'The connection ended before the whole volume was sent. The network failed, or the ' +
-              'volume is larger than the server takes.',
+            'The upload was interrupted',
+            'The connection was lost before the whole volume was sent. Either the network failed, or the ' +
+              'volume is larger than the server allows.',
           ),
         );
       } else {
-        connected.value = false;
+        connection.connected.value = false;
         reject(unreachable());
       }
     };
-    request.onabort = () => reject(new DOMException('The upload was cancelled', 'AbortError'));
+    request.onabort = () => reject(options.signal?.reason as Error);
     options.signal?.addEventListener('abort', () => request.abort());
     request.send(body);
   });

@@ -1,6 +1,5 @@
 // Jobs that this tab has started: a person who went elsewhere is told when one has ended.
-import { getJob } from '../api/client';
-import { jobEvents } from '../api/job_events';
+import { client } from '../client';
 import { asApiError } from '../api/problem';
 import { isFinal, type Job } from '../api/types';
 
@@ -39,7 +38,7 @@ export class WatchedJobs {
   private listen(): void {
     if (this.listening) return;
     this.listening = new AbortController();
-    jobEvents.listen(
+    client.events.listen(
       {
         // What ended while nothing was told.
         onBegin: () => {
@@ -56,7 +55,7 @@ export class WatchedJobs {
 
   private async look(id: string): Promise<void> {
     try {
-      const job = await getJob(id);
+      const job = await client.getJob(id);
       if (!isFinal(job.state) || !this.ids.includes(id)) return;
       this.ids = this.ids.filter((other) => other !== id);
       this.tell(job);

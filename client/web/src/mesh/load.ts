@@ -1,5 +1,5 @@
 // A finished job's mesh, part by part: downloaded, decoded in workers, and handed over as it comes.
-import { headers, connected } from '../api/client';
+import { client, connected } from '../client';
 import { ApiError, asApiError, errorOf, unreachable } from '../api/problem';
 import type { Job, MeshFile } from '../api/types';
 import type { Block } from './blocks';
@@ -73,7 +73,7 @@ async function download(
     try {
       const range: Record<string, string> =
         received > 0 ? { Range: `bytes=${received}-`, 'If-Range': `"${file.sha256}"` } : {};
-      const answer = await fetch(file.href, { signal, headers: headers(range) });
+      const answer = await fetch(file.href, { signal, headers: client.connection.headers(range) });
       if (!answer.ok) throw errorOf(answer.status, await answer.text());
       if (received > 0 && answer.status !== 206) {
         throw new ApiError(-1, 'The mesh changed', 'The file is not the same any more; reload the page.');

@@ -1,5 +1,5 @@
 // The token lives as long as the tab.
-import { token } from '../api/client';
+import { token } from '../client';
 
 const key = 'isomesh.token';
 

@@ -1,4 +1,4 @@
-import { token, unauthorized } from '../api/client';
+import { token, unauthorized } from '../client';
 import { button, field, h } from './dom';
 import { Signal } from './signal';
 

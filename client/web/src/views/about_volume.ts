@@ -1,5 +1,5 @@
 // What there is to say about a volume beside its slices.
-import { renameVolume } from '../api/client';
+import { client } from '../client';
 import type { Volume } from '../api/types';
 import { button, h } from '../ui/dom';
 import { formatDims, formatNames, formatSpacing, formatValue } from '../ui/format';
@@ -34,7 +34,7 @@ function nameHeading(volume: Volume, onRenamed: () => void): HTMLElement {
     const name = await askText('Name of this volume', volume.name ?? '', 'Rename');
     if (name === null) return;
     try {
-      volume.name = (await renameVolume(volume.id, name === '' ? null : name)).name;
+      volume.name = (await client.renameVolume(volume.id, name === '' ? null : name)).name;
       text.textContent = volumeName(volume);
       onRenamed();
     } catch (error) {

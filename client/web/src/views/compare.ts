@@ -1,6 +1,5 @@
 // Two to four surfaces side by side that turn together: #/compare?jobs=A,B
-import { getJob, getVolume } from '../api/client';
-import { follow } from '../api/follow';
+import { client } from '../client';
 import { ApiError, asApiError, errorOfProblem } from '../api/problem';
 import { isFinal, type Job, type Volume } from '../api/types';
 import { differences } from '../job/differences';
@@ -40,8 +39,8 @@ function numbersOf(job: Job): HTMLElement {
 }
 
 async function finished(id: string, scope: Scope, onChange: (job: Job) => void): Promise<Job> {
-  const job = await getJob(id);
-  return isFinal(job.state) ? job : follow(id, scope.signal, onChange);
+  const job = await client.getJob(id);
+  return isFinal(job.state) ? job : client.follow(id, scope.signal, onChange);
 }
 
 export async function compareView(scope: Scope, route: Route): Promise<HTMLElement> {
@@ -50,9 +49,9 @@ export async function compareView(scope: Scope, route: Route): Promise<HTMLEleme
     const link = { href: hashOf(['jobs']), text: 'To the list of jobs' };
     throw new ApiError(-1, 'Nothing to compare', 'Choose two to four jobs in the list of jobs.', [], {}, link);
   }
-  const jobs = await Promise.all(ids.map((id) => getJob(id)));
+  const jobs = await Promise.all(ids.map((id) => client.getJob(id)));
   const [first] = jobs;
-  const volume = first ? await getVolume(first.volume).catch(() => null) : null;
+  const volume = first ? await client.getVolume(first.volume).catch(() => null) : null;
   return new Comparison(scope, jobs, volume, placeOfText(route.query.get('cam') ?? '')).element;
 }
 

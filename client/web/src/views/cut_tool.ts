@@ -1,5 +1,5 @@
 // The cut along a slice: its controls, and the slice's picture on it.
-import { histogramOf, slicePicture } from '../api/client';
+import { client } from '../client';
 import type { Axis, Job, Volume } from '../api/types';
 import type { Surface } from '../scene/surface';
 import { checkbox, h } from '../ui/dom';
@@ -126,9 +126,9 @@ export class CutTool {
         if (this.window === null) {
           const { iso: asked } = this.job.parameters;
           const iso = typeof asked === 'number' ? asked : volume.suggested_iso;
-          this.window = defaultWindow(await histogramOf(volume.id, bins, this.scope.signal), iso);
+          this.window = defaultWindow(await client.histogramOf(volume.id, bins, this.scope.signal), iso);
         }
-        const blob = await slicePicture(volume.id, axis, index, this.window, this.scope.signal);
+        const blob = await client.slicePicture(volume.id, axis, index, this.window, this.scope.signal);
         const picture = await createImageBitmap(blob);
         if (this.scope.isOver || !this.isOn) picture.close();
         else {

@@ -1,6 +1,5 @@
 // One job: its way, then its surface. #/jobs/ID
-import { cancelJob, getJob, getVolume } from '../api/client';
-import { follow } from '../api/follow';
+import { client } from '../client';
 import { asApiError, errorOfProblem } from '../api/problem';
 import { isFinal, type Job, type JobParameters, type Volume } from '../api/types';
 import { emptyReason } from '../job/empty';
@@ -31,7 +30,7 @@ function stagesOf({ parameters }: Job): string[] {
 // The volume may be gone while its surface is still there.
 async function volumeOf(job: Job): Promise<Volume | null> {
   try {
-    return await getVolume(job.volume);
+    return await client.getVolume(job.volume);
   } catch (error) {
     if (asApiError(error).isUnreachable) throw error;
     return null;
@@ -69,7 +68,7 @@ class ProgressPanel {
   constructor(job: Job) {
     const cancel = button('Cancel', () => {
       cancel.disabled = true;
-      cancelJob(job.id).catch((error: unknown) => {
+      client.cancelJob(job.id).catch((error: unknown) => {
         cancel.disabled = false;
         tellError(error);
       });
@@ -108,7 +107,7 @@ class ProgressPanel {
 export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> {
   // While the daemon is asked.
   void graphicsStarted();
-  const first = await getJob(route.path[1] ?? '');
+  const first = await client.getJob(route.path[1] ?? '');
   const volume = await volumeOf(first);
   const stageArea = h('div', { class: 'stage-area' });
   const panel = h('aside', { class: 'panel', 'aria-label': 'The job' });
@@ -137,7 +136,7 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
   progress.show(first);
   stageArea.append(h('div', { class: 'waiting' }, h('p', {}, 'The surface appears here when it is made.')));
   panel.append(head(first, volume), progress.element);
-  follow(first.id, scope.signal, (job) => {
+  client.follow(first.id, scope.signal, (job) => {
     element.dataset.state = job.state;
     nameTab(job);
     progress.show(job);

@@ -1,5 +1,5 @@
 // What stands beside a surface: its numbers, timings, files, and how to make others.
-import { submitJob, token } from '../api/client';
+import { client, token } from '../client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../api/types';
 import { defaultParameters, isSameJob, jobRequest, queryOfParameters, surfaceInWords, variantOf, withGlb } from '../job/parameters';
 import { commandSnippet, curlSnippet, librarySnippet } from '../job/snippets';
@@ -144,7 +144,7 @@ export function timings(job: Job, more: Durations = {}): HTMLElement {
 
 // Makes the same surface with other parameters, or finds it made already.
 export async function submitVariant(job: Job, variant: Partial<JobParameters>): Promise<Job> {
-  return submitJob(jobRequest(variantOf(job.parameters, variant)));
+  return client.submitJob(jobRequest(variantOf(job.parameters, variant)));
 }
 
 // Of the surface, with what it is of: head-iso-60.glb.

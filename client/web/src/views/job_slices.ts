@@ -1,5 +1,5 @@
 // Three slices beside a surface, through the place that was clicked on it.
-import { histogramOf } from '../api/client';
+import { client } from '../client';
 import type { Job, Vec3, Volume } from '../api/types';
 import { h } from '../ui/dom';
 import { tellError } from '../ui/notices';
@@ -33,7 +33,7 @@ class JobSlices {
   async load(scope: Scope, job: Job): Promise<void> {
     const { volume } = this;
     const iso = job.mesh?.iso ?? null;
-    const common = defaultWindow(await histogramOf(volume.id, bins, scope.signal), iso ?? volume.suggested_iso);
+    const common = defaultWindow(await client.histogramOf(volume.id, bins, scope.signal), iso ?? volume.suggested_iso);
     let window = common;
     const update = (): void => {
       for (const view of this.views) view.update();

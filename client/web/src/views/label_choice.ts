@@ -1,5 +1,5 @@
 // Which labels of a volume are to be meshed: all of them, or those that are picked from a list.
-import { labelsOf } from '../api/client';
+import { client } from '../client';
 import { asApiError } from '../api/problem';
 import type { JobParameters, VolumeLabel } from '../api/types';
 import { labelTitle } from '../job/labels';
@@ -58,7 +58,7 @@ export class LabelChoice {
     this.chosen.clear();
     this.boxes.clear();
     this.search = null;
-    labelsOf(this.volume, this.background, asking.signal).then(
+    client.labelsOf(this.volume, this.background, asking.signal).then(
       ({ labels }) => {
         if (!asking.signal.aborted) this.show(labels, wanted);
       },

@@ -1,5 +1,5 @@
 // The surface at the iso-value, beside the slices and as it changes: drawn from a reduced copy of the volume.
-import { connected, previewFile } from '../api/client';
+import { client, connected } from '../client';
 import { asApiError } from '../api/problem';
 import type { Vec3, Volume } from '../api/types';
 import { graphicsStarted } from '../scene/graphics';
@@ -192,7 +192,7 @@ export class LiveView {
   private async fetch(size: number, signal: AbortSignal): Promise<Preview> {
     const { window } = this;
     if (!window) throw new Error('There is no window.');
-    const file = await previewFile(this.host.volume.id, size, window, signal);
+    const file = await client.previewFile(this.host.volume.id, size, window, signal);
     return new Promise((resolve, reject) => {
       const worker = new Worker(new URL('../volume/preview.worker.ts', import.meta.url), { type: 'module' });
       this.worker?.terminate();

@@ -1,5 +1,5 @@
 // What was made of a volume lately, to go back to. Nothing is missed without it.
-import { listJobs } from '../api/client';
+import { client } from '../client';
 import { inWords, surfaceInWords } from '../job/parameters';
 import { h } from '../ui/dom';
 import { hashOf } from '../ui/route';
@@ -8,7 +8,7 @@ const most = 3;
 
 export function madeSurfaces(volumeId: string): HTMLElement {
   const element = h('div', { class: 'made' });
-  listJobs().then(
+  client.listJobs().then(
     ({ jobs }) => {
       const made = jobs.filter(({ volume, mesh }) => volume === volumeId && mesh).slice(0, most);
       if (made.length === 0) return;

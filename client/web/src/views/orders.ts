@@ -1,5 +1,5 @@
 // A hospital's orders: what waits and why, what failed, and how the PACS are. #/orders
-import { cancelOrder, listOrders, listPacs, retryOrder } from '../api/orders';
+import { client } from '../client';
 import type { Order, OrderState, PacsList } from '../api/types';
 import { surfaceInWords } from '../job/parameters';
 import { button, field, h } from '../ui/dom';
@@ -86,7 +86,7 @@ class Orders {
   // Takes the newest over; older ones that were asked for stay as they are.
   async refresh(): Promise<void> {
     const { state } = this;
-    const [page, { pacs }] = await Promise.all([listOrders(state, '', this.scope.signal), listPacs(this.scope.signal)]);
+    const [page, { pacs }] = await Promise.all([client.listOrders(state, '', this.scope.signal), client.listPacs(this.scope.signal)]);
     // Another state was chosen meanwhile.
     if (state !== this.state) return;
     const newest = new Set(page.orders.map(({ id }) => id));
@@ -99,7 +99,7 @@ class Orders {
 
   private async showMore(): Promise<void> {
     if (this.next === null) return;
-    const page = await listOrders(this.state, this.next, this.scope.signal);
+    const page = await client.listOrders(this.state, this.next, this.scope.signal);
     this.orders = [...this.orders, ...page.orders];
     this.next = page.next;
     this.show();
@@ -157,7 +157,7 @@ class Orders {
       run(id).then(() => void this.refresh().catch(tellError), tellError);
     };
     const named = (text: string): Record<string, string> => ({ class: 'quiet', 'aria-label': `${text} order ${shortId(id)}` });
-    if (state === 'failed') return button('Retry', act(retryOrder), named('Retry'));
-    return isOver(state) ? null : button('Cancel', act(cancelOrder), named('Cancel'));
+    if (state === 'failed') return button('Retry', act((order) => client.retryOrder(order)), named('Retry'));
+    return isOver(state) ? null : button('Cancel', act((order) => client.cancelOrder(order)), named('Cancel'));
   }
 }

@@ -1,5 +1,5 @@
 // A volume and the iso-value to be chosen in it: #/volumes/ID.
-import { estimateOf, getVolume, histogramOf, submitJob } from '../api/client';
+import { client } from '../client';
 import { asApiError, type ApiError } from '../api/problem';
 import type { Estimate, JobParameters, Vec3, Volume } from '../api/types';
 import {
@@ -48,10 +48,10 @@ function windowOfQuery(query: URLSearchParams): Window | null {
 }
 
 export async function prepareView(scope: Scope, route: Route): Promise<HTMLElement> {
-  const volume = await getVolume(route.path[1] ?? '');
+  const volume = await client.getVolume(route.path[1] ?? '');
   // A bin for each value where there are few: more bins would leave gaps between the values.
   const values = isInteger(volume) ? volume.range[1] - volume.range[0] + 1 : mostBins;
-  const histogram = await histogramOf(volume.id, Math.min(mostBins, values), scope.signal);
+  const histogram = await client.histogramOf(volume.id, Math.min(mostBins, values), scope.signal);
   return new Prepare(scope, route, volume, histogram).element;
 }
 
@@ -387,7 +387,7 @@ class Prepare {
     this.estimateTimer = window.setTimeout(() => {
       const controller = new AbortController();
       this.estimating = controller;
-      estimateOf(estimateQuery(this.parameters), controller.signal).then(
+      client.estimateOf(estimateQuery(this.parameters), controller.signal).then(
         (estimate) => this.showEstimate(estimate),
         (error: unknown) => {
           if (!controller.signal.aborted) this.showNoEstimate(asApiError(error));
@@ -418,7 +418,7 @@ class Prepare {
     this.run.disabled = true;
     this.problem.replaceChildren();
     try {
-      const job = await submitJob(jobRequest(this.parameters));
+      const job = await client.submitJob(jobRequest(this.parameters));
       go(['jobs', job.id]);
     } catch (error) {
       const failure = asApiError(error);

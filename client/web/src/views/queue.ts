@@ -1,5 +1,5 @@
 // All jobs: what waits in which order, what runs, what is done. #/jobs
-import { cancelJob, listJobs } from '../api/client';
+import { client } from '../client';
 import { isFinal, type Job } from '../api/types';
 import { inWords, surfaceInWords } from '../job/parameters';
 import { priorities } from '../job/table';
@@ -107,7 +107,7 @@ class Queue {
 
   // Takes the newest jobs over; older ones that were asked for stay as they are.
   async refresh(): Promise<void> {
-    const page = await listJobs();
+    const page = await client.listJobs();
     const newest = new Set(page.jobs.map((job) => job.id));
     const older = this.jobs.filter((job) => !newest.has(job.id) && job.id < (page.jobs.at(-1)?.id ?? ''));
     if (older.length === 0) this.next = page.next;
@@ -118,7 +118,7 @@ class Queue {
 
   private async showMore(): Promise<void> {
     if (this.next === null) return;
-    const page = await listJobs(this.next);
+    const page = await client.listJobs(this.next);
     this.jobs = [...this.jobs, ...page.jobs];
     this.next = page.next;
     await this.volumes.find(this.jobs.map(({ volume }) => volume));
@@ -177,7 +177,7 @@ class Queue {
 
   private cancelButton(job: Job): HTMLElement {
     const cancel = (): void => {
-      cancelJob(job.id).then(() => void this.refresh().catch(tellError), tellError);
+      client.cancelJob(job.id).then(() => void this.refresh().catch(tellError), tellError);
     };
     return button('Cancel', cancel, { class: 'quiet', 'aria-label': `Cancel ${shortId(job.id)}` });
   }

@@ -1,5 +1,4 @@
-import type { SampleType } from '../api/types';
-import type { RawDescription } from '../api/upload';
+import type { RawDescription, SampleType } from '../api/types';
 import { button, field, h } from '../ui/dom';
 import { rawFault, sampleBytes } from '../volume/raw';
 

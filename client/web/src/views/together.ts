@@ -1,5 +1,5 @@
 // Several surfaces in one scene, each with its colour and opacity: #/together?jobs=A,B
-import { getJob, getVolume } from '../api/client';
+import { client } from '../client';
 import { ApiError } from '../api/problem';
 import type { Job, Vec3 } from '../api/types';
 import { differences } from '../job/differences';
@@ -22,7 +22,7 @@ const noteDelay = 300;
 
 export async function togetherView(scope: Scope, route: Route): Promise<HTMLElement> {
   const ids = (route.query.get('jobs') ?? '').split(',').filter(Boolean).slice(0, most);
-  const jobs = (await Promise.all(ids.map((id) => getJob(id)))).filter((job) => viewableFile(job) !== null);
+  const jobs = (await Promise.all(ids.map((id) => client.getJob(id)))).filter((job) => viewableFile(job) !== null);
   if (jobs.length === 0) {
     const link = { href: hashOf(['jobs']), text: 'To the list of jobs' };
     throw new ApiError(-1, 'No surfaces to show', 'Choose jobs that have made a GLB or Draco file.', [], {}, link);
@@ -37,7 +37,7 @@ async function titlesOf(jobs: readonly Job[]): Promise<string[]> {
   const volumes = new Set(jobs.map(({ volume }) => volume));
   const names = new Map(
     await Promise.all(
-      [...volumes].map(async (id): Promise<[string, string]> => [id, await getVolume(id).then(volumeName, () => 'erased volume')]),
+      [...volumes].map(async (id): Promise<[string, string]> => [id, await client.getVolume(id).then(volumeName, () => 'erased volume')]),
     ),
   );
   const isNamed = volumes.size > 1 || jobs.length === 1;

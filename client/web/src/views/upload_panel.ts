@@ -1,7 +1,7 @@
 // Where volumes are dropped: one file, a folder of slices, or several files.
+import { client } from '../client';
 import { ApiError, asApiError, mayPass } from '../api/problem';
-import type { UploadedVolume } from '../api/types';
-import { upload, type RawDescription } from '../api/upload';
+import type { RawDescription, UploadedVolume } from '../api/types';
 import { button, h, icon } from '../ui/dom';
 import { refusal, tell, tellError } from '../ui/notices';
 import { hashOf } from '../ui/route';
@@ -117,7 +117,7 @@ export class UploadPanel {
     this.showRunning(gathered, progress, controller);
     this.state.value = 'Uploading';
     try {
-      const uploaded = await upload(gathered.body, {
+      const uploaded = await client.upload(gathered.body, {
         ...addition,
         name: gathered.name,
         kept,

@@ -1,6 +1,5 @@
 // The first view: upload, the volumes that are there, the last surfaces.
-import { eraseVolume, listJobs, listVolumes, renameVolume, slicePicture } from '../api/client';
-import { jobEvents } from '../api/job_events';
+import { client } from '../client';
 import type { Job, UploadedVolume, Volume } from '../api/types';
 import { inWords, surfaceInWords } from '../job/parameters';
 import { button, h } from '../ui/dom';
@@ -26,7 +25,7 @@ async function paintThumbnail(canvas: HTMLCanvasElement, volume: Volume, signal:
   const { normal } = plane;
   const index = Math.floor(volume.dims[axisIndex(normal)] / 2);
   const bitmap = await createImageBitmap(
-    await slicePicture(volume.id, normal, index, volume.range, signal),
+    await client.slicePicture(volume.id, normal, index, volume.range, signal),
   );
   const context = canvas.getContext('2d');
   if (!context) return;
@@ -65,7 +64,7 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChange
     );
     if (!sure) return;
     try {
-      await eraseVolume(volume.id);
+      await client.eraseVolume(volume.id);
       tell('The volume was erased.');
       onErased();
     } catch (error) {
@@ -76,7 +75,7 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChange
     const given = await askText('Name of this volume', volume.name ?? '', 'Rename');
     if (given === null) return;
     try {
-      await renameVolume(volume.id, given === '' ? null : given);
+      await client.renameVolume(volume.id, given === '' ? null : given);
       onChanged();
     } catch (error) {
       tellError(error);
@@ -212,12 +211,12 @@ class Home {
         refresh();
       }, refreshDelay);
     };
-    jobEvents.listen({ onBegin: refreshSoon, onChange: refreshSoon, onPause: () => undefined }, this.scope.signal);
+    client.events.listen({ onBegin: refreshSoon, onChange: refreshSoon, onPause: () => undefined }, this.scope.signal);
     this.scope.listen(document, 'visibilitychange', refresh);
   }
 
   async refresh(): Promise<void> {
-    const [page, { jobs }] = await Promise.all([listVolumes('', this.scope.signal), listJobs()]);
+    const [page, { jobs }] = await Promise.all([client.listVolumes('', this.scope.signal), client.listJobs()]);
     const newest = new Set(page.volumes.map(({ id }) => id));
     this.older = this.older.filter(({ id }) => !newest.has(id));
     if (this.older.length === 0) this.next = page.next;
@@ -242,7 +241,7 @@ class Home {
 
   private async loadMore(): Promise<void> {
     if (this.next === null) return;
-    const page = await listVolumes(this.next, this.scope.signal);
+    const page = await client.listVolumes(this.next, this.scope.signal);
     const known = new Set(this.older.map(({ id }) => id));
     this.older = [...this.older, ...page.volumes.filter(({ id }) => !known.has(id))];
     this.next = page.next;

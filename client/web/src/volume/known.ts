@@ -1,5 +1,5 @@
 // Volumes by their ids, each asked for once: to call those by their names that jobs were made of.
-import { getVolume } from '../api/client';
+import { client } from '../client';
 import { asApiError } from '../api/problem';
 import type { Volume } from '../api/types';
 import { volumeName } from './names';
@@ -18,7 +18,7 @@ export class KnownVolumes {
     await Promise.all(
       unknown.map(async (id) => {
         try {
-          this.known.set(id, await getVolume(id));
+          this.known.set(id, await client.getVolume(id));
         } catch (error) {
           const { status } = asApiError(error);
           if (status !== 404 && status !== 410) throw error;

@@ -1,5 +1,5 @@
 // Brings the slice that is wanted: one request at a time, of which the next is for what is wanted last.
-import { connected } from '../api/client';
+import { connected } from '../client';
 import { asApiError, mayPass, type ApiError } from '../api/problem';
 import type { Axis } from '../api/types';
 import type { Scope } from '../ui/signal';

@@ -1,5 +1,5 @@
 // Slices of a volume as samples: fetched as pictures of 8 bits over a window, kept while they are near.
-import { slicePicture } from '../api/client';
+import { client } from '../client';
 import type { Axis, Volume } from '../api/types';
 
 export type Window = [number, number];
@@ -59,7 +59,7 @@ export class SliceSource {
       this.kept.set(key, found);
       return found;
     }
-    const slice = slicePicture(this.volume.id, axis, index, window, this.signal)
+    const slice = client.slicePicture(this.volume.id, axis, index, window, this.signal)
       .then(grey)
       .then((samples) => ({ axis, index, window, ...samples }));
     this.kept.set(key, slice);

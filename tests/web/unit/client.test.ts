@@ -1,0 +1,197 @@
+// Clients and real HTTP servers in one process.
+import { File } from 'node:buffer';
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { ApiError, Client, type Job } from '@/api/index';
+import { Daemon, id } from './daemon';
+
+let first: Daemon;
+let second: Daemon;
+let client: Client;
+
+beforeEach(async () => {
+  first = new Daemon('first');
+  second = new Daemon('second');
+  await Promise.all([first.start(), second.start()]);
+  client = new Client({ server: first.address });
+});
+
+afterEach(async () => {
+  vi.unstubAllGlobals();
+  await Promise.all([first.stop(), second.stop()]);
+});
+
+const rejectionOf = (promise: Promise<unknown>): Promise<unknown> =>
+  promise.then(
+    () => 'it was resolved',
+    (error: unknown) => error,
+  );
+
+describe('two clients in one process', () => {
+  it('each talk to their own server with their own token', async () => {
+    const others = new Client({ server: `${second.address}/`, token: 'secret' });
+    const jobs = [client.follow(id), others.follow(id)];
+    await vi.waitFor(() => expect([first.streams.size, second.streams.size]).toEqual([1, 1]));
+    second.end();
+    expect((await jobs[1])?.volume).toBe('second');
+    // The end of the second job ends the second stream alone.
+    await vi.waitFor(() => expect([first.streams.size, second.streams.size]).toEqual([1, 0]));
+    first.end();
+    expect((await jobs[0])?.volume).toBe('first');
+    expect([...first.tokens]).toEqual([undefined]);
+    expect([...second.tokens]).toEqual(['Bearer secret']);
+    expect(await rejectionOf(client.getVolume('a'))).toMatchObject({ status: 404, detail: 'first has no /v1/volumes/a' });
+    expect(await rejectionOf(others.getVolume('a'))).toMatchObject({ status: 404, detail: 'second has no /v1/volumes/a' });
+  });
+});
+
+describe('follow', () => {
+  it('rejects with a TimeoutError at the time limit, and closes its stream', async () => {
+    const began = performance.now();
+    const error = await rejectionOf(client.follow(id, AbortSignal.timeout(300), () => undefined));
+    expect(performance.now() - began).toBeLessThan(5000);
+    expect(error).toBeInstanceOf(DOMException);
+    expect(error).toMatchObject({ name: 'TimeoutError' });
+    expect(first.asked).toContain('GET /v1/events');
+    await vi.waitFor(() => expect(first.streams.size).toBe(0));
+  });
+
+  it('rejects with an AbortError while a request waits for its response, and closes that', async () => {
+    first.holds = true;
+    const over = new AbortController();
+    const error = rejectionOf(client.follow(id, over.signal));
+    await vi.waitFor(() => expect([first.streams.size, first.held.size]).toEqual([1, 1]));
+    over.abort();
+    expect(await error).toBe(over.signal.reason);
+    expect(await error).toMatchObject({ name: 'AbortError' });
+    await vi.waitFor(() => expect([first.streams.size, first.held.size]).toEqual([0, 0]));
+  });
+
+  it('leaves the stream to those that still follow', async () => {
+    const over = new AbortController();
+    const stopped = rejectionOf(client.follow(id, over.signal));
+    const other = client.follow(id);
+    await vi.waitFor(() => expect(first.streams.size).toBe(1));
+    over.abort(new Error('enough'));
+    expect(await stopped).toEqual(new Error('enough'));
+    first.end();
+    expect((await other).state).toBe('succeeded');
+    expect(first.asked.filter((each) => each === 'GET /v1/events')).toHaveLength(1);
+  });
+
+  it('rejects at once and sends nothing if the signal is aborted already', async () => {
+    const signal = AbortSignal.abort();
+    expect(await rejectionOf(client.follow(id, signal))).toBe(signal.reason);
+    expect(first.asked).toEqual([]);
+  });
+
+  it('rejects with what its callback throws', async () => {
+    const fault = new TypeError('job.mesh is null');
+    const fail = (): never => {
+      throw fault;
+    };
+    expect(await rejectionOf(client.follow(id, undefined, fail))).toBe(fault);
+    await vi.waitFor(() => expect(first.streams.size).toBe(0));
+  });
+
+  it('keeps no listener on a signal that lives longer', async () => {
+    const { signal } = new AbortController();
+    const add = vi.spyOn(signal, 'addEventListener');
+    first.state = 'succeeded';
+    await client.follow(id, signal);
+    expect(add).toHaveBeenCalledOnce();
+    const [, , options] = add.mock.calls[0] ?? [];
+    expect((options as AddEventListenerOptions).signal?.aborted).toBe(true);
+  });
+});
+
+describe('a request', () => {
+  it('rejects with the reason of its own signal, which says nothing about the server', async () => {
+    first.holds = true;
+    const error = await rejectionOf(client.getJob(id, 0, AbortSignal.timeout(100)));
+    expect(error).toMatchObject({ name: 'TimeoutError' });
+    expect(client.connection.connected.value).toBe(true);
+  });
+
+  it('says that no server responded, and why', async () => {
+    const { address } = second;
+    await second.stop();
+    const error = await rejectionOf(new Client({ server: address }).getVolume('a'));
+    await second.start();
+    expect(error).toBeInstanceOf(ApiError);
+    expect(error).toMatchObject({ status: 0, isUnreachable: true, cause: { code: 'ECONNREFUSED' } });
+  });
+
+  it('has its key in Node 18, too, which has no global crypto', async () => {
+    vi.stubGlobal('crypto', undefined);
+    const keys = new Set<unknown>();
+    for (let each = 0; each < 20; each += 1) {
+      const job = (await client.submitJob({ volume: 'a', iso: 60 })) as Job & { key: string };
+      expect(job.key).toMatch(/^[0-9a-f]{32}$/);
+      keys.add(job.key);
+    }
+    expect(keys.size).toBe(20);
+  });
+});
+
+describe('upload', () => {
+  const bytes = Uint8Array.from([92, 1, 0, 0, 7]);
+
+  it('takes bytes in every form', async () => {
+    const forms: Parameters<Client['upload']>[0][] = [
+      bytes,
+      Buffer.from(bytes),
+      bytes.buffer,
+      new DataView(bytes.buffer),
+      new Blob([bytes]),
+      new File([bytes], 'head.nii') as unknown as Blob,
+    ];
+    for (const form of forms) {
+      const told: number[] = [];
+      const { volumes } = await client.upload(form, { onProgress: (sent) => told.push(sent) });
+      expect(volumes[0]?.volume?.id, form.constructor.name).toBe('first');
+      expect([...first.uploaded], form.constructor.name).toEqual([...bytes]);
+      expect(told.at(-1), form.constructor.name).toBe(bytes.length);
+      first.uploaded = Buffer.alloc(0);
+    }
+    // The part that a view shows, and not the whole buffer.
+    await client.upload(bytes.subarray(1, 3));
+    expect([...first.uploaded]).toEqual([1, 0]);
+  });
+
+  it('rejects anything else, and names what it takes', async () => {
+    const takes = /^upload takes a Blob, a File, an ArrayBuffer or a Uint8Array, not /;
+    for (const [form, name] of [
+      ['head.nii.gz', 'a string'],
+      [new URL('file:///head.nii.gz'), 'URL'],
+      [[1, 2], 'Array'],
+      [undefined, 'undefined'],
+      [null, 'null'],
+    ] as const) {
+      const error = await rejectionOf(client.upload(form as unknown as Uint8Array));
+      expect(error).toBeInstanceOf(TypeError);
+      expect((error as Error).message).toMatch(takes);
+      expect((error as Error).message).toContain(`not ${name}. `);
+      expect((error as Error).message).toContain("upload(await readFile('head.nii.gz'))");
+    }
+    expect(first.asked).toEqual([]);
+  });
+
+  it('sends nothing if its signal is aborted already', async () => {
+    const signal = AbortSignal.abort();
+    expect(await rejectionOf(client.upload(bytes, { signal }))).toBe(signal.reason);
+    expect(first.asked).toEqual([]);
+  });
+});
+
+describe("a server's address", () => {
+  it('is required in Node', () => {
+    expect(() => new Client()).toThrow("The client needs the server's address, such as new Client(");
+    expect(() => new Client({ token: 'a' })).toThrow(TypeError);
+  });
+
+  it('begins with its scheme', () => {
+    for (const server of ['127.0.0.1:8080', 'unix:/run/isomesh', 'http://']) {
+      expect(() => new Client({ server })).toThrow(`It is "${server}".`);
+    }
+  });
+});

@@ -1,0 +1,73 @@
+// An HTTP server that responds as openapi.yaml describes, as far as clients need it for one job.
+import { createServer, type IncomingMessage, type Server, type ServerResponse } from 'node:http';
+import type { AddressInfo } from 'node:net';
+
+// The one job that a daemon has.
+export const id = '0123456789abcdef';
+
+export class Daemon {
+  // The job runs until `end`, unless a test begins with another state.
+  state = 'running';
+  readonly asked: string[] = [];
+  readonly tokens = new Set<string | undefined>();
+  uploaded = Buffer.alloc(0);
+  // Keeps requests for the job without a response.
+  holds = false;
+  readonly streams = new Set<ServerResponse>();
+  readonly held = new Set<ServerResponse>();
+  private readonly server: Server;
+
+  constructor(readonly name: string) {
+    this.server = createServer((request, response) => void this.answer(request, response));
+  }
+
+  async start(): Promise<void> {
+    await new Promise<void>((resolve) => this.server.listen(0, '127.0.0.1', resolve));
+  }
+
+  async stop(): Promise<void> {
+    this.server.closeAllConnections();
+    await new Promise((resolve) => this.server.close(resolve));
+  }
+
+  get address(): string {
+    return `http://127.0.0.1:${(this.server.address() as AddressInfo).port}`;
+  }
+
+  end(): void {
+    this.state = 'succeeded';
+    for (const stream of this.streams) stream.write(`data: ${JSON.stringify({ id, state: 'succeeded' })}\n\n`);
+  }
+
+  private async answer(request: IncomingMessage, response: ServerResponse): Promise<void> {
+    const path = request.url?.split('?')[0] ?? '';
+    this.asked.push(`${request.method} ${path}`);
+    this.tokens.add(request.headers.authorization);
+    const keep = (all: Set<ServerResponse>): void => {
+      all.add(response);
+      response.on('close', () => all.delete(response));
+    };
+    if (path === '/v1/events') {
+      keep(this.streams);
+      response.writeHead(200, { 'Content-Type': 'text/event-stream' }).write(': here\n\n');
+    } else if (path === `/v1/jobs/${id}` && this.holds) {
+      keep(this.held);
+    } else if (path === `/v1/jobs/${id}`) {
+      const mesh = { files: { glb: { href: `/v1/jobs/${id}/mesh.glb` } } };
+      response.end(JSON.stringify({ id, state: this.state, progress: 0.5, volume: this.name, mesh }));
+    } else if (path === `/v1/jobs/${id}/mesh.glb`) {
+      response.end('glTF');
+    } else if (path === '/v1/jobs' && request.method === 'POST') {
+      response.writeHead(202).end(JSON.stringify({ id, key: request.headers['idempotency-key'] }));
+    } else if (path === '/v1/volumes' && request.method === 'POST') {
+      response.writeHead(201, { Location: '/v1/uploads/a' }).end();
+    } else if (path === '/v1/uploads/a') {
+      const pieces: Buffer[] = [];
+      for await (const piece of request) pieces.push(piece as Buffer);
+      this.uploaded = Buffer.concat(pieces);
+      response.writeHead(201).end(JSON.stringify({ id: this.name }));
+    } else {
+      response.writeHead(404).end(JSON.stringify({ title: 'Not found', detail: `${this.name} has no ${path}` }));
+    }
+  }
+}
