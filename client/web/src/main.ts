@@ -43,7 +43,7 @@ function placeOf({ path }: Route): Place {
   if (name === undefined || (name === 'volumes' && id === undefined)) {
     return { title: 'Volumes', show: volumesView };
   }
-  if (name === 'volumes') return { title: 'Choose the surface', show: prepareView };
+  if (name === 'volumes') return { title: 'New surface', show: prepareView };
   if (name === 'jobs' && id === undefined) return { title: 'Jobs', show: queueView };
   if (name === 'orders') return { title: 'Orders', show: ordersView };
   if (name === 'jobs') {
@@ -60,13 +60,13 @@ function placeOf({ path }: Route): Place {
   }
   if (name === 'together') {
     return {
-      title: 'Surfaces together',
+      title: 'Surfaces in one scene',
       show: async (scope, route) => (await import('./views/together')).togetherView(scope, route),
     };
   }
   return {
     title: 'Not found',
-    show: () => Promise.reject(new ApiError(404, 'Not found', 'There is nothing at this address.')),
+    show: () => Promise.reject(new ApiError(404, 'Not found', 'No page has this address.')),
   };
 }
 
@@ -112,7 +112,7 @@ function shell(): HTMLElement[] {
     h('a', { class: 'skip', href: '#main', onClick: (event: Event) => {
       event.preventDefault();
       main.focus();
-    } }, 'Skip to the content'),
+    } }, 'Skip to content'),
     h(
       'header',
       { class: 'top' },
@@ -121,8 +121,8 @@ function shell(): HTMLElement[] {
       h('span', { class: 'grow' }),
       uploadNote(),
       ...tokenButtons(),
-      button('Keys', showHelp, { class: 'quiet keys', title: 'Keyboard (?)' }),
-      button(icon(halfDisc), toggleTheme, { class: 'quiet', 'aria-label': 'Light or dark' }),
+      button('Shortcuts', showHelp, { class: 'quiet keys', title: 'Keyboard shortcuts (?)' }),
+      button(icon(halfDisc), toggleTheme, { class: 'quiet', 'aria-label': 'Switch between light and dark' }),
     ),
     banner,
     main,
@@ -176,7 +176,7 @@ async function show(): Promise<void> {
     const home = h('a', { class: 'button', href: hashOf([]) }, 'All volumes');
     const way = failure.link ? h('a', { class: 'button', href: failure.link.href }, failure.link.text) : home;
     const shown = failure.isUnreachable ? pendingRefusal(failure, again, way) : refusal(failure, again, way);
-    main.replaceChildren(h('h1', { class: 'sr-only' }, 'This view cannot be shown'), h('div', { class: 'page-problem' }, shown));
+    main.replaceChildren(h('h1', { class: 'sr-only' }, 'This page cannot be shown'), h('div', { class: 'page-problem' }, shown));
     // What failed because nobody answered is tried again when somebody does.
     if (failure.isUnreachable) {
       const stop = connected.subscribe((isConnected) => {
@@ -196,7 +196,7 @@ function watchConnection(): void {
     clearInterval(timer);
     banner.hidden = isConnected;
     if (isConnected) return;
-    banner.textContent = 'The connection to the server is lost. This page goes on as soon as it is back.';
+    banner.textContent = 'The connection to the server is lost. The page reconnects automatically.';
     timer = window.setInterval(() => {
       void isAlive().then((alive) => {
         if (alive) connected.value = true;
@@ -248,8 +248,8 @@ function watchJobs(): void {
   const watched = new WatchedJobs(({ id, state, parameters }) => {
     const [place, job] = currentRoute().path;
     if (place === 'jobs' && job === id) return;
-    const what = { succeeded: 'is made', failed: 'could not be made', cancelled: 'was cancelled' }[state as string] ?? state;
-    tell(h('span', {}, h('a', { href: hashOf(['jobs', id]) }, `The surface of ${surfaceInWords(parameters)}`), ` ${what}.`));
+    const what = { succeeded: 'is ready', failed: 'could not be made', cancelled: 'was cancelled' }[state as string] ?? state;
+    tell(h('span', {}, h('a', { href: hashOf(['jobs', id]) }, `The surface for ${surfaceInWords(parameters)}`), ` ${what}.`));
   });
   submitted.subscribe((id) => watched.add(id));
   watched.start();

@@ -37,7 +37,7 @@ export function refusal(error: ApiError, ...actions: Child[]): HTMLElement {
 
 // Of what the page tries again by itself.
 export function pendingRefusal(error: ApiError, ...actions: Child[]): HTMLElement {
-  return refusalWith(error, error.isUnreachable ? 'The page tries again by itself.' : adviceFor(error), actions);
+  return refusalWith(error, error.isUnreachable ? 'The page tries again automatically.' : adviceFor(error), actions);
 }
 
 function refusalWith(error: ApiError, advice: string, actions: readonly Child[]): HTMLElement {

@@ -14,13 +14,13 @@ export function watchToken(onToken: () => void): void {
     const form = h(
       'form',
       { method: 'dialog' },
-      h('h2', {}, 'This server asks for a token'),
+      h('h2', {}, 'This server requires a token'),
       h(
         'p',
         {},
         token.value === ''
-          ? 'Your administrator has one for you. It is kept until this tab is closed.'
-          : 'The token that was entered is not valid here (any more).',
+          ? 'Ask your administrator for a token. The page keeps it until you close this tab.'
+          : 'This server does not accept the token. It may have expired.',
       ),
       field('Token', input),
       h('div', { class: 'actions' }, h('button', { class: 'primary', type: 'submit' }, 'Continue')),

@@ -51,7 +51,7 @@ export class CropControl {
       }),
     );
     const size = box[0].map((low, axis) => (box[1][axis as 0] - low) * this.volume.spacing[axis as 0]);
-    this.size.textContent = `${size.map((value) => formatNumber(value, 1)).join(' \u00d7 ')} mm. Drag its edges in the slices.`;
+    this.size.textContent = `${size.map((value) => formatNumber(value, 1)).join(' \u00d7 ')} mm. Drag the edges of the box in the slices.`;
   }
 
   private take(axis: 0 | 1 | 2, end: 0 | 1, value: number): void {

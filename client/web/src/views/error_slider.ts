@@ -27,7 +27,7 @@ export function errorInWords(error: number | null, spacing: readonly number[]): 
   const smallest = Math.min(...spacing);
   const share = error / smallest;
   const times = share < 0.095 ? formatNumber(share, 3) : formatNumber(share, 2);
-  return `${formatValue(error)} mm, ${times} of the spacing of ${formatNumber(smallest, 3)} mm`;
+  return `${formatValue(error)} mm, ${times} \u00d7 the spacing of ${formatNumber(smallest, 3)} mm`;
 }
 
 export interface SliderHost {

@@ -71,7 +71,7 @@ export class LabelChoice {
   private show(labels: readonly VolumeLabel[], start: Choice['labels']): void {
     this.labels = labels;
     if (labels.length === 0) {
-      this.body.replaceChildren(h('p', { class: 'warning' }, 'All samples are background: there is no label.'));
+      this.body.replaceChildren(h('p', { class: 'warning' }, 'All samples are background. The volume has no labels.'));
       return;
     }
     const wanted = Array.isArray(start) ? new Set(start) : null;
@@ -83,8 +83,8 @@ export class LabelChoice {
     );
     this.body.replaceChildren(
       ...this.search.elements(
-        button('All', () => this.choose(true), { title: 'Choose all that are found' }),
-        button('None', () => this.choose(false), { title: 'Choose none of those that are found' }),
+        button('All', () => this.choose(true), { title: 'Choose all labels that match the search' }),
+        button('None', () => this.choose(false), { title: 'Clear all labels that match the search' }),
       ),
     );
     this.search.fill();

@@ -14,7 +14,7 @@ export function madeSurfaces(volumeId: string): HTMLElement {
       if (made.length === 0) return;
       const item = ({ id, parameters }: (typeof made)[number]): HTMLElement =>
         h('li', {}, h('a', { href: hashOf(['jobs', id]) }, surfaceInWords(parameters)), ` ${inWords(parameters)}`);
-      element.replaceChildren(h('h2', {}, 'Surfaces of it'), h('ul', {}, ...made.map(item)));
+      element.replaceChildren(h('h2', {}, 'Surfaces of this volume'), h('ul', {}, ...made.map(item)));
     },
     () => undefined,
   );

@@ -32,7 +32,7 @@ export function outcomeOf({ member, status, volume, problem }: UploadedVolume, b
 function storedRow({ id, dims }: Volume, name: string, wasThere: boolean): Node[] {
   return [
     h('a', { href: hashOf(['volumes', id]) }, name),
-    h('span', { class: 'faint' }, `${formatDims(dims)}, ${wasThere ? 'was there already' : 'stored'}`),
+    h('span', { class: 'faint' }, `${formatDims(dims)}, ${wasThere ? 'already stored' : 'stored'}`),
   ];
 }
 
@@ -65,5 +65,5 @@ export function outcomeList(
       ...(error ? refusedRow(error, name, outcome.choices, (choices) => onAgain(outcome, choices)) : []),
     );
   };
-  return h('ul', { class: 'outcomes', 'aria-label': 'Volumes of the upload' }, ...outcomes.map(row));
+  return h('ul', { class: 'outcomes', 'aria-label': 'Volumes in the upload' }, ...outcomes.map(row));
 }

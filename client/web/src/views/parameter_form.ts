@@ -124,7 +124,7 @@ function faultOf(parameter: Parameter, job: JobParameters): string {
     most === undefined ? '' : `at most ${most}`,
   ].filter(Boolean);
   const noun = kind === 'integer' ? 'a whole number' : 'a number';
-  return `Enter ${[noun, limits.join(' and ')].filter(Boolean).join(', ')}${parameter.isNullable ? '; or nothing' : ''}.`;
+  return `Enter ${[noun, limits.join(' and ')].filter(Boolean).join(', ')}${parameter.isNullable ? ', or leave this empty' : ''}.`;
 }
 
 function numberControl(parameter: Parameter, host: FormHost): Control {

@@ -42,8 +42,8 @@ export class PickedLabel {
       swatch,
       h('b', {}, labelTitle(picked)),
       h('span', {}, `volume ${volumeText(picked)}, area ${areaText(picked)}`),
-      button('Hide', () => this.hide(), { class: 'quiet', title: 'Hide it (h)' }),
-      button('Only', () => this.isolate(), { class: 'quiet', title: 'Hide all others, or show them again (o)' }),
+      button('Hide', () => this.hide(), { class: 'quiet', title: 'Hide this label (h)' }),
+      button('Only', () => this.isolate(), { class: 'quiet', title: 'Hide all other labels, or show them again (o)' }),
     );
   }
 }

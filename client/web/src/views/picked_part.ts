@@ -63,15 +63,15 @@ export class PickedPart {
       ? [isClosed && `volume ${formatValue(part.volume)} mm\u00b3`, `area ${formatValue(part.area)} mm\u00b2`, `${formatCount(part.triangles)} triangles`]
       : [`at ${point.map((value) => value.toFixed(1)).join(', ')} mm`];
     this.element.replaceChildren(
-      h('span', {}, `One of ${formatCount(this.parts)} parts: ${size.filter(Boolean).join(', ')}`),
-      button('Keep only this part', () => this.make(keepOnlyAt(point)), {
+      h('span', {}, `One of ${formatCount(this.parts)} connected components: ${size.filter(Boolean).join(', ')}`),
+      button('Keep only this component', () => this.make(keepOnlyAt(point)), {
         class: 'link',
-        title: 'Starts a job that leaves all others out',
+        title: 'Starts a job that drops all other components',
       }),
-      button('Leave it out', () => this.make(keepOnlyAt(...others.map((other) => other.point))), {
+      button('Drop this component', () => this.make(keepOnlyAt(...others.map((other) => other.point))), {
         class: 'link',
         disabled: others.length === 0 || others.length > mostPlaces,
-        title: others.length > mostPlaces ? 'There are too many others' : 'Starts a job that keeps the others',
+        title: others.length > mostPlaces ? 'There are too many other components' : 'Starts a job that keeps all other components',
       }),
     );
   }

@@ -24,6 +24,7 @@ import { SliceSource, type Window } from '../volume/slices';
 import { boxOf, cropOf, isUpright, within, type Box } from '../volume/crop';
 import { cursorOfText } from '../volume/geometry';
 import { isInteger, volumeName } from '../volume/names';
+import { eachLabel } from '../volume/notes';
 import { aboutVolume, notedOf, sliceHelp } from './about_volume';
 import { CropControl } from './crop_control';
 import { estimateTexts } from './estimate_texts';
@@ -65,7 +66,7 @@ function startOfQuery(query: URLSearchParams, volume: Volume, defaults: JobParam
 // '' where no fewer triangles are asked for.
 function simplifiedInWords({ triangles, simplified_triangles: left }: Estimate): string {
   if (left === undefined) return '';
-  return `About ${formatCount(left)} triangles of ${formatCount(triangles)}.`;
+  return `About ${formatCount(left)} of ${formatCount(triangles)} triangles remain.`;
 }
 
 class Prepare {
@@ -97,7 +98,7 @@ class Prepare {
   private estimateTimer = 0;
   private isStarting = false;
   private readonly history: History<JobParameters>;
-  private readonly undoButton = button('Undo', () => this.goBack(this.history.undo()), { class: 'chip', title: 'Take the last change back (Ctrl Z)' });
+  private readonly undoButton = button('Undo', () => this.goBack(this.history.undo()), { class: 'chip', title: 'Undo the last change (Ctrl Z)' });
 
   constructor(
     private readonly scope: Scope,
@@ -267,8 +268,8 @@ class Prepare {
   private kindChoice(): HTMLElement | null {
     if (!isInteger(this.volume)) return null;
     const choices = [
-      { value: 'iso', label: 'One surface', title: 'Around all samples of the iso-value or more' },
-      { value: 'labels', label: 'Each label', title: 'One surface around each label of a segmentation' },
+      { value: 'iso', label: 'One surface', title: 'One surface around all samples at or above the iso-value' },
+      { value: 'labels', label: eachLabel, title: 'One surface around each label of a segmentation' },
     ] as const;
     return segmented('What to mesh', choices, isByLabels(this.parameters) ? 'labels' : 'iso', (kind) => this.setKind(kind));
   }
@@ -348,7 +349,7 @@ class Prepare {
     this.run.disabled = !this.isReady || this.isStarting;
     this.update();
     if (this.isReady) this.askForEstimate();
-    else this.showMissing(this.hasLabel ? 'Correct what is marked.' : 'Choose a label.');
+    else this.showMissing(this.hasLabel ? 'Correct the marked fields.' : 'Choose at least one label.');
   }
 
   private showMissing(text: string): void {

@@ -14,7 +14,7 @@ export function acceptButton(
 ): HTMLButtonElement | false {
   if (overridable === undefined) return false;
   const accept = [before['accept'], overridable].filter(Boolean).join(',');
-  return button('Take it in spite of this', () => onChoices({ ...before, accept }));
+  return button('Accept it anyway', () => onChoices({ ...before, accept }));
 }
 
 function choiceForm(
@@ -32,7 +32,7 @@ function choiceForm(
     'div',
     { class: 'series' },
     field(`${noun.charAt(0).toUpperCase()}${noun.slice(1)} to read`, select),
-    button(`Take this ${noun}`, () => onChoice(select.value), { class: 'primary' }),
+    button(`Use this ${noun}`, () => onChoice(select.value), { class: 'primary' }),
   );
 }
 

@@ -64,7 +64,7 @@ export class UploadPanel {
   take(files: NamedFile[]): void {
     const gathered = gather(files);
     if (!gathered) {
-      if (!this.running) this.showUnusable(new ApiError(-1, 'Nothing to upload', 'There are no files with content in it.'));
+      if (!this.running) this.showUnusable(new ApiError(-1, 'Nothing to upload', 'All files are empty, or there are none.'));
     } else if (this.running) {
       this.waiting.push(gathered);
       this.showQueue();
@@ -92,7 +92,7 @@ export class UploadPanel {
   private showQueue(): void {
     const count = this.waiting.length;
     this.queue.hidden = count === 0;
-    this.queue.textContent = `Then ${this.waiting.map(({ name }) => name).join(', ')}`;
+    this.queue.textContent = `Next: ${this.waiting.map(({ name }) => name).join(', ')}`;
   }
 
   // What surely is no volume is not sent without being asked about.
@@ -201,7 +201,7 @@ export class UploadPanel {
     this.body.replaceChildren(
       icon(arrow),
       h('h2', {}, 'Drop a volume here'),
-      h('p', {}, 'NIfTI, NRRD, MetaImage, VTK (.vti), a DICOM file or folder, a ZIP or TAR of them, raw samples'),
+      h('p', {}, 'NIfTI, NRRD, MetaImage, VTK (.vti), a DICOM file or folder, raw samples, or a ZIP or TAR archive of these'),
       h(
         'div',
         { class: 'actions' },
@@ -232,7 +232,7 @@ export class UploadPanel {
 
   private showProblem(error: ApiError, gathered: Gathered, ...actions: (HTMLElement | false)[]): void {
     this.element.classList.remove('busy');
-    this.state.value = 'Upload: a question';
+    this.state.value = 'Upload: your choice is needed';
     if (!this.onVolumes) tellError(error);
     this.body.replaceChildren(refusal(error, ...actions, this.otherButton()));
     if (error.status === 415 && gathered.count === 1) {
@@ -245,7 +245,7 @@ export class UploadPanel {
     this.element.classList.remove('busy');
     const stored = outcomes.filter(({ volume }) => volume !== null).length;
     this.body.replaceChildren(
-      h('h2', { role: 'status' }, `${stored} of the ${outcomes.length} volumes in the upload were stored`),
+      h('h2', { role: 'status' }, `${stored} of ${outcomes.length} volumes in the upload were stored`),
       outcomeList(outcomes, (_, choices) => void this.send(gathered, { choices, outcomes })),
       h('div', { class: 'actions' }, button('Upload another', () => this.showIdle())),
     );
@@ -258,7 +258,7 @@ export class UploadPanel {
   }
 
   private otherButton(): HTMLButtonElement {
-    return button('Choose another', () => {
+    return button('Choose another file', () => {
       this.showIdle();
       this.goOn();
     });

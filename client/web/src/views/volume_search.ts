@@ -25,7 +25,7 @@ export class VolumeSearch {
   private readonly input = h('input', { type: 'search', placeholder: 'Search', 'aria-label': 'Search volumes' });
   private readonly order = h(
     'select',
-    { 'aria-label': 'Order of volumes' },
+    { 'aria-label': 'Sort volumes' },
     ...Object.entries(orders).map(([value, { title }]) => h('option', { value }, title)),
   );
 

@@ -11,6 +11,7 @@ import type { Scope } from '../ui/signal';
 import { axisIndex, slicePlacement, slicePlane } from '../volume/geometry';
 import { KnownVolumes } from '../volume/known';
 import { volumeKind, volumeName } from '../volume/names';
+import { noteTexts } from '../volume/notes';
 import { uploads } from './upload_panel';
 import { VolumeSearch } from './volume_search';
 
@@ -60,7 +61,7 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChange
   const erase = async (): Promise<void> => {
     const sure = await ask(
       'Erase this volume?',
-      `${volumeName(volume)} and its samples are removed from the server. Its surfaces stay.`,
+      `${volumeName(volume)} and its samples will be removed from the server. The surfaces made from it stay.`,
       'Erase',
     );
     if (!sure) return;
@@ -157,13 +158,15 @@ class Home {
   private soon = 0;
   private isSearching = false;
 
+  // For a person who is here for the first time.
+  private readonly intro = h('p', { class: 'intro', hidden: true }, 'isomesh turns a CT, MRI or label volume into a 3D surface mesh.');
   private readonly noVolumes = h(
     'li',
     { class: 'empty' },
-    h('p', {}, 'No volumes yet. Drop one above to begin, or'),
+    h('p', {}, 'No volumes yet. Drop a file above, or'),
     button('try a sample', () => void import('../volume/sample').then(({ sampleHead }) => uploads.take([sampleHead()]), tellError), {
       class: 'link',
-      title: 'Makes a simple head of 112 \u00d7 112 \u00d7 112 samples and uploads it',
+      title: 'Makes and uploads a simple head of 112 \u00d7 112 \u00d7 112 samples',
     }),
   );
 
@@ -172,6 +175,7 @@ class Home {
       'div',
       { class: 'home' },
       h('h1', { class: 'sr-only' }, 'Volumes and surfaces'),
+      this.intro,
       uploads.element,
       h(
         'section',
@@ -186,7 +190,7 @@ class Home {
         h(
           'div',
           { class: 'section-head' },
-          h('h2', { id: 'surfaces-title' }, 'Last surfaces'),
+          h('h2', { id: 'surfaces-title' }, 'Recent surfaces'),
           h('a', { href: hashOf(['jobs']) }, 'All jobs'),
         ),
         this.surfaces,
@@ -225,6 +229,7 @@ class Home {
     const shown = jobs.slice(0, shownJobs);
     await this.known.find(shown.map(({ volume }) => volume));
     this.newest = page.volumes;
+    this.intro.hidden = page.volumes.length > 0 || shown.length > 0;
     this.showVolumes([...page.volumes, ...this.older]);
     this.surfaces.replaceChildren(...shown.map((job) => surfaceRow(job, this.known.nameOf(job.volume))));
     if (shown.length === 0) this.surfaces.append(h('li', { class: 'empty' }, 'No surfaces yet.'));
@@ -278,7 +283,7 @@ class Home {
     const all = `${formatCount(volumes.length)}${this.next === null ? '' : '+'}`;
     this.count.textContent = volumes.length === 0 ? '' : this.finding.isOn ? `${formatCount(shown.length)} of ${all}` : all;
     if (volumes.length === 0) cards.push(this.noVolumes);
-    else if (cards.length === 0) cards.push(h('li', { class: 'empty' }, 'No volume is called so.'));
+    else if (cards.length === 0) cards.push(h('li', { class: 'empty' }, 'No volume matches the search.'));
     const isSame = cards.length === this.list.children.length && cards.every((card, at) => card === this.list.children[at]);
     if (isSame) return;
     const focused = document.activeElement;
@@ -304,8 +309,7 @@ class Home {
       return;
     }
     // Its page shows the notes of the file that came first.
-    const notes = only.volume.notes.map(({ detail }) => detail);
-    if (only.status === 200) tell(['This volume was there already.', ...notes].join(' '));
+    if (only.status === 200) tell(['This volume is already stored.', ...noteTexts(only.volume)].join(' '));
     go(['volumes', only.volume.id]);
   }
 }

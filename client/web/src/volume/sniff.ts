@@ -80,24 +80,24 @@ export async function mayBeVolume(file: Blob): Promise<boolean> {
 }
 
 function unsent(status: 415 | 422, detail: string): ApiError {
-  const title = status === 415 ? 'This is no volume that can be read' : 'This volume is not whole';
-  return new ApiError(status, title, `${detail} Nothing was sent.`);
+  const title = status === 415 ? 'This file is not a supported volume' : 'This volume is incomplete';
+  return new ApiError(status, title, `${detail} Nothing was uploaded.`);
 }
 
 // Why sending it is surely for nothing; null where it may be a volume.
 async function faultOfOne({ path, file }: NamedFile): Promise<ApiError | null> {
-  if (!(await mayBeVolume(file))) return unsent(415, `The first bytes of ${path} are those of no known format.`);
+  if (!(await mayBeVolume(file))) return unsent(415, `The first bytes of ${path} match no supported format.`);
   const head = await bytesOf(file, textBytes);
   const declared = declaredBy(head);
   if (!declared) return null;
   if (declared.isElsewhere) {
-    return unsent(422, `${path} is a header, whose samples are in a file of their own. Choose both together.`);
+    return unsent(422, `${path} is a header; its samples are in another file. Choose both files together.`);
   }
   if (declared.bytes === null || file.size >= declared.bytes) return null;
   return unsent(
     422,
-    `${path} says that it has ${formatDims(declared.dims)} samples, which with its header are ` +
-    `${formatBytes(declared.bytes)}, but the file has ${formatBytes(file.size)}: it was cut off.`,
+    `${path} is cut off: its header declares ${formatDims(declared.dims)} samples, so the file should have ` +
+    `${formatBytes(declared.bytes)}, but it has ${formatBytes(file.size)}.`,
   );
 }
 
@@ -106,5 +106,5 @@ export async function faultOf(files: readonly NamedFile[]): Promise<ApiError | n
   const [only] = files;
   if (only && files.length === 1) return faultOfOne(only);
   for (const { file } of files) if (await mayBeVolume(file)) return null;
-  return unsent(415, `The first bytes of all ${files.length} files are those of no known format.`);
+  return unsent(415, `The first bytes of all ${files.length} files match no supported format.`);
 }
