@@ -37,7 +37,7 @@ interface Place {
   show: (scope: Scope, route: Route) => Promise<HTMLElement>;
 }
 
-// What draws in 3D is only loaded when it is needed.
+// The views that draw in 3D are loaded when they are needed.
 function placeOf({ path }: Route): Place {
   const [name, id] = path;
   if (name === undefined || (name === 'volumes' && id === undefined)) {
@@ -79,14 +79,14 @@ const links = [
   h('a', { href: hashOf(['orders']), 'data-place': 'orders', hidden: true }, 'Orders'),
 ];
 
-// Only where the daemon knows a PACS.
+// Only if the daemon knows a PACS.
 function showOrders(): void {
   const link = links.find(({ dataset }) => dataset.place === 'orders');
   hasOrders().then(
     (isOn) => {
       if (link) link.hidden = !isOn;
     },
-    // Nobody answers, which is said at the top; asked again when somebody does.
+    // The server is unreachable, which the banner says. The page asks again when it is back.
     () => {
       const stop = connected.subscribe((isConnected) => {
         if (!isConnected) return;
@@ -97,7 +97,7 @@ function showOrders(): void {
   );
 }
 
-// What the upload does that goes on behind other views.
+// Shows the state of an upload while other views are open.
 function uploadNote(): HTMLElement {
   const note = h('a', { class: 'upload-note', href: hashOf([]), hidden: true });
   uploads.state.watch((state) => {
@@ -132,7 +132,7 @@ function shell(): HTMLElement[] {
 let scope = new Scope();
 let shownPath = '';
 
-// Tabs are told apart by what they show.
+// The title of the browser's tab says what it shows.
 function nameTab(view: HTMLElement, place: Place): void {
   const name = (): string => view.dataset.title ?? place.title;
   document.title = `${name()} \u00b7 isomesh`;
@@ -177,7 +177,7 @@ async function show(): Promise<void> {
     const way = failure.link ? h('a', { class: 'button', href: failure.link.href }, failure.link.text) : home;
     const shown = failure.isUnreachable ? pendingRefusal(failure, again, way) : refusal(failure, again, way);
     main.replaceChildren(h('h1', { class: 'sr-only' }, 'This page cannot be shown'), h('div', { class: 'page-problem' }, shown));
-    // What failed because nobody answered is tried again when somebody does.
+    // If the server could not be reached, the page tries again when the connection is back.
     if (failure.isUnreachable) {
       const stop = connected.subscribe((isConnected) => {
         if (isConnected) void show();
@@ -217,7 +217,7 @@ function watchKeys(): void {
   });
 }
 
-// A file that was dropped beside a view would replace the page, and what it is doing.
+// The browser would replace the page by a file that is dropped outside the upload panel.
 function watchDrops(): void {
   const mark = (isOver: boolean): void => {
     uploads.element.classList.toggle('over', isOver);
@@ -243,7 +243,7 @@ function watchDrops(): void {
   });
 }
 
-// Whoever looks at something else hears of it when a job of theirs has ended.
+// Tells the user when one of their jobs ends while another view is open.
 function watchJobs(): void {
   const watched = new WatchedJobs(({ id, state, parameters }) => {
     const [place, job] = currentRoute().path;

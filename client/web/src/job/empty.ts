@@ -1,4 +1,4 @@
-// Why a job's surface has no triangle, and what to do about it.
+// The reason why a job's surface is empty, and what to do about it.
 import type { Job, Volume } from '../api/types';
 import { formatCount, formatValue } from '../ui/format';
 import { isByLabels } from './table';

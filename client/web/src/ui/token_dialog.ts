@@ -2,10 +2,10 @@ import { token, unauthorized } from '../api/client';
 import { button, field, h } from './dom';
 import { Signal } from './signal';
 
-// Whether the dialog was closed without a token.
+// True if the dialog was closed without a token.
 const isDeclined = new Signal<boolean>(false);
 
-// Asks for a token whenever the daemon refuses for want of one.
+// Asks for a token whenever the daemon rejects a request that has none.
 export function watchToken(onToken: () => void): void {
   let dialog: HTMLDialogElement | null = null;
   const open = (): void => {
@@ -38,8 +38,8 @@ export function watchToken(onToken: () => void): void {
       made.close();
       onToken();
     });
-    // Who closes it without a token is not asked by what the page does on its own, but in the next view, or by the
-    // button in the bar.
+    // After the dialog was closed without a token, the page's own requests do not open it again. The next view and
+    // the button in the bar do.
     made.addEventListener('close', () => {
       made.remove();
       if (dialog !== made) return;

@@ -1,4 +1,4 @@
-// What there is to say about a volume beside its slices.
+// The description of a volume beside its slices.
 import { renameVolume } from '../api/client';
 import type { Volume } from '../api/types';
 import { button, h } from '../ui/dom';
@@ -7,7 +7,7 @@ import { askText, tellError } from '../ui/notices';
 import { volumeName } from '../volume/names';
 import { noteTexts } from '../volume/notes';
 
-// What of an upload was left out, because a person may miss it.
+// Lists the skipped files of an upload, because a user may miss them.
 function ignoredNote({ ignored }: Volume): HTMLElement | null {
   if (ignored.length === 0) return null;
   return h(
@@ -18,7 +18,7 @@ function ignoredNote({ ignored }: Volume): HTMLElement | null {
   );
 }
 
-// What the server decided or corrected when it read the upload.
+// Lists what the server decided or corrected when it read the upload.
 function notesOf(volume: Volume): HTMLElement | null {
   const { notes } = volume;
   if (notes.length === 0) return null;
@@ -87,7 +87,7 @@ export function aboutVolume(volume: Volume, onRenamed: () => void): HTMLElement 
   return h('header', { class: 'about' }, nameHeading(volume, onRenamed), h('p', { class: 'facts' }, factsOf(volume)));
 }
 
-// What was noted when it was read.
+// The notes and the skipped files of the upload.
 export function notedOf(volume: Volume): (HTMLElement | null)[] {
   return [notesOf(volume), ignoredNote(volume)];
 }

@@ -1,5 +1,5 @@
-// What was measured of a mesh's error, and what its surface is not: the certificate, triangles that
-// intersect, an opening.
+// The measured error of a mesh and the faults of its surface: the certificate, self-intersections,
+// openings.
 import type { DistanceSummary, Job, JobParameters, MeshSummary } from '../api/types';
 import { button, h, svg, type Child } from '../ui/dom';
 import { formatCount, formatNames, formatValue } from '../ui/format';
@@ -99,7 +99,7 @@ function spent({ budget_mm: budget }: Certificate, allowed: number | null | unde
   return h('div', { class: 'spent' }, bar, h('p', { class: 'hint' }, `The allowed ${formatValue(allowed)} mm are divided into: ${words} mm.`));
 }
 
-// Null where nothing was measured, or there is nothing to measure.
+// Null if nothing was measured or the surface is empty.
 export function certificateBody(job: Job): HTMLElement | null {
   const certificate = job.mesh?.certificate;
   if (!certificate || job.mesh?.empty) return null;

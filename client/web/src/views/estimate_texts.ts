@@ -1,4 +1,4 @@
-// What an estimate says of a job before it runs.
+// The texts of a job's estimate.
 import type { Estimate } from '../api/types';
 import { h } from '../ui/dom';
 import { formatBytes, formatCount, formatMilliseconds, formatNames } from '../ui/format';

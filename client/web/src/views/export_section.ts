@@ -1,4 +1,4 @@
-// What a surface is saved as beside the files of its job: for a printer, for a phone, and what was measured of it.
+// Exports beside the files of a job: for a 3D printer, for a phone, and the certificate of the measurements.
 import type { Job, JobParameters, Volume } from '../api/types';
 import { withGlb } from '../job/parameters';
 import { certificateFile, isForPrinting, printingVariant } from '../job/printing';
@@ -8,7 +8,7 @@ import { button, h } from '../ui/dom';
 import { tellError } from '../ui/notices';
 import { saveBlob } from '../ui/save';
 
-// So many triangles are left where a phone could not show all.
+// The number of triangles that a phone can show.
 const triangles = 150_000;
 
 type Make = (variant: Partial<JobParameters>) => void;

@@ -22,7 +22,7 @@ import { SurfacePane } from './surface_pane';
 const stages = ['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify'];
 const noteDelay = 300;
 
-// Those that such a job goes through.
+// The stages of this job.
 function stagesOf({ parameters }: Job): string[] {
   const isSimplified = (parameters.max_error_mm ?? parameters.triangles ?? null) !== null;
   return stages.filter((name) => (name !== 'simplify' || isSimplified) && (name !== 'certify' || parameters.certify));

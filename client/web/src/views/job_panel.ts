@@ -1,4 +1,4 @@
-// What stands beside a surface: its numbers, timings, files, and how to make others.
+// The panel beside a surface: its numbers, timings, files, and links to make others.
 import { submitJob, token } from '../api/client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../api/types';
 import { defaultParameters, isSameJob, jobRequest, queryOfParameters, surfaceInWords, variantOf, withGlb } from '../job/parameters';
@@ -147,7 +147,7 @@ export async function submitVariant(job: Job, variant: Partial<JobParameters>): 
   return submitJob(jobRequest(variantOf(job.parameters, variant)));
 }
 
-// Of the surface, with what it is of: head-iso-60.glb.
+// The file name of a surface: head-iso-60.glb.
 export function fileNameOf(job: Job, volume: Volume | null, suffix: string): string {
   const surface = surfaceInWords(job.parameters).replaceAll(' ', '-');
   return `${fileStem(volume, `surface-${shortId(job.id)}`)}-${surface}${suffix}`;

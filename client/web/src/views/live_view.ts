@@ -23,7 +23,7 @@ const turnStep = Math.PI / 24;
 
 export interface LiveHost {
   volume: Volume;
-  // Where iso-values usually lie.
+  // The usual range of iso-values.
   window: Window;
   setCursor: (cursor: Vec3) => void;
   // How the volume is looked through; '' for its surface.
@@ -132,7 +132,7 @@ export class LiveView {
     this.showIso();
   }
 
-  // What eight bits are spread over: where iso-values usually lie, and all values for those outside of that.
+  // The range that eight bits cover: the usual range of iso-values, or all values if the iso-value lies outside it.
   private windowFor(iso: number): Window | null {
     const { window, volume } = this.host;
     if (iso > window[0] && iso <= window[1]) return window;

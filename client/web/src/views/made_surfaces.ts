@@ -1,4 +1,4 @@
-// What was made of a volume lately, to go back to. Nothing is missed without it.
+// Links to the latest surfaces of a volume. If the list cannot be loaded, it stays empty.
 import { listJobs } from '../api/client';
 import { inWords, surfaceInWords } from '../job/parameters';
 import { h } from '../ui/dom';

@@ -1,4 +1,4 @@
-// What there is to say about an order: what it waits for, why, and when it goes on.
+// The texts of an order: what it waits for, why, and when it goes on.
 import type { Order, OrderState } from '../api/types';
 import { formatBytes, formatCount, formatTime } from '../ui/format';
 
@@ -45,7 +45,7 @@ function stored({ results }: Order): string {
 export interface Said {
   text: string;
   isBad: boolean;
-  // When it is tried again.
+  // The time of the next attempt.
   next: string;
 }
 

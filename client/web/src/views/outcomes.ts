@@ -1,4 +1,4 @@
-// What became of each volume of an upload of several.
+// The result for each volume of an upload of several.
 import { errorOfProblem, type ApiError } from '../api/problem';
 import type { UploadedVolume, Volume } from '../api/types';
 import { h } from '../ui/dom';
@@ -12,7 +12,7 @@ export interface Outcome {
   volume: Volume | null;
   wasThere: boolean;
   error: ApiError | null;
-  // What the member was asked for with.
+  // The choices with which the member was requested.
   choices: Choices;
 }
 

@@ -1,4 +1,4 @@
-// The label of the part of the surface that was clicked: what it is, and what can be done with it.
+// The label that was clicked: its size, and buttons to hide or isolate it.
 import type { LabelSummary } from '../api/types';
 import { labelTitle, type LabelState } from '../job/labels';
 import { button, h } from '../ui/dom';

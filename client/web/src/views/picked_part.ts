@@ -1,4 +1,4 @@
-// The part of a surface that was clicked, where it has several: how large it is, and a new job with or without it.
+// The connected component that was clicked, if a surface has several: its size, and a new job with or without it.
 import type { Job, JobParameters, Vec3 } from '../api/types';
 import type { PartFinder, PartSummary } from '../mesh/part_finder';
 import type { Picked } from '../scene/picked';
@@ -7,16 +7,16 @@ import { button, h } from '../ui/dom';
 import { formatCount, formatValue } from '../ui/format';
 import type { Scope } from '../ui/signal';
 
-const slice = 8; // milliseconds that finding parts takes at a time
-// A job is told of each part that stays.
+const slice = 8; // milliseconds for one step of the search for components
+// A job lists each component that it keeps.
 const mostPlaces = 1000;
 
 function placeOf(point: Vec3): Vec3 {
   return point.map((value) => Number(value.toFixed(3))) as Vec3;
 }
 
-// The parameters that keep the parts at those places alone. Parts that were left out before stay out: what is
-// nearest to a place is of those that are there.
+// The parameters that keep only the components at those points. Components that were dropped before stay dropped,
+// because the nearest component to a point is one of those that are left.
 export function keepOnlyAt(...points: Vec3[]): Partial<JobParameters> {
   return { components: { keep: null, min_triangles: null, nearest_to: points.map(placeOf) } };
 }

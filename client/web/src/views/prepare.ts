@@ -58,12 +58,12 @@ export async function prepareView(scope: Scope, route: Route): Promise<HTMLEleme
 
 function startOfQuery(query: URLSearchParams, volume: Volume, defaults: JobParameters): JobParameters {
   const parameters = parametersOfQuery(query, defaults);
-  // An iso-value makes one surface of all labels above it, which hardly anybody wants.
+  // An iso-value makes one surface of all labels above it, which users rarely want.
   const areLabels = isInteger(volume) && volume.notes.some(({ code }) => code === 'looks-like-labels');
   return areLabels && !query.has('iso') && !isByLabels(parameters) ? withLabels(parameters, 'all') : parameters;
 }
 
-// '' where no fewer triangles are asked for.
+// '' if the job is not simplified.
 function simplifiedInWords({ triangles, simplified_triangles: left }: Estimate): string {
   if (left === undefined) return '';
   return `About ${formatCount(left)} of ${formatCount(triangles)} triangles remain.`;
@@ -192,7 +192,7 @@ class Prepare {
       this.mark('iso', isGood);
       if (isGood) this.setIso(this.isoInput.valueAsNumber);
     });
-    // What was left unfinished gives way to the value that is used.
+    // An unfinished number is replaced by the value that is used.
     this.isoInput.addEventListener('blur', () => {
       this.isoInput.setAttribute('aria-invalid', 'false');
       this.mark('iso', true);
@@ -245,7 +245,7 @@ class Prepare {
     this.changed();
   }
 
-  // Whether a job can be made of what is entered.
+  // True if the entered values make a valid job.
   private get isReady(): boolean {
     return this.hasLabel && this.faulty.size === 0;
   }

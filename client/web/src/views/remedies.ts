@@ -1,12 +1,12 @@
-// What a person may add to an upload that was refused, so that it is taken.
+// What a user can add to a rejected upload so that the server accepts it.
 import { choicesOf, type ApiError } from '../api/problem';
 import type { Choice } from '../api/types';
 import { button, field, h } from '../ui/dom';
 
-// What chooses and accepts, by its parameter of the query.
+// The values of the query's parameters that choose or accept something.
 export type Choices = Readonly<Record<string, string>>;
 
-// Has the upload taken in spite of what it was refused for, beside what was accepted before.
+// Repeats the upload and accepts the cause of its rejection, in addition to what was accepted before.
 export function acceptButton(
   { remedy: { overridable } }: ApiError,
   before: Choices,

@@ -32,9 +32,9 @@ export interface PaneOptions {
   volume: Volume | null;
   // Shows slices beside the surface, or takes them away; null where there are none.
   onSlices: (() => void) | null;
-  // Of an address: cut, style, rulers, hide.
+  // The parameters of the address: cut, style, rulers, hide.
   look: URLSearchParams;
-  // Of a job by labels: which are shown and how.
+  // For a job by labels: which labels are shown, and their colours.
   labels: LabelState;
 }
 
@@ -109,7 +109,7 @@ export class SurfacePane {
       if (this.scope.isOver) return null;
       surface.finish();
       this.isWhole = true;
-      // Who asked for distances wants to see them.
+      // A user who asked for distances wants to see them.
       if (this.distance?.loaded()) this.distance.set(this.options.hasKeys || this.wantsDistance);
       this.element.dataset.loaded = 'true';
       this.bar.parentElement?.remove();
@@ -164,7 +164,7 @@ export class SurfacePane {
     this.press('flat', this.style.shading === 'flat');
   }
 
-  // Where the slices meet, in the volume's samples; null for nowhere.
+  // The point where the slices meet, in the volume's samples; null for none.
   setCursor(cursor: Vec3 | null): void {
     if (this.options.volume) this.surface?.setCross(this.options.volume, cursor);
   }

@@ -31,7 +31,7 @@ export async function togetherView(scope: Scope, route: Route): Promise<HTMLElem
   return new Together(scope, jobs, titles, route.query).element;
 }
 
-// What tells them apart; the volume's name too where there are several.
+// The differences between the jobs; with the volume's name if there are several volumes.
 async function titlesOf(jobs: readonly Job[]): Promise<string[]> {
   const different = jobs.length > 1 ? differences(jobs) : [''];
   const volumes = new Set(jobs.map(({ volume }) => volume));
@@ -146,7 +146,7 @@ class Together {
     surface.setHidden(new Set(this.parts.filter((each) => looks[each.at]?.isShown === false).map(({ id }) => id)));
   }
 
-  // What a label of a job is in the scene; a job without labels is one.
+  // The part of the scene that shows a job's label; a job without labels has one part.
   private partOf(at: number, label: Part | null): Part {
     const found = this.parts.find((each) => each.at === at && each.label === label?.label);
     const { id, colour } = found ?? { at, label: label?.label, id: this.parts.length, colour: label?.colour ?? usual(at) };

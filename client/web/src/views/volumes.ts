@@ -144,7 +144,7 @@ export async function volumesView(scope: Scope): Promise<HTMLElement> {
 class Home {
   readonly element: HTMLElement;
   private readonly known = new KnownVolumes();
-  // What a card shows, and the card.
+  // The contents of each card, and its element.
   private readonly cards = new Map<string, { text: string; card: HTMLElement }>();
   private readonly list = h('ul', { class: 'cards' });
   private readonly count = h('span', { class: 'count' });
@@ -153,12 +153,12 @@ class Home {
   private readonly finding = new VolumeSearch(() => void this.search().catch(tellError));
   private newest: readonly Volume[] = [];
   private older: Volume[] = [];
-  // Where the list goes on behind the older ones.
+  // The cursor of the page after the older volumes.
   private next: string | null = null;
   private soon = 0;
   private isSearching = false;
 
-  // For a person who is here for the first time.
+  // For a first-time user.
   private readonly intro = h('p', { class: 'intro', hidden: true }, 'isomesh turns a CT, MRI or label volume into a 3D surface mesh.');
   private readonly noVolumes = h(
     'li',
@@ -200,7 +200,7 @@ class Home {
     scope.onEnd(() => (uploads.onVolumes = null));
   }
 
-  // What others do is seen as well: jobs at once, volumes some seconds later.
+  // Shows what other users do: jobs at once, volumes some seconds later.
   keepFresh(): void {
     const refresh = (): void => {
       // A lost connection is said at the top of the page.

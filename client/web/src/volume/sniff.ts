@@ -1,5 +1,5 @@
-// Whether a file's first bytes are those of something that the daemon reads, so that gigabytes of something
-// else are not sent for nothing. The daemon judges; this only says what is surely none of it.
+// Checks the first bytes of a file before gigabytes are sent in vain. It only finds files that are certainly
+// not volumes; the daemon decides about all others.
 
 import { ApiError } from '../api/problem';
 import { formatBytes, formatDims } from '../ui/format';
@@ -9,7 +9,7 @@ import type { NamedFile } from './tar';
 const headBytes = 1024;
 // Headers of text may be long.
 const textBytes = 16_384;
-// Of a compressed file, which surely hold the first bytes of what it was.
+// This much of a compressed file certainly holds the first bytes of its contents.
 const packedBytes = 65_536;
 
 function startsWith(head: Uint8Array, ...bytes: number[]): boolean {
@@ -40,7 +40,7 @@ function isArchive(head: Uint8Array): boolean {
   return textOf(head, 0, 2) === 'PK' || textOf(head, 257, 5) === 'ustar';
 }
 
-// What is packed otherwise than with gzip, which browsers cannot look into.
+// Compression other than gzip, which browsers cannot decompress.
 function isPackedOtherwise(head: Uint8Array): boolean {
   return (
     textOf(head, 0, 3) === 'BZh' ||
@@ -84,7 +84,7 @@ function unsent(status: 415 | 422, detail: string): ApiError {
   return new ApiError(status, title, `${detail} Nothing was uploaded.`);
 }
 
-// Why sending it is surely for nothing; null where it may be a volume.
+// The reason why the file is certainly not a volume; null if it may be one.
 async function faultOfOne({ path, file }: NamedFile): Promise<ApiError | null> {
   if (!(await mayBeVolume(file))) return unsent(415, `The first bytes of ${path} match no supported format.`);
   const head = await bytesOf(file, textBytes);
@@ -101,7 +101,7 @@ async function faultOfOne({ path, file }: NamedFile): Promise<ApiError | null> {
   );
 }
 
-// The same of what is sent together: data files beside a header are known by nothing.
+// The same for files that are sent together. A data file beside a header has no known first bytes.
 export async function faultOf(files: readonly NamedFile[]): Promise<ApiError | null> {
   const [only] = files;
   if (only && files.length === 1) return faultOfOne(only);
