@@ -15,7 +15,7 @@ const keys: [string, string][] = [
   ['+ \u2212', 'zoom'],
   ['a p l r s i', 'surface: standard views'],
   ['f', 'surface: show the whole surface'],
-  ['t w d', 'surface: flat shading, wireframe, colours by distance'],
+  ['t w d', 'surface: flat shading, edges only, colours by distance'],
   ['c x m', 'surface: cut, show slices beside it, measure'],
   ['h o e', 'labels: hide the selected label, show only it, show all'],
   ['Esc Delete', 'measuring: remove the last point, remove all distances'],

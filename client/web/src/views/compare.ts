@@ -124,7 +124,7 @@ class Comparison {
         ...views,
         button('Fit', () => this.panes[0]?.fit()),
         this.styleButton('Flat', (isOn) => ({ shading: isOn ? 'flat' : 'smooth' })),
-        this.styleButton('Wireframe', (isOn) => ({ wireframe: isOn })),
+        this.styleButton('Edges', (isOn) => ({ wireframe: isOn })),
       ),
       h('span', { class: 'hint grow' }, 'All views turn together.'),
       h('a', { class: 'button', href: hashOf(['together'], new URLSearchParams({ jobs: jobs.join(',') })) }, 'Show in one scene'),

@@ -282,7 +282,7 @@ export class SurfacePane {
         'div',
         { class: 'tool-group' },
         this.toggle('flat', 'Flat', 'Flat shading shows every triangle (t)', () => this.toggleFlat()),
-        this.toggle('wireframe', 'Wireframe', 'Show only the edges (w)', () => this.toggleWires()),
+        this.toggle('wireframe', 'Edges', 'Wireframe: show only the edges (w)', () => this.toggleWires()),
         distance.toggle,
         h('label', { class: 'opacity' }, h('span', {}, 'Opacity'), opacity),
       ),
