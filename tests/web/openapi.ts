@@ -47,6 +47,11 @@ export const jobParameters: ReadonlyMap<string, Schema> = new Map(
   leaves(whole({ $ref: 'JobParameters' }), ''),
 );
 
+// The name that the page shows.
+export function titleOf(parameter: string): string {
+  return jobParameters.get(parameter)?.title ?? parameter;
+}
+
 // What the query of an estimate may hold.
 export const estimateNames: readonly string[] = (api.paths['/v1/estimate']?.get?.parameters ?? []).map(
   ({ $ref, name = '' }) => ($ref ? named(api.components.parameters, $ref).name : name),

@@ -35,13 +35,13 @@ interface Place {
   show: (scope: Scope, route: Route) => Promise<HTMLElement>;
 }
 
-// What draws in 3D is only loaded when it is needed.
+// The views that draw in 3D are loaded when they are needed.
 function placeOf({ path }: Route): Place {
   const [name, id] = path;
   if (name === undefined || (name === 'volumes' && id === undefined)) {
     return { title: 'Volumes', show: volumesView };
   }
-  if (name === 'volumes') return { title: 'Choose the surface', show: prepareView };
+  if (name === 'volumes') return { title: 'New surface', show: prepareView };
   if (name === 'jobs' && id === undefined) return { title: 'Jobs', show: queueView };
   if (name === 'orders') return { title: 'Orders', show: ordersView };
   if (name === 'jobs') {
@@ -58,13 +58,13 @@ function placeOf({ path }: Route): Place {
   }
   if (name === 'together') {
     return {
-      title: 'Surfaces together',
+      title: 'Surfaces in one scene',
       show: async (scope, route) => (await import('./views/together')).togetherView(scope, route),
     };
   }
   return {
     title: 'Not found',
-    show: () => Promise.reject(new ApiError(404, 'Not found', 'There is nothing at this address.')),
+    show: () => Promise.reject(new ApiError(404, 'Not found', 'No page has this address.')),
   };
 }
 
@@ -77,14 +77,14 @@ const links = [
   h('a', { href: hashOf(['orders']), 'data-place': 'orders', hidden: true }, 'Orders'),
 ];
 
-// Only where the daemon knows a PACS.
+// Only if the daemon knows a PACS.
 function showOrders(): void {
   const link = links.find(({ dataset }) => dataset.place === 'orders');
   client.hasOrders().then(
     (isOn) => {
       if (link) link.hidden = !isOn;
     },
-    // Nobody answers, which is said at the top; asked again when somebody does.
+    // The server is unreachable, which the banner says. The page asks again when it is back.
     () => {
       const stop = connected.subscribe((isConnected) => {
         if (!isConnected) return;
@@ -95,7 +95,7 @@ function showOrders(): void {
   );
 }
 
-// What the upload does that goes on behind other views.
+// Shows the state of an upload while other views are open.
 function uploadNote(): HTMLElement {
   const note = h('a', { class: 'upload-note', href: hashOf([]), hidden: true });
   uploads.state.watch((state) => {
@@ -110,7 +110,7 @@ function shell(): HTMLElement[] {
     h('a', { class: 'skip', href: '#main', onClick: (event: Event) => {
       event.preventDefault();
       main.focus();
-    } }, 'Skip to the content'),
+    } }, 'Skip to content'),
     h(
       'header',
       { class: 'top' },
@@ -119,8 +119,8 @@ function shell(): HTMLElement[] {
       h('span', { class: 'grow' }),
       uploadNote(),
       ...tokenButtons(),
-      button('Keys', showHelp, { class: 'quiet keys', title: 'Keyboard (?)' }),
-      button(icon(halfDisc), toggleTheme, { class: 'quiet', 'aria-label': 'Light or dark' }),
+      button('Shortcuts', showHelp, { class: 'quiet keys', title: 'Keyboard shortcuts (?)' }),
+      button(icon(halfDisc), toggleTheme, { class: 'quiet', 'aria-label': 'Switch between light and dark' }),
     ),
     banner,
     main,
@@ -130,7 +130,7 @@ function shell(): HTMLElement[] {
 let scope = new Scope();
 let shownPath = '';
 
-// Tabs are told apart by what they show.
+// The title of the browser's tab says what it shows.
 function nameTab(view: HTMLElement, place: Place): void {
   const name = (): string => view.dataset.title ?? place.title;
   document.title = `${name()} \u00b7 isomesh`;
@@ -174,8 +174,8 @@ async function show(): Promise<void> {
     const home = h('a', { class: 'button', href: hashOf([]) }, 'All volumes');
     const way = failure.link ? h('a', { class: 'button', href: failure.link.href }, failure.link.text) : home;
     const shown = failure.isUnreachable ? pendingRefusal(failure, again, way) : refusal(failure, again, way);
-    main.replaceChildren(h('h1', { class: 'sr-only' }, 'This view cannot be shown'), h('div', { class: 'page-problem' }, shown));
-    // What failed because nobody answered is tried again when somebody does.
+    main.replaceChildren(h('h1', { class: 'sr-only' }, 'This page cannot be shown'), h('div', { class: 'page-problem' }, shown));
+    // If the server could not be reached, the page tries again when the connection is back.
     if (failure.isUnreachable) {
       const stop = connected.subscribe((isConnected) => {
         if (isConnected) void show();
@@ -194,7 +194,7 @@ function watchConnection(): void {
     clearInterval(timer);
     banner.hidden = isConnected;
     if (isConnected) return;
-    banner.textContent = 'The connection to the server is lost. This page goes on as soon as it is back.';
+    banner.textContent = 'The connection to the server is lost. The page reconnects automatically.';
     timer = window.setInterval(() => {
       void client.connection.isAlive().then((alive) => {
         if (alive) connected.value = true;
@@ -223,7 +223,7 @@ function watchKeys(): void {
   });
 }
 
-// A file that was dropped beside a view would replace the page, and what it is doing.
+// The browser would replace the page by a file that is dropped outside the upload panel.
 function watchDrops(): void {
   const mark = (isOver: boolean): void => {
     uploads.element.classList.toggle('over', isOver);
@@ -249,13 +249,13 @@ function watchDrops(): void {
   });
 }
 
-// Whoever looks at something else hears of it when a job of theirs has ended.
+// Tells the user when one of their jobs ends while another view is open.
 function watchJobs(): void {
   const watched = new WatchedJobs(({ id, state, parameters }) => {
     const [place, job] = currentRoute().path;
     if (place === 'jobs' && job === id) return;
-    const what = { succeeded: 'is made', failed: 'could not be made', cancelled: 'was cancelled' }[state as string] ?? state;
-    tell(h('span', {}, h('a', { href: hashOf(['jobs', id]) }, `The surface of ${surfaceInWords(parameters)}`), ` ${what}.`));
+    const what = { succeeded: 'is ready', failed: 'could not be made', cancelled: 'was cancelled' }[state as string] ?? state;
+    tell(h('span', {}, h('a', { href: hashOf(['jobs', id]) }, `The surface for ${surfaceInWords(parameters)}`), ` ${what}.`));
   });
   client.submitted.subscribe((id) => watched.add(id));
   watched.start();

@@ -1,6 +1,7 @@
 // The error of a surface: asked for by a slider, measured, shown in numbers and as colour.
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
+import { titleOf } from '../openapi';
 import { ballNrrd, ballsNrrd, hues, openedJob, setup, silhouette, still, surfaceLoaded, type JobAnswer } from './support';
 
 const at = setup();
@@ -24,27 +25,27 @@ describe('the largest error', () => {
   it('is chosen by a slider, said beside the spacing and in the address, and measured', async () => {
     const { page } = at;
     await open(page, `volumes/${ball}?iso=100`);
-    const slider = page.getByRole('slider', { name: 'Largest error' });
+    const slider = page.getByRole('slider', { name: titleOf('max_error_mm') });
     await expect.poll(() => slider.getAttribute('aria-valuetext')).toBe('off');
-    const certify = page.getByLabel('Measure the error');
+    const certify = page.getByLabel(titleOf('certify'));
     await expect.poll(() => certify.isChecked()).toBe(false);
     await slider.focus();
     await page.keyboard.press('End');
-    await expect.poll(() => slider.getAttribute('aria-valuetext')).toBe('2 mm, 2 of the spacing of 1 mm');
+    await expect.poll(() => slider.getAttribute('aria-valuetext')).toBe('2 mm, 2 × the spacing of 1 mm');
     await slider.fill('22');
-    await expect.poll(() => slider.getAttribute('aria-valuetext')).toBe('0.1 mm, 0.1 of the spacing of 1 mm');
+    await expect.poll(() => slider.getAttribute('aria-valuetext')).toBe('0.1 mm, 0.1 × the spacing of 1 mm');
     expect([await certify.isChecked(), await certify.isDisabled()]).toEqual([true, true]);
     await expect.poll(() => page.url()).toContain('max_error_mm=0.1');
     await page.getByRole('button', { name: 'Make the surface' }).click();
     await page.waitForURL(/#\/jobs\//);
     await surfaceLoaded(page);
     expect((await openedJob(at)).parameters).toMatchObject({ max_error_mm: 0.1, certify: true });
-    const panel = page.getByLabel('The job');
-    await expect.poll(() => panel.innerText()).toMatch(/0\.0\d+ mm of 0\.1 mm allowed/);
+    const panel = page.getByLabel('Job', { exact: true });
+    await expect.poll(() => panel.innerText()).toMatch(/0\.0\d+ mm is the largest distance[^]*Allowed: 0\.1 mm/);
     const text = await panel.innerText();
     expect(text).toMatch(/simplified from \d/);
-    expect(text).toMatch(/Of 0\.1 mm: smoothing 0\.0\d+, fewer triangles 0\.0\d+, rounding/);
-    expect(text).toMatch(/Run through themselves\s+none/);
+    expect(text).toMatch(/The allowed 0\.1 mm are divided into: smoothing 0\.0\d+, fewer triangles 0\.0\d+, rounding/);
+    expect(text).toMatch(/Self-intersections\s+none/);
     expect(text).toMatch(/simplify\s/);
     await expect.poll(() => page.locator('.both-ways td').count()).toBe(6);
     await expect.poll(() => page.locator('.distances path').count()).toBe(2);
@@ -95,7 +96,7 @@ describe('distances', () => {
     await openJob(page, await daemon.submit({ volume: ball, iso: 100, passes: 3, formats: ['glb'], certify: true }, 30));
     await expect.poll(() => page.getByRole('button', { name: 'Distance', exact: true }).isVisible()).toBe(false);
     const before = page.url();
-    await page.getByRole('button', { name: 'Show it as colour' }).click();
+    await page.getByRole('button', { name: 'Show the distance as colour' }).click();
     await expect.poll(() => page.url()).not.toBe(before);
     await surfaceLoaded(page);
     await page.locator('.legend').waitFor();
@@ -118,7 +119,7 @@ describe('a surface that is not what was meant', () => {
     const { daemon, page } = at;
     const cut = await daemon.upload(ballNrrd(24, 14));
     await openJob(page, await daemon.submit({ volume: cut, iso: 100, formats: ['glb'] }, 30));
-    const panel = page.getByLabel('The job');
+    const panel = page.getByLabel('Job', { exact: true });
     await expect.poll(() => panel.innerText()).toMatch(/Volume\s+none: the surface is open/);
     const before = page.url();
     await panel.getByRole('button', { name: 'Close it' }).click();
@@ -144,9 +145,9 @@ describe('a surface that is not what was meant', () => {
     if (!disc) throw new Error('there is no view');
     const seen = await silhouette(page, page.locator('.viewport'));
     await page.mouse.click(box.x + box.width * (0.5 + 0.4 * seen.width), box.y + box.height / 2);
-    await page.getByText('One of 2 parts').waitFor();
+    await page.getByText('One of 2 connected components').waitFor();
     const before = page.url();
-    await page.getByRole('button', { name: 'Keep only this part' }).click();
+    await page.getByRole('button', { name: 'Keep only this component' }).click();
     await expect.poll(() => page.url()).not.toBe(before);
     // The surface of before stays until the new one is there.
     await expect.poll(async () => (await openedJob(at)).mesh?.components, { timeout: 30_000 }).toBe(1);
@@ -176,7 +177,7 @@ describe('a surface that is not what was meant', () => {
       expect(part).toBeLessThan(1.02);
     }
     const before = page.url();
-    await page.getByRole('button', { name: 'Leave it out' }).click();
+    await page.getByRole('button', { name: 'Drop this component' }).click();
     await expect.poll(() => page.url()).not.toBe(before);
     await expect.poll(async () => (await openedJob(at)).mesh?.components, { timeout: 30_000 }).toBe(1);
     expect((await openedJob(at)).mesh?.bounds[1][0]).toBeLessThan(24);

@@ -20,11 +20,11 @@ describe('a surface', () => {
     const volume = await daemon.upload(ballNrrd(24, 14));
     const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
     await page.goto(`${daemon.url}/#/jobs/${id}`);
-    await page.getByRole('button', { name: 'For printing' }).click();
+    await page.getByRole('button', { name: 'For 3D printing' }).click();
     await expect.poll(() => page.url()).not.toContain(id);
     await expect.poll(() => page.locator('[data-format="3mf"]').count()).toBe(1);
     await expect.poll(() => page.locator('[data-format=stl]').count()).toBe(1);
-    await expect.poll(() => page.getByRole('button', { name: 'For printing' }).count()).toBe(0);
+    await expect.poll(() => page.getByRole('button', { name: 'For 3D printing' }).count()).toBe(0);
     const made = await openedJob(at);
     expect(made.parameters).toMatchObject({ close: true, certify: true });
     const { name, bytes } = await saved(page, /^Certificate$/);

@@ -85,7 +85,7 @@ describe('the labels of a volume', () => {
     await page.getByRole('button', { name: 'None', exact: true }).click();
     const run = page.getByRole('button', { name: 'Make the surface' });
     await expect.poll(() => run.isDisabled()).toBe(true);
-    await expect.poll(() => page.locator('.estimate').innerText()).toContain('Choose a label');
+    await expect.poll(() => page.locator('.estimate').innerText()).toContain('Choose at least one label');
     await page.getByRole('radio', { name: 'One surface' }).check();
     await expect.poll(() => run.isDisabled()).toBe(false);
     const { parameters } = await make(page);

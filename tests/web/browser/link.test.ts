@@ -26,7 +26,7 @@ describe('a link to a surface', () => {
     await page.keyboard.press('t');
     await page.getByLabel('Opacity').fill('0.6');
     await page.keyboard.press('c');
-    await page.getByLabel('Slice of the cut').fill('20');
+    await page.getByLabel('Position of the cut').fill('20');
     await page.getByLabel('Other side').check();
     await still(page);
     await expect.poll(() => [noted(page, 'cut'), noted(page, 'style')]).toEqual(['z20-', 'flat,opacity-60']);
@@ -60,19 +60,19 @@ describe('parameters', () => {
     const volume = await daemon.upload(ballNrrd(32, 12));
     await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
     const undo = page.getByRole('button', { name: 'Undo' });
-    await page.getByLabel('Passes').waitFor();
+    await page.locator('[data-parameter=passes] input').waitFor();
     await expect.poll(() => undo.isVisible()).toBe(false);
-    await page.getByLabel('Passes').fill('9');
+    await page.locator('[data-parameter=passes] input').fill('9');
     await page.waitForTimeout(700);
     await page.getByRole('radio', { name: 'Taubin' }).check({ force: true });
     await page.waitForTimeout(700);
     await undo.click();
     await expect.poll(() => noted(page, 'smoothing')).toBe('');
-    await expect.poll(() => page.getByLabel('Passes').inputValue()).toBe('9');
+    await expect.poll(() => page.locator('[data-parameter=passes] input').inputValue()).toBe('9');
     await page.locator('h1').click();
     await page.keyboard.press('Control+z');
     await expect.poll(() => noted(page, 'passes')).toBe('');
-    await expect.poll(() => page.getByLabel('Passes').inputValue()).toBe('5');
+    await expect.poll(() => page.locator('[data-parameter=passes] input').inputValue()).toBe('5');
     await expect.poll(() => undo.isVisible()).toBe(false);
     await page.keyboard.press('Control+Shift+z');
     await page.keyboard.press('Control+Shift+z');
@@ -97,7 +97,7 @@ describe('a job that was left', () => {
       await page.reload();
       await own.json(`/v1/jobs/${before.id}`, { method: 'DELETE' });
       const toast = page.locator('.toast', { hasText: 'iso 128' });
-      await expect.poll(() => toast.innerText()).toMatch(/The surface of iso 128 is made/);
+      await expect.poll(() => toast.innerText()).toMatch(/The surface for iso 128 is ready/);
       await toast.getByRole('link').click();
       await page.waitForURL(new RegExp(`#/jobs/${id}`));
       await page.close();
@@ -132,9 +132,9 @@ describe('the list of volumes', () => {
       await page.getByRole('button', { name: 'Rename elbow.nrrd' }).click();
       await page.getByLabel('Name of this volume').and(page.locator('input')).fill('a knee');
       await page.keyboard.press('Enter');
-      await expect.poll(() => page.locator('.cards').innerText()).toContain('No volume is called so');
+      await expect.poll(() => page.locator('.cards').innerText()).toContain('No volume matches the search');
       await page.getByLabel('Search volumes').fill('');
-      await page.getByLabel('Order of volumes').selectOption('name');
+      await page.getByLabel('Sort volumes').selectOption('name');
       await expect.poll(async () => (await names.allInnerTexts()).slice(0, 3)).toEqual(['a knee', 'case 1.nrrd', 'case 2.nrrd']);
       await page.close();
     } finally {
@@ -142,17 +142,23 @@ describe('the list of volumes', () => {
     }
   });
 
-  it('that is empty offers a sample', async () => {
+  it('that is empty says what is made here, and offers a sample', async () => {
     const { browser } = at;
     const other = await Daemon.start();
     try {
       const { page, faults } = await openPage(browser, other.url);
       await page.goto(other.url);
+      const intro = page.locator('.intro');
+      await expect.poll(() => intro.innerText()).toBe('isomesh turns a CT, MRI or label volume into a 3D surface mesh.');
       await page.getByRole('button', { name: 'try a sample' }).click();
       await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
       await expect.poll(() => page.locator('h1').first().innerText()).toContain('Sample head');
       await expect.poll(() => page.locator('.live[data-size] .live-picture[data-still]').count()).toBe(1);
       expect((await silhouette(page, page.locator('.live-picture'))).part).toBeGreaterThan(0.1);
+      // With a volume the page needs no introduction.
+      await page.goto(other.url);
+      await expect.poll(() => page.locator('.cards > li a').count()).toBe(1);
+      await expect.poll(() => intro.isVisible()).toBe(false);
       await page.close();
       expect(faults).toEqual([]);
     } finally {

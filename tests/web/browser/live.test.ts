@@ -99,13 +99,13 @@ describe('the surface beside the slices', () => {
     const { page, daemon } = at;
     await open(page, 'iso=100');
     await page.getByLabel('Iso-value', { exact: true }).nth(0).fill('9999');
-    await expect.poll(() => page.locator('.live .slice-state').innerText()).toMatch(/No sample/);
+    await expect.poll(() => page.locator('.live .slice-state').innerText()).toMatch(/not between the smallest and the largest sample/);
     await expect.poll(() => page.locator('.live-picture').isVisible()).toBe(false);
     await page.getByLabel('Iso-value', { exact: true }).nth(0).fill('100');
     await expect.poll(() => page.locator('.live-picture').isVisible()).toBe(true);
     const labels = await daemon.upload(labelsNrrd(24));
     await page.goto(`${daemon.url}/#/volumes/${labels}`);
-    await expect.poll(() => page.locator('.live .slice-state').innerText()).toMatch(/iso-values only/);
+    await expect.poll(() => page.locator('.live .slice-state').innerText()).toMatch(/iso-values only, not labels/);
   });
 
   it('comes when the daemon has it again', async () => {

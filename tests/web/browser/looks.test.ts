@@ -24,7 +24,7 @@ describe('a look through the volume', () => {
     await rested(page);
     const view = page.locator('.live-picture');
     const surface = await silhouette(page, view);
-    const choice = page.getByLabel('What is drawn');
+    const choice = page.getByLabel('Kind of preview');
     await expect.poll(() => choice.locator('option').allInnerTexts()).toEqual(['Surface', 'MR']);
     await choice.selectOption('MR');
     await rested(page);

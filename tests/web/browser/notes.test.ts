@@ -42,13 +42,13 @@ describe('an upload of several volumes', () => {
     const rows = page.locator('.outcomes > li');
     await expect.poll(() => rows.count()).toBe(3);
     await expectText(hostileName);
-    await expect.poll(() => page.locator('.drop h2').innerText()).toBe('1 of the 3 volumes in the upload were stored');
+    await expect.poll(() => page.locator('.drop h2').innerText()).toBe('1 of 3 volumes in the upload were stored');
     await expect.poll(() => page.locator('[data-member="cut.nrrd"]').innerText()).toContain('truncated');
     await expect.poll(() => page.locator('[data-volume]').count()).toBe(1);
 
     const times = page.locator('[data-member="times.nii"]');
     await times.getByLabel('Volume to read').selectOption({ label: 'time 1 (1)' });
-    await times.getByRole('button', { name: 'Take this volume' }).click();
+    await times.getByRole('button', { name: 'Use this volume' }).click();
     await expect.poll(() => page.locator('.outcomes .stored').count()).toBe(2);
     const [kept = ''] = /upload=\w{32}/.exec(queries[1] ?? '') ?? [];
     expect(queries).toEqual(['?keep=true', `?keep=true&${kept}&member=times.nii&volume=1`]);
@@ -70,7 +70,7 @@ describe('a refusal', () => {
     await drop(page, [{ name: 'two.nii', bytes: seriesNifti() }]);
     await expect.poll(() => page.locator('.refusal').innerText()).toContain('2 volumes');
     await page.getByLabel('Volume to read').selectOption('0');
-    await page.getByRole('button', { name: 'Take this volume' }).click();
+    await page.getByRole('button', { name: 'Use this volume' }).click();
     await page.waitForURL(volumePage);
     await expect.poll(() => page.locator('[data-note="volume-chosen"]').innerText()).toContain('Volume 0');
   });
@@ -85,7 +85,7 @@ describe('a refusal', () => {
       bytes: ctSlice(index, index < 3 ? '1.9.1' : '1.9.2', hostile),
     }));
     await drop(page, slices);
-    await page.getByRole('button', { name: 'Take it in spite of this' }).click();
+    await page.getByRole('button', { name: 'Accept it anyway' }).click();
     await page.waitForURL(volumePage);
     const [kept = ''] = /upload=\w{32}/.exec(queries[1] ?? '') ?? [];
     expect(queries).toEqual(['?keep=true', `?keep=true&${kept}&accept=frame-of-reference`]);
@@ -125,8 +125,11 @@ describe('notes and what was left out', () => {
       { name, bytes: Buffer.from('no volume') },
     ]);
     await page.waitForURL(volumePage);
-    await page.locator('summary', { hasText: '1 file was left out' }).click();
-    await expectText('it is no DICOM file');
+    await page.locator('summary', { hasText: '1 file was skipped' }).click();
+    const id = new URL(page.url()).hash.split(/[/?]/)[2] ?? '';
+    const { ignored } = await daemon.json<{ ignored: { reason: string }[] }>(`/v1/volumes/${id}`);
+    expect(ignored).toHaveLength(1);
+    await expectText(ignored[0]?.reason ?? '');
   });
 });
 
@@ -134,11 +137,15 @@ describe('a volume', () => {
   it('that was there already says what its new file showed', async () => {
     const { daemon, page } = at;
     const fields = ['spacings: 1 1 4'];
+    const bytes = Buffer.concat([smallNrrd(fields), Buffer.from('more')]);
     await daemon.upload(smallNrrd(fields));
+    const body = new Blob([new Uint8Array(bytes)]);
+    const { notes } = await daemon.json<{ notes: { detail: string }[] }>('/v1/volumes', { method: 'POST', body });
+    expect(notes).toHaveLength(1);
     await page.goto(daemon.url);
-    await drop(page, [{ name: 'longer.nrrd', bytes: Buffer.concat([smallNrrd(fields), Buffer.from('more')]) }]);
+    await drop(page, [{ name: 'longer.nrrd', bytes }]);
     await page.waitForURL(volumePage);
-    await expect.poll(() => page.locator('.toast').innerText()).toMatch(/there already.*4 bytes more/);
+    await expect.poll(() => page.locator('.toast').innerText()).toContain(`already stored. ${notes[0]?.detail}`);
     await expect.poll(() => page.locator('[data-note]').count()).toBe(0);
   });
 

@@ -48,8 +48,8 @@ describe('orders', () => {
     status = 503;
     const { id: waiting } = await order('1.2.3.4');
     const row = page.locator(`tr[data-order="${waiting}"]`);
-    await expect.poll(() => row.innerText()).toMatch(/waiting[^]*503[^]*one attempt failed[^]*tried again in \d+ s[^]*main[^]*1\.2\.3\.4[^]*bone/);
-    await expect.poll(() => page.locator('[data-pacs=main]').innerText()).toMatch(/does not answer as it should/);
+    await expect.poll(() => row.innerText()).toMatch(/waiting[^]*503[^]*1 attempt failed[^]*next attempt in \d+ s[^]*main[^]*1\.2\.3\.4[^]*bone/);
+    await expect.poll(() => page.locator('[data-pacs=main]').innerText()).toMatch(/last request failed/);
     await row.getByRole('button', { name: /Cancel/ }).click();
     await expect.poll(() => row.locator('td').first().innerText()).toBe('cancelled');
     await expect.poll(() => row.getByRole('button').count()).toBe(0);
@@ -67,7 +67,7 @@ describe('orders', () => {
     await other.getByRole('button', { name: /Retry/ }).click();
     await expect.poll(() => page.locator('.queue-body').innerText()).toContain('No orders are failed');
     await page.getByLabel('State').selectOption('waiting');
-    await expect.poll(() => other.innerText()).toContain('tried again');
+    await expect.poll(() => other.innerText()).toContain('next attempt');
     await page.close();
     expect(faults).toEqual([]);
   });
@@ -81,7 +81,7 @@ describe('orders', () => {
     const asked = page.waitForResponse(`${daemon.url}/version`);
     await page.goto(daemon.url);
     await (await asked).finished();
-    await page.getByRole('heading', { name: 'Last surfaces' }).waitFor();
+    await page.getByRole('heading', { name: 'Recent surfaces' }).waitFor();
     await expect.poll(() => page.getByRole('link', { name: 'Orders', exact: true }).isVisible()).toBe(false);
     expect(missing).toEqual([]);
     await page.goto(`${daemon.url}/#/orders`);

@@ -28,7 +28,7 @@ describe('the page', () => {
     await expect.poll(() => page.locator('.page-problem').count()).toBe(1);
     await expect.poll(() => page.locator('main h1').count()).toBe(1);
     await page.goto(`${daemon.url}/#/compare`);
-    await page.getByRole('link', { name: 'To the list of jobs' }).click();
+    await page.getByRole('link', { name: 'Go to the list of jobs' }).click();
     await page.waitForURL(/#\/jobs$/);
   });
 

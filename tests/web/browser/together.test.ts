@@ -14,7 +14,7 @@ describe('surfaces in one scene', () => {
     const boxes = page.getByRole('checkbox', { name: /to compare/ });
     await expect.poll(() => boxes.count()).toBe(2);
     for (const box of await boxes.all()) await box.check();
-    await page.getByRole('button', { name: 'In one scene' }).click();
+    await page.getByRole('button', { name: 'Show in one scene' }).click();
     await page.waitForURL(/#\/together/);
     await surfaceLoaded(page);
     const view = page.locator('.viewport');

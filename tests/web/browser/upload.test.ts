@@ -63,7 +63,7 @@ describe('several files', () => {
     await drop(page, [{ name: 'study.nrrd', bytes: ballNrrd(16, 5, 3) }]);
     const choice = page.getByLabel('Series to read');
     await choice.selectOption({ label: 'chest, 40 slices (1.2.840.2)' });
-    await page.getByRole('button', { name: 'Take this series' }).click();
+    await page.getByRole('button', { name: 'Use this series' }).click();
     await page.waitForURL(/#\/volumes\/[0-9a-f]{64}/);
     expect(asked).toEqual(['', '1.2.840.2']);
   });
@@ -78,7 +78,7 @@ describe('a server with tokens', () => {
       const field = mine.getByLabel('Token', { exact: true }).and(mine.locator('input'));
       await field.fill('wrong');
       await mine.getByRole('button', { name: 'Continue' }).click();
-      await expect.poll(() => mine.locator('dialog').innerText()).toMatch(/not valid/);
+      await expect.poll(() => mine.locator('dialog').innerText()).toMatch(/does not accept the token/);
       await field.fill(token);
       await mine.getByRole('button', { name: 'Continue' }).click();
       await expect.poll(() => mine.getByRole('button', { name: 'Choose files' }).isVisible()).toBe(true);
@@ -110,7 +110,7 @@ describe('a refused file', () => {
     await drop(page, [{ name: 'half.nii.gz', bytes: whole.subarray(0, whole.length / 2) }]);
     await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/\w{4}/);
     expect(await page.locator('.refusal .advice').innerText()).not.toBe('');
-    await page.getByRole('button', { name: 'Choose another' }).click();
+    await page.getByRole('button', { name: 'Choose another file' }).click();
     await expect.poll(() => page.getByRole('button', { name: 'Choose files' }).isVisible()).toBe(true);
   });
 

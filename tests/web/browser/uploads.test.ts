@@ -72,11 +72,11 @@ describe('an upload', () => {
     await page.goto(daemon.url);
     const junk = Buffer.from(Array.from({ length: 4_000_000 }, (_, n) => (n * 7919) % 251));
     await drop(page, [{ name: 'junk.bin', bytes: junk }]);
-    await expect.poll(() => page.locator('.refusal').innerText()).toContain('Nothing was sent');
+    await expect.poll(() => page.locator('.refusal').innerText()).toContain('Nothing was uploaded');
     await expect.poll(() => page.getByRole('button', { name: 'Upload as raw samples' }).count()).toBe(1);
     expect(sent).toEqual([]);
     await page.getByRole('button', { name: 'Upload it anyway' }).click();
-    await expect.poll(() => page.locator('.refusal').innerText()).not.toContain('Nothing was sent');
+    await expect.poll(() => page.locator('.refusal').innerText()).not.toContain('Nothing was uploaded');
     expect(sent).toHaveLength(1);
   });
 
@@ -95,7 +95,7 @@ describe('an upload', () => {
     const choice = page.getByLabel('Series to read');
     await choice.waitFor();
     await choice.selectOption({ index: (await choice.locator('option').allInnerTexts()).findIndex((text) => text.startsWith('none')) });
-    await page.getByRole('button', { name: 'Take this series' }).click();
+    await page.getByRole('button', { name: 'Use this series' }).click();
     await page.waitForURL(volumePage);
     await expect.poll(() => page.locator('.facts').innerText()).toContain('4 \u00d7 4 \u00d7 2');
     const bytes = slices.reduce((sum, slice) => sum + slice.bytes.length, 0);
@@ -119,7 +119,7 @@ describe('what was uploaded and refused', () => {
     for (let other = 0; other < 2; other += 1) {
       await fetch(`${daemon.url}/v1/volumes?keep=true`, { method: 'POST', body: new Uint8Array(seriesNifti()) });
     }
-    await page.getByRole('button', { name: 'Take this volume' }).click();
+    await page.getByRole('button', { name: 'Use this volume' }).click();
     await page.waitForURL(volumePage);
     expect(statuses).toEqual([410, 201]);
   });
@@ -132,8 +132,8 @@ describe('what was uploaded and refused', () => {
     });
     await page.goto(daemon.url);
     await drop(page, [{ name: 'cut.nrrd', bytes: ballNrrd(32, 10).subarray(0, 20_000) }]);
-    await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/32 × 32 × 32.*cut off.*Nothing was sent/);
-    await page.getByRole('button', { name: 'Choose another' }).click();
+    await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/cut off.*32 × 32 × 32.*Nothing was uploaded/);
+    await page.getByRole('button', { name: 'Choose another file' }).click();
     await drop(page, [
       { name: 'a.txt', bytes: Buffer.from('Dear colleague') },
       { name: 'b.txt', bytes: Buffer.from('Dear colleague') },
@@ -156,7 +156,7 @@ describe('what fails for want of a connection', () => {
       await page.getByRole('button', { name: 'Make the surface' }).click();
       const refusal = page.locator('.panel .refusal');
       await expect.poll(() => refusal.count(), { timeout: 30_000 }).toBe(1);
-      expect(await refusal.innerText()).not.toContain('by itself');
+      expect(await refusal.innerText()).not.toContain('automatically');
       const again = await Daemon.start(other.data, new URL(other.url).host);
       try {
         await refusal.getByRole('button', { name: 'Try again' }).click();

@@ -26,8 +26,8 @@ describe('the slider of the largest error', () => {
 
   it('says the error beside the smallest spacing', () => {
     expect(errorInWords(null, [1, 1, 1])).toBe('off');
-    expect(errorInWords(0.1, [1, 0.5, 2])).toBe('0.1 mm, 0.2 of the spacing of 0.5 mm');
-    expect(errorInWords(0.02, [1.5, 1.5, 3])).toBe('0.02 mm, 0.013 of the spacing of 1.5 mm');
+    expect(errorInWords(0.1, [1, 0.5, 2])).toBe('0.1 mm, 0.2 × the spacing of 0.5 mm');
+    expect(errorInWords(0.02, [1.5, 1.5, 3])).toBe('0.02 mm, 0.013 × the spacing of 1.5 mm');
   });
 });
 
@@ -40,7 +40,7 @@ describe('why a surface is empty', () => {
 
   it('is an iso-value outside the samples, which are told', () => {
     expect(emptyReason(emptyJob({ iso: 300 }, { iso: 300 }), volume)).toBe(
-      "There is no surface at the iso-value 300: the volume's samples go from 0 to 255. Choose an iso-value between them.",
+      "There is no surface at the iso-value 300: the volume's samples range from 0 to 255. Choose an iso-value between these limits.",
     );
     expect(emptyReason(emptyJob({ iso: 0 }, { iso: 0 }), volume)).toMatch(/Choose an iso-value between/);
     expect(emptyReason(emptyJob({ iso: 300 }), null)).toBe('There is no surface at the iso-value 300.');
@@ -48,7 +48,7 @@ describe('why a surface is empty', () => {
 
   it('is what the parameters left out, or a box without any', () => {
     const dropped = { iso: 60, dropped: { components: 3, triangles: 90 } };
-    expect(emptyReason(emptyJob({ iso: 60 }, dropped), volume)).toMatch(/all 3 parts were dropped/);
+    expect(emptyReason(emptyJob({ iso: 60 }, dropped), volume)).toMatch(/all 3 connected components were dropped/);
     expect(emptyReason(emptyJob({ iso: 60, crop: [[0, 0, 0], [1, 1, 1]] }, { iso: 60 }), volume)).toMatch(/within the box.*a larger box/);
     expect(emptyReason(emptyJob({ labels: 'all' }), volume)).toMatch(/no boundary/);
   });

@@ -52,7 +52,7 @@ describe('what is surely no volume', () => {
 
   it('is a file that was cut off, or a header alone', async () => {
     expect(await told(['a.nrrd', blob(smallNrrd())])).toBe('');
-    expect(await told(['a.nrrd', blob(smallNrrd().subarray(0, -1))])).toMatch(/4 × 3 × 2 samples.*cut off.*Nothing was sent/);
+    expect(await told(['a.nrrd', blob(smallNrrd().subarray(0, -1))])).toMatch(/cut off.*4 × 3 × 2 samples.*Nothing was uploaded/);
     expect(await told(['a.nii', blob(seriesNifti().subarray(0, 360))])).toMatch(/cut off/);
     expect(await told(['a.mhd', blob(`${metaHeader}ElementDataFile = a.raw\n`)])).toMatch(/Choose both/);
   });

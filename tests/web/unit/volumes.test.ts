@@ -2,6 +2,7 @@ import { describe, expect, it } from 'vitest';
 import type { Volume } from '@/api/types';
 import { foundVolumes } from '@/views/volume_search';
 import { declaredBy } from '@/volume/declared';
+import { noteTexts } from '@/volume/notes';
 import { sampleHead } from '@/volume/sample';
 import { mayBeVolume } from '@/volume/sniff';
 
@@ -19,6 +20,22 @@ describe('volumes', () => {
 
   it('are sorted', () => {
     expect([ids('', 'newest'), ids('knee', 'name'), ids('', 'size'), ids('', 'nonsense')]).toEqual(['abc', 'ba', 'bca', 'abc']);
+  });
+});
+
+describe('the notes of a volume', () => {
+  const notes = [
+    { code: 'looks-like-labels', detail: 'The samples look like labels.' },
+    { code: 'unit-unknown', detail: 'The unit is unknown.' },
+  ];
+  const textsOf = (type: string): string[] => noteTexts({ type, range: [0, 5], notes } as unknown as Volume);
+
+  it('name the button for labels where there is one', () => {
+    expect(textsOf('uint8')).toEqual([
+      'The samples look like labels. The button "Each label" makes one surface for each label.',
+      'The unit is unknown.',
+    ]);
+    expect(textsOf('float32')).toEqual(notes.map(({ detail }) => detail));
   });
 });
 

@@ -1,4 +1,4 @@
-// In which parameters jobs differ.
+// The parameters in which jobs differ.
 import type { Job, JobParameters } from '../api/types';
 import { formatValue } from '../ui/format';
 import { surfaceInWords } from './parameters';
@@ -15,7 +15,7 @@ const words: Record<string, (job: JobParameters) => string> = {
   smoothing: ({ smoothing }) => smoothing,
   close: ({ close }) => (close ? 'closed' : 'open'),
 };
-// Which files are made, and how soon; the surface is the same.
+// These do not change the surface.
 const besides = ['formats', 'priority'];
 
 function inWords(parameter: Parameter, job: JobParameters): string {

@@ -12,7 +12,7 @@ export function labelTitle({ label, name }: Named): string {
   return name ?? `label ${label}`;
 }
 
-// Those whose title holds all of the words, or whose value is the text.
+// The labels whose title contains all words, or whose value is the text.
 export function matching<T extends Named>(labels: readonly T[], text: string): T[] {
   const words = text.toLowerCase().split(/\s+/).filter(Boolean);
   return labels.filter((one) => {
@@ -25,7 +25,7 @@ export function labelsOfMesh({ mesh }: Job): readonly LabelSummary[] {
   return mesh?.labels ?? [];
 }
 
-// Of each label's surface.
+// The triangles of each label's surface.
 export function trianglesOf(estimate: Estimate): ReadonlyMap<number, number> {
   return new Map((estimate.labels ?? []).map(({ label, triangles }) => [label, triangles]));
 }

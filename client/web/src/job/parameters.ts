@@ -104,7 +104,7 @@ export function parametersOfQuery(query: URLSearchParams, defaults: JobParameter
     const value = fromText(parameter, text);
     return text !== '' && fits(parameter, value, job) ? withValue(job, parameter, value) : job;
   };
-  // What depends on another parameter is judged after that.
+  // Parameters that depend on another one are checked after it.
   const labels = parameters.find(({ kind }) => kind === 'labels');
   const start = labels ? withLabels(defaults, take(defaults, labels).labels) : defaults;
   const inAddress = parameters.filter(({ name }) => name !== 'volume');
@@ -112,7 +112,7 @@ export function parametersOfQuery(query: URLSearchParams, defaults: JobParameter
   return { ...job, formats: withGlb(job.formats) };
 }
 
-// What differs from the defaults, as texts for a query; '' where it does not.
+// The parameters that differ from the defaults, as texts for a query; '' for all others.
 export function queryOfParameters(job: JobParameters, defaults: JobParameters): Record<string, string> {
   const textOf = (parameter: Parameter): string => {
     const text = asText(valueIn(job, parameter));
@@ -165,7 +165,7 @@ export function filesOf({ labels, formats }: JobParameters): MeshFormat[] {
   return whole.length < formats.length ? [...whole, 'zip'] : whole;
 }
 
-// Which surface: iso 60, all labels.
+// The surface in words: iso 60, all labels.
 export function surfaceInWords({ iso, labels }: Partial<JobParameters>): string {
   if (labels === undefined) return `iso ${formatIso(iso ?? 'otsu')}`;
   if (labels === 'all') return 'all labels';

@@ -1,4 +1,4 @@
-// A surface for a printer, and what was measured of it.
+// A surface for a 3D printer, and its measurements.
 import type { Job, JobParameters } from '../api/types';
 import { withGlb } from './parameters';
 
@@ -11,7 +11,7 @@ export function isForPrinting({ parameters: { formats, certify }, mesh }: Job): 
   return certify === true && (mesh?.quality.closed ?? false) && formats.includes('stl') && formats.includes('3mf');
 }
 
-// What was measured, of which files, made how: to be kept with a print.
+// The measurements, the files and the parameters, to keep with a print.
 export function certificateFile(job: Job): string {
   const { parameters, mesh, finished, id } = job;
   const { certificate, quality, volume_mm3: volume, area_mm2: area, triangles: count, files } = mesh ?? {};

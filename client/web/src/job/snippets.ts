@@ -46,7 +46,7 @@ export function commandSnippet(origin: string, job: JobParameters, hasToken: boo
   ].join('\n');
 }
 
-// Of C++: Glb for glb.
+// The enumerator in C++: Glb for glb.
 function enumeratorOf(name: string): string {
   return `k${name.charAt(0).toUpperCase()}${name.slice(1)}`;
 }

@@ -17,27 +17,27 @@ export function asText(value: Value | undefined): string {
 }
 
 export interface Parameter {
-  // Where it stands in a job: passes, draco.speed.
+  // Its place in a job: passes, draco.speed.
   name: string;
   kind: 'number' | 'integer' | 'switch' | 'choice' | 'choices' | 'text' | 'labels' | 'by label' | 'numbers' | 'places';
   title: string;
   help: string;
   unit: string;
-  // What a query and an option of the command call it.
+  // Its name in a query and as an option of the command.
   query: string;
   option: string;
   isNullable: boolean;
   // Undefined when every request has to give the parameter.
   default?: Value;
-  // Of a choice.
+  // For a choice.
   values?: readonly (string | number)[];
   valueHelp?: Readonly<Record<string, string>>;
-  // Of a number.
+  // For a number.
   minimum?: number;
   above?: number;
   maximum?: number;
-  // Which jobs it is for: those at an iso-value, those by labels, or both; and its default in the latter
-  // where it is another one.
+  // The jobs that take it: those at an iso-value, those by labels, or both; and its default by labels,
+  // if that differs.
   jobs: 'iso' | 'labels' | 'any';
   byLabels?: number;
   // The parameter is only for jobs in which the other one has a value that is among the cases; what the
@@ -105,12 +105,12 @@ function caseOf({ by }: Parameter, job: JobParameters): { default?: number; maxi
   return by ? by.cases[asText(valueIn(job, parameterOf(by.parameter)))] : {};
 }
 
-// Whether the parameter is for jobs at an iso-value, or by labels, as this one is.
+// True if the parameter is for this kind of job: at an iso-value or by labels.
 export function isOfKind({ jobs }: Parameter, job: JobParameters): boolean {
   return jobs === 'any' || jobs === (isByLabels(job) ? 'labels' : 'iso');
 }
 
-// Whether the parameter is for such a job.
+// True if the parameter applies to this job.
 export function applies(parameter: Parameter, job: JobParameters): boolean {
   if (!isOfKind(parameter, job)) return false;
   return caseOf(parameter, job) !== undefined;
@@ -120,7 +120,7 @@ export function maximumOf(parameter: Parameter, job: JobParameters): number | un
   return caseOf(parameter, job)?.maximum ?? parameter.maximum;
 }
 
-// What the daemon takes when such a job does not say it; null: no limit.
+// The daemon's default for this job; null: no limit.
 export function defaultOf(parameter: Parameter, job: JobParameters): Value | undefined {
   const forThese = isByLabels(job) ? parameter.byLabels : undefined;
   if (forThese !== undefined) return forThese;
@@ -132,7 +132,7 @@ function isWithin(parameter: Parameter, value: number, job: JobParameters): bool
   return value >= minimum && value > above && value <= (maximumOf(parameter, job) ?? Infinity);
 }
 
-// Whether the daemon takes that value of the parameter in such a job.
+// True if the daemon accepts this value of the parameter in this job.
 export function fits(parameter: Parameter, value: Value, job: JobParameters): boolean {
   const { kind, values = [] } = parameter;
   if (value === null) return parameter.isNullable;
@@ -172,7 +172,7 @@ function isOfLabel(label: string, value: unknown): boolean {
   return /^-?\d+$/.test(label) && (typeof value === 'string' || areLabels(value));
 }
 
-// Whether the daemon takes that value without being told.
+// True if the value is the daemon's default.
 export function isDefault(parameter: Parameter, job: JobParameters): boolean {
   const own = valueIn(job, parameter);
   if (own === undefined || (own === null && parameter.default === undefined)) return true;
@@ -184,7 +184,7 @@ export function isDefault(parameter: Parameter, job: JobParameters): boolean {
   );
 }
 
-// Whether one file of the format holds all labels; those of the others are in a ZIP.
+// True if one file of the format holds all labels. Files of other formats come in a ZIP.
 export function holdsAllLabels(format: MeshFormat): boolean {
   return wholeFormats.includes(format);
 }

@@ -40,7 +40,7 @@ export class WatchedJobs {
     this.listening = new AbortController();
     client.events.listen(
       {
-        // What ended while nothing was told.
+        // Jobs that ended while there were no events.
         onBegin: () => {
           for (const id of this.ids) void this.look(id);
         },

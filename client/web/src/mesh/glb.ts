@@ -109,7 +109,7 @@ export function primitivesOf(gltf: Gltf): DracoPrimitive[] {
     const indices = gltf.accessors?.[primitive.indices ?? -1];
     const positionId = draco?.attributes.POSITION;
     if (!view || !position || !indices || positionId === undefined) {
-      throw new Error('The GLB file holds a part that is not compressed with Draco.');
+      throw new Error('The GLB file holds a mesh that is not compressed with Draco.');
     }
     return {
       offset: view.byteOffset ?? 0,
@@ -167,7 +167,7 @@ export class GlbReader {
       }
       const bytes = view.getUint32(12, true);
       if (view.getUint32(16, true) !== jsonChunk || bytes > largestJson) {
-        throw new Error('The GLB file does not begin with its description.');
+        throw new Error('The GLB file does not begin with a JSON chunk.');
       }
       if (this.head.length < headerBytes + bytes) return;
       this.jsonBytes = bytes;
@@ -184,10 +184,10 @@ export class GlbReader {
     if (this.primitives.length === 0 || this.head.length < start + chunkHeaderBytes) return;
     const bytes = view.getUint32(start, true);
     if (view.getUint32(start + 4, true) !== binaryChunk) {
-      throw new Error('The GLB file has no binary part.');
+      throw new Error('The GLB file has no binary chunk.');
     }
     if (this.primitives.some((part) => part.offset + part.length > bytes)) {
-      throw new Error('The GLB file names bytes that it does not hold.');
+      throw new Error('The GLB file refers to bytes that it does not hold.');
     }
     this.binary = new Uint8Array(bytes);
     const rest = this.head.subarray(start + chunkHeaderBytes);

@@ -55,7 +55,7 @@ function reconnected(signal: AbortSignal): Promise<void> {
     });
     signal.addEventListener('abort', () => {
       stop();
-      reject(new DOMException('Not wanted any more', 'AbortError'));
+      reject(new DOMException('No longer wanted', 'AbortError'));
     });
   });
 }
@@ -76,7 +76,7 @@ async function download(
       const answer = await fetch(file.href, { signal, headers: client.connection.headers(range) });
       if (!answer.ok) throw errorOf(answer.status, await answer.text());
       if (received > 0 && answer.status !== 206) {
-        throw new ApiError(-1, 'The mesh changed', 'The file is not the same any more; reload the page.');
+        throw new ApiError(-1, 'The mesh changed', 'The file has changed on the server. Reload the page.');
       }
       connected.value = true;
       const reader = answer.body?.getReader();
@@ -106,7 +106,7 @@ export async function loadMesh(
   listener: LoadListener,
 ): Promise<LoadTiming> {
   const viewable = viewableFile(job);
-  if (!viewable) throw new Error('The job has no file that can be shown.');
+  if (!viewable) throw new Error('The job has no file that the page can show.');
   const { file, format } = viewable;
   const progress: LoadProgress = {
     bytes: 0,
@@ -143,7 +143,7 @@ export async function loadMesh(
       progress.bytes += piece.length;
       listener.onProgress({ ...progress });
     });
-    if (!reader.isComplete) throw new Error('The GLB file ends before its last part.');
+    if (!reader.isComplete) throw new Error('The GLB file ends too early.');
   } else {
     const whole = new Uint8Array(file.bytes);
     await download(file, signal, (piece) => {

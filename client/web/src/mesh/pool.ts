@@ -26,7 +26,7 @@ class DecodePool {
       signal.addEventListener('abort', () => {
         const place = this.waiting.indexOf(task);
         if (place >= 0) this.waiting.splice(place, 1);
-        reject(new DOMException('Not wanted any more', 'AbortError'));
+        reject(new DOMException('No longer wanted', 'AbortError'));
       });
       this.waiting.push(task);
       this.pump();

@@ -8,7 +8,7 @@ export function pictureOf(
   canvas.width = drawn.width;
   canvas.height = drawn.height;
   const context = canvas.getContext('2d');
-  if (!context) return Promise.reject(new Error('The browser has no memory for the picture.'));
+  if (!context) return Promise.reject(new Error('The browser does not have enough memory for the picture.'));
   context.fillStyle = background;
   context.fillRect(0, 0, canvas.width, canvas.height);
   context.drawImage(drawn, 0, 0);

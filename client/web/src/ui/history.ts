@@ -1,4 +1,4 @@
-// What a person changed, to be taken back and done again.
+// Undo and redo of a user's changes.
 const most = 100;
 // Changes that follow each other so fast are one: a drag, a number that is typed.
 const together = 600;

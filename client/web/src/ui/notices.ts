@@ -1,4 +1,4 @@
-// What the page says: passing messages, refusals in place, questions.
+// Messages of the page: short notices, errors in place, questions.
 import { adviceFor, asApiError, type ApiError } from '../api/problem';
 import { button, h, type Child } from './dom';
 
@@ -30,14 +30,14 @@ export function tellError(error: unknown): void {
   setTimeout(() => toast.remove(), 3 * shownFor);
 }
 
-// A refusal with what is at fault and what to do next.
+// An error with its cause and what to do next.
 export function refusal(error: ApiError, ...actions: Child[]): HTMLElement {
   return refusalWith(error, adviceFor(error), actions);
 }
 
-// Of what the page tries again by itself.
+// For requests that the page repeats by itself.
 export function pendingRefusal(error: ApiError, ...actions: Child[]): HTMLElement {
-  return refusalWith(error, error.isUnreachable ? 'The page tries again by itself.' : adviceFor(error), actions);
+  return refusalWith(error, error.isUnreachable ? 'The page tries again automatically.' : adviceFor(error), actions);
 }
 
 function refusalWith(error: ApiError, advice: string, actions: readonly Child[]): HTMLElement {

@@ -14,7 +14,7 @@ function systems(): Theme {
   return preferred.matches ? 'dark' : 'light';
 }
 
-// What a person chose, else what their system prefers.
+// The user's choice, or the system's preference if there is none.
 export const theme = new Signal<Theme>(stored() ?? systems());
 
 export function startTheme(): void {

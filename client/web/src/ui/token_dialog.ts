@@ -2,10 +2,10 @@ import { token, unauthorized } from '../client';
 import { button, field, h } from './dom';
 import { Signal } from './signal';
 
-// Whether the dialog was closed without a token.
+// True if the dialog was closed without a token.
 const isDeclined = new Signal<boolean>(false);
 
-// Asks for a token whenever the daemon refuses for want of one.
+// Asks for a token whenever the daemon rejects a request that has none.
 export function watchToken(onToken: () => void): void {
   let dialog: HTMLDialogElement | null = null;
   const open = (): void => {
@@ -14,13 +14,13 @@ export function watchToken(onToken: () => void): void {
     const form = h(
       'form',
       { method: 'dialog' },
-      h('h2', {}, 'This server asks for a token'),
+      h('h2', {}, 'This server requires a token'),
       h(
         'p',
         {},
         token.value === ''
-          ? 'Your administrator has one for you. It is kept until this tab is closed.'
-          : 'The token that was entered is not valid here (any more).',
+          ? 'Ask your administrator for a token. The page keeps it until you close this tab.'
+          : 'This server does not accept the token. It may have expired.',
       ),
       field('Token', input),
       h('div', { class: 'actions' }, h('button', { class: 'primary', type: 'submit' }, 'Continue')),
@@ -38,8 +38,8 @@ export function watchToken(onToken: () => void): void {
       made.close();
       onToken();
     });
-    // Who closes it without a token is not asked by what the page does on its own, but in the next view, or by the
-    // button in the bar.
+    // After the dialog was closed without a token, the page's own requests do not open it again. The next view and
+    // the button in the bar do.
     made.addEventListener('close', () => {
       made.remove();
       if (dialog !== made) return;

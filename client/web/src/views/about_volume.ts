@@ -1,29 +1,32 @@
-// What there is to say about a volume beside its slices.
+// The description of a volume beside its slices.
 import { client } from '../client';
 import type { Volume } from '../api/types';
 import { button, h } from '../ui/dom';
 import { formatDims, formatNames, formatSpacing, formatValue } from '../ui/format';
 import { askText, tellError } from '../ui/notices';
 import { volumeName } from '../volume/names';
+import { noteTexts } from '../volume/notes';
 
-// What of an upload was left out, because a person may miss it.
+// Lists the skipped files of an upload, because a user may miss them.
 function ignoredNote({ ignored }: Volume): HTMLElement | null {
   if (ignored.length === 0) return null;
   return h(
     'details',
     { class: 'more' },
-    h('summary', {}, ignored.length === 1 ? '1 file was left out' : `${ignored.length} files were left out`),
+    h('summary', {}, ignored.length === 1 ? '1 file was skipped' : `${ignored.length} files were skipped`),
     h('ul', {}, ...ignored.map(({ name, reason }) => h('li', {}, h('b', {}, name), `: ${reason}`))),
   );
 }
 
-// What the server decided or corrected when it read the upload.
-function notesOf({ notes }: Volume): HTMLElement | null {
+// Lists what the server decided or corrected when it read the upload.
+function notesOf(volume: Volume): HTMLElement | null {
+  const { notes } = volume;
   if (notes.length === 0) return null;
+  const texts = noteTexts(volume);
   return h(
     'ul',
     { class: 'notes', 'aria-label': 'Notes' },
-    ...notes.map(({ code, detail }) => h('li', { 'data-note': code }, detail)),
+    ...notes.map(({ code }, place) => h('li', { 'data-note': code }, texts[place])),
   );
 }
 
@@ -61,20 +64,20 @@ export function sliceHelp(): HTMLElement {
   return h(
     'details',
     { class: 'more slice-help' },
-    h('summary', {}, 'How to move in the slices'),
+    h('summary', {}, 'How to use the slices'),
     h(
       'ul',
       {},
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Drag'), ' in a slice: window and level'),
-    h('li', { class: 'by-touch' }, h('b', {}, 'Drag to the side'), ' in a slice: window and level; up and down scrolls'),
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Wheel'), ' or arrow keys: next slice'),
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Ctrl and wheel'), ', or + and \u2212: zoom; ', h('b', {}, 'Shift and drag'), ': move; 0: all of it'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Drag'), ' in a slice: change window and level'),
+    h('li', { class: 'by-touch' }, h('b', {}, 'Drag sideways'), ' in a slice: change window and level; drag up or down: scroll the page'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Wheel'), ' or arrow keys: next or previous slice'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Ctrl and wheel'), ', or + and \u2212: zoom; ', h('b', {}, 'Shift and drag'), ': move; 0: show the whole slice'),
     h('li', { class: 'by-touch' }, h('b', {}, 'Two fingers'), ': zoom and move'),
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Click'), ': the other slices go there'),
-    h('li', { class: 'by-mouse' }, h('b', {}, 'Double click'), ' or i: the value there becomes the iso-value'),
-    h('li', { class: 'by-touch' }, h('b', {}, 'Slider'), ' below it: next slice'),
-    h('li', { class: 'by-touch' }, h('b', {}, 'Tap'), ': the other slices go there'),
-    h('li', {}, h('b', {}, 'Line in the histogram'), ': the iso-value', h('span', { class: 'by-mouse' }, '; arrow keys move it too')),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Click'), ': move the other slices to this point'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Double click'), ' or i: use the value at this point as the iso-value'),
+    h('li', { class: 'by-touch' }, h('b', {}, 'Slider'), ' below a slice: choose the slice'),
+    h('li', { class: 'by-touch' }, h('b', {}, 'Tap'), ': move the other slices to this point'),
+    h('li', {}, h('b', {}, 'Line in the histogram'), ': drag it to change the iso-value', h('span', { class: 'by-mouse' }, '; the arrow keys move it too')),
     ),
   );
 }
@@ -84,7 +87,7 @@ export function aboutVolume(volume: Volume, onRenamed: () => void): HTMLElement 
   return h('header', { class: 'about' }, nameHeading(volume, onRenamed), h('p', { class: 'facts' }, factsOf(volume)));
 }
 
-// What was noted when it was read.
+// The notes and the skipped files of the upload.
 export function notedOf(volume: Volume): (HTMLElement | null)[] {
   return [notesOf(volume), ignoredNote(volume)];
 }

@@ -1,5 +1,5 @@
-// What was measured of a mesh's error, and what its surface is not: the certificate, triangles that
-// intersect, an opening.
+// The measured error of a mesh and the faults of its surface: the certificate, self-intersections,
+// openings.
 import type { DistanceSummary, Job, JobParameters, MeshSummary } from '../api/types';
 import { button, h, svg, type Child } from '../ui/dom';
 import { formatCount, formatNames, formatValue } from '../ui/format';
@@ -42,7 +42,7 @@ function chart({ from_mesh: mesh, from_extracted: extracted, max_mm: most }: Cer
         viewBox: `0 0 ${width} ${height}`,
         preserveAspectRatio: 'none',
         role: 'img',
-        'aria-label': `Distances from 0 to ${millimetres(most)} millimetres, both ways`,
+        'aria-label': `Distribution of the distances from 0 to ${millimetres(most)} millimetres, in both directions`,
       },
       svg('path', { class: 'after', d: histogramPath(mesh, most, top) }),
       svg('path', { class: 'before', d: histogramPath(extracted, most, top) }),
@@ -53,7 +53,7 @@ function chart({ from_mesh: mesh, from_extracted: extracted, max_mm: most }: Cer
       h('span', {}, '0'),
       h('span', {}, `${millimetres(most)} mm`),
     ),
-    h('figcaption', {}, 'Filled: from the file. Line: from the extracted surface. Heights are logarithms of counts.'),
+    h('figcaption', {}, 'Filled: from the file. Line: to the file. The height shows the logarithm of the number of points.'),
   );
 }
 
@@ -75,10 +75,10 @@ function bothWays({ from_mesh: mesh, from_extracted: extracted }: Certificate): 
       'tr',
       {},
       h('th', { scope: 'col' }, 'mm'),
-      ...['largest', '99 of 100', 'mean'].map((name) => h('th', { scope: 'col', class: 'number' }, name)),
+      ...['largest', '99th percentile', 'mean'].map((name) => h('th', { scope: 'col', class: 'number' }, name)),
     ),
-    row('from the file', 'Shows what has been added', mesh),
-    row('to the file', 'From the surface as it was extracted; shows what has been left out', extracted),
+    row('from the file', 'From the file to the extracted surface; shows what was added', mesh),
+    row('to the file', 'From the extracted surface to the file; shows what was left out', extracted),
   );
 }
 
@@ -96,17 +96,16 @@ function spent({ budget_mm: budget }: Certificate, allowed: number | null | unde
     bar.append(part);
   }
   const words = parts.map(([name, value]) => `${name} ${millimetres(value)}`).join(', ');
-  return h('div', { class: 'spent' }, bar, h('p', { class: 'hint' }, `Of ${formatValue(allowed)} mm: ${words} mm.`));
+  return h('div', { class: 'spent' }, bar, h('p', { class: 'hint' }, `The allowed ${formatValue(allowed)} mm are divided into: ${words} mm.`));
 }
 
-// Null where nothing was measured, or there is nothing to measure.
+// Null if nothing was measured or the surface is empty.
 export function certificateBody(job: Job): HTMLElement | null {
   const certificate = job.mesh?.certificate;
   if (!certificate || job.mesh?.empty) return null;
   const allowed = job.parameters.max_error_mm;
   const isOne = Object.keys(job.mesh?.files ?? {}).length === 1;
   const file = formatNames[certificate.file] ?? certificate.file;
-  const which = isOne ? `the ${file} file` : `the ${file} file, the farthest of all,`;
   return h(
     'div',
     { class: 'certificate' },
@@ -114,8 +113,9 @@ export function certificateBody(job: Job): HTMLElement | null {
       'p',
       {},
       h('b', {}, `${millimetres(certificate.max_mm)} mm`),
-      typeof allowed === 'number' ? ` of ${formatValue(allowed)} mm allowed` : '',
-      ` is the most that ${which} is from the surface as it was extracted.`,
+      ` is the largest distance between the ${file} file and the extracted surface.`,
+      isOne ? '' : ' Every other file is at least as near.',
+      typeof allowed === 'number' ? ` Allowed: ${formatValue(allowed)} mm.` : '',
     ),
     bothWays(certificate),
     chart(certificate),
@@ -128,18 +128,18 @@ export function intersectionsText({ quality }: MeshSummary): Child {
   if (!found) return '';
   if (found.pairs === 0) return 'none';
   const [first] = found.places;
-  const at = first ? ` At ${first.map((value) => value.toFixed(1)).join(', ')} mm.` : '';
+  const at = first ? ` The first pair is at ${first.map((value) => value.toFixed(1)).join(', ')} mm.` : '';
   const pairs = found.pairs === 1 ? '1 pair' : `${formatCount(found.pairs)} pairs`;
-  return h('span', { class: 'attention', title: `Triangles that run through each other.${at}` }, `${pairs} of triangles`);
+  return h('span', { class: 'attention', title: `These triangles intersect.${at}` }, `${pairs} of triangles`);
 }
 
 // For a surface whose volume would be a number without a meaning.
 export function openText({ parameters, mesh }: Job, make: MakeVariant): Child {
-  if (mesh?.quality.closed) return h('span', { class: 'attention' }, 'none: triangles do not agree which side is out');
+  if (mesh?.quality.closed) return h('span', { class: 'attention' }, 'none: the triangles disagree about which side is outside');
   return h(
     'span',
     { class: 'attention' },
     'none: the surface is open. ',
-    !parameters.close && button('Close it', () => make({ close: true }), { class: 'link', title: 'Starts a job that caps it' }),
+    !parameters.close && button('Close it', () => make({ close: true }), { class: 'link', title: 'Starts a job that closes the surface at the border of the volume' }),
   );
 }

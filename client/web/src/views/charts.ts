@@ -36,7 +36,7 @@ export function waterfall(steps: readonly Step[]): HTMLElement {
   return h(
     'table',
     { class: 'waterfall' },
-    h('caption', { class: 'sr-only' }, 'How long each stage took'),
+    h('caption', { class: 'sr-only' }, 'Time of each stage'),
     ...steps.map(({ name, begin, duration }) => {
       const bar = h('span', { class: `bar of-${name}` });
       bar.style.marginLeft = `${(100 * begin) / total}%`;
@@ -52,7 +52,7 @@ export function waterfall(steps: readonly Step[]): HTMLElement {
     h(
       'tr',
       { class: 'total' },
-      h('th', { scope: 'row' }, 'in all'),
+      h('th', { scope: 'row' }, 'total'),
       h('td', {}),
       h('td', { class: 'number' }, formatMilliseconds(total)),
     ),
@@ -102,7 +102,7 @@ export function distributionChart(
       'figcaption',
       {},
       h('b', {}, title),
-      ` mean ${said(extracted.mean)} \u2192 ${said(smoothed.mean)}, least ${said(smoothed.min)}`,
+      ` mean ${said(extracted.mean)} \u2192 ${said(smoothed.mean)}, minimum ${said(smoothed.min)}`,
     ),
   );
 }

@@ -26,13 +26,13 @@ function numbersOf(job: Job): HTMLElement {
   const work = job.timing.total - job.timing.queue;
   const volume: [string, string][] = [
     ['Volume', `${formatValue(smoothed)} mm\u00b3`],
-    ['by smoothing', `${percent > 0 ? '+' : ''}${formatNumber(percent, 2)} %`],
+    ['Change by smoothing', `${percent > 0 ? '+' : ''}${formatNumber(percent, 2)} %`],
   ];
   const rows: [string, string][] = [
     ['Triangles', formatCount(mesh.triangles)],
-    ...(mesh.quality.encloses_volume ? volume : [['Volume', 'none: open'] as [string, string]]),
+    ...(mesh.quality.encloses_volume ? volume : [['Volume', 'none: the surface is open'] as [string, string]]),
     // An equal job's files were there already.
-    ['Time', work < 1 ? 'was made before' : formatMilliseconds(work)],
+    ['Time', work < 1 ? 'already made' : formatMilliseconds(work)],
     ['Mean smallest angle', `${formatNumber(mesh.quality.smallest_angle_deg.smoothed.mean, 1)}\u00b0`],
   ];
   return h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
@@ -46,7 +46,7 @@ async function finished(id: string, scope: Scope, onChange: (job: Job) => void):
 export async function compareView(scope: Scope, route: Route): Promise<HTMLElement> {
   const ids = (route.query.get('jobs') ?? '').split(',').filter(Boolean).slice(0, most);
   if (ids.length < 2) {
-    const link = { href: hashOf(['jobs']), text: 'To the list of jobs' };
+    const link = { href: hashOf(['jobs']), text: 'Go to the list of jobs' };
     throw new ApiError(-1, 'Nothing to compare', 'Choose two to four jobs in the list of jobs.', [], {}, link);
   }
   const jobs = await Promise.all(ids.map((id) => client.getJob(id)));
@@ -119,14 +119,14 @@ class Comparison {
       h('h1', { title: this.volume ? volumeName(this.volume) : '' }, title),
       h(
         'div',
-        { class: 'tool-group', role: 'toolbar', 'aria-label': 'View of all' },
+        { class: 'tool-group', role: 'toolbar', 'aria-label': 'View of all surfaces' },
         ...views,
         button('Fit', () => this.panes[0]?.fit()),
         this.styleButton('Flat', (isOn) => ({ shading: isOn ? 'flat' : 'smooth' })),
-        this.styleButton('Wires', (isOn) => ({ wireframe: isOn })),
+        this.styleButton('Edges', (isOn) => ({ wireframe: isOn })),
       ),
-      h('span', { class: 'hint grow' }, 'The cameras are linked.'),
-      h('a', { class: 'button', href: hashOf(['together'], new URLSearchParams({ jobs: jobs.join(',') })) }, 'In one scene'),
+      h('span', { class: 'hint grow' }, 'All views turn together.'),
+      h('a', { class: 'button', href: hashOf(['together'], new URLSearchParams({ jobs: jobs.join(',') })) }, 'Show in one scene'),
     );
   }
 

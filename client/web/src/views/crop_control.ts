@@ -1,4 +1,4 @@
-// Whether a job is cropped to a box, and to which, by numbers.
+// Switches the crop of a job on, with its box as numbers.
 import type { Vec3, Volume } from '../api/types';
 import { parameterOf } from '../job/table';
 import { checkbox, h } from '../ui/dom';
@@ -51,7 +51,7 @@ export class CropControl {
       }),
     );
     const size = box[0].map((low, axis) => (box[1][axis as 0] - low) * this.volume.spacing[axis as 0]);
-    this.size.textContent = `${size.map((value) => formatNumber(value, 1)).join(' \u00d7 ')} mm. Drag its edges in the slices.`;
+    this.size.textContent = `${size.map((value) => formatNumber(value, 1)).join(' \u00d7 ')} mm. Drag the edges of the box in the slices.`;
   }
 
   private take(axis: 0 | 1 | 2, end: 0 | 1, value: number): void {
@@ -62,7 +62,7 @@ export class CropControl {
   }
 }
 
-// What a new crop begins with: the middle, so that its edges are seen.
+// The box of a new crop: the middle, so that its edges are visible.
 function middleOf(volume: Volume): Box {
   const [, last] = wholeBox(volume);
   return within(volume, [last.map((value) => value * 0.15) as Vec3, last.map((value) => value * 0.85) as Vec3]);

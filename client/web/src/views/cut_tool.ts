@@ -77,7 +77,7 @@ export class CutTool {
   }
 
   private showControls(): void {
-    const slider = h('input', { type: 'range', min: 0, max: this.count - 1, step: 1, 'aria-label': 'Slice of the cut' });
+    const slider = h('input', { type: 'range', min: 0, max: this.count - 1, step: 1, 'aria-label': 'Position of the cut' });
     slider.value = String(this.index);
     const place = h('span', { class: 'cut-place' }, `${this.index + 1} / ${this.count}`);
     slider.addEventListener('input', () => {

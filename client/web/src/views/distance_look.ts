@@ -16,7 +16,7 @@ export class DistanceLook {
   readonly legend = h('div', { class: 'legend', hidden: true, role: 'group', 'aria-label': 'Distance from the scan' });
   readonly toggle = button('Distance', () => this.set(!this.isOn), {
     'aria-pressed': 'false',
-    title: 'Colours tell how far the surface is from the scan (d)',
+    title: 'Colour the surface by its distance from the scan (d)',
     'data-tool': 'distance',
     hidden: true,
   });
@@ -35,8 +35,8 @@ export class DistanceLook {
     const bar = h('div', { class: 'legend-bar', 'aria-hidden': 'true' });
     bar.style.backgroundImage = cssGradient();
     const tops = [
-      { value: 'p99', label: '99 of 100', title: 'The last colour is for all but the farthest hundredth' },
-      { value: 'most', label: 'Largest', title: 'The last colour is for the farthest' },
+      { value: 'p99', label: '99 %', title: 'The colours end at the 99th percentile of the distances' },
+      { value: 'most', label: 'Largest', title: 'The colours end at the largest distance' },
     ] as const;
     this.legend.append(
       segmented<Top>('Distance from the scan', tops, this.top, (top) => {

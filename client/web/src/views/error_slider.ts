@@ -7,7 +7,7 @@ const least = 0.02;
 const most = 2;
 const steps = 60; // beside off
 
-// Of 0 there is no bound; two digits that count.
+// The error at a place of the slider, rounded to two significant digits; null at 0, for no limit.
 export function errorAt(place: number): number | null {
   if (place <= 0) return null;
   const exact = least * (most / least) ** ((Math.min(place, steps) - 1) / (steps - 1));
@@ -27,12 +27,12 @@ export function errorInWords(error: number | null, spacing: readonly number[]): 
   const smallest = Math.min(...spacing);
   const share = error / smallest;
   const times = share < 0.095 ? formatNumber(share, 3) : formatNumber(share, 2);
-  return `${formatValue(error)} mm, ${times} of the spacing of ${formatNumber(smallest, 3)} mm`;
+  return `${formatValue(error)} mm, ${times} \u00d7 the spacing of ${formatNumber(smallest, 3)} mm`;
 }
 
 export interface SliderHost {
   spacing: readonly number[];
-  // What is known of the outcome; stands below.
+  // Shows the estimated result below the slider.
   outcome: HTMLElement;
 }
 

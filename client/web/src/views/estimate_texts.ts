@@ -1,4 +1,4 @@
-// What an estimate says of a job before it runs.
+// The texts of a job's estimate.
 import type { Estimate } from '../api/types';
 import { h } from '../ui/dom';
 import { formatBytes, formatCount, formatMilliseconds, formatNames } from '../ui/format';
@@ -18,22 +18,22 @@ export function estimateTexts(estimate: Estimate, isByLabels: boolean): HTMLElem
     ['Time', `about ${formatMilliseconds(estimate.milliseconds)}`],
   ];
   const before = estimate.queue.queued + estimate.queue.running;
-  if (before > 0) rows.push(['Before it', before === 1 ? '1 job' : `${before} jobs`]);
+  if (before > 0) rows.push(['Jobs ahead', before === 1 ? '1 job' : `${before} jobs`]);
   const texts: HTMLElement[] = [h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]))];
   if (estimate.triangles === 0) {
     texts.push(
       warning(
         isByLabels
-          ? 'These labels have no boundary: the surface would be empty.'
-          : 'No sample boundary has this value: the surface would be empty.',
+          ? 'The chosen labels have no boundary. The surface would be empty.'
+          : 'No surface exists at this iso-value. The mesh would be empty.',
       ),
     );
   }
   if (!estimate.fits) {
     texts.push(
       warning(
-        `This needs ${formatBytes(estimate.memory_bytes)} of memory, more than a job may take. ` +
-          (isByLabels ? 'Choose fewer labels.' : 'Choose an iso-value with fewer triangles.'),
+        `This job needs ${formatBytes(estimate.memory_bytes)} of memory, which is more than a job may use. ` +
+          (isByLabels ? 'Choose fewer labels.' : 'Choose an iso-value that gives fewer triangles.'),
       ),
     );
   }

@@ -1,4 +1,4 @@
-// What a surface is saved as beside the files of its job: for a printer, for a phone, and what was measured of it.
+// Exports beside the files of a job: for a 3D printer, for a phone, and the certificate of the measurements.
 import type { Job, JobParameters, Volume } from '../api/types';
 import { withGlb } from '../job/parameters';
 import { certificateFile, isForPrinting, printingVariant } from '../job/printing';
@@ -8,7 +8,7 @@ import { button, h } from '../ui/dom';
 import { tellError } from '../ui/notices';
 import { saveBlob } from '../ui/save';
 
-// So many triangles are left where a phone could not show all.
+// The number of triangles that a phone can show.
 const triangles = 150_000;
 
 type Make = (variant: Partial<JobParameters>) => void;
@@ -32,9 +32,9 @@ export function exportActions(job: Job, volume: Volume | null, make: Make, nameO
     }
   };
   const isLarge = mesh.triangles > triangles;
-  const phone = button(isLarge ? 'For a phone: simplify first' : 'USDZ for a phone', () => void usdz(), {
+  const phone = button(isLarge ? 'Simplify for a phone' : 'USDZ for a phone', () => void usdz(), {
     class: 'chip',
-    title: isLarge ? 'Starts a job of fewer triangles, which then is saved as USDZ' : 'Shows it in the room (AR)',
+    title: isLarge ? 'Starts a job with fewer triangles; save its surface as USDZ afterwards' : 'Saves a file that phones show in augmented reality (AR)',
   });
   const canMake = volume !== null;
   return h(
@@ -43,15 +43,15 @@ export function exportActions(job: Job, volume: Volume | null, make: Make, nameO
     canMake &&
       !isForPrinting(job) &&
       !isByLabels(parameters) &&
-      button('For printing', () => make(printingVariant(parameters)), {
+      button('For 3D printing', () => make(printingVariant(parameters)), {
         class: 'chip',
-        title: 'Starts a job that closes the surface, measures it, and makes STL and 3MF',
+        title: 'Starts a job that closes the surface, measures its error, and makes STL and 3MF',
       }),
     viewableFile(job) !== null && (canMake || !isLarge) && phone,
     mesh.certificate &&
       button('Certificate', () => saveBlob(new Blob([certificateFile(job)], { type: 'application/json' }), nameOf('-certificate.json')), {
         class: 'chip',
-        title: 'What was measured, with the digests of the files',
+        title: 'Saves the measurements and the SHA-256 of each file',
       }),
   );
 }

@@ -15,7 +15,7 @@ export class HistogramView {
   private readonly grip = h('span', { class: 'iso-grip' });
   private readonly band = svg('rect', { class: 'window-band', y: 0, height: baseline });
   private readonly thumb: HTMLElement;
-  // What is shown: outliers make most of some volumes' range, and are left out.
+  // The visible range. It leaves out outliers, which make most of some volumes' range.
   private readonly low: number;
   private readonly high: number;
   private readonly step: number;

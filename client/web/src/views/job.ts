@@ -21,7 +21,7 @@ import { SurfacePane } from './surface_pane';
 const stages = ['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify'];
 const noteDelay = 300;
 
-// Those that such a job goes through.
+// The stages of this job.
 function stagesOf({ parameters }: Job): string[] {
   const isSimplified = (parameters.max_error_mm ?? parameters.triangles ?? null) !== null;
   return stages.filter((name) => (name !== 'simplify' || isSimplified) && (name !== 'certify' || parameters.certify));
@@ -48,7 +48,7 @@ function head(job: Job, volume: Volume | null): HTMLElement {
     'header',
     { class: 'panel-head' },
     h('h1', {}, titleOf(job.parameters)),
-    h('p', { class: 'of-volume' }, volume ? volumeName(volume) : 'Its volume was erased'),
+    h('p', { class: 'of-volume' }, volume ? volumeName(volume) : 'The volume was erased'),
     h('p', {}, inWords(job.parameters)),
     h(
       'p',
@@ -98,9 +98,9 @@ class ProgressPanel {
     this.text.textContent =
       job.state === 'queued'
         ? job.waiting_for
-          ? `Waiting for room on the server's ${job.waiting_for}`
-          : `Waiting in the queue as ${job.priority}`
-        : `${job.stage}, ${Math.round(100 * job.progress)} % in all`;
+          ? `Waiting for free space on the server's ${job.waiting_for}`
+          : `Waiting in the queue with priority ${job.priority}`
+        : `${job.stage}, ${Math.round(100 * job.progress)} % done`;
   }
 }
 
@@ -110,7 +110,7 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
   const first = await client.getJob(route.path[1] ?? '');
   const volume = await volumeOf(first);
   const stageArea = h('div', { class: 'stage-area' });
-  const panel = h('aside', { class: 'panel', 'aria-label': 'The job' });
+  const panel = h('aside', { class: 'panel', 'aria-label': 'Job' });
   const element = h('div', { class: 'job', 'data-state': first.state }, stageArea, panel);
 
   // A tab in the background says how far its job is.
@@ -134,7 +134,7 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
 
   const progress = new ProgressPanel(first);
   progress.show(first);
-  stageArea.append(h('div', { class: 'waiting' }, h('p', {}, 'The surface appears here when it is made.')));
+  stageArea.append(h('div', { class: 'waiting' }, h('p', {}, 'The surface appears here when it is ready.')));
   panel.append(head(first, volume), progress.element);
   client.follow(first.id, scope.signal, (job) => {
     element.dataset.state = job.state;

@@ -1,4 +1,4 @@
-// What stands beside a surface: its numbers, timings, files, and how to make others.
+// The panel beside a surface: its numbers, timings, files, and links to make others.
 import { client, token } from '../client';
 import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../api/types';
 import { defaultParameters, isSameJob, jobRequest, queryOfParameters, surfaceInWords, variantOf, withGlb } from '../job/parameters';
@@ -37,17 +37,17 @@ function sized(value: number, unit: string): string {
 export function makeVariant(job: Job): (variant: Partial<JobParameters>) => void {
   return (variant) =>
     void submitVariant(job, variant).then(({ id }) => {
-      tell('Another job was started.');
+      tell('A new job was started.');
       go(['jobs', id]);
     }, tellError);
 }
 
 function trianglesText({ triangles, simplified }: MeshSummary): Child {
   if (!simplified) return formatCount(triangles);
-  const bound = { error: 'the error allows no fewer', triangles: 'as few as were asked for' }[simplified.bound_by];
+  const bound = { error: 'stopped at the allowed error', triangles: 'stopped at the requested number' }[simplified.bound_by];
   return h(
     'span',
-    { title: `Simplified until ${bound}` },
+    { title: `Simplification ${bound}` },
     formatCount(triangles),
     h('span', { class: 'faint' }, ` simplified from ${formatCount(simplified.triangles_before)}; ${bound}`),
   );
@@ -58,15 +58,15 @@ function volumeText({ volume_mm3: { extracted, smoothed } }: MeshSummary): Child
     'span',
     {},
     sized(smoothed, 'mm\u00b3'),
-    h('span', { class: 'faint' }, `${change(extracted, smoothed)} was ${sized(extracted, 'mm\u00b3')}`),
+    h('span', { class: 'faint' }, `${change(extracted, smoothed)}, ${sized(extracted, 'mm\u00b3')} before smoothing`),
   );
 }
 
-// Of a surface in many parts the largest is often the one that is wanted.
-function partsText(job: Job, { components }: MeshSummary): Child {
+// People often want only the largest connected component.
+function componentsText(job: Job, { components }: MeshSummary): Child {
   if (components < 2 || isByLabels(job.parameters)) return formatCount(components);
   const keep = (): void => makeVariant(job)({ components: { keep: 1, min_triangles: null } });
-  return h('span', {}, `${formatCount(components)} `, button('Keep the largest', keep, { class: 'link', title: 'Starts a job that leaves the others out' }));
+  return h('span', {}, `${formatCount(components)} `, button('Keep the largest', keep, { class: 'link', title: 'Starts a job that drops all other connected components' }));
 }
 
 export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
@@ -87,7 +87,7 @@ export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
         h(
           'span',
           { class: 'faint' },
-          `${change(mesh.area_extracted_mm2, mesh.area_mm2)} was ${sized(mesh.area_extracted_mm2, 'mm\u00b2')}`,
+          `${change(mesh.area_extracted_mm2, mesh.area_mm2)}, ${sized(mesh.area_extracted_mm2, 'mm\u00b2')} before smoothing`,
         ),
       ),
     ],
@@ -95,18 +95,18 @@ export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
       'Closed',
       mesh.quality.closed
         ? 'yes'
-        : h('span', { class: 'attention' }, `no, ${formatCount(mesh.boundary_edges)} edges on the border`),
+        : h('span', { class: 'attention' }, `no, ${formatCount(mesh.boundary_edges)} boundary edges`),
     ],
-    ['Parts', partsText(job, mesh)],
+    ['Connected components', componentsText(job, mesh)],
     ['Genus', mesh.quality.genus === null ? '' : formatCount(mesh.quality.genus)],
     ['Extent', `${extent} mm`],
-    ['Run through themselves', intersectionsText(mesh)],
-    ['Moved by smoothing', `mean ${formatNumber(mean, 3)}, most ${formatNumber(max, 3)} mm`],
+    ['Self-intersections', intersectionsText(mesh)],
+    ['Moved by smoothing', `mean ${formatNumber(mean, 3)}, largest ${formatNumber(max, 3)} mm`],
   ];
   if (mesh.dropped.components > 0) {
     rows.push([
-      'Dropped parts',
-      `${formatCount(mesh.dropped.components)} of ${formatCount(mesh.dropped.triangles)} triangles`,
+      'Dropped components',
+      `${formatCount(mesh.dropped.components)}, with ${formatCount(mesh.dropped.triangles)} triangles`,
     ]);
   }
   return definitions(rows.filter(([, value]) => value !== ''));
@@ -122,7 +122,7 @@ export function quality(mesh: MeshSummary): HTMLElement {
       distributionChart('Radius ratio', aspect, 1, ''),
       distributionChart('Smallest angle', angle, 60, '\u00b0'),
     ),
-    h('p', { class: 'hint' }, 'Filled: after smoothing. Line: before.'),
+    h('p', { class: 'hint' }, 'Filled: after smoothing. Line: before smoothing.'),
   );
 }
 
@@ -133,7 +133,7 @@ export function accuracy(job: Job): HTMLElement | null {
   const { distances, formats } = job.parameters;
   if (!distances) {
     const colour = (): void => makeVariant(job)({ distances: true, formats: withGlb(formats) });
-    body.append(button('Show it as colour', colour, { title: 'Starts a job whose GLB holds the distances' }));
+    body.append(button('Show the distance as colour', colour, { title: 'Starts a job whose GLB file holds the distances' }));
   }
   return section('Distance from the scan', body);
 }
@@ -147,7 +147,7 @@ export async function submitVariant(job: Job, variant: Partial<JobParameters>): 
   return client.submitJob(jobRequest(variantOf(job.parameters, variant)));
 }
 
-// Of the surface, with what it is of: head-iso-60.glb.
+// The file name of a surface: head-iso-60.glb.
 export function fileNameOf(job: Job, volume: Volume | null, suffix: string): string {
   const surface = surfaceInWords(job.parameters).replaceAll(' ', '-');
   return `${fileStem(volume, `surface-${shortId(job.id)}`)}-${surface}${suffix}`;
@@ -160,7 +160,7 @@ export function downloads(job: Job, volume: Volume | null): HTMLElement {
   const make = async (format: MeshFormat): Promise<void> => {
     try {
       const variant = await submitVariant(job, { formats: withGlb([...job.parameters.formats, format]) });
-      tell(`A job that makes ${formatNames[format] ?? format} as well was started.`);
+      tell(`A new job was started. It also makes ${formatNames[format] ?? format}.`);
       go(['jobs', variant.id]);
     } catch (error) {
       tellError(error);
@@ -243,7 +243,7 @@ export function compareSection(job: Job): HTMLElement {
       { class: 'stack' },
       ...comparisons.map((comparison) => button(comparison.title, () => void start(comparison))),
     ),
-    h('p', { class: 'hint' }, 'Starts the jobs that are needed. Others can be chosen in the list of jobs.'),
+    h('p', { class: 'hint' }, 'Starts the jobs that are missing. The list of jobs can compare any other jobs.'),
   );
 }
 
@@ -287,7 +287,7 @@ export function againSection(job: Job): HTMLElement {
       copyButton(() => text),
     );
   return section(
-    'The same again',
+    'Repeat this job',
     h('div', { class: 'link-row' }, shown, copyButton(link)),
     block('With the isomesh command', texts.isomesh),
     block('With curl', texts.curl),

@@ -17,7 +17,7 @@ const bins = 1024;
 
 class JobSlices {
   readonly element = h('section', { class: 'slices', 'aria-label': 'Slices' });
-  // Where the slices meet; for the cross on the surface, and the address.
+  // The point where the slices meet, for the cross on the surface and the address.
   onCursor: ((cursor: Vec3) => void) | null = null;
   cursor: Vec3;
   private views: SliceView[] = [];

@@ -1,4 +1,4 @@
-// Which labels of a volume are to be meshed: all of them, or those that are picked from a list.
+// The choice of labels to mesh: all labels of a volume, or some of a list.
 import { client } from '../client';
 import { asApiError } from '../api/problem';
 import type { JobParameters, VolumeLabel } from '../api/types';
@@ -29,7 +29,7 @@ export class LabelChoice {
   private triangles: ReadonlyMap<number, number> = new Map();
   private search: LabelSearch<VolumeLabel> | null = null;
 
-  // Tells no labels while none is chosen.
+  // `onChange` gets undefined labels while none is chosen.
   constructor(
     scope: Scope,
     private readonly volume: string,
@@ -71,7 +71,7 @@ export class LabelChoice {
   private show(labels: readonly VolumeLabel[], start: Choice['labels']): void {
     this.labels = labels;
     if (labels.length === 0) {
-      this.body.replaceChildren(h('p', { class: 'warning' }, 'All samples are background: there is no label.'));
+      this.body.replaceChildren(h('p', { class: 'warning' }, 'All samples are background. The volume has no labels.'));
       return;
     }
     const wanted = Array.isArray(start) ? new Set(start) : null;
@@ -83,14 +83,14 @@ export class LabelChoice {
     );
     this.body.replaceChildren(
       ...this.search.elements(
-        button('All', () => this.choose(true), { title: 'Choose all that are found' }),
-        button('None', () => this.choose(false), { title: 'Choose none of those that are found' }),
+        button('All', () => this.choose(true), { title: 'Choose all labels that match the search' }),
+        button('None', () => this.choose(false), { title: 'Clear all labels that match the search' }),
       ),
     );
     this.search.fill();
   }
 
-  // Of each label's surface, as an estimate tells them.
+  // The triangles of each label's surface, from the estimate.
   showTriangles(triangles: ReadonlyMap<number, number>): void {
     this.triangles = triangles;
     this.update();
@@ -151,7 +151,7 @@ export class LabelChoice {
     this.onChange({ labels: this.choice(), background: this.background });
   }
 
-  // What is chosen now; undefined: nothing.
+  // The chosen labels; undefined if there are none.
   choice(): Choice['labels'] {
     if (this.chosen.size === this.labels.length) return 'all';
     const [first, ...others] = this.labels.map(({ label }) => label).filter((label) => this.chosen.has(label));

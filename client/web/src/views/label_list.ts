@@ -77,7 +77,7 @@ export class LabelList {
       class: 'quiet',
       'aria-label': `Show only ${title}`,
       'aria-pressed': 'false',
-      title: 'Hide all others',
+      title: 'Hide all other labels',
     });
     const row = {
       element: h(

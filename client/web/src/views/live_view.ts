@@ -23,7 +23,7 @@ const turnStep = Math.PI / 24;
 
 export interface LiveHost {
   volume: Volume;
-  // Where iso-values usually lie.
+  // The usual range of iso-values.
   window: Window;
   setCursor: (cursor: Vec3) => void;
   // How the volume is looked through; '' for its surface.
@@ -76,11 +76,11 @@ export class LiveView {
     this.look = names.find((name) => name === this.host.look) ?? '';
     const choice = h(
       'select',
-      { 'aria-label': 'What is drawn', class: 'look', title: 'The surface at the iso-value, or a look through the volume' },
+      { 'aria-label': 'Kind of preview', class: 'look', title: 'The surface at the iso-value, or volume rendering' },
       h('option', { value: '' }, 'Surface'),
       h(
         'optgroup',
-        { label: 'Look through' },
+        { label: 'Volume rendering' },
         ...names.map((name) => h('option', { value: name, selected: name === this.look }, name.charAt(0).toUpperCase() + name.slice(1))),
       ),
     );
@@ -112,14 +112,14 @@ export class LiveView {
     this.iso = iso;
     this.cursor = cursor;
     if (iso === null) {
-      this.say('A preview is shown for iso-values only.');
+      this.say('The preview shows iso-values only, not labels.');
       this.view.hidden = true;
       return;
     }
     this.view.hidden = false;
     const window = this.windowFor(iso);
     if (!window) {
-      this.say('No sample has this value: there is no surface.');
+      this.say('There is no surface: the iso-value is not between the smallest and the largest sample.');
       this.view.hidden = true;
       return;
     }
@@ -132,7 +132,7 @@ export class LiveView {
     this.showIso();
   }
 
-  // What eight bits are spread over: where iso-values usually lie, and all values for those outside of that.
+  // The range that eight bits cover: the usual range of iso-values, or all values if the iso-value lies outside it.
   private windowFor(iso: number): Window | null {
     const { window, volume } = this.host;
     if (iso > window[0] && iso <= window[1]) return window;

@@ -1,4 +1,4 @@
-// What was made of a volume lately, to go back to. Nothing is missed without it.
+// Links to the latest surfaces of a volume. If the list cannot be loaded, it stays empty.
 import { client } from '../client';
 import { inWords, surfaceInWords } from '../job/parameters';
 import { h } from '../ui/dom';
@@ -14,7 +14,7 @@ export function madeSurfaces(volumeId: string): HTMLElement {
       if (made.length === 0) return;
       const item = ({ id, parameters }: (typeof made)[number]): HTMLElement =>
         h('li', {}, h('a', { href: hashOf(['jobs', id]) }, surfaceInWords(parameters)), ` ${inWords(parameters)}`);
-      element.replaceChildren(h('h2', {}, 'Surfaces of it'), h('ul', {}, ...made.map(item)));
+      element.replaceChildren(h('h2', {}, 'Surfaces of this volume'), h('ul', {}, ...made.map(item)));
     },
     () => undefined,
   );

@@ -1,4 +1,4 @@
-// What there is to say about an order: what it waits for, why, and when it goes on.
+// The texts of an order: what it waits for, why, and when it goes on.
 import type { Order, OrderState } from '../api/types';
 import { formatBytes, formatCount, formatTime } from '../ui/format';
 
@@ -22,11 +22,11 @@ function doing({ state, source, send }: Order): string {
   const targets = send.map(({ pacs }) => pacs).join(', ');
   switch (state) {
     case 'waiting':
-      return source.instances === null ? 'until the series is whole' : `until ${images} stay as many`;
+      return source.instances === null ? 'waits until the series is complete' : `waits until no images are added (${images} so far)`;
     case 'fetching':
       return `reads ${images} from ${source.pacs}`;
     case 'meshing':
-      return 'its job makes the mesh';
+      return 'makes the mesh';
     case 'sending':
       return `stores the mesh in ${targets}`;
     default:
@@ -36,7 +36,7 @@ function doing({ state, source, send }: Order): string {
 
 function stored({ results }: Order): string {
   const done = results.filter((result) => result.stored);
-  if (done.length === 0) return 'nothing was to be stored';
+  if (done.length === 0) return 'nothing to store';
   const bytes = done.reduce((sum, { bytes: each }) => sum + each, 0);
   const places = [...new Set(done.map(({ pacs }) => pacs))].join(', ');
   return `${formatCount(done.length)} ${done.length === 1 ? 'object' : 'objects'} in ${places}, ${formatBytes(bytes)}`;
@@ -45,7 +45,7 @@ function stored({ results }: Order): string {
 export interface Said {
   text: string;
   isBad: boolean;
-  // When it is tried again.
+  // The time of the next attempt.
   next: string;
 }
 
@@ -55,6 +55,6 @@ export function saidOf(order: Order, now: number): Said {
   if (state === 'cancelled') return { text: '', isBad: false, next: '' };
   if (state === 'failed') return { text: error?.detail ?? '', isBad: true, next: '' };
   if (!error) return { text: doing(order), isBad: false, next: '' };
-  const count = attempts === 1 ? 'one attempt failed' : `${formatCount(attempts)} attempts failed`;
-  return { text: `${error.detail}; ${count}`, isBad: true, next: next === null ? '' : `tried again ${untilText(next, now)}` };
+  const count = attempts === 1 ? '1 attempt failed' : `${formatCount(attempts)} attempts failed`;
+  return { text: `${error.detail}; ${count}`, isBad: true, next: next === null ? '' : `next attempt ${untilText(next, now)}` };
 }

@@ -10,7 +10,7 @@ import type { Scope } from '../ui/signal';
 import { isOver, orderStates, saidOf } from './order_texts';
 
 const refreshEvery = 2000;
-const columns = ['State', 'What', 'Series', 'Rule', 'Created', 'Action'];
+const columns = ['State', 'Details', 'Series', 'Rule', 'Created', 'Action'];
 const dots: Partial<Record<OrderState, string>> = { waiting: 'queued', fetching: 'running', meshing: 'running', sending: 'running' };
 
 export async function ordersView(scope: Scope, route: Route): Promise<HTMLElement> {
@@ -28,9 +28,9 @@ function cell(...children: (Node | string | null)[]): HTMLElement {
 function pacsItem({ name, last_success: success, last_failure: failure, reason }: PacsList['pacs'][number]): HTMLElement {
   const isDown = failure !== null && (success === null || failure > success);
   const text = isDown
-    ? `does not answer as it should since ${formatTime(failure)}${reason === null ? '' : `: ${reason}`}`
+    ? `last request failed, ${formatTime(failure)}${reason === null ? '' : `: ${reason}`}`
     : success === null
-      ? 'was not asked yet'
+      ? 'not contacted yet'
       : `answered ${formatTime(success)}`;
   return h(
     'li',

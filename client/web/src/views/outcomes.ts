@@ -1,4 +1,4 @@
-// What became of each volume of an upload of several.
+// The result for each volume of an upload of several.
 import { errorOfProblem, type ApiError } from '../api/problem';
 import type { UploadedVolume, Volume } from '../api/types';
 import { h } from '../ui/dom';
@@ -12,7 +12,7 @@ export interface Outcome {
   volume: Volume | null;
   wasThere: boolean;
   error: ApiError | null;
-  // What the member was asked for with.
+  // The choices with which the member was requested.
   choices: Choices;
 }
 
@@ -32,7 +32,7 @@ export function outcomeOf({ member, status, volume, problem }: UploadedVolume, b
 function storedRow({ id, dims }: Volume, name: string, wasThere: boolean): Node[] {
   return [
     h('a', { href: hashOf(['volumes', id]) }, name),
-    h('span', { class: 'faint' }, `${formatDims(dims)}, ${wasThere ? 'was there already' : 'stored'}`),
+    h('span', { class: 'faint' }, `${formatDims(dims)}, ${wasThere ? 'already stored' : 'stored'}`),
   ];
 }
 
@@ -65,5 +65,5 @@ export function outcomeList(
       ...(error ? refusedRow(error, name, outcome.choices, (choices) => onAgain(outcome, choices)) : []),
     );
   };
-  return h('ul', { class: 'outcomes', 'aria-label': 'Volumes of the upload' }, ...outcomes.map(row));
+  return h('ul', { class: 'outcomes', 'aria-label': 'Volumes in the upload' }, ...outcomes.map(row));
 }

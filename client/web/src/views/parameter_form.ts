@@ -22,7 +22,7 @@ import { errorSlider, type SliderHost } from './error_slider';
 export interface FormHost {
   job: () => JobParameters;
   set: (parameter: Parameter, value: Value) => void;
-  // Whether what stands in the parameter's control can be used; while it cannot, the job has another value.
+  // Says if the value in the parameter's control is valid. While it is not, the job keeps its previous value.
   mark: (parameter: Parameter, isGood: boolean) => void;
   slider: SliderHost;
   // Has a control beside the form.
@@ -36,10 +36,10 @@ interface Control {
   follows?: readonly string[];
 }
 
-// These are chosen elsewhere: the volume before, the iso-value in the histogram, labels in their list;
-// what labels are called and are made of is the volume's.
+// These are chosen elsewhere: the volume before, the iso-value in the histogram, labels in their list.
+// Names, colours and values of labels come from the volume.
 const elsewhere = ['volume', 'iso', 'labels', 'background', 'label_names', 'label_colors', 'label_values'];
-// Those that are seen at once, in rows. All others are under "More".
+// The parameters that are always visible, in rows. All others are under "More".
 const front = [
   ['scheme', 'interpolation'],
   ['smoothing', 'passes'],
@@ -107,14 +107,14 @@ function stepOf({ kind, maximum }: Parameter): number | 'any' {
   return maximum === undefined ? 'any' : 10 ** Math.floor(Math.log10(maximum)) / 100;
 }
 
-// What stands in an empty field: what the daemon takes then.
+// The placeholder of an empty field: the value that the daemon uses then.
 function placeholderOf(parameter: Parameter, job: JobParameters): string {
   if (!applies(parameter, job)) return `${Object.keys(parameter.by?.cases ?? {}).map(capitalised).join(', ')} only`;
   const standard = defaultOf(parameter, job) ?? null;
   return typeof standard === 'number' ? formatValue(standard) : 'no limit';
 }
 
-// What a number has to be.
+// The error message of a number that is not valid.
 function faultOf(parameter: Parameter, job: JobParameters): string {
   const { kind, minimum, above } = parameter;
   const most = maximumOf(parameter, job);
@@ -124,7 +124,7 @@ function faultOf(parameter: Parameter, job: JobParameters): string {
     most === undefined ? '' : `at most ${most}`,
   ].filter(Boolean);
   const noun = kind === 'integer' ? 'a whole number' : 'a number';
-  return `Enter ${[noun, limits.join(' and ')].filter(Boolean).join(', ')}${parameter.isNullable ? '; or nothing' : ''}.`;
+  return `Enter ${[noun, limits.join(' and ')].filter(Boolean).join(', ')}${parameter.isNullable ? ', or leave this empty' : ''}.`;
 }
 
 function numberControl(parameter: Parameter, host: FormHost): Control {

@@ -1,4 +1,4 @@
-// The label of the part of the surface that was clicked: what it is, and what can be done with it.
+// The label that was clicked: its size, and buttons to hide or isolate it.
 import type { LabelSummary } from '../api/types';
 import { labelTitle, type LabelState } from '../job/labels';
 import { button, h } from '../ui/dom';
@@ -42,8 +42,8 @@ export class PickedLabel {
       swatch,
       h('b', {}, labelTitle(picked)),
       h('span', {}, `volume ${volumeText(picked)}, area ${areaText(picked)}`),
-      button('Hide', () => this.hide(), { class: 'quiet', title: 'Hide it (h)' }),
-      button('Only', () => this.isolate(), { class: 'quiet', title: 'Hide all others, or show them again (o)' }),
+      button('Hide', () => this.hide(), { class: 'quiet', title: 'Hide this label (h)' }),
+      button('Only', () => this.isolate(), { class: 'quiet', title: 'Hide all other labels, or show them again (o)' }),
     );
   }
 }

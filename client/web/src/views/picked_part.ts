@@ -1,4 +1,4 @@
-// The part of a surface that was clicked, where it has several: how large it is, and a new job with or without it.
+// The connected component that was clicked, if a surface has several: its size, and a new job with or without it.
 import type { Job, JobParameters, Vec3 } from '../api/types';
 import type { PartFinder, PartSummary } from '../mesh/part_finder';
 import type { Picked } from '../scene/picked';
@@ -7,16 +7,16 @@ import { button, h } from '../ui/dom';
 import { formatCount, formatValue } from '../ui/format';
 import type { Scope } from '../ui/signal';
 
-const slice = 8; // milliseconds that finding parts takes at a time
-// A job is told of each part that stays.
+const slice = 8; // milliseconds for one step of the search for components
+// A job lists each component that it keeps.
 const mostPlaces = 1000;
 
 function placeOf(point: Vec3): Vec3 {
   return point.map((value) => Number(value.toFixed(3))) as Vec3;
 }
 
-// The parameters that keep the parts at those places alone. Parts that were left out before stay out: what is
-// nearest to a place is of those that are there.
+// The parameters that keep only the components at those points. Components that were dropped before stay dropped,
+// because the nearest component to a point is one of those that are left.
 export function keepOnlyAt(...points: Vec3[]): Partial<JobParameters> {
   return { components: { keep: null, min_triangles: null, nearest_to: points.map(placeOf) } };
 }
@@ -63,15 +63,15 @@ export class PickedPart {
       ? [isClosed && `volume ${formatValue(part.volume)} mm\u00b3`, `area ${formatValue(part.area)} mm\u00b2`, `${formatCount(part.triangles)} triangles`]
       : [`at ${point.map((value) => value.toFixed(1)).join(', ')} mm`];
     this.element.replaceChildren(
-      h('span', {}, `One of ${formatCount(this.parts)} parts: ${size.filter(Boolean).join(', ')}`),
-      button('Keep only this part', () => this.make(keepOnlyAt(point)), {
+      h('span', {}, `One of ${formatCount(this.parts)} connected components: ${size.filter(Boolean).join(', ')}`),
+      button('Keep only this component', () => this.make(keepOnlyAt(point)), {
         class: 'link',
-        title: 'Starts a job that leaves all others out',
+        title: 'Starts a job that drops all other components',
       }),
-      button('Leave it out', () => this.make(keepOnlyAt(...others.map((other) => other.point))), {
+      button('Drop this component', () => this.make(keepOnlyAt(...others.map((other) => other.point))), {
         class: 'link',
         disabled: others.length === 0 || others.length > mostPlaces,
-        title: others.length > mostPlaces ? 'There are too many others' : 'Starts a job that keeps the others',
+        title: others.length > mostPlaces ? 'There are too many other components' : 'Starts a job that keeps all other components',
       }),
     );
   }

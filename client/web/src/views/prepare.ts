@@ -24,6 +24,7 @@ import { SliceSource, type Window } from '../volume/slices';
 import { boxOf, cropOf, isUpright, within, type Box } from '../volume/crop';
 import { cursorOfText } from '../volume/geometry';
 import { isInteger, volumeName } from '../volume/names';
+import { eachLabel } from '../volume/notes';
 import { aboutVolume, notedOf, sliceHelp } from './about_volume';
 import { CropControl } from './crop_control';
 import { estimateTexts } from './estimate_texts';
@@ -57,15 +58,15 @@ export async function prepareView(scope: Scope, route: Route): Promise<HTMLEleme
 
 function startOfQuery(query: URLSearchParams, volume: Volume, defaults: JobParameters): JobParameters {
   const parameters = parametersOfQuery(query, defaults);
-  // An iso-value makes one surface of all labels above it, which hardly anybody wants.
+  // An iso-value makes one surface of all labels above it, which users rarely want.
   const areLabels = isInteger(volume) && volume.notes.some(({ code }) => code === 'looks-like-labels');
   return areLabels && !query.has('iso') && !isByLabels(parameters) ? withLabels(parameters, 'all') : parameters;
 }
 
-// '' where no fewer triangles are asked for.
+// '' if the job is not simplified.
 function simplifiedInWords({ triangles, simplified_triangles: left }: Estimate): string {
   if (left === undefined) return '';
-  return `About ${formatCount(left)} triangles of ${formatCount(triangles)}.`;
+  return `About ${formatCount(left)} of ${formatCount(triangles)} triangles remain.`;
 }
 
 class Prepare {
@@ -97,7 +98,7 @@ class Prepare {
   private estimateTimer = 0;
   private isStarting = false;
   private readonly history: History<JobParameters>;
-  private readonly undoButton = button('Undo', () => this.goBack(this.history.undo()), { class: 'chip', title: 'Take the last change back (Ctrl Z)' });
+  private readonly undoButton = button('Undo', () => this.goBack(this.history.undo()), { class: 'chip', title: 'Undo the last change (Ctrl Z)' });
 
   constructor(
     private readonly scope: Scope,
@@ -191,7 +192,7 @@ class Prepare {
       this.mark('iso', isGood);
       if (isGood) this.setIso(this.isoInput.valueAsNumber);
     });
-    // What was left unfinished gives way to the value that is used.
+    // An unfinished number is replaced by the value that is used.
     this.isoInput.addEventListener('blur', () => {
       this.isoInput.setAttribute('aria-invalid', 'false');
       this.mark('iso', true);
@@ -244,7 +245,7 @@ class Prepare {
     this.changed();
   }
 
-  // Whether a job can be made of what is entered.
+  // True if the entered values make a valid job.
   private get isReady(): boolean {
     return this.hasLabel && this.faulty.size === 0;
   }
@@ -267,8 +268,8 @@ class Prepare {
   private kindChoice(): HTMLElement | null {
     if (!isInteger(this.volume)) return null;
     const choices = [
-      { value: 'iso', label: 'One surface', title: 'Around all samples of the iso-value or more' },
-      { value: 'labels', label: 'Each label', title: 'One surface around each label of a segmentation' },
+      { value: 'iso', label: 'One surface', title: 'One surface around all samples at or above the iso-value' },
+      { value: 'labels', label: eachLabel, title: 'One surface around each label of a segmentation' },
     ] as const;
     return segmented('What to mesh', choices, isByLabels(this.parameters) ? 'labels' : 'iso', (kind) => this.setKind(kind));
   }
@@ -348,7 +349,7 @@ class Prepare {
     this.run.disabled = !this.isReady || this.isStarting;
     this.update();
     if (this.isReady) this.askForEstimate();
-    else this.showMissing(this.hasLabel ? 'Correct what is marked.' : 'Choose a label.');
+    else this.showMissing(this.hasLabel ? 'Correct the marked fields.' : 'Choose at least one label.');
   }
 
   private showMissing(text: string): void {

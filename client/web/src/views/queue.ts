@@ -38,12 +38,12 @@ function progressOf(job: Job): Node | string {
   }
   if (job.mesh) return `${formatCount(job.mesh.triangles)} triangles`;
   if (job.error) return job.error.detail;
-  if (job.waiting_for) return `waits for room on the ${job.waiting_for}`;
+  if (job.waiting_for) return `waits for free space on the ${job.waiting_for}`;
   return '';
 }
 
 function stateCell(job: Job, place: number): HTMLElement {
-  const text = job.state === 'queued' ? `queued, ${place + 1}.` : job.state;
+  const text = job.state === 'queued' ? `queued, number ${place + 1}` : job.state;
   return cell(h('span', { class: `state ${job.state}` }), text);
 }
 
@@ -84,9 +84,9 @@ class Queue {
 
   constructor() {
     this.compare = button('Compare', () => this.goCompare(), { class: 'primary', disabled: true });
-    this.together = button('In one scene', () => go(['together'], new URLSearchParams({ jobs: [...this.chosen].join(',') })), {
+    this.together = button('Show in one scene', () => go(['together'], new URLSearchParams({ jobs: [...this.chosen].join(',') })), {
       disabled: true,
-      title: 'Two to eight surfaces with colours of their own',
+      title: 'Shows two to eight surfaces, each in its own colour',
     });
     this.more = button('Older jobs', () => void this.showMore().catch(tellError), { hidden: true });
     this.element = h(
@@ -96,7 +96,7 @@ class Queue {
         'div',
         { class: 'section-head' },
         h('h1', {}, 'Jobs'),
-        h('span', { class: 'hint grow' }, 'Stat goes before routine, routine before bulk; then the oldest.'),
+        h('span', { class: 'hint grow' }, 'Stat jobs run first, then routine, then bulk; within a priority the oldest runs first.'),
         this.together,
         this.compare,
       ),

@@ -56,7 +56,7 @@ export function rawForm(size: number, onDescribed: (raw: RawDescription) => void
   const check = (): void => {
     const missing =
       rawFault(size, dims.read(), chosenType()) ||
-      (spacing.read().every((value) => value > 0) ? '' : 'The spacing has to be positive.');
+      (spacing.read().every((value) => value > 0) ? '' : 'The spacing must be positive.');
     fault.textContent = missing;
     submit.disabled = missing !== '';
   };
@@ -64,7 +64,7 @@ export function rawForm(size: number, onDescribed: (raw: RawDescription) => void
     'div',
     { class: 'raw' },
     h('h3', {}, 'Are these raw samples?'),
-    h('p', {}, 'Say how many there are; x runs fastest.'),
+    h('p', {}, 'Enter the number of samples along x, y and z. x changes fastest.'),
     dims.element,
     h('div', { class: 'pair' }, field('Type', type), field('Byte order', order)),
     spacing.element,

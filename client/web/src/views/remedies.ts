@@ -1,12 +1,12 @@
-// What a person may add to an upload that was refused, so that it is taken.
+// What a user can add to a rejected upload so that the server accepts it.
 import { choicesOf, type ApiError } from '../api/problem';
 import type { Choice } from '../api/types';
 import { button, field, h } from '../ui/dom';
 
-// What chooses and accepts, by its parameter of the query.
+// The values of the query's parameters that choose or accept something.
 export type Choices = Readonly<Record<string, string>>;
 
-// Has the upload taken in spite of what it was refused for, beside what was accepted before.
+// Repeats the upload and accepts the cause of its rejection, in addition to what was accepted before.
 export function acceptButton(
   { remedy: { overridable } }: ApiError,
   before: Choices,
@@ -14,7 +14,7 @@ export function acceptButton(
 ): HTMLButtonElement | false {
   if (overridable === undefined) return false;
   const accept = [before['accept'], overridable].filter(Boolean).join(',');
-  return button('Take it in spite of this', () => onChoices({ ...before, accept }));
+  return button('Accept it anyway', () => onChoices({ ...before, accept }));
 }
 
 function choiceForm(
@@ -32,7 +32,7 @@ function choiceForm(
     'div',
     { class: 'series' },
     field(`${noun.charAt(0).toUpperCase()}${noun.slice(1)} to read`, select),
-    button(`Take this ${noun}`, () => onChoice(select.value), { class: 'primary' }),
+    button(`Use this ${noun}`, () => onChoice(select.value), { class: 'primary' }),
   );
 }
 

@@ -60,7 +60,7 @@ export class SliceCrop {
     this.grabbed = { pointer, ends };
   }
 
-  // Whether this pointer moves the box.
+  // True if this pointer moves the box.
   move(pointer: number, place: [number, number]): boolean {
     const box = this.host.box();
     if (this.grabbed?.pointer !== pointer || !box) return false;

@@ -65,7 +65,7 @@ export class SliceView {
   private readonly buffer = document.createElement('canvas');
   private readonly loader: SliceLoader;
   private readonly state = h('p', { class: 'slice-state', role: 'status' });
-  // Of the sample under the pointer.
+  // The value of the sample under the pointer.
   private readonly value = h('p', { class: 'slice-value', 'aria-hidden': 'true' });
   private readonly zoom: SliceZoom;
   private readonly crop: SliceCrop | null;
@@ -134,7 +134,7 @@ export class SliceView {
     this.goTo(this.host.state().cursor[axisIndex(this.layout.normal)] + by);
   }
 
-  // Where the picture lies on the canvas, in its own pixels.
+  // The picture's place on the canvas, in canvas pixels.
   private placement(): Placement {
     const { width, height, clientWidth } = this.canvas;
     const edge = padding * (width / (clientWidth || 1));
@@ -168,7 +168,7 @@ export class SliceView {
     const index = cursor[axisIndex(this.layout.normal)];
     const { slice, isLate, error } = this.loader;
     if (slice) {
-      // What is another slice's is never shown as this one's.
+      // A picture of another slice is never shown as this one.
       context.globalAlpha = slice.index === index ? 1 : otherSlice;
       this.paintSlice(context, slice, ratio);
       context.globalAlpha = 1;

@@ -33,7 +33,7 @@ export class SliceZoom {
     scope.listen(canvas, 'keydown', (event: KeyboardEvent) => this.key(event));
   }
 
-  // Whether this pointer, or the fingers together, move the picture.
+  // True if this pointer, or two fingers, move the picture.
   isMoving(event: PointerEvent): boolean {
     return event.pointerType === 'touch' ? this.held.size > 1 : this.held.has(event.pointerId);
   }

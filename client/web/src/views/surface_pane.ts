@@ -32,9 +32,9 @@ export interface PaneOptions {
   volume: Volume | null;
   // Shows slices beside the surface, or takes them away; null where there are none.
   onSlices: (() => void) | null;
-  // Of an address: cut, style, rulers, hide.
+  // The parameters of the address: cut, style, rulers, hide.
   look: URLSearchParams;
-  // Of a job by labels: which are shown and how.
+  // For a job by labels: which labels are shown, and their colours.
   labels: LabelState;
 }
 
@@ -109,7 +109,7 @@ export class SurfacePane {
       if (this.scope.isOver) return null;
       surface.finish();
       this.isWhole = true;
-      // Who asked for distances wants to see them.
+      // A user who asked for distances wants to see them.
       if (this.distance?.loaded()) this.distance.set(this.options.hasKeys || this.wantsDistance);
       this.element.dataset.loaded = 'true';
       this.bar.parentElement?.remove();
@@ -122,7 +122,7 @@ export class SurfacePane {
           { class: 'overlay' },
           refusal(
             asApiError(error),
-            button('Load again', () => window.location.reload(), { class: 'primary' }),
+            button('Reload', () => window.location.reload(), { class: 'primary' }),
           ),
         ),
       );
@@ -133,7 +133,7 @@ export class SurfacePane {
   // Null, and says why, where there is nothing to be shown.
   private begin(mesh: MeshSummary): Surface | null {
     if (!viewableFile(this.job)) {
-      this.say('This job made no file that can be shown. Make it again as GLB or Draco.');
+      this.say('This job has no file that the page can show. Start it again with GLB or Draco.');
       return null;
     }
     if (mesh.triangles === 0) {
@@ -143,7 +143,7 @@ export class SurfacePane {
     try {
       return new Surface(this.view);
     } catch {
-      this.say('This browser cannot draw in 3D (WebGL 2 is missing or off). Downloads work all the same.');
+      this.say('This browser cannot draw in 3D (WebGL 2 is missing or off). Downloads still work.');
       return null;
     }
   }
@@ -164,7 +164,7 @@ export class SurfacePane {
     this.press('flat', this.style.shading === 'flat');
   }
 
-  // Where the slices meet, in the volume's samples; null for nowhere.
+  // The point where the slices meet, in the volume's samples; null for none.
   setCursor(cursor: Vec3 | null): void {
     if (this.options.volume) this.surface?.setCross(this.options.volume, cursor);
   }
@@ -233,7 +233,7 @@ export class SurfacePane {
       return;
     }
     if (!picked) {
-      tell('There is no surface at that place.');
+      tell('There is no surface at this point.');
       return;
     }
     const ruler = surface.rulers.add(picked.point);
@@ -276,23 +276,23 @@ export class SurfacePane {
             'aria-label': viewTitles[name],
           }),
         ),
-        button('Fit', () => surface.fit(), { title: 'Show all of it (f)' }),
+        button('Fit', () => surface.fit(), { title: 'Show the whole surface (f)' }),
       ),
       h(
         'div',
         { class: 'tool-group' },
         this.toggle('flat', 'Flat', 'Flat shading shows every triangle (t)', () => this.toggleFlat()),
-        this.toggle('wireframe', 'Wires', 'Edges only (w)', () => this.toggleWires()),
+        this.toggle('wireframe', 'Edges', 'Wireframe: show only the edges (w)', () => this.toggleWires()),
         distance.toggle,
         h('label', { class: 'opacity' }, h('span', {}, 'Opacity'), opacity),
       ),
       h(
         'div',
         { class: 'tool-group' },
-        this.options.volume && this.toggle('cut', 'Cut', 'Cut along a slice (c)', () => this.toggleCut()),
-        this.options.onSlices && this.toggle('slices', 'Slices', 'Slices beside the surface (x)', () => this.options.onSlices?.()),
-        this.toggle('measure', 'Measure', 'Distance between two points (m)', () => this.toggleMeasure()),
-        button('Picture', () => void this.savePicture(surface), { title: 'Save what is shown as PNG' }),
+        this.options.volume && this.toggle('cut', 'Cut', 'Cut the surface along a slice (c)', () => this.toggleCut()),
+        this.options.onSlices && this.toggle('slices', 'Slices', 'Show slices beside the surface (x)', () => this.options.onSlices?.()),
+        this.toggle('measure', 'Measure', 'Measure the distance between two points (m)', () => this.toggleMeasure()),
+        button('Picture', () => void this.savePicture(surface), { title: 'Save this view as a PNG file' }),
       ),
     );
   }
@@ -309,7 +309,7 @@ export class SurfacePane {
     this.isMeasuring = !this.isMeasuring;
     this.press('measure', this.isMeasuring);
     this.view.classList.toggle('measuring', this.isMeasuring);
-    if (this.isMeasuring) tell('Click or tap two points, of the surface or of the slice on its cut. Esc takes the last one back.');
+    if (this.isMeasuring) tell('Click or tap two points on the surface or on the slice of the cut. Esc removes the last point.');
   }
 
   private toggleCut(): void {

@@ -24,14 +24,14 @@ export async function togetherView(scope: Scope, route: Route): Promise<HTMLElem
   const ids = (route.query.get('jobs') ?? '').split(',').filter(Boolean).slice(0, most);
   const jobs = (await Promise.all(ids.map((id) => client.getJob(id)))).filter((job) => viewableFile(job) !== null);
   if (jobs.length === 0) {
-    const link = { href: hashOf(['jobs']), text: 'To the list of jobs' };
-    throw new ApiError(-1, 'No surfaces to show', 'Choose jobs that have made a GLB or Draco file.', [], {}, link);
+    const link = { href: hashOf(['jobs']), text: 'Go to the list of jobs' };
+    throw new ApiError(-1, 'No surfaces to show', 'Choose jobs that made a GLB or Draco file.', [], {}, link);
   }
   const titles = await titlesOf(jobs);
   return new Together(scope, jobs, titles, route.query).element;
 }
 
-// What tells them apart; the volume's name too where there are several.
+// The differences between the jobs; with the volume's name if there are several volumes.
 async function titlesOf(jobs: readonly Job[]): Promise<string[]> {
   const different = jobs.length > 1 ? differences(jobs) : [''];
   const volumes = new Set(jobs.map(({ volume }) => volume));
@@ -67,14 +67,14 @@ class Together {
     this.looks = looksOfText(query.get('looks') ?? '', jobs.map(hasLabels));
     this.element = h(
       'div',
-      { class: 'job together', 'data-title': `Together: ${titles.join(', ')}` },
+      { class: 'job together', 'data-title': `In one scene: ${titles.join(', ')}` },
       h('div', { class: 'stage-area' }, h('div', { class: 'pane' }, this.view, this.tools())),
       h(
         'aside',
         { class: 'panel', 'aria-label': 'Surfaces' },
-        h('header', { class: 'panel-head' }, h('h1', {}, 'Surfaces together'), this.status),
+        h('header', { class: 'panel-head' }, h('h1', {}, 'Surfaces in one scene'), this.status),
         h('ul', { class: 'surfaces' }, ...jobs.map((job, at) => this.row(job, at, titles[at] ?? ''))),
-        h('p', { class: 'hint' }, 'They lie as their volumes say. Volumes of different examinations need not lie one on the other.'),
+        h('p', { class: 'hint' }, 'Each surface has the position that its volume gives. Surfaces from different examinations may not align.'),
       ),
     );
     // The canvas takes its size from the page, so the view has to be in it first.
@@ -113,7 +113,7 @@ class Together {
     const colour = h('input', { type: 'color', value: look.colour || usual(at), 'aria-label': `Colour of ${title}` });
     colour.addEventListener('input', () => change({ colour: colour.value }));
     colour.disabled = look.colour === '';
-    const own = checkbox('its labels\u2019 colours', look.colour === '', (isOwn) => {
+    const own = checkbox('colours of its labels', look.colour === '', (isOwn) => {
       colour.disabled = isOwn;
       change({ colour: isOwn ? '' : colour.value });
     });
@@ -129,7 +129,7 @@ class Together {
         checkbox(title, look.isShown, (isShown) => change({ isShown })),
         hasLabels(job) ? own : null,
         h('label', { class: 'surface-opacity' }, h('span', {}, 'Opacity'), opacity),
-        h('span', { class: 'faint' }, h('a', { href: hashOf(['jobs', job.id]) }, 'alone'), ` ${formatCount(job.mesh?.triangles ?? 0)} triangles`),
+        h('span', { class: 'faint' }, h('a', { href: hashOf(['jobs', job.id]) }, 'open'), ` ${formatCount(job.mesh?.triangles ?? 0)} triangles`),
       ),
     );
   }
@@ -146,7 +146,7 @@ class Together {
     surface.setHidden(new Set(this.parts.filter((each) => looks[each.at]?.isShown === false).map(({ id }) => id)));
   }
 
-  // What a label of a job is in the scene; a job without labels is one.
+  // The part of the scene that shows a job's label; a job without labels has one part.
   private partOf(at: number, label: Part | null): Part {
     const found = this.parts.find((each) => each.at === at && each.label === label?.label);
     const { id, colour } = found ?? { at, label: label?.label, id: this.parts.length, colour: label?.colour ?? usual(at) };

@@ -1,4 +1,4 @@
-// Where volumes are dropped: one file, a folder of slices, or several files.
+// The panel that takes dropped volumes: one file, a folder of slices, or several files.
 import { client } from '../client';
 import { ApiError, asApiError, mayPass } from '../api/problem';
 import type { RawDescription, UploadedVolume } from '../api/types';
@@ -17,11 +17,11 @@ import { UploadProgress } from './upload_progress';
 
 const arrow = 'M8 11V2.5M4.5 6 8 2.5 11.5 6M2.5 10.5v3h11v-3';
 
-// What a person added to an upload that was refused.
+// What a user added to a rejected upload.
 interface Addition {
   raw?: RawDescription;
   choices?: Choices;
-  // What became of the upload's volumes, of which `choices` names one that is tried again.
+  // The results of the upload's volumes; `choices` names the one to retry.
   outcomes?: readonly Outcome[];
 }
 
@@ -64,7 +64,7 @@ export class UploadPanel {
   take(files: NamedFile[]): void {
     const gathered = gather(files);
     if (!gathered) {
-      if (!this.running) this.showUnusable(new ApiError(-1, 'Nothing to upload', 'There are no files with content in it.'));
+      if (!this.running) this.showUnusable(new ApiError(-1, 'Nothing to upload', 'All files are empty, or there are none.'));
     } else if (this.running) {
       this.waiting.push(gathered);
       this.showQueue();
@@ -92,13 +92,13 @@ export class UploadPanel {
   private showQueue(): void {
     const count = this.waiting.length;
     this.queue.hidden = count === 0;
-    this.queue.textContent = `Then ${this.waiting.map(({ name }) => name).join(', ')}`;
+    this.queue.textContent = `Next: ${this.waiting.map(({ name }) => name).join(', ')}`;
   }
 
-  // What surely is no volume is not sent without being asked about.
+  // Asks before it sends a file that is certainly not a volume.
   private async begin(gathered: Gathered): Promise<void> {
     this.running = new AbortController();
-    // What the browser cannot read the daemon will not get either, and is said when it is sent.
+    // If the browser cannot read a file, the upload fails with the reason.
     const fault = await faultOf(gathered.files).catch(() => null);
     if (!fault) {
       await this.send(gathered);
@@ -146,7 +146,7 @@ export class UploadPanel {
     }
   }
 
-  // What waits comes next, unless a person has to look at this one first.
+  // Starts the next upload, unless this one needs the user's attention.
   private goOn(): void {
     const [next] = this.waiting.splice(0, 1);
     this.showQueue();
@@ -201,7 +201,7 @@ export class UploadPanel {
     this.body.replaceChildren(
       icon(arrow),
       h('h2', {}, 'Drop a volume here'),
-      h('p', {}, 'NIfTI, NRRD, MetaImage, VTK (.vti), a DICOM file or folder, a ZIP or TAR of them, raw samples'),
+      h('p', {}, 'NIfTI, NRRD, MetaImage, VTK (.vti), a DICOM file or folder, raw samples, or a ZIP or TAR archive of these'),
       h(
         'div',
         { class: 'actions' },
@@ -221,7 +221,7 @@ export class UploadPanel {
     );
   }
 
-  // What the server refused, with all that may help it: another try, a choice, a description.
+  // A rejected upload with the ways out: another attempt, a choice, a description.
   private showRefused(error: ApiError, gathered: Gathered, before: Addition): void {
     const again = mayPass(error) && button('Try again', () => void this.send(gathered, before));
     const known = before.choices ?? {};
@@ -232,7 +232,7 @@ export class UploadPanel {
 
   private showProblem(error: ApiError, gathered: Gathered, ...actions: (HTMLElement | false)[]): void {
     this.element.classList.remove('busy');
-    this.state.value = 'Upload: a question';
+    this.state.value = 'Upload: your choice is needed';
     if (!this.onVolumes) tellError(error);
     this.body.replaceChildren(refusal(error, ...actions, this.otherButton()));
     if (error.status === 415 && gathered.count === 1) {
@@ -240,12 +240,12 @@ export class UploadPanel {
     }
   }
 
-  // What became of several volumes stays until the next upload, since each refused one may be tried again.
+  // The results of several volumes stay until the next upload, since each rejected one can be retried.
   private showOutcomes(outcomes: readonly Outcome[], gathered: Gathered): void {
     this.element.classList.remove('busy');
     const stored = outcomes.filter(({ volume }) => volume !== null).length;
     this.body.replaceChildren(
-      h('h2', { role: 'status' }, `${stored} of the ${outcomes.length} volumes in the upload were stored`),
+      h('h2', { role: 'status' }, `${stored} of ${outcomes.length} volumes in the upload were stored`),
       outcomeList(outcomes, (_, choices) => void this.send(gathered, { choices, outcomes })),
       h('div', { class: 'actions' }, button('Upload another', () => this.showIdle())),
     );
@@ -258,7 +258,7 @@ export class UploadPanel {
   }
 
   private otherButton(): HTMLButtonElement {
-    return button('Choose another', () => {
+    return button('Choose another file', () => {
       this.showIdle();
       this.goOn();
     });

@@ -12,7 +12,7 @@ export class UploadProgress {
     this.bar = h('progress', { max: Math.max(1, total), value: 0, 'aria-label': 'Upload' });
     if (total > 0) return;
     this.bar.removeAttribute('value');
-    this.text.textContent = 'The server reads the volume out of what it has';
+    this.text.textContent = 'The server is reading the files that it already has';
   }
 
   show(sent: number): void {
@@ -20,7 +20,7 @@ export class UploadProgress {
     this.bar.value = sent;
     if (sent >= this.total) {
       this.bar.removeAttribute('value');
-      this.text.textContent = `${formatBytes(this.total)} sent; the server reads the volume`;
+      this.text.textContent = `${formatBytes(this.total)} sent; the server is reading the volume`;
       return;
     }
     const rate = sent / Math.max(0.001, (performance.now() - this.began) / 1000);

@@ -9,7 +9,7 @@ const orders: Record<string, { title: string; compare: ((a: Volume, b: Volume) =
   size: { title: 'largest first', compare: (a, b) => b.bytes - a.bytes },
 };
 
-// Those whose name or kind has all of the words, in that order of the table above.
+// The volumes whose name or kind contains all words, sorted by `order` of the table above.
 export function foundVolumes(volumes: readonly Volume[], text: string, order: string): Volume[] {
   const words = text.toLowerCase().split(/\s+/).filter(Boolean);
   const found = volumes.filter((volume) => {
@@ -25,7 +25,7 @@ export class VolumeSearch {
   private readonly input = h('input', { type: 'search', placeholder: 'Search', 'aria-label': 'Search volumes' });
   private readonly order = h(
     'select',
-    { 'aria-label': 'Order of volumes' },
+    { 'aria-label': 'Sort volumes' },
     ...Object.entries(orders).map(([value, { title }]) => h('option', { value }, title)),
   );
 
@@ -35,7 +35,7 @@ export class VolumeSearch {
     this.order.addEventListener('change', onChange);
   }
 
-  // Whether all volumes have to be there.
+  // True if all volumes have to be loaded.
   get isOn(): boolean {
     return this.input.value.trim() !== '' || this.order.value !== 'newest';
   }

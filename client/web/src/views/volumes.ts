@@ -10,6 +10,7 @@ import type { Scope } from '../ui/signal';
 import { axisIndex, slicePlacement, slicePlane } from '../volume/geometry';
 import { KnownVolumes } from '../volume/known';
 import { volumeKind, volumeName } from '../volume/names';
+import { noteTexts } from '../volume/notes';
 import { uploads } from './upload_panel';
 import { VolumeSearch } from './volume_search';
 
@@ -59,7 +60,7 @@ function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChange
   const erase = async (): Promise<void> => {
     const sure = await ask(
       'Erase this volume?',
-      `${volumeName(volume)} and its samples are removed from the server. Its surfaces stay.`,
+      `${volumeName(volume)} and its samples will be removed from the server. The surfaces made from it stay.`,
       'Erase',
     );
     if (!sure) return;
@@ -142,7 +143,7 @@ export async function volumesView(scope: Scope): Promise<HTMLElement> {
 class Home {
   readonly element: HTMLElement;
   private readonly known = new KnownVolumes();
-  // What a card shows, and the card.
+  // The contents of each card, and its element.
   private readonly cards = new Map<string, { text: string; card: HTMLElement }>();
   private readonly list = h('ul', { class: 'cards' });
   private readonly count = h('span', { class: 'count' });
@@ -151,18 +152,20 @@ class Home {
   private readonly finding = new VolumeSearch(() => void this.search().catch(tellError));
   private newest: readonly Volume[] = [];
   private older: Volume[] = [];
-  // Where the list goes on behind the older ones.
+  // The cursor of the page after the older volumes.
   private next: string | null = null;
   private soon = 0;
   private isSearching = false;
 
+  // For a first-time user.
+  private readonly intro = h('p', { class: 'intro', hidden: true }, 'isomesh turns a CT, MRI or label volume into a 3D surface mesh.');
   private readonly noVolumes = h(
     'li',
     { class: 'empty' },
-    h('p', {}, 'No volumes yet. Drop one above to begin, or'),
+    h('p', {}, 'No volumes yet. Drop a file above, or'),
     button('try a sample', () => void import('../volume/sample').then(({ sampleHead }) => uploads.take([sampleHead()]), tellError), {
       class: 'link',
-      title: 'Makes a simple head of 112 \u00d7 112 \u00d7 112 samples and uploads it',
+      title: 'Makes and uploads a simple head of 112 \u00d7 112 \u00d7 112 samples',
     }),
   );
 
@@ -171,6 +174,7 @@ class Home {
       'div',
       { class: 'home' },
       h('h1', { class: 'sr-only' }, 'Volumes and surfaces'),
+      this.intro,
       uploads.element,
       h(
         'section',
@@ -185,7 +189,7 @@ class Home {
         h(
           'div',
           { class: 'section-head' },
-          h('h2', { id: 'surfaces-title' }, 'Last surfaces'),
+          h('h2', { id: 'surfaces-title' }, 'Recent surfaces'),
           h('a', { href: hashOf(['jobs']) }, 'All jobs'),
         ),
         this.surfaces,
@@ -195,7 +199,7 @@ class Home {
     scope.onEnd(() => (uploads.onVolumes = null));
   }
 
-  // What others do is seen as well: jobs at once, volumes some seconds later.
+  // Shows what other users do: jobs at once, volumes some seconds later.
   keepFresh(): void {
     const refresh = (): void => {
       // A lost connection is said at the top of the page.
@@ -224,6 +228,7 @@ class Home {
     const shown = jobs.slice(0, shownJobs);
     await this.known.find(shown.map(({ volume }) => volume));
     this.newest = page.volumes;
+    this.intro.hidden = page.volumes.length > 0 || shown.length > 0;
     this.showVolumes([...page.volumes, ...this.older]);
     this.surfaces.replaceChildren(...shown.map((job) => surfaceRow(job, this.known.nameOf(job.volume))));
     if (shown.length === 0) this.surfaces.append(h('li', { class: 'empty' }, 'No surfaces yet.'));
@@ -277,7 +282,7 @@ class Home {
     const all = `${formatCount(volumes.length)}${this.next === null ? '' : '+'}`;
     this.count.textContent = volumes.length === 0 ? '' : this.finding.isOn ? `${formatCount(shown.length)} of ${all}` : all;
     if (volumes.length === 0) cards.push(this.noVolumes);
-    else if (cards.length === 0) cards.push(h('li', { class: 'empty' }, 'No volume is called so.'));
+    else if (cards.length === 0) cards.push(h('li', { class: 'empty' }, 'No volume matches the search.'));
     const isSame = cards.length === this.list.children.length && cards.every((card, at) => card === this.list.children[at]);
     if (isSame) return;
     const focused = document.activeElement;
@@ -303,8 +308,7 @@ class Home {
       return;
     }
     // Its page shows the notes of the file that came first.
-    const notes = only.volume.notes.map(({ detail }) => detail);
-    if (only.status === 200) tell(['This volume was there already.', ...notes].join(' '));
+    if (only.status === 200) tell(['This volume is already stored.', ...noteTexts(only.volume)].join(' '));
     go(['volumes', only.volume.id]);
   }
 }

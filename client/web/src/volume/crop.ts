@@ -7,7 +7,7 @@ export type Box = [Vec3, Vec3];
 
 type Placed = Pick<Volume, 'dims' | 'spacing' | 'origin' | 'direction'>;
 
-// Whether the volume's axes are the patient's, so that a box of the one is a box of the other.
+// True if the volume's axes are the patient's axes, so that a box is a box in both.
 export function isUpright(volume: Pick<Volume, 'direction'>): boolean {
   return [0, 1, 2].every((axis) => axisDirection(volume, axis).some((value) => Math.abs(value) > 1 - 1e-6));
 }

@@ -1,4 +1,4 @@
-// What was dropped or chosen, as one body to upload.
+// Packs the dropped or chosen files into one body to upload.
 import { packTar, type NamedFile } from './tar';
 
 // Files that operating systems put into folders by themselves.

@@ -31,6 +31,6 @@ export class KnownVolumes {
   nameOf(id: string): string {
     const volume = this.known.get(id);
     if (volume === undefined) return '';
-    return volume ? volumeName(volume) : 'a volume that was erased';
+    return volume ? volumeName(volume) : 'erased volume';
   }
 }

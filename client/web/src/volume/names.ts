@@ -1,4 +1,4 @@
-// What a person calls a volume.
+// Names of volumes for users.
 import type { Volume } from '../api/types';
 import { formatDims, formatNames } from '../ui/format';
 
@@ -8,7 +8,7 @@ function dateOf(text: string | undefined): string {
   return match ? `${match[1]}-${match[2]}-${match[3]}` : '';
 }
 
-// Whose and which study it is, and what it is called; or else what it holds.
+// Patient, name and date of a volume, or its kind if none of these is known.
 export function volumeName(volume: Volume): string {
   const { patient_name: patient, series_description: series, study_date: date } = volume.dicom ?? {};
   const own = (volume.name ?? series)?.trim();
@@ -16,7 +16,7 @@ export function volumeName(volume: Volume): string {
   return told.length > 0 ? told.join(', ') : volumeKind(volume);
 }
 
-// What a file made of it is called, without its suffix: nothing of whom it shows, since files are sent around.
+// The name of a file that is made from it, without its suffix. It never has the patient's name, since files are passed on.
 export function fileStem(volume: Volume | null, otherwise: string): string {
   const own = (volume?.name ?? volume?.dicom?.series_description ?? '').replace(/\.(nii|nrrd|mha|mhd|vti|dcm|zip|tar|gz|tgz)\b/gi, '');
   const plain = own

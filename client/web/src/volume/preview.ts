@@ -20,7 +20,7 @@ export const blockSize = 8;
 
 export function triple(text: string | undefined): Vec3 {
   const numbers = (text ?? '').split(/[\s,]+/).map(Number);
-  if (numbers.length !== 3 || !numbers.every(Number.isFinite)) throw new Error('The preview is not understood.');
+  if (numbers.length !== 3 || !numbers.every(Number.isFinite)) throw new Error('The preview has an unknown format.');
   return numbers as Vec3;
 }
 
@@ -38,7 +38,7 @@ export function previewOf(file: ArrayBuffer, window: Window): Preview {
   const samples = bytes.subarray(headEnd);
   if (headEnd < 2 || samples.length !== dims[0] * dims[1] * dims[2]) throw new Error('The preview ends too early.');
   const vectors = [...(fields.get('space directions') ?? '').matchAll(/\(([^)]*)\)/g)].map(([, inner]) => triple(inner));
-  if (vectors.length !== 3) throw new Error('The preview does not say where it lies.');
+  if (vectors.length !== 3) throw new Error('The preview has no position.');
   return {
     dims,
     origin: triple(fields.get('space origin')?.replace(/[()]/g, '')),

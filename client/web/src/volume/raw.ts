@@ -12,12 +12,12 @@ export const sampleBytes: Record<SampleType, number> = {
   float64: 8,
 };
 
-// What a description misses; empty when it accounts for every byte.
+// The fault of a description; empty if it accounts for every byte.
 export function rawFault(size: number, dims: readonly number[], type: SampleType): string {
   if (dims.length !== 3 || !dims.every((count) => Number.isInteger(count) && count > 0)) {
-    return 'Enter three whole numbers of samples.';
+    return 'Enter a positive whole number for each axis.';
   }
   const described = dims.reduce((a, b) => a * b, sampleBytes[type]);
   if (described === size) return '';
-  return `That describes ${described} bytes, but the file has ${size}.`;
+  return `These values describe ${described} bytes, but the file has ${size}.`;
 }

@@ -23,7 +23,7 @@ async function grey(picture: Blob): Promise<{ width: number; height: number; val
   canvas.width = width;
   canvas.height = height;
   const context = canvas.getContext('2d', { willReadFrequently: true });
-  if (!context) throw new Error('The browser has no memory for the slice.');
+  if (!context) throw new Error('The browser does not have enough memory for the slice.');
   context.drawImage(bitmap, 0, 0);
   bitmap.close();
   const pixels = context.getImageData(0, 0, width, height).data;

@@ -1,5 +1,5 @@
-// Whether a file's first bytes are those of something that the daemon reads, so that gigabytes of something
-// else are not sent for nothing. The daemon judges; this only says what is surely none of it.
+// Checks the first bytes of a file before gigabytes are sent in vain. It only finds files that are certainly
+// not volumes; the daemon decides about all others.
 
 import { ApiError } from '../api/problem';
 import { formatBytes, formatDims } from '../ui/format';
@@ -9,7 +9,7 @@ import type { NamedFile } from './tar';
 const headBytes = 1024;
 // Headers of text may be long.
 const textBytes = 16_384;
-// Of a compressed file, which surely hold the first bytes of what it was.
+// This much of a compressed file certainly holds the first bytes of its contents.
 const packedBytes = 65_536;
 
 function startsWith(head: Uint8Array, ...bytes: number[]): boolean {
@@ -40,7 +40,7 @@ function isArchive(head: Uint8Array): boolean {
   return textOf(head, 0, 2) === 'PK' || textOf(head, 257, 5) === 'ustar';
 }
 
-// What is packed otherwise than with gzip, which browsers cannot look into.
+// Compression other than gzip, which browsers cannot decompress.
 function isPackedOtherwise(head: Uint8Array): boolean {
   return (
     textOf(head, 0, 3) === 'BZh' ||
@@ -80,31 +80,31 @@ export async function mayBeVolume(file: Blob): Promise<boolean> {
 }
 
 function unsent(status: 415 | 422, detail: string): ApiError {
-  const title = status === 415 ? 'This is no volume that can be read' : 'This volume is not whole';
-  return new ApiError(status, title, `${detail} Nothing was sent.`);
+  const title = status === 415 ? 'This file is not a supported volume' : 'This volume is incomplete';
+  return new ApiError(status, title, `${detail} Nothing was uploaded.`);
 }
 
-// Why sending it is surely for nothing; null where it may be a volume.
+// The reason why the file is certainly not a volume; null if it may be one.
 async function faultOfOne({ path, file }: NamedFile): Promise<ApiError | null> {
-  if (!(await mayBeVolume(file))) return unsent(415, `The first bytes of ${path} are those of no known format.`);
+  if (!(await mayBeVolume(file))) return unsent(415, `The first bytes of ${path} match no supported format.`);
   const head = await bytesOf(file, textBytes);
   const declared = declaredBy(head);
   if (!declared) return null;
   if (declared.isElsewhere) {
-    return unsent(422, `${path} is a header, whose samples are in a file of their own. Choose both together.`);
+    return unsent(422, `${path} is a header; its samples are in another file. Choose both files together.`);
   }
   if (declared.bytes === null || file.size >= declared.bytes) return null;
   return unsent(
     422,
-    `${path} says that it has ${formatDims(declared.dims)} samples, which with its header are ` +
-    `${formatBytes(declared.bytes)}, but the file has ${formatBytes(file.size)}: it was cut off.`,
+    `${path} is cut off: its header declares ${formatDims(declared.dims)} samples, so the file should have ` +
+    `${formatBytes(declared.bytes)}, but it has ${formatBytes(file.size)}.`,
   );
 }
 
-// The same of what is sent together: data files beside a header are known by nothing.
+// The same for files that are sent together. A data file beside a header has no known first bytes.
 export async function faultOf(files: readonly NamedFile[]): Promise<ApiError | null> {
   const [only] = files;
   if (only && files.length === 1) return faultOfOne(only);
   for (const { file } of files) if (await mayBeVolume(file)) return null;
-  return unsent(415, `The first bytes of all ${files.length} files are those of no known format.`);
+  return unsent(415, `The first bytes of all ${files.length} files match no supported format.`);
 }
