@@ -19,8 +19,6 @@ isomesh_written(${made}/isomeshd.8 isomeshd manual)
 isomesh_written(${made}/isomeshd.bash isomeshd completion bash)
 isomesh_written(${made}/_isomeshd isomeshd completion zsh)
 isomesh_written(${made}/isomeshd.fish isomeshd completion fish)
-add_custom_target(isomesh_daemon_files ALL DEPENDS
-  ${made}/isomeshd.toml ${made}/isomeshd.8 ${made}/isomeshd.bash ${made}/_isomeshd ${made}/isomeshd.fish)
 
 install(FILES ${made}/isomeshd.toml DESTINATION ${config} COMPONENT daemon)
 install(FILES ${made}/isomeshd.service DESTINATION lib/systemd/system COMPONENT daemon)

@@ -1,0 +1,1 @@
+// The precompiled header of most libraries belongs to this source.

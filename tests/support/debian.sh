@@ -1,0 +1,37 @@
+# A bare Debian in a folder, for tests that must not see this machine's packages. Needs root, debootstrap and the network.
+# Sourced by scripts that set `root` to the checkout and define fail().
+
+# make_debian SUITE FOLDER: debootstrap's smallest Debian, a copy of build/debian/SUITE, which is made the first time.
+# The caller ends with remove_debian FOLDER.
+make_debian() {
+  local suite="$1" there="$2" base="$root/build/debian/$1" log="$root/build/debian/$1.log"
+  [[ "$(id -u)" -eq 0 ]] || fail "needs root, for debootstrap and chroot"
+  if [[ ! -d "$base" ]]; then
+    mkdir -p "$root/build/debian"
+    rm -rf "$base.part"
+    debootstrap --variant=minbase "$suite" "$base.part" >"$log" 2>&1 || { tail "$log" >&2; fail "debootstrap $suite"; }
+    mv "$base.part" "$base"
+  fi
+  cp -a "$base" "$there"
+  cp /etc/resolv.conf "$there/etc/resolv.conf"
+  # The machine's own package sources, if they are of that suite.
+  if grep -qs "$suite" /etc/apt/sources.list.d/debian.sources; then
+    cp /etc/apt/sources.list.d/debian.sources "$there/etc/apt/sources.list.d/"
+    : >"$there/etc/apt/sources.list"
+  fi
+  mount -t proc proc "$there/proc"
+  # Services are not started in there.
+  printf '#!/bin/sh\nexit 101\n' >"$there/usr/sbin/policy-rc.d"
+  chmod +x "$there/usr/sbin/policy-rc.d"
+}
+
+# remove_debian FOLDER: also what make_debian did not finish.
+remove_debian() {
+  ! mountpoint --quiet "$1/proc" || umount "$1/proc"
+  rm -rf --one-file-system "$1"
+}
+
+# inside FOLDER COMMAND..: runs in that Debian, with nothing of this environment.
+inside() {
+  env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive chroot "$@"
+}
