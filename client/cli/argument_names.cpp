@@ -68,8 +68,8 @@ bool is_option(std::string_view word) {
 std::string closest_to(const std::string& text, const std::vector<std::string>& names) {
   constexpr std::size_t kMostEdits = 3;
   std::string closest;
-  // Short names are close to each other, so a third of the letters may differ at most.
-  std::size_t least = std::min(kMostEdits, text.size() / 3) + 1;
+  // Short names are close to each other, so at most half of the letters may differ.
+  std::size_t least = std::min(kMostEdits, text.size() / 2) + 1;
   for (const std::string& name : names) {
     const std::size_t edits = edits_between(text, name);
     if (edits < least) closest = name;

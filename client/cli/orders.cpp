@@ -119,8 +119,11 @@ void add_orders_options(CLI::App& app, Options& options) {
   app.add_option("ORDER", options.id,
                  "Id of an order to show; its beginning or end is enough if unique")
       ->type_name("ID");
-  add_name<OrderState>(app, "--state", "Only orders in this state",
-                       [&order](OrderState state) { order.state = state; });
+  add(app, "--state", "waiting|fetching|meshing|sending|succeeded|failed|cancelled",
+      "Only orders in this state", [&order](const std::string& name) {
+        order.state = from_string<OrderState>(name);
+        if (!order.state) refuse("--state", "there is no state " + name);
+      });
   app.add_option("--rule", order.rule, "Only orders of this rule");
   app.add_option("--cursor", options.cursor, "Page to show; the page before it prints its cursor");
   auto* cancel = app.add_flag("--cancel", order.cancels, "Cancel this order")->needs("ORDER");

@@ -42,19 +42,22 @@ std::string default_of(const Parameter& parameter, const T& standard) {
   }
 }
 
-// The words that a value may be, or the range of a number. Limits that are those of a type help
-// nobody.
+// The words that a value may be; empty if it is something else.
 template <class T>
-std::string values_of(const Parameter& parameter) {
-  constexpr double kLimitOfType = std::numeric_limits<std::uint32_t>::max();
+std::string words_of() {
   if constexpr (std::is_same_v<T, Scheme>) {
     return ": 5 or 6";
   } else if constexpr (Enumeration<T>) {
     return ": " + listed(names_from<T>());
   } else {
-    const bool is_limited = parameter.maximum && *parameter.maximum < kLimitOfType;
-    return is_limited ? ", " + range_of(parameter) : "";
+    return "";
   }
+}
+
+// The range of a number. It is left out if it is only that of a type.
+std::string limits_of(const Parameter& parameter) {
+  constexpr double kLimitOfType = std::numeric_limits<std::uint32_t>::max();
+  return parameter.maximum && *parameter.maximum < kLimitOfType ? range_of(parameter) : "";
 }
 
 // A row of the table as one sentence of a help text, without its full stop.
@@ -66,8 +69,10 @@ std::string help_of(const Parameter& parameter, const T& standard) {
   const std::string unit = parameter.unit;
   std::string defaults = default_of(parameter, standard);
   if (parameter.by_labels) defaults += ", " + number_text(*parameter.by_labels) + " with --labels";
-  return help + (unit.empty() ? "" : ", in " + unit) + values_of<T>(parameter) +
-         (defaults.empty() ? "" : " (default: " + defaults + ')');
+  std::string more = limits_of(parameter);
+  if (!defaults.empty()) more += (more.empty() ? "default: " : "; default: ") + defaults;
+  return help + (unit.empty() ? "" : ", in " + unit) + words_of<T>() +
+         (more.empty() ? "" : " (" + more + ')');
 }
 
 // An option for each kind of parameter.

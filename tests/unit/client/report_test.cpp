@@ -165,6 +165,22 @@ TEST(JobReport, TellsAMeshThatWasThereAlready) {
   EXPECT_THAT(job_report(job), HasSubstr("earlier job"));
 }
 
+TEST(JobList, NamesTheVolumes) {
+  Job named = test::finished_job("7", "mesh");
+  Job nameless = test::finished_job("8", "mesh");
+  nameless.parameters.volume = "0123456789abcdef";
+  const std::string list = job_list({named, nameless}, {{"abc", "CT of the knee"}});
+  EXPECT_THAT(list, HasSubstr("volume\n"));
+  EXPECT_THAT(list, HasSubstr("  CT of the knee\n"));
+  EXPECT_THAT(list, HasSubstr("  0123456789ab\n"));
+}
+
+TEST(NoteText, NamesTheOptionInsteadOfTheMember) {
+  EXPECT_EQ(note_text({"looks-like-labels", "It has labels: mesh it with \"labels\": \"all\"."}),
+            "It has labels: mesh it with --labels all.");
+  EXPECT_EQ(note_text({"other", "as it is"}), "as it is");
+}
+
 TEST(JobJson, AddsWhatTheClientKnows) {
   const Job job = test::finished_job("7", "mesh");
   const std::string text = job_json(job, {"out/a.drc", "b\".drc"}, {.upload = 12.5});
