@@ -36,8 +36,13 @@ class WrappedHelp : public CLI::Formatter {
     return app->get_description().empty() ? "" : wrapped(app->get_description(), 0) + '\n';
   }
 
-  // As it is: it holds commands, which must not be broken.
-  std::string make_footer(const CLI::App* app) const override { return app->get_footer() + '\n'; }
+  // The footer is not wrapped, because it contains commands.
+  std::string make_footer(const CLI::App* app) const override {
+    const std::string footer = app->get_footer();
+    if (app->get_parent() == nullptr) return footer.empty() ? "" : footer + '\n';
+    return footer + (footer.empty() ? "" : "\n") + '`' + app->get_parent()->get_name() +
+           " --help` lists the options of all commands.\n";
+  }
 
  private:
   static std::string joined_names(const CLI::Option& option) {

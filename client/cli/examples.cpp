@@ -18,7 +18,7 @@ constexpr std::string_view kMesh = R"(
   isomesh mesh scans/*.nii.gz --iso otsu -o meshes/ --format glb --jobs 4
   isomesh mesh ct.raw --dims 512,512,300 --type int16 --spacing 0.7,0.7,1 \
       --iso 300 -o ct.stl
-  isomesh mesh 3f2a91c0 --iso 60 -o head.stl    (a stored volume, by its id)
+  isomesh mesh 3f2a91c0 --iso 60 -o head.stl    # a stored volume, by its id
   isomesh mesh head.nii.gz --iso 60 --dry-run
 )";
 

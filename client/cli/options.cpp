@@ -314,8 +314,7 @@ class Parser {
 
   static std::string footer_of(const std::string& name) {
     const std::string examples = examples_of(name);
-    return (examples.empty() ? "" : "Examples:\n" + examples + '\n') +
-           "`isomesh --help` lists the options of all commands, such as --server.";
+    return examples.empty() ? "" : "Examples:\n" + examples;
   }
 
   std::string help_of_command() const {

@@ -95,13 +95,13 @@ TEST(MeshReport, TellsTheIsoValueAndTheError) {
   mesh.certificate->budget_mm = {.smoothing = 0.05, .quantisation = 0.01, .simplification = 0.04};
   mesh.quality.self_intersections = {.pairs = 3, .triangles = 5};
   const std::string report = mesh_report(mesh);
-  EXPECT_THAT(report, HasSubstr("iso-value            61.5\n"));
+  EXPECT_THAT(report, HasSubstr("iso-value           61.5\n"));
   EXPECT_THAT(report, HasSubstr("from 5,000 triangles, bound by the number of triangles\n"));
   EXPECT_THAT(report,
               HasSubstr("0.0988 mm from the extracted surface, measured on the stl file\n"));
-  EXPECT_THAT(report, HasSubstr("scan to mesh       0.0988 mm at most, 0.0300 mm for 99 %"));
+  EXPECT_THAT(report, HasSubstr("scan to mesh      0.0988 mm at most, 0.0300 mm for 99 %"));
   EXPECT_THAT(report, HasSubstr("0.0500 mm smoothing, 0.0400 mm simplification, 0.0100 mm"));
-  EXPECT_THAT(report, HasSubstr("self-intersections   3 pairs of triangles\n"));
+  EXPECT_THAT(report, HasSubstr("self-intersections  3 pairs of triangles\n"));
 }
 
 TEST(VolumeReport, NamesWhatTheVolumeIs) {
