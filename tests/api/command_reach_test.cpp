@@ -91,14 +91,13 @@ TEST_F(CommandReachTest, MeshTakesAStoredVolume) {
   EXPECT_THAT(absent.errors, HasSubstr("no volume whose id"));
 }
 
-// Two flat regions, which the server takes for labels.
+// Three flat slabs, which the server takes for labels.
 TEST_F(CommandReachTest, NotesNameTheirInputAndTheOption) {
-  std::string bytes(32 * 32 * 32, '\0');
-  bytes.replace(0, bytes.size() / 2, std::string(bytes.size() / 2, '\3'));
+  constexpr std::size_t kSlab = 32 * 32 * 10;
   for (const char* name : {"a.raw", "b.raw"}) {
-    bytes.front() = name[0];
-    bytes.front() = '\3';
-    bytes[1] = name[0] == 'a' ? '\0' : '\3';
+    std::string bytes(32 * 32 * 32, '\0');
+    bytes.replace(kSlab, kSlab, kSlab, '\3');
+    bytes.replace(2 * kSlab, kSlab, kSlab, name[0]);
     write_file(folder_ / name, bytes);
   }
   const std::vector<std::string> how = {"--dims", "32,32,32", "--type", "uint8", "--iso", "2"};
