@@ -46,9 +46,9 @@ std::string default_of(const Parameter& parameter, const T& standard) {
 template <class T>
 std::string words_of() {
   if constexpr (std::is_same_v<T, Scheme>) {
-    return ": 5 or 6";
+    return "5 or 6";
   } else if constexpr (Enumeration<T>) {
-    return ": " + listed(names_from<T>());
+    return listed(names_from<T>());
   } else {
     return "";
   }
@@ -69,10 +69,9 @@ std::string help_of(const Parameter& parameter, const T& standard) {
   const std::string unit = parameter.unit;
   std::string defaults = default_of(parameter, standard);
   if (parameter.by_labels) defaults += ", " + number_text(*parameter.by_labels) + " with --labels";
-  std::string more = limits_of(parameter);
+  std::string more = words_of<T>() + limits_of(parameter);  // a number has limits, others words
   if (!defaults.empty()) more += (more.empty() ? "default: " : "; default: ") + defaults;
-  return help + (unit.empty() ? "" : ", in " + unit) + words_of<T>() +
-         (more.empty() ? "" : " (" + more + ')');
+  return help + (unit.empty() ? "" : ", in " + unit) + (more.empty() ? "" : " (" + more + ')');
 }
 
 // An option for each kind of parameter.
