@@ -86,7 +86,15 @@ int wait(const Options& options, const std::stop_token& stop) {
   ProgressBar bar(!options.quiet);
   const Job job = wait(client, job_id(client, options.id), bar);
   if (!options.quiet || options.json) show(job, options.json);
-  return status_of(job, options);
+  std::optional<SampleRange> range;
+  if (job.mesh && job.mesh->empty) {
+    try {
+      range = client.volume(job.parameters.volume).range;
+    } catch (const Error&) {
+      // The volume may have been deleted since.
+    }
+  }
+  return status_of(job, options, {}, range);
 }
 
 int fetch(const Options& options, const std::stop_token& stop) {

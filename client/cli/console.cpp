@@ -31,10 +31,15 @@ Error reason_of(const Job& job) {
   return {ErrorCode::kCancelled, "the job was cancelled"};
 }
 
-std::string why_empty(const MeshSummary& mesh) {
+std::string why_empty(const MeshSummary& mesh, const std::optional<SampleRange>& range) {
   if (mesh.dropped.components > 0) return "all of its components were dropped";
   if (!mesh.iso) return "the labels have no surface";
-  return "the volume has no surface at the iso-value " + human_number(*mesh.iso);
+  std::string reason = "the volume has no surface at the iso-value " + human_number(*mesh.iso);
+  if (range) {
+    reason += "; its samples range from " + human_number((*range)[0]) + " to " +
+              human_number((*range)[1]);
+  }
+  return reason;
 }
 
 // "Soft tissue" and "soft-tissue" are "soft tissue".
@@ -112,14 +117,15 @@ int status_of(const Error& error) {
   return error.code() == ErrorCode::kUnreachable ? kServerUnreachable : kRefused;
 }
 
-int status_of(const Job& job, const Options& options, const std::string& subject) {
+int status_of(const Job& job, const Options& options, const std::string& subject,
+              const std::optional<SampleRange>& range) {
   if (job.state == JobState::kFailed || job.state == JobState::kCancelled) {
     complain(reason_of(job), subject);
     return kRefused;
   }
   if (!job.mesh || !job.mesh->empty || options.allow_empty) return kDone;
   complain((subject.empty() ? "" : subject + ": ") +
-           "the surface is empty: " + why_empty(*job.mesh) + "; --allow-empty accepts that");
+           "the surface is empty: " + why_empty(*job.mesh, range) + "; --allow-empty accepts that");
   return kRefused;
 }
 

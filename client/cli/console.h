@@ -1,6 +1,8 @@
 // What the commands share: a client, and messages to people; private to this folder.
 #pragma once
 
+#include <array>
+#include <optional>
 #include <stop_token>
 #include <string>
 
@@ -30,9 +32,12 @@ void suggest_local();
 
 // The exit status for an error that ended a command.
 int status_of(const Error& error);
+using SampleRange = std::array<double, 2>;
+
 // The exit status for the end of a job. The reason of a failure, or an empty surface, is reported
-// on standard error.
-int status_of(const Job& job, const Options& options, const std::string& subject = {});
+// on standard error, with the range of the volume's samples if it is known.
+int status_of(const Job& job, const Options& options, const std::string& subject = {},
+              const std::optional<SampleRange>& range = {});
 
 // Reports the server's notes on a volume; `subject` as above.
 void tell_notes(const Volume& volume, const std::string& subject);

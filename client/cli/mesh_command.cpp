@@ -176,7 +176,7 @@ class Run {
     });
     seen_.download = downloading.milliseconds();
     report(*job, outputs);
-    return status_of(*job, options_, about);
+    return status_of(*job, options_, about, volume.range);
   }
 
   // Returns the job when it has ended; nothing after an interrupt.

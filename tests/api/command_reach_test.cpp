@@ -117,7 +117,10 @@ TEST_F(CommandReachTest, AnIsoValueBeyondTheSamplesIsExplained) {
       raw({"mesh", folder_ / "sphere.raw", "--iso", "9999", "-o", folder_ / "out.stl"}));
   EXPECT_EQ(result.status, 1);
   EXPECT_THAT(result.errors, HasSubstr("isomesh: "));
-  EXPECT_THAT(result.errors, HasSubstr("9999"));
+  EXPECT_THAT(result.errors,
+              HasSubstr("no surface at the iso-value 9999; its samples range from 0 to "));
+  const std::string job = daemon_.client().jobs().jobs.at(0).id;
+  EXPECT_THAT(daemon_.command({"wait", job}).errors, HasSubstr("its samples range from 0 to "));
 }
 
 TEST(CommandWithoutAServer, SaysWhatToDo) {
