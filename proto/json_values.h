@@ -184,7 +184,7 @@ T from_text(std::string_view text, const char* list = nullptr) {
     read(list ? json.at(list) : json, value);
     return value;
   } catch (const Json::exception&) {
-    throw Error(ErrorCode::kInternal, "the server's answer is not what the API describes");
+    throw Error(ErrorCode::kInternal, "the server's response does not match the API");
   }
 }
 

@@ -33,6 +33,17 @@ std::string range_of(const Parameter& parameter) {
   return text + number_text(*parameter.maximum);
 }
 
+std::string must_be(const Parameter& parameter, bool is_whole) {
+  // Without an upper bound, "a number" would include the infinite ones.
+  const std::string kind = is_whole            ? "whole number"
+                           : parameter.maximum ? "number"
+                                               : "finite number";
+  const std::string range = range_of(parameter);
+  const std::string word =
+      parameter.when_empty == nullptr ? "" : " or \"" + std::string(parameter.when_empty) + '"';
+  return "must be a " + kind + (range.empty() ? "" : ' ' + range) + word;
+}
+
 std::string number_text(double number) {
   constexpr double kWholeBelow = 1e15;
   std::array<char, 32> digits = {};

@@ -20,14 +20,14 @@
 
 namespace isomesh {
 
-// Collects what is wrong with every member, so that one answer names all of it.
+// Collects the errors of all members, so that one response names them all.
 class RequestReader {
  public:
-  // How the request spells a member's path; as it is, unless this is set.
+  // How errors spell a member's path. Without this they show the path as it is.
   using Spelling = std::string (*)(const std::string& path);
   void spell_by(Spelling spelling) { spelling_ = spelling; }
 
-  // Reads `json` into `value`, whose parameters are those of `visit`, and refuses any other member.
+  // Reads `json` into `value` by the rows of `visit`. Any other member is an error.
   template <class T>
   void read_object(const Json& json, T& value, const std::string& prefix) {
     std::vector<std::string> known;
@@ -64,21 +64,12 @@ class RequestReader {
            !(parameter.maximum && number > *parameter.maximum);
   }
 
-  // `kind` of number, and what the table says that it may be.
-  void refuse(const std::string& path, const std::string& kind, const Parameter& parameter) {
-    const std::string range = range_of(parameter);
-    std::string message = "must be a " + kind + (range.empty() ? "" : ' ' + range);
-    if (parameter.when_empty != nullptr)
-      message += " or \"" + std::string(parameter.when_empty) + '"';
-    add(path, message);
-  }
-
   template <class Whole>
   void read_whole(const Json& json, const std::string& path, const Parameter& parameter,
                   Whole& value) {
     const double number = json.is_number() ? json.get<double>() : std::nan("");
     if (std::floor(number) != number || !fits(parameter, number)) {
-      return refuse(path, "whole number", parameter);
+      return add(path, must_be(parameter, true));
     }
     value = static_cast<Whole>(number);
   }
@@ -130,10 +121,7 @@ class RequestReader {
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
                    double& value) {
     const double number = json.is_number() ? json.get<double>() : std::nan("");
-    // Without an upper bound "a number" would take in the infinite ones.
-    if (!fits(parameter, number)) {
-      return refuse(path, parameter.maximum ? "number" : "finite number", parameter);
-    }
+    if (!fits(parameter, number)) return add(path, must_be(parameter, false));
     value = number;
   }
 
@@ -163,7 +151,7 @@ class RequestReader {
     read_whole(json, path, parameter, value);
   }
 
-  // Ascending, each once.
+  // Sorts the values and removes repeated ones.
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
                    std::vector<std::int64_t>& values) {
     if (!json.is_array() || json.empty() || json.size() > Volume::kMostLabels) {
@@ -199,7 +187,7 @@ class RequestReader {
       return one.is_number() && std::isfinite(one.get<double>());
     };
     if (!json.is_array() || json.size() != place.size() || !std::ranges::all_of(json, is_number)) {
-      return add(path, "must be of three finite numbers each: x, y and z");
+      return add(path, "must be three finite numbers per point: x, y and z");
     }
     for (std::size_t axis = 0; axis < place.size(); ++axis) place[axis] = json[axis];
   }
@@ -208,7 +196,7 @@ class RequestReader {
                    std::vector<std::array<double, 3>>& places) {
     if (!json.is_array() || json.empty() || json.size() > ComponentFilter::kMostPlaces) {
       return add(path, "must be a list of 1 to " + std::to_string(ComponentFilter::kMostPlaces) +
-                           " places");
+                           " points");
     }
     for (const Json& element : json) {
       const std::size_t before = errors_.size();
@@ -231,7 +219,7 @@ class RequestReader {
     if (errors_.size() > before) return;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if ((*box)[0][axis] >= (*box)[1][axis]) {
-        return add(path, "must begin with its smaller corner, smaller in x, y and z");
+        return add(path, "must have a first corner that is smaller than the second in x, y and z");
       }
     }
   }
@@ -241,18 +229,18 @@ class RequestReader {
     value.emplace();
     if (json == kAllLabels) return;
     if (!json.is_array()) {
-      return add(path, "must be \"all\" or a list of labels, which are whole numbers");
+      return add(path, "must be \"all\" or a list of whole numbers");
     }
     read_member(json, path, parameter, value->values);
   }
 
-  // By the labels' own values.
+  // An object whose members are named by labels.
   template <class T>
   void read_member(const Json& json, const std::string& path, const Parameter& parameter,
                    std::map<std::int64_t, T>& value) {
     if (!json.is_object() || json.size() > Volume::kMostLabels) {
       return add(path, "must be an object with at most " + std::to_string(Volume::kMostLabels) +
-                           " members, which are named by labels");
+                           " members named by labels");
     }
     for (const auto& [name, element] : json.items()) {
       const auto label = parse_int64(name);
@@ -283,7 +271,7 @@ class RequestReader {
     }
   }
 
-  // What a label may be, as the table has it.
+  // The table's row for the range of a label.
   static const Parameter& label_range() {
     static const Parameter range = [] {
       MeshParameters parameters;  // not constant, for those members that may be absent

@@ -13,9 +13,9 @@
 namespace isomesh {
 namespace {
 
-// What a query calls a parameter, where it stands in a body and how its text is read.
+// A query parameter: its place in a body, and how its text is read.
 struct QueryName {
-  // kPlaces: numbers, of which each three are one.
+  // kPlaces: numbers, three for each point.
   enum class Kind { kValue, kText, kTexts, kLabels, kNumbers, kPlaces };
 
   std::string path;
@@ -63,7 +63,7 @@ Json::json_pointer pointer_to(std::string path) {
   return Json::json_pointer('/' + path);
 }
 
-// Members that an object has twice: readers differ in which one they take.
+// Finds members that an object has twice: readers differ in which one they use.
 class Repetitions {
  public:
   void see(Json::parse_event_t event, const Json& parsed) {
@@ -84,7 +84,7 @@ class Repetitions {
   std::vector<std::string> names_;
 };
 
-// A query's text as the JSON value that the member would have had in a body.
+// Converts a query's text to the JSON value that a body would have.
 Json value_of(const std::string& text) {
   const Json parsed = Json::parse(text, nullptr, false);
   return parsed.is_number() || parsed.is_boolean() ? parsed : Json(text);
@@ -107,7 +107,7 @@ Json values_of(const std::string& text) {
   return values;
 }
 
-// What the table says of the chosen kind of smoothing alone.
+// Checks the table's limits for the chosen kind of smoothing.
 void check_case(const std::string& path, const Parameter& parameter, Smoothing smoothing,
                 const std::optional<double>& value, RequestReader& reader) {
   for (const auto& entry : parameter.cases) {
@@ -118,7 +118,7 @@ void check_case(const std::string& path, const Parameter& parameter, Smoothing s
   }
 }
 
-// What is for iso-values alone, or for labels alone.
+// Rejects members that jobs with labels, or jobs without them, do not have.
 void check_labels(const Json& json, const JobParameters& parameters, RequestReader& reader) {
   const auto refuse_if = [&](bool is_wrong, const char* name, const std::string& message) {
     if (is_wrong) reader.add(name, message);
@@ -134,18 +134,19 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
                 "is only for jobs with labels");
     });
     return refuse_if(has(MeshFormat::kZip), "formats",
-                     "\"zip\" holds a file of each label, so it needs labels");
+                     "\"zip\" holds one file per label, so it needs labels");
   }
-  refuse_if(json.contains("iso"), "iso", "cannot stand beside labels");
+  refuse_if(json.contains("iso"), "iso", "cannot be combined with labels");
   refuse_if(parameters.fill_cavities, "fill_cavities",
-            "cannot stand beside labels, which have others in their cavities");
+            "cannot be combined with labels: other labels may lie in their cavities");
   refuse_if(json.contains("interpolation") && parameters.interpolation == Interpolation::kLinear,
-            "interpolation", "must be \"midpoint\" for labels, which have no values between them");
+            "interpolation",
+            "must be \"midpoint\" for labels: there are no values between two labels");
   refuse_if(!parameters.components.keeps_all(), "components",
-            "cannot stand beside labels: a part that is left out would leave a hole in its "
+            "cannot be combined with labels: a dropped component would leave a hole in its "
             "neighbours");
   const std::string names_background =
-      "must not name the background, " + std::to_string(parameters.background);
+      "must not include the background, " + std::to_string(parameters.background);
   refuse_if(std::ranges::binary_search(parameters.labels->values, parameters.background), "labels",
             names_background);
   const bool has_background = std::ranges::any_of(parameters.label_values, [&](const auto& entry) {
@@ -155,30 +156,30 @@ void check_labels(const Json& json, const JobParameters& parameters, RequestRead
   refuse_if(has_background, "label_values", names_background);
 }
 
-// What one parameter says of another.
+// Rules between parameters.
 void settle(const Json& json, JobParameters& parameters, RequestReader& reader) {
-  // Clients that send every member say `close` too, by its default.
+  // Clients that send every member also send the default of `close`.
   if (parameters.crop) parameters.close = true;
-  // What fewer triangles cost is told unless it is not asked for.
+  // The error of simplification is measured unless the request says otherwise.
   if (parameters.triangles && !json.contains("certify")) parameters.certify = true;
   if (parameters.max_error_mm) {
     if (json.contains("certify") && !parameters.certify) {
-      reader.add("certify", "must be true beside max_error_mm, which is measured");
+      reader.add("certify", "must be true with max_error_mm, which is measured");
     }
     parameters.certify = true;
   }
   const std::vector<double>& lods = parameters.lods;
   const bool is_falling = std::ranges::is_sorted(lods, std::ranges::greater_equal{});
   if (!lods.empty() && (lods.front() != 1 || !is_falling)) {
-    reader.add("lods", "must begin with 1 and go down from each to the next");
+    reader.add("lods", "must start at 1 and then decrease");
   }
   if (std::ranges::find(parameters.formats, MeshFormat::kGlb) != parameters.formats.end()) return;
-  constexpr const char* kNeedsGlb = "are for \"glb\", which is not among the formats";
+  constexpr const char* kNeedsGlb = "needs the format \"glb\"";
   if (!lods.empty()) reader.add("lods", kNeedsGlb);
   if (parameters.distances) reader.add("distances", kNeedsGlb);
 }
 
-// The members that such a job has another default for than others.
+// Defaults differ between jobs with labels and other jobs.
 JobParameters defaults_of(const Json& json) {
   return json.contains("labels") ? label_parameters({}) : JobParameters{};
 }
@@ -186,18 +187,18 @@ JobParameters defaults_of(const Json& json) {
 JobParameters read_parameters(const Json& json, bool with_volume, RequestReader& reader) {
   JobParameters parameters = defaults_of(json);
   reader.read_object(json, parameters, "");
-  visit_leaves(
-      parameters, [&](const std::string& path, const Parameter& parameter, const auto& member) {
-        const bool is_expected = parameter.is_required && (with_volume || path != "volume") &&
-                                 !(parameter.unless != nullptr && json.contains(parameter.unless));
-        if (is_expected && !json.contains(pointer_to(path))) {
-          const std::string other = parameter.unless == nullptr ? "" : parameter.unless;
-          reader.add(path, other.empty() ? "is required" : "is required, or " + other);
-        }
-        if constexpr (std::is_same_v<decltype(member), const std::optional<double>&>) {
-          check_case(path, parameter, parameters.smoothing, member, reader);
-        }
-      });
+  visit_leaves(parameters, [&](const std::string& path, const Parameter& parameter,
+                               const auto& member) {
+    const bool is_expected = parameter.is_required && (with_volume || path != "volume") &&
+                             !(parameter.unless != nullptr && json.contains(parameter.unless));
+    if (is_expected && !json.contains(pointer_to(path))) {
+      const std::string other = parameter.unless == nullptr ? "" : parameter.unless;
+      reader.add(path, other.empty() ? "is required" : "is required unless " + other + " is given");
+    }
+    if constexpr (std::is_same_v<decltype(member), const std::optional<double>&>) {
+      check_case(path, parameter, parameters.smoothing, member, reader);
+    }
+  });
   check_labels(json, parameters, reader);
   settle(json, parameters, reader);
   reader.throw_if_any();
@@ -205,7 +206,7 @@ JobParameters read_parameters(const Json& json, bool with_volume, RequestReader&
   return parameters;
 }
 
-// Members of a body that no query has, or has by another name.
+// True for members of a body that a query lacks or spells differently.
 bool is_for_bodies(const std::string& name) {
   bool found = false;
   JobParameters parameters;  // not constant, for those members that an empty one hides
@@ -215,7 +216,7 @@ bool is_for_bodies(const std::string& name) {
   return found && !query_names().contains(name);
 }
 
-// A query's text as the JSON value of a body.
+// Converts a query's text to the JSON value that a body would have.
 Json value_of(const std::string& text, const QueryName& name) {
   switch (name.kind) {
     case QueryName::Kind::kText:
@@ -245,7 +246,7 @@ std::string text_of(const Json& value) {
   std::string list;
   for (const Json& item : value) {
     if (!list.empty()) list += ',';
-    list += text_of(item);  // of places, all their numbers
+    list += text_of(item);  // of points: all their numbers
   }
   return list;
 }

@@ -13,7 +13,7 @@ std::string joined(const std::vector<std::string>& words, const std::string& bet
   return text;
 }
 
-// Within single quotes of a shell; `quote` is how that shell writes one there.
+// Puts text in single quotes of a shell; `quote` is how that shell writes one inside them.
 std::string quoted(std::string_view text, std::string_view quote) {
   std::string result = "'";
   for (const char c : text) {
@@ -26,7 +26,7 @@ std::string quoted(std::string_view text, std::string_view quote) {
   return result + '\'';
 }
 
-// Of a subcommand that has some of its own: those of all of them.
+// A command's options. For a subcommand they include those of its own subcommands.
 std::vector<const CLI::Option*> all_options(const CLI::App& app) {
   std::vector<const CLI::Option*> options = shown_options(app);
   if (app.get_parent() == nullptr) return options;
@@ -52,16 +52,35 @@ std::vector<std::string> command_names(const CLI::App& app) {
   return names;
 }
 
-// The program's own table, and then each subcommand's.
+// Calls `each` for the program's own table, then for each subcommand's.
 void visit(const CLI::App& app, const std::function<void(const CLI::App&)>& each) {
   each(app);
   for (const CLI::App* command : shown_commands(app)) each(*command);
 }
 
+// The positional whose values complete a command's arguments, if a shell can know them.
+struct Operand {
+  std::string name = {};
+  std::vector<std::string> words = {};
+  std::string listing = {};  // a shell's command that prints the values
+};
+
+Operand operand_of(const CLI::App& command, const std::string& program, const Listings& listings) {
+  for (const CLI::Option* option : shown_options(command)) {
+    if (option->nonpositional()) continue;
+    Operand operand{.name = option->get_name(true), .words = words_of(*option)};
+    if (const auto found = listings.find(operand.name); found != listings.end()) {
+      operand.listing = program + ' ' + found->second + " 2>/dev/null";
+    }
+    return operand;
+  }
+  return {};
+}
+
 // --- bash ----------------------------------------------------------------------------------------
 
-// What follows an option that takes a value; the first option of a name stands for those of other
-// subcommands.
+// The cases that complete an option's value. Options of one name in several subcommands share the
+// first one's case.
 std::string bash_values(const CLI::App& app) {
   std::string cases;
   std::vector<std::string> seen;
@@ -71,8 +90,11 @@ std::string bash_values(const CLI::App& app) {
       if (is_flag(*option) || names.empty() || std::ranges::count(seen, names.back()) > 0) continue;
       seen.push_back(names.back());
       const std::vector<std::string> words = words_of(*option);
+      const std::string list = '\'' + joined(words, " ") + '\'';
       cases += "    " + joined(names, "|") + ")\n      COMPREPLY=(" +
-               (!words.empty()        ? "$(compgen -W '" + joined(words, " ") + "' -- \"$word\")"
+               (is_list(*option) && !words.empty()
+                    ? "$(compgen -P \"${word%\"${word##*,}\"}\" -W " + list + " -- \"${word##*,}\")"
+                : !words.empty()      ? "$(compgen -W " + list + " -- \"$word\")"
                 : takes_path(*option) ? "$(compgen -f -- \"$word\")"
                                       : "") +
                ")\n      return ;;\n";
@@ -81,7 +103,7 @@ std::string bash_values(const CLI::App& app) {
   return cases;
 }
 
-// Lines of a script in which % stands for the program's name.
+// Replaces every % of a script by the program's name.
 std::string with_name(std::string script, const std::string& name) {
   for (std::size_t at = 0; (at = script.find('%', at)) != std::string::npos; at += name.size()) {
     script.replace(at, 1, name);
@@ -89,13 +111,19 @@ std::string with_name(std::string script, const std::string& name) {
   return script;
 }
 
-std::string for_bash(const CLI::App& app) {
+std::string for_bash(const CLI::App& app, const Listings& listings) {
   const std::string name = app.get_name();
   std::string cases;
   for (const CLI::App* command : shown_commands(app)) {
-    const std::string own = joined(command_names(*command), " ");
+    const Operand operand = operand_of(*command, name, listings);
+    std::vector<std::string> own = command_names(*command);
+    own.insert(own.end(), operand.words.begin(), operand.words.end());
     cases += "    " + command->get_name() + ")\n      names+=' " +
-             joined(all_names(*command), " ") + "'\n      words='" + own + "' ;;\n";
+             joined(all_names(*command), " ") + "'\n      words='" + joined(own, " ") + "'";
+    if (!operand.listing.empty()) {
+      cases += "\n      [[ \"$word\" == -* ]] || words+=\" $(" + operand.listing + ")\"";
+    }
+    cases += " ;;\n";
   }
   return with_name(R"(# bash completion of %; made by `% completion bash`.
 _%() {
@@ -141,7 +169,7 @@ std::string zsh_text(const std::string& text) {
   return escaped;
 }
 
-// One argument of _arguments for each name: '--iso[The iso-value]:N:'.
+// Makes one argument of _arguments for each name: '--iso[The iso-value]:N:'.
 std::string zsh_options(const CLI::App& app) {
   std::string lines;
   for (const CLI::Option* option : all_options(app)) {
@@ -150,9 +178,10 @@ std::string zsh_options(const CLI::App& app) {
       if (!is_flag(*option)) {
         const std::vector<std::string> words = words_of(*option);
         entry += ":" + zsh_text(option->get_type_name()) + ":" +
-                 (!words.empty()        ? "(" + joined(words, " ") + ")"
-                  : takes_path(*option) ? "_files"
-                                        : "");
+                 (!words.empty() && is_list(*option) ? "_values -s , value " + joined(words, " ")
+                  : !words.empty()                   ? "(" + joined(words, " ") + ")"
+                  : takes_path(*option)              ? "_files"
+                                                     : "");
       }
       lines += "    " + quoted(entry, "'\\''") + " \\\n";
     }
@@ -160,15 +189,22 @@ std::string zsh_options(const CLI::App& app) {
   return lines;
 }
 
-std::string for_zsh(const CLI::App& app) {
+// How _arguments completes what is not an option.
+std::string zsh_operands(const CLI::App& command, const Operand& operand) {
+  std::vector<std::string> own = command_names(command);
+  own.insert(own.end(), operand.words.begin(), operand.words.end());
+  if (!own.empty()) return "'1:word:(" + joined(own, " ") + ")' '*:file:_files'";
+  if (operand.listing.empty()) return "'*:file:_files'";
+  return "'*:" + operand.name + ":{compadd -- $(" + operand.listing + ")}'";
+}
+
+std::string for_zsh(const CLI::App& app, const Listings& listings) {
   const std::string name = app.get_name();
   std::string script = "#compdef " + name + "\n# Made by `" + name + " completion zsh`.\n\n";
   for (const CLI::App* command : shown_commands(app)) {
-    const std::vector<std::string> own = command_names(*command);
     script += "_" + name + "_" + command->get_name() + "() {\n  _arguments \\\n" +
-              zsh_options(*command) + zsh_options(app) +
-              (own.empty() ? "" : "    '1:command:(" + joined(own, " ") + ")' \\\n") +
-              "    '*:file:_files'\n}\n\n";
+              zsh_options(*command) + zsh_options(app) + "    " +
+              zsh_operands(*command, operand_of(*command, name, listings)) + "\n}\n\n";
   }
   script += "_" + name + "() {\n  local line state\n  _arguments -C \\\n" + zsh_options(app) +
             "    '1:command:->command' '*::argument:->arguments'\n  case $state in\n"
@@ -201,7 +237,7 @@ std::string fish_options(const CLI::App& app, const std::string& begin) {
   return lines;
 }
 
-std::string for_fish(const CLI::App& app) {
+std::string for_fish(const CLI::App& app, const Listings& listings) {
   const std::string name = app.get_name();
   const std::string complete = "complete -c " + name;
   const std::string commands = joined(command_names(app), " ");
@@ -211,10 +247,13 @@ std::string for_fish(const CLI::App& app) {
   for (const CLI::App* command : shown_commands(app)) {
     script += complete + " -f -n 'not __fish_seen_subcommand_from " + commands + "' -a " +
               command->get_name() + " -d " + quoted(command->get_description(), "\\'") + '\n';
-    const std::string own = joined(command_names(*command), " ");
+    const Operand operand = operand_of(*command, name, listings);
+    std::vector<std::string> own = command_names(*command);
+    own.insert(own.end(), operand.words.begin(), operand.words.end());
+    if (!operand.listing.empty()) own.push_back('(' + operand.listing + ')');
     if (!own.empty()) {
       script += complete + " -f -n '__fish_seen_subcommand_from " + command->get_name() + "' -a '" +
-                own + "'\n";
+                joined(own, " ") + "'\n";
     }
     script += fish_options(
         *command, complete + " -n '__fish_seen_subcommand_from " + command->get_name() + "'");
@@ -231,14 +270,14 @@ std::optional<Shell> shell_from(std::string_view name) {
   return std::nullopt;
 }
 
-std::string completion(const CLI::App& app, Shell shell) {
+std::string completion(const CLI::App& app, Shell shell, const Listings& listings) {
   switch (shell) {
     case Shell::kBash:
-      return for_bash(app);
+      return for_bash(app, listings);
     case Shell::kZsh:
-      return for_zsh(app);
+      return for_zsh(app, listings);
     case Shell::kFish:
-      return for_fish(app);
+      return for_fish(app, listings);
   }
   return {};
 }

@@ -1,6 +1,7 @@
-// What shells complete a program's arguments with, made of its own table of options.
+// Completion of a program's arguments in shells, made from its own table of options.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,11 +14,15 @@ namespace isomesh::command_line {
 
 enum class Shell { kBash, kZsh, kFish };
 
-// Of "bash", "zsh" or "fish".
+// The shell called "bash", "zsh" or "fish".
 std::optional<Shell> shell_from(std::string_view name);
 
-// A script for that shell: subcommands, the options of each, the words that a value may be, and
-// files where a value is one. What belongs to no group is left out.
-std::string completion(const CLI::App& app, Shell shell);
+// Arguments by which the program prints the values of a positional, one a line, by the name of the
+// positional: {"JOB", "ids jobs"}.
+using Listings = std::map<std::string, std::string>;
+
+// A script for that shell. It completes subcommands, their options, the words that a value may be,
+// files, and positionals that `listings` has. Options and subcommands without a group are left out.
+std::string completion(const CLI::App& app, Shell shell, const Listings& listings = {});
 
 }  // namespace isomesh::command_line

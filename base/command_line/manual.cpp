@@ -10,7 +10,7 @@
 namespace isomesh::command_line {
 namespace {
 
-// As roff takes it for plain text: hyphens that can be copied, no macros, no escapes.
+// Escapes text for roff: hyphens can be copied, and nothing is a macro.
 std::string plain(std::string_view text) {
   std::string escaped;
   bool begins_line = true;
@@ -50,28 +50,14 @@ std::string paragraphs(const std::string& text) {
   return page + (is_shown_as_is ? ".fi\n" : "");
 }
 
-// "UINT" of "UINT:INT in [1 - 64]", which is the kind of the value; the range comes with the text.
-std::string kind_of(const CLI::Option& option) {
-  const std::string type = option.get_type_name();
-  if (option.nonpositional()) return type.substr(0, type.find(':'));
-  return option.get_name(true);
-}
-
 std::string entry(const CLI::Option& option) {
   std::string head;
   for (const std::string& name : names_of(option)) head += (head.empty() ? "" : ", ") + bold(name);
   if (!is_flag(option)) head += (head.empty() ? "" : " ") + italic(kind_of(option));
-  std::string text = option.get_description();
-  const std::string type = option.get_type_name();
-  const std::size_t range = type.find(" in [");
-  if (range != std::string::npos) text += "; within " + type.substr(range + 4);
-  const std::string standard = option.get_default_str();
-  if (!is_flag(option) && !standard.empty()) text += " (default: " + standard + ")";
-  if (!option.get_envname().empty()) text += ". From the environment: " + option.get_envname();
-  return ".TP\n" + head + '\n' + plain(text) + ".\n";
+  return ".TP\n" + head + '\n' + plain(text_of(option)) + ".\n";
 }
 
-// Options of one table, group by group in the order in which groups come first.
+// The options of one table by their groups, in the order in which the groups first appear.
 std::string options(const CLI::App& app, const std::string& heading) {
   std::string page;
   const std::vector<const CLI::Option*> all = shown_options(app);
@@ -103,7 +89,7 @@ std::string synopsis(const CLI::App& app, const std::string& program) {
   return line + '\n';
 }
 
-// A subcommand and those below it.
+// Calls `each` for every subcommand that has no subcommands of its own.
 void visit_commands(
     const CLI::App& app, const std::string& name,
     const std::function<void(const CLI::App& command, const std::string& name)>& each) {
@@ -128,6 +114,8 @@ std::string manual_page(const CLI::App& app, const Manual& manual) {
     for (const CLI::Option* option : shown_options(command)) {
       if (!option->check_lname("help")) commands += entry(*option);
     }
+    // Examples, which the help shows at its end.
+    if (!command.get_footer().empty()) commands += ".PP\n" + paragraphs(command.get_footer());
   });
   page += ".SH DESCRIPTION\n" + plain(app.get_description()) + '\n' + options(app, ".SH");
   if (!commands.empty()) page += ".SH COMMANDS\n" + commands;

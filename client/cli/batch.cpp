@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "base/text.h"
+#include "client/cli/ids.h"
 #include "client/cli/options.h"
 #include "client/isomesh/package.h"
 #include "proto/error.h"
@@ -16,17 +17,17 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kName = "{name}";
 
-// The files that would be sent for it, the first of which it is itself.
+// The files that would be sent for `path`; `path` itself is the first.
 std::vector<fs::path> sent_for(const fs::path& path) {
   std::vector<fs::path> files;
-  if (path == "-" || fs::is_directory(path)) return {path};
+  if (path == "-" || fs::is_directory(path) || is_stored_volume(path)) return {path};
   for (const PackedFile& file : files_of_upload(path)) {
     files.push_back(file.path.lexically_normal());
   }
   return files;
 }
 
-// Whether another input sends that file with it: it stands before in the list, or is its header.
+// True if another input sends that file too: an earlier one in the list, or its header.
 bool belongs_to_another(const std::vector<std::vector<fs::path>>& sent, std::size_t which) {
   const fs::path& own = sent[which].front();
   for (std::size_t other = 0; other < sent.size(); ++other) {
@@ -62,8 +63,8 @@ std::vector<Input> inputs_of(const Options& options) {
     if (belongs_to_another(sent, n)) continue;
     inputs.push_back({{files[n]}, name_of_input(files[n])});
     if (!names.insert(inputs.back().name).second) {
-      throw EarlyExit(kWrongUsage, "isomesh: two inputs are called " + inputs.back().name +
-                                       ", so one mesh would replace the other\n");
+      wrong_usage("two inputs are called " + inputs.back().name +
+                  ": one mesh would overwrite the other");
     }
   }
   return inputs;
@@ -87,6 +88,16 @@ std::vector<Output> filled(const std::vector<Output>& outputs, const std::string
     output.path = path;
   }
   return result;
+}
+
+std::vector<MeshFormat> formats_of(const std::vector<Output>& outputs) {
+  std::vector<MeshFormat> formats;
+  for (const Output& output : outputs) {
+    if (std::ranges::find(formats, output.format) == formats.end()) {
+      formats.push_back(output.format);
+    }
+  }
+  return formats;
 }
 
 }  // namespace isomesh::cli

@@ -1,4 +1,4 @@
-// Several inputs, each of which becomes a mesh of its own; private to this folder.
+// Several inputs, each with a mesh of its own; private to this folder.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,7 @@
 
 namespace isomesh::cli {
 
-// What is sent together, and what its outputs are called.
+// Files that are sent together, or the id of a stored volume, and the name of the outputs.
 struct Input {
   std::vector<std::filesystem::path> files;
   std::string name;
@@ -17,18 +17,21 @@ struct Input {
   bool operator==(const Input&) const = default;
 };
 
-// "head" of "scans/head.nii.gz"; of a folder its own name, of "-" "stdin".
+// "head" for "scans/head.nii.gz", "stdin" for "-"; for a folder its own name.
 std::string name_of_input(const std::filesystem::path& path);
 
-// Each file by itself when outputs are called by their inputs, but for those that belong to another
-// one of them, such as the data of a header; all of them together otherwise. Throws Error
-// kInvalidParameter where two would write the same output.
+// If outputs are named after inputs, each file is one input, without those that belong to another
+// file, such as the data of a header. Otherwise all files are one input. Throws EarlyExit if two
+// inputs would write the same output.
 std::vector<Input> inputs_of(const Options& options);
 
-// Whether outputs are called by their inputs: one of them has "{name}" in it.
+// True if outputs are named after inputs: one of them has "{name}" in it.
 bool is_by_name(const std::vector<Output>& outputs);
 
-// With `name` in place of "{name}", as far as it can be a file's.
+// Replaces "{name}" by `name`; slashes become underscores.
 std::vector<Output> filled(const std::vector<Output>& outputs, const std::string& name);
+
+// The formats of the outputs, each once, in the order of the outputs.
+std::vector<MeshFormat> formats_of(const std::vector<Output>& outputs);
 
 }  // namespace isomesh::cli

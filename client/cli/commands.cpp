@@ -7,6 +7,7 @@
 
 #include "client/cli/batch.h"
 #include "client/cli/console.h"
+#include "client/cli/ids.h"
 #include "client/cli/local_daemon.h"
 #include "client/cli/mesh_command.h"
 #include "client/cli/orders.h"
@@ -45,12 +46,12 @@ int upload(const Options& options, const std::stop_token& stop) {
   return status;
 }
 
-// Of a job on a volume that is there.
+// The parameters of a job on a stored volume.
 JobParameters parameters_of(const Options& options, Client& client) {
   JobParameters parameters = options.parameters;
-  parameters.volume = options.id;
+  parameters.volume = volume_id(client, options.id);
   if (!options.preset.empty()) {
-    parameters.iso = preset_of(client.volume(options.id), options.preset);
+    parameters.iso = preset_of(client.volume(parameters.volume), options.preset);
   }
   return parameters;
 }
@@ -73,28 +74,38 @@ void show(const Job& job, bool json) {
   std::cout << (json ? to_json(job) + '\n' : job_report(job));
 }
 
-// The status is 0 for every state of the job, because the question was answered.
+// Returns 0 for every state of the job.
 int status(const Options& options, const std::stop_token& stop) {
-  show(client_of(options, stop).job(options.id), options.json);
+  Client client = client_of(options, stop);
+  show(client.job(job_id(client, options.id)), options.json);
   return kDone;
 }
 
 int wait(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
   ProgressBar bar(!options.quiet);
-  const Job job = wait(client, options.id, bar);
+  const Job job = wait(client, job_id(client, options.id), bar);
   if (!options.quiet || options.json) show(job, options.json);
-  return status_of(job, options);
+  std::optional<SampleRange> range;
+  if (job.mesh && job.mesh->empty) {
+    try {
+      range = client.volume(job.parameters.volume).range;
+    } catch (const Error&) {
+      // The volume may have been deleted since.
+    }
+  }
+  return status_of(job, options, {}, range);
 }
 
 int fetch(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
   ProgressBar bar(!options.quiet);
-  const std::vector<Output> outputs = filled(options.outputs, options.id);
+  const std::string id = job_id(client, options.id);
+  const std::vector<Output> outputs = filled(options.outputs, id);
   const auto start = std::chrono::steady_clock::now();
-  for (const Output& output : outputs) fetch(client, options.id, output, bar, options.label);
+  for (const Output& output : outputs) fetch(client, id, output, bar, options.label);
   const ClientTiming seen{.download = milliseconds_since(start)};
-  const Job job = client.job(options.id);
+  const Job job = client.job(id);
   if (options.json) {
     std::cout << job_json(job, paths_of(outputs), seen) << '\n';
   } else if (job.mesh && !options.quiet) {
@@ -103,13 +114,13 @@ int fetch(const Options& options, const std::stop_token& stop) {
   return kDone;
 }
 
-// All that can be erased are, whatever is wrong with others.
+// Deletes as many volumes as possible and reports the others.
 int erase(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
   int status = kDone;
   for (const std::string& id : options.ids) {
     try {
-      client.erase_volume(id);
+      client.erase_volume(volume_id(client, id));
     } catch (const Error& error) {
       complain(error, id);
       status = std::max(status, status_of(error));
@@ -120,15 +131,25 @@ int erase(const Options& options, const std::stop_token& stop) {
 
 int cancel(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
-  client.cancel(options.id);
-  const Job job = client.job(options.id);
+  const std::string id = job_id(client, options.id);
+  client.cancel(id);
+  const Job job = client.job(id);
   if (options.json) {
     std::cout << to_json(job) << '\n';
   } else {
-    // A job that had ended stays as it was, and one that runs takes a moment to stop.
+    // A job that had ended keeps its state, and one that runs takes a moment to stop.
     std::cout << (is_final(job.state) ? to_string(job.state) : "stopping") << ' ' << job.id << '\n';
   }
   return kDone;
+}
+
+VolumeNames names_of_volumes(Client& client, const std::vector<Job>& jobs) {
+  VolumeNames names;
+  if (jobs.empty()) return names;
+  for (const Volume& volume : client.volumes()) {
+    if (volume.name) names[volume.id] = *volume.name;
+  }
+  return names;
 }
 
 int list(const Options& options, const std::stop_token& stop) {
@@ -138,9 +159,10 @@ int list(const Options& options, const std::stop_token& stop) {
     std::cout << (options.json ? to_json(volumes) + '\n' : volume_list(volumes));
   } else {
     const JobPage page = client.jobs(options.state, options.cursor);
-    std::cout << (options.json ? to_json(page.jobs, page.next) + '\n' : job_list(page.jobs));
+    std::cout << (options.json ? to_json(page.jobs, page.next) + '\n'
+                               : job_list(page.jobs, names_of_volumes(client, page.jobs)));
     if (!options.json && !page.next.empty()) {
-      std::cerr << "There are more: --cursor " << page.next << '\n';
+      std::cerr << "More: isomesh list --cursor " << page.next << '\n';
     }
   }
   return kDone;
@@ -148,26 +170,40 @@ int list(const Options& options, const std::stop_token& stop) {
 
 int info(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
-  const Volume volume = client.volume(options.id);
+  const Volume volume = client.volume(volume_id(client, options.id));
   if (options.json) {
     std::cout << to_json(volume) << '\n';
   } else {
     constexpr std::uint32_t kColumns = 64;
-    std::cout << volume_report(volume) << histogram_report(client.histogram(options.id, kColumns));
+    std::cout << volume_report(volume) << histogram_report(client.histogram(volume.id, kColumns));
   }
   return kDone;
 }
 
 int labels(const Options& options, const std::stop_token& stop) {
-  const VolumeLabels labels = client_of(options, stop).labels(options.id, options.background);
+  Client client = client_of(options, stop);
+  const VolumeLabels labels = client.labels(volume_id(client, options.id), options.background);
   std::cout << (options.json ? to_json(labels) + '\n' : label_list(labels));
   return kDone;
 }
 
 int rename(const Options& options, const std::stop_token& stop) {
   const auto name = options.name.empty() ? std::nullopt : std::optional(options.name);
-  const Volume volume = client_of(options, stop).rename_volume(options.id, name);
+  Client client = client_of(options, stop);
+  const Volume volume = client.rename_volume(volume_id(client, options.id), name);
   std::cout << (options.json ? to_json(volume) : volume.id) << '\n';
+  return kDone;
+}
+
+// For completions, which must be quick and say nothing on errors.
+int ids(const Options& options, const std::stop_token& stop) {
+  Client client({.server = options.server,
+                 .token = options.token,
+                 .authorities = options.authorities,
+                 .connect_timeout = std::chrono::seconds{1},
+                 .silence_timeout = std::chrono::seconds{2},
+                 .stop = stop});
+  for (const Candidate& each : ids_of(client, options.kind)) std::cout << each.id << '\n';
   return kDone;
 }
 
@@ -199,6 +235,8 @@ int dispatch(const Options& options, const std::stop_token& stop) {
       return info(options, stop);
     case Command::kLabels:
       return labels(options, stop);
+    case Command::kIds:
+      return ids(options, stop);
     case Command::kOrder:
     case Command::kOrders:
     case Command::kPacs: {
@@ -211,8 +249,7 @@ int dispatch(const Options& options, const std::stop_token& stop) {
   return kWrongUsage;
 }
 
-// A malformed server address or token is wrong usage; every other parameter that is refused was
-// refused by the server.
+// A malformed server address or token is wrong usage. The server rejects all other parameters.
 void check_server(const Options& options) { client_of(options, {}); }
 
 int run_locally(Options options, const std::stop_token& stop) {
@@ -239,8 +276,12 @@ int run(const Options& options, const std::stop_token& stop) {
   }
   try {
     return dispatch(options, stop);
+  } catch (const Lost& error) {
+    complain(error);
+    return status_of(error);
   } catch (const Error& error) {
     complain(error);
+    if (error.code() == ErrorCode::kUnreachable) suggest_local();
     return status_of(error);
   }
 }

@@ -10,9 +10,9 @@ constexpr int kDone = 0;
 constexpr int kRefused = 1;
 constexpr int kServerUnreachable = 3;
 
-// Runs the command and returns the process's exit status. Results go to standard output; progress,
-// and the reason when something fails, to standard error. A stop request ends the command, and
-// cancels the job that `mesh` waits for.
+// Runs the command and returns the process's exit status. Results go to standard output; progress
+// and errors go to standard error. A stop request ends the command and cancels the job that `mesh`
+// waits for.
 int run(const Options& options, const std::stop_token& stop);
 
 }  // namespace isomesh::cli

@@ -12,6 +12,7 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "client/cli/commands.h"
+#include "client/cli/parameter_options.h"
 #include "client/cli/report.h"
 #include "client/cli/text.h"
 #include "client/isomesh/package.h"
@@ -30,10 +31,15 @@ Error reason_of(const Job& job) {
   return {ErrorCode::kCancelled, "the job was cancelled"};
 }
 
-std::string why_empty(const MeshSummary& mesh) {
-  if (mesh.dropped.components > 0) return "no part of it was kept";
+std::string why_empty(const MeshSummary& mesh, const std::optional<SampleRange>& range) {
+  if (mesh.dropped.components > 0) return "all of its components were dropped";
   if (!mesh.iso) return "the labels have no surface";
-  return "the volume has no surface at the iso-value " + human_number(*mesh.iso);
+  std::string reason = "the volume has no surface at the iso-value " + human_number(*mesh.iso);
+  if (range) {
+    reason += "; its samples range from " + human_number((*range)[0]) + " to " +
+              human_number((*range)[1]);
+  }
+  return reason;
 }
 
 // "Soft tissue" and "soft-tissue" are "soft tissue".
@@ -49,7 +55,7 @@ std::string files_in_words(const std::vector<PackedFile>& files) {
          (files.size() == 1 ? " file" : " files");
 }
 
-// A folder may hold more than its name lets one think.
+// A folder may hold more than its name suggests.
 void tell_folders(const std::vector<std::filesystem::path>& files) {
   for (const std::filesystem::path& path : files) {
     std::error_code error;
@@ -66,11 +72,11 @@ void tell_folders(const std::vector<std::filesystem::path>& files) {
       names += (names.empty() ? "" : ", ") + file.name;
     }
     if (left_out.size() > kNamed) names += ", ...";
-    complain("leaving out " + files_in_words(left_out) + " that can be no volume: " + names);
+    complain("skipping " + files_in_words(left_out) + " that cannot be a volume: " + names);
   }
 }
 
-// Checked as a file is before it appears, and then written.
+// Downloads to a file first, so that only a complete mesh is written.
 void fetch_to_stdout(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
                      std::optional<std::int64_t> label) {
   const ScratchFile file(std::filesystem::temp_directory_path(), ".mesh");
@@ -78,7 +84,7 @@ void fetch_to_stdout(Client& client, const std::string& id, const Output& output
   std::ifstream mesh(file.path(), std::ios::binary);
   std::cout << mesh.rdbuf() << std::flush;
   if (!std::cout) {
-    throw Error(ErrorCode::kInvalidParameter, "standard output takes no more of the mesh");
+    throw Error(ErrorCode::kInvalidParameter, "standard output cannot be written to");
   }
 }
 
@@ -99,27 +105,35 @@ void complain(const std::string& message) {
 void complain(const Error& error, const std::string& subject) {
   const std::string remedy = remedy_report(error.remedy());
   const std::scoped_lock lock(console_mutex());
-  std::cerr << "isomesh: " << subject << (subject.empty() ? "" : ": ") << error.what() << '\n'
+  std::cerr << "isomesh: " << subject << (subject.empty() ? "" : ": ") << in_options(error) << '\n'
             << remedy;
+}
+
+void suggest_local() {
+  complain("check --server, start isomeshd, or use `isomesh local`, which needs no server");
 }
 
 int status_of(const Error& error) {
   return error.code() == ErrorCode::kUnreachable ? kServerUnreachable : kRefused;
 }
 
-int status_of(const Job& job, const Options& options, const std::string& subject) {
+int status_of(const Job& job, const Options& options, const std::string& subject,
+              const std::optional<SampleRange>& range) {
   if (job.state == JobState::kFailed || job.state == JobState::kCancelled) {
     complain(reason_of(job), subject);
     return kRefused;
   }
   if (!job.mesh || !job.mesh->empty || options.allow_empty) return kDone;
-  complain((subject.empty() ? "" : subject + ": ") + "the surface is empty: " +
-           why_empty(*job.mesh) + "; --allow-empty takes that for a result");
+  complain((subject.empty() ? "" : subject + ": ") +
+           "the surface is empty: " + why_empty(*job.mesh, range) + "; --allow-empty accepts that");
   return kRefused;
 }
 
-void tell_notes(const Volume& volume) {
-  for (const Note& note : volume.notes) complain("note: " + note.detail + " (" + note.code + ")");
+void tell_notes(const Volume& volume, const std::string& subject) {
+  for (const Note& note : volume.notes) {
+    complain((subject.empty() ? "" : subject + ": ") + "note: " + note_text(note) + " (" +
+             note.code + ")");
+  }
 }
 
 Job wait(Client& client, const std::string& id, ProgressBar& bar) {
@@ -141,7 +155,8 @@ void fetch(Client& client, const std::string& id, const Output& output, Progress
 
 std::vector<UploadedVolume> upload_all(Client& client, const Options& options,
                                        const std::vector<std::filesystem::path>& files,
-                                       const UploadOptions& how, ProgressBar& bar) {
+                                       const UploadOptions& how, ProgressBar& bar,
+                                       const std::string& subject) {
   if (!options.quiet) tell_folders(files);
   UploadOptions watched = how;
   watched.progress = [&](std::uint64_t done, std::uint64_t total) {
@@ -151,7 +166,10 @@ std::vector<UploadedVolume> upload_all(Client& client, const Options& options,
   bar.clear();
   if (options.quiet) return volumes;
   for (const UploadedVolume& each : volumes) {
-    if (each.volume) tell_notes(*each.volume);
+    if (!each.volume) continue;
+    const bool has_both = !subject.empty() && volumes.size() > 1;
+    tell_notes(*each.volume,
+               subject + (has_both ? ": " : "") + (volumes.size() > 1 ? each.member : ""));
   }
   return volumes;
 }
@@ -164,7 +182,7 @@ double preset_of(const Volume& volume, const std::string& name) {
   }
   const std::string has =
       names.empty()
-          ? "it has none, which CTs have whose values are Hounsfield units and reach there"
+          ? "only CTs in Hounsfield units have presets, and only for values that occur in them"
           : "it has " + listed(names);
   throw Error(ErrorCode::kInvalidParameter,
               "--iso: the volume has no preset \"" + name + "\"; " + has);

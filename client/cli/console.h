@@ -1,9 +1,12 @@
-// What the commands share: a client, and what they say to people; private to this folder.
+// What the commands share: a client, and messages to people; private to this folder.
 #pragma once
 
+#include <array>
+#include <optional>
 #include <stop_token>
 #include <string>
 
+#include "base/error.h"
 #include "client/cli/options.h"
 #include "client/cli/progress_bar.h"
 #include "client/isomesh/client.h"
@@ -14,32 +17,46 @@ Client client_of(const Options& options, const std::stop_token& stop);
 
 // A line on standard error. Safe to call from several threads.
 void complain(const std::string& message);
-// What was refused, and the options that would have it taken; `subject`, where there is one, is the
-// input that it is about.
+// The error, and the options that would resolve it. `subject` is the input that it is about; empty
+// if there is only one.
 void complain(const Error& error, const std::string& subject = {});
+
+// The server was lost after it had accepted a job; the text says how to resume.
+class Lost : public Error {
+ public:
+  explicit Lost(const std::string& detail) : Error(ErrorCode::kUnreachable, detail) {}
+};
+
+// What to do if no server answers.
+void suggest_local();
 
 // The exit status for an error that ended a command.
 int status_of(const Error& error);
-// The exit status for how a job ended. Why it failed, or that it found no surface, goes to standard
-// error.
-int status_of(const Job& job, const Options& options, const std::string& subject = {});
+using SampleRange = std::array<double, 2>;
 
-// What the server says about a volume besides what was asked; not for scripts.
-void tell_notes(const Volume& volume);
+// The exit status for the end of a job. The reason of a failure, or an empty surface, is reported
+// on standard error, with the range of the volume's samples if it is known.
+int status_of(const Job& job, const Options& options, const std::string& subject = {},
+              const std::optional<SampleRange>& range = {});
 
-// Without a terminal there is no progress to show, so the client uses the longest polls.
+// Reports the server's notes on a volume; `subject` as above.
+void tell_notes(const Volume& volume, const std::string& subject);
+
+// Without a terminal no progress is shown, so the client uses the longest polls.
 Job wait(Client& client, const std::string& id, ProgressBar& bar);
 
 void fetch(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
            std::optional<std::int64_t> label = std::nullopt);
 
-// Sends the files, and tells notes of what came of them.
+// Uploads the files and reports the notes on the volumes. `subject` names the input if there are
+// several.
 std::vector<UploadedVolume> upload_all(Client& client, const Options& options,
                                        const std::vector<std::filesystem::path>& files,
-                                       const UploadOptions& how, ProgressBar& bar);
+                                       const UploadOptions& how, ProgressBar& bar,
+                                       const std::string& subject = {});
 
-// A name for the iso-value, such as "bone", as the volume's presets have it. Throws Error
-// kInvalidParameter that names those that there are.
+// The iso-value that a preset of the volume has, such as "bone". Throws Error kInvalidParameter,
+// which lists the presets, if there is none with that name.
 double preset_of(const Volume& volume, const std::string& name);
 
 // A line for each file that was written.

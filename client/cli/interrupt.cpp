@@ -3,7 +3,6 @@
 #include <csignal>
 
 #include <pthread.h>
-#include <unistd.h>
 
 namespace isomesh::cli {
 namespace {
@@ -16,11 +15,23 @@ sigset_t stop_signals() {
   return signals;
 }
 
-void wait_for_signals(const std::stop_token& over, std::stop_source& source) {
+void die_by(int signal) {
+  std::signal(signal, SIG_DFL);
+  sigset_t own{};
+  sigemptyset(&own);
+  sigaddset(&own, signal);
+  ::pthread_sigmask(SIG_UNBLOCK, &own, nullptr);
+  std::raise(signal);
+}
+
+void wait_for_signals(const std::stop_token& over, std::stop_source& source,
+                      std::atomic<int>& first) {
   const sigset_t signals = stop_signals();
   int signal = 0;
   while (::sigwait(&signals, &signal) == 0 && !over.stop_requested()) {
-    if (!source.request_stop()) ::_exit(1);
+    if (first != 0) die_by(signal);
+    first = signal;
+    source.request_stop();
   }
 }
 
@@ -30,13 +41,17 @@ Interrupt::Interrupt() {
   const sigset_t signals = stop_signals();
   ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   waiter_ = std::jthread(
-      [source = source_](const std::stop_token& over) mutable { wait_for_signals(over, source); });
+      [this](const std::stop_token& over) { wait_for_signals(over, source_, signal_); });
 }
 
 Interrupt::~Interrupt() {
   waiter_.request_stop();
   // The signal ends the thread's wait. No other thread receives it.
   ::pthread_kill(waiter_.native_handle(), SIGINT);
+}
+
+void Interrupt::end_by_signal() const {
+  if (signal_ != 0) die_by(signal_);
 }
 
 }  // namespace isomesh::cli

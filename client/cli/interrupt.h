@@ -1,14 +1,15 @@
 // Ctrl-C as a stop request instead of a sudden end.
 #pragma once
 
+#include <atomic>
 #include <stop_token>
 #include <thread>
 
 namespace isomesh::cli {
 
-// To be made first in main, before any other thread, while one thread runs: blocks SIGINT and
-// SIGTERM for all and waits for them on a thread of its own. The first asks to stop; the second
-// ends the process at once with status 1.
+// Create it first in main, while only one thread runs: it blocks SIGINT and SIGTERM for all threads
+// and waits for them on a thread of its own. The first signal asks to stop; a second one ends the
+// process at once, by that signal.
 class Interrupt {
  public:
   Interrupt();
@@ -18,8 +19,13 @@ class Interrupt {
 
   std::stop_token token() const { return source_.get_token(); }
 
+  // Ends the process by the signal that came, with its default action; returns if none came. A
+  // shell ends its loop only if the command has died by SIGINT.
+  void end_by_signal() const;
+
  private:
   std::stop_source source_;
+  std::atomic<int> signal_ = 0;
   std::jthread waiter_;
 };
 

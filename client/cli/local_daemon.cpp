@@ -30,7 +30,7 @@ bool is_program(const fs::path& file) {
 fs::path find_program(const fs::path& given) {
   if (!given.empty()) {
     if (is_program(given)) return given;
-    throw Error(ErrorCode::kInvalidParameter, "--daemon: " + given.string() + " is no program");
+    throw Error(ErrorCode::kInvalidParameter, "--daemon: " + given.string() + " is not a program");
   }
   std::error_code unknown;
   const fs::path own = fs::read_symlink("/proc/self/exe", unknown).parent_path();
@@ -43,10 +43,10 @@ fs::path find_program(const fs::path& given) {
     if (is_program(place / "isomeshd")) return (place / "isomeshd").lexically_normal();
   }
   throw Error(ErrorCode::kInvalidParameter,
-              "isomeshd is not installed here; --daemon FILE says where it is");
+              "the program isomeshd was not found; give its path by --daemon FILE");
 }
 
-// What configures another daemon must not reach this one.
+// The environment may configure another daemon, so this one does not get those variables.
 std::vector<std::string> environment() {
   std::vector<std::string> all;
   for (char** entry = environ; *entry != nullptr; ++entry) {
@@ -62,7 +62,7 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
   return result;
 }
 
-// The first line that comes, or what there is of it when the writer ends.
+// Returns the first line, or its beginning if the writer ends.
 std::string first_line(int pipe) {
   std::string line;
   char letter = 0;
@@ -76,7 +76,7 @@ LocalDaemon::LocalDaemon(const fs::path& program, int jobs) {
   const fs::path found = find_program(program);
   std::string folder = (fs::temp_directory_path() / "isomesh-XXXXXX").string();
   if (::mkdtemp(folder.data()) == nullptr) {
-    throw Error(ErrorCode::kInvalidParameter, "no folder can be made: " + folder);
+    throw Error(ErrorCode::kInvalidParameter, "a temporary folder cannot be created: " + folder);
   }
   folder_ = folder;
   try {
@@ -126,7 +126,7 @@ void LocalDaemon::start(const fs::path& program, int jobs) {
     ::execve(arguments[0], arguments.data(), setting.data());
     ::_exit(127);
   }
-  if (process_ < 0) throw Error(ErrorCode::kInternal, "no process can be started");
+  if (process_ < 0) throw Error(ErrorCode::kInternal, "a process cannot be started");
   input = Descriptor(-1);
   if (!first_line(output.number()).starts_with("listening on ")) {
     const std::string text = read_whole(log);
@@ -143,7 +143,7 @@ void LocalDaemon::end() noexcept {
     }
   }
   process_ = -1;
-  std::error_code ignored;  // what stays is in the folder for temporary files
+  std::error_code ignored;  // leftovers are in the folder for temporary files
   std::filesystem::remove_all(folder_, ignored);
 }
 

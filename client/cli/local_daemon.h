@@ -8,19 +8,19 @@
 
 namespace isomesh::cli {
 
-// isomeshd on a socket that nobody else can reach, with a data folder that goes with it. It ends
-// with this object, and with this process however that ends.
+// isomeshd on a private socket, with a temporary data folder. It ends with this object, and also
+// with this process, however that ends.
 class LocalDaemon {
  public:
-  // `program` is isomeshd; empty: beside this program, in ../sbin from there, or in PATH. So many
-  // jobs run at the same time. Throws Error kInvalidParameter when there is no such program,
-  // kUnreachable when it does not start, with what it said.
+  // `program` is isomeshd; if empty, it is searched for beside this program, in ../sbin from there
+  // and in PATH. `jobs` run at the same time. Throws Error kInvalidParameter if there is no such
+  // program, and kUnreachable with its own message if it does not start.
   LocalDaemon(const std::filesystem::path& program, int jobs);
   ~LocalDaemon();
   LocalDaemon(const LocalDaemon&) = delete;
   LocalDaemon& operator=(const LocalDaemon&) = delete;
 
-  // As --server takes it.
+  // The address in the form of --server.
   std::string url() const;
 
  private:

@@ -13,7 +13,7 @@
 
 namespace {
 
-// As `head` does when it has seen enough, which nobody has to be told.
+// True if the reader of the output has ended, as `head` does. That is not an error to report.
 bool reader_has_left() {
   pollfd output{.fd = STDOUT_FILENO, .events = POLLOUT, .revents = 0};
   return ::poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;
@@ -23,7 +23,7 @@ bool reader_has_left() {
 
 int main(int argc, char** argv) {
   using namespace isomesh::cli;
-  // A reader of the output that went away is an error of std::cout, and no sudden end.
+  // If the reader of the output ends, writing fails instead of ending the process.
   std::signal(SIGPIPE, SIG_IGN);
   const Interrupt interrupt;
   int status = kRefused;
@@ -36,6 +36,7 @@ int main(int argc, char** argv) {
     std::cerr << "isomesh: " << error.what() << '\n';
   }
   std::cout.flush();
+  interrupt.end_by_signal();
   if (std::cout || status != kDone) return status;
   if (!reader_has_left()) std::cerr << "isomesh: standard output cannot be written to\n";
   return kRefused;

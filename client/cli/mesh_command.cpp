@@ -16,6 +16,7 @@
 #include "client/cli/batch.h"
 #include "client/cli/commands.h"
 #include "client/cli/console.h"
+#include "client/cli/ids.h"
 #include "client/cli/report.h"
 #include "client/cli/text.h"
 #include "proto/json.h"
@@ -34,8 +35,8 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// For what the server must learn at the end, also after an interrupt: the user does not wait long
-// for that.
+// For the last requests, also after an interrupt. The time limits are short, because the user
+// waits.
 Client parting_client(const Options& options) {
   return Client({.server = options.server,
                  .token = options.token,
@@ -44,28 +45,18 @@ Client parting_client(const Options& options) {
                  .silence_timeout = std::chrono::seconds{5}});
 }
 
-// After an interrupt the job is no longer wanted.
+// Cancels the job after an interrupt.
 void cancel_after_stop(const Options& options, const std::string& id) {
   Client client = parting_client(options);
   try {
     client.cancel(id);
-    complain("interrupted; the job " + id + " is cancelled");
+    complain("interrupted; the job " + id + " was cancelled");
   } catch (const Error& error) {
     complain("interrupted; the job " + id + " could not be cancelled: " + error.what());
   }
 }
 
-std::vector<MeshFormat> formats_of(const std::vector<Output>& outputs) {
-  std::vector<MeshFormat> formats;
-  for (const Output& output : outputs) {
-    if (std::ranges::find(formats, output.format) == formats.end()) {
-      formats.push_back(output.format);
-    }
-  }
-  return formats;
-}
-
-// What came from standard input, as a file, because an upload's size is told ahead.
+// Copies standard input to a file, because an upload states its size first.
 std::unique_ptr<ScratchFile> stdin_as_file() {
   auto file = std::make_unique<ScratchFile>(std::filesystem::temp_directory_path(), ".volume");
   std::vector<char> block(std::size_t{1} << 20);
@@ -78,8 +69,8 @@ std::unique_ptr<ScratchFile> stdin_as_file() {
   return file;
 }
 
-// The volumes that a dry run has stored: erased when all of it has ended, because inputs may be the
-// same volume.
+// The volumes that a dry run has stored. They are deleted when all inputs have ended, because
+// several inputs may be the same volume.
 class Leftovers {
  public:
   explicit Leftovers(const Options& options) : options_(options) {}
@@ -99,7 +90,7 @@ class Leftovers {
       try {
         parting_client(options_).erase_volume(id);
       } catch (const Error& error) {
-        complain("the volume " + id + " could not be erased: " + error.what());
+        complain("the volume " + id + " could not be deleted: " + error.what());
       }
     }
   }
@@ -110,7 +101,7 @@ class Leftovers {
   std::set<std::string> ids_;
 };
 
-// One input's way: up, meshed, down. Made for each thread.
+// Takes one input at a time: uploads it, meshes it and downloads the mesh. One object per thread.
 class Run {
  public:
   Run(const Options& options, const std::stop_token& stop, bool is_one_of_many,
@@ -134,12 +125,14 @@ class Run {
       file = copy->path();
       if (how.name.empty()) how.name = "stdin";
     }
+    if (is_stored_volume(files.front())) return stored(files.front().string(), input.name);
     const Stopwatch uploading;
-    const std::vector<UploadedVolume> volumes = upload_all(client_, options_, files, how, bar_);
+    const std::vector<UploadedVolume> volumes =
+        upload_all(client_, options_, files, how, bar_, is_one_of_many_ ? input.name : "");
     seen_.upload = uploading.milliseconds();
     if (options_.dry_run) leftovers_.add(volumes);
     if (volumes.size() == 1 && volumes.front().volume) {
-      return volume(volumes.front(), input.name, input.name);
+      return mesh(*volumes.front().volume, input.name, input.name);
     }
     if (!is_by_name(options_.outputs)) throw several_volumes(volumes);
     int status = kDone;
@@ -148,15 +141,21 @@ class Run {
       if (each.problem) complain(to_error(*each.problem), subject);
       const int of_this =
           each.problem ? kRefused
-                       : volume(each, input.name + '-' + name_of_input(each.member), subject);
+                       : mesh(*each.volume, input.name + '-' + name_of_input(each.member), subject);
       status = std::max(status, of_this);
     }
     return status;
   }
 
  private:
-  int volume(const UploadedVolume& uploaded, const std::string& name, const std::string& subject) {
-    const Volume& volume = *uploaded.volume;
+  // A volume that is on the server already.
+  int stored(const std::string& id, const std::string& name) {
+    const Volume found = client_.volume(volume_id(client_, id));
+    if (!options_.quiet) tell_notes(found, is_one_of_many_ ? name : "");
+    return mesh(found, name, name);
+  }
+
+  int mesh(const Volume& volume, const std::string& name, const std::string& subject) {
     const std::vector<Output> outputs = filled(options_.outputs, name);
     JobParameters parameters = options_.parameters;
     parameters.volume = volume.id;
@@ -177,10 +176,10 @@ class Run {
     });
     seen_.download = downloading.milliseconds();
     report(*job, outputs);
-    return status_of(*job, options_, about);
+    return status_of(*job, options_, about, volume.range);
   }
 
-  // The job that has ended; none after an interrupt.
+  // Returns the job when it has ended; nothing after an interrupt.
   std::optional<Job> made(const JobParameters& parameters) {
     Job job = client_.submit(parameters);
     try {
@@ -194,7 +193,7 @@ class Run {
     }
   }
 
-  // What to do when the server went away in the middle, which a job outlives.
+  // If the server is lost, the job goes on there; the error says how to resume.
   template <class Step>
   void resumable(const std::string& job, const Step& step) {
     try {
@@ -203,14 +202,12 @@ class Run {
       bar_.clear();
       if (error.code() != ErrorCode::kUnreachable || options_.is_local) throw;
       const std::string command = "isomesh --server " + options_.server;
-      throw Error(ErrorCode::kUnreachable, std::string(error.what()) + "\nThe server has the job " +
-                                               job + " and goes on with it. To go on here:\n  " +
-                                               command + " wait " + job + "\n  " + command +
-                                               " fetch " + job + " -o OUT");
+      throw Lost(std::string(error.what()) + "\nThe server has accepted the job " + job +
+                 " and continues it. To resume:\n  " + command + " wait " + job + "\n  " + command +
+                 " fetch " + job + " -o OUT");
     }
   }
 
-  // What a job would make and take.
   int dry_run(const JobParameters& parameters, const std::string& name) {
     const Estimate estimate = client_.estimate(parameters);
     print(options_.json ? to_json(estimate) + '\n'
@@ -225,7 +222,7 @@ class Run {
     if (options_.quiet || has_mesh_on_stdout) return;
     std::string text = outputs_report(job, outputs);
     if (!is_one_of_many_) {
-      if (job.reused) text += "\nthe mesh is that of an earlier job like this one\n";
+      if (job.reused) text += "\nthe mesh was reused from an identical earlier job\n";
       text += '\n' + timing_report(job.timing, seen_) + '\n' + mesh_report(*job.mesh);
     }
     print(text);
@@ -246,18 +243,23 @@ class Run {
   ClientTiming seen_;
 };
 
-// Some at a time, each told of by itself.
+// Meshes some inputs at a time and reports each of them.
 int mesh_all(const Options& options, const std::vector<Input>& inputs, const std::stop_token& stop,
              Leftovers& leftovers) {
   std::atomic<std::size_t> next = 0;
   std::atomic<int> worst = kDone;
   std::atomic<std::size_t> failed = 0;
+  std::atomic<bool> is_lost = false;
   const auto work = [&] {
     Run run(options, stop, true, leftovers);
     for (std::size_t at = next++; at < inputs.size() && !stop.stop_requested(); at = next++) {
       int status = kDone;
       try {
         status = run.input(inputs[at]);
+      } catch (const Lost& error) {
+        is_lost = true;
+        complain(error, inputs[at].name);
+        status = kServerUnreachable;
       } catch (const Error& error) {
         complain(error, inputs[at].name);
         status = status_of(error);
@@ -278,6 +280,7 @@ int mesh_all(const Options& options, const std::vector<Input>& inputs, const std
   if (failed > 0) {
     complain(std::to_string(failed) + " of " + std::to_string(inputs.size()) + " inputs failed");
   }
+  if (worst == kServerUnreachable && !is_lost && !options.is_local) suggest_local();
   return worst;
 }
 

@@ -1,4 +1,4 @@
-// Options that take values, and how their texts are read; private to this folder.
+// Options that take values, and the reading of those values; private to this folder.
 #pragma once
 
 #include <algorithm>
@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -33,21 +34,35 @@ std::optional<Number> number_from(std::string_view text) {
   return number;
 }
 
-// Exactly as many numbers as the target has, separated by commas.
+// Exactly N numbers, separated by commas.
 template <class Number, std::size_t N>
-std::array<Number, N> numbers_from(const std::string& option, std::string_view text) {
+std::optional<std::array<Number, N>> all_numbers_from(std::string_view text) {
   std::array<Number, N> numbers{};
   for (std::size_t n = 0; n < N; ++n) {
     const std::size_t end = std::min(text.find(','), text.size());
     const auto number = number_from<Number>(text.substr(0, end));
     const bool last = n + 1 == N;
-    if (!number || last != (end == text.size())) {
-      refuse(option, "must be " + std::to_string(N) + " numbers separated by commas");
-    }
+    if (!number || last != (end == text.size())) return std::nullopt;
     numbers[n] = *number;
     text.remove_prefix(last ? end : end + 1);
   }
   return numbers;
+}
+
+template <class Number, std::size_t N>
+std::array<Number, N> numbers_from(const std::string& option, std::string_view text) {
+  const auto numbers = all_numbers_from<Number, N>(text);
+  if (!numbers) refuse(option, "must be " + std::to_string(N) + " numbers separated by commas");
+  return *numbers;
+}
+
+// "must be a whole number from 0 to 4294967295": what a rejected number has to be, by its type.
+template <class Number>
+std::string must_be_number() {
+  if constexpr (std::is_floating_point_v<Number>) return "must be a number";
+  if constexpr (sizeof(Number) > 4) return "must be a whole number";
+  return "must be a whole number from " + std::to_string(std::numeric_limits<Number>::min()) +
+         " to " + std::to_string(std::numeric_limits<Number>::max());
 }
 
 template <class Enum>
@@ -73,15 +88,17 @@ inline CLI::Option* add(CLI::App& app, const std::string& name, const std::strin
 
 template <class Number>
 CLI::Option* add_number(CLI::App& app, const std::string& name, const std::string& help,
-                        std::function<void(Number)> take) {
-  return add(app, name, "N", help, [name, take = std::move(take)](const std::string& text) {
-    const auto number = number_from<Number>(text);
-    if (!number) refuse(name, "\"" + text + "\" is not a number");
-    take(*number);
-  });
+                        std::function<void(Number)> take,
+                        const std::string& must_be = must_be_number<Number>()) {
+  return add(app, name, "N", help,
+             [name, must_be, take = std::move(take)](const std::string& text) {
+               const auto number = number_from<Number>(text);
+               if (!number) refuse(name, must_be);
+               take(*number);
+             });
 }
 
-// "linear|midpoint", by which completions know them too.
+// "linear|midpoint": the type that help shows and that completions offer.
 template <class Enum>
 std::string type_of_names() {
   std::string names = names_of<Enum>();  // "linear" or "midpoint"

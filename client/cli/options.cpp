@@ -1,8 +1,6 @@
 #include "client/cli/options.h"
 
 #include <algorithm>
-#include <cctype>
-#include <cmath>
 #include <sstream>
 #include <string_view>
 #include <utility>
@@ -10,164 +8,82 @@
 #include <CLI/CLI.hpp>
 
 #include "base/command_line/completion.h"
+#include "base/command_line/help.h"
 #include "base/command_line/manual.h"
 #include "base/text.h"
+#include "client/cli/argument_names.h"
+#include "client/cli/batch.h"
+#include "client/cli/examples.h"
+#include "client/cli/ids.h"
 #include "client/cli/option_values.h"
 #include "client/cli/orders.h"
 #include "client/cli/output_options.h"
 #include "client/cli/parameter_options.h"
+#include "client/cli/upload_options.h"
 #include "proto/json.h"
 #include "proto/parameters.h"
 
 namespace isomesh::cli {
 namespace {
 
-constexpr const char* kDescription = "Turns volumes into surface meshes on an isomesh server.";
-
-constexpr const char* kExamples = R"(
-  isomesh mesh head.nii.gz --iso 60 -o head.drc
-  isomesh mesh ct-series/ --iso bone --passes 10 -o bone.glb -o bone.stl
-  isomesh mesh scans/*.nii.gz --iso otsu -o meshes/ --format glb --jobs 4
-  zcat head.nii.gz | isomesh local - --iso 60 -o - --format stl >head.stl
-  isomesh mesh ct.raw --dims 512,512,300 --type int16 --spacing 0.7,0.7,1 --iso 300 -o ct.stl
-  isomesh mesh organs.seg.nrrd --labels all -o body.glb -o organs.zip
-  isomesh submit $(isomesh upload head.nii.gz) --iso 60 --format drc,stl
-  isomesh --server https://meshes.example.org --json list
-)";
+constexpr const char* kDescription =
+    "Turns medical volumes into surface meshes, on an isomesh server or on this computer alone.";
 
 constexpr const char* kExitStatus =
-    "0 done, 1 the job failed or was refused, 2 wrong usage, 3 the server could not be reached.";
+    "0 done, 1 the job failed or was rejected, 2 wrong usage, 3 the server could not be reached. "
+    "Ctrl-C cancels the job and ends the command by SIGINT.";
 
 command_line::Manual manual() {
-  return {
-      .number = 1,
-      .version = ISOMESH_VERSION,
-      .name = "turn medical volumes into surface meshes on an isomesh server",
-      .sections = {
-          {"Examples", kExamples + 1}, {"Exit status", kExitStatus}, {"See also", "isomeshd(8)"}}};
-}
-
-void add_file(CLI::App& app, Options& options) {
-  app.add_option_function<std::vector<std::string>>(
-         "FILE",
-         [&](const std::vector<std::string>& paths) {
-           for (const std::string& path : paths) {
-             std::error_code error;
-             if (path != "-" && !std::filesystem::exists(path, error)) {
-               refuse("FILE", path + " is not there");
-             }
-             if (path == "-" && std::ranges::count(paths, "-") > 1) {
-               refuse("FILE", "standard input, -, can be read once");
-             }
-             options.files.emplace_back(path);
-           }
-         },
-         "NIfTI, NRRD, MetaImage, VTI, DICOM, a folder or archive of one, or raw samples with "
-         "--dims and --type; several files that belong together, such as .hdr and .img; - for "
-         "standard input")
-      ->type_name("FILE")
-      ->required();
-  add(app, "--series", "UID", "The DICOM series to take, where there are several",
-      [&](const std::string& text) { options.upload.series = text; })
-      ->group("Upload");
-  add(app, "--member", "NAME", "The archive's member to take, where it holds several volumes",
-      [&](const std::string& text) { options.upload.member = text; })
-      ->group("Upload");
-  add_number<std::uint32_t>(app, "--volume", "The volume to take of a file of several, from 0 on",
-                            [&](std::uint32_t number) { options.upload.volume = number; })
-      ->group("Upload");
-  add(app, "--accept", "CODE,..", "Take it in spite of what the server would refuse it for",
-      [&](const std::string& text) {
-        for (const std::string_view code : split(text, ','))
-          options.upload.accept.emplace_back(code);
-      })
-      ->group("Upload");
-  add_name<NiftiForm>(app, "--nifti-form", "Which form of a NIfTI header to go by: sform or qform",
-                      [&](NiftiForm form) { options.upload.nifti_form = form; })
-      ->group("Upload");
-  add(app, "--name", "TEXT", "What to call the volume (default: as the series or the file)",
-      [&](const std::string& text) { options.upload.name = text; })
-      ->group("Upload");
-  app.add_flag("--digest", options.upload.digest, "Have the server check the file's SHA-256")
-      ->group("Upload");
-}
-
-void add_raw(CLI::App& app, Options& options) {
-  const auto raw = [&options]() -> RawDescription& {
-    auto& described = options.upload.raw;
-    return described ? *described : described.emplace();
-  };
-  auto* dims = add(app, "--dims", "X,Y,Z", "Samples along x, y and z; x runs fastest",
-                   [raw](const std::string& text) {
-                     raw().dims = numbers_from<std::uint32_t, 3>("--dims", text);
-                     if (std::ranges::count(raw().dims, 0U) > 0)
-                       refuse("--dims", "must be 1 or more");
-                   });
-  auto* type = add_name<SampleType>(app, "--type", "Such as uint8, int16, float32",
-                                    [raw](SampleType value) { raw().type = value; });
-  dims->needs(type);
-  type->needs(dims);
-  std::vector<CLI::Option*> others = {
-      add(app, "--spacing", "X,Y,Z", "Millimetres between samples",
-          [raw](const std::string& text) {
-            raw().geometry.spacing = numbers_from<double, 3>("--spacing", text);
-            const auto is_length = [](double length) {
-              return length > 0 && std::isfinite(length);
-            };
-            if (!std::ranges::all_of(raw().geometry.spacing, is_length)) {
-              refuse("--spacing", "must be greater than 0");
-            }
-          }),
-      add(app, "--origin", "X,Y,Z", "Where the first sample lies, in millimetres (LPS)",
-          [raw](const std::string& text) {
-            raw().geometry.origin = numbers_from<double, 3>("--origin", text);
-          }),
-      add(app, "--direction", "A,..,I", "Nine numbers, row by row; columns are the axes",
-          [raw](const std::string& text) {
-            raw().geometry.direction = numbers_from<double, 9>("--direction", text);
-          }),
-      add(app, "--byte-order", "ORDER", "little (the default) or big",
-          [raw](const std::string& text) {
-            if (text != "little" && text != "big") refuse("--byte-order", "must be little or big");
-            raw().big_endian = text == "big";
-          })};
-  for (CLI::Option* other : others) other->needs(dims)->group("Raw samples");
-  dims->group("Raw samples");
-  type->group("Raw samples");
+  return {.number = 1,
+          .version = ISOMESH_VERSION,
+          .name = "turn medical volumes into surface meshes on an isomesh server",
+          .sections = {{"Examples", general_examples()},
+                       {"Exit status", kExitStatus},
+                       {"See also", "isomeshd(8)"}}};
 }
 
 void add_id(CLI::App& app, Options& options, const std::string& name) {
-  app.add_option(name, options.id, "Its id")->required();
+  const std::string kind = name == "JOB" ? "job" : "volume";
+  app.add_option(name, options.id,
+                 "Id of the " + kind + "; its beginning or end is enough if unique")
+      ->required()
+      ->type_name("ID");
 }
 
 void add_allow_empty(CLI::App& app, Options& options) {
   app.add_flag("--allow-empty", options.allow_empty,
-               "Exit with 0 also where the surface is empty, which else is 1");
+               "Exit with status 0 instead of 1 if the surface is empty");
 }
 
 class Parser {
  public:
   Parser() : app_(kDescription, "isomesh") {
-    app_.set_version_flag("--version", "isomesh " ISOMESH_VERSION);
+    app_.formatter(command_line::wrapped_help());
+    app_.set_help_flag("-h,--help", "Print this help and exit");
+    app_.set_version_flag("-V,--version", "isomesh " ISOMESH_VERSION, "Print the version and exit");
     app_.require_subcommand(1);
     app_.fallthrough();
-    app_.footer(std::string("\nExamples:") + kExamples + "\nExit status: " + kExitStatus);
-    app_.add_option("--server", options_.server, "http://HOST:PORT, https://HOST:PORT or unix:PATH")
+    app_.footer("Examples:\n" + general_examples() + "\n" +
+                command_line::wrapped(std::string("Exit status: ") + kExitStatus, 0) +
+                "\n\n`isomesh COMMAND --help` shows the options and examples of a command.");
+    app_.add_option("--server", options_.server,
+                    "Address of the server: http://HOST:PORT, https://HOST:PORT or unix:PATH")
         ->envname("ISOMESH_SERVER")
         ->type_name("URL")
         ->capture_default_str();
-    app_.add_option("--token", options_.token, "The bearer token, where the server wants one")
+    app_.add_option("--token", options_.token, "Bearer token, if the server requires one")
         ->envname("ISOMESH_TOKEN")
         ->type_name("TOKEN");
     app_.add_option("--ca", options_.authorities,
-                    "File of the certificate authorities to trust, where the system's do not do")
+                    "File of certificate authorities (PEM) to trust instead of the system's")
         ->envname("ISOMESH_CA")
         ->type_name("FILE")
         ->check(CLI::ExistingFile);
-    app_.add_flag("--json", options_.json, "JSON on standard output");
-    app_.add_flag("-q,--quiet", options_.quiet, "Say nothing but what went wrong");
+    app_.add_flag("--json", options_.json, "Print JSON to standard output");
+    app_.add_flag("-q,--quiet", options_.quiet, "Print only errors");
 
-    add_mesh(command(Command::kMesh, "mesh", "Upload volumes, mesh them, download the meshes"));
+    add_mesh(command(Command::kMesh, "mesh", "Upload volumes, mesh them and download the meshes"),
+             Inputs::kFilesAndVolumes);
     add_local();
 
     CLI::App& upload = command(Command::kUpload, "upload", "Upload a volume and print its id");
@@ -179,40 +95,44 @@ class Parser {
     add_parameters(submit, options_.parameters, options_.preset, Formats::kAsOption);
     submit
         .add_option("--key", options_.key,
-                    "Idempotency key: the same one gives the same job again (default: a new one)")
+                    "Idempotency key: the same key returns the same job (default: a new key)")
         ->type_name("KEY");
 
     CLI::App& estimate =
-        command(Command::kEstimate, "estimate", "Say what a job would make and take");
+        command(Command::kEstimate, "estimate", "Estimate the size, memory and time of a job");
     add_id(estimate, options_, "VOLUME");
     add_parameters(estimate, options_.parameters, options_.preset, Formats::kAsOption,
                    Carrier::kQuery);
 
     add_id(command(Command::kStatus, "status", "Show a job"), options_, "JOB");
-    CLI::App& wait = command(Command::kWait, "wait", "Wait for a job and show it");
+    CLI::App& wait = command(Command::kWait, "wait", "Wait until a job ends, then show it");
     add_id(wait, options_, "JOB");
     add_allow_empty(wait, options_);
 
     CLI::App& fetch = command(Command::kFetch, "fetch", "Download the mesh of a finished job");
     add_id(fetch, options_, "JOB");
     add_outputs(fetch, outputs_);
-    add_number<std::int64_t>(fetch, "--label", "Of a job by labels: this label's own surface",
+    add_number<std::int64_t>(fetch, "--label",
+                             "Download the surface of this label alone, from a job with --labels",
                              [&](std::int64_t label) { options_.label = label; });
 
     add_id(command(Command::kCancel, "cancel", "Cancel a job"), options_, "JOB");
 
-    CLI::App& rename = command(Command::kRename, "rename", "Give a volume another name");
+    CLI::App& rename = command(Command::kRename, "rename", "Rename a volume");
     add_id(rename, options_, "VOLUME");
-    rename.add_option("NAME", options_.name, "What it is called; empty for no name")->required();
+    rename.add_option("NAME", options_.name, "The new name; \"\" removes the name")->required();
 
-    command(Command::kErase, "erase", "Erase volumes and their samples")
-        .add_option("VOLUME", options_.ids, "Their ids")
+    command(Command::kErase, "erase", "Delete volumes from the server")
+        .add_option("VOLUME", options_.ids,
+                    "Ids of the volumes; unique beginnings or ends are enough")
+        ->type_name("ID")
         ->required();
 
     CLI::App& list = command(Command::kList, "list", "List jobs, or volumes");
     add_name<JobState>(list, "--state", "Only jobs in this state",
                        [&](JobState state) { options_.state = state; });
-    list.add_option("--cursor", options_.cursor, "The page to show, as the one before names it")
+    list.add_option("--cursor", options_.cursor,
+                    "Page to show; the page before it prints its cursor")
         ->type_name("CURSOR");
     list.add_flag("--volumes", options_.volumes, "List volumes instead");
 
@@ -222,40 +142,40 @@ class Parser {
         command(Command::kLabels, "labels", "List the labels of a volume that is a label map");
     add_id(labels, options_, "VOLUME");
     add_number<std::int64_t>(labels, "--background",
-                             "The value that belongs to no label (default: 0)",
+                             "Value of samples without a label (default: 0)",
                              [&](std::int64_t value) { options_.background = value; });
     add_order_commands();
     add_descriptions();
   }
 
-  // What is about a PACS.
   void add_order_commands() {
     add_order_options(command(Command::kOrder, "order",
-                              "Order a mesh of a series in a PACS, back into a PACS, and wait"),
+                              "Mesh a series from a PACS, send the mesh to a PACS, and wait"),
                       options_);
-    add_orders_options(command(Command::kOrders, "orders", "List orders, or act on one"), options_);
-    command(Command::kPacs, "pacs", "List the PACS that the server knows, and how they are");
+    add_orders_options(
+        command(Command::kOrders, "orders", "List orders; show, cancel or retry one"), options_);
+    command(Command::kPacs, "pacs", "List the PACS that the server knows, and their state");
   }
 
   Options parse(int argc, const char* const* argv) {
-    check_names(argc, argv);
+    check_names(app_, argc, argv);
     try {
       app_.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
       std::ostringstream out;
       std::ostringstream err;
-      const int status = app_.exit(error, out, err);
-      throw EarlyExit(status == 0 ? 0 : kWrongUsage, status == 0 ? out.str() : err.str());
+      if (app_.exit(error, out, err) == 0) throw EarlyExit(0, out.str());
+      wrong_usage(error.what() + ("\n" + help_of_command()));
     }
     describe_itself();
     options_.outputs = outputs_from(outputs_);
-    // Of a dry run, which may name no files.
+    // A dry run may have formats without files.
     if (options_.outputs.empty() && !outputs_.formats.empty()) {
       options_.parameters.formats = outputs_.formats;
     }
     if (options_.command == Command::kMesh) check_mesh();
     if (options_.command == Command::kFetch && options_.outputs.empty()) {
-      throw EarlyExit(kWrongUsage, "-o is required\n");
+      wrong_usage("-o is required");
     }
     check_parameters();
     return std::move(options_);
@@ -264,72 +184,48 @@ class Parser {
  private:
   CLI::App& command(Command value, const std::string& name, const std::string& help) {
     CLI::App* app = app_.add_subcommand(name, help);
+    app->footer(footer_of(name));
     app->callback([this, value] { options_.command = value; });
     return *app;
   }
 
-  // Ahead of the library, which would tell "FILE: 30 is not there" of "--isoo 30".
-  void check_names(int argc, const char* const* argv) const {
-    const CLI::App* command = &app_;
-    for (int n = 1; n < argc && std::string_view(argv[n]) != "--"; ++n) {
-      const std::string word = argv[n];
-      const bool is_option = word.starts_with("--") ||
-                             (word.size() == 2 && word[0] == '-' && std::isalpha(word[1]) != 0);
-      if (!is_option) {
-        if (command != &app_ || word.starts_with('-')) continue;
-        command = subcommand(word);
-        continue;
-      }
-      const std::string name = word.substr(0, word.find('='));
-      const CLI::Option* option = command->get_option_no_throw(name);
-      if (option == nullptr) option = std::as_const(app_).get_option_no_throw(name);
-      if (option == nullptr) {
-        throw EarlyExit(kWrongUsage, "isomesh: there is no option " + name + "; `isomesh" +
-                                         (command == &app_ ? "" : ' ' + command->get_name()) +
-                                         " --help` lists them\n");
-      }
-      const bool has_value_behind =
-          option->get_items_expected_max() > 0 && name.size() == word.size();
-      if (has_value_behind) ++n;
-    }
-  }
-
-  const CLI::App* subcommand(const std::string& name) const {
-    for (const CLI::App* each : app_.get_subcommands([](const CLI::App*) { return true; })) {
-      if (each->check_name(name)) return each;
-    }
-    throw EarlyExit(kWrongUsage,
-                    "isomesh: there is no command " + name + "; `isomesh --help` lists them\n");
-  }
-
   void add_descriptions() {
-    completion_ = app_.add_subcommand("completion", "Print what a shell completes arguments with");
-    completion_->add_option("SHELL", shell_, "bash, zsh or fish")->required();
+    completion_ = app_.add_subcommand("completion", "Print the completion script of a shell");
+    completion_->add_option("SHELL", shell_, "The shell")->required()->type_name("bash|zsh|fish");
+    completion_->footer(footer_of("completion"));
     manual_ = app_.add_subcommand("manual", "Print the manual page");
     manual_->group("");
+    // For completions.
+    CLI::App& ids = command(Command::kIds, "ids", "Print ids, one a line");
+    ids.add_option("KIND", options_.kind, "What to list")
+        ->required()
+        ->check(CLI::IsMember({"volumes", "jobs", "orders"}));
+    ids.group("");
   }
 
-  // Ends the program where that was asked for.
+  // Prints the manual page or a completion and ends the program, if that was asked for.
   void describe_itself() const {
     if (manual_->parsed()) throw EarlyExit(0, command_line::manual_page(app_, manual()));
     if (!completion_->parsed()) return;
     const auto shell = command_line::shell_from(shell_);
-    if (!shell) throw EarlyExit(kWrongUsage, "SHELL must be bash, zsh or fish\n");
-    throw EarlyExit(0, command_line::completion(app_, *shell));
+    if (!shell) wrong_usage("SHELL must be bash, zsh or fish");
+    const command_line::Listings listings = {
+        {"VOLUME", "ids volumes"}, {"JOB", "ids jobs"}, {"ORDER", "ids orders"}};
+    throw EarlyExit(0, command_line::completion(app_, *shell, listings));
   }
 
-  void add_mesh(CLI::App& app) {
-    add_file(app, options_);
+  void add_mesh(CLI::App& app, Inputs inputs) {
+    add_file(app, options_, inputs);
     add_outputs(app, outputs_);
-    add_number<int>(app, "--jobs",
-                    "How many FILEs at a time, of those that are meshed each (default: 1)",
-                    [&](int jobs) {
-                      if (jobs < 1 || jobs > kMostJobs) refuse("--jobs", "must be from 1 to 64");
-                      options_.jobs = jobs;
-                    });
-    app.add_flag(
-        "--dry-run", options_.dry_run,
-        "Upload, print what the job would make and take, and erase what was not there before");
+    add_number<int>(
+        app, "--jobs", "Number of FILEs to mesh at the same time (default: 1)",
+        [&](int jobs) {
+          if (jobs < 1 || jobs > kMostJobs) refuse("--jobs", kJobsRange);
+          options_.jobs = jobs;
+        },
+        kJobsRange);
+    app.add_flag("--dry-run", options_.dry_run,
+                 "Upload the volume, estimate the job, and delete the volume again if it is new");
     add_allow_empty(app, options_);
     add_parameters(app, options_.parameters, options_.preset, Formats::kByFiles);
     add_raw(app, options_);
@@ -337,36 +233,33 @@ class Parser {
 
   void add_local() {
     CLI::App& local =
-        command(Command::kMesh, "local",
-                "Mesh without a server: on an isomeshd of its own, which ends with it");
+        command(Command::kMesh, "local", "Mesh without a server; takes the same options as mesh");
     local.callback([this] {
       options_.command = Command::kMesh;
       options_.is_local = true;
     });
-    add_mesh(local);
+    add_mesh(local, Inputs::kFiles);
     local
         .add_option("--daemon", options_.daemon,
-                    "The program isomeshd, where it is not beside this one or in PATH")
+                    "The program isomeshd, if it is neither beside isomesh nor in PATH")
         ->envname("ISOMESHD")
         ->type_name("FILE");
   }
 
   void check_mesh() const {
-    if (options_.outputs.empty() && !options_.dry_run)
-      throw EarlyExit(kWrongUsage, "-o is required\n");
+    if (options_.outputs.empty() && !options_.dry_run) wrong_usage("-o is required");
     const bool is_piped = std::ranges::any_of(options_.outputs, &Output::is_stdout);
     if (is_piped && (options_.json || options_.outputs.size() > 1)) {
-      throw EarlyExit(kWrongUsage, "-o: standard output takes one mesh and nothing else\n");
+      wrong_usage("-o: standard output takes one mesh and nothing else");
     }
     if (options_.dry_run && !options_.parameters.label_values.empty()) {
-      throw EarlyExit(
-          kWrongUsage,
-          "--dry-run: estimates go by the labels of the volume's file, not by --label-values\n");
+      wrong_usage("--dry-run: estimates do not support --label-values");
     }
     check_outputs();
+    check_stored();
   }
 
-  // What the server would refuse is refused before anything is sent to it.
+  // Rejects what the server would reject, before anything is sent.
   void check_parameters() const {
     const bool is_job = options_.command == Command::kMesh ||
                         options_.command == Command::kSubmit ||
@@ -375,36 +268,63 @@ class Parser {
     JobParameters parameters = options_.parameters;
     parameters.volume = "any";
     if (!options_.preset.empty()) parameters.iso = 0;
+    if (!options_.outputs.empty()) parameters.formats = formats_of(options_.outputs);
     const std::string url = parameters.callback ? lower(parameters.callback->url) : "http://";
     if (!url.starts_with("http://") && !url.starts_with("https://")) {
-      throw EarlyExit(kWrongUsage, "isomesh: --callback: must begin with http:// or https://\n");
+      wrong_usage("--callback: must begin with http:// or https://");
     }
     try {
       parse_job_parameters(to_json(parameters));
     } catch (const Error& error) {
-      throw EarlyExit(kWrongUsage, std::string("isomesh: ") + error.what() + '\n');
+      wrong_usage(in_options(error));
     }
   }
 
-  // Some files hold one label only, and others only labels.
+  // Some formats hold only one label, others only labels.
   void check_outputs() const {
     const auto& labels = options_.parameters.labels;
     for (const Output& output : options_.outputs) {
       const std::string file = output.path.string();
       if (!labels && output.format == MeshFormat::kZip) {
-        throw EarlyExit(kWrongUsage, "-o: " + file + " is for --labels, a file of each\n");
+        wrong_usage("-o: " + file + " needs --labels: a .zip holds one file per label");
       }
       const bool holds_one = !holds_all_labels(output.format) && output.format != MeshFormat::kZip;
       if (labels && holds_one && labels->values.size() != 1) {
-        throw EarlyExit(kWrongUsage,
-                        "-o: " + file +
-                            " would hold one label; .glb, .3mf, .ply, .obj, .vtk and .vtp "
-                            "hold all, .zip a file of each\n");
+        wrong_usage("-o: " + file +
+                    " can hold only one label. Use .glb, .3mf, .ply, .obj, .vtk or .vtp for all "
+                    "labels in one file, or .zip for one file per label");
       }
     }
   }
 
+  // Stored volumes have no file that options could describe.
+  void check_stored() const {
+    const bool has_stored = std::ranges::any_of(options_.files, is_stored_volume);
+    const auto given = app_.get_subcommands().front()->get_options([](const CLI::Option* option) {
+      return option->count() > 0 &&
+             (option->get_group() == kUploadGroup || option->get_group() == kRawGroup);
+    });
+    if (has_stored && !given.empty()) {
+      wrong_usage(given.front()->get_name() + " applies to files, not to stored volumes");
+    }
+    if (has_stored && options_.files.size() > 1 && !is_by_name(options_.outputs)) {
+      wrong_usage("-o: several volumes need a folder, or {name} in the file's name");
+    }
+  }
+
+  static std::string footer_of(const std::string& name) {
+    const std::string examples = examples_of(name);
+    return examples.empty() ? "" : "Examples:\n" + examples;
+  }
+
+  std::string help_of_command() const {
+    const auto parsed = app_.get_subcommands();
+    return "`isomesh" + (parsed.empty() ? "" : ' ' + parsed.front()->get_name()) +
+           " --help` explains the options";
+  }
+
   static constexpr int kMostJobs = 64;
+  static constexpr const char* kJobsRange = "must be a whole number from 1 to 64";
 
   Options options_;
   GivenOutputs outputs_;
@@ -415,6 +335,10 @@ class Parser {
 };
 
 }  // namespace
+
+void wrong_usage(const std::string& message) {
+  throw EarlyExit(kWrongUsage, "isomesh: " + message + '\n');
+}
 
 Options parse_options(int argc, const char* const* argv) { return Parser().parse(argc, argv); }
 

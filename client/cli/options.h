@@ -30,9 +30,10 @@ enum class Command {
   kOrder,
   kOrders,
   kPacs,
+  kIds,
 };
 
-// What is said of orders.
+// The options of orders.
 struct OrderOptions {
   std::string pacs;
   std::string study;
@@ -48,8 +49,8 @@ struct OrderOptions {
   bool retries = false;
 };
 
-// A file to write a mesh to, in the format that its suffix names; "-" is standard output, and
-// "{name}" in its name stands for the input's.
+// A file to write a mesh to, in the format that its suffix names. "-" is standard output; "{name}"
+// in its name stands for the input's name.
 struct Output {
   std::filesystem::path path;
   MeshFormat format = MeshFormat::kDrc;
@@ -62,20 +63,20 @@ struct Options {
   Command command = Command::kMesh;
   std::string server = "http://127.0.0.1:8080";
   std::string token;
-  std::filesystem::path authorities;  // of an https server; empty: the system's
+  std::filesystem::path authorities;  // certificate authorities; empty: the system's
   bool json = false;
-  bool allow_empty = false;  // a surface without triangles is no failure
+  bool allow_empty = false;  // an empty surface is a success
   bool quiet = false;
 
   std::vector<std::filesystem::path> files;  // mesh, upload; "-" is standard input
   UploadOptions upload;                      // mesh, upload; without progress
-  std::string id;                            // of a job or, for submit and info, of a volume
+  std::string id;                            // of a job, a volume or an order; may be short
   JobParameters parameters;                  // mesh, submit, estimate
-  std::string preset;                        // the iso-value by its name; empty: in parameters
-  bool dry_run = false;                      // mesh: an estimate in its place
-  int jobs = 1;                              // mesh: inputs at a time
-  bool is_local = false;                     // mesh: on a daemon of its own
-  std::filesystem::path daemon;              // of that; empty: looked for
+  std::string preset;                        // the iso-value's name; empty: see parameters
+  bool dry_run = false;                      // mesh: only an estimate
+  int jobs = 1;                              // mesh: inputs at the same time
+  bool is_local = false;                     // mesh: with a daemon of its own
+  std::filesystem::path daemon;              // its program; empty: searched for
   std::string key;                           // submit
   std::vector<Output> outputs;               // mesh, fetch
   std::optional<JobState> state;             // list
@@ -86,6 +87,7 @@ struct Options {
   std::optional<std::int64_t> label;         // fetch
   std::int64_t background = 0;               // labels
   OrderOptions order;                        // order, orders
+  std::string kind;                          // ids: volumes, jobs or orders
 };
 
 // Ends the program before any command runs: help, the version, or wrong usage. `text` belongs on
@@ -101,6 +103,9 @@ class EarlyExit : public std::runtime_error {
 };
 
 constexpr int kWrongUsage = 2;
+
+// Throws EarlyExit with that status and "isomesh: `message`".
+[[noreturn]] void wrong_usage(const std::string& message);
 
 // Reads the arguments, and ISOMESH_SERVER and ISOMESH_TOKEN of the environment. Throws EarlyExit.
 Options parse_options(int argc, const char* const* argv);

@@ -10,6 +10,8 @@
 
 #include "base/clock.h"
 #include "client/cli/commands.h"
+#include "client/cli/ids.h"
+#include "client/cli/option_values.h"
 #include "proto/orders.h"
 
 namespace isomesh::cli {
@@ -17,7 +19,7 @@ namespace {
 
 using Seconds = std::chrono::duration<double>;
 
-// Seconds with two digits behind the point.
+// Seconds with two decimals.
 std::string in_seconds(Seconds time) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2f s", time.count());
@@ -42,7 +44,7 @@ std::string reason_of(const Order& order) {
   return order.error ? ": " + order.error->detail : std::string();
 }
 
-// One line for each step that has ended, as it ends.
+// Prints one line for each step when it ends.
 class StepTimes {
  public:
   void see(const Order& order) {
@@ -85,47 +87,47 @@ void print(const Order& order, bool json) {
 
 void add_order_options(CLI::App& app, Options& options) {
   OrderOptions& order = options.order;
-  app.add_option("PACS", order.pacs, "The name of a PACS that the server knows")->required();
+  app.add_option("PACS", order.pacs, "Name of a PACS that the server knows")->required();
   app.add_option("STUDY", order.study, "Study Instance UID")->required();
   app.add_option("SERIES", order.series, "Series Instance UID")->required();
-  app.add_option("--rule", order.rule, "The rule that says what is not said here");
+  app.add_option("--rule", order.rule,
+                 "Rule on the server that supplies everything that is not given here");
   app.add_option("--parameters", order.parameters,
-                 "Parameters of the mesh as a JSON object, as in POST /v1/jobs, such as "
-                 "'{\"iso\": 250}'")
+                 "Parameters of the mesh as a JSON object, as in POST /v1/jobs: '{\"iso\": 250}'")
       ->type_name("JSON")
       ->check([](const std::string& text) {
         return nlohmann::json::parse(text, nullptr, false).is_object()
                    ? std::string()
                    : std::string("must be a JSON object");
       });
-  app.add_option("--send", order.send, "The PACS that get the mesh, instead of the rule's")
+  app.add_option("--send", order.send,
+                 "PACS that receive the mesh, instead of those of the rule. May be repeated")
       ->type_name("PACS")
       ->allow_extra_args(false);
-  app.add_flag("--send-nothing", order.sends_nothing, "Make the mesh only")->excludes("--send");
-  app.add_option_function<std::string>(
-         "--priority",
-         [&order](const std::string& name) { order.priority = from_string<Priority>(name); },
-         "stat, routine or bulk")
-      ->check(CLI::IsMember({"stat", "routine", "bulk"}));
+  app.add_flag("--send-nothing", order.sends_nothing, "Make the mesh, but send it nowhere")
+      ->excludes("--send");
+  add_name<Priority>(app, "--priority", "Priority of the order",
+                     [&order](Priority priority) { order.priority = priority; });
   app.add_option("--key", options.key,
-                 "Idempotency key: the same one gives the same order again (default: a new one)")
+                 "Idempotency key: the same key returns the same order (default: a new key)")
       ->type_name("KEY");
-  app.add_flag("--no-wait", order.does_not_wait, "Print the order's id and end");
+  app.add_flag("--no-wait", order.does_not_wait, "Print the id of the order and exit");
 }
 
 void add_orders_options(CLI::App& app, Options& options) {
   OrderOptions& order = options.order;
-  app.add_option("ORDER", options.id, "Show this one, instead of a list");
-  app.add_option_function<std::string>(
-         "--state",
-         [&order](const std::string& name) { order.state = from_string<OrderState>(name); },
-         "Only orders in this state")
-      ->check(CLI::IsMember(
-          {"waiting", "fetching", "meshing", "sending", "succeeded", "failed", "cancelled"}));
+  app.add_option("ORDER", options.id,
+                 "Id of an order to show; its beginning or end is enough if unique")
+      ->type_name("ID");
+  add(app, "--state", "waiting|fetching|meshing|sending|succeeded|failed|cancelled",
+      "Only orders in this state", [&order](const std::string& name) {
+        order.state = from_string<OrderState>(name);
+        if (!order.state) refuse("--state", "there is no state " + name);
+      });
   app.add_option("--rule", order.rule, "Only orders of this rule");
-  app.add_option("--cursor", options.cursor, "The page to show, as the one before names it");
-  auto* cancel = app.add_flag("--cancel", order.cancels, "Cancel it")->needs("ORDER");
-  app.add_flag("--retry", order.retries, "Try it anew, when it has failed")
+  app.add_option("--cursor", options.cursor, "Page to show; the page before it prints its cursor");
+  auto* cancel = app.add_flag("--cancel", order.cancels, "Cancel this order")->needs("ORDER");
+  app.add_flag("--retry", order.retries, "Retry this order if it has failed")
       ->needs("ORDER")
       ->excludes(cancel);
 }
@@ -146,9 +148,10 @@ int order(Client& client, const Options& options) {
 int orders(Client& client, const Options& options) {
   const OrderOptions& asked = options.order;
   if (!options.id.empty()) {
-    print(asked.cancels   ? client.cancel_order(options.id)
-          : asked.retries ? client.retry_order(options.id)
-                          : client.order(options.id),
+    const std::string id = order_id(client, options.id);
+    print(asked.cancels   ? client.cancel_order(id)
+          : asked.retries ? client.retry_order(id)
+                          : client.order(id),
           options.json);
     return kDone;
   }
@@ -158,7 +161,7 @@ int orders(Client& client, const Options& options) {
     return kDone;
   }
   for (const Order& each : page.orders) show(each);
-  if (!page.next.empty()) std::cerr << "There are more: --cursor " << page.next << '\n';
+  if (!page.next.empty()) std::cerr << "More: isomesh orders --cursor " << page.next << '\n';
   return kDone;
 }
 

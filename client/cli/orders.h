@@ -1,4 +1,4 @@
-// The commands about orders.
+// The commands for orders.
 #pragma once
 
 #include <stop_token>
@@ -17,11 +17,11 @@ void add_order_options(CLI::App& app, Options& options);
 // The arguments of `isomesh orders`.
 void add_orders_options(CLI::App& app, Options& options);
 
-// Orders, waits for the end unless it is not to, and says how long each step took. Returns the exit
-// status.
+// Places an order, waits for its end unless told not to, and reports the time of each step. Returns
+// the exit status.
 int order(Client& client, const Options& options);
 
-// Shows, cancels or tries again one order, or lists them.
+// Shows, cancels or retries one order, or lists all.
 int orders(Client& client, const Options& options);
 
 // Lists the PACS.

@@ -15,11 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void refuse_output(const std::string& message) {
-  throw EarlyExit(kWrongUsage, "-o: " + message + '\n');
-}
+[[noreturn]] void refuse_output(const std::string& message) { wrong_usage("-o: " + message); }
 
-// ".drc, .glb or .stl": what a file's name may end in.
+// The known suffixes: ".drc, .glb or .stl".
 std::string suffixes() {
   std::vector<std::string> all;
   for (const std::string& name : names_from<MeshFormat>()) all.push_back('.' + name);
@@ -31,18 +29,18 @@ MeshFormat format_of(const fs::path& path) {
   const auto format = from_string<MeshFormat>(suffix.empty() ? suffix : suffix.substr(1));
   if (!format) {
     refuse_output(path.string() + " must end in " + suffixes() +
-                  ", be a folder, or - with --format");
+                  ", or be a folder, or - with --format");
   }
   return *format;
 }
 
-// `path` is the file that is to lie in it; empty where the folder itself was named.
+// `path` is the file to write there; empty if the folder itself was named.
 void check_folder(const fs::path& folder, const std::string& path) {
   const std::string which =
       path.empty() ? "the folder " + folder.string() : "the folder of " + path;
   std::error_code error;
-  if (!fs::is_directory(folder, error)) refuse_output(which + " is not there");
-  if (::access(folder.c_str(), W_OK) != 0) refuse_output(which + " cannot be written to");
+  if (!fs::is_directory(folder, error)) refuse_output(which + " does not exist");
+  if (::access(folder.c_str(), W_OK) != 0) refuse_output(which + " is not writable");
 }
 
 bool is_folder(const std::string& path) {
@@ -50,18 +48,32 @@ bool is_folder(const std::string& path) {
   return path.ends_with('/') || fs::is_directory(path, error);
 }
 
+// "x.glb,y.stl" would be a valid name, but is meant as a list.
+void refuse_list(const std::string& path) {
+  const auto is_output = [](std::string_view part) {
+    const std::string suffix = lower(fs::path(part).extension().string());
+    return !suffix.empty() && from_string<MeshFormat>(suffix.substr(1)).has_value();
+  };
+  const auto parts = split(path, ',');
+  if (parts.size() < 2 || !std::ranges::all_of(parts, is_output)) return;
+  std::string each;
+  for (const std::string_view part : parts) each += " -o " + std::string(part);
+  refuse_output(path + " looks like a list; repeat the option instead:" + each);
+}
+
 }  // namespace
 
 void add_outputs(CLI::App& app, GivenOutputs& given) {
   app.add_option("-o,--output", given.paths,
-                 "Where the mesh goes: a file, whose suffix (" + suffixes() +
-                     ") says the format; a folder, or {name} in a file's name, for a mesh of each "
-                     "FILE; - for standard output. May be repeated")
+                 "File to write the mesh to; its suffix chooses the format: " + suffixes() +
+                     ". A folder, or {name} in the file's name, gives each FILE a mesh of its own; "
+                     "- is standard output. May be repeated")
       ->type_name("OUT")
       ->expected(1)
       ->take_all();
   add(app, "--format", type_of_names<MeshFormat>() + ",..",
-      "The formats in a folder (default: drc), or of -", [&given](const std::string& text) {
+      "Formats of the files in a folder (default: drc), or the format of -",
+      [&given](const std::string& text) {
         for (const std::string_view name : split(text, ',')) {
           given.formats.push_back(name_from<MeshFormat>("--format", lower(name)));
         }
@@ -73,7 +85,7 @@ std::vector<Output> outputs_from(const GivenOutputs& given) {
   bool is_format_used = false;
   for (const std::string& path : given.paths) {
     if (path == "-") {
-      if (given.formats.size() != 1) refuse_output("- needs a --format, and one only");
+      if (given.formats.size() != 1) refuse_output("- needs exactly one --format");
       outputs.push_back({path, given.formats.front()});
       is_format_used = true;
     } else if (is_folder(path)) {
@@ -85,18 +97,18 @@ std::vector<Output> outputs_from(const GivenOutputs& given) {
       }
       is_format_used = true;
     } else {
+      refuse_list(path);
       const fs::path file = path;
       check_folder(file.has_parent_path() ? file.parent_path() : ".", path);
       outputs.push_back({file, format_of(file)});
     }
   }
   if (!given.formats.empty() && !is_format_used && !given.paths.empty()) {
-    throw EarlyExit(kWrongUsage, "--format: the suffixes of -o say the formats of files\n");
+    wrong_usage("--format is only for folders and -; the suffix of a file chooses its format");
   }
   const auto by_name = [](const Output& output) { return is_by_name({output}); };
   if (std::ranges::any_of(outputs, by_name) && !std::ranges::all_of(outputs, by_name)) {
-    refuse_output(
-        "either all outputs are called by their inputs, with {name} or in a folder, or none is");
+    refuse_output("either all outputs need {name} or a folder, or none of them");
   }
   return outputs;
 }

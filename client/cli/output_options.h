@@ -1,4 +1,4 @@
-// Where meshes go, as -o and --format say it; private to this folder.
+// Where meshes go: -o and --format; private to this folder.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace isomesh::cli {
 
-// What was given, before it is known what that means.
+// The values of the options as they were given.
 struct GivenOutputs {
   std::vector<std::string> paths = {};
   std::vector<MeshFormat> formats = {};  // of --format
@@ -18,8 +18,8 @@ struct GivenOutputs {
 
 void add_outputs(CLI::App& app, GivenOutputs& given);
 
-// The files to write: what -o names, and of a folder one of each format. Throws EarlyExit for what
-// cannot be: suffixes that are none, folders that are not there, formats that nothing asks for.
+// The files to write: those that -o names, and one of each format in a folder. Throws EarlyExit for
+// unknown suffixes, missing folders and formats that no output uses.
 std::vector<Output> outputs_from(const GivenOutputs& given);
 
 }  // namespace isomesh::cli

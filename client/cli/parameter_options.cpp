@@ -1,6 +1,8 @@
 #include "client/cli/parameter_options.h"
 
 #include <algorithm>
+#include <array>
+#include <limits>
 #include <map>
 #include <memory>
 #include <sstream>
@@ -17,42 +19,59 @@
 namespace isomesh::cli {
 namespace {
 
-// What a parameter is by default, and what it may be where that are some words. Ranges are the
-// server's to check: it names the limits that it has.
+// The default in words, or one for each kind of smoothing; empty if there is none.
 template <class T>
-std::string values_and_default(const Parameter& parameter, const T& standard) {
+std::string default_of(const Parameter& parameter, const T& standard) {
   if constexpr (std::is_same_v<T, Scheme>) {
-    return ": 5 or 6 (default: " + std::to_string(static_cast<int>(standard)) + ")";
+    return std::to_string(static_cast<int>(standard));
   } else if constexpr (Enumeration<T>) {
-    return ": " + listed(names_from<T>()) + " (default: " + std::string(to_string(standard)) + ")";
+    return std::string(to_string(standard));
   } else if constexpr (std::is_same_v<T, std::vector<MeshFormat>>) {
-    return ", of " + listed(names_from<MeshFormat>()) +
-           " (default: " + std::string(to_string(standard.front())) + ")";
+    return std::string(to_string(standard.front()));
   } else if constexpr (std::is_same_v<T, int> || std::is_same_v<T, std::int64_t> ||
                        std::is_same_v<T, double>) {
-    return " (default: " + number_text(standard) + ")";
+    return number_text(standard);
   } else {
     std::string defaults;
     for (const auto& entry : parameter.cases) {
       if (!entry || !entry->standard) continue;
-      defaults += (defaults.empty() ? " (default: " : ", ") + number_text(*entry->standard) +
-                  " for " + std::string(to_string(entry->smoothing));
+      defaults += (defaults.empty() ? "" : ", ") + number_text(*entry->standard) + " for " +
+                  std::string(to_string(entry->smoothing));
     }
-    return defaults.empty() ? "" : defaults + ")";
+    return defaults;
   }
 }
 
-// One line of the table, as it reads on a terminal.
+// The words that a value may be; empty if it is something else.
+template <class T>
+std::string words_of() {
+  if constexpr (std::is_same_v<T, Scheme>) {
+    return "5 or 6";
+  } else if constexpr (Enumeration<T>) {
+    return listed(names_from<T>());
+  } else {
+    return "";
+  }
+}
+
+// The range of a number. It is left out if it is only that of a type.
+std::string limits_of(const Parameter& parameter) {
+  constexpr double kLimitOfType = std::numeric_limits<std::uint32_t>::max();
+  return parameter.maximum && *parameter.maximum < kLimitOfType ? range_of(parameter) : "";
+}
+
+// A row of the table as one sentence of a help text, without its full stop.
 template <class T>
 std::string help_of(const Parameter& parameter, const T& standard) {
   std::string help = parameter.help;
   std::erase(help, '`');
   if (help.ends_with('.')) help.pop_back();
   const std::string unit = parameter.unit;
-  const std::string by_labels =
-      parameter.by_labels ? "; by labels " + number_text(*parameter.by_labels) : "";
-  return help + (unit.empty() ? "" : ", in " + unit) + values_and_default(parameter, standard) +
-         by_labels;
+  std::string defaults = default_of(parameter, standard);
+  if (parameter.by_labels) defaults += ", " + number_text(*parameter.by_labels) + " with --labels";
+  std::string more = words_of<T>() + limits_of(parameter);  // a number has limits, others words
+  if (!defaults.empty()) more += (more.empty() ? "default: " : "; default: ") + defaults;
+  return help + (unit.empty() ? "" : ", in " + unit) + (more.empty() ? "" : " (" + more + ')');
 }
 
 // An option for each kind of parameter.
@@ -69,10 +88,12 @@ class ParameterOptions {
  private:
   template <class Number>
   requires std::is_arithmetic_v<Number> CLI::Option* add_kind(const std::string& name,
-                                                              const Parameter& /*parameter*/,
+                                                              const Parameter& parameter,
                                                               const std::string& help,
                                                               Number& value) {
-    return add_number<Number>(app_, name, help, [&value](Number given) { value = given; });
+    return add_number<Number>(
+        app_, name, help, [&value](Number given) { value = given; },
+        must_be(parameter, std::is_integral_v<Number>));
   }
 
   CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
@@ -90,7 +111,8 @@ class ParameterOptions {
 
   CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
                         const std::string& help, Scheme& value) {
-    return add_number<int>(app_, name, help, [&value](int given) { value = Scheme{given}; })
+    return add_number<int>(
+               app_, name, help, [&value](int given) { value = Scheme{given}; }, "must be 5 or 6")
         ->type_name("5|6");
   }
 
@@ -106,7 +128,9 @@ class ParameterOptions {
                                                               const std::string& help,
                                                               std::optional<Number>& value) {
     if (parameter.when_empty == nullptr) {
-      return add_number<Number>(app_, name, help, [&value](Number given) { value = given; });
+      return add_number<Number>(
+          app_, name, help, [&value](Number given) { value = given; },
+          must_be(parameter, std::is_integral_v<Number>));
     }
     const std::string word = parameter.when_empty;
     const bool is_iso = std::string_view(parameter) == "iso";
@@ -118,7 +142,7 @@ class ParameterOptions {
       std::ranges::replace(each, ' ', '-');
       type += '|' + each;
     }
-    const std::string more = is_iso ? "; or a preset, where the volume has one" : "";
+    const std::string more = is_iso ? ". CTs also have presets by name" : "";
     return isomesh::cli::add(app_, name, type, help + more,
                              [this, &value, name, word, words, shown](const std::string& text) {
                                value = number_from<Number>(text);
@@ -135,21 +159,23 @@ class ParameterOptions {
 
   CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
                         const std::string& help, std::vector<MeshFormat>& value) {
-    return isomesh::cli::add(app_, name, "NAME,..", help, [&value, name](const std::string& text) {
-      value.clear();
-      std::stringstream names(text);
-      for (std::string format; std::getline(names, format, ',');) {
-        value.push_back(name_from<MeshFormat>(name, format));
-      }
-    });
+    return isomesh::cli::add(app_, name, type_of_names<MeshFormat>() + ",..", help,
+                             [&value, name](const std::string& text) {
+                               value.clear();
+                               std::stringstream names(text);
+                               for (std::string format; std::getline(names, format, ',');) {
+                                 value.push_back(name_from<MeshFormat>(name, format));
+                               }
+                             });
   }
 
-  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+  CLI::Option* add_kind(const std::string& name, const Parameter& parameter,
                         const std::string& help, std::optional<LabelChoice>& value) {
-    return isomesh::cli::add(app_, name, "all|N,..", help, [&value, name](const std::string& text) {
-      value.emplace();
-      if (text != "all") value->values = labels_from(name, text);
-    });
+    return isomesh::cli::add(app_, name, "all|N,N-N,..", help,
+                             [&value, name, range = range_of(parameter)](const std::string& text) {
+                               value.emplace();
+                               if (text != "all") value->values = labels_from(name, text, range);
+                             });
   }
 
   CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
@@ -188,25 +214,25 @@ class ParameterOptions {
         ->take_all();
   }
 
-  // `--label-name 3=Liver`, once for each label.
+  // `--label-name 3=Liver`, once per label.
   template <class T>
-  CLI::Option* add_kind(const std::string& name, const Parameter& /*parameter*/,
+  CLI::Option* add_kind(const std::string& name, const Parameter& parameter,
                         const std::string& help, std::map<std::int64_t, T>& value) {
     constexpr bool kIsList = std::is_same_v<T, std::vector<std::int64_t>>;
     return app_
         .add_option_function<std::vector<std::string>>(
             name,
-            [&value, name](const std::vector<std::string>& texts) {
+            [&value, name, range = range_of(parameter)](const std::vector<std::string>& texts) {
               for (const std::string& text : texts) {
                 const std::size_t sign = text.find('=');
                 const auto label =
                     number_from<std::int64_t>(std::string_view(text).substr(0, sign));
                 if (sign == std::string::npos || !label) {
-                  refuse(name, "\"" + text + "\" must begin with a label and =");
+                  refuse(name, "\"" + text + "\" must begin with a label and =, such as 3=");
                 }
                 const std::string own = text.substr(sign + 1);
                 if constexpr (kIsList) {
-                  value[*label] = labels_from(name, own);
+                  value[*label] = labels_from(name, own, range);
                 } else {
                   value[*label] = own;
                 }
@@ -218,12 +244,27 @@ class ParameterOptions {
         ->take_all();
   }
 
-  static std::vector<std::int64_t> labels_from(const std::string& name, const std::string& text) {
+  // "1,3-5": values and ranges of values. `range` says in words what a label may be.
+  static std::vector<std::int64_t> labels_from(const std::string& name, const std::string& text,
+                                               const std::string& range) {
+    constexpr std::int64_t kLeast = std::numeric_limits<std::int32_t>::min();
+    constexpr std::int64_t kMost = std::numeric_limits<std::uint32_t>::max();
     std::vector<std::int64_t> labels;
     for (const std::string_view each : split(text, ',')) {
-      const auto label = number_from<std::int64_t>(each);
-      if (!label) refuse(name, "must be whole numbers separated by commas");
-      labels.push_back(*label);
+      const std::size_t dash = each.find('-', 1);  // at the beginning it is a sign
+      const auto first = number_from<std::int64_t>(each.substr(0, dash));
+      const auto last =
+          dash == std::string_view::npos ? first : number_from<std::int64_t>(each.substr(dash + 1));
+      if (!first || !last || *last < *first) {
+        refuse(name, "must be whole numbers or ranges separated by commas, such as 1,3-5");
+      }
+      if (*first < kLeast || *last > kMost) refuse(name, "must be whole numbers " + range);
+      for (std::int64_t label = *first; label <= *last; ++label) {
+        if (labels.size() == Volume::kMostLabels) {
+          refuse(name, "must be at most " + std::to_string(Volume::kMostLabels) + " labels");
+        }
+        labels.push_back(label);
+      }
     }
     return labels;
   }
@@ -238,7 +279,7 @@ class ParameterOptions {
   std::string& preset_;
 };
 
-// What is required, and what needs or excludes what.
+// Sets which options are required, need others or exclude others.
 void relate(const Parameter& parameter, const std::map<std::string, CLI::Option*>& options) {
   CLI::Option* const option = options.at(parameter.name);
   if (parameter.jobs == JobKind::kByLabels && !parameter.is_required) {
@@ -255,11 +296,59 @@ void relate(const Parameter& parameter, const std::map<std::string, CLI::Option*
   }
 }
 
+// The table's options by the paths of their fields; a group has the options of its members.
+const std::map<std::string, std::string>& options_of_fields() {
+  static const std::map<std::string, std::string> options = [] {
+    std::map<std::string, std::vector<std::string>> by_path;
+    JobParameters all;
+    all.callback.emplace();  // not constant, for those members that may be absent
+    visit_leaves(all, [&](const std::string& path, const Parameter& parameter, const auto&) {
+      const std::string option = "--" + option_name_of(parameter);
+      by_path[path].push_back(option);
+      const std::size_t dot = path.find('.');
+      if (dot != std::string::npos) by_path[path.substr(0, dot)].push_back(option);
+    });
+    std::map<std::string, std::string> texts;
+    for (const auto& [path, names] : by_path) texts[path] = listed(names);
+    return texts;
+  }();
+  return options;
+}
+
+// The options of raw samples and of a choice in the upload are called as their fields.
+bool is_of_upload(const std::string& field) {
+  constexpr std::array kFields = {"dims",      "type",       "spacing",   "origin",
+                                  "direction", "byte_order", "series",    "member",
+                                  "accept",    "name",       "nifti_form"};
+  return std::ranges::find(kFields, field) != kFields.end();
+}
+
+// "--label-color" for "label_colors.3".
+std::string option_of_field(const std::string& field) {
+  std::string name = field;
+  const auto& options = options_of_fields();
+  if (!options.contains(name)) name = field.substr(0, field.find('.'));
+  if (const auto found = options.find(name); found != options.end()) return found->second;
+  if (!is_of_upload(name)) return field;
+  std::ranges::replace(name, '_', '-');
+  return "--" + name;
+}
+
+// Replaces the names of fields that are no words of their own, such as max_error_mm.
+std::string with_option_names(std::string text) {
+  for (const auto& [path, option] : options_of_fields()) {
+    if (path.find('_') == std::string::npos) continue;
+    const std::size_t at = text.find(path);
+    if (at != std::string::npos) text.replace(at, path.size(), option);
+  }
+  return text;
+}
+
 }  // namespace
 
 void add_parameters(CLI::App& app, JobParameters& parameters, std::string& preset, Formats formats,
                     Carrier carrier) {
-  // The options' callbacks use it, as long as the command's table is there.
+  // The options' callbacks use it as long as the command's table exists.
   const auto kept = std::make_shared<ParameterOptions>(app, preset);
   ParameterOptions& all = *kept;
   std::map<std::string, CLI::Option*> options;  // by the parameters' names
@@ -270,7 +359,7 @@ void add_parameters(CLI::App& app, JobParameters& parameters, std::string& prese
                  const bool is_formats = std::is_same_v<Member, std::vector<MeshFormat>>;
                  if (is_formats && formats == Formats::kByFiles) return;
                  if (carrier == Carrier::kQuery && !parameter.in_query) return;
-                 // The volume is the command's file or its first argument.
+                 // The volume is the command's first argument.
                  if constexpr (!std::is_same_v<Member, std::string>) {
                    options[parameter.name] = all.add(parameter, member);
                    added.push_back(parameter);
@@ -278,13 +367,23 @@ void add_parameters(CLI::App& app, JobParameters& parameters, std::string& prese
                });
   for (const Parameter& parameter : added) relate(parameter, options);
   CLI::Option* const labels = options.at("labels");
-  options.at("interpolation")->excludes(labels);  // their vertices lie half-way
+  options.at("interpolation")->excludes(labels);  // vertices of labels lie half-way
   app.parse_complete_callback(
       [&parameters, kept, labels, iso = options.at("iso"), passes = options.at("passes")] {
         if (labels->count() + iso->count() == 0) throw CLI::RequiredError("--iso or --labels");
         const bool is_by_labels = labels->count() > 0;
         if (is_by_labels && passes->count() == 0) parameters.passes = label_parameters({}).passes;
       });
+}
+
+std::string in_options(const Error& error) {
+  if (error.fields().empty()) return error.what();
+  std::string text;
+  for (const FieldError& fault : error.fields()) {
+    text += (text.empty() ? "" : "; ") + option_of_field(fault.field) + ": " +
+            with_option_names(fault.message);
+  }
+  return text;
 }
 
 }  // namespace isomesh::cli

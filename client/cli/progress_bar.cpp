@@ -43,7 +43,7 @@ std::string bar_line(const std::string& label, double share, const std::string& 
 std::string note_of(const Job& job) {
   if (job.state != JobState::kQueued) return "";
   return job.waiting_for
-             ? "waiting for room on the server's " + std::string(to_string(*job.waiting_for))
+             ? "waiting for free space on the server's " + std::string(to_string(*job.waiting_for))
              : "waiting for a worker";
 }
 

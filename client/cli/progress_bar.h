@@ -1,4 +1,4 @@
-// One line on a terminal that shows how far something is.
+// A progress bar: one line on a terminal.
 #pragma once
 
 #include <chrono>
@@ -9,16 +9,16 @@
 
 namespace isomesh::cli {
 
-// The line for `label` at `share` (0..1, bounded), such as `extract   [#####.....]  50 %  note`,
-// cut to `columns`. Pure.
+// The line for `label` at `share`, such as `extract   [#####.....]  50 %  note`, cut to `columns`.
+// `share` is clamped to 0..1. Pure.
 std::string bar_line(const std::string& label, double share, const std::string& note,
                      std::size_t columns);
 
-// What a job waits for; empty once it runs. Pure.
+// What a job waits for; empty when it runs. Pure.
 std::string note_of(const Job& job);
 
-// Draws on standard error when that is wanted and a terminal, and does nothing otherwise. One
-// thread at a time.
+// Draws on standard error if that is a terminal and drawing is wanted; otherwise it does nothing.
+// For one thread at a time.
 class ProgressBar {
  public:
   explicit ProgressBar(bool is_wanted = true);

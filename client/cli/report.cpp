@@ -36,7 +36,7 @@ std::string iso_of(const JobParameters& parameters) {
   return parameters.iso ? human_number(*parameters.iso) : "otsu";
 }
 
-// What a job is asked to make a surface of.
+// What the job makes a surface of.
 std::string subject_of(const JobParameters& parameters) {
   const auto& labels = parameters.labels;
   if (!labels) {
@@ -62,12 +62,12 @@ std::string size_of(const MeshFile& file) {
   return file.bytes < 1000 ? exact : human_bytes(file.bytes) + " (" + exact + ")";
 }
 
-// What an iso-value of a job is: the one that was used, also where Otsu's was asked for.
+// The iso-value that was used, also with Otsu's method.
 void tell_iso(const MeshSummary& mesh, Rows& rows) {
   if (mesh.iso) rows.push_back({"iso-value", human_number(*mesh.iso)});
 }
 
-// An open surface encloses nothing, and the number that its triangles sum up to is no volume.
+// An open surface encloses nothing, so the sum over its triangles is not a volume.
 void tell_volume(const MeshSummary& mesh, Rows& rows) {
   if (mesh.empty) return;
   if (!mesh.quality.encloses_volume) {
@@ -81,7 +81,7 @@ void tell_volume(const MeshSummary& mesh, Rows& rows) {
 
 std::string way_of(const DistanceSummary& distances) {
   return fixed(distances.max_mm, 4) + " mm at most, " + fixed(distances.p99_mm, 4) +
-         " mm for 99 of 100, " + fixed(distances.mean_mm, 4) + " mm on average";
+         " mm for 99 %, " + fixed(distances.mean_mm, 4) + " mm on average";
 }
 
 void tell_error(const MeshSummary& mesh, Rows& rows) {
@@ -101,9 +101,9 @@ void tell_error(const MeshSummary& mesh, Rows& rows) {
   rows.push_back({"  scan to mesh", way_of(certificate.from_extracted)});
   if (certificate.budget_mm) {
     const ErrorBudget& budget = *certificate.budget_mm;
-    rows.push_back({"  shared out", fixed(budget.smoothing, 4) + " mm smoothing, " +
-                                        fixed(budget.simplification, 4) + " mm simplification, " +
-                                        fixed(budget.quantisation, 4) + " mm rounding"});
+    rows.push_back({"  budget", fixed(budget.smoothing, 4) + " mm smoothing, " +
+                                    fixed(budget.simplification, 4) + " mm simplification, " +
+                                    fixed(budget.quantisation, 4) + " mm rounding"});
   }
 }
 
@@ -171,7 +171,7 @@ std::string mesh_report(const MeshSummary& mesh) {
   rows.push_back({"topology", topology_of(quality)});
   if (const auto& found = quality.self_intersections) {
     const std::string pairs = count(found->pairs) + " pairs of triangles";
-    rows.push_back({"runs through itself", found->pairs == 0 ? "nowhere" : "at " + pairs});
+    rows.push_back({"self-intersections", found->pairs == 0 ? "none" : pairs});
   }
   rows.push_back({"aspect ratio", fixed(quality.aspect_ratio.extracted.mean, 3) + " extracted, " +
                                       fixed(quality.aspect_ratio.smoothed.mean, 3) + " smoothed"});
@@ -203,7 +203,7 @@ std::string volume_report(const Volume& volume) {
   }
   rows.push_back({"created", volume.created});
   for (const Note& note : volume.notes)
-    rows.push_back({"note", note.detail + " (" + note.code + ')'});
+    rows.push_back({"note", note_text(note) + " (" + note.code + ')'});
   for (const IgnoredObject& object : volume.ignored) {
     rows.push_back({"ignored", object.name + ": " + object.reason});
   }
@@ -235,11 +235,11 @@ std::string histogram_report(const Histogram& histogram) {
   std::string bars;
   for (const std::uint64_t count : histogram.counts) {
     const double share = most > 0 ? std::log1p(static_cast<double>(count)) / most : 0;
-    // A count above zero always has a bar.
+    // A count above zero always gets a bar.
     bars += kBars.at(static_cast<std::size_t>(std::ceil(share * (kBars.size() - 1))));
   }
   return "\n  " + bars + "\n  " + human_number(histogram.range[0]) + " to " +
-         human_number(histogram.range[1]) + ", logarithms of the numbers of samples\n";
+         human_number(histogram.range[1]) + ", logarithmic numbers of samples\n";
 }
 
 std::string estimate_report(const Estimate& estimate) {
@@ -253,8 +253,9 @@ std::string estimate_report(const Estimate& estimate) {
   for (const auto& [format, bytes] : estimate.bytes) {
     rows.push_back({std::string(to_string(format)), "about " + human_bytes(bytes)});
   }
-  rows.push_back({"memory", "about " + human_bytes(estimate.memory_bytes) +
-                                (estimate.fits ? "" : ", more than a job may take")});
+  rows.push_back(
+      {"memory", "about " + human_bytes(estimate.memory_bytes) +
+                     (estimate.fits ? "" : ", more than the server allows for one job")});
   rows.push_back({"time", "about " + fixed(estimate.milliseconds / 1000, 1) + " s"});
   rows.push_back({"queue", std::to_string(estimate.queue.queued) + " waiting, " +
                                std::to_string(estimate.queue.running) + " running"});
@@ -277,7 +278,7 @@ std::string job_report(const Job& job) {
   rows.push_back({"created", job.created});
   if (job.started) rows.push_back({"started", *job.started});
   if (job.finished) rows.push_back({"finished", *job.finished});
-  if (job.reused) rows.push_back({"mesh", "taken from an earlier job like this one"});
+  if (job.reused) rows.push_back({"mesh", "reused from an identical earlier job"});
   if (job.error) {
     rows.push_back({"error", job.error->detail.empty() ? job.error->title : job.error->detail});
   }
@@ -287,15 +288,27 @@ std::string job_report(const Job& job) {
   return text;
 }
 
-std::string job_list(const std::vector<Job>& jobs) {
-  Rows rows = {{"job", "state", "done", "iso", "priority", "created"}};
+std::string note_text(const Note& note) {
+  constexpr std::string_view kMember = "\"labels\": \"all\"";
+  std::string text = note.detail;
+  const std::size_t at = text.find(kMember);
+  if (at != std::string::npos) text.replace(at, kMember.size(), "--labels all");
+  return text;
+}
+
+std::string job_list(const std::vector<Job>& jobs, const VolumeNames& names) {
+  constexpr std::size_t kShortId = 12;
+  Rows rows = {{"job", "state", "done", "iso", "priority", "created", "volume"}};
   for (const Job& job : jobs) {
-    rows.push_back({job.id, std::string(to_string(job.state)), fixed(100 * job.progress, 0) + " %",
-                    iso_of(job.parameters), std::string(to_string(job.parameters.priority)),
-                    job.created});
+    const auto name = names.find(job.parameters.volume);
+    rows.push_back(
+        {job.id, std::string(to_string(job.state)), fixed(100 * job.progress, 0) + " %",
+         iso_of(job.parameters), std::string(to_string(job.parameters.priority)), job.created,
+         name != names.end() ? name->second : job.parameters.volume.substr(0, kShortId)});
   }
-  return in_columns(
-      {Align::kLeft, Align::kLeft, Align::kRight, Align::kRight, Align::kLeft, Align::kLeft}, rows);
+  return in_columns({Align::kLeft, Align::kLeft, Align::kRight, Align::kRight, Align::kLeft,
+                     Align::kLeft, Align::kLeft},
+                    rows);
 }
 
 std::string volume_list(const std::vector<Volume>& volumes) {

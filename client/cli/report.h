@@ -1,7 +1,8 @@
-// What the command says about jobs and volumes. Pure functions: values in, lines of text out.
+// The command's texts about jobs and volumes. Pure functions: values in, lines of text out.
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,32 +11,38 @@
 
 namespace isomesh::cli {
 
-// What the client saw of a job's way, beside what the server measured; milliseconds.
+// What the client measured of a job, in milliseconds; the rest comes from the server.
 struct ClientTiming {
   std::optional<double> upload = {};
   std::optional<double> download = {};
 };
 
-// The stages with their times and their shares of the total, transfers around them.
+// The stages with their times and their percentages of the total, with the transfers around them.
 std::string timing_report(const Timing& timing, const ClientTiming& client);
 
 std::string mesh_report(const MeshSummary& mesh);
 std::string volume_report(const Volume& volume);
-// A line of bars under the range; their heights are logarithms, because air outnumbers everything.
+// A line of bars over the range. Heights are logarithms, because air outnumbers everything else.
 std::string histogram_report(const Histogram& histogram);
 std::string estimate_report(const Estimate& estimate);
 std::string job_report(const Job& job);
 
-// What to add to the command so that it is not refused: a line for each choice. Empty without one.
+// The options that would resolve an error, a line each; empty if there are none.
 std::string remedy_report(const Remedy& remedy);
 
-// One line each under a heading.
-std::string job_list(const std::vector<Job>& jobs);
+// The note's detail, with the command's options instead of the API's members.
+std::string note_text(const Note& note);
+
+// The names of volumes by their ids; volumes without a name are left out.
+using VolumeNames = std::map<std::string, std::string>;
+
+// One line each under a heading. A volume without a name is shown by the beginning of its id.
+std::string job_list(const std::vector<Job>& jobs, const VolumeNames& names = {});
 std::string volume_list(const std::vector<Volume>& volumes);
 std::string label_list(const VolumeLabels& labels);
 
-// The job as the server's JSON, with what the client adds: `outputs`, the files that were written,
-// and `client`, with `upload` and `download` in milliseconds.
+// The server's JSON of the job. The client adds `outputs`, the files that were written, and
+// `client`, with `upload` and `download` in milliseconds.
 std::string job_json(const Job& job, const std::vector<std::filesystem::path>& outputs,
                      const ClientTiming& client);
 

@@ -1,4 +1,4 @@
-// Numbers as a person reads them, and columns. Pure functions.
+// Numbers for people, and columns. Pure functions.
 #pragma once
 
 #include <cstdint>

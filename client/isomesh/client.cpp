@@ -99,8 +99,8 @@ Error several_volumes(const std::vector<UploadedVolume>& volumes) {
     remedy.choices.push_back(
         {"member", each.member, each.problem ? each.problem->detail : "stored"});
   }
-  return Error(ErrorCode::kUnusableVolume, "the upload holds " + std::to_string(volumes.size()) +
-                                               " volumes, where one is needed")
+  return Error(ErrorCode::kUnusableVolume, "the upload contains " + std::to_string(volumes.size()) +
+                                               " volumes, but one is needed")
       .with_remedy(std::move(remedy));
 }
 

@@ -15,7 +15,7 @@ MeshFile file_of(const Job& job, MeshFormat format, std::optional<std::int64_t> 
   }
   if (job.state != JobState::kSucceeded || !job.mesh) {
     throw Error(ErrorCode::kNotReady,
-                "the job is " + std::string(to_string(job.state)) + ", its mesh is not ready");
+                "the job is " + std::string(to_string(job.state)) + "; its mesh is not ready");
   }
   if (const auto found = job.mesh->files.find(format); !label && found != job.mesh->files.end()) {
     return found->second;
@@ -31,7 +31,7 @@ MeshFile file_of(const Job& job, MeshFormat format, std::optional<std::int64_t> 
   if (!label && std::ranges::any_of(job.mesh->labels, has)) {
     throw Error(ErrorCode::kNotFound, "the job has a file of the format \"" +
                                           std::string(to_string(format)) +
-                                          "\" for each label: say which, or take the zip");
+                                          "\" for each label; choose a label, or the zip");
   }
   throw Error(ErrorCode::kNotFound, "the job has no file of the format \"" +
                                         std::string(to_string(format)) + '"' +
@@ -71,7 +71,7 @@ void Download::publish() {
 
 void Download::refuse() {
   throw Error(ErrorCode::kDigestMismatch,
-              "the mesh that arrived is not the one that the job describes");
+              "the received mesh does not match the checksum of the job");
 }
 
 }  // namespace isomesh

@@ -16,7 +16,7 @@ void EventReader::take(std::string_view piece) {
     const std::size_t end = piece.find('\n');
     line_ += piece.substr(0, end);
     if (line_.size() > kLongestLine) {
-      throw Error(ErrorCode::kInternal, "the server's events are not what the API describes");
+      throw Error(ErrorCode::kInternal, "the server's events do not match the API");
     }
     if (end == std::string_view::npos) return;
     take_line(line_);

@@ -19,7 +19,8 @@ constexpr milliseconds kFirstPause{100};
 TransportOptions transport_options(ClientOptions&& options) {
   const bool sendable =
       std::ranges::all_of(options.token, [](char c) { return c > ' ' && c < '\x7f'; });
-  if (!sendable) throw invalid_parameter("token", "must be letters, digits and signs of ASCII");
+  if (!sendable)
+    throw invalid_parameter("token", "must consist of ASCII letters, digits and punctuation");
   return {.server = parse_server_address(options.server),
           .server_url = options.server,
           .token = std::move(options.token),
@@ -80,7 +81,7 @@ ErrorCode code_of_status(int status) {
 }  // namespace
 
 Error refusal(const HttpAnswer& answer) {
-  const std::string status = "the server answered with status " + std::to_string(answer.status);
+  const std::string status = "the server responded with status " + std::to_string(answer.status);
   if (!answer.content_type.starts_with("application/problem+json")) {
     return {code_of_status(answer.status), status};
   }

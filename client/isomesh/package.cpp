@@ -51,8 +51,8 @@ std::vector<PackedFile> files_below(const fs::path& folder) {
     if (at->is_symlink() || !at->is_regular_file()) continue;
     files.push_back({at->path().lexically_relative(folder).generic_string(), at->path()});
     if (files.size() > kMostFiles) {
-      throw Error(ErrorCode::kInvalidParameter,
-                  folder.string() + ": holds more than " + std::to_string(kMostFiles) + " files");
+      throw Error(ErrorCode::kInvalidParameter, folder.string() + ": contains more than " +
+                                                    std::to_string(kMostFiles) + " files");
     }
   }
   if (error) throw Error(ErrorCode::kInvalidParameter, folder.string() + ": " + error.message());
@@ -227,8 +227,8 @@ FolderFiles files_of_folder(const std::filesystem::path& folder) {
   if (result.sent.empty()) {
     throw Error(
         ErrorCode::kInvalidParameter,
-        folder.string() + (result.left_out.empty() ? ": holds no files to send"
-                                                   : ": holds no files that could be a volume"));
+        folder.string() + (result.left_out.empty() ? ": contains no files"
+                                                   : ": contains no files that could be a volume"));
   }
   return result;
 }
@@ -252,7 +252,7 @@ std::vector<PackedFile> files_of_upload(const std::vector<std::filesystem::path>
         files.push_back(std::move(file));
       } else if (!fs::equivalent(same->path, file.path, error)) {
         throw Error(ErrorCode::kInvalidParameter,
-                    file.path.string() + ": another file of that name is sent with it");
+                    file.path.string() + ": another file in this upload has the same name");
       }
     }
   }

@@ -72,7 +72,7 @@ struct Progress {
 Progress progress_of(const HttpAnswer& answer, std::uint64_t bytes) {
   const auto offset = parse_uint64(answer.header("upload-offset"));
   if (!offset || *offset > bytes) {
-    throw Error(ErrorCode::kInternal, "the server's answer is not what the API describes");
+    throw Error(ErrorCode::kInternal, "the server's response does not match the API");
   }
   return {*offset, answer.header("upload-complete") == "?1"};
 }

@@ -34,13 +34,13 @@ using curl::make_multi;
 using curl::Multi;
 
 void check(bool done) {
-  if (!done) throw Error(ErrorCode::kInternal, "libcurl cannot be used");
+  if (!done) throw Error(ErrorCode::kInternal, "libcurl failed");
 }
 
 void append(Headers& headers, const std::string& name, const std::string& value) {
   // libcurl sends lines as they are, so a line break would begin another header.
   if (has_control_characters(value)) {
-    throw invalid_parameter(name, "must not hold control characters");
+    throw invalid_parameter(name, "must not contain control characters");
   }
   curl::append(headers, name + ": " + value);
 }
@@ -61,18 +61,18 @@ std::string reason_of(CURLcode code) {
   switch (code) {
     case CURLE_COULDNT_RESOLVE_HOST:
     case CURLE_COULDNT_CONNECT:
-      return "it cannot be connected to";
+      return "cannot connect";
     case CURLE_OPERATION_TIMEDOUT:
-      return "it does not answer to connecting";
+      return "the connection timed out";
     case CURLE_SSL_CONNECT_ERROR:
-      return "it does not speak TLS";
+      return "the TLS handshake failed";
     case CURLE_SSL_CACERT_BADFILE:
-      return "the certificate authorities to trust cannot be read";
+      return "the file of certificate authorities cannot be read";
     case CURLE_PEER_FAILED_VERIFICATION:
-      return "its certificate is not one that is trusted here";
+      return "its certificate is not trusted";
     default:
-      return is_broken(code) ? "the connection was closed before the answer was complete"
-                             : "what answers there does not speak this API";
+      return is_broken(code) ? "the connection was closed before the response was complete"
+                             : "the response is not one of isomeshd's API";
   }
 }
 
@@ -95,7 +95,7 @@ class Transfer {
     if (failure_) std::rethrow_exception(failure_);
     if (!end) {
       if (options_.stop.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
-      throw no_answer("the server was silent for too long", is_sending());
+      throw no_answer("the server did not respond in time", is_sending());
     }
     if (*end != CURLE_OK) throw no_answer(reason_of(*end), is_broken(*end));
     // libcurl accepts a head that the end of the connection cuts off.
@@ -210,7 +210,7 @@ class Transfer {
   }
 
   NoAnswer no_answer(const std::string& reason, bool broken) const {
-    return {"no answer from " + options_.server_url + ": " + reason, broken};
+    return {"no response from " + options_.server_url + ": " + reason, broken};
   }
 
   // An exception must not pass through libcurl, which is C. It ends the transfer, and `answer`
@@ -271,7 +271,7 @@ class Transfer {
       return request_.sink(piece);
     }
     if (answer_.body.size() + piece.size() > kLongestBody) {
-      throw Error(ErrorCode::kInternal, "the server's answer is not what the API describes");
+      throw Error(ErrorCode::kInternal, "the server's response does not match the API");
     }
     answer_.body += piece;
   }

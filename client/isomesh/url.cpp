@@ -36,7 +36,7 @@ void check_host_and_port(const std::string& origin) {
 
 ServerAddress parse_server_address(std::string_view url) {
   if (take_prefix(url, "unix:")) {
-    if (url.empty()) refuse("the path of the socket is missing");
+    if (url.empty()) refuse("must name the path of a socket after unix:");
     return {.origin = "http://localhost", .socket = url};
   }
   std::string_view authority = url;

@@ -48,7 +48,7 @@ TEST(Import, AFolderWithoutFilesIsRefusedByTheCommand) {
   const TemporaryFolder folder;
   const Finished result = daemon.command({"upload", folder.path()});
   EXPECT_NE(result.status, 0);
-  EXPECT_THAT(result.errors, HasSubstr("holds no files"));
+  EXPECT_THAT(result.errors, HasSubstr("contains no files"));
 }
 
 TEST(Import, ASeriesIsChosenOnlyWhereThereIsOne) {

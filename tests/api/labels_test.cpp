@@ -134,7 +134,7 @@ TEST_F(LabelsTest, AreRefusedByName) {
     const Answer answer = post(members);
     return std::to_string(answer.status) + ' ' + json::parse(answer.body).value("detail", "");
   };
-  EXPECT_EQ(fault(""), "400 iso: is required, or labels");
+  EXPECT_EQ(fault(""), "400 iso: is required unless labels is given");
   EXPECT_THAT(fault(R"("iso": 3, "labels": "all")"), HasSubstr("400 iso: "));
   EXPECT_THAT(fault(R"("labels": [3, 4, 9])"),
               HasSubstr("422 the volume has no voxels of the labels 4, 9"));

@@ -111,7 +111,7 @@ TEST_F(Commands, AnInterruptCancelsTheJobThatMeshWaitsFor) {
   const Outcome outcome = outcome_of(options_, stop.get_token());
   EXPECT_EQ(outcome.status, kRefused);
   EXPECT_EQ(cancelled_, 1);
-  EXPECT_THAT(outcome.err, HasSubstr("the job 7 is cancelled"));
+  EXPECT_THAT(outcome.err, HasSubstr("the job 7 was cancelled"));
 }
 
 TEST_F(Commands, ARefusalIsStatusOne) {
@@ -126,7 +126,7 @@ TEST_F(Commands, AServerThatIsNotThereIsStatusThree) {
   options_.server = test::unused_url();
   const Outcome outcome = outcome_of(options_);
   EXPECT_EQ(outcome.status, kServerUnreachable);
-  EXPECT_THAT(outcome.err, StartsWith("isomesh: no answer from http://"));
+  EXPECT_THAT(outcome.err, StartsWith("isomesh: no response from http://"));
 }
 
 TEST_F(Commands, AServerThatGoesAwayLeavesAJobToComeBackTo) {

@@ -92,7 +92,7 @@ TEST(UploadBody, OfAnEmptyFolderIsRefused) {
   test::write_file(folder / "empty" / ".hidden", "x");
   const Error error = test::error_of([&] { UploadBody body(folder / "empty"); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidParameter);
-  EXPECT_THAT(error.what(), HasSubstr("holds no files"));
+  EXPECT_THAT(error.what(), HasSubstr("contains no files"));
 }
 
 TEST(UploadBody, OfAFolderLeavesOutWhatCanBeNoVolume) {

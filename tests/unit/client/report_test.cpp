@@ -95,13 +95,13 @@ TEST(MeshReport, TellsTheIsoValueAndTheError) {
   mesh.certificate->budget_mm = {.smoothing = 0.05, .quantisation = 0.01, .simplification = 0.04};
   mesh.quality.self_intersections = {.pairs = 3, .triangles = 5};
   const std::string report = mesh_report(mesh);
-  EXPECT_THAT(report, HasSubstr("iso-value            61.5\n"));
+  EXPECT_THAT(report, HasSubstr("iso-value           61.5\n"));
   EXPECT_THAT(report, HasSubstr("from 5,000 triangles, bound by the number of triangles\n"));
   EXPECT_THAT(report,
               HasSubstr("0.0988 mm from the extracted surface, measured on the stl file\n"));
-  EXPECT_THAT(report, HasSubstr("scan to mesh       0.0988 mm at most, 0.0300 mm for 99 of 100"));
+  EXPECT_THAT(report, HasSubstr("scan to mesh      0.0988 mm at most, 0.0300 mm for 99 %"));
   EXPECT_THAT(report, HasSubstr("0.0500 mm smoothing, 0.0400 mm simplification, 0.0100 mm"));
-  EXPECT_THAT(report, HasSubstr("runs through itself  at 3 pairs of triangles\n"));
+  EXPECT_THAT(report, HasSubstr("self-intersections  3 pairs of triangles\n"));
 }
 
 TEST(VolumeReport, NamesWhatTheVolumeIs) {
@@ -163,6 +163,22 @@ TEST(JobReport, TellsAMeshThatWasThereAlready) {
   EXPECT_THAT(job_report(job), Not(HasSubstr("earlier job")));
   job.reused = true;
   EXPECT_THAT(job_report(job), HasSubstr("earlier job"));
+}
+
+TEST(JobList, NamesTheVolumes) {
+  Job named = test::finished_job("7", "mesh");
+  Job nameless = test::finished_job("8", "mesh");
+  nameless.parameters.volume = "0123456789abcdef";
+  const std::string list = job_list({named, nameless}, {{"abc", "CT of the knee"}});
+  EXPECT_THAT(list, HasSubstr("volume\n"));
+  EXPECT_THAT(list, HasSubstr("  CT of the knee\n"));
+  EXPECT_THAT(list, HasSubstr("  0123456789ab\n"));
+}
+
+TEST(NoteText, NamesTheOptionInsteadOfTheMember) {
+  EXPECT_EQ(note_text({"looks-like-labels", "It has labels: mesh it with \"labels\": \"all\"."}),
+            "It has labels: mesh it with --labels all.");
+  EXPECT_EQ(note_text({"other", "as it is"}), "as it is");
 }
 
 TEST(JobJson, AddsWhatTheClientKnows) {

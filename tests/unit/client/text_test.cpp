@@ -66,7 +66,7 @@ TEST(BarLine, SaysWhatAJobWaitsFor) {
   Job job;
   EXPECT_EQ(note_of(job), "waiting for a worker");
   job.waiting_for = WaitingFor::kDisk;
-  EXPECT_EQ(note_of(job), "waiting for room on the server's disk");
+  EXPECT_EQ(note_of(job), "waiting for free space on the server's disk");
   job.state = JobState::kRunning;
   EXPECT_EQ(note_of(job), "");
 }

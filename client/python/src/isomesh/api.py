@@ -248,7 +248,8 @@ class Estimate(TypedDict):
     volume: str
     #: Otsu's threshold where that was asked for; none by labels.
     iso: NotRequired[float]
-    #: Tetrahedra per cell. With 5 every second cell is mirrored; the cell (0,0,0) is not.
+    #: Number of tetrahedra per cell. With 5, every second cell is mirrored; the cell (0,0,0) is
+    #: not.
     scheme: Scheme
     #: Exact, of the surface as it is extracted: before the parameters components and fill_cavities
     #: drop any, and before it is simplified.
@@ -376,29 +377,31 @@ Certify = bool
 
 
 class JobParametersComponents(TypedDict):
-    """Which parts of the surface are kept; the others are dropped before smoothing. With
-    several members, the largest of those that are large enough. Parts are compared by their
-    triangles, equal ones by their first vertex. Without members all are kept. Not for
-    labels."""
+    """Which connected components to keep; the others are dropped before smoothing. A component
+    must meet all members that are given: keep chooses among those that are large enough.
+    Components are ranked by their number of triangles, equal ones by their first vertex.
+    Without members all are kept. Labels do not allow it."""
 
-    #: Of the parts, so many of the largest are kept.
+    #: Keep the N largest connected components.
     keep: NotRequired[Keep]
-    #: Of the parts, those of so many triangles are kept.
+    #: Drop connected components with fewer triangles than this.
     min_triangles: NotRequired[MinTriangles]
-    #: Of the parts, those nearest to these places are kept. Places are x, y and z in millimetres,
-    #: LPS, one after the other; the part of the nearest vertex is meant.
+    #: Keep the connected component nearest to each of these points. A point is x, y and z in
+    #: millimetres (LPS). A query lists the numbers of all points in one row. The nearest component
+    #: is the one with the nearest vertex.
     nearest_to: NotRequired[NearestTo]
 
 
 class JobParametersDraco(TypedDict):
-    """Of the drc format, and of the Draco streams inside glb."""
+    """Options of the drc format, and of the Draco streams in glb."""
 
-    #: Bits per coordinate on a grid over the mesh's longest extent.
+    #: Number of bits that Draco keeps per coordinate. The grid spans the mesh's longest side.
     position_bits: NotRequired[PositionBits]
-    #: Of Draco: 0 to 4 are smallest and slow (valence coding, by libdraco); 5 to 9 are all the
-    #: same (an encoder of isomesh's own, on several threads, in no more bytes than libdraco takes
-    #: at 5); 10 keeps the order of vertices and triangles at several times the bytes (sequential,
-    #: by libdraco).
+    #: Draco's encoding speed; low values make smaller files and take longer. 0 to 4 use valence
+    #: coding by libdraco: the smallest files, slow. 5 to 9 are all the same: isomesh's own
+    #: encoder, which uses several threads and takes no more bytes than libdraco at 5. 10 uses
+    #: sequential coding by libdraco: the order of vertices and triangles is kept, at several times
+    #: the bytes.
     speed: NotRequired[Speed]
 
 
@@ -457,7 +460,7 @@ class Job(TypedDict):
     parameters: CompleteJobParameters
     #: The volume's id, as in the parameters.
     volume: str
-    #: Jobs are begun by priority, then by age.
+    #: Jobs start in order of priority, then of age.
     priority: Priority
     created: str
     #: Null while the job is queued.
@@ -778,7 +781,7 @@ class OrderRequest(TypedDict):
     parameters: NotRequired[Mapping[str, Any]]
     #: Where the mesh goes; may be empty.
     send: NotRequired[Sequence[SendTarget]]
-    #: Jobs are begun by priority, then by age.
+    #: Jobs start in order of priority, then of age.
     priority: NotRequired[Priority]
     #: As of a job. What is sent tells id, state, rule, job, created, finished and the type of an
     #: error: nothing of a patient.
@@ -817,7 +820,7 @@ class Order(TypedDict):
     source: OrderSource
     #: As of a job.
     parameters: Mapping[str, Any]
-    #: Jobs are begun by priority, then by age.
+    #: Jobs start in order of priority, then of age.
     priority: Priority
     send: Sequence[SendTarget]
     volume: Optional[str]
@@ -900,7 +903,7 @@ class SucceededJob(TypedDict):
     parameters: CompleteJobParameters
     #: The volume's id, as in the parameters.
     volume: str
-    #: Jobs are begun by priority, then by age.
+    #: Jobs start in order of priority, then of age.
     priority: Priority
     created: str
     started: str
@@ -924,131 +927,135 @@ class JobOptions(TypedDict, total=False):
     Every member is a keyword of Client.mesh, Client.submit and Client.estimate.
 
     iso
-        The iso-value, in the volume's units, or Otsu's threshold. A sample is inside when its
-        value is >= iso.
+        The iso-value in the volume's units, or otsu for Otsu's threshold. A sample is inside
+        when its value is >= iso.
 
     labels
-        In place of an iso-value: the labels of a segmentation, each with a surface of its own,
-        or all of them. Neighbours share the wall between them. All other values, and those that
-        are not listed, are background. Vertices lie half-way between two samples. Unless the
-        request says, there are 10 passes with a lambda of 0.33, and no vertex moves farther
-        than half the smallest spacing.
+        Labels of a segmentation to mesh instead of an iso-value: their values, or all. Each
+        label gets a surface of its own. Neighbouring labels share the wall between them. Values
+        that are not listed are background. Vertices lie half-way between two samples. Some
+        defaults differ from those of jobs with an iso-value: 10 passes, a lambda of 0.33, and
+        no vertex moves farther than half the smallest spacing.
 
     background
         The value of samples without a label.
 
     label_names
-        What labels are called, by their values. Those that are left out are called as the
-        volume's file says.
+        Names of the labels, by value. Labels that are not listed keep the name from the
+        volume's file.
 
     label_colors
-        The colours of labels, as #rrggbb, by their values. Those that are left out have the
-        colour that the volume's file says, or one of a fixed series.
+        Colours of the labels as #rrggbb, by value. Labels that are not listed keep the colour
+        from the volume's file, or get one of a fixed series.
 
     label_values
-        Labels that are made of the samples of several values, by their own. A value may belong
-        to several labels, which then overlap there. Those that are left out are as the volume's
-        file says.
+        Labels that consist of several sample values: the values of each label. A value may
+        belong to several labels, which then overlap there. Labels that are not listed keep the
+        values from the volume's file.
 
     scheme
-        Tetrahedra per cell. With 5 every second cell is mirrored; the cell (0,0,0) is not.
+        Number of tetrahedra per cell. With 5, every second cell is mirrored; the cell (0,0,0)
+        is not.
 
     interpolation
-        Where a vertex lies on its edge. midpoint puts all half-way.
+        Position of a vertex on the edge between two samples. linear interpolates the two
+        samples; midpoint puts every vertex half-way.
 
     passes
-        How often the surface is smoothed. Vertices on its boundary stay. By labels the default
-        is 10.
+        Number of smoothing passes. Vertices on the surface's boundary stay where they are. For
+        labels the default is 10.
 
     smoothing
-        How a pass moves the vertices. laplacian: every pass moves each vertex by lambda of the
-        way to the mean of its neighbours; what the surface encloses shrinks. taubin: every pass
-        does so and then moves the vertices back by mu, the same for all, with 1/lambda + 1/mu =
-        pass_band; so a pass is two steps, and noise goes while shape and volume stay.
+        The smoothing method. laplacian: each pass moves every vertex towards the mean of its
+        neighbours by the factor lambda; the enclosed volume shrinks. taubin: each pass does the
+        same and then moves all vertices back by the factor mu, where 1/lambda + 1/mu =
+        pass_band. A pass is thus two steps: they remove noise and keep shape and volume.
 
     lambda_
-        How far a pass moves a vertex; 1 moves it onto the mean of its neighbours. Null: 1 for
-        laplacian, 0.33 for taubin, which takes at most 0.66.
+        Relaxation factor of a pass; 1 moves a vertex onto the mean of its neighbours. Null: 1
+        for laplacian, 0.33 for taubin, which takes at most 0.66.
 
     pass_band
-        Of taubin: what varies along the surface more slowly than this is kept. From 0 for a
-        constant to 2 for what changes sign from each vertex to the next.
+        For taubin: frequencies along the surface below this are kept. They range from 0
+        (constant) to 2 (the sign changes from each vertex to the next).
 
     max_displacement_mm
-        Smoothing moves no vertex farther than this from where it was extracted. Millimetres;
-        null: as far as it goes, and of labels half the smallest spacing.
+        Smoothing moves no vertex farther than this from its extracted position. In millimetres.
+        Null means no limit, and for labels half the smallest spacing.
 
     close
-        Cap the surface where it meets the volume's border, as if the samples beyond it were
-        outside. The result has no boundary. Caps lie in the border, stay flat and are not
-        smoothed; the rest is smoothed as if the surface were open.
+        Cap the surface where it meets the volume's border. Samples beyond the border then count
+        as outside. The result has no boundary. Caps lie in the border, stay flat and are not
+        smoothed. The rest is smoothed as if the surface were open.
 
     components
-        Which parts of the surface are kept; the others are dropped before smoothing. With
-        several members, the largest of those that are large enough. Parts are compared by their
-        triangles, equal ones by their first vertex. Without members all are kept. Not for
-        labels.
+        Which connected components to keep; the others are dropped before smoothing. A component
+        must meet all members that are given: keep chooses among those that are large enough.
+        Components are ranked by their number of triangles, equal ones by their first vertex.
+        Without members all are kept. Labels do not allow it.
 
     fill_cavities
-        Leave out the walls of cavities, which no opening leads to, and what floats in them.
+        Remove the walls of enclosed cavities and everything that floats in them. A cavity is
+        enclosed if no opening leads to it.
 
     crop
-        Only what is in this box: its smallest and its largest corner, in millimetres, LPS. The
-        volume's samples within the box are taken as if they were all; of one that lies askew,
-        those between the box's extents along its axes. The surface is closed by caps: close is
-        true.
+        Mesh only what lies in this box: its smallest and its largest corner in millimetres
+        (LPS). Samples outside the box are ignored, as if the volume ended there. If the
+        volume's axes are oblique, the box's extents along those axes are used. Caps close the
+        surface: close is true.
 
     max_error_mm
-        No part of a file is farther than this from the surface as it was extracted, nor that
-        from it. Millimetres. Half of it is what smoothing may take; then the surface gets as
-        few triangles as the rest allows, and Draco's coordinates as many bits as it takes. It
-        is measured on the files' own bytes: see certify, which comes with it.
+        Largest distance between a file's surface and the extracted surface, measured both ways.
+        In millimetres. Smoothing may use half of it. Simplification then removes as many
+        triangles as the rest allows, and Draco's coordinates get as many bits as that takes.
+        The error is measured on the files' own bytes: see certify, which is switched on.
 
     triangles
-        Simplify the surface to so many triangles, or fewer. With max_error_mm, what binds
-        first; the answer says which. What it costs is measured: see certify, which comes with
-        it unless it is false.
+        Simplify the surface to at most this many triangles. If max_error_mm is given too, the
+        limit that is reached first applies; the response names it. The resulting error is
+        measured: see certify, which is switched on unless it is set to false.
 
     formats
-        The files to make, each named once.
+        The file formats to write.
 
     draco
-        Of the drc format, and of the Draco streams inside glb.
+        Options of the drc format, and of the Draco streams in glb.
 
     normals
-        Put the vertices' normals, weighted by the areas around them, into glb. Without them
-        viewers shade every triangle flat, or compute their own.
+        Write vertex normals, weighted by the areas around them, to glb. Without normals,
+        viewers shade each triangle flat or compute their own.
 
     distances
-        Put each vertex's distance to the surface as it was extracted into glb, in millimetres.
-        As the vertex attribute _DISTANCE_MM, of all levels of detail; rounded to a four
-        thousandth of the largest. The page shows it as colour.
+        Write each vertex's distance to the extracted surface to glb, in millimetres. The vertex
+        attribute is _DISTANCE_MM; every level of detail has it. Values are rounded to a four
+        thousandth of the largest. The page shows them as colours. The formats must include glb.
 
     lods
-        Levels of detail for glb, as shares of the triangles from 1 downwards. By the extension
-        MSFT_lod, which readers that do not know it pass over. At most 8.
+        Levels of detail in glb, as fractions of the triangles, from 1 downwards. At most 8.
+        They use the extension MSFT_lod; readers that do not know it ignore them. The formats
+        must include glb.
 
     merge
-        Make the surface one primitive of glb, or one for each label. For programs that take a
-        primitive for an object of its own. Otherwise there is one for each hundred thousand
-        triangles or so, which are written and read side by side.
+        Write the surface to glb as one primitive, or as one per label. For programs that take
+        each primitive for a separate object. Otherwise there is one per hundred thousand
+        triangles or so; they are written and read in parallel.
 
     glb_codec
-        What the surface in glb is compressed by. draco is KHR_draco_mesh_compression, which
-        makes the smaller files; meshopt is EXT_meshopt_compression, which is read faster.
-        Readers have to know the one that it is.
+        How the surface in glb is compressed. draco is KHR_draco_mesh_compression and makes
+        smaller files. meshopt is EXT_meshopt_compression and is read faster. Readers must
+        support the one that is used.
 
     space
-        Which ways the coordinates in the files run: x to the patient's left and y to the back,
-        or x to the right and y to the front. z runs to the head. gii is always RAS, and glb has
-        its own node, by which Y is up.
+        Directions of x and y in the files: to the patient's left and back, or to the right and
+        front. z points to the head. gii is always RAS. glb has a node of its own that turns Y
+        up.
 
     priority
-        Jobs are begun by priority, then by age.
+        Jobs start in order of priority, then of age.
 
     certify
-        Measure how far the files are from the surface as it was extracted, and where they run
-        through themselves.
+        Measure how far the files are from the extracted surface, and where they intersect
+        themselves.
 
     callback
         Whom to tell that the job has ended, whichever way: a POST of the job, as GET gives it.

@@ -1,0 +1,39 @@
+// Ids on the command line, which may be shortened; private to this folder.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "client/isomesh/client.h"
+
+namespace isomesh::cli {
+
+// One of the things that an id may stand for.
+struct Candidate {
+  std::string id;
+  std::string title;  // what tells it from others, for a person
+};
+
+// True for text that could be a volume's id or a shortened one: at least four hexadecimal digits.
+bool may_be_volume_id(const std::string& text);
+
+// True for an argument FILE that names no file but could be a volume's id.
+bool is_stored_volume(const std::filesystem::path& path);
+
+// The one id that `text` is, begins or ends. Throws Error kNotFound if there is none, and
+// kInvalidParameter, which lists them, if there are several. `kind` is "volume", "job" or "order".
+std::string whole_id(const std::string& text, const std::string& kind,
+                     const std::vector<Candidate>& candidates);
+
+// The whole ids on the server. Whole ids and those with fewer than four characters are returned as
+// they are, without a request. Throws Error as whole_id and Client do.
+std::string volume_id(Client& client, const std::string& text);
+std::string job_id(Client& client, const std::string& text);
+std::string order_id(Client& client, const std::string& text);
+
+// All volumes, or the newest page of jobs or orders, for completion by shells. `kind` is "volumes",
+// "jobs" or "orders".
+std::vector<Candidate> ids_of(Client& client, const std::string& kind);
+
+}  // namespace isomesh::cli

@@ -1,0 +1,23 @@
+// The options that say what to upload; private to this folder.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "client/cli/options.h"
+
+namespace isomesh::cli {
+
+// The groups of these options in help texts.
+inline constexpr const char* kUploadGroup = "Upload";
+inline constexpr const char* kRawGroup = "Raw samples";
+
+// What the argument FILE may name.
+enum class Inputs { kFiles, kFilesAndVolumes };
+
+// FILE and the options that choose a volume in it.
+void add_file(CLI::App& app, Options& options, Inputs inputs = Inputs::kFiles);
+
+// The options that describe raw samples.
+void add_raw(CLI::App& app, Options& options);
+
+}  // namespace isomesh::cli

@@ -1,0 +1,55 @@
+// One row of the table of parameters (proto/parameters.h).
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <optional>
+#include <type_traits>
+
+#include "proto/types.h"
+
+namespace isomesh {
+
+template <class T>
+concept Enumeration = std::is_enum_v<T>;
+
+template <class Self, class T>
+concept Is = std::same_as<std::remove_const_t<Self>, T>;
+
+// What differs for one kind of smoothing.
+struct SmoothingCase {
+  Smoothing smoothing;
+  std::optional<double> standard = {};  // the default for this kind
+  std::optional<double> maximum = {};
+};
+
+// The jobs that a parameter applies to.
+enum class JobKind { kAny, kAtIso, kByLabels };
+
+struct Parameter {
+  const char* name;        // the member in JSON
+  const char* title = "";  // a short label
+  const char* help = "";   // what it does, in one line
+  const char* more = "";   // further sentences for readers of the API
+  const char* unit = "";   // also the name's ending, as in max_displacement_mm
+  // The range of a number.
+  std::optional<double> minimum = {};
+  std::optional<double> above = {};
+  std::optional<double> maximum = {};
+  const char* when_empty = nullptr;        // the word for no value, instead of JSON's null
+  std::array<const char*, 4> values = {};  // the meanings of an enumeration's values, in order
+  // What differs between kinds of smoothing; empty if nothing does.
+  std::array<std::optional<SmoothingCase>, 2> cases = {};
+  bool is_required = false;
+  const char* unless = nullptr;  // a required parameter may be missing if this one is given
+  JobKind jobs = JobKind::kAny;
+  std::optional<double> by_labels = {};  // the default for jobs by labels, if it differs
+  bool may_be_absent = false;            // jobs that it does not concern lack it
+  bool in_query = true;
+  const char* query = nullptr;   // its name in a query, if it is not `name`
+  const char* option = nullptr;  // its name on the command line, if it is not the query's
+
+  operator const char*() const { return name; }
+};
+
+}  // namespace isomesh
