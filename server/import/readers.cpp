@@ -11,6 +11,7 @@
 #include "server/import/formats/nrrd.h"
 #include "server/import/formats/raw.h"
 #include "server/import/formats/vti.h"
+#include "server/import/labels_beside.h"
 #include "server/import/transfer.h"
 
 namespace isomesh::import {
@@ -21,7 +22,9 @@ template <SourceVolume (*kParse)(const InputFile&, const Companions&, const Impo
 Volume parse_with(const Input& input) {
   const InputFile file(input.path);
   const ImportTask& task = input.task;
-  return write_canonical(file, kParse(file, input.companions, task.options), task);
+  Volume volume = write_canonical(file, kParse(file, input.companions, task.options), task);
+  take_labels_beside(input.companions, volume);
+  return volume;
 }
 
 constexpr Reader kRaw = {.name = "raw", .title = "raw samples", .parse = parse_raw};

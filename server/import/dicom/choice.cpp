@@ -37,9 +37,8 @@ std::vector<Slice> chosen_of(SeriesVolumes all, const ImportOptions& options,
                              std::vector<Note>& notes) {
   const std::size_t count = all.volumes.size();
   if (count == 1 && options.volume.value_or(0) == 0) return std::move(all.volumes.front().slices);
-  const std::string difference =
-      all.difference.empty() ? "" : " The volumes differ in " + all.difference + '.';
-  const std::string found = "The series holds " + count_of(count, "volume") + '.' + difference;
+  const std::string difference = all.difference.empty() ? "" : " that differ in " + all.difference;
+  const std::string found = "The series holds " + count_of(count, "volume") + difference + '.';
   std::vector<Choice> choices = choices_of(all);
   const std::string choose = " Choose one with volume=N: " + listed(choices) + '.';
   if (!options.volume) {
@@ -58,9 +57,9 @@ std::vector<Slice> chosen_of(SeriesVolumes all, const ImportOptions& options,
                  choices);
   }
   notes.push_back(note_of(NoteCode::kVolumeChosen, "Volume " + std::to_string(*options.volume) +
-                                                       " of " + std::to_string(count) +
-                                                       " was read. The first is volume 0." +
-                                                       difference));
+                                                       " of " + count_of(count, "volume") +
+                                                       difference +
+                                                       " was read. The first is volume 0."));
   return std::move(chosen.slices);
 }
 

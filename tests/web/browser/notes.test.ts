@@ -126,7 +126,7 @@ describe('notes and what was left out', () => {
     ]);
     await page.waitForURL(volumePage);
     await page.locator('summary', { hasText: '1 file was left out' }).click();
-    await expectText('it is no DICOM file');
+    await expectText('it is not a DICOM file');
   });
 });
 

@@ -72,13 +72,13 @@ TEST(DicomMosaic, TellsTheNumberInTwoPlaces) {
 
 TEST(DicomMosaic, IsRefusedWhenItDoesNotSayWhereSlicesLie) {
   EXPECT_THAT(import_one(siemens_mosaic().erase(kCsaImageHeader)).error, HasSubstr("header"));
-  EXPECT_THAT(import_one(siemens_mosaic({})).error, HasSubstr("how many"));
+  EXPECT_THAT(import_one(siemens_mosaic({})).error, HasSubstr("number of slices is unknown"));
   EXPECT_THAT(import_one(siemens_mosaic(csa_fields({}))).error, HasSubstr("SliceNormalVector"));
   EXPECT_THAT(import_one(siemens_mosaic(csa_fields({"0", "1", "0"}))).error, HasSubstr("normal"));
   EXPECT_THAT(import_one(siemens_mosaic(csa_fields({"0", "0", "3"}))).error,
               HasSubstr("unit vectors"));
   EXPECT_THAT(import_one(siemens_mosaic().erase(kSpacingBetweenSlices)).error,
-              HasSubstr("how far apart"));
+              HasSubstr("the distance between its slices"));
   EXPECT_THAT(
       import_one(
           siemens_mosaic().number(kBitsAllocated, 1).number(kBitsStored, 1).number(kHighBit, 0))
@@ -88,7 +88,7 @@ TEST(DicomMosaic, IsRefusedWhenItDoesNotSayWhereSlicesLie) {
   many[1].second = {"17"};
   EXPECT_THAT(import_one(siemens_mosaic(many)).error, HasSubstr("no 5 x 5 tiles"));
   many[1].second = {"1e9"};
-  EXPECT_THAT(import_one(siemens_mosaic(many)).error, HasSubstr("no number of slices"));
+  EXPECT_THAT(import_one(siemens_mosaic(many)).error, HasSubstr("not a valid number of slices"));
 }
 
 TEST(DicomMosaic, TakesTheThicknessWhereNoDistanceIsTold) {
@@ -121,7 +121,7 @@ TEST(DicomMosaic, IsAVolumeOfItsSeries) {
                            .file());
   }
   const Outcome all = import_objects(files);
-  EXPECT_THAT(all.error, HasSubstr("3 volumes, which differ in AcquisitionTime"));
+  EXPECT_THAT(all.error, HasSubstr("3 volumes that differ in AcquisitionTime"));
   ASSERT_EQ(all.remedy.choices.size(), 3);
   EXPECT_EQ(all.remedy.choices[1], (Choice{"volume", "1", "AcquisitionTime 120002, 5 slices"}));
   const Outcome second = import_objects(files, {.volume = 1});
