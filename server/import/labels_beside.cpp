@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -92,7 +91,7 @@ std::vector<Table> named_as(const std::string& stem, std::vector<Table> tables) 
   return tables;
 }
 
-std::optional<Table> table_beside(const Companions& companions) {
+std::vector<Table> tables_beside(const Companions& companions) {
   const std::string stem = stem_of(companions.name);
   const auto is_own = [&](const std::string& name) { return begins_with(name, stem); };
   std::vector<Table> tables = tables_in(companions, is_own);
@@ -105,8 +104,7 @@ std::optional<Table> table_beside(const Companions& companions) {
   } else if (tables.size() > 1) {
     tables = named_as(stem, std::move(tables));
   }
-  if (tables.size() != 1) return std::nullopt;
-  return std::move(tables.front());
+  return tables;
 }
 
 }  // namespace
@@ -115,10 +113,16 @@ void take_labels_beside(const Companions& companions, Volume& volume) {
   const auto note =
       std::ranges::find(volume.notes, describe(NoteCode::kLooksLikeLabels).name, &Note::code);
   if (!volume.labels.empty() || note == volume.notes.end()) return;
-  auto table = table_beside(companions);
-  if (!table) return;
-  volume.labels = std::move(table->labels);
-  note->detail += " The names of the labels are from " + in_quotes(table->name) + '.';
+  std::vector<Table> tables = tables_beside(companions);
+  if (tables.empty()) return;
+  if (tables.size() > 1) {
+    note->detail +=
+        " Several tables of label names fit, so none was used: " + in_quotes(tables[0].name) +
+        " and " + in_quotes(tables[1].name) + (tables.size() > 2 ? ", among others." : ".");
+    return;
+  }
+  volume.labels = std::move(tables.front().labels);
+  note->detail += " The names of the labels are from " + in_quotes(tables.front().name) + '.';
 }
 
 }  // namespace isomesh::import

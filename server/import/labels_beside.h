@@ -8,8 +8,8 @@ namespace isomesh::import {
 
 // Gives a volume whose samples look like labels, and whose own file names none, the labels of a
 // table of text among its companions. A table belongs to the volume whose name it begins with; one
-// that belongs to no volume belongs to all. Where several would do, none is taken: no name is
-// better than a wrong one. The note on labels names the table.
+// that belongs to no volume belongs to all. If several fit, none is taken: no name is better than a
+// wrong one. The note on labels names the table, or those that fit.
 void take_labels_beside(const Companions& companions, Volume& volume);
 
 }  // namespace isomesh::import

@@ -59,7 +59,7 @@ void refuse_placeless(const DataSet& data, std::uint32_t frames) {
        {std::pair{kImagePosition, "position"}, std::pair{kImageOrientation, "orientation"},
         std::pair{kPixelSpacing, "pixel spacing"}}) {
     if (!data.text(tag).empty()) continue;
-    throw_unusable("The DICOM image is a single slice without " + std::string(name) + ' ' +
+    throw_unusable("The DICOM image is a single slice and has no " + std::string(name) + ' ' +
                    tag_name(tag) + ", so it cannot be part of a volume.");
   }
 }

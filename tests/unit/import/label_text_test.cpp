@@ -16,7 +16,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::Not;
 using testing::SizeIs;
 
 LabelEntry entry(std::int64_t label, std::string name, std::optional<std::string> color = {}) {
@@ -143,7 +142,11 @@ TEST(LabelsBeside, AreNotThoseOfAnotherVolume) {
 TEST(LabelsBeside, AreNoneWhereSeveralTablesWouldDo) {
   const std::string table(kTable);
   const Member volume = {"seg.nii", label_volume()};
-  EXPECT_THAT(labels_in({volume, {"x.txt", table}, {"y.txt", table}}), IsEmpty());
+  const Outcome outcome = import_bytes(zip({volume, {"x.txt", table}, {"y.txt", table}}));
+  EXPECT_THAT(outcome.volume.labels, IsEmpty());
+  ASSERT_THAT(codes_of(outcome), ElementsAre("looks-like-labels"));
+  EXPECT_THAT(outcome.volume.notes[0].detail,
+              HasSubstr("so none was used: \"x.txt\" and \"y.txt\"."));
   EXPECT_THAT(labels_in({volume, {"seg_x.txt", table}, {"seg_y.txt", table}}), IsEmpty());
   EXPECT_THAT(labels_in({volume, {"seg_x.txt", "9 x"}, {"seg.txt", table}}), SizeIs(2));
 }
