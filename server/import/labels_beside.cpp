@@ -102,7 +102,8 @@ std::vector<Table> tables_beside(const Companions& companions) {
           others, [&](const std::string& other) { return begins_with(name, other); });
     });
   } else if (tables.size() > 1) {
-    tables = named_as(stem, std::move(tables));
+    std::vector<Table> exact = named_as(stem, tables);
+    if (!exact.empty()) return exact;
   }
   return tables;
 }
