@@ -43,9 +43,8 @@ std::vector<std::size_t> first_fragments(const DicomFile& file, std::size_t fram
     offset += pixels.fragments[i].bytes + 8;
   }
   if (firsts.size() != frames) {
-    throw_unusable(
-        "The DICOM image's compressed frames cannot be separated: " + std::to_string(fragments) +
-        " fragments hold " + std::to_string(frames) + " frames.");
+    throw_unusable("its compressed frames cannot be separated: " + std::to_string(fragments) +
+                   " fragments hold " + std::to_string(frames) + " frames");
   }
   firsts.push_back(fragments);
   return firsts;

@@ -320,7 +320,7 @@ TEST(Archive, IsBounded) {
   for (std::size_t at = 0; at < many.size(); ++at) {
     many[at] = {std::to_string(at), "", Kind::kFolder};
   }
-  EXPECT_THAT(import_bytes(tar(many)).error, HasSubstr("more than 20000 members"));
+  EXPECT_THAT(import_bytes(tar(many)).error, HasSubstr("more than the 20000 members"));
 }
 
 // A TAR of a member of which nothing is written but its size (type S of GNU's tar).

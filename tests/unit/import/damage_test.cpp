@@ -120,10 +120,10 @@ TEST(Damage, BombsAreStoppedByCounting) {
   EXPECT_THAT(import_bytes(gzip(vti({}, kSmallSamples) + zeros)).error,
               HasSubstr("unpacks to more"));
   EXPECT_THAT(import_bytes(nrrd(with(small_nrrd(), "encoding", "gzip"), gzip(zeros))).error,
-              HasSubstr("more samples"));
+              HasSubstr("more than the 24 bytes of samples"));
   EXPECT_THAT(
       import_bytes(metaimage(with(small_metaimage(), "CompressedData", "True"), zlib(zeros))).error,
-      HasSubstr("more samples"));
+      HasSubstr("more than the 24 bytes of samples"));
 }
 
 TEST(Damage, ClaimsBeyondTheLimitsAreRefusedBeforeAnythingIsInflated) {

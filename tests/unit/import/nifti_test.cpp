@@ -116,7 +116,7 @@ TEST(Nifti, TakesTheSformWhateverItsCodeAndTellsHowFarTheQformIs) {
     const Outcome outcome = import_nifti(fields);
     EXPECT_EQ(outcome.volume.geometry.origin, (Vector3{0, 0, 0}));
     ASSERT_EQ(codes_of(outcome), std::vector<std::string>{"forms-differ"});
-    EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("13.0 mm apart; the sform"));
+    EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("13.0 mm apart. The sform"));
     fields.qoffset = {0.001, 0, 0};
     EXPECT_EQ(codes_of(import_nifti(fields)), std::vector<std::string>{});
   }
@@ -153,7 +153,7 @@ TEST(Nifti, ReadsAnSformFarFromTheOrigin) {
 TEST(Nifti, NotesAnSformThatContradictsPixdim) {
   const Outcome outcome = import_nifti({.pixdim = {1, 1, 1, 2, 0, 0, 0, 0}});
   ASSERT_EQ(codes_of(outcome), std::vector<std::string>{"pixdim-differs"});
-  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("Along k"));
+  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("along k: 2 in its pixdim"));
   EXPECT_EQ(outcome.volume.geometry.spacing, (Vector3{1, 1, 1}));
 }
 
@@ -217,7 +217,7 @@ TEST(Nifti, OffersTheVolumesOfASeries) {
   EXPECT_THAT(import_bytes(nifti({.dim = {5, 2, 2, 2, 1, 3, 1, 1}}, kSmallSamples)).error,
               HasSubstr("3 volumes that differ in value"));
   EXPECT_THAT(import_bytes(nifti({}, kSmallSamples), {}, {.volume = 1}).error,
-              HasSubstr("one volume"));
+              HasSubstr("only volume 0"));
 }
 
 TEST(Nifti, PassesOverDimensionsOfOne) {

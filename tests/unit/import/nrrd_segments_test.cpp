@@ -193,7 +193,7 @@ TEST(NrrdSegments, WithTooManyCombinationsAreRefused) {
 TEST(NrrdSegments, OfNonsenseAreRefused) {
   const std::string samples(16, '\0');
   EXPECT_THAT(import_bytes(with_segments(layers_first(), {{"0_Layer", "2"}}, samples)).error,
-              HasSubstr("segment 0 lies in layer 2 of 2"));
+              HasSubstr("segment 0 is in layer 2, but the file has 2 layers"));
   EXPECT_THAT(import_bytes(with_segments(layers_first(), {{"0_Layer", "x"}}, samples)).error,
               HasSubstr("Segment0_Layer"));
   EXPECT_THAT(import_bytes(with_segments(layers_first(), {{"0_LabelValue", "1.5"}}, samples)).error,

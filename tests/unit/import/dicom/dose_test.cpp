@@ -79,8 +79,8 @@ TEST(DicomDose, WithoutPlaceOrScaleIsRefused) {
   const auto error_with = [](const std::string& offsets) {
     return import_dose(dose(dose_series(), offsets)).error;
   };
-  EXPECT_THAT(error_with("0\\2.5"), HasSubstr("3 planes, and 2 offsets"));
-  EXPECT_THAT(error_with(""), HasSubstr("3 planes, and 0 offsets"));
+  EXPECT_THAT(error_with("0\\2.5"), HasSubstr("3 planes, but 2 offsets"));
+  EXPECT_THAT(error_with(""), HasSubstr("3 planes, but 0 offsets"));
   EXPECT_THAT(error_with("7\\9.5\\12"), HasSubstr("do not begin with 0"));
   EXPECT_THAT(error_with("0\\2.5\\9"), HasSubstr("slice"));
   DicomSeries oblique = dose_series();

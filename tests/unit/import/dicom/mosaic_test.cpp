@@ -86,7 +86,8 @@ TEST(DicomMosaic, IsRefusedWhenItDoesNotSayWhereSlicesLie) {
       HasSubstr("single bits"));
   CsaFields many = csa_fields({"0", "0", "1"});
   many[1].second = {"17"};
-  EXPECT_THAT(import_one(siemens_mosaic(many)).error, HasSubstr("no 5 x 5 tiles"));
+  EXPECT_THAT(import_one(siemens_mosaic(many)).error,
+              HasSubstr("cannot be divided into 5 x 5 tiles"));
   many[1].second = {"1e9"};
   EXPECT_THAT(import_one(siemens_mosaic(many)).error, HasSubstr("not a valid number of slices"));
 }
@@ -142,8 +143,9 @@ TEST(DicomGrid, HasAPlaceForEachSlice) {
 
 TEST(DicomGrid, IsRefusedWhenPlacesAreMissing) {
   EXPECT_THAT(import_one(united_imaging_grid().text(kGridImages, "DS", "6")).error,
-              HasSubstr("a grid of 6 slices, and 5 are described"));
-  EXPECT_THAT(import_one(united_imaging_grid().items(kGridFrames, {})).error, HasSubstr("0 are"));
+              HasSubstr("a grid of 6 slices, but it describes 5"));
+  EXPECT_THAT(import_one(united_imaging_grid().items(kGridFrames, {})).error,
+              HasSubstr("it describes 0"));
   EXPECT_THAT(
       import_one(united_imaging_grid().items(kGridFrames, std::vector<DicomObject>(kTiles))).error,
       HasSubstr("position"));

@@ -79,7 +79,7 @@ TEST(DicomSegmentation, WithOverlapsNumbersTheirCombinations) {
   EXPECT_THAT(outcome.volume.labels,
               testing::ElementsAre(entry(1, "liver", {1, 3}), entry(2, "spleen", {2, 3})));
   EXPECT_THAT(note_detail(outcome, NoteCode::kOverlappingSegments),
-              HasSubstr("1 sample is of several segments"));
+              HasSubstr("1 sample belongs to several segments"));
   // Frames may come in any order.
   std::swap(object.frames[1], object.frames[2]);
   EXPECT_EQ(import_labels(object).canonical, outcome.canonical);

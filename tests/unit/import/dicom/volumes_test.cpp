@@ -166,7 +166,8 @@ TEST(DicomVolumes, ThatWereBrokenOffAreNotTaken) {
   const Outcome outcome = import_objects(files);
   EXPECT_EQ(outcome.remedy.choices.at(2).title, "EchoTime 100, 5 slices of 6");
   EXPECT_EQ(import_objects(files, {.volume = 1}).error, "");
-  EXPECT_THAT(import_objects(files, {.volume = 2}).error, HasSubstr("broken off: 5 of its 6"));
+  EXPECT_THAT(import_objects(files, {.volume = 2}).error,
+              HasSubstr("is incomplete: it has 5 of 6 slices"));
 }
 
 TEST(DicomVolumes, OfOtherOrientationsAreOffered) {
@@ -255,8 +256,7 @@ TEST(DicomUpload, TakesAFileOnceThatCameTwice) {
   EXPECT_THAT(outcome.volume.ignored,
               ElementsAre(IgnoredObject{"copy", "it is the same as \"IM9\""},
                           IgnoredObject{"another", "it is the same as \"IM10\""}));
-  EXPECT_THAT(note_detail(outcome, NoteCode::kDuplicateFile),
-              HasSubstr("2 files came more than once"));
+  EXPECT_THAT(note_detail(outcome, NoteCode::kDuplicateFile), HasSubstr("2 files are copies"));
   // The same name for another content is no copy.
   files.back().second = DicomSeries{}.slice(2).number(kRows, 4).text(kStudyId, "SH", "x").file();
   EXPECT_THAT(import_objects(files).error, HasSubstr("more than once"));
@@ -311,7 +311,7 @@ TEST(DicomUpload, NamesTheOneThatDiffersWhereverItComes) {
     }
     EXPECT_THAT(import_objects(files).error,
                 AllOf(HasSubstr("1 of its 6 slices differs in pixel spacing"),
-                      HasSubstr("\"F" + std::to_string(odd) + "\" from")));
+                      HasSubstr("\"F" + std::to_string(odd) + "\" differs from")));
   }
 }
 
