@@ -138,7 +138,7 @@ describe('a volume', () => {
     await page.goto(daemon.url);
     await drop(page, [{ name: 'longer.nrrd', bytes: Buffer.concat([smallNrrd(fields), Buffer.from('more')]) }]);
     await page.waitForURL(volumePage);
-    await expect.poll(() => page.locator('.toast').innerText()).toMatch(/there already.*4 bytes more/);
+    await expect.poll(() => page.locator('.toast').innerText()).toMatch(/there already.*4 bytes longer/);
     await expect.poll(() => page.locator('[data-note]').count()).toBe(0);
   });
 
