@@ -167,7 +167,7 @@ TEST(LabelsBeside, AreNotForImagesNorForFilesThatNameTheirOwn) {
 
 TEST(LabelsBeside, ThatAreTooLongAreNone) {
   std::string longest(kTable);
-  longest += '#' + std::string(std::size_t{1} << 20, '-') + '\n';
+  longest.append("# ").append(std::size_t{1} << 20, '-');
   EXPECT_THAT(labels_in({{"seg.nii", label_volume()}, {"seg.txt", longest}}), IsEmpty());
 }
 
