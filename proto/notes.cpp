@@ -9,73 +9,78 @@ namespace {
 constexpr NoteDescription kNoteDescriptions[] = {
     {.code = NoteCode::kFormsDiffer,
      .name = "forms-differ",
-     .meaning = "A NIfTI header's sform and qform place the samples differently; the detail says "
-                "by how much and which was taken.",
+     .meaning =
+         "The sform and qform of a NIfTI header place the samples differently. The detail says "
+         "by how much and which one was used.",
      .is_in_mesh = true},
     {.code = NoteCode::kPixdimDiffers,
      .name = "pixdim-differs",
-     .meaning = "A NIfTI header's voxel sizes are not the lengths of its sform's steps; the sform "
-                "was taken.",
+     .meaning = "The voxel sizes of a NIfTI header differ from the steps of its sform. The sform "
+                "was used.",
      .is_in_mesh = true},
     {.code = NoteCode::kVolumeChosen,
      .name = "volume-chosen",
-     .meaning = "The file holds several volumes, of which the request chose this one.",
+     .meaning = "The file holds several volumes. The request selected this one.",
      .is_in_mesh = true},
     {.code = NoteCode::kSpaceAssumed,
      .name = "space-assumed",
-     .meaning = "The file does not say how its axes lie in the patient; the detail says what was "
+     .meaning = "The file does not say how its axes lie in the patient. The detail says what was "
                 "assumed.",
      .is_in_mesh = true},
     {.code = NoteCode::kUnitUnknown,
      .name = "unit-unknown",
-     .meaning = "The file's unit is no length; one unit was taken for one millimetre.",
+     .meaning = "The file's unit is not a length. One unit was read as one millimetre.",
      .is_in_mesh = true},
     {.code = NoteCode::kNonFiniteSamples,
      .name = "non-finite-samples",
-     .meaning = "Some samples are no numbers or infinite; they have the smallest sample's value "
-                "and are outside of the surface.",
+     .meaning = "Some samples are infinite or not a number. They got the smallest sample's value "
+                "and lie outside the surface.",
      .is_in_mesh = true},
     {.code = NoteCode::kTrailingBytes,
      .name = "trailing-bytes",
-     .meaning = "The data is longer than the header tells; what is too much was left out."},
+     .meaning = "The data is longer than the header declares. The extra bytes were ignored."},
     {.code = NoteCode::kValuesRescaled,
      .name = "values-rescaled",
      .meaning = "The samples were changed by the header's slope and offset, which other programs "
-                "pass over.",
+                "ignore.",
      .is_in_mesh = true},
     {.code = NoteCode::kDuplicateFile,
      .name = "duplicate-file",
-     .meaning = "A file came more than once and was taken once."},
+     .meaning = "A file came more than once and was read once."},
     {.code = NoteCode::kLooksLikeLabels,
      .name = "looks-like-labels",
-     .meaning = "The samples are labels, as the file says or as few whole values in flat regions "
-                "look: a job's `labels` suits them, and an iso-value makes one surface of all that "
-                "lie above it."},
+     .meaning =
+         "The file describes labels, or the samples look like labels: few whole values in flat "
+         "regions. A job with `labels` meshes each label. An iso-value makes one surface "
+         "around all samples above it."},
     {.code = NoteCode::kFrameOfReference,
      .name = "frame-of-reference",
-     .meaning = "The DICOM slices do not share one frame of reference; that they lie in one space "
-                "is taken from their positions.",
+     .meaning =
+         "The DICOM slices do not share one frame of reference. They were read as one volume "
+         "because of their positions.",
      .is_acceptable = true,
      .is_in_mesh = true},
     {.code = NoteCode::kEmptyPlanes,
      .name = "empty-planes",
-     .meaning =
-         "A DICOM segmentation leaves out frames that show nothing; they are planes of zeros.",
+     .meaning = "A DICOM segmentation leaves out empty frames. They became planes of zeros.",
      .is_in_mesh = true},
     {.code = NoteCode::kDistanceAssumed,
      .name = "distance-assumed",
-     .meaning = "The DICOM image does not tell how far apart its slices are; the thickness of a "
-                "slice was taken.",
+     .meaning =
+         "The DICOM image does not give the distance between its slices. The slice thickness "
+         "was used.",
      .is_in_mesh = true},
     {.code = NoteCode::kOverlappingSegments,
      .name = "overlapping-segments",
-     .meaning = "Segments overlap; samples of several have values that number their combinations, "
-                "and a label is all values that its segment is in.",
+     .meaning = "Segments overlap. Samples of several segments have values that stand for the "
+                "combination. "
+                "A label consists of all values of its segment.",
      .is_in_mesh = true},
     {.code = NoteCode::kFractionalSegments,
      .name = "fractional-segments",
-     .meaning = "A DICOM segmentation tells shares or probabilities; a segment is where they are "
-                "half of their maximum or more.",
+     .meaning =
+         "A DICOM segmentation holds fractions or probabilities. A sample belongs to a segment if "
+         "its value is half of the maximum or more.",
      .is_in_mesh = true},
 };
 

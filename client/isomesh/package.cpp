@@ -8,6 +8,8 @@
 #include <string_view>
 #include <utility>
 
+#include <unistd.h>
+
 #include "base/files.h"
 #include "base/text.h"
 #include "proto/error.h"
@@ -73,6 +75,23 @@ std::vector<std::string> lines_of(const fs::path& path) {
     next = end + 1;
   }
   return lines;
+}
+
+// Whether a text begins with a number and a name on each line. The server reads such a table of
+// label names beside a label volume.
+bool is_label_text(const fs::path& path) {
+  if (lower(path.extension().string()) != ".txt") return false;
+  if (::access(path.c_str(), R_OK) != 0) return false;
+  std::size_t entries = 0;
+  for (const std::string& line : lines_of(path)) {
+    const bool is_comment =
+        line.starts_with('#') || line.starts_with('%') || line.starts_with("//");
+    if (line.empty() || is_comment) continue;
+    const auto parts = words(line);
+    if (parts.size() < 2 || !parse_int64(parts.front())) return false;
+    ++entries;
+  }
+  return entries > 0;
 }
 
 // The value of the field `name` where the line, "Name = value" or "name: value", is that field.
@@ -221,7 +240,8 @@ FolderFiles files_of_folder(const std::filesystem::path& folder) {
   for (PackedFile& file : all) {
     std::error_code error;
     const bool is_data = data.contains(file.path.lexically_normal());
-    const bool is_other = has_other_suffix(file.path) || fs::file_size(file.path, error) == 0;
+    const bool is_empty = fs::file_size(file.path, error) == 0;
+    const bool is_other = is_empty || (has_other_suffix(file.path) && !is_label_text(file.path));
     (is_other && !is_data ? result.left_out : result.sent).push_back(std::move(file));
   }
   if (result.sent.empty()) {

@@ -12,15 +12,6 @@
 namespace isomesh {
 namespace {
 
-std::string with_commas(const std::vector<std::string>& items) {
-  std::string text;
-  for (const std::string& item : items) {
-    if (!text.empty()) text += ", ";
-    text += item;
-  }
-  return text;
-}
-
 std::string in_brackets(const std::vector<std::string>& items) {
   return '[' + with_commas(items) + ']';
 }
@@ -304,7 +295,7 @@ std::string schemas() {
   });
   yaml.under("JobParameters", [&] {
     yaml.line(
-        "description: What a job is asked to do. The same volume and parameters give the same "
+        "description: The parameters of a job. The same volume and parameters give the same "
         "bytes.");
     write_properties(yaml, parameters);
   });
@@ -326,7 +317,8 @@ std::string schemas() {
     yaml.line("oneOf: " + in_brackets(alternatives));
   });
   yaml.under("CompleteJobParameters", [&] {
-    yaml.line("description: All of them, with the defaults of those that were left out.");
+    yaml.line(
+        "description: All parameters. Parameters that the request left out have their defaults.");
     yaml.line(base);
     yaml.under("required", [&] {
       for (const std::string& name : always) yaml.line("- " + name);
@@ -371,11 +363,12 @@ std::string query_references() {
 std::string formats() {
   Yaml yaml(2);
   yaml.under("MeshFormat", [&] {
-    yaml.text("description",
-              "A mesh file's format and suffix. STL, PLY and VTK are binary. `vtk` is VTK's legacy "
-              "file, `vtp` its XML file, `gii` GIFTI. `zip` is for labels: it "
-              "holds one file of each label, in the other formats that are asked for, `glb` "
-              "and `3mf` aside, or in STL.");
+    yaml.text(
+        "description",
+        "The format and suffix of a mesh file. STL, PLY and VTK are binary. `vtk` is VTK's legacy "
+        "format, `vtp` its XML format, `gii` GIFTI. `zip` is for labels. It "
+        "holds one file per label in each other requested format except `glb` "
+        "and `3mf`. If there is none, the files are STL.");
     yaml.line("type: string");
     yaml.line("enum: " + in_brackets(value_names<MeshFormat>()));
     std::vector<std::string> whole;
@@ -398,7 +391,7 @@ std::string notes() {
   Yaml yaml(2);
   yaml.under("NoteCode", [&] {
     yaml.line("description: |");
-    yaml.line("  A name that stays, for programs.");
+    yaml.line("  A stable name, for programs.");
     for (const NoteDescription& note : note_descriptions()) {
       yaml.line("  * `" + std::string(note.name) + "`: " + std::string(note.meaning));
     }
@@ -408,7 +401,7 @@ std::string notes() {
     });
   });
   yaml.under("AcceptableNote", [&] {
-    yaml.line("description: A note for which a volume is refused unless the query accepts it.");
+    yaml.line("description: A reason to reject a volume, unless the query accepts it.");
     yaml.line("type: string");
     yaml.line("enum: " + in_brackets(acceptable));
   });

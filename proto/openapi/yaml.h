@@ -7,8 +7,27 @@
 #include <sstream>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace isomesh {
+
+// A word as YAML, in quotes if YAML 1.1 reads it as true or false. PyYAML reads YAML 1.1.
+inline std::string yaml_word(const std::string& word) {
+  for (const char* const truth : {"on", "off", "yes", "no", "y", "n"}) {
+    if (word == truth) return '"' + word + '"';
+  }
+  return word;
+}
+
+// Words of a list or a mapping, without its brackets.
+inline std::string with_commas(const std::vector<std::string>& items) {
+  std::string text;
+  for (const std::string& item : items) {
+    if (!text.empty()) text += ", ";
+    text += yaml_word(item);
+  }
+  return text;
+}
 
 // Lines of YAML, each indented as deep as the mapping that it stands in.
 class Yaml {

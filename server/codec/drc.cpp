@@ -12,7 +12,9 @@ std::optional<mesh::Topology> encode_drc(const mesh::Mesh& mesh, const DracoPara
                                          const Grid* grid) {
   context.throw_if_stopped();
   if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max()) {
-    throw Error(ErrorCode::kTooLarge, "the surface has more triangles than Draco can encode");
+    throw Error(
+        ErrorCode::kTooLarge,
+        "The surface has more triangles than Draco can encode. Set \"triangles\" to simplify it.");
   }
   const DracoOptions options = {grid == nullptr ? grid_of(mesh, draco.position_bits) : *grid,
                                 draco.speed};

@@ -43,9 +43,9 @@ void check_signed_indices(std::size_t vertices, std::size_t triangles, MeshForma
   constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
   if (vertices <= kMost && triangles <= kMost / 3) return;
   throw Error(ErrorCode::kTooLarge,
-              "the surface has more vertices or triangles than a file of the "
+              "The surface has more vertices or triangles than a file of the "
               "format " +
-                  std::string(to_string(format)) + " can hold");
+                  std::string(to_string(format)) + " can hold. Set \"triangles\" to simplify it.");
 }
 
 }  // namespace isomesh::codec

@@ -38,12 +38,13 @@ struct Distances {
             const mesh::TriangleGrid* extracted, const mesh::Context& context) {
     if (!parameters.distances) return;
     if (extracted == nullptr) {
-      throw Error(ErrorCode::kInternal, "distances are asked for, but not from where");
+      throw Error(ErrorCode::kInternal,
+                  "distances are requested without a surface to measure from");
     }
     measure_vertex_distances(mesh, *extracted, {context.stop, nullptr}, values);
     if (values.size() > 0) most = *std::ranges::max_element(values);
     if (!std::isfinite(most)) {
-      throw Error(ErrorCode::kInternal, "distances are asked for to a surface of no triangles");
+      throw Error(ErrorCode::kInternal, "distances are requested to a surface without triangles");
     }
   }
 
@@ -100,7 +101,9 @@ void write_glb(std::span<const GlbPart> parts, const Grid& grid, const Provenanc
   const std::size_t total = kHeaderBytes + kChunkHeaderBytes + json.size() +
                             (binary_bytes == 0 ? 0 : kChunkHeaderBytes + binary_bytes);
   if (total > std::numeric_limits<std::uint32_t>::max()) {
-    throw Error(ErrorCode::kTooLarge, "the encoded surface exceeds the 4 GiB of a GLB file");
+    throw Error(ErrorCode::kTooLarge,
+                "The encoded surface exceeds the 4 GiB that a GLB file can hold. Set \"triangles\" "
+                "to simplify it.");
   }
   write_words(sink, {kMagic, kVersion, static_cast<std::uint32_t>(total)});
   write_words(sink, {static_cast<std::uint32_t>(json.size()), kJsonChunk});

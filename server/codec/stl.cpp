@@ -50,7 +50,9 @@ void encode_stl(const mesh::Mesh& mesh, Space space, const mesh::Context& contex
                 const Sink& sink) {
   const std::size_t triangles = mesh.triangles.size();
   if (triangles > std::numeric_limits<std::uint32_t>::max()) {
-    throw Error(ErrorCode::kTooLarge, "the surface has more triangles than an STL file can hold");
+    throw Error(ErrorCode::kTooLarge,
+                "The surface has more triangles than an STL file can hold. Set \"triangles\" to "
+                "simplify it.");
   }
   // The header must not start with "solid", or readers take the file for text.
   const std::string title =

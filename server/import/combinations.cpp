@@ -35,7 +35,8 @@ Combinations::State Combinations::with(State state, std::uint32_t label) {
   const auto [child, is_new] = children_.emplace(key, static_cast<State>(nodes_.size()));
   if (is_new) {
     if (nodes_.size() == kMostStates) {
-      throw_unusable("The segments overlap in more than " + std::to_string(kMostStates) + " ways.");
+      throw_unusable("The segments overlap in more than " + std::to_string(kMostStates) +
+                     " combinations. Choose one segment with volume=N.");
     }
     nodes_.push_back({.parent = state, .label = label, .size = nodes_[state].size + 1});
   }
@@ -49,8 +50,9 @@ std::uint32_t Combinations::new_label() { return next_value(); }
 std::uint32_t Combinations::next_value() {
   constexpr std::uint32_t kMostValues = 0xFFFF;
   if (next_value_ > kMostValues) {
-    throw_unusable("The segments overlap in so many ways that " + std::to_string(kMostValues) +
-                   " values do not tell them apart; choose one of them with volume=N.");
+    throw_unusable("The segments and their overlaps need more than the " +
+                   std::to_string(kMostValues) +
+                   " values that are available. Choose one segment with volume=N.");
   }
   return next_value_++;
 }
@@ -73,7 +75,9 @@ std::vector<LabelEntry> Combinations::entries(std::vector<LabelEntry> named) con
     count += node.size;
     // Each takes some bytes of an answer, and one combination may be of thousands.
     if (count > Volume::kMostLabels * 16) {
-      throw_unusable("The segments overlap in more ways than can be listed.");
+      throw_unusable(
+          "The segments overlap in too many combinations to list. Choose one segment with "
+          "volume=N.");
     }
     for (const Node* part = &node; part->size > 0; part = &nodes_[part->parent]) {
       values[part->label].push_back(node.value);
@@ -105,8 +109,8 @@ std::optional<Note> Combinations::note() const {
   if (overlapping_samples_ == 0) return std::nullopt;
   return note_of(NoteCode::kOverlappingSegments,
                  std::to_string(overlapping_samples_) +
-                     (overlapping_samples_ == 1 ? " sample is" : " samples are") +
-                     " of several segments; " + std::to_string(overlaps_) +
+                     (overlapping_samples_ == 1 ? " sample belongs" : " samples belong") +
+                     " to several segments. " + std::to_string(overlaps_) +
                      (overlaps_ == 1 ? " value stands" : " values stand") +
                      " for their combinations.");
 }

@@ -13,11 +13,12 @@ namespace {
   std::string titles;
   for (const Reader& reader : readers()) {
     if (reader.sniff == nullptr) continue;
-    if (!titles.empty()) titles += reader.content == Content::kFiles ? ", nor " : ", ";
+    if (!titles.empty()) titles += reader.content == Content::kFiles ? ", or " : ", ";
     titles += reader.title;
   }
-  throw Error(ErrorCode::kUnsupportedMedia,
-              "The file is not " + titles + "; raw samples need dims and type.");
+  throw Error(
+      ErrorCode::kUnsupportedMedia,
+      "The file is not " + titles + ". If it holds raw samples, add dims=X,Y,Z and type=T.");
 }
 
 }  // namespace
@@ -29,7 +30,8 @@ Volume import_volume(const ImportTask& task, const FormatListener& listener) {
   const Reader* reader = sniff(InputFile(task.source));
   if (reader == nullptr) throw_unknown_format();
   if (!task.options.member.empty() && reader->content != Content::kFiles) {
-    throw invalid_parameter("member", "chooses among an archive's members, and this is no archive");
+    throw invalid_parameter("member",
+                            "selects a member of an archive, but this file is not an archive");
   }
   return read_input(*reader, input);
 }

@@ -23,8 +23,8 @@ std::string valid_utf8(std::string_view text) {
 
 void check_size(const std::vector<LabelEntry>& entries) {
   if (entries.size() > Volume::kMostLabels) {
-    throw_unusable("The file has " + std::to_string(entries.size()) + " labels, and " +
-                   std::to_string(Volume::kMostLabels) + " are the most.");
+    throw_unusable("The file has " + std::to_string(entries.size()) + " labels. At most " +
+                   std::to_string(Volume::kMostLabels) + " are supported.");
   }
   constexpr std::size_t kBytesOfValue = 8;
   std::size_t bytes = 0;
@@ -32,9 +32,8 @@ void check_size(const std::vector<LabelEntry>& entries) {
     bytes += entry.name.size() + entry.values.size() * kBytesOfValue;
   }
   if (bytes <= kMostBytes) return;
-  throw_unusable(
-      "The names of the file's labels, or the ways in which they overlap, are more than "
-      "can be kept.");
+  throw_unusable("The names and overlaps of the file's labels take more than the " +
+                 std::to_string(kMostBytes) + " bytes that can be stored.");
 }
 
 }  // namespace

@@ -121,7 +121,8 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
           if constexpr (std::is_integral_v<Sample>) {
             return write_states<Sample>(samples, source, type, writer.samples());
           } else {
-            throw Error(ErrorCode::kInternal, "Layers of segments are whole numbers.");
+            throw Error(ErrorCode::kInternal,
+                        "The layers of a segmentation must hold whole numbers.");
           }
         });
     if (!combinations) continue;
@@ -129,7 +130,7 @@ Volume write_layers(const PlainSamples& samples, const SourceVolume& source, Vol
     if (auto note = combinations->note()) volume.notes.push_back(std::move(*note));
     return finish(writer, std::move(volume));
   }
-  throw Error(ErrorCode::kInternal, "No type holds the labels of a segmentation.");
+  throw Error(ErrorCode::kInternal, "No sample type can hold the labels of a segmentation.");
 }
 
 }  // namespace isomesh::import

@@ -90,13 +90,14 @@ std::string read_as_ordered(const std::string& message) {
   } catch (const Error& error) {
     return error_message(error);
   } catch (const std::bad_alloc&) {
-    return error_message({ErrorCode::kUnusableVolume, "Reading it takes more memory than the " +
-                                                          std::to_string(memory_bytes) +
-                                                          " bytes that an import may have."});
+    return error_message({ErrorCode::kUnusableVolume,
+                          "Reading the file needs more memory than the " +
+                              std::to_string(memory_bytes) + " bytes that an import may use."});
   } catch (const std::exception& error) {
     // Its text comes from a library and may repeat what the file holds, so it must not reach a log.
-    return error_message({ErrorCode::kInternal, std::string("An import ended with an exception: ") +
-                                                    typeid(error).name() + "."});
+    return error_message(
+        {ErrorCode::kInternal,
+         std::string("An import failed with an exception: ") + typeid(error).name() + "."});
   }
 }
 

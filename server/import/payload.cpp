@@ -19,8 +19,8 @@ namespace {
 constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
 
 [[noreturn]] void throw_short(std::uint64_t expected, std::uint64_t found) {
-  throw_unusable("The file is truncated: its header tells " + std::to_string(expected) +
-                 " bytes of samples, and " + std::to_string(found) + " are there.");
+  throw_unusable("The file is truncated: its header declares " + std::to_string(expected) +
+                 " bytes of samples, but the file has " + std::to_string(found) + ".");
 }
 
 // All samples, or the share of them that one data file holds.
@@ -33,8 +33,8 @@ struct Part {
 };
 
 [[noreturn]] void throw_long(std::uint64_t expected) {
-  throw_unusable("The file holds more samples than its header tells, which are " +
-                 std::to_string(expected) + " bytes.");
+  throw_unusable("The file has more than the " + std::to_string(expected) +
+                 " bytes of samples that its header declares.");
 }
 
 // As inflate_range, of any kind of stream.
@@ -118,7 +118,9 @@ void decode_word(std::string_view word, StoredType type, Decoded& decoded) {
   if (word.ends_with(',')) word.remove_suffix(1);
   with_stored_sample(type, [&](auto sample) {
     const auto value = parse_sample<decltype(sample)>(word);
-    if (!value) throw_unusable("A sample is not a number of its type: " + in_quotes(word) + ".");
+    if (!value)
+      throw_unusable("The sample " + in_quotes(word) +
+                     " is not a number of the type that the header declares.");
     sample = *value;
     decoded.add(std::as_bytes(std::span(&sample, 1)));
   });
@@ -135,7 +137,7 @@ void decode_text(const Part& part, ScratchFile& scratch) {
     next += piece.size() - rest.size();
     const std::size_t end = next < last ? piece.find_last_of(" \t\r\n") : piece.size();
     if (end == std::string::npos || piece.size() - end > kLongestWord) {
-      throw_unusable("The samples are not numbers between white space.");
+      throw_unusable("The samples are not numbers separated by white space.");
     }
     for (const std::string_view word : words(std::string_view(piece).substr(0, end))) {
       if (word != ",") decode_word(word, part.type, decoded);

@@ -11,6 +11,7 @@
 #include "server/import/formats/nrrd.h"
 #include "server/import/formats/raw.h"
 #include "server/import/formats/vti.h"
+#include "server/import/labels_beside.h"
 #include "server/import/transfer.h"
 
 namespace isomesh::import {
@@ -21,7 +22,9 @@ template <SourceVolume (*kParse)(const InputFile&, const Companions&, const Impo
 Volume parse_with(const Input& input) {
   const InputFile file(input.path);
   const ImportTask& task = input.task;
-  return write_canonical(file, kParse(file, input.companions, task.options), task);
+  Volume volume = write_canonical(file, kParse(file, input.companions, task.options), task);
+  take_labels_beside(input.companions, volume);
+  return volume;
 }
 
 constexpr Reader kRaw = {.name = "raw", .title = "raw samples", .parse = parse_raw};
@@ -81,7 +84,7 @@ void gunzip(const InputFile& file, std::uint64_t limit, ScratchFile& target) {
       inflate_range(file, {0, file.size()}, limit,
                     [&](std::span<const std::byte> piece) { target.write(piece); });
   if (bytes > limit) {
-    throw_unusable("The compressed file holds more than the " + std::to_string(limit) +
+    throw_unusable("The compressed file unpacks to more than the " + std::to_string(limit) +
                    " bytes that its volume can have.");
   }
 }
@@ -124,10 +127,10 @@ std::uint64_t most_inflated_bytes(const Reader& reader, const InputFile& file,
 void check_options(const Reader& reader, const ImportOptions& options) {
   const bool is_volume = reader.content == Content::kVolume;
   if (is_volume && !options.series.empty()) {
-    throw invalid_parameter("series", "chooses among DICOM series, and this is no DICOM");
+    throw invalid_parameter("series", "selects a DICOM series, but this file is not DICOM");
   }
   if (options.nifti_form && reader.content != Content::kFiles && reader.name != "nifti") {
-    throw invalid_parameter("nifti_form", "is of NIfTI files, and this is none");
+    throw invalid_parameter("nifti_form", "applies to NIfTI files, but this file is not NIfTI");
   }
 }
 

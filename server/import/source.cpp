@@ -14,7 +14,7 @@ namespace {
 [[noreturn]] void throw_other_size(const std::string& name, std::uint64_t found,
                                    std::uint64_t expected) {
   throw_unusable("The data file " + in_quotes(name) + " has " + std::to_string(found) +
-                 " bytes, where the header tells " + std::to_string(expected) + ".");
+                 " bytes, but the header declares " + std::to_string(expected) + ".");
 }
 
 }  // namespace
@@ -43,16 +43,16 @@ void check_limits(const SourceVolume& volume, const SizeLimits& limits) {
 }
 
 const std::filesystem::path& companion(const std::string& name, const Companions& companions) {
-  const std::string reason = "Its samples are in another file, " + in_quotes(name) + ", ";
+  const std::string reason = "The header names the data file " + in_quotes(name);
   const std::string path = std::filesystem::path(name).lexically_normal().generic_string();
   if (path.starts_with('/') || path.starts_with("..") || name.find('\\') != std::string::npos) {
     throw_unusable(reason +
-                   "which lies outside of its folder; only files beside it or in folders "
-                   "there can be followed.");
+                   ", which is outside the header's folder. Only files in that folder and its "
+                   "subfolders are read.");
   }
   const auto found = companions.files.find(path);
   if (found != companions.files.end()) return found->second;
-  throw_unusable(reason + "which did not come with it; send both in one ZIP or TAR.");
+  throw_unusable(reason + ", which is missing. Send both files in one ZIP or TAR.");
 }
 
 bool may_trail(std::uint64_t bytes, const SourceVolume& volume) {
@@ -61,15 +61,15 @@ bool may_trail(std::uint64_t bytes, const SourceVolume& volume) {
 }
 
 Note trailing_note(std::uint64_t bytes) {
-  return note_of(NoteCode::kTrailingBytes, "The data has " + std::to_string(bytes) +
-                                               " bytes more than the header tells; they were left "
-                                               "out.");
+  return note_of(NoteCode::kTrailingBytes,
+                 "The data is " + std::to_string(bytes) + (bytes == 1 ? " byte" : " bytes") +
+                     " longer than the header declares. The extra bytes were ignored.");
 }
 
 Note duplicate_note(std::size_t files) {
   return note_of(NoteCode::kDuplicateFile,
-                 std::to_string(files) + (files == 1 ? " file" : " files") +
-                     " came more than once, byte for byte, and each was taken once.");
+                 std::to_string(files) + (files == 1 ? " file is a copy" : " files are copies") +
+                     " of another file, byte for byte. Each file was read once.");
 }
 
 std::string reason_of_double(std::string_view first_name) {
@@ -81,12 +81,12 @@ std::vector<DataFile> data_files_of(const std::vector<std::string>& names,
                                     SourceVolume& volume) {
   if (names.empty()) throw_unusable("The header names no data file.");
   if (volume.sample_count() * volume.chosen.count % names.size() != 0) {
-    throw_unusable("The header names " + std::to_string(names.size()) + " data files, which " +
-                   std::to_string(volume.sample_count()) + " samples cannot be shared out to.");
+    throw_unusable("The header names " + std::to_string(names.size()) +
+                   " data files. The samples cannot be divided equally among them.");
   }
   const bool is_raw = volume.encoding == Encoding::kRaw;
   if (!is_raw && names.size() > 1 && skip != Skip(0)) {
-    throw_unusable("Skipping bytes within several encoded files is not supported.");
+    throw_unusable("The header skips bytes in several encoded data files, which is not supported.");
   }
   if (!is_raw) volume.decoded_skip = skip;
   const std::uint64_t part = volume.stored_bytes() / names.size();
@@ -114,8 +114,8 @@ std::uint64_t volumes_beyond(std::span<const std::uint64_t> sizes) {
   for (std::size_t axis = 3; axis < sizes.size(); ++axis) {
     if (sizes[axis] == 0) throw_unusable("The size along " + axis_name(axis) + " is 0.");
     if (sizes[axis] > kMost / count) {
-      throw_unusable("The header's sizes are not believable: " + std::to_string(sizes[axis]) +
-                     " along " + axis_name(axis) + ".");
+      throw_unusable("The size along " + axis_name(axis) +
+                     " is not plausible: " + std::to_string(sizes[axis]) + ".");
     }
     count *= sizes[axis];
   }
@@ -129,27 +129,26 @@ void choose_volume(std::uint64_t count, const Difference& difference, const Impo
   volume.chosen.index = chosen.value_or(0);
   if (count == 1 && volume.chosen.index == 0) return;
   if (chosen && *chosen < count) {
-    volume.notes.push_back(note_of(NoteCode::kVolumeChosen,
-                                   "Volume " + std::to_string(*chosen) + " (" +
-                                       difference.title(*chosen) + ") of " + std::to_string(count) +
-                                       ", which differ in " + difference.what + ", was taken."));
+    volume.notes.push_back(note_of(
+        NoteCode::kVolumeChosen, "Volume " + std::to_string(*chosen) + " (" +
+                                     difference.title(*chosen) + ") of " + std::to_string(count) +
+                                     " was read. The volumes differ in " + difference.what + "."));
     return;
   }
   if (count == 1) {
-    throw_unusable("The file holds one volume, 0, and no volume " + std::to_string(*chosen) + ".");
+    throw_unusable("The file has only volume 0. It has no volume " + std::to_string(*chosen) + ".");
   }
   constexpr std::uint64_t kMost = 1000;
   std::vector<Choice> choices;
   for (std::uint64_t index = 0; index < std::min(count, kMost); ++index) {
     choices.push_back({"volume", std::to_string(index), difference.title(index)});
   }
-  const std::string there = std::to_string(count) + " volumes";
-  const std::string range = "volume=0 to " + std::to_string(count - 1);
-  throw_choice(chosen ? "The file holds " + there + " and has no volume " +
-                            std::to_string(*chosen) + "; choose one with " + range + "."
-                      : "The file holds " + there + " that differ in " + difference.what +
-                            ", where one volume is needed; choose one with " + range + ".",
-               std::move(choices));
+  const std::string reason = "The file holds " + std::to_string(count) +
+                             " volumes that differ in " + difference.what + ". ";
+  const std::string none = chosen ? "It has no volume " + std::to_string(*chosen) + ". " : "";
+  throw_choice(
+      reason + none + "Choose one with volume=0 to volume=" + std::to_string(count - 1) + ".",
+      std::move(choices));
 }
 
 }  // namespace isomesh::import

@@ -30,8 +30,8 @@ template <class Stored>
 double to_double(Stored stored) {
   const auto value = static_cast<double>(stored);
   if (!is_exact(stored, value)) {
-    throw_unusable("A 64-bit sample, " + std::to_string(stored) +
-                   ", is too large to be held exactly.");
+    throw_unusable("The 64-bit sample " + std::to_string(stored) +
+                   " is too large to be stored exactly.");
   }
   return value;
 }

@@ -45,13 +45,13 @@ void note_labels(std::span<const std::byte> samples, Volume& volume) {
   const auto values = volume::label_count(samples, volume.type, volume.dims);
   if (told == 0 && !values) return;
   const std::string what =
-      told > 0 ? "The file tells of " + std::to_string(told) + (told == 1 ? " label" : " labels")
-               : "The samples are " + std::to_string(*values) +
-                     " whole values in flat regions, as labels are";
-  volume.notes.push_back(note_of(
-      NoteCode::kLooksLikeLabels,
-      what +
-          ": mesh it with \"labels\": \"all\"; an iso-value makes one surface of all above it."));
+      told > 0 ? "The file describes " + std::to_string(told) + (told == 1 ? " label" : " labels")
+               : "The samples look like labels: they have " + std::to_string(*values) +
+                     " different whole values in flat regions";
+  volume.notes.push_back(
+      note_of(NoteCode::kLooksLikeLabels,
+              what + ". Use \"labels\": \"all\" to mesh each label. An iso-value makes one surface "
+                     "around all samples above it."));
 }
 
 }  // namespace
@@ -87,13 +87,14 @@ Volume write_canonical(const InputFile& file, const SourceVolume& source, const 
 Volume finish(CanonicalWriter& writer, Volume volume) {
   volume::Statistics statistics = volume::measure(writer.samples(), volume.type);
   if (statistics.non_finite > 0) {
-    const std::string count = std::to_string(statistics.non_finite) + " of its " +
-                              std::to_string(volume.sample_count()) + " samples are not finite ";
-    if (statistics.non_finite == volume.sample_count()) throw_unusable(count + "numbers.");
+    const std::string count = std::to_string(statistics.non_finite) + " of the " +
+                              std::to_string(volume.sample_count()) +
+                              " samples are not finite numbers";
+    if (statistics.non_finite == volume.sample_count()) throw_unusable(count + ".");
     replace_non_finite(writer.samples(), volume.type, statistics.range[0]);
     statistics = volume::measure(writer.samples(), volume.type);
     volume.notes.push_back(
-        note_of(NoteCode::kNonFiniteSamples, count + "numbers; they lie outside of the surface."));
+        note_of(NoteCode::kNonFiniteSamples, count + ". They lie outside the surface."));
   }
   note_labels(writer.samples(), volume);
   volume.range = statistics.range;

@@ -42,7 +42,7 @@ void scale_to_millimetres(Geometry& geometry, std::string_view unit, std::vector
   if (counts_samples(unit)) {
     notes.push_back(note_of(NoteCode::kUnitUnknown,
                             "The file's unit, " + in_quotes(unit) +
-                                ", is no length; one of it was taken for one millimetre."));
+                                ", is not a length. One unit was read as one millimetre."));
     return;
   }
   const double millimetres = millimetres_per(unit);

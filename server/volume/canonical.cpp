@@ -109,7 +109,8 @@ CanonicalFile::CanonicalFile(const std::filesystem::path& path) : CanonicalFile(
 CanonicalFile::CanonicalFile(InputFile file) : file_(std::move(file)) {
   header_ = from_text(file_.text(0, kHeaderBytes));
   const auto size = file_bytes(header_);
-  if (!size || *size != file_.size()) throw_not_canonical("its size is not what its header tells");
+  if (!size || *size != file_.size())
+    throw_not_canonical("its size differs from that in its header");
   if (find_fault(header_.dims, header_.geometry)) throw_not_canonical("its geometry is unusable");
 }
 

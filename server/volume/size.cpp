@@ -34,8 +34,8 @@ std::array<std::uint32_t, 3> volume_dims(std::span<const std::uint64_t> sizes) {
     if (sizes[axis] == 0) throw_unusable("The size along " + axis_name(axis) + " is 0.");
     if (sizes[axis] > std::numeric_limits<std::uint32_t>::max() ||
         samples > kMostSamples / sizes[axis]) {
-      throw_unusable("The header's sizes are not believable: " + std::to_string(sizes[axis]) +
-                     " along " + axis_name(axis) + ".");
+      throw_unusable("The size along " + axis_name(axis) +
+                     " is not plausible: " + std::to_string(sizes[axis]) + ".");
     }
     samples *= sizes[axis];
     dims[axis] = static_cast<std::uint32_t>(sizes[axis]);
@@ -45,10 +45,10 @@ std::array<std::uint32_t, 3> volume_dims(std::span<const std::uint64_t> sizes) {
 
 void check_limits(std::uint64_t sample_count, SampleType type, const SizeLimits& limits) {
   if (sample_count <= limits.max_sample_bytes / bytes_per_sample(type)) return;
-  throw Error(ErrorCode::kTooLarge,
-              "Its samples are " + std::to_string(sample_count * bytes_per_sample(type)) +
-                  " bytes, more than the " + std::to_string(limits.max_sample_bytes) +
-                  " that are accepted.");
+  throw Error(ErrorCode::kTooLarge, "The volume is too large: its samples take " +
+                                        std::to_string(sample_count * bytes_per_sample(type)) +
+                                        " bytes, and at most " +
+                                        std::to_string(limits.max_sample_bytes) + " are accepted.");
 }
 
 void check_raw(const RawDescription& description, const SizeLimits& limits) {

@@ -108,7 +108,7 @@ struct SlicePng::Writer {
 namespace {
 
 void check(bool written) {
-  if (!written) throw Error(ErrorCode::kInternal, "a slice could not be written as PNG");
+  if (!written) throw Error(ErrorCode::kInternal, "A slice could not be written as PNG.");
 }
 
 }  // namespace

@@ -47,6 +47,12 @@ std::vector<std::string> nifti_files() {
       nifti({.dim = {4, 2, 3, 2, 2, 1, 1, 1}}, kSamples)};
 }
 
+std::vector<std::string> label_texts() {
+  return {"# Color table file x.ctbl\n3 soft_tissue 111 184 210 255\n4 (none) 0 0 0 0\n",
+          "0 0 0 0 0 0 0 \"Clear Label\"\n2 255 0 0 1 1 1 \"Deep R\"\n",
+          "1 0.93 0.2 0 Frontal Pole\n", "1 Precentral_L 2001\r\n2 Precentral_R 2002\r\n"};
+}
+
 std::vector<std::string> nrrd_files() {
   const auto encoded = [](const std::string& encoding, const std::string& payload) {
     return nrrd(with(small_nrrd(), "encoding", encoding), payload);
@@ -190,6 +196,7 @@ std::vector<std::string> corpus(std::string_view name) {
   if (name == "dicom") return dicom_files();
   if (name == "csa") return csa_headers();
   if (name == "archive") return archive_files();
+  if (name == "labels") return label_texts();
   if (name == "raw") return raw_files();
   if (name == "canonical") return canonical_files();
   if (name == "report") return report_texts();

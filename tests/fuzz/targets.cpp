@@ -13,7 +13,9 @@
 #include "proto/error.h"
 #include "proto/json.h"
 #include "server/import/dicom/csa_header.h"
+#include "server/import/formats/label_text.h"
 #include "server/import/import.h"
+#include "server/import/label_table.h"
 #include "server/import/readers.h"
 #include "server/process/import_message.h"
 #include "server/volume/canonical.h"
@@ -139,6 +141,14 @@ void read_text(Bytes bytes, const Read& read) {
   }
 }
 
+void read_labels(Bytes bytes) {
+  read_text(bytes, [](std::string_view text) {
+    if (!volume::is_label_table(import::label_table(import::labels_of_text(text)))) {
+      fail("the labels of a text are no table");
+    }
+  });
+}
+
 void read_report(Bytes bytes) {
   read_text(bytes, [](std::string_view text) { process::report_from(text); });
   read_text(bytes, [](std::string_view text) { process::order_from(text); });
@@ -165,6 +175,7 @@ constexpr Target kTargets[] = {
        read_text(bytes, [](auto text) { import::dicom::parse_csa_header(text); });
      }},
     {"archive", [](Bytes bytes) { import_only("archive", bytes); }},
+    {"labels", read_labels},
     {"raw", import_raw},
     {"canonical", open_canonical},
     {"report", read_report},

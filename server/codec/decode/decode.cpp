@@ -37,7 +37,7 @@ void check(const DecodedSurface& surface, MeshFormat format, const mesh::Context
   const bool is_there = all_of(surface.triangles, context, [&](const mesh::Triangle& triangle) {
     return triangle[0] < vertices && triangle[1] < vertices && triangle[2] < vertices;
   });
-  if (!is_there) refuse(format, "a triangle names a vertex that is not there");
+  if (!is_there) refuse(format, "a triangle names a vertex that does not exist");
 }
 
 DecodedSurface decode_unchecked(Bytes file, MeshFormat format, Space space,
@@ -88,8 +88,8 @@ DecodedSurface join(std::vector<DecodedSurface>&& parts, const mesh::Context& co
     triangles.push_back(triangles.back() + part.triangles.size());
   }
   if (vertices.back() > std::numeric_limits<std::uint32_t>::max()) {
-    throw Error(ErrorCode::kTooLarge, "the file has " + std::to_string(vertices.back()) +
-                                          " vertices; 32 bits cannot number them");
+    throw Error(ErrorCode::kTooLarge, "The file has " + std::to_string(vertices.back()) +
+                                          " vertices, more than 32 bits can number.");
   }
   DecodedSurface all;
   all.positions.resize_for_overwrite(vertices.back());

@@ -32,7 +32,7 @@ DecodedSurface decode_draco_stream(Bytes stream, int position_id) {
   draco::Decoder decoder;
   const auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
   if (!decoded.ok()) {
-    refuse(MeshFormat::kDrc, "libdraco says: " + decoded.status().error_msg_string());
+    refuse(MeshFormat::kDrc, "libdraco reports: " + decoded.status().error_msg_string());
   }
   const draco::Mesh& mesh = *decoded.value();
   const draco::PointAttribute* positions =

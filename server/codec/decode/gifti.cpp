@@ -33,7 +33,7 @@ Array array_of(const std::vector<XmlElement>& elements, std::string_view file,
   if (!has("DataType", type) || !has("Encoding", "Base64Binary") ||
       !has("Endian", "LittleEndian") || !has("ArrayIndexingOrder", "RowMajorOrder") ||
       !has("Dimensionality", "2") || !has("Dim1", "3")) {
-    refuse(kFormat, "an array is not as it should be");
+    refuse(kFormat, "an array has wrong attributes");
   }
   const auto data = std::find_if(array, elements.end(), [](const XmlElement& element) {
     return element.path == "GIFTI/DataArray/Data";
@@ -42,7 +42,7 @@ Array array_of(const std::vector<XmlElement>& elements, std::string_view file,
   const auto [rows] = numbers_of<std::uint32_t, 1>(array->attribute("Dim0", kFormat), kFormat);
   const std::string_view text = file.substr(data->begin, data->end - data->begin);
   if (text.size() != rows * kRecordText) {
-    refuse(kFormat, "an array has not the size that it should have");
+    refuse(kFormat, "an array has the wrong size");
   }
   return {rows, text};
 }
@@ -57,7 +57,7 @@ void read(const Array& array, const mesh::Context& context, mesh::Buffer<Record>
     const std::size_t count = std::min(kRecordsPerTask, array.rows - begin);
     const auto bytes = from_base64(array.text.substr(begin * kRecordText, count * kRecordText));
     if (!bytes || bytes->size() != count * sizeof(Record)) {
-      refuse(kFormat, "an array is no base64");
+      refuse(kFormat, "an array is not base64");
     }
     std::memcpy(records.data() + begin, bytes->data(), bytes->size());
   });
@@ -69,7 +69,7 @@ DecodedSurface decode_gii(Bytes file, const mesh::Context& context) {
   const std::vector<XmlElement> elements = elements_of(file, kFormat, "", context);
   const std::string_view text = as_text(file);
   DecodedSurface surface;
-  if (elements.front().path != "GIFTI") refuse(kFormat, "it is no GIFTI");
+  if (elements.front().path != "GIFTI") refuse(kFormat, "it is not GIFTI");
   if (elements.front().attribute("NumberOfDataArrays", kFormat) == "0") return surface;
   read(array_of(elements, text, "NIFTI_INTENT_POINTSET", "NIFTI_TYPE_FLOAT32"), context,
        surface.positions);

@@ -32,12 +32,12 @@ struct Chunks {
 Chunks chunks_of(Bytes file) {
   if (file.size() < kHeaderBytes || value_at<std::uint32_t>(file, 0) != kMagic ||
       value_at<std::uint32_t>(file, 4) != 2 || value_at<std::uint32_t>(file, 8) != file.size()) {
-    refuse_glb("its header is not that of a whole file of version 2");
+    refuse_glb("its header is not that of a complete file of version 2");
   }
   Bytes rest = file.subspan(kHeaderBytes);
   const auto take = [&](std::uint32_t type, const char* name) {
     if (rest.size() < kChunkHeaderBytes || value_at<std::uint32_t>(rest, 4) != type) {
-      refuse_glb(std::string("it has no chunk of ") + name + " where it should be");
+      refuse_glb(std::string("its chunk of ") + name + " is missing");
     }
     const std::size_t bytes = value_at<std::uint32_t>(rest, 0);
     if (bytes > rest.size() - kChunkHeaderBytes) {
@@ -50,7 +50,7 @@ Chunks chunks_of(Bytes file) {
   Chunks chunks;
   chunks.json = take(kJsonChunk, "JSON");
   if (!rest.empty()) chunks.binary = take(kBinaryChunk, "binary data");
-  if (!rest.empty()) refuse_glb("something follows its chunks");
+  if (!rest.empty()) refuse_glb("extra data follows its chunks");
   return chunks;
 }
 
@@ -118,7 +118,7 @@ class Scene {
 
  private:
   void visit(std::size_t number, const Matrix& above) {
-    if (!visited_.insert(number).second) refuse_glb("a node is there twice");
+    if (!visited_.insert(number).second) refuse_glb("a node occurs twice");
     const Json& node = gltf_.at("nodes").at(number);
     const Matrix matrix = times(above, transformation_of(node));
     if (node.contains("mesh")) {
@@ -149,7 +149,7 @@ class Scene {
     const auto offset = place.at("byteOffset").get<std::size_t>();
     const auto bytes = place.at("byteLength").get<std::size_t>();
     if (offset > binary_.size() || bytes > binary_.size() - offset) {
-      refuse_glb("a buffer view ends behind the file's binary data");
+      refuse_glb("a buffer view ends after the file's binary data");
     }
     return binary_.subspan(offset, bytes);
   }
@@ -162,7 +162,7 @@ class Scene {
     const Json& view =
         gltf_.at("bufferViews").at(accessor(number).at("bufferView").get<std::size_t>());
     const Json& packed = view.at("extensions").at("EXT_meshopt_compression");
-    if (packed.at("mode") != mode) refuse_glb("an array is packed in another way");
+    if (packed.at("mode") != mode) refuse_glb("an array has another compression mode");
     return {.bytes = binary_at(packed),
             .stride = packed.at("byteStride").get<std::size_t>(),
             .count = packed.at("count").get<std::size_t>()};
@@ -201,7 +201,7 @@ std::vector<Primitive> primitives_of(Bytes file) {
     const Json gltf = Json::parse(as_text(chunks.json));
     return Scene(gltf, chunks.binary).primitives();
   } catch (const Json::exception& error) {
-    refuse_glb(std::string("its JSON is not as it should be: ") + error.what());
+    refuse_glb(std::string("its JSON is malformed: ") + error.what());
   }
 }
 
@@ -226,7 +226,7 @@ void unpack_positions(const Primitive& primitive, DecodedSurface& surface) {
   if (meshopt_decodeVertexBuffer(stored.data(), count, stride,
                                  reinterpret_cast<const unsigned char*>(bytes.data()),
                                  bytes.size()) != 0) {
-    refuse_glb("meshoptimizer refuses its positions");
+    refuse_glb("meshoptimizer cannot decode its positions");
   }
   place(stored, primitive.to_patient, surface);
 }
@@ -240,7 +240,7 @@ DecodedSurface unpack(const Primitive& primitive) {
       (stride != sizeof(Steps) && stride != sizeof(mesh::Vec3)) ||
       primitive.vertices / kMostPerByte > primitive.positions.bytes.size() ||
       primitive.triangles / kMostPerByte > primitive.indices.bytes.size()) {
-    refuse_glb("a block's accessors do not say what is in it");
+    refuse_glb("a block's accessors do not match its content");
   }
   DecodedSurface surface;
   if (stride == sizeof(Steps)) {
@@ -254,7 +254,7 @@ DecodedSurface unpack(const Primitive& primitive) {
       meshopt_decodeIndexBuffer(
           surface.triangles.data(), primitive.indices.count, sizeof(std::uint32_t),
           reinterpret_cast<const unsigned char*>(indices.data()), indices.size()) != 0) {
-    refuse_glb("meshoptimizer refuses its triangles");
+    refuse_glb("meshoptimizer cannot decode its triangles");
   }
   return surface;
 }
@@ -273,7 +273,7 @@ DecodedSurface decode_glb(Bytes file, const mesh::Context& context) {
     parts[n] = decode_draco_stream(primitive.stream, primitive.position_id);
     if (parts[n].positions.size() != primitive.vertices ||
         parts[n].triangles.size() != primitive.triangles) {
-      refuse_glb("the accessors of block " + std::to_string(n) + " do not say what is in it");
+      refuse_glb("the accessors of block " + std::to_string(n) + " do not match its content");
     }
   });
   return join(std::move(parts), context);

@@ -48,12 +48,12 @@ std::array<T, N> numbers_of(std::string_view text, MeshFormat format) {
     const char* const begin = is_there ? at + (n == 0 ? 0 : 1) : end;
     const auto [next, error] = std::from_chars(begin, end, numbers[n]);
     if (error != std::errc{}) {
-      refuse(format, "there are no " + std::to_string(N) + " numbers in \"" +
+      refuse(format, std::to_string(N) + " numbers are expected in \"" +
                          std::string(text.substr(0, 80)) + '"');
     }
     at = next;
   }
-  if (at != end) refuse(format, "something follows \"" + std::string(text.substr(0, 80)) + '"');
+  if (at != end) refuse(format, "extra text follows \"" + std::string(text.substr(0, 80)) + '"');
   return numbers;
 }
 

@@ -39,7 +39,7 @@ void read(const Piece& piece, mesh::Vec3* position, mesh::Triangle* triangle) {
     if (!line.starts_with("f ")) return;
     *triangle = numbers_of<std::uint32_t, 3>(line.substr(2), MeshFormat::kObj);
     for (std::uint32_t& vertex : *triangle) {
-      if (vertex == 0) refuse(MeshFormat::kObj, "a face names vertex 0, and the first is 1");
+      if (vertex == 0) refuse(MeshFormat::kObj, "a face names vertex 0, but the first vertex is 1");
       --vertex;
     }
     ++triangle;

@@ -13,7 +13,7 @@ constexpr MeshFormat kFormat = MeshFormat::kOff;
 // Takes the next line off the text, without its end.
 std::string_view next_line(std::string_view& text) {
   const std::size_t end = text.find('\n');
-  if (end == std::string_view::npos) refuse(kFormat, "it ends within its head");
+  if (end == std::string_view::npos) refuse(kFormat, "it ends within its header");
   const std::string_view line = text.substr(0, end);
   text.remove_prefix(end + 1);
   return line;
@@ -34,7 +34,7 @@ Counts read_head(std::string_view& text) {
 
 mesh::Triangle triangle_of(std::string_view line) {
   const auto [corners, a, b, c] = numbers_of<std::uint32_t, 4>(line, kFormat);
-  if (corners != 3) refuse(kFormat, "a face is no triangle");
+  if (corners != 3) refuse(kFormat, "a face is not a triangle");
   return {a, b, c};
 }
 

@@ -57,7 +57,7 @@ class Header {
  private:
   void next() {
     const std::size_t end = text_.find('\n', at_);
-    if (end == std::string_view::npos) refuse(MeshFormat::kPly, "its header does not end");
+    if (end == std::string_view::npos) refuse(MeshFormat::kPly, "its header has no end");
     line_ = text_.substr(at_, end - at_);
     at_ = end + 1;
     ++number_;
@@ -99,7 +99,7 @@ DecodedSurface decode_ply(Bytes file, const mesh::Context& context) {
   const std::size_t rest = file.size() - layout.body;
   if (layout.vertices > rest / kVertexBytes || layout.faces > rest / layout.face_bytes ||
       rest != layout.vertices * kVertexBytes + layout.faces * layout.face_bytes) {
-    refuse(MeshFormat::kPly, "the " + std::to_string(rest) + " bytes behind its header are not " +
+    refuse(MeshFormat::kPly, "the " + std::to_string(rest) + " bytes after its header are not " +
                                  std::to_string(layout.vertices) + " vertices and " +
                                  std::to_string(layout.faces) + " faces");
   }
@@ -117,7 +117,7 @@ DecodedSurface decode_ply(Bytes file, const mesh::Context& context) {
     for (std::size_t t = task * kElementsPerTask; t < end; ++t) {
       const std::size_t face = t * layout.face_bytes;
       if (faces[face] != std::byte{3}) {
-        refuse(MeshFormat::kPly, "face " + std::to_string(t) + " is no triangle");
+        refuse(MeshFormat::kPly, "face " + std::to_string(t) + " is not a triangle");
       }
       surface.triangles[t] = value_at<mesh::Triangle>(faces, face + 1);
     }

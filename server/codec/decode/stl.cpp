@@ -194,13 +194,13 @@ DecodedSurface decode_stl(Bytes file, const mesh::Context& context) {
   if (file.size() < kHeaderBytes) refuse(MeshFormat::kStl, "it ends within its header");
   const auto count = value_at<std::uint32_t>(file, kHeaderBytes - 4);
   if (file.size() != kHeaderBytes + count * kFacetBytes) {
-    refuse(MeshFormat::kStl, "it has " + std::to_string(file.size()) + " bytes where its " +
+    refuse(MeshFormat::kStl, "it has " + std::to_string(file.size()) + " bytes, but its " +
                                  std::to_string(count) + " triangles take " +
                                  std::to_string(kHeaderBytes + count * kFacetBytes));
   }
   if (count > std::numeric_limits<std::uint32_t>::max() / 3) {
-    throw Error(ErrorCode::kTooLarge, "the surface has " + std::to_string(count) +
-                                          " triangles; 32 bits cannot number their corners");
+    throw Error(ErrorCode::kTooLarge, "The surface has " + std::to_string(count) +
+                                          " triangles, more corners than 32 bits can number.");
   }
   const Facets facets(file);
   mesh::Buffer<std::uint32_t> first;

@@ -28,8 +28,8 @@ T number_of(const XmlAttributes& attributes, std::string_view name) {
   T number = {};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc{} || end != text.data() + text.size()) {
-    refuse_3mf("\"" + std::string(text) + "\" is not the number that \"" + std::string(name) +
-               "\" has to be");
+    refuse_3mf("\"" + std::string(text) + "\" is not a number, as \"" + std::string(name) +
+               "\" must be");
   }
   return number;
 }
@@ -42,13 +42,13 @@ class Model : public XmlHandler {
     try {
       reader_.read({reinterpret_cast<const char*>(piece.data()), piece.size()}, is_last);
     } catch (const XmlError& error) {
-      refuse_3mf("its model is no XML that is read: " + std::string(error.what()));
+      refuse_3mf("its model is not valid XML: " + std::string(error.what()));
     }
   }
 
   DecodedSurface surface() const {
     if (!is_model_) refuse_3mf("its model is not in millimetres");
-    if (objects_ != built_) refuse_3mf("an object is not built, or not alone");
+    if (objects_ != built_) refuse_3mf("an object is not built, or is built more than once");
     DecodedSurface surface;
     surface.positions.resize_for_overwrite(positions_.size());
     std::ranges::copy(positions_, surface.positions.begin());
@@ -61,7 +61,7 @@ class Model : public XmlHandler {
   void start_element(std::string_view element, const XmlAttributes& attributes) override {
     if (element == "vertex") {
       if (positions_.size() == std::numeric_limits<std::uint32_t>::max()) {
-        throw Error(ErrorCode::kTooLarge, "the file has more vertices than 32 bits can number");
+        throw Error(ErrorCode::kTooLarge, "The file has more vertices than 32 bits can number.");
       }
       positions_.push_back({number_of<float>(attributes, "x"), number_of<float>(attributes, "y"),
                             number_of<float>(attributes, "z")});
@@ -73,11 +73,11 @@ class Model : public XmlHandler {
       first_vertex_ = static_cast<std::uint32_t>(positions_.size());
     } else if (element == "item") {
       built_.push_back(number_of<std::uint32_t>(attributes, "objectid"));
-      if (attributes.find("transform")) refuse_3mf("an object is built elsewhere than it lies");
+      if (attributes.find("transform")) refuse_3mf("an object is transformed");
     } else if (element == "model") {
       is_model_ = value_of(attributes, "unit") == "millimeter";
     } else if (element == "components") {
-      refuse_3mf("an object is made of others");
+      refuse_3mf("an object consists of other objects");
     }
   }
 
@@ -85,7 +85,7 @@ class Model : public XmlHandler {
   std::uint32_t vertex_of(const XmlAttributes& attributes, std::string_view name) const {
     const auto vertex = number_of<std::uint32_t>(attributes, name);
     if (vertex >= positions_.size() - first_vertex_) {
-      refuse_3mf("a triangle names a vertex that is not there");
+      refuse_3mf("a triangle names a vertex that does not exist");
     }
     return first_vertex_ + vertex;
   }

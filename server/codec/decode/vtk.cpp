@@ -45,7 +45,7 @@ class Reader {
     if (count > rest_.size() / element_bytes) refuse_vtk("it ends within its data");
     const Bytes data = rest_.first(count * element_bytes);
     rest_ = rest_.subspan(data.size());
-    if (!line().empty()) refuse_vtk("its data does not end where it should");
+    if (!line().empty()) refuse_vtk("its data does not end at the expected place");
     return data;
   }
 
@@ -80,7 +80,7 @@ DecodedSurface decode_vtk(Bytes file, const mesh::Context& context) {
   const Bytes points = reader.data(vertices, sizeof(mesh::Vec3));
   const auto [triangles, numbers] =
       numbers_of<std::uint64_t, 2>(reader.between("POLYGONS ", ""), MeshFormat::kVtk);
-  if (numbers != 4 * triangles) refuse_vtk("its faces are no triangles");
+  if (numbers != 4 * triangles) refuse_vtk("its faces are not triangles");
   const Bytes faces = reader.data(triangles, kFaceBytes);
   if (!reader.empty()) {
     reader.expect("CELL_DATA ");
@@ -88,7 +88,7 @@ DecodedSurface decode_vtk(Bytes file, const mesh::Context& context) {
     reader.expect("LOOKUP_TABLE default");
     reader.data(triangles, sizeof(std::uint32_t));
   }
-  if (!reader.empty()) refuse_vtk("something follows its data");
+  if (!reader.empty()) refuse_vtk("extra data follows its data");
   DecodedSurface surface;
   surface.positions.resize_for_overwrite(vertices);
   surface.triangles.resize_for_overwrite(triangles);
@@ -99,7 +99,7 @@ DecodedSurface decode_vtk(Bytes file, const mesh::Context& context) {
     }
   });
   for_all(triangles, context, [&](std::size_t t) {
-    if (word_at(faces, t * kFaceBytes) != 3) refuse_vtk("a face is no triangle");
+    if (word_at(faces, t * kFaceBytes) != 3) refuse_vtk("a face is not a triangle");
     for (std::size_t corner = 0; corner < 3; ++corner) {
       surface.triangles[t][corner] =
           word_at(faces, t * kFaceBytes + (corner + 1) * sizeof(std::uint32_t));

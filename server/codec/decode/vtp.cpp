@@ -18,15 +18,15 @@ class Document {
     const XmlElement& root = elements_.front();
     if (root.path != "VTKFile" || value(root, "type") != "PolyData" ||
         value(root, "byte_order") != "LittleEndian" || value(root, "header_type") != "UInt64") {
-      refuse_vtp("it is no little-endian file of VTK's polygonal data");
+      refuse_vtp("it is not a little-endian file of VTK's polygonal data");
     }
     const XmlElement& appended = elements_.back();
     if (appended.path != "VTKFile/AppendedData" || value(appended, "encoding") != "raw") {
-      refuse_vtp("its data is not appended as it is");
+      refuse_vtp("its data is not appended in raw encoding");
     }
     const std::string_view text = as_text(file);
     const std::size_t mark = text.find('_', appended.begin);
-    if (mark == std::string_view::npos) refuse_vtp("its data does not begin");
+    if (mark == std::string_view::npos) refuse_vtp("its data has no beginning");
     data_ = file.subspan(mark + 1);
   }
 
@@ -50,7 +50,7 @@ class Document {
     const Bytes rest = data_.subspan(offset + kHeadBytes);
     if (bytes > rest.size()) refuse_cut();
     if (count > bytes / element_bytes || bytes != count * element_bytes) {
-      refuse_vtp("the array " + std::string(name) + " has not the size that it should have");
+      refuse_vtp("the array " + std::string(name) + " has the wrong size");
     }
     return rest.first(bytes);
   }
@@ -77,7 +77,7 @@ class Document {
   }
 
  private:
-  [[noreturn]] static void refuse_cut() { refuse_vtp("it ends too soon"); }
+  [[noreturn]] static void refuse_cut() { refuse_vtp("it ends too early"); }
 
   static std::string_view value(const XmlElement& element, std::string_view name) {
     return element.attribute(name, MeshFormat::kVtp);
@@ -86,7 +86,7 @@ class Document {
   template <class Is>
   const XmlElement& only(const Is& is) const {
     if (std::ranges::count_if(elements_, is) != 1) {
-      refuse_vtp("an element is not there, or there twice");
+      refuse_vtp("an element is missing or occurs twice");
     }
     return *std::ranges::find_if(elements_, is);
   }
@@ -116,7 +116,7 @@ DecodedSurface decode_vtp(Bytes file, const mesh::Context& context) {
   document.expect_end(document.end_of(last));
   for (std::size_t t = 0; t < triangles; ++t) {
     if (value_at<std::uint32_t>(ends, t * sizeof(std::uint32_t)) != 3 * (t + 1)) {
-      refuse_vtp("a face is no triangle");
+      refuse_vtp("a face is not a triangle");
     }
   }
   DecodedSurface surface;

@@ -20,7 +20,7 @@ class Parser : public XmlHandler {
       try {
         reader_.read({reinterpret_cast<const char*>(next.data()), next.size()}, file.empty());
       } catch (const XmlError& error) {
-        refuse(format_, "it is no XML that is read: " + std::string(error.what()));
+        refuse(format_, "it is not valid XML: " + std::string(error.what()));
       }
     } while (!file.empty() && !reader_.is_stopped());
     return std::move(elements_);
@@ -29,7 +29,7 @@ class Parser : public XmlHandler {
  private:
   void start_element(std::string_view name, const XmlAttributes& pairs) override {
     constexpr std::size_t kMostElements = 1000;
-    if (elements_.size() == kMostElements) refuse(format_, "it has more than a thousand elements");
+    if (elements_.size() == kMostElements) refuse(format_, "it has more than 1000 elements");
     XmlElement& element = elements_.emplace_back();
     element.path = (open_.empty() ? "" : elements_[open_.back()].path + '/') + std::string(name);
     pairs.for_each(

@@ -15,7 +15,7 @@ struct Packed {
 MeshFormat format_of(const std::string& name) {
   const auto format = from_string<MeshFormat>(name.substr(name.rfind('.') + 1));
   if (!format || *format == MeshFormat::kZip) {
-    decoding::refuse(MeshFormat::kZip, "a file in it has no format's suffix");
+    decoding::refuse(MeshFormat::kZip, "a file in it has no known suffix");
   }
   return *format;
 }

@@ -59,7 +59,8 @@ class ZipReader::Library {
   void check(int status) const {
     if (status == ARCHIVE_OK) return;
     const char* reason = archive_ ? archive_error_string(archive_.get()) : nullptr;
-    refuse(format_, std::string("libarchive says: ") + (reason == nullptr ? "nothing" : reason));
+    refuse(format_,
+           std::string("libarchive reports: ") + (reason == nullptr ? "no reason" : reason));
   }
 
   MeshFormat format_;

@@ -43,7 +43,7 @@ Grid grid_of(const mesh::Mesh& mesh, int bits) {
     grid.side = std::max(grid.side, as_draco_keeps(high[axis] - grid.low[axis] + kOptionStep));
   }
   if (zero != 0 || !std::isfinite(grid.side)) {
-    throw Error(ErrorCode::kUnusableVolume, "the surface does not lie in a finite space");
+    throw Error(ErrorCode::kUnusableVolume, "The surface has coordinates that are not finite.");
   }
   return grid;
 }

@@ -117,7 +117,7 @@ class Reader {
     while (const std::size_t count = file_.read(at, piece)) {
       const auto rest = std::span(piece).first(count);
       if (std::ranges::any_of(rest, [](std::byte b) { return b != std::byte{0}; })) {
-        throw_unusable("Something that is no part of the archive follows its end.");
+        throw_unusable("The archive is followed by data that is not part of it.");
       }
       at += count;
     }
@@ -156,10 +156,10 @@ class Unpacker {
     for_each_file([&](archive_entry* entry, const std::string& name) {
       if (base_of(name).empty()) {
         throw_unusable("The archive is damaged: its member " + std::to_string(entries_) +
-                       " is a file without a name.");
+                       " has no name.");
       }
       if (!names.insert(name).second) {
-        throw_unusable("The archive has the member " + in_quotes(name) + " twice.");
+        throw_unusable("The archive contains the member " + in_quotes(name) + " twice.");
       }
       if (::archive_entry_size_is_set(entry) != 0) {
         check_total(static_cast<std::uint64_t>(::archive_entry_size(entry)));
@@ -192,12 +192,13 @@ class Unpacker {
   void for_each_file(const Use& use) {
     while (archive_entry* entry = reader_.next()) {
       if (++entries_ > limits_.max_members) {
-        throw Error(ErrorCode::kTooLarge, "The archive has more than " +
-                                              std::to_string(limits_.max_members) + " members.");
+        throw Error(ErrorCode::kTooLarge, "The archive has more than the " +
+                                              std::to_string(limits_.max_members) +
+                                              " members that are accepted.");
       }
       const std::string name = name_of(entry, entries_);
       if (::archive_entry_is_encrypted(entry) != 0) {
-        throw_unusable("The archive is encrypted; send it without a password.");
+        throw_unusable("The archive is encrypted. Send it without a password.");
       }
       if (is_regular(entry) && !is_hidden(name)) use(entry, name);
     }
@@ -225,8 +226,8 @@ class Unpacker {
     while (const std::size_t count = write_piece(target, buffer_.size())) {
       bytes += count;
       if (bytes <= most) continue;
-      throw_unusable("The archive's member " + in_quotes(name) + " holds more than the " +
-                     std::to_string(most) + " bytes that its header lets it have.");
+      throw_unusable("The archive's member " + in_quotes(name) + " has more than the " +
+                     std::to_string(most) + " bytes that its header allows.");
     }
     return bytes;
   }
@@ -242,17 +243,17 @@ class Unpacker {
 
   void check_total(std::uint64_t further) const {
     if (further > limits_.max_bytes - std::min(total_, limits_.max_bytes)) {
-      throw Error(ErrorCode::kTooLarge, "The archive's members are more than the " +
+      throw Error(ErrorCode::kTooLarge, "The archive unpacks to more than the " +
                                             std::to_string(limits_.max_bytes) +
                                             " bytes that are accepted.");
     }
     // A TAR compresses nothing, but it can hold files of which only parts are written.
     if (reader_.is_tar() && total_ + further > file_.size()) {
-      throw_unusable("The archive's members are larger than it is: it holds sparse files.");
+      throw_unusable("The archive contains sparse files, which are not accepted.");
     }
     if (total_ + further > most_unpacked_bytes(file_.size())) {
       throw_unusable("The archive unpacks to more than " + std::to_string(kMostUnpackedPerByte) +
-                     " times its size, as only bombs do.");
+                     " times its size. Only decompression bombs do that.");
     }
   }
 

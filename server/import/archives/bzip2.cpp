@@ -34,7 +34,7 @@ class Stream {
     const int status = BZ2_bzDecompress(&stream_);
     if (status != BZ_OK && status != BZ_STREAM_END) {
       volume::throw_unusable(
-          "The compressed data is corrupt: it does not unpack or fails its checksum.");
+          "The compressed data is corrupt: it cannot be unpacked, or its checksum is wrong.");
     }
     is_over = status == BZ_STREAM_END;
     input = input.last(stream_.avail_in);
@@ -73,8 +73,7 @@ std::uint64_t unzip2_range(const InputFile& file, const CompressedRange& range, 
     bool is_full = false;
     for (bool is_over = false; !is_over;) {
       if (!is_full && !refill()) {
-        volume::throw_unusable(
-            "The compressed data is truncated: the file ends before its stream does.");
+        volume::throw_unusable("The compressed data is truncated: the file ends too early.");
       }
       const std::size_t count = stream.decode(input, output, is_over);
       is_full = count == output.size();
@@ -85,7 +84,7 @@ std::uint64_t unzip2_range(const InputFile& file, const CompressedRange& range, 
   } while (refill() && input.front() == std::byte{'B'});
   do {
     if (!is_padding(input)) {
-      volume::throw_unusable("Something that is not compressed data follows the compressed data.");
+      volume::throw_unusable("The compressed data is followed by data that is not part of it.");
     }
     input = {};
   } while (refill());

@@ -49,17 +49,17 @@ void set_output(z_stream& stream, std::span<std::byte> output) {
 
 [[noreturn]] void throw_corrupt() {
   throw Error(ErrorCode::kUnusableVolume,
-              "The compressed data is corrupt: it does not inflate or fails its checksum.");
+              "The compressed data is corrupt: it cannot be unpacked, or its checksum is wrong.");
 }
 
 [[noreturn]] void throw_truncated() {
   throw Error(ErrorCode::kUnusableVolume,
-              "The compressed data is truncated: the file ends before its stream does.");
+              "The compressed data is truncated: the file ends too early.");
 }
 
 [[noreturn]] void throw_followed() {
   throw Error(ErrorCode::kUnusableVolume,
-              "Something that is not compressed data follows the compressed data.");
+              "The compressed data is followed by data that is not part of it.");
 }
 
 // Gives zlib the range's bytes, piece by piece.

@@ -112,8 +112,8 @@ std::vector<FoundVolume> files_of_formats(const std::vector<ArchiveMember>& memb
     const Reader* reader = sniff(InputFile(member.path));
     if (reader == nullptr) continue;
     if (reader->content == Content::kFiles) {
-      throw_unusable("The archive holds another archive, " + in_quotes(member.name) +
-                     "; send that one by itself.");
+      throw_unusable("The archive contains another archive, " + in_quotes(member.name) +
+                     ". Send that one by itself.");
     }
     found.push_back({member, reader});
   }
@@ -245,11 +245,11 @@ Volume read_file(const FoundVolume& found, Members& members, const Input& input)
     names += (at > 0 ? ", " : "") + in_quotes(choices[at].value);
   }
   if (choices.size() > kMost) names += " and " + std::to_string(choices.size() - kMost) + " more";
-  const std::string reason =
-      asked.empty()
-          ? "The archive holds " + std::to_string(choices.size()) +
-                " volumes, where one is needed; choose one with member=NAME: " + names + "."
-          : "The archive has no volume " + in_quotes(asked) + ", but: " + names + ".";
+  const std::string reason = asked.empty()
+                                 ? "The archive holds " + std::to_string(choices.size()) +
+                                       " volumes. Choose one with member=NAME: " + names + "."
+                                 : "The archive has no volume " + in_quotes(asked) +
+                                       ". Choose one with member=NAME: " + names + ".";
   throw_choice(reason, std::move(choices));
 }
 
@@ -258,9 +258,9 @@ Volume read_members(Members& members, const Input& input) {
   const std::string& asked = input.task.options.member;
   const std::size_t count = contents.volumes.size() + (contents.slices.empty() ? 0 : 1);
   if (count == 0) {
-    throw Error(ErrorCode::kUnsupportedMedia, "None of the archive's " +
-                                                  std::to_string(members.all().size()) +
-                                                  " files is a volume of a format that is read.");
+    throw Error(ErrorCode::kUnsupportedMedia,
+                "None of the " + std::to_string(members.all().size()) +
+                    " files in the archive is a volume in a supported format.");
   }
   if (!contents.slices.empty() &&
       (asked == process::kDicomMember || (asked.empty() && count == 1))) {

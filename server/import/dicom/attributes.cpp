@@ -123,7 +123,7 @@ std::optional<double> factor(const DataSet& data, Tag tag) {
   if (numbers.size() == 1 && !(tag == kRescaleSlope && numbers[0] == 0)) return numbers[0];
   throw_unusable("The DICOM image's rescale slope " + in_quotes(data.text(kRescaleSlope)) +
                  " and intercept " + in_quotes(data.text(kRescaleIntercept)) +
-                 " give its samples no values.");
+                 " do not define the values of its samples.");
 }
 
 }  // namespace
@@ -157,8 +157,8 @@ std::vector<double> required_numbers(const DataSet& data, Tag tag, std::size_t c
   if (numbers.size() == count) return numbers;
   const std::string_view text = data.text(tag);
   if (text.empty()) {
-    throw_unusable("The DICOM image does not tell its " + std::string(name) + ' ' + tag_name(tag) +
-                   ", without which nobody knows where it lies in the patient.");
+    throw_unusable("The DICOM image has no " + std::string(name) + ' ' + tag_name(tag) +
+                   ", so its place in the patient is unknown.");
   }
   throw_unusable("The DICOM image's " + std::string(name) + ' ' + tag_name(tag) + " is " +
                  in_quotes(text) + ", not " + std::to_string(count) + " numbers.");
@@ -168,7 +168,7 @@ Vector3 unit_vector(const double* parts) {
   Vector3 vector = {parts[0], parts[1], parts[2]};
   const double size = std::sqrt(dot(vector, vector));
   if (!(std::abs(size - 1) <= kCosineTolerance)) {
-    throw_unusable("The DICOM image's orientation is not made of unit vectors.");
+    throw_unusable("The DICOM image's orientation does not consist of unit vectors.");
   }
   for (double& part : vector) part /= size;
   return vector;
@@ -186,7 +186,7 @@ Plane plane_of(const Attributes& attributes) {
   plane.along_row = unit_vector(cosines.data());
   plane.along_column = unit_vector(cosines.data() + 3);
   if (std::abs(dot(plane.along_row, plane.along_column)) > kCosineTolerance) {
-    throw_unusable("The DICOM image's rows and columns are not at right angles.");
+    throw_unusable("The DICOM image's rows and columns are not perpendicular.");
   }
   // The file tells the distance between rows first, then that between columns.
   plane.spacing = {spacing[1], spacing[0]};

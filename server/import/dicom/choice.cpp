@@ -37,28 +37,29 @@ std::vector<Slice> chosen_of(SeriesVolumes all, const ImportOptions& options,
                              std::vector<Note>& notes) {
   const std::size_t count = all.volumes.size();
   if (count == 1 && options.volume.value_or(0) == 0) return std::move(all.volumes.front().slices);
-  const std::string difference =
-      all.difference.empty() ? "" : ", which differ in " + all.difference;
-  const std::string found = "The series holds " + count_of(count, "volume") + difference;
+  const std::string difference = all.difference.empty() ? "" : " that differ in " + all.difference;
+  const std::string found = "The series holds " + count_of(count, "volume") + difference + '.';
   std::vector<Choice> choices = choices_of(all);
+  const std::string choose = " Choose one with volume=N: " + listed(choices) + '.';
   if (!options.volume) {
-    throw_choice(found + "; choose one with volume=N: " + listed(choices) + '.', choices);
+    throw_choice(found + choose, choices);
   }
   if (*options.volume >= count) {
-    throw_choice(found + ", and none of them is volume " + std::to_string(*options.volume) + ": " +
-                     listed(choices) + '.',
+    throw_choice(found + " It has no volume " + std::to_string(*options.volume) + '.' + choose,
                  choices);
   }
   SeriesVolume& chosen = all.volumes[*options.volume];
   if (chosen.whole_count > 0) {
     throw_choice("Volume " + std::to_string(*options.volume) +
-                     " of the series was broken off: " + std::to_string(chosen.slices.size()) +
-                     " of its " + count_of(chosen.whole_count, "slice") + " are there.",
+                     " of the series is incomplete: it has " +
+                     std::to_string(chosen.slices.size()) + " of " +
+                     count_of(chosen.whole_count, "slice") + '.',
                  choices);
   }
   notes.push_back(note_of(NoteCode::kVolumeChosen, "Volume " + std::to_string(*options.volume) +
-                                                       " of " + std::to_string(count) +
-                                                       " from 0 on" + difference + '.'));
+                                                       " of " + count_of(count, "volume") +
+                                                       difference +
+                                                       " was read. The first is volume 0."));
   return std::move(chosen.slices);
 }
 
@@ -105,7 +106,7 @@ void note_empty_planes(const Stack& stack, std::vector<Note>& notes) {
   notes.push_back(
       note_of(NoteCode::kEmptyPlanes, std::to_string(stack.plane_count - filled) + " of the " +
                                           std::to_string(stack.plane_count) +
-                                          " planes have no frame; their samples are 0."));
+                                          " planes have no frame. Their samples are 0."));
 }
 
 std::vector<Slice> choose_label_slices(std::vector<Slice> slices, const ImportOptions& options,
@@ -116,7 +117,7 @@ std::vector<Slice> choose_label_slices(std::vector<Slice> slices, const ImportOp
     return chosen_of({"", {{"", std::move(slices), 0}}}, options, notes);
   }
   std::vector<Slice> chosen = chosen_of(one_a_segment(slices), options, notes);
-  if (chosen.empty()) throw_unusable("The segmentation has no frames of the segment.");
+  if (chosen.empty()) throw_unusable("The segmentation has no frames of the chosen segment.");
   return chosen;
 }
 
@@ -135,14 +136,14 @@ Stack choose_stack(std::vector<Slice> slices, const ImportOptions& options,
     return choose_labels(std::move(slices), options, notes);
   }
   if (std::ranges::any_of(slices, is_label_slice)) {
-    throw_unusable("The series is no single volume: it mixes images and segmentations.");
+    throw_unusable("The series is not a single volume: it mixes images and segmentations.");
   }
   Stack stack = make_stack(chosen_of(split_volumes(std::move(slices)), options, notes));
   if (stack.slices.front().image->is_distance_assumed) {
-    notes.push_back(note_of(NoteCode::kDistanceAssumed,
-                            "The slices of the mosaic are taken to be as far apart as they are "
-                            "thick, " +
-                                in_mm(stack.geometry.spacing[2]) + '.'));
+    notes.push_back(
+        note_of(NoteCode::kDistanceAssumed,
+                "The distance between the slices of the mosaic is unknown. The slice thickness, " +
+                    in_mm(stack.geometry.spacing[2]) + ", was used."));
   }
   if (auto note = note_on_frames_of_reference(stack.slices, options)) {
     notes.push_back(std::move(*note));

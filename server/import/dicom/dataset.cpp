@@ -19,7 +19,7 @@ namespace {
 std::size_t beginning_of(const InputFile& file) {
   const std::string head = file.text(0, kSniffBytes);
   const auto beginning = find_beginning(std::as_bytes(std::span(head)));
-  if (!beginning) throw_unusable("The file is no DICOM file.");
+  if (!beginning) throw_unusable("The file is not a DICOM file.");
   return *beginning;
 }
 
@@ -29,8 +29,8 @@ void inflate(const InputFile& file, std::uint64_t offset, std::uint64_t limit,
       file, {offset, file.size() - offset}, limit,
       [&](std::span<const std::byte> piece) { scratch.write(piece); }, Wrapping::kNone);
   if (bytes > limit) {
-    throw_unusable("The deflated file holds more than the " + std::to_string(limit) +
-                   " bytes that its header lets it have.");
+    throw_unusable("The deflated file unpacks to more than the " + std::to_string(limit) +
+                   " bytes that its header allows.");
   }
 }
 

@@ -117,18 +117,18 @@ void check_stream(std::span<const std::byte> stream, const Syntax& syntax,
                   const PixelLayout& layout) {
   const auto size = syntax.family == Family::kJpeg2000 ? jpeg_2000_size(stream) : jpeg_size(stream);
   if (!size) {
-    throw_unusable("its compressed samples are no " + std::string(syntax.name) + " stream");
+    throw_unusable("its compressed samples are not a " + std::string(syntax.name) + " stream");
   }
   if (!is_whole(stream)) throw_unusable("its compressed samples are truncated");
   if (size->columns != layout.columns || size->rows != layout.rows || size->components != 1) {
     throw_unusable("its compressed samples are " + std::to_string(size->columns) + " x " +
                    std::to_string(size->rows) + " with " + std::to_string(size->components) +
-                   " components, where its header tells " + std::to_string(layout.columns) + " x " +
-                   std::to_string(layout.rows) + " with 1");
+                   " components, but its header declares " + std::to_string(layout.columns) +
+                   " x " + std::to_string(layout.rows) + " with 1");
   }
   if ((size->bits + 7) / 8 != layout.bits_allocated / 8) {
     throw_unusable("its compressed samples have " + std::to_string(size->bits) +
-                   " bits, where its header tells " + std::to_string(layout.bits_allocated));
+                   " bits, but its header declares " + std::to_string(layout.bits_allocated));
   }
 }
 
@@ -165,14 +165,14 @@ void decode_rle(std::span<const std::byte> stream, const PixelLayout& layout,
   };
   const std::size_t segments = layout.bits_allocated / 8;
   if (header(0) != segments) {
-    throw_unusable("its RLE header tells " + std::to_string(header(0)) + " segments, where " +
+    throw_unusable("its RLE header declares " + std::to_string(header(0)) + " segments, but " +
                    std::to_string(segments) + " are needed");
   }
   for (std::size_t i = 0; i < segments; ++i) {
     const std::size_t begin = header(i + 1);
     const std::size_t end = i + 1 < segments ? header(i + 2) : stream.size();
     if (begin < kHeaderBytes || begin > end || end > stream.size()) {
-      throw_unusable("its RLE segments do not lie within it");
+      throw_unusable("its RLE segments lie outside its compressed data");
     }
     decode_rle_segment(stream.subspan(begin, end - begin), segments - 1 - i, segments, target);
   }
@@ -255,7 +255,7 @@ void decode_frame(std::string_view transfer_syntax, std::span<const std::byte> c
                   const PixelLayout& layout, std::span<std::byte> target) {
   const Syntax* syntax = find_syntax(transfer_syntax);
   if (syntax == nullptr) {
-    throw_unusable("its transfer syntax " + in_quotes(transfer_syntax) + " is not read");
+    throw_unusable("its transfer syntax " + in_quotes(transfer_syntax) + " is not supported");
   }
   if (syntax->family == Family::kRle) return decode_rle(compressed, layout, target);
   decode_jpeg(compressed, *syntax, layout, target);

@@ -16,9 +16,9 @@ constexpr double kSamePlace = 1e-3;  // mm
 std::vector<double> offsets_of(const DataSet& data, std::size_t frames) {
   std::vector<double> offsets = data.numbers(kGridFrameOffsetVector);
   if (offsets.size() == frames) return offsets;
-  throw_unusable("The DICOM dose has " + std::to_string(frames) + " planes, and " +
+  throw_unusable("The DICOM dose has " + std::to_string(frames) + " planes, but " +
                  std::to_string(offsets.size()) + " offsets " + tag_name(kGridFrameOffsetVector) +
-                 " that say where they lie.");
+                 " for their positions.");
 }
 
 // The distance of each plane from the first, along the normal. The offsets in the file begin with
@@ -30,7 +30,7 @@ std::vector<double> distances_of(const DataSet& data, const Plane& first, std::s
   if (std::abs(std::abs(along_z) - 1) > kSamePlace ||
       std::abs(offsets.front() - first.position[2]) > kSamePlace) {
     throw_unusable("The DICOM dose's offsets " + tag_name(kGridFrameOffsetVector) +
-                   " begin neither with 0 nor with the z of its first transverse plane.");
+                   " do not begin with 0 or with the z of its first transverse plane.");
   }
   for (double& offset : offsets) offset = (offset - first.position[2]) * std::copysign(1, along_z);
   return offsets;
@@ -46,7 +46,7 @@ void place_dose(const DataSet& data, std::span<Frame> frames) {
   const auto scaling = data.numbers(kDoseGridScaling);
   if (scaling.size() != 1 || !(scaling[0] > 0)) {
     throw_unusable("The DICOM dose's scaling " + tag_name(kDoseGridScaling) + " is " +
-                   in_quotes(data.text(kDoseGridScaling)) + ", not one positive number.");
+                   in_quotes(data.text(kDoseGridScaling)) + ", not a positive number.");
   }
   for (Frame& frame : frames) frame.rescale = {scaling[0], 0};
   if (frames.size() == 1) return;

@@ -26,23 +26,25 @@ std::optional<Note> note_on_frames_of_reference(std::span<const Slice> slices,
   const bool one_each = std::ranges::all_of(
       counts, [](const auto& entry) { return entry.first.empty() || entry.second == 1; });
   const std::size_t several = counts.size() - counts.count("");
-  const std::string found = "The " + std::to_string(slices.size()) + " slices have " +
-                            std::to_string(several) + " frames of reference" +
-                            (counts.contains("") ? ", and some have none" : "");
+  const std::string found = "the " + std::to_string(slices.size()) + " slices have " +
+                            std::to_string(several) + " frames of reference (0020,0052)" +
+                            (counts.contains("") ? ", and some have none." : ".");
+  const std::string even_line =
+      " The slices are evenly spaced on one line, so they were read as one volume.";
   if (one_each) {
     return note_of(NoteCode::kFrameOfReference,
-                   found +
-                       ": each its own, as some anonymisers leave them. They lie on one even "
-                       "line, so they were taken as one volume.");
+                   "Each slice has its own frame of reference, as some anonymisers write it: " +
+                       found + even_line);
   }
   if (options.accepts(NoteCode::kFrameOfReference)) {
     return note_of(NoteCode::kFrameOfReference,
-                   found + ", which was accepted. They lie on one even line.");
+                   "The request accepts several frames of reference: " + found + even_line);
   }
-  throw_overridable(NoteCode::kFrameOfReference,
-                    "The series is no single volume: " + found +
-                        " (0020,0052), so they fall into groups that may lie anywhere to each "
-                        "other.");
+  throw_overridable(
+      NoteCode::kFrameOfReference,
+      "The series is not a single volume: " + found +
+          " Slices with different frames of reference may not share one coordinate system. "
+          "Add accept=frame-of-reference to read them as one volume.");
 }
 
 }  // namespace isomesh::import::dicom

@@ -24,7 +24,7 @@ std::uint32_t frame_count(const DataSet& data) {
   const auto count = data.integer(kNumberOfFrames);
   if (count && *count > 0 && *count <= kMostFrames) return static_cast<std::uint32_t>(*count);
   throw_unusable("The DICOM image's number of frames is " + in_quotes(data.text(kNumberOfFrames)) +
-                 ".");
+                 ", not a number from 1 to " + std::to_string(kMostFrames) + ".");
 }
 
 void refuse_unplaced_frames(const DataSet& data, std::uint32_t frames) {
@@ -32,11 +32,11 @@ void refuse_unplaced_frames(const DataSet& data, std::uint32_t frames) {
   if (frames == 1) return;
   if (!has_functional_groups(data)) {
     throw_unusable("The DICOM image has " + std::to_string(frames) +
-                   " frames and does not tell where each of them lies in the patient.");
+                   " frames, but no position for each of them.");
   }
   const std::size_t placed = groups == nullptr ? 0 : groups->items.size();
   if (placed != frames) {
-    throw_unusable("The DICOM image has " + std::to_string(frames) + " frames and describes " +
+    throw_unusable("The DICOM image has " + std::to_string(frames) + " frames, but describes " +
                    std::to_string(placed) + '.');
   }
 }
@@ -47,7 +47,7 @@ void check_label_layout(const Segmentation& segmentation, const PixelLayout& lay
   const bool fits = layout.bits_allocated == (is_binary ? 1U : 8U) ||
                     (is_label_map && layout.bits_allocated == 16);
   if (fits && !layout.is_signed && !layout.is_float) return;
-  throw_unusable("The DICOM segmentation's samples are no labels: they have " +
+  throw_unusable("The DICOM segmentation's samples cannot be labels: they have " +
                  std::to_string(layout.bits_allocated) + " bits" +
                  (layout.is_signed ? " and a sign." : "."));
 }
@@ -59,8 +59,8 @@ void refuse_placeless(const DataSet& data, std::uint32_t frames) {
        {std::pair{kImagePosition, "position"}, std::pair{kImageOrientation, "orientation"},
         std::pair{kPixelSpacing, "pixel spacing"}}) {
     if (!data.text(tag).empty()) continue;
-    throw_unusable("The DICOM image is one slice that does not tell its " + std::string(name) +
-                   ' ' + tag_name(tag) + ", so it can be no part of a volume.");
+    throw_unusable("The DICOM image is a single slice and has no " + std::string(name) + ' ' +
+                   tag_name(tag) + ", so it cannot be part of a volume.");
   }
 }
 
@@ -111,7 +111,9 @@ Image describe_image(const DicomFile& file) {
   if (image.segmentation) check_label_layout(*image.segmentation, image.stored);
   require_pixels(file, image.stored, frames);
   if (data.item(kModalityLutSequence) != nullptr) {
-    throw_unusable("The DICOM image gives its samples their values by a table, which is not read.");
+    throw_unusable(
+        "The DICOM image defines the values of its samples by a lookup table, which is not "
+        "supported.");
   }
   if (!is_dose(data)) refuse_unplaced_frames(data, frames);
   refuse_placeless(data, frames);

@@ -113,7 +113,7 @@ Volume write_volume(const Stack& stack, Volume volume, OpenFile& file, const Imp
     CanonicalWriter writer(task.target, {volume.dims, type, volume.geometry});
     if (write_stack(stack, file, writer.samples(), volume)) return finish(writer, volume);
   }
-  throw Error(ErrorCode::kInternal, "No type holds a DICOM volume's samples.");
+  throw Error(ErrorCode::kInternal, "No sample type can hold the samples of a DICOM volume.");
 }
 
 Volume describe_volume(const Stack& stack) {
@@ -123,7 +123,7 @@ Volume describe_volume(const Stack& stack) {
   volume.dims = {image.layout.columns, image.layout.rows, stack.depth()};
   volume.geometry = normalised(stack.geometry);
   if (const auto fault = find_fault(volume.dims, volume.geometry)) {
-    throw_unusable("The series' geometry cannot be used: " + fault->message + ".");
+    throw_unusable("The geometry of the series cannot be used: " + fault->message + ".");
   }
   if (!image.modality.empty()) volume.modality = image.modality;
   return volume;

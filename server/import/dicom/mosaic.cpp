@@ -37,7 +37,7 @@ std::uint32_t checked_count(double count) {
     return static_cast<std::uint32_t>(count);
   }
   throw_unusable("The DICOM image is a mosaic of " + to_text(count) +
-                 " slices, which is no number of slices.");
+                 " slices, which is not a valid number of slices.");
 }
 
 Tiling tiling_of(double count, bool is_square) {
@@ -52,10 +52,11 @@ void cut(const Tiling& tiling, Image& image) {
   const PixelLayout& whole = image.stored;
   if (whole.bits_allocated < 8) throw_unusable("The DICOM image is a mosaic of single bits.");
   if (whole.columns % tiling.columns != 0 || whole.rows % tiling.rows != 0) {
-    throw_unusable(
-        "The DICOM image is a mosaic of " + std::to_string(tiling.slices) + " slices, and its " +
-        std::to_string(whole.columns) + " x " + std::to_string(whole.rows) + " samples are no " +
-        std::to_string(tiling.columns) + " x " + std::to_string(tiling.rows) + " tiles.");
+    throw_unusable("The DICOM image is a mosaic of " + std::to_string(tiling.slices) +
+                   " slices, but its " + std::to_string(whole.columns) + " x " +
+                   std::to_string(whole.rows) + " samples cannot be divided into " +
+                   std::to_string(tiling.columns) + " x " + std::to_string(tiling.rows) +
+                   " tiles.");
   }
   image.layout.columns = whole.columns / tiling.columns;
   image.layout.rows = whole.rows / tiling.rows;
@@ -71,8 +72,8 @@ double slice_count(const DataSet& data, const CsaHeader& header) {
   }
   if (const auto told = data.unsigned_number(kMosaicImages)) return *told;
   throw_unusable(
-      "The DICOM image is a mosaic of slices and does not tell how many: its Siemens header "
-      "(0029,1010) is not there.");
+      "The DICOM image is a mosaic, but its number of slices is unknown: it has no Siemens header "
+      "(0029,1010).");
 }
 
 // The way in which the slices follow one another.
@@ -80,14 +81,14 @@ Vector3 slice_normal(const Plane& plane, const CsaHeader& header) {
   const auto told = csa_numbers(header, "SliceNormalVector");
   if (told.size() != 3) {
     throw_unusable(
-        "The DICOM image is a mosaic of slices and does not tell in which direction they follow "
-        "one another: its Siemens header (0029,1010) has no SliceNormalVector.");
+        "The DICOM image is a mosaic, but the order of its slices is unknown: its Siemens header "
+        "(0029,1010) has no SliceNormalVector.");
   }
   const Vector3 own = cross(plane.along_row, plane.along_column);
   const double along = dot(own, unit_vector(told.data()));
   if (std::abs(std::abs(along) - 1) > kParallel) {
     throw_unusable(
-        "The DICOM image is a mosaic of slices that do not follow one another along their normal.");
+        "The DICOM image is a mosaic, but its slices are not stacked along their normal.");
   }
   return moved({}, own, std::copysign(1, along));
 }
@@ -100,8 +101,8 @@ double slice_distance(const DataSet& data, const CsaHeader& header, Image& image
   image.is_distance_assumed = true;
   const auto thickness = data.numbers(kSliceThickness);
   if (!thickness.empty() && thickness.front() > 0) return thickness.front();
-  throw_unusable("The DICOM image is a mosaic of slices and does not tell how far apart they are " +
-                 tag_name(kSpacingBetweenSlices) + ".");
+  throw_unusable("The DICOM image is a mosaic, but the distance between its slices " +
+                 tag_name(kSpacingBetweenSlices) + " is unknown.");
 }
 
 void unfold_siemens(const DataSet& data, Image& image) {
@@ -132,7 +133,7 @@ void unfold_united_imaging(const DataSet& data, Image& image) {
   const std::size_t told = places == nullptr ? 0 : places->items.size();
   if (told != tiling.slices) {
     throw_unusable("The DICOM image is a grid of " + std::to_string(tiling.slices) +
-                   " slices, and " + std::to_string(told) + " are described " +
+                   " slices, but it describes " + std::to_string(told) + ' ' +
                    tag_name(kGridFrames) + ".");
   }
   cut(tiling, image);

@@ -18,7 +18,7 @@ std::optional<std::string> reason_to_ignore(const DicomFile& file) {
     return "it is " + std::string(*kind) + " (modality " + in_quotes(data.text(kModality)) + ")";
   }
   if (data.find(kRows) == nullptr && !file.pixels()) {
-    return "it is no image (modality " + in_quotes(data.text(kModality)) + ")";
+    return "it is not an image (modality " + in_quotes(data.text(kModality)) + ")";
   }
   const auto types = data.texts(kImageType);
   if (std::ranges::find(types, "LOCALIZER") != types.end()) return "it is a localiser";

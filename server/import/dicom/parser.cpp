@@ -143,7 +143,7 @@ class Parser {
                                                 : "element " + tag_name(tag);
     const std::string there = std::to_string(limit > at_ ? limit - at_ : 0);
     throw_unusable("The DICOM file is truncated or corrupt: its " + name + " takes " +
-                   std::to_string(bytes) + " bytes, and " + there + " are there.");
+                   std::to_string(bytes) + " bytes, but only " + there + " are left.");
   }
 
   Head read_head(const Encoding& encoding, std::uint64_t limit) {
@@ -183,15 +183,16 @@ class Parser {
   // Throws when there are more parts than any scanner writes, which would fill the memory.
   void count_part() {
     if (++parts_ <= kMostParts) return;
-    throw_unusable("The DICOM file has more than " + std::to_string(kMostParts) + " elements.");
+    throw_unusable("The DICOM file has more than the " + std::to_string(kMostParts) +
+                   " elements that are accepted.");
   }
 
   void keep(DataSet& set, Element element) {
     count_part();
     kept_bytes_ += element.value.size();
     if (kept_bytes_ > kMostKeptBytes) {
-      throw_unusable("The DICOM file's elements take more than " + std::to_string(kMostKeptBytes) +
-                     " bytes.");
+      throw_unusable("The DICOM file's elements take more than the " +
+                     std::to_string(kMostKeptBytes) + " bytes that are accepted.");
     }
     set.elements.push_back(std::move(element));
   }
@@ -241,8 +242,8 @@ class Parser {
   void read_items(const Head& head, const Encoding& encoding, std::uint64_t limit, unsigned depth,
                   Element& sequence) {
     if (depth > kDeepestSequence) {
-      throw_unusable("The DICOM file is corrupt: more than " + std::to_string(kDeepestSequence) +
-                     " sequences lie in one another.");
+      throw_unusable("The DICOM file is corrupt: its sequences are nested more than " +
+                     std::to_string(kDeepestSequence) + " levels deep.");
     }
     const bool has_end = !head.has_undefined_length();
     if (has_end) require(head.length, limit, head.tag);
@@ -252,7 +253,7 @@ class Parser {
       if (item.tag == kSequenceEnd) return;
       if (item.tag != kItem) {
         throw_unusable("The DICOM file is corrupt: its sequence " + tag_name(sequence.tag) +
-                       " holds something that is no item.");
+                       " contains something that is not an item.");
       }
       count_part();
       DataSet set = read_item(item, encoding, end, depth);

@@ -18,7 +18,7 @@ constexpr std::uint32_t kMostSamplesOfRow = 0xFFFF;
 
 unsigned required(const DataSet& data, Tag tag, std::string_view name) {
   if (const auto number = data.unsigned_number(tag)) return *number;
-  throw_unusable("The DICOM image does not tell its " + std::string(name) + ' ' + tag_name(tag) +
+  throw_unusable("The DICOM image does not declare its " + std::string(name) + ' ' + tag_name(tag) +
                  ".");
 }
 
@@ -29,26 +29,29 @@ void refuse_colours(const DataSet& data) {
   if (samples == 1 && photometric == "PALETTE COLOR") {
     // The labels of a segmentation stay what they are under colours.
     if (!data.text(kSegmentationType).empty()) return;
-    throw_unusable("The DICOM image's samples are indices into a palette of colours.");
+    throw_unusable(
+        "The DICOM image is in colour: its samples are indices into a palette. Only grey images "
+        "are read.");
   }
   if (photometric.empty()) {
-    throw_unusable("The DICOM image does not tell what its samples are " +
+    throw_unusable("The DICOM image does not declare its photometric interpretation " +
                    tag_name(kPhotometricInterpretation) + ".");
   }
   throw_unusable("The DICOM image is in colour: " + in_quotes(photometric) + " with " +
-                 std::to_string(samples) + (samples == 1 ? " sample" : " samples") + " a pixel.");
+                 std::to_string(samples) + (samples == 1 ? " sample" : " samples") +
+                 " per pixel. Only grey images are read.");
 }
 
 void check_bits(const PixelLayout& layout) {
   const unsigned allocated = layout.bits_allocated;
   if (allocated != 1 && allocated != 8 && allocated != 16 && allocated != 32) {
     throw_unusable("The DICOM image's samples have " + std::to_string(allocated) +
-                   " bits; 1, 8, 16 and 32 are read.");
+                   " bits. 1, 8, 16 and 32 bits are supported.");
   }
   if (layout.bits_stored == 0 || layout.bits_stored > allocated || layout.high_bit >= allocated ||
       layout.high_bit + 1 < layout.bits_stored) {
-    throw_unusable("The DICOM image's bits contradict each other: " +
-                   std::to_string(layout.bits_stored) + " stored up to bit " +
+    throw_unusable("The DICOM image's header contradicts itself: it stores " +
+                   std::to_string(layout.bits_stored) + " bits up to bit " +
                    std::to_string(layout.high_bit) + " of " + std::to_string(allocated) + ".");
   }
 }
@@ -74,14 +77,14 @@ void check_syntax(const DicomFile& file, const PixelLayout& layout) {
   const std::string& syntax = file.transfer_syntax();
   const bool is_encapsulated = file.pixels()->is_encapsulated;
   if (!(is_encapsulated ? can_decode(syntax) : is_native_syntax(syntax))) {
-    throw_unusable("The DICOM image's transfer syntax " + in_quotes(syntax) +
-                   (is_encapsulated ? " is not one of compressed samples that are read."
-                                    : " is not one of plain samples."));
+    throw_unusable(
+        "The DICOM image's transfer syntax " + in_quotes(syntax) +
+        (is_encapsulated ? " is not supported." : " is not one for uncompressed samples."));
   }
   if (is_encapsulated && (layout.is_float || layout.bits_allocated == 1)) {
-    throw_unusable("The DICOM image's samples are compressed, and " +
-                   std::string(layout.is_float ? "floating-point numbers" : "single bits") +
-                   " are read only as they are.");
+    throw_unusable("The DICOM image's samples are compressed. " +
+                   std::string(layout.is_float ? "Floating-point numbers" : "Single bits") +
+                   " are read only uncompressed.");
   }
 }
 
@@ -95,7 +98,7 @@ PixelLayout pixel_layout(const DicomFile& file) {
   layout.rows = required(data, kRows, "rows");
   if (layout.columns == 0 || layout.rows == 0) throw_unusable("The DICOM image's size is 0.");
   if (std::max(layout.columns, layout.rows) > kMostSamplesOfRow) {
-    throw_unusable("The DICOM image's rows or columns are more than DICOM can have.");
+    throw_unusable("The DICOM image has more rows or columns than DICOM allows.");
   }
   if (take_float(file, layout)) return layout;
   layout.bits_allocated = required(data, kBitsAllocated, "bits allocated");
@@ -108,19 +111,19 @@ PixelLayout pixel_layout(const DicomFile& file) {
 
 void require_pixels(const DicomFile& file, const PixelLayout& layout, std::uint32_t frames) {
   const auto& pixels = file.pixels();
-  if (!pixels) throw_unusable("The DICOM image holds no pixel data.");
+  if (!pixels) throw_unusable("The DICOM image has no pixel data.");
   check_syntax(file, layout);
   const std::uint64_t expected = layout.bytes_of(frames);
   if (!pixels->is_encapsulated && pixels->native.bytes < expected) {
     throw_unusable("The DICOM image's pixel data is truncated: " + std::to_string(layout.columns) +
                    " x " + std::to_string(layout.rows) + " x " + std::to_string(frames) +
-                   " samples take " + std::to_string(expected) + " bytes, and " +
-                   std::to_string(pixels->native.bytes) + " are there.");
+                   " samples take " + std::to_string(expected) + " bytes, but the file has " +
+                   std::to_string(pixels->native.bytes) + ".");
   }
   if (pixels->is_encapsulated && pixels->fragments.size() < frames) {
     throw_unusable("The DICOM image's pixel data is truncated: it has " + std::to_string(frames) +
-                   " frames, and " + std::to_string(pixels->fragments.size()) +
-                   " compressed fragments are there.");
+                   " frames, but only " + std::to_string(pixels->fragments.size()) +
+                   " compressed fragments.");
   }
   if (layout.bytes_of(1) > kMostFrameBytes) {
     throw_unusable("One frame of the DICOM image is " + std::to_string(layout.columns) + " x " +

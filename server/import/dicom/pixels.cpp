@@ -43,8 +43,8 @@ std::vector<std::size_t> first_fragments(const DicomFile& file, std::size_t fram
     offset += pixels.fragments[i].bytes + 8;
   }
   if (firsts.size() != frames) {
-    throw_unusable("The DICOM image's compressed fragments cannot be told apart: " +
-                   std::to_string(fragments) + " hold " + std::to_string(frames) + " frames.");
+    throw_unusable("its compressed frames cannot be separated: " + std::to_string(fragments) +
+                   " fragments hold " + std::to_string(frames) + " frames");
   }
   firsts.push_back(fragments);
   return firsts;
@@ -130,7 +130,7 @@ std::vector<std::byte> FrameReader::compressed(std::uint32_t frame) const {
   std::uint64_t bytes = 0;
   for (std::size_t i = first; i < end; ++i) bytes += fragments[i].bytes;
   if (bytes > most_compressed_bytes(stored_)) {
-    throw_unusable("its compressed samples are far larger than its size tells");
+    throw_unusable("its compressed samples take far more bytes than its size explains");
   }
   std::vector<std::byte> result(bytes);
   std::span<std::byte> rest = result;

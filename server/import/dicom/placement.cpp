@@ -56,10 +56,10 @@ void refuse_others(std::span<const Slice> slices, const std::string& what, const
   const auto count = static_cast<std::size_t>(std::ranges::count_if(slices, is_other));
   if (count == 0) return;
   const auto other = std::ranges::find_if(slices, is_other);
-  throw_unusable("The series is no single volume: " + std::to_string(count) + " of its " +
+  throw_unusable("The series is not a single volume: " + std::to_string(count) + " of its " +
                  count_of(slices.size(), "slice") + (count == 1 ? " differs" : " differ") + " in " +
-                 what + " from the others: " + place_of(*other) + " from " + place_of(usual) +
-                 ", for one.");
+                 what + " from the others. For example, " + place_of(*other) + " differs from " +
+                 place_of(usual) + ".");
 }
 
 }  // namespace

@@ -69,7 +69,7 @@ double plane_distance(const std::vector<double>& gaps, const std::optional<doubl
   const double smallest = std::ranges::min(gaps);
   if (fits(smallest)) return smallest;
   throw_unusable("The segmentation's frames are unevenly spaced: some are " + in_mm(smallest) +
-                 " apart, and others " + in_mm(std::ranges::max(gaps)) + '.');
+                 " apart, others " + in_mm(std::ranges::max(gaps)) + '.');
 }
 
 // The number of each slice's plane.
@@ -77,7 +77,7 @@ std::vector<std::uint32_t> planes_of(std::span<const Placed> placed,
                                      const std::optional<double>& told) {
   const std::vector<std::size_t> starts = position_starts(placed);
   if (starts.size() < 2) {
-    throw_unusable("The segmentation is a single slice, and a volume needs at least two.");
+    throw_unusable("The segmentation is a single slice. A volume needs at least two.");
   }
   const std::vector<double> gaps = gaps_of(placed, starts);
   const double distance = plane_distance(gaps, told);
@@ -102,7 +102,7 @@ void refuse_crooked(std::span<const Placed> placed, const Stack& stack, const Ve
     if (off <= kPlaceTolerance * length(step)) continue;
     throw_unusable("Frame " + std::to_string(placed[i].slice.frame->number + 1) +
                    " of the segmentation lies " + in_mm(off) +
-                   " off the line on which the others are evenly spaced.");
+                   " away from its place in a line of evenly spaced frames.");
   }
 }
 
@@ -127,15 +127,14 @@ SegmentKind kind_of(const DataSet& data) {
   if (type == "FRACTIONAL") return SegmentKind::kFractional;
   if (type == "LABELMAP") return SegmentKind::kLabelMap;
   throw_unusable("The DICOM segmentation is " + in_quotes(type) +
-                 ", which is unknown; binary and fractional ones and label maps are read.");
+                 ", which is unknown. BINARY, FRACTIONAL and LABELMAP are supported.");
 }
 
 std::uint32_t maximum_of(const DataSet& data) {
   const auto maximum = data.unsigned_number(kMaximumFractionalValue);
   if (maximum && *maximum > 0 && *maximum <= 0xFF) return *maximum;
   throw_unusable(
-      "The fractional DICOM segmentation does not tell the largest value that its "
-      "samples may have " +
+      "The fractional DICOM segmentation does not declare the largest value of its samples " +
       tag_name(kMaximumFractionalValue) + ".");
 }
 
@@ -243,8 +242,8 @@ std::uint32_t segment_of(const DataSet& data, std::uint32_t frame) {
                           .place(kSegmentIdentificationSequence)
                           .unsigned_number(kReferencedSegmentNumber);
   if (number && *number > 0 && *number <= 0xFFFF) return *number;
-  throw_unusable("The DICOM segmentation does not tell which segment its frame " +
-                 std::to_string(frame + 1) + " shows " + tag_name(kReferencedSegmentNumber) + ".");
+  throw_unusable("The DICOM segmentation does not declare the segment of its frame " +
+                 std::to_string(frame + 1) + ' ' + tag_name(kReferencedSegmentNumber) + ".");
 }
 
 std::string segment_name(const Image& image, std::uint64_t number) {
@@ -307,9 +306,9 @@ std::optional<Note> note_on_shares(const Stack& stack) {
   const Segmentation& segmentation = segmentation_of(stack);
   if (segmentation.kind != SegmentKind::kFractional) return std::nullopt;
   return note_of(NoteCode::kFractionalSegments,
-                 "A segment is where its samples are " + to_text(half_of(stack)) +
-                     " or more, half of their maximum" +
-                     (are_shares(stack) ? "; they are kept as they are." : "."));
+                 "A sample belongs to a segment if its value is " + to_text(half_of(stack)) +
+                     " or more, half of the maximum." +
+                     (are_shares(stack) ? " The values are kept unchanged." : ""));
 }
 
 double half_of(const Stack& stack) { return segmentation_of(stack).maximum / 2.0; }

@@ -75,7 +75,7 @@ class HeaderReader {
       : scratch_(std::move(scratch)), most_sample_bytes_(most_sample_bytes) {}
 
   void read(const std::filesystem::path& path) {
-    if (!begins_as_dicom(path)) return ignore(upload_, path, "it is no DICOM file");
+    if (!begins_as_dicom(path)) return ignore(upload_, path, "it is not a DICOM file");
     const DicomFile file(path, scratch_, most_sample_bytes_);
     if (const auto reason = reason_to_ignore(file)) return ignore(upload_, path, *reason);
     Source source = describe_source(path, file);
@@ -182,10 +182,10 @@ Upload read_headers(std::span<const std::filesystem::path> files,
   }
   if (!upload.sources.empty()) return upload;
   if (upload.ignored.size() == 1) {
-    throw_unusable("The upload holds no DICOM image: " + upload.ignored.front().reason + ".");
+    throw_unusable("The upload has no DICOM image: " + upload.ignored.front().reason + ".");
   }
   throw_unusable("None of the upload's " + std::to_string(files.size()) +
-                 " files is a DICOM image that a volume can be made of.");
+                 " files is a DICOM image that can be part of a volume.");
 }
 
 std::vector<Source> choose_series(std::vector<Source> sources, const std::string& uid) {
@@ -193,12 +193,13 @@ std::vector<Source> choose_series(std::vector<Source> sources, const std::string
   if (!uid.empty()) {
     std::erase_if(sources, [&](const Source& source) { return source.series_uid != uid; });
     if (sources.empty()) {
-      throw_choice(
-          "The upload has no series " + in_quotes(uid) + ", but: " + joined_titles(all) + '.', all);
+      throw_choice("The upload has no series " + in_quotes(uid) +
+                       ". Choose one with series=UID: " + joined_titles(all) + '.',
+                   all);
     }
   } else if (all.size() > 1) {
     throw_choice("The upload holds " + std::to_string(all.size()) +
-                     " series; choose one with series=UID: " + joined_titles(all) + '.',
+                     " series. Choose one with series=UID: " + joined_titles(all) + '.',
                  all);
   }
   for (const Source& source : sources) {

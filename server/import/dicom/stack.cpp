@@ -43,10 +43,10 @@ void refuse_shared_positions(std::span<const Placed> placed, bool from_end) {
     throw_unusable("The series holds " + std::to_string(placed.size() / positions) + " slices at " +
                    (positions == 1 ? "its only position"
                                    : "each of its " + std::to_string(positions) + " positions") +
-                   ", and nothing tells which of them make one volume.");
+                   ". Nothing shows which slices belong to the same volume.");
   }
   throw_unusable("Slice " + number_of(place, positions, from_end) + " of " +
-                 std::to_string(positions) + " is there more than once.");
+                 std::to_string(positions) + " occurs more than once.");
 }
 
 double median_gap(std::span<const Placed> placed) {
@@ -99,7 +99,7 @@ void refuse_gaps(std::span<const Placed> placed, bool from_end) {
     throw_unusable("The slices are unevenly spaced: slices " + std::to_string(one) + " and " +
                    std::to_string(other) + " of " + std::to_string(count) + " are " +
                    in_mm(placed[uneven].along - placed[uneven - 1].along) +
-                   " apart, where others are " + in_mm(usual) + " apart.");
+                   " apart, but others are " + in_mm(usual) + " apart.");
   }
   if (!missing.empty()) {
     throw_unusable("The series is incomplete: " +
@@ -117,7 +117,7 @@ void refuse_crooked(std::span<const Placed> placed, const Vector3& step, bool fr
     if (length(off) <= tolerance) continue;
     throw_unusable("Slice " + number_of(i, placed.size(), from_end) + " of " +
                    std::to_string(placed.size()) + " lies " + in_mm(length(off)) +
-                   " off the line on which the others are evenly spaced.");
+                   " away from its place in a line of evenly spaced slices.");
   }
 }
 
@@ -130,7 +130,7 @@ std::string Stack::name(std::size_t place) const {
 
 Stack make_stack(std::vector<Slice> slices) {
   if (slices.size() < 2) {
-    throw_unusable("The upload is a single slice, and a volume needs at least two.");
+    throw_unusable("The upload is a single slice. A volume needs at least two.");
   }
   refuse_mixtures(slices);
   const std::vector<Placed> placed = placed_along_normal(slices);

@@ -195,7 +195,7 @@ std::string title_of(std::span<const Criterion* const> criteria, std::size_t sli
   std::string title;
   for (const Criterion* criterion : criteria) {
     const std::string& value = criterion->values[criterion->ranks[slice]];
-    title += criterion->name + ' ' + (value.empty() ? "not told" : value) + ", ";
+    title += criterion->name + ' ' + (value.empty() ? "unknown" : value) + ", ";
   }
   return title + count_of(slices, "slice");
 }

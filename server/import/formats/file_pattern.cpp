@@ -15,7 +15,7 @@ constexpr std::size_t kWidestNumber = 9;
 
 [[noreturn]] void throw_no_pattern(std::string_view said) {
   throw_unusable("The header names its data files by " + in_quotes(said) +
-                 ", which is no pattern of one whole number with its first and last value.");
+                 ", which is not a pattern such as \"slice%03d.raw 1 93 1\".");
 }
 
 // The text around the number, and how its digits are written.
@@ -67,7 +67,8 @@ std::vector<std::string> expand_file_pattern(std::string_view said) {
   if (first < 0 || last < 0 || step == 0 || (last - first) * step < 0) throw_no_pattern(said);
   const std::int64_t count = (last - first) / step + 1;
   if (count > kMostFiles) {
-    throw_unusable("The header names " + std::to_string(count) + " data files.");
+    throw_unusable("The header names " + std::to_string(count) + " data files. At most " +
+                   std::to_string(kMostFiles) + " are supported.");
   }
   std::vector<std::string> names;
   for (std::int64_t at = 0; at < count; ++at) names.push_back(pattern->name(first + at * step));

@@ -40,12 +40,13 @@ bool is_header_line(std::string_view line) {
 void add_field(Fields& fields, std::string_view line) {
   const std::size_t equals = line.find('=');
   if (equals == std::string_view::npos) {
-    throw_unusable("The MetaImage header has a line that is no field: " + in_quotes(line) + ".");
+    throw_unusable("The MetaImage header has a line that is not a field: " + in_quotes(line) + ".");
   }
   const std::string key(trimmed(line.substr(0, equals)));
   const std::string_view value = trimmed(line.substr(equals + 1));
   if (has_control_characters(value)) {
-    throw_unusable("The MetaImage header's field " + in_quotes(key) + " holds control characters.");
+    throw_unusable("The MetaImage header's field " + in_quotes(key) +
+                   " contains control characters.");
   }
   if (!fields.emplace(key, value).second) {
     throw_unusable("The MetaImage header has the field " + in_quotes(key) + " twice.");
@@ -66,7 +67,7 @@ Header read_header(const std::string& text) {
       return header;
     }
   }
-  throw_unusable("The MetaImage header does not end: it has no field \"ElementDataFile\".");
+  throw_unusable("The MetaImage header has no end: the field \"ElementDataFile\" is missing.");
 }
 
 std::string_view optional(const Fields& fields, std::string_view name) {
@@ -76,8 +77,7 @@ std::string_view optional(const Fields& fields, std::string_view name) {
 
 std::string_view required(const Fields& fields, std::string_view name) {
   const std::string_view value = optional(fields, name);
-  if (value.empty())
-    throw_unusable("The MetaImage header lacks the field " + in_quotes(name) + ".");
+  if (value.empty()) throw_unusable("The MetaImage header has no field " + in_quotes(name) + ".");
   return value;
 }
 
@@ -86,7 +86,7 @@ bool flag(const Fields& fields, std::string_view name, bool otherwise) {
   if (value.empty()) return otherwise;
   if (value == "true" || value == "1") return true;
   if (value == "false" || value == "0") return false;
-  throw_unusable("The MetaImage header's " + in_quotes(name) + " is neither True nor False.");
+  throw_unusable("The MetaImage header's " + in_quotes(name) + " is not True or False.");
 }
 
 bool is_detached(const Fields& fields) { return lower(optional(fields, kLastKey)) != "local"; }
@@ -106,7 +106,8 @@ Skip data_skip(const Fields& fields) {
   if (text.empty()) return 0;
   const auto bytes = parse_int64(text);
   if (!bytes || *bytes < -1) {
-    throw_unusable("The MetaImage header's HeaderSize is " + in_quotes(text) + ".");
+    throw_unusable("The MetaImage header's \"HeaderSize\" is " + in_quotes(text) +
+                   ", not a number of bytes or -1.");
   }
   if (*bytes < 0) return std::nullopt;
   return static_cast<std::uint64_t>(*bytes);
@@ -118,12 +119,13 @@ std::vector<std::uint64_t> sizes_of(const Fields& fields) {
   std::vector<std::uint64_t> sizes;
   for (const std::string_view word : words(required(fields, "DimSize"))) {
     const auto size = parse_uint64(word);
-    if (!size) throw_unusable("The MetaImage header's size " + in_quotes(word) + " is no number.");
+    if (!size)
+      throw_unusable("The MetaImage header's size " + in_quotes(word) + " is not a number.");
     sizes.push_back(*size);
   }
   if (!count || *count < 1 || *count > kMostAxes || *count != sizes.size()) {
-    throw_unusable("The MetaImage header's NDims " + in_quotes(required(fields, "NDims")) +
-                   " does not fit its " + std::to_string(sizes.size()) + " sizes.");
+    throw_unusable("The MetaImage header's NDims is " + in_quotes(required(fields, "NDims")) +
+                   ", but it has " + std::to_string(sizes.size()) + " sizes.");
   }
   return sizes;
 }
@@ -147,14 +149,14 @@ StoredType type_of(const Fields& fields) {
     if (row.name == name) return row.type;
   }
   throw_unusable("The MetaImage header's ElementType " + in_quotes(name) +
-                 " is not one of plain numbers.");
+                 " is not supported. Samples must be single numbers.");
 }
 
 void check_samples_are_plain(const Fields& fields) {
   const std::string_view channels = optional(fields, "ElementNumberOfChannels");
   if (!channels.empty() && parse_uint64(channels) != 1) {
     throw_unusable("Each sample has " + in_quotes(channels) +
-                   " channels, where plain numbers are needed.");
+                   " channels. Samples must be single numbers.");
   }
 }
 
@@ -165,13 +167,13 @@ std::optional<Rescale> rescale_of(const Fields& fields) {
     if (text.empty()) return otherwise;
     const auto value = parse_double(text);
     if (!value || !std::isfinite(*value)) {
-      throw_unusable("The MetaImage header's " + in_quotes(name) + " is no finite number.");
+      throw_unusable("The MetaImage header's " + in_quotes(name) + " is not a finite number.");
     }
     return *value;
   };
   const Rescale rescale = {number("ElementToIntensityFunctionSlope", 1),
                            number("ElementToIntensityFunctionOffset", 0)};
-  if (rescale.slope == 0) throw_unusable("The MetaImage header's slope of its samples is 0.");
+  if (rescale.slope == 0) throw_unusable("The MetaImage header's slope for its samples is 0.");
   if (rescale.slope == 1 && rescale.intercept == 0) return std::nullopt;
   return rescale;
 }
@@ -184,7 +186,7 @@ Encoding encoding_of(const Fields& fields) {
   const bool compressed = flag(fields, "CompressedData", false);
   if (flag(fields, "BinaryData", true)) return compressed ? Encoding::kDeflate : Encoding::kRaw;
   if (compressed)
-    throw_unusable("The MetaImage header contradicts itself: text that is compressed.");
+    throw_unusable("The MetaImage header contradicts itself: its samples are text and compressed.");
   return Encoding::kText;
 }
 
@@ -193,16 +195,16 @@ CompressedRange payload_of(const InputFile& file, const Header& header,
   CompressedRange payload{header.bytes, file.size() - header.bytes};
   const std::string_view skip = optional(header.fields, "HeaderSize");
   if (!skip.empty() && parse_int64(skip) != 0) {
-    throw_unusable(
-        "The MetaImage header has a HeaderSize, which only samples in another file can.");
+    throw_unusable("The MetaImage header has a HeaderSize, but its samples are in the same file.");
   }
   const std::string_view size = optional(header.fields, "CompressedDataSize");
   if (size.empty() || volume.encoding != Encoding::kDeflate) return payload;
   const auto bytes = parse_uint64(size);
-  if (!bytes) throw_unusable("The MetaImage header's CompressedDataSize is no number.");
+  if (!bytes) throw_unusable("The MetaImage header's \"CompressedDataSize\" is not a number.");
   if (*bytes > payload.bytes) {
-    throw_unusable("The file is truncated: its header tells " + std::to_string(*bytes) +
-                   " bytes of compressed data, and " + std::to_string(payload.bytes) + " follow.");
+    throw_unusable("The file is truncated: its header declares " + std::to_string(*bytes) +
+                   " bytes of compressed data, but the file has " + std::to_string(payload.bytes) +
+                   ".");
   }
   payload.bytes = *bytes;
   return payload;
@@ -230,7 +232,7 @@ std::string_view one_of(const Fields& fields, std::initializer_list<std::string_
     if (value.empty()) continue;
     if (!result.empty() && words(result) != words(value)) {
       throw_unusable("The MetaImage header contradicts itself: " + in_quotes(name) +
-                     " is not what another field tells.");
+                     " differs from another field with the same meaning.");
     }
     result = value;
   }
@@ -323,9 +325,10 @@ SourceVolume samples_of(const Fields& fields, const std::vector<std::uint64_t>& 
   volume.layout.big_endian = is_big_endian(fields);
   volume.layout.rescale = rescale_of(fields);
   if (volume.layout.rescale) {
-    volume.notes.push_back(note_of(NoteCode::kValuesRescaled,
-                                   "The slope and offset of the MetaImage header's samples were "
-                                   "applied; programs that pass over them show other values."));
+    volume.notes.push_back(
+        note_of(NoteCode::kValuesRescaled,
+                "The samples were changed by the slope and offset of the MetaImage header. "
+                "Programs that ignore these show other values."));
   }
   choose_volume(volumes_beyond(sizes), difference_of(fields, sizes), options, volume);
   return volume;

@@ -17,8 +17,8 @@ namespace {
 
 std::vector<std::uint64_t> sizes_of(const NiftiHeader& header) {
   if (header.dim[0] < 1 || header.dim[0] > 7) {
-    throw_unusable("The NIfTI header tells " + std::to_string(header.dim[0]) +
-                   " dimensions, where 1 to 7 are possible.");
+    throw_unusable("The NIfTI header declares " + std::to_string(header.dim[0]) +
+                   " dimensions. 1 to 7 are possible.");
   }
   std::vector<std::uint64_t> sizes;
   for (std::size_t axis = 1; axis <= static_cast<std::size_t>(header.dim[0]); ++axis) {
@@ -91,14 +91,14 @@ StoredType type_of(const NiftiHeader& header) {
     if (header.bits != 0 && header.bits != bits) {
       throw_unusable("The NIfTI header contradicts itself: its datatype " +
                      std::to_string(header.datatype) + " has " + std::to_string(bits) +
-                     " bits, its bitpix is " + std::to_string(header.bits) + ".");
+                     " bits, but its bitpix is " + std::to_string(header.bits) + ".");
     }
     return row.type;
   }
   for (const Name& other : kOthers) {
     if (other.code != header.datatype) continue;
     throw_unusable(std::string("The samples are ") + other.name +
-                   ", where plain numbers are needed.");
+                   ". Samples must be single numbers.");
   }
   throw_unusable("The NIfTI header's datatype " + std::to_string(header.datatype) + " is unknown.");
 }
@@ -175,7 +175,7 @@ bool is_rotation(const NiftiHeader& header) {
 // The quaternion has length 1 and its real part is never negative, so that part is not stored.
 Placement qform_of(const NiftiHeader& header, const Vector3& spacing) {
   if (!is_rotation(header)) {
-    throw_unusable("The quaternion of the NIfTI header's qform is no rotation.");
+    throw_unusable("The quaternion of the NIfTI header's qform is not a rotation.");
   }
   auto [b, c, d] = header.quaternion;
   const double squares = squares_of(header);
@@ -241,10 +241,11 @@ void note_other_pixdim(const NiftiHeader& header, const Placement& sform, Source
     const double told = header.pixdim[axis + 1];
     const bool agrees = is_length(told) && std::abs(size - told) <= told * kTolerance;
     if (volume.dims[axis] == 1 || agrees) continue;
-    volume.notes.push_back(note_of(NoteCode::kPixdimDiffers,
-                                   "Along " + axis_name(axis) + " a voxel of the NIfTI header is " +
-                                       to_text(told) + " long by its pixdim and " + to_text(size) +
-                                       " by its sform, which was taken."));
+    volume.notes.push_back(
+        note_of(NoteCode::kPixdimDiffers, "The NIfTI header gives two sizes for a voxel along " +
+                                              axis_name(axis) + ": " + to_text(told) +
+                                              " in its pixdim and " + to_text(size) +
+                                              " in its sform. The sform was used."));
     return;
   }
 }
@@ -263,8 +264,8 @@ Placement without_forms(const Vector3& spacing) {
 Placement analyze_placement(const Vector3& spacing, SourceVolume& volume) {
   volume.notes.push_back(
       note_of(NoteCode::kSpaceAssumed,
-              "An Analyze header does not tell how its axes lie in the patient; they were taken to "
-              "run to the left, to the front and up, around the point (0,0,0)."));
+              "An Analyze header does not say how its axes lie in the patient. The axes were "
+              "assumed to run to the left, to the front and up, with (0,0,0) in the middle."));
   Placement placement;
   placement.steps[0][0] = -spacing[0];
   placement.steps[1][1] = spacing[1];
@@ -279,16 +280,18 @@ Placement analyze_placement(const Vector3& spacing, SourceVolume& volume) {
 void note_other_form(const NiftiHeader& header, const Placement& taken, const Placement& other,
                      const std::string& name_of_taken, SourceVolume& volume) {
   constexpr double kVoxels = 0.01;
+  const std::string name_of_other = name_of_taken == "sform" ? "qform" : "sform";
   const double apart = distance_of(taken, other, volume.dims);
   if (apart <= shortest_step(taken) * kVoxels) return;
   std::array<char, 32> millimetres = {};
   std::snprintf(millimetres.data(), millimetres.size(), "%.1f",
                 apart * millimetres_per_unit(header));
-  volume.notes.push_back(note_of(NoteCode::kFormsDiffer,
-                                 std::string("The sform and the qform of the NIfTI header place "
-                                             "samples up to ") +
-                                     millimetres.data() + " mm apart; the " + name_of_taken +
-                                     " was taken."));
+  volume.notes.push_back(
+      note_of(NoteCode::kFormsDiffer, std::string("The sform and qform of the NIfTI header place "
+                                                  "samples up to ") +
+                                          millimetres.data() + " mm apart. The " + name_of_taken +
+                                          " was used. nifti_form=" + name_of_other +
+                                          " selects the " + name_of_other + "."));
 }
 
 Placement placement_of(const NiftiHeader& header, const ImportOptions& options,
@@ -297,8 +300,8 @@ Placement placement_of(const NiftiHeader& header, const ImportOptions& options,
   const bool has_qform = header.qform_code > 0;
   const auto asked = options.nifti_form;
   if (asked && !(*asked == NiftiForm::kSform ? has_sform : has_qform)) {
-    throw_unusable("The header has no " + std::string(to_string(*asked)) +
-                   ", which the request asks for.");
+    throw_unusable("The NIfTI header has no " + std::string(to_string(*asked)) +
+                   ", which nifti_form selects.");
   }
   const bool takes_sform = asked ? *asked == NiftiForm::kSform : has_sform;
   const bool has_sizes =
@@ -341,7 +344,7 @@ std::uint64_t payload_offset(const NiftiHeader& header) {
   if (!(header.vox_offset >= least && header.vox_offset <= kMost) ||
       header.vox_offset != std::floor(header.vox_offset)) {
     throw_unusable("The NIfTI header's vox_offset is " + to_text(header.vox_offset) +
-                   ", which no place in the file can be.");
+                   ", which is not a possible position of the samples.");
   }
   return static_cast<std::uint64_t>(header.vox_offset);
 }
@@ -367,8 +370,9 @@ std::string image_name(const Companions& companions) {
     if (companions.files.contains(stem + suffix)) return stem + suffix;
   }
   throw_unusable(
-      "Its samples are in another file (a pair of .hdr and .img), which did not come with it; send "
-      "both in one ZIP, TAR or folder, or the volume as one .nii.");
+      "The samples of the NIfTI header (.hdr) are in an .img file, which is missing. Send both "
+      "files in one ZIP or "
+      "TAR, or send the volume as one .nii file.");
 }
 
 }  // namespace

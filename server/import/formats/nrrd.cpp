@@ -39,7 +39,7 @@ std::string field_name(std::string_view text) {
 void add_field(Fields& fields, std::string_view line) {
   const std::size_t colon = line.find(':');
   if (colon == std::string_view::npos) {
-    throw_unusable("The NRRD header has a line that is no field: " + in_quotes(line) + ".");
+    throw_unusable("The NRRD header has a line that is not a field: " + in_quotes(line) + ".");
   }
   // "key:=value" is a program's own, whose names may be those of fields.
   if (line.substr(colon).starts_with(":=")) {
@@ -49,7 +49,7 @@ void add_field(Fields& fields, std::string_view line) {
   const std::string name = field_name(line.substr(0, colon));
   const std::string_view value = trimmed(line.substr(colon + 1));
   if (has_control_characters(value)) {
-    throw_unusable("The NRRD header's field " + in_quotes(name) + " holds control characters.");
+    throw_unusable("The NRRD header's field " + in_quotes(name) + " contains control characters.");
   }
   if (!fields.emplace(name, value).second) {
     throw_unusable("The NRRD header has the field " + in_quotes(name) + " twice.");
@@ -82,13 +82,13 @@ Header read_header(const std::string& text) {
     }
     if (!first && !line.starts_with('#')) add_field(header.fields, line);
   }
-  throw_unusable("The NRRD header does not end: no empty line is found after it.");
+  throw_unusable("The NRRD header has no end: the empty line after it is missing.");
 }
 
 const std::string& required(const Fields& fields, std::string_view name) {
   const auto found = fields.find(name);
   if (found == fields.end()) {
-    throw_unusable("The NRRD header lacks the field " + in_quotes(name) + ".");
+    throw_unusable("The NRRD header has no field " + in_quotes(name) + ".");
   }
   return found->second;
 }
@@ -115,7 +115,8 @@ StoredType type_of(const Fields& fields) {
   for (const auto& [type, names] : types) {
     if (std::find(names.begin(), names.end(), name) != names.end()) return type;
   }
-  throw_unusable("The NRRD header's type " + in_quotes(name) + " is not one of plain numbers.");
+  throw_unusable("The NRRD header's type " + in_quotes(name) +
+                 " is not supported. Samples must be single numbers.");
 }
 
 std::vector<std::uint64_t> sizes_of(const Fields& fields) {
@@ -124,12 +125,12 @@ std::vector<std::uint64_t> sizes_of(const Fields& fields) {
   std::vector<std::uint64_t> sizes;
   for (const std::string_view word : words(required(fields, "sizes"))) {
     const auto size = parse_uint64(word);
-    if (!size) throw_unusable("The NRRD header's size " + in_quotes(word) + " is no number.");
+    if (!size) throw_unusable("The NRRD header's size " + in_quotes(word) + " is not a number.");
     sizes.push_back(*size);
   }
   if (!count || *count < 1 || *count > kMostAxes || *count != sizes.size()) {
-    throw_unusable("The NRRD header's dimension " + in_quotes(required(fields, "dimension")) +
-                   " does not fit its " + std::to_string(sizes.size()) + " sizes.");
+    throw_unusable("The NRRD header's dimension is " + in_quotes(required(fields, "dimension")) +
+                   ", but it has " + std::to_string(sizes.size()) + " sizes.");
   }
   return sizes;
 }
@@ -142,7 +143,7 @@ Encoding encoding_of(const Fields& fields) {
   if (name == "hex") return Encoding::kHex;
   if (name == "bzip2" || name == "bz2") return Encoding::kBzip2;
   throw_unusable("The NRRD header's encoding " + in_quotes(name) +
-                 " is not read; raw, gzip, bzip2, ascii and hex are.");
+                 " is not supported. raw, gzip, bzip2, ascii and hex are.");
 }
 
 bool is_big_endian(const Fields& fields, StoredType type, Encoding encoding) {
@@ -151,7 +152,7 @@ bool is_big_endian(const Fields& fields, StoredType type, Encoding encoding) {
   if (name == "big") return true;
   if (!name.empty()) throw_unusable("The NRRD header's endian " + in_quotes(name) + " is unknown.");
   if (bytes_per_sample(type) > 1 && encoding != Encoding::kText) {
-    throw_unusable("The NRRD header lacks the field \"endian\".");
+    throw_unusable("The NRRD header has no field \"endian\".");
   }
   return false;
 }
@@ -160,7 +161,7 @@ std::uint64_t skip_lines(const InputFile& file, std::uint64_t offset, std::uint6
   constexpr std::size_t kPieceBytes = std::size_t{1} << 16;
   while (lines > 0) {
     const std::string piece = file.text(offset, kPieceBytes);
-    if (piece.empty()) throw_unusable("The file ends before the lines that are to be skipped do.");
+    if (piece.empty()) throw_unusable("The file ends within the lines that its header skips.");
     std::size_t begin = 0;
     for (std::size_t end = 0; lines > 0 && end != std::string::npos;) {
       end = piece.find('\n', begin);
@@ -178,7 +179,8 @@ std::int64_t skip_field(const Fields& fields, std::string_view name) {
   if (text.empty()) return 0;
   const auto count = parse_int64(text);
   if (!count || *count < -1) {
-    throw_unusable("The NRRD header's " + in_quotes(name) + " is " + in_quotes(text) + ".");
+    throw_unusable("The NRRD header's " + in_quotes(name) + " is " + in_quotes(text) +
+                   ", not a whole number of -1 or more.");
   }
   return *count;
 }
@@ -192,7 +194,8 @@ Skip byte_skip(const Fields& fields, const SourceVolume& volume) {
   const std::int64_t bytes = skip_field(fields, "byteskip");
   const bool can_end = is_stream(volume) || volume.encoding == Encoding::kRaw;
   if (bytes < 0 && !can_end) {
-    throw_unusable("The NRRD header says that samples in text end with their file.");
+    throw_unusable(
+        "The NRRD header has a \"byteskip\" of -1, which is not possible for samples in text.");
   }
   return bytes < 0 ? Skip() : Skip(static_cast<std::uint64_t>(bytes));
 }
@@ -203,7 +206,7 @@ std::uint64_t payload_offset(const InputFile& file, const Header& header, Source
   const Skip skip = byte_skip(header.fields, volume);
   if (!skip && volume.encoding == Encoding::kRaw) {
     if (file.size() < header.bytes + volume.stored_bytes()) {
-      throw_unusable("The file is too short for its samples to be at its end.");
+      throw_unusable("The file is truncated: it is too short for its samples.");
     }
     return file.size() - volume.stored_bytes();
   }
@@ -236,15 +239,15 @@ bool has_own_header(const std::string& name, const Companions& companions) {
 std::vector<DataFile> data_files(const InputFile& file, const Header& header,
                                  const Companions& companions, SourceVolume& volume) {
   if (skip_field(header.fields, "lineskip") != 0) {
-    throw_unusable("Skipping lines of a data file is not supported.");
+    throw_unusable("The NRRD header skips lines in a data file, which is not supported.");
   }
   const std::vector<std::string> names = data_names(file, header);
   Skip skip = byte_skip(header.fields, volume);
   if (skip == Skip(0) && names.size() == 1 && has_own_header(names.front(), companions)) {
     skip.reset();
     volume.notes.push_back(note_of(NoteCode::kTrailingBytes,
-                                   "The data file has a header of its own, which was left out: the "
-                                   "samples are those at its end."));
+                                   "The data file has a header of its own, which was ignored. The "
+                                   "samples were read from the end of the file."));
   }
   return data_files_of(names, companions, skip, volume);
 }

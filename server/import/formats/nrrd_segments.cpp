@@ -35,7 +35,7 @@ std::int64_t number_of(const NrrdFields& fields, std::size_t segment, std::strin
   if (text.empty()) return otherwise;
   if (const auto number = parse_int64(text)) return *number;
   throw_unusable("The NRRD header's \"Segment" + std::to_string(segment) + '_' + std::string(key) +
-                 "\" is " + in_quotes(text) + ", where a whole number is needed.");
+                 "\" is " + in_quotes(text) + ", not a whole number.");
 }
 
 // Three numbers, 0..1.
@@ -59,8 +59,9 @@ std::vector<Segment> segments_of(const NrrdFields& fields, std::uint64_t layers)
     const std::int64_t usual = at < layers ? static_cast<std::int64_t>(at) : 0;
     const std::int64_t layer = number_of(fields, at, "Layer", usual);
     if (layer < 0 || static_cast<std::uint64_t>(layer) >= layers) {
-      throw_unusable("The NRRD header's segment " + std::to_string(at) + " lies in layer " +
-                     std::to_string(layer) + " of " + std::to_string(layers) + ".");
+      throw_unusable("The NRRD header's segment " + std::to_string(at) + " is in layer " +
+                     std::to_string(layer) + ", but the file has " + std::to_string(layers) +
+                     " layers.");
     }
     segments.push_back({.layer = static_cast<std::uint64_t>(layer),
                         .value = number_of(fields, at, "LabelValue", 1),
@@ -97,7 +98,7 @@ void set_layers(std::vector<Segment> segments, bool is_interleaved, SourceVolume
     const bool keeps = is_label(segment.value) && taken.insert(segment.value).second;
     const std::int64_t label = keeps ? segment.value : next++;
     if (!is_label(label))
-      throw_unusable("The segmentation has more labels than 16 bits tell apart.");
+      throw_unusable("The segmentation needs labels above 65535, the largest that is supported.");
     layers.labels[{segment.layer, segment.value}] = static_cast<std::uint32_t>(label);
     segment.entry.label = label;
     entries.push_back(std::move(segment.entry));

@@ -47,7 +47,8 @@ void check_space_is_told(const NrrdFields& fields, std::size_t component_axes) {
   const std::string origin = lower(value_of(fields, "spaceorigin"));
   if (count_of(directions, "none") > component_axes || count_of(spacings, "nan") > component_axes ||
       count_of(directions, "nan") > component_axes * 3 || count_of(origin, "nan") > 0) {
-    throw_unusable("The NRRD header leaves open how its samples are spaced (none or nan).");
+    throw_unusable(
+        "The NRRD header does not define how its samples are spaced: it has \"none\" or \"nan\".");
   }
 }
 
@@ -77,7 +78,7 @@ std::optional<Space> space_of(const NrrdFields& fields) {
   }
   if (name.starts_with("3d-left-handed")) {
     throw_unusable("The NRRD header's space " + in_quotes(name) +
-                   " is left-handed, and nothing tells how it lies in the patient.");
+                   " is left-handed. Its directions in the patient are unknown.");
   }
   throw_unusable("The NRRD header's space " + in_quotes(name) +
                  " is unknown or has more than three dimensions.");
@@ -144,7 +145,7 @@ void set_directions(std::vector<Axis>& axes, const NrrdFields& fields, std::size
   const std::string_view value = value_of(fields, "spacedirections");
   if (value.empty()) return;
   if (dimension == 0) {
-    throw_unusable("The NRRD header has directions, and no space in which they lie.");
+    throw_unusable("The NRRD header has space directions, but no space.");
   }
   std::string_view rest = value;
   for (Axis& axis : axes) {
@@ -153,7 +154,8 @@ void set_directions(std::vector<Axis>& axes, const NrrdFields& fields, std::size
     axis.direction = *direction;
     if (axis.has_direction() &&
         (is_known(axis.spacing) || is_known(axis.min) || is_known(axis.max))) {
-      throw_unusable("The NRRD header has both a direction and a spacing, min or max of an axis.");
+      throw_unusable(
+          "The NRRD header has both a direction and a spacing, min or max for the same axis.");
     }
   }
   skip_spaces(rest);
@@ -188,11 +190,11 @@ std::vector<Axis> lattice_axes(const NrrdFields& fields, std::span<const std::ui
   const auto components = std::erase_if(axes, [](const Axis& axis) { return axis.is_component; });
   if (components > 1) {
     throw_unusable("The NRRD header has " + std::to_string(components) +
-                   " axes of components, where one at most can be read.");
+                   " axes of components. At most one is supported.");
   }
   if (dimension != 0 && dimension != axes.size()) {
     throw_unusable("The NRRD header's space has " + std::to_string(dimension) +
-                   " dimensions, and its samples lie on " + std::to_string(axes.size()) + " axes.");
+                   " dimensions, but its samples lie on " + std::to_string(axes.size()) + " axes.");
   }
   return axes;
 }
@@ -208,7 +210,8 @@ double spacing_of_extent(const Axis& axis) {
   const double spacing = (axis.max - axis.min) / static_cast<double>(steps);
   if (steps == 0) return 1;
   if (!std::isfinite(spacing) || !(spacing > 0)) {
-    throw_unusable("The NRRD header's axis mins and maxs make no distance between samples.");
+    throw_unusable(
+        "The NRRD header's axis mins and maxs do not give a positive distance between samples.");
   }
   return spacing;
 }
@@ -216,7 +219,8 @@ double spacing_of_extent(const Axis& axis) {
 void set_step(Geometry& geometry, std::size_t at, const Axis& axis, bool in_space) {
   if (is_known(axis.spacing)) {
     if (in_space) {
-      throw_unusable("The NRRD header has a spacing of an axis, and a space in which it has none.");
+      throw_unusable(
+          "The NRRD header has a space, but an axis with a spacing instead of a direction.");
     }
     geometry.spacing[at] = axis.spacing;
     return;
@@ -244,7 +248,7 @@ void set_space_origin(Geometry& geometry, const NrrdFields& fields, std::size_t 
   const std::string_view value = value_of(fields, "spaceorigin");
   if (value.empty()) return;
   if (dimension == 0) {
-    throw_unusable("The NRRD header has an origin, and no space in which it lies.");
+    throw_unusable("The NRRD header has a space origin, but no space.");
   }
   std::string_view rest = value;
   const auto origin = take_vector(rest, dimension);
@@ -319,13 +323,12 @@ NrrdSizes nrrd_sizes(const NrrdFields& fields, const std::vector<std::uint64_t>&
     if (!is_volume_kind(kind) && !is_lattice_kind(kind)) {
       throw_unusable("Each sample has " + std::to_string(sizes[axis]) +
                      " components (an axis of kind " + in_quotes(kind) +
-                     "), where plain numbers are needed.");
+                     "). Samples must be single numbers.");
     }
     if (!is_at_end || result.volumes > 1) {
       throw_unusable("The NRRD header's axis " + axis_name(axis) + " holds several volumes (kind " +
                      in_quotes(kind) +
-                     "), of which one can be chosen only along the first or the "
-                     "last axis.");
+                     "). Only volumes along the first or the last axis are supported.");
     }
     result.volumes = sizes[axis];
     result.volume_kind = is_volume_kind(kind) ? kind : "axis " + axis_name(axis);
@@ -369,9 +372,9 @@ void place_as_slicer(const NrrdFields& fields, const std::vector<std::uint64_t>&
   turn_into_lps(geometry, {"ras", {-1, -1, 1}});
   notes.push_back(
       note_of(NoteCode::kSpaceAssumed,
-              std::string("The NRRD header's space has four dimensions and no name; it "
-                          "was taken for RAS, as Slicer does") +
-                  (first ? ", with the samples where the segment's extent begins." : ".")));
+              std::string("The NRRD header's space has four dimensions and no name. It "
+                          "was read as RAS, as 3D Slicer does") +
+                  (first ? ". The samples begin where the segment's extent begins." : ".")));
 }
 
 bool is_unnamed_4d(const NrrdFields& fields, std::size_t dimension) {

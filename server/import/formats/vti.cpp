@@ -90,7 +90,8 @@ StoredType type_of(const VtiArray& array) {
   for (const Row& row : kTypes) {
     if (row.name == name) return row.type;
   }
-  throw_unusable("The VTK array's type " + in_quotes(name) + " is not one of plain numbers.");
+  throw_unusable("The VTK array's type " + in_quotes(name) +
+                 " is not supported. Samples must be single numbers.");
 }
 
 // The image's samples: the array that the point data names as its scalars, or the only one.
@@ -100,21 +101,23 @@ const VtiArray& scalars_of(const VtiDocument& document) {
   for (const VtiArray& array : document.arrays) {
     if (!scalars.empty() && attribute_of(array.attributes, "Name") != scalars) continue;
     if (found != nullptr) {
-      throw_unusable("The VTK file has several arrays of point data, and none is its scalars.");
+      throw_unusable(
+          "The VTK file has several arrays of point data, but does not say which one is its "
+          "scalars.");
     }
     found = &array;
   }
   if (found != nullptr) return *found;
-  throw_unusable(scalars.empty()
-                     ? "The VTK file has no point data, which is where samples are."
-                     : "The VTK file has no array " + in_quotes(scalars) + ", its scalars.");
+  throw_unusable(scalars.empty() ? "The VTK file has no point data. Samples must be point data."
+                                 : "The VTK file has no array " + in_quotes(scalars) +
+                                       ", which it names as its scalars.");
 }
 
 void check_components(const VtiArray& array) {
   const std::string_view count = attribute_of(array.attributes, "NumberOfComponents");
   if (count.empty() || parse_uint64(count) == 1) return;
   throw_unusable("Each sample has " + in_quotes(count) +
-                 " components, where plain numbers are needed.");
+                 " components. Samples must be single numbers.");
 }
 
 bool is_big_endian(const VtiDocument& document) {
@@ -148,7 +151,7 @@ void check_text(const InputFile& file, const CompressedRange& text) {
     const std::string piece =
         file.text(text.offset + done, std::min<std::uint64_t>(kPieceBytes, text.bytes - done));
     if (piece.empty() || piece.find_first_of("<&") != std::string::npos) {
-      throw_unusable("The VTK array that holds the samples has something else among them.");
+      throw_unusable("The VTK array of the samples contains other elements.");
     }
     done += piece.size();
   }
@@ -159,7 +162,7 @@ void check_end(const InputFile& file) {
   constexpr std::uint64_t kTailBytes = 256;
   const std::string tail = file.text(file.size() - std::min(kTailBytes, file.size()), kTailBytes);
   if (trimmed(tail).ends_with("</VTKFile>")) return;
-  throw_unusable("The file is truncated: it does not end as VTK files do.");
+  throw_unusable("The file is truncated: the end of the VTK file is missing.");
 }
 
 CompressedRange appended_range(const InputFile& file, const VtiDocument& document,
@@ -169,11 +172,13 @@ CompressedRange appended_range(const InputFile& file, const VtiDocument& documen
   const std::string start = file.text(document.appended_at, kMostSpace);
   const std::size_t mark = start.find_first_not_of(" \t\r\n");
   if (!offset || document.appended_at == 0 || mark == std::string::npos || start[mark] != '_') {
-    throw_unusable("The VTK file's appended data is not where it should begin.");
+    throw_unusable(
+        "The VTK file's appended data cannot be found: the array's offset or the mark \"_\" is "
+        "missing.");
   }
   const std::uint64_t begin = document.appended_at + mark + 1;
   if (*offset > file.size() - begin) {
-    throw_unusable("The file is truncated: it ends before the VTK array that holds the samples.");
+    throw_unusable("The file is truncated: it ends before the VTK array of the samples.");
   }
   return {begin + *offset, file.size() - begin - *offset};
 }
@@ -182,8 +187,8 @@ bool appended_is_base64(const VtiDocument& document) {
   const std::string_view encoding = attribute_of(document.appended, "encoding");
   if (encoding == "base64") return true;
   if (encoding == "raw") return false;
-  throw_unusable("The VTK file's appended data has the encoding " + in_quotes(encoding) +
-                 "; raw and base64 are read.");
+  throw_unusable("The encoding of the VTK file's appended data, " + in_quotes(encoding) +
+                 ", is not supported. raw and base64 are.");
 }
 
 void place_samples(const InputFile& file, const VtiDocument& document, const VtiArray& array,
@@ -222,10 +227,10 @@ SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
   const VtiDocument document = read_vti_document(file);
   if (document.pieces != 1) {
     throw_unusable("The VTK file has " + std::to_string(document.pieces) +
-                   " pieces, where one is needed.");
+                   " pieces. Exactly one is supported.");
   }
   if (!attribute_of(document.image, "TimeValues").empty()) {
-    throw_unusable("The VTK file holds a time series, where one volume is needed.");
+    throw_unusable("The VTK file holds a time series. Only single volumes are supported.");
   }
   const Extent extent = extent_of(document.image, "WholeExtent");
   if (extent_of(document.piece, "Extent") != extent) {

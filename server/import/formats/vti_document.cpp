@@ -26,7 +26,7 @@ class Parser : public XmlHandler {
       try {
         reader_.read(piece, last);
       } catch (const XmlError& error) {
-        throw_unusable("The VTK file is no XML that is read: " + std::string(error.what()) + ".");
+        throw_unusable("The VTK file is not valid XML: " + std::string(error.what()) + ".");
       }
       if (last) break;
       check_progress(next);
@@ -48,7 +48,7 @@ class Parser : public XmlHandler {
     // In others the samples' text could not be read byte by byte.
     const std::string name = lower(encoding);
     if (name == "utf-8" || name == "us-ascii" || name == "iso-8859-1") return;
-    throw_unusable("The VTK file's encoding " + in_quotes(name) + " is not read.");
+    throw_unusable("The VTK file's encoding " + in_quotes(name) + " is not supported.");
   }
 
   void start_element(std::string_view name, const XmlAttributes& pairs) override {
@@ -95,7 +95,7 @@ class Parser : public XmlHandler {
   void add_array(VtiAttributes attributes) {
     constexpr std::size_t kMostArrays = 1000;
     if (document_.arrays.size() == kMostArrays) {
-      throw_unusable("The VTK file has more than a thousand arrays.");
+      throw_unusable("The VTK file has more than the 1000 arrays that are supported.");
     }
     document_.arrays.push_back({std::move(attributes), {reader_.end(), 0}});
   }
@@ -128,7 +128,7 @@ VtiDocument read_vti_document(const InputFile& file) {
 
 VtiAttributes read_vti_image(const InputFile& beginning) {
   VtiAttributes image = Parser(beginning, Parser::Until::kImage).parse().image;
-  if (image.empty()) throw_unusable("The VTK file does not begin with an image's extent.");
+  if (image.empty()) throw_unusable("The VTK file does not begin with the extent of an image.");
   return image;
 }
 

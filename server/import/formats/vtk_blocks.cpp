@@ -30,13 +30,13 @@ std::uint64_t expand_xz(std::span<const std::byte> stored, std::span<std::byte> 
 std::vector<std::byte> expanded_block(VtkCompression compression, std::span<const std::byte> stored,
                                       std::uint64_t bytes) {
   if (bytes > kLargestVtkBlock || stored.size() > 2 * kLargestVtkBlock) {
-    volume::throw_unusable("A compressed block of the VTK array is larger than it can be.");
+    volume::throw_unusable("A compressed block of the VTK array is too large.");
   }
   std::vector<std::byte> block(bytes);
   const std::uint64_t found =
       compression == VtkCompression::kLz4 ? expand_lz4(stored, block) : expand_xz(stored, block);
   if (found != bytes) {
-    volume::throw_unusable("A compressed block of the VTK array is damaged or has a wrong size.");
+    volume::throw_unusable("A compressed block of the VTK array is damaged or has the wrong size.");
   }
   return block;
 }

@@ -15,12 +15,12 @@ namespace {
 constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
 
 [[noreturn]] void throw_short() {
-  throw_unusable("The file is truncated: the VTK array that holds the samples ends early.");
+  throw_unusable("The file is truncated: the VTK array of the samples ends too early.");
 }
 
 [[noreturn]] void throw_contradiction(std::uint64_t expected, std::uint64_t found) {
-  throw_unusable("The VTK file contradicts itself: its extent makes " + std::to_string(expected) +
-                 " bytes of samples, and its array tells " + std::to_string(found) + ".");
+  throw_unusable("The VTK file contradicts itself: its extent needs " + std::to_string(expected) +
+                 " bytes of samples, but its array declares " + std::to_string(found) + ".");
 }
 
 std::optional<unsigned> base64_digit(char letter) {
@@ -67,7 +67,7 @@ class Base64 {
       } else if (digit && padding == 0) {
         digits[at] = *digit;
       } else {
-        throw_unusable("The VTK array that holds the samples is not base64.");
+        throw_unusable("The VTK array of the samples is not base64.");
       }
     }
     const unsigned bits = digits[0] << 18 | digits[1] << 12 | digits[2] << 6 | digits[3];
@@ -135,10 +135,11 @@ std::size_t block_count(std::span<const std::byte> counts, std::uint64_t expecte
   const std::uint64_t bytes = count_at(counts, 1, encoding);
   const std::uint64_t last = count_at(counts, 2, encoding);
   if (count == 0 || count > kMostBlocks || bytes == 0 || bytes > kLargestBlock || last > bytes) {
-    throw_unusable("The VTK array's counts of compressed blocks are not believable.");
+    throw_unusable("The VTK array's counts of compressed blocks are not plausible.");
   }
   if (count - 1 > expected / bytes) {
-    throw_unusable("The VTK array tells more samples than its extent makes.");
+    throw_unusable(
+        "The VTK file contradicts itself: its array declares more samples than its extent has.");
   }
   const std::uint64_t total = (count - 1) * bytes + (last == 0 ? bytes : last);
   if (total != expected) throw_contradiction(expected, total);
@@ -156,7 +157,7 @@ Blocks blocks_of(std::span<const std::byte> counts, const VtkEncoding& encoding)
     // Bytes that cannot be compressed grow by little. The bound also keeps the sum from
     // overflowing.
     if (blocks.stored.back() > blocks.bytes + blocks.bytes / 2 + kPieceBytes) {
-      throw_unusable("A compressed block of the VTK array is larger than it can be.");
+      throw_unusable("A compressed block of the VTK array is too large.");
     }
   }
   return blocks;
@@ -203,7 +204,7 @@ class Source {
 std::vector<std::byte> read_block(const InputFile& file, std::uint64_t offset,
                                   std::uint64_t bytes) {
   if (bytes > 2 * kLargestVtkBlock) {
-    throw_unusable("A compressed block of the VTK array is larger than it can be.");
+    throw_unusable("A compressed block of the VTK array is too large.");
   }
   std::vector<std::byte> block(bytes);
   if (file.read(offset, block) != block.size()) throw_short();
@@ -221,7 +222,7 @@ void expand_blocks(const InputFile& file, std::uint64_t offset, const Blocks& bl
     if (compression != VtkCompression::kZlib) {
       target.write(expanded_block(compression, read_block(file, offset, stored), bytes));
     } else if (inflate_range(file, {offset, stored}, bytes, sink) != bytes) {
-      throw_unusable("A compressed block of the VTK array has a wrong size.");
+      throw_unusable("A compressed block of the VTK array has the wrong size.");
     }
     offset += stored;
   }

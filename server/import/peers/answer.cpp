@@ -31,7 +31,7 @@ constexpr const char* kSeriesInstanceUid = "0020000E";
 constexpr const char* kNumberOfSeriesRelatedInstances = "00201209";
 
 [[noreturn]] void throw_unreadable() {
-  throw Error(ErrorCode::kPacsUnreachable, "the answer of the PACS is no DICOM JSON");
+  throw Error(ErrorCode::kPacsUnreachable, "the response of the PACS is not DICOM JSON");
 }
 
 // The first value of an attribute; null where it has none.

@@ -21,7 +21,7 @@ constexpr std::size_t kLongestHead = 64 * 1024;  // of a part
 constexpr std::size_t kLongestBoundary = 70;
 
 [[noreturn]] void throw_cut() {
-  throw Error(ErrorCode::kSeriesIncomplete, "the answer of the PACS ends before its last part");
+  throw Error(ErrorCode::kSeriesIncomplete, "the response of the PACS ends before its last part");
 }
 
 // The file's bytes in order, of which some are kept until they have been looked at.
@@ -99,7 +99,7 @@ void skip_head(Window& window) {
     bytes += line;
     if (line == 0) return;
     if (bytes > kLongestHead) {
-      throw Error(ErrorCode::kSeriesIncomplete, "a part of the PACS's answer has no content");
+      throw Error(ErrorCode::kSeriesIncomplete, "a part of the PACS's response is empty");
     }
   }
 }
@@ -119,7 +119,7 @@ std::string boundary_of(std::string_view content_type) {
   }
   if (!low.starts_with("multipart/") || value.empty() || value.size() > kLongestBoundary ||
       has_control_characters(value)) {
-    throw Error(ErrorCode::kSeriesIncomplete, "the answer of the PACS is no multipart/related");
+    throw Error(ErrorCode::kSeriesIncomplete, "the response of the PACS is not multipart/related");
   }
   return std::string(value);
 }
@@ -136,8 +136,9 @@ std::vector<std::filesystem::path> unpack_multipart(const std::filesystem::path&
   std::uint64_t bytes = 0;
   while (!is_closing(window)) {
     if (parts.size() == limits.max_parts) {
-      throw Error(ErrorCode::kTooLarge,
-                  "the series has more than " + std::to_string(limits.max_parts) + " objects");
+      throw Error(ErrorCode::kTooLarge, "the series has more than the " +
+                                            std::to_string(limits.max_parts) +
+                                            " objects that are accepted");
     }
     skip_head(window);
     parts.push_back(folder / std::to_string(parts.size() + 1));
@@ -147,7 +148,7 @@ std::vector<std::filesystem::path> unpack_multipart(const std::filesystem::path&
     const bool is_whole = take_until(window, mark, [&](std::string_view text) {
       bytes += text.size();
       if (bytes > limits.max_bytes) {
-        throw Error(ErrorCode::kTooLarge, "the series is more than the " +
+        throw Error(ErrorCode::kTooLarge, "the series has more than the " +
                                               std::to_string(limits.max_bytes) +
                                               " bytes that are accepted");
       }

@@ -30,16 +30,15 @@ std::vector<std::filesystem::path> checked(const std::vector<std::filesystem::pa
     if (data.text(dicom::kStudyInstanceUid) != asked.study ||
         data.text(dicom::kSeriesInstanceUid) != asked.series) {
       throw Error(ErrorCode::kSeriesIncomplete,
-                  "the PACS has sent an object of another series than the one that was asked for");
+                  "the PACS sent an object of another series than the requested one");
     }
     if (instances.emplace(data.text(dicom::kSopInstanceUid)).second) files.push_back(part);
   }
   const std::set<std::string> listed(asked.instances.begin(), asked.instances.end());
   if (instances == listed) return files;
-  throw Error(ErrorCode::kSeriesIncomplete, "the PACS has sent " +
-                                                std::to_string(instances.size()) +
-                                                " objects of the series, and not the " +
-                                                std::to_string(listed.size()) + " that it lists");
+  throw Error(ErrorCode::kSeriesIncomplete, "the PACS sent " + std::to_string(instances.size()) +
+                                                " objects of the series, but lists " +
+                                                std::to_string(listed.size()));
 }
 
 }  // namespace

@@ -115,6 +115,19 @@ TEST(UploadBody, OfAFolderLeavesOutWhatCanBeNoVolume) {
   EXPECT_EQ(files_of_upload(fs::path(folder / ".")).size(), files.sent.size());
 }
 
+// The server reads it beside a label volume.
+TEST(UploadBody, OfAFolderKeepsATableOfLabelNames) {
+  const test::TemporaryFolder folder;
+  test::write_file(folder / "seg.nii", "x");
+  test::write_file(folder / "labels.txt", "# organs\n\n1 liver 255 0 0 0\r\n5\tspleen\n");
+  test::write_file(folder / "steps.txt", "1 Export the series.\nThen send it.\n");
+  test::write_file(folder / "numbers.txt", "0\n1000\n");
+  const FolderFiles files = files_of_folder(fs::path(folder / "."));
+  ASSERT_EQ(files.sent.size(), 2U);
+  EXPECT_EQ(files.sent[0].name, "labels.txt");
+  EXPECT_EQ(files.sent[1].name, "seg.nii");
+}
+
 TEST(UploadBody, OfAFolderWithoutAnyVolumeIsRefused) {
   const test::TemporaryFolder folder;
   test::write_file(folder / "notes.txt", "x");

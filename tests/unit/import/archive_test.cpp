@@ -112,9 +112,9 @@ TEST(Archive, DataMayBeNamedByAPattern) {
   expect_read({{"9.raw", upper.bytes}, {"10.raw", lower.bytes}, {"h.nhdr", nhdr("%d.raw 10 9 -1")}},
               "nrrd");
   expect_refused({lower, {"h.mhd", mhd("head-%02d.raw 8 10 2")}},
-                 HasSubstr("\"head-10.raw\", which did not come with it"));
+                 HasSubstr("\"head-10.raw\", which is missing"));
   expect_refused({lower, upper, between, {"h.mhd", mhd("head-%02d.raw 8 10 1")}},
-                 HasSubstr("has 12 bytes, where the header tells 8"));
+                 HasSubstr("has 12 bytes, but the header declares 8"));
 }
 
 TEST(Archive, PatternsOfOtherThingsAreRefused) {
@@ -139,17 +139,17 @@ TEST(Archive, PatternsOfOtherThingsAreRefused) {
                                  "a%d 1 99999999999",
                                  "a%d 1 2 3 4 5",
                                  "b 1%d 2"}) {
-    expect_refused({{"h.mhd", mhd(said)}, {"a01.raw", kSamples}}, HasSubstr("no pattern"));
+    expect_refused({{"h.mhd", mhd(said)}, {"a01.raw", kSamples}}, HasSubstr("not a pattern"));
   }
   expect_refused({{"h.mhd", mhd("a%d 0 65536")}}, HasSubstr("names 65537 data files"));
-  expect_refused({{"h.mhd", mhd("../a%d.raw 1 2")}}, HasSubstr("in another file"));
+  expect_refused({{"h.mhd", mhd("../a%d.raw 1 2")}}, HasSubstr("outside the header's folder"));
 }
 
 TEST(Archive, DataThatIsNotWhatTheHeaderTellsIsRefused) {
   expect_refused({{"head.mhd", mhd()}, {"head.raw", kSamples + std::string(5000, 'x')}},
                  HasSubstr("5024 bytes"));
   expect_refused({{"head.nhdr", nhdr()}, {"head.raw", kSamples.substr(1)}}, HasSubstr("23 bytes"));
-  expect_refused({{"head.mhd", mhd()}, {"other.raw", kSamples}}, HasSubstr("did not come with it"));
+  expect_refused({{"head.mhd", mhd()}, {"other.raw", kSamples}}, HasSubstr("which is missing"));
   expect_refused({{"head.mhd", mhd("")}, {"head.raw", kSamples}}, HasSubstr(""));
 }
 
@@ -157,9 +157,9 @@ TEST(Archive, HeadersNameOnlyFilesOfTheirFolder) {
   for (const std::string name :
        {"../head.raw", "/etc/passwd", "a/head.raw", "b/../../head.raw", "..", "a\\head.raw"}) {
     expect_refused({{"a/head.mhd", mhd(name)}, {"head.raw", kSamples}, {"a/head.raw", kSamples}},
-                   HasSubstr("in another file"));
+                   HasSubstr("names the data file"));
     expect_refused({{"a/head.nhdr", nhdr(name)}, {"head.raw", kSamples}},
-                   HasSubstr("in another file"));
+                   HasSubstr("names the data file"));
   }
 }
 
@@ -179,7 +179,7 @@ TEST(Archive, AFileWithoutANameIsRefused) {
   EXPECT_TRUE(import_bytes(file).imported());
   const Outcome outcome = import_bytes(without_name(file, "notes"));
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-  EXPECT_THAT(outcome.error, HasSubstr("member 2 is a file without a name"));
+  EXPECT_THAT(outcome.error, HasSubstr("member 2 has no name"));
 }
 
 TEST(Archive, LinksDevicesAndHiddenFilesArePassedOver) {
@@ -268,7 +268,7 @@ TEST(Archive, LargeMembersAreReadWhole) {
 TEST(Archive, MembersAreNoLargerThanTheirHeadersTell) {
   const std::string zeros(std::size_t{3} << 20, '\0');
   const auto refused = [](const std::vector<Member>& members) {
-    expect_refused(members, HasSubstr("that its header lets it have"));
+    expect_refused(members, HasSubstr("that its header allows"));
   };
   refused({{"a.nrrd", nrrd(small_nrrd(), zeros)}});
   refused({{"a.nii", nifti({}, zeros)}});
@@ -320,7 +320,7 @@ TEST(Archive, IsBounded) {
   for (std::size_t at = 0; at < many.size(); ++at) {
     many[at] = {std::to_string(at), "", Kind::kFolder};
   }
-  EXPECT_THAT(import_bytes(tar(many)).error, HasSubstr("more than 20000 members"));
+  EXPECT_THAT(import_bytes(tar(many)).error, HasSubstr("more than the 20000 members"));
 }
 
 // A TAR of a member of which nothing is written but its size (type S of GNU's tar).
@@ -350,7 +350,8 @@ TEST(Archive, SparseFilesAreRefused) {
 TEST(Archive, SomethingBehindATarIsRefused) {
   const std::string file = tar({{"head.nii", nifti({}, kSamples)}});
   EXPECT_TRUE(import_bytes(file + std::string(5120, '\0')).imported());
-  EXPECT_THAT(import_bytes(file + "garbage").error, HasSubstr("follows its end"));
+  EXPECT_THAT(import_bytes(file + "garbage").error,
+              HasSubstr("followed by data that is not part of it"));
 }
 
 TEST(Archive, ASeriesThatIsNotThereIsNotChosen) {

@@ -155,9 +155,9 @@ TEST(ForeignPairs, AreReadWithTheirImage) {
     EXPECT_EQ(outcome.sample_bytes(), kSamples);
     EXPECT_THAT(codes_of(outcome), IsEmpty());
   }
-  EXPECT_THAT(import_bytes(header).error, HasSubstr("a pair of .hdr and .img"));
+  EXPECT_THAT(import_bytes(header).error, HasSubstr("in an .img file, which is missing"));
   EXPECT_THAT(import_bytes(zip({{"a.hdr", header}, {"b.img", kSamples}})).error,
-              HasSubstr("a pair of .hdr and .img"));
+              HasSubstr("in an .img file, which is missing"));
 }
 
 TEST(ForeignPairs, AnalyzeLiesAroundTheMiddleWithANote) {
@@ -190,11 +190,11 @@ TEST(ForeignSamples, ThatAreNoNumbersAreOutside) {
   };
   const Outcome outcome = import_bytes(file(samples));
   ASSERT_THAT(codes_of(outcome), ElementsAre("non-finite-samples"));
-  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("3 of its 24"));
+  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("3 of the 24"));
   EXPECT_EQ(outcome.volume.range[0], -1e12F);
   for (const std::size_t at : {3, 7, 9}) EXPECT_EQ(samples_of<float>(outcome)[at], -1e12F);
   EXPECT_EQ(samples_of<float>(outcome)[4], samples[4]);
-  EXPECT_THAT(import_bytes(file(std::vector<float>(24, kNan))).error, HasSubstr("24 of its 24"));
+  EXPECT_THAT(import_bytes(file(std::vector<float>(24, kNan))).error, HasSubstr("24 of the 24"));
 }
 
 TEST(ForeignSamples, OfFewWholeValuesInRegionsLookLikeLabels) {

@@ -66,7 +66,8 @@ TEST(MetaImage, ReadsText) {
 // What may be unpacked follows from the header, not from what is accepted at most.
 TEST(MetaImage, InsideGzipItMayBeAsLargeAsItsHeaderTells) {
   const std::string bomb = gzip(metaimage(small_metaimage(), std::string(10'000'000, '\0')));
-  EXPECT_THAT(import_bytes(bomb).error, testing::HasSubstr("The compressed file holds more than"));
+  EXPECT_THAT(import_bytes(bomb).error,
+              testing::HasSubstr("The compressed file unpacks to more than"));
 }
 
 TEST(MetaImage, LiesInLps) {
@@ -107,7 +108,8 @@ TEST(MetaImage, GivesLengthsOfDirectionsToTheSpacing) {
 
 TEST(MetaImage, NeverReadsAnotherFile) {
   for (const char* name : {"/etc/passwd", "volume.raw", "LIST", "slice%03d.raw 1 2 1", "Local2"}) {
-    EXPECT_THAT(import_with("ElementDataFile", name).error, HasSubstr("in another file")) << name;
+    EXPECT_THAT(import_with("ElementDataFile", name).error, HasSubstr("names the data file"))
+        << name;
   }
   EXPECT_TRUE(import_with("ElementDataFile", "Local").imported());
 }
@@ -176,7 +178,7 @@ TEST(MetaImage, RefusesHeadersThatContradictThemselves) {
   EXPECT_FALSE(import_with("HeaderSize", "100").imported());
   EXPECT_THAT(import_with("CompressedData", "True").error, HasSubstr("corrupt"));
   EXPECT_THAT(import_bytes("NDims = 3\nNDims = 3\n").error, HasSubstr("twice"));
-  EXPECT_THAT(import_bytes("NDims = 3\nDimSize = 1 1 1\n").error, HasSubstr("does not end"));
+  EXPECT_THAT(import_bytes("NDims = 3\nDimSize = 1 1 1\n").error, HasSubstr("has no end"));
 }
 
 }  // namespace

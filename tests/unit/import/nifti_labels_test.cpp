@@ -113,7 +113,7 @@ TEST(NiftiLabels, AreNotMoreThanSixteenBitsTellApart) {
   std::string labels;
   for (int at = 0; at < 66'000; ++at) labels += "<Label Key=\"" + std::to_string(at) + "\"/>";
   EXPECT_THAT(import_bytes(with_extensions({}, extension(caret(labels), 30, false))).error,
-              HasSubstr("labels, and 65535 are the most"));
+              HasSubstr("labels. At most 65535 are supported"));
 }
 
 }  // namespace

@@ -64,7 +64,7 @@ TEST(NrrdSegments, HaveNamesAndColors) {
                                                          .color = "#ff8000"}));
   // Also where samples do not look as if.
   EXPECT_THAT(codes_of(outcome), Contains("looks-like-labels"));
-  EXPECT_THAT(outcome.volume.notes.back().detail, HasSubstr("2 labels: mesh it with \"labels\""));
+  EXPECT_THAT(outcome.volume.notes.back().detail, HasSubstr("2 labels. Use \"labels\": \"all\""));
 }
 
 TEST(NrrdSegments, OfFractionsAreNoLabels) {
@@ -93,7 +93,7 @@ TEST(NrrdSegments, InLayersMayOverlap) {
               ElementsAre(entry(1, "liver", {1, 3}), entry(2, "tumour", {2, 3})));
   ASSERT_THAT(codes_of(outcome), ElementsAre("overlapping-segments", "looks-like-labels"));
   EXPECT_EQ(outcome.volume.notes[0].detail,
-            "1 sample is of several segments; 1 value stands for their combinations.");
+            "1 sample belongs to several segments. 1 value stands for their combinations.");
   EXPECT_EQ(outcome.volume.range, (std::array<double, 2>{0, 3}));
 
   const Outcome packed = import_bytes(
@@ -187,13 +187,13 @@ TEST(NrrdSegments, WithTooManyCombinationsAreRefused) {
       layered("17 64 64 32", "list domain domain domain", "none (1,0,0) (0,1,0) (0,0,1)"),
       {{"0_Layer", "0"}}, samples));
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-  EXPECT_THAT(outcome.error, HasSubstr("65535 values do not tell them apart"));
+  EXPECT_THAT(outcome.error, HasSubstr("need more than the 65535 values"));
 }
 
 TEST(NrrdSegments, OfNonsenseAreRefused) {
   const std::string samples(16, '\0');
   EXPECT_THAT(import_bytes(with_segments(layers_first(), {{"0_Layer", "2"}}, samples)).error,
-              HasSubstr("segment 0 lies in layer 2 of 2"));
+              HasSubstr("segment 0 is in layer 2, but the file has 2 layers"));
   EXPECT_THAT(import_bytes(with_segments(layers_first(), {{"0_Layer", "x"}}, samples)).error,
               HasSubstr("Segment0_Layer"));
   EXPECT_THAT(import_bytes(with_segments(layers_first(), {{"0_LabelValue", "1.5"}}, samples)).error,

@@ -168,9 +168,9 @@ TEST(Nrrd, RefusesStepsWhoseLengthsCannotBeComputed) {
 
 TEST(Nrrd, RefusesFieldsOfSpaceWithoutOne) {
   Lines lines = with(small_nrrd(), "space", "");
-  EXPECT_THAT(import_nrrd(lines).error, HasSubstr("no space in which they lie"));
+  EXPECT_THAT(import_nrrd(lines).error, HasSubstr("directions, but no space"));
   lines = with(lines, "space directions", "");
-  EXPECT_THAT(import_nrrd(lines).error, HasSubstr("no space in which it lies"));
+  EXPECT_THAT(import_nrrd(lines).error, HasSubstr("origin, but no space"));
   EXPECT_TRUE(import_nrrd(with(lines, "space origin", "")).imported());
 }
 
@@ -197,7 +197,7 @@ TEST(Nrrd, TakesASingleComponentForNone) {
 
 TEST(Nrrd, NeverReadsAnotherFile) {
   for (const char* name : {"data file", "datafile", "Data File", "DATAFILE", "data  file"}) {
-    EXPECT_THAT(import_with(name, "/etc/passwd").error, HasSubstr("in another file")) << name;
+    EXPECT_THAT(import_with(name, "/etc/passwd").error, HasSubstr("names the data file")) << name;
     // What follows a list are names, also where it looks like fields.
     EXPECT_EQ(import_with(name, "LIST").code, ErrorCode::kUnusableVolume) << name;
   }
@@ -230,16 +230,16 @@ TEST(Nrrd, RefusesHeadersThatContradictThemselves) {
   EXPECT_THAT(import_bytes("NRRD0004\nno field\n\n").error, HasSubstr("no field"));
   EXPECT_THAT(import_with("content", "a\rb").error, HasSubstr("control characters"));
   EXPECT_THAT(import_bytes("NRRD0004\ntype: uint8\ntype: uint8\n\n").error, HasSubstr("twice"));
-  EXPECT_THAT(import_bytes("NRRD0004\ntype: uint8\n").error, HasSubstr("does not end"));
+  EXPECT_THAT(import_bytes("NRRD0004\ntype: uint8\n").error, HasSubstr("has no end"));
 }
 
 // What may be unpacked follows from the header, not from what is accepted at most.
 TEST(Nrrd, InsideGzipItMayBeAsLargeAsItsHeaderTells) {
   const std::string bomb = gzip(nrrd(small_nrrd(), std::string(10'000'000, '\0')));
-  EXPECT_THAT(import_bytes(bomb).error, HasSubstr("The compressed file holds more than"));
+  EXPECT_THAT(import_bytes(bomb).error, HasSubstr("The compressed file unpacks to more than"));
   const Lines text = with(small_nrrd(), "encoding", "ascii");
   EXPECT_THAT(import_bytes(gzip(nrrd(text, std::string(10'000'000, ' ')))).error,
-              HasSubstr("The compressed file holds more than"));
+              HasSubstr("The compressed file unpacks to more than"));
   const std::string skipped(100'000, '\n');
   EXPECT_EQ(import_bytes(gzip(nrrd(with(small_nrrd(), "line skip", "100000"),
                                    skipped + std::string(kSmallSamples))))
@@ -254,7 +254,7 @@ TEST(Nrrd, SkipsManyLines) {
                        std::string(lines, '\n') + std::string(kSmallSamples));
   };
   EXPECT_EQ(with_lines(1'000'000).error, "");
-  EXPECT_THAT(with_lines(1000).error, HasSubstr("lines that are to be skipped"));
+  EXPECT_THAT(with_lines(1000).error, HasSubstr("lines that its header skips"));
 }
 
 TEST(Nrrd, FieldsOfManyNumbersAreRefused) {

@@ -49,7 +49,7 @@ TEST(Raw, IsRefusedWithBothSizesWhenTheyDiffer) {
   for (const std::size_t size : {0, 1, 23, 25, 4096}) {
     const Outcome outcome = import_raw_bytes(std::string(size, 'a'), small_description());
     EXPECT_EQ(outcome.code, ErrorCode::kInvalidParameter);
-    EXPECT_THAT(outcome.error, HasSubstr("are 24 bytes"));
+    EXPECT_THAT(outcome.error, HasSubstr("take 24 bytes"));
     EXPECT_THAT(outcome.error, HasSubstr("has " + std::to_string(size)));
   }
 }
@@ -82,7 +82,7 @@ TEST(Raw, NotesTheCountOfSamplesThatAreNotFinite) {
   samples[7] = std::nanf("");
   const Outcome outcome = import_raw_bytes(bytes_of(samples), description);
   ASSERT_EQ(codes_of(outcome), std::vector<std::string>{"non-finite-samples"});
-  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("2 of its 24 samples"));
+  EXPECT_THAT(outcome.volume.notes[0].detail, HasSubstr("2 of the 24 samples"));
   EXPECT_EQ(outcome.volume.range, (std::array<double, 2>{1, 1}));
 }
 

@@ -56,6 +56,7 @@ TEST(Parameters, AreDescribedAsTheyAre) {
   ASSERT_FALSE(description.empty());
   EXPECT_TRUE(with_parameters(description) == description)
       << "openapi.yaml is not what the table says: build the target openapi";
+  EXPECT_NE(description.find(", \"off\","), std::string::npos) << "YAML 1.1 reads off as false";
 }
 
 TEST(Parameters, ADescriptionWithoutItsPlacesIsRefused) {

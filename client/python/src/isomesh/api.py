@@ -30,60 +30,60 @@ Vector = Union['Sequence[float]']
 
 
 class Volume(TypedDict):
-    """A volume that is stored. The sample (i,j,k) lies at origin + direction * diag(spacing) *
-    (i,j,k), in millimetres, in DICOM's patient space (LPS)."""
+    """A stored volume. The sample (i,j,k) lies at origin + direction * diag(spacing) * (i,j,k),
+    in millimetres, in DICOM's patient space (LPS)."""
 
-    #: The SHA-256 of what identifies the volume, its samples and geometry.
+    #: The SHA-256 of the samples and their geometry.
     id: str
-    #: What its owner calls it: the series or file that it came as, until it is renamed. No part of
-    #: the id, in no mesh and in no log. Null where nothing told one.
+    #: The volume's name: at first that of the series or file, until the volume is renamed. It is
+    #: not part of the id, of any mesh or of any log. Null if nothing gave a name.
     name: Optional[str]
-    #: What was uploaded first.
+    #: The format of the first upload.
     format: Literal['raw', 'nifti', 'nrrd', 'metaimage', 'vti', 'dicom']
-    #: Samples along x, y and z.
+    #: The number of samples along x, y and z.
     dims: Sequence[int]
     #: The type of one sample.
     type: SampleType
-    #: Millimetres between samples along each axis; along z from slice to slice, also where slices
-    #: are sheared by a tilted gantry.
+    #: Millimetres between samples along each axis. Along z it is the distance from slice to slice,
+    #: even if a tilted gantry shears the slices.
     spacing: Vector
-    #: Where the first sample lies.
+    #: The position of the first sample.
     origin: Vector
-    #: Row-major; the columns are the unit vectors of x, y and z. They are at right angles but for
-    #: a tilted gantry, which shears z.
+    #: Row-major. The columns are the unit vectors of x, y and z. They are perpendicular, except
+    #: that a tilted gantry shears z.
     direction: Sequence[float]
     #: The smallest and the largest sample.
     range: Sequence[float]
     #: Otsu's threshold.
     suggested_iso: float
-    #: Of all samples.
+    #: The size of all samples in bytes.
     bytes: int
     created: str
-    #: DICOM's name for what made the images, such as CT or MR; null when it is not told.
+    #: DICOM's modality, such as CT or MR. Null if unknown.
     modality: Optional[str]
-    #: Iso-values that suit the modality, as far as they lie within range: for a CT in Hounsfield
-    #: units skin, soft tissue and bone.
+    #: Iso-values for this modality that lie within range. For a CT in Hounsfield units: skin, soft
+    #: tissue and bone.
     presets: Sequence[Preset]
-    #: What the upload holds beside the volume, up to a hundred of them.
+    #: Files of the upload that are not part of the volume, at most 100.
     ignored: Sequence[IgnoredObject]
-    #: What was decided, corrected or left open when the upload was read. The same samples and
-    #: geometry are one volume, whatever they came as: as name, format and ignored, its notes are
-    #: those of the upload that came first. A GLB repeats those that tell how samples or geometry
-    #: came about in asset.extras.notes; a job takes no mesh of an earlier one with other notes.
+    #: Decisions, corrections and open points from reading the upload. The same samples with the
+    #: same geometry are one volume, whatever the format. Its notes, name, format and ignored are
+    #: those of the first upload. A GLB repeats the notes on samples and geometry in
+    #: asset.extras.notes. A job does not reuse a mesh that was made with other notes.
     notes: Sequence[Note]
-    #: Whose volume it is and what it was made from, of a volume that came as DICOM; only for who
-    #: uploaded it, and not in lists of volumes. A text that DICOM does not tell is empty.
+    #: The patient and the origin of a volume from DICOM. Only the uploader sees it, and lists of
+    #: volumes leave it out. A text is empty if DICOM does not give it.
     dicom: NotRequired[DicomIdentity]
 
 
 class UploadedVolumesVolumes(TypedDict):
-    #: Of the archive, as the query member takes it.
+    #: The member of the archive, as the query member takes it.
     member: str
-    #: As if it had come alone: 201, 200 or that of the problem.
+    #: The status as if the member had been uploaded alone: 201, 200 or that of the problem.
     status: int
-    #: Null where it was refused.
+    #: Null if the member was rejected.
     volume: Optional[Volume]
-    #: Why it was refused.
+    #: The reason for the rejection.
     problem: Optional[Problem]
 
 
@@ -92,9 +92,9 @@ class UploadedVolumes(TypedDict):
 
 
 class Note(TypedDict):
-    #: A name that stays, for programs.
+    #: A stable name, for programs.
     code: NoteCode
-    #: What of it is true of this volume, for people.
+    #: What the note means for this volume, for people.
     detail: str
 
 
@@ -110,7 +110,7 @@ class Preset(TypedDict):
 
 
 class IgnoredObject(TypedDict):
-    #: Of the file, without folders.
+    #: The name of the file, without folders.
     name: str
     reason: str
 
@@ -126,8 +126,8 @@ class DicomIdentityEquipment(TypedDict):
 
 
 class DicomIdentity(TypedDict):
-    """Whose volume it is and what it was made from, of a volume that came as DICOM; only for
-    who uploaded it, and not in lists of volumes. A text that DICOM does not tell is empty."""
+    """The patient and the origin of a volume from DICOM. Only the uploader sees it, and lists
+    of volumes leave it out. A text is empty if DICOM does not give it."""
 
     patient_name: str
     patient_id: str
@@ -144,7 +144,7 @@ class DicomIdentity(TypedDict):
     series_description: str
     modality: str
     frame_of_reference_uid: str
-    #: The objects that hold the slices, in the slices' order.
+    #: The objects of the slices, in the order of the slices.
     instances: Sequence[DicomInstance]
     issuer_of_patient_id: str
     patient_identity_removed: str
@@ -153,23 +153,23 @@ class DicomIdentity(TypedDict):
     position_reference_indicator: str
     #: The device that made the images.
     equipment: DicomIdentityEquipment
-    #: What the segments of a segmentation are, by their codes; left out where there are none.
+    #: The coded meanings of the segments. Left out if there are none.
     segments: NotRequired[Sequence[DicomSegment]]
 
 
 class DicomSegment(TypedDict):
-    #: The volume's label that the segment became.
+    #: The label of the segment in the volume.
     label: int
-    #: An entry of a coding scheme; its texts are empty where nothing was coded.
+    #: An entry of a coding scheme. Its texts are empty if nothing was coded.
     category: DicomCode
-    #: An entry of a coding scheme; its texts are empty where nothing was coded.
+    #: An entry of a coding scheme. Its texts are empty if nothing was coded.
     type: DicomCode
-    #: An entry of a coding scheme; its texts are empty where nothing was coded.
+    #: An entry of a coding scheme. Its texts are empty if nothing was coded.
     region: DicomCode
 
 
 class DicomCode(TypedDict):
-    """An entry of a coding scheme; its texts are empty where nothing was coded."""
+    """An entry of a coding scheme. Its texts are empty if nothing was coded."""
 
     value: str
     scheme: str
@@ -183,32 +183,34 @@ class DicomInstance(TypedDict):
 
 class Version(TypedDict):
     version: str
-    #: Whether it knows a PACS, so that it takes orders.
+    #: Whether a PACS is configured, so that orders are accepted.
     orders: bool
-    #: Of what makes meshes. While it stays, the same volume and parameters give the same bytes.
+    #: The version of the mesher. As long as it stays the same, the same volume and parameters give
+    #: the same bytes.
     mesher: str
 
 
 class VolumeList(TypedDict):
     volumes: Sequence[Volume]
-    #: The cursor of the next page; null on the last.
+    #: The cursor of the next page. Null on the last page.
     next: Optional[str]
 
 
 class Histogram(TypedDict):
     #: The volume's id.
     volume: str
-    #: Where the first bin begins and the last one ends, the volume's smallest and largest sample.
+    #: The beginning of the first bin and the end of the last one: the smallest and the largest
+    #: sample of the volume.
     range: Sequence[float]
-    #: The samples in each bin, all of equal width. A sample at an edge counts for the bin above,
-    #: the largest for the last.
+    #: The number of samples in each bin. All bins have the same width. A sample on an edge counts
+    #: for the bin above; the largest counts for the last bin.
     counts: Sequence[int]
 
 
 class VolumeLabels(TypedDict):
     #: The volume's id.
     volume: str
-    #: The value of samples that belong to no label.
+    #: The value of samples without a label.
     background: int
     #: In ascending order.
     labels: Sequence[VolumeLabel]
@@ -217,22 +219,22 @@ class VolumeLabels(TypedDict):
 class VolumeLabel(TypedDict):
     label: int
     voxels: int
-    #: Of so many voxels.
+    #: The volume of these voxels.
     volume_mm3: float
-    #: The smallest index along x, y and z of its voxels.
+    #: The smallest index of its voxels along x, y and z.
     low: Sequence[int]
-    #: The largest.
+    #: The largest index of its voxels along x, y and z.
     high: Sequence[int]
-    #: The smallest and the largest corner (LPS, mm) of the box of these voxels.
+    #: The smallest and the largest corner of the box around these voxels (LPS, mm).
     bounds: Sequence[Sequence[float]]
-    #: As the file calls it; null where it does not.
+    #: The name in the file. Null if there is none.
     name: Optional[str]
-    #: As the file has it; null where it has none.
+    #: The colour in the file. Null if there is none.
     color: Optional[str]
 
 
 class EstimateQueue(TypedDict):
-    """How many jobs there are at the moment, of those that the asker sees."""
+    """The current number of jobs that the client can see."""
 
     queued: int
     running: int
@@ -246,40 +248,39 @@ class EstimateLabels(TypedDict):
 class Estimate(TypedDict):
     #: The volume's id.
     volume: str
-    #: Otsu's threshold where that was asked for; none by labels.
+    #: Otsu's threshold if it was requested. Left out for a job by labels.
     iso: NotRequired[float]
     #: Number of tetrahedra per cell. With 5, every second cell is mirrored; the cell (0,0,0) is
     #: not.
     scheme: Scheme
-    #: Exact, of the surface as it is extracted: before the parameters components and fill_cavities
-    #: drop any, and before it is simplified.
+    #: The exact number for the extracted surface, before components and fill_cavities remove
+    #: anything and before simplification.
     triangles: int
-    #: As exact.
+    #: The exact number for the same surface.
     vertices: int
-    #: About how many are left, where the parameters ask for fewer.
+    #: About how many triangles remain if the parameters request fewer.
     simplified_triangles: NotRequired[int]
-    #: Of each file; exact for stl.
+    #: The size of each file. Exact for stl.
     bytes: Mapping[str, int]
-    #: At the job's peak, beside its mapped volume; an upper estimate.
+    #: The peak memory of the job without its mapped volume. An upper estimate.
     memory_bytes: int
-    #: Whether one job may take that much memory.
+    #: Whether a job may use that much memory.
     fits: bool
-    #: Of the run, without the queue.
+    #: The time of the run, without the queue.
     milliseconds: float
-    #: How many jobs there are at the moment, of those that the asker sees.
+    #: The current number of jobs that the client can see.
     queue: EstimateQueue
-    #: Of a job by labels, how many triangles each label's own surface has; exact.
+    #: For a job by labels: the exact number of triangles of each label's surface.
     labels: NotRequired[Sequence[EstimateLabels]]
 
 
 class Callback(TypedDict):
-    """Whom to tell that the job has ended, whichever way: a POST of the job, as GET gives it.
-    Only addresses that the operator has listed are called. It is signed as the Standard
-    Webhooks specification says (webhook-id, webhook-timestamp, webhook-signature), repeated
-    until it is answered with success, for a day, and may come more than once with the same
-    webhook-id."""
+    """Receives a POST with the job when the job ends, whatever the result. The body is that of
+    GET. Only addresses that the operator has listed are called. The request is signed as in
+    Standard Webhooks (webhook-id, webhook-timestamp, webhook-signature). It is repeated for a
+    day until it succeeds. It may arrive more than once with the same webhook-id."""
 
-    #: http or https, without a user, a password or a fragment.
+    #: An http or https URL without a user, a password or a fragment.
     url: str
 
 
@@ -447,16 +448,16 @@ CompleteJobParameters = Union['JobParameters']
 
 
 class Job(TypedDict):
-    """A job and, once it has succeeded, its mesh."""
+    """A job and, if it succeeded, its mesh."""
 
-    #: A UUID; younger jobs have greater ones.
+    #: A UUID. Newer jobs have greater ids.
     id: str
     state: JobState
-    #: What a job does at the moment, or did last.
+    #: The current stage of a job, or its last one.
     stage: Stage
-    #: Of the whole job.
+    #: The progress of the whole job.
     progress: float
-    #: All of them, with the defaults of those that were left out.
+    #: All parameters. Parameters that the request left out have their defaults.
     parameters: CompleteJobParameters
     #: The volume's id, as in the parameters.
     volume: str
@@ -467,175 +468,176 @@ class Job(TypedDict):
     started: Optional[str]
     #: Null until the job ends.
     finished: Optional[str]
-    #: Milliseconds of each stage; 0 for one that has not ended yet.
+    #: The milliseconds of each stage. 0 for a stage that has not ended.
     timing: Timing
     #: Null unless the job has succeeded.
     mesh: Optional[MeshSummary]
     #: Null unless the job has failed.
     error: Optional[Problem]
-    #: Whether the job took the mesh of an earlier job with the same volume and parameters instead
-    #: of making it again; priority and callback may differ.
+    #: Whether the job used the mesh of an earlier job with the same volume and parameters.
+    #: Priority and callback may differ.
     reused: bool
-    #: What a queued job waits for besides a worker: disk is room for its files, and it is run when
-    #: there is some. Null otherwise.
+    #: What a queued job waits for, other than a worker. disk means that it runs when there is
+    #: space for its files. Otherwise null.
     waiting_for: Optional[Literal['disk']]
 
 
 class JobEvent(TypedDict):
-    """How far a job is."""
+    """The progress of a job."""
 
     state: JobState
-    #: What a job does at the moment, or did last.
+    #: The current stage of a job, or its last one.
     stage: Stage
     progress: float
 
 
 class AnyJobEvent(TypedDict):
-    """How far one of all jobs is."""
+    """The progress of one of all jobs."""
 
-    #: The job's.
+    #: The id of the job.
     id: str
     state: JobState
-    #: What a job does at the moment, or did last.
+    #: The current stage of a job, or its last one.
     stage: Stage
     progress: float
 
 
 class JobList(TypedDict):
     jobs: Sequence[Job]
-    #: The cursor of the next page; null on the last.
+    #: The cursor of the next page. Null on the last page.
     next: Optional[str]
 
 
 class Timing(TypedDict):
-    """Milliseconds of each stage; 0 for one that has not ended yet."""
+    """The milliseconds of each stage. 0 for a stage that has not ended."""
 
-    #: From acceptance to the start.
+    #: From acceptance to start.
     queue: float
-    #: Bringing the samples into memory.
+    #: Loading the samples into memory.
     load: float
     #: Marching tetrahedra.
     extract: float
-    #: All passes.
+    #: All smoothing passes.
     smooth: float
-    #: Where fewer triangles are asked for.
+    #: Simplification, if fewer triangles are requested.
     simplify: float
     #: Writing the files and measuring the mesh.
     encode: float
-    #: Where the error is to be measured.
+    #: Measuring the error, if requested.
     certify: float
-    #: From acceptance to the end.
+    #: From acceptance to end.
     total: float
 
 
 class MeshSummaryDropped(TypedDict):
-    """What the parameters components and fill_cavities took away."""
+    """What components and fill_cavities removed."""
 
     components: int
     triangles: int
 
 
 class MeshSummarySimplified(TypedDict):
-    """Of a job with max_error_mm or triangles."""
+    """Only for a job with max_error_mm or triangles."""
 
     triangles_before: int
-    #: What kept it from going on, the error or the number of triangles.
+    #: What stopped the simplification: the error or the number of triangles.
     bound_by: Literal['error', 'triangles']
 
 
 class MeshSummaryVolumeMm3(TypedDict):
-    """What the surface encloses, before and after smoothing and simplification. An open surface
-    encloses nothing: it is closed by the cone to where the first sample lies, and the number
-    depends on that point and may be negative; see quality.encloses_volume, and the parameter
-    close."""
+    """The volume that the surface encloses, before and after smoothing and simplification. An
+    open surface encloses nothing. It is then closed by a cone to the first sample, so the
+    number depends on that point and may be negative. See quality.encloses_volume and the
+    parameter close."""
 
     extracted: float
     smoothed: float
 
 
 class MeshSummaryDisplacementMm(TypedDict):
-    """How far smoothing moved the vertices from where they were extracted."""
+    """How far smoothing moved the vertices from their extracted positions."""
 
     mean: float
     max: float
 
 
 class MeshSummary(TypedDict):
-    """The mesh in numbers, after smoothing unless named otherwise. By labels: triangles,
-    vertices and areas are those of the walls, each counted once; volumes are what all labels
-    enclose together; pieces, edges and quality are those of the labels' own surfaces, all of
-    them."""
+    """The numbers of the mesh, after smoothing unless stated otherwise. For a job by labels:
+    triangles, vertices and areas count each wall between labels once. Volumes are what all
+    labels enclose together. Connected components, edges and quality cover the surfaces of all
+    labels."""
 
-    #: The value that was used; Otsu's, too. None by labels.
+    #: The iso-value that was used, also for Otsu's. Left out for a job by labels.
     iso: NotRequired[float]
-    #: There is no surface: the iso-value is outside the samples' range, or nothing was left of the
-    #: parts. The files hold no triangle.
+    #: There is no surface: the iso-value is outside the samples' range, or no connected component
+    #: remained. The files have no triangles.
     empty: bool
     triangles: int
     vertices: int
-    #: Edges of one triangle only; they lie on the volume's border. A surface that was closed has
-    #: none.
+    #: Edges that belong to one triangle only. They lie on the volume's border. A surface made with
+    #: close has none.
     boundary_edges: int
-    #: Pieces that do not touch.
+    #: The number of connected components.
     components: int
     #: Vertices - edges + triangles.
     euler: int
-    #: What the parameters components and fill_cavities took away.
+    #: What components and fill_cavities removed.
     dropped: MeshSummaryDropped
-    #: Of a job with max_error_mm or triangles.
+    #: Only for a job with max_error_mm or triangles.
     simplified: NotRequired[MeshSummarySimplified]
-    #: How good the mesh is. All of it is found out on the mesh itself, in each job.
+    #: The quality of the mesh. Each job measures all values on the mesh itself.
     quality: MeshQuality
     area_mm2: float
     #: Before smoothing.
     area_extracted_mm2: float
-    #: What the surface encloses, before and after smoothing and simplification. An open surface
-    #: encloses nothing: it is closed by the cone to where the first sample lies, and the number
-    #: depends on that point and may be negative; see quality.encloses_volume, and the parameter
+    #: The volume that the surface encloses, before and after smoothing and simplification. An open
+    #: surface encloses nothing. It is then closed by a cone to the first sample, so the number
+    #: depends on that point and may be negative. See quality.encloses_volume and the parameter
     #: close.
     volume_mm3: MeshSummaryVolumeMm3
-    #: How far smoothing moved the vertices from where they were extracted.
+    #: How far smoothing moved the vertices from their extracted positions.
     displacement_mm: MeshSummaryDisplacementMm
-    #: The smallest and the largest corner; zero for an empty mesh.
+    #: The smallest and the largest corner. Zero for an empty mesh.
     bounds: Sequence[Vector]
-    #: One for each format that was asked for. By labels those that hold all labels, and a zip of
-    #: the others.
+    #: One entry for each requested format. For a job by labels: the formats that hold all labels,
+    #: and a zip of the others.
     files: Mapping[str, MeshFile]
-    #: Of a job by labels, in ascending order. Lists of jobs leave it out.
+    #: For a job by labels, in ascending order. Lists of jobs leave it out.
     labels: NotRequired[Sequence[LabelSummary]]
-    #: How far the files are from the surface as it was extracted, before it was smoothed; of a job
-    #: with certify. Each file's bytes are decoded as a stranger does, and measured at all vertices
-    #: and the centres of all triangles: exact distances from these points to the other surface's
-    #: triangles, which are found by a grid. Distances are kept in single precision.
+    #: The distance between the files and the extracted surface, before smoothing. Only for a job
+    #: with certify. The bytes of each file are decoded by an independent reader. The distance is
+    #: measured at all vertices and at the centres of all triangles. It is the exact distance from
+    #: each point to the triangles of the other surface. Distances are stored in single precision.
     certificate: NotRequired[MeshCertificate]
 
 
 class MeshCertificateBudgetMm(TypedDict):
-    """How max_error_mm was shared out; the three make it up."""
+    """How max_error_mm was divided among three causes."""
 
-    #: The farthest that it moved a vertex.
+    #: The largest movement of a vertex by smoothing.
     smoothing: float
-    #: The rest.
+    #: The remaining error.
     simplification: float
-    #: The most that rounding the files' coordinates moves a point.
+    #: The largest movement of a point by rounding the coordinates in a file.
     quantisation: float
 
 
 class MeshCertificate(TypedDict):
-    """How far the files are from the surface as it was extracted, before it was smoothed; of a
-    job with certify. Each file's bytes are decoded as a stranger does, and measured at all
-    vertices and the centres of all triangles: exact distances from these points to the other
-    surface's triangles, which are found by a grid. Distances are kept in single precision."""
+    """The distance between the files and the extracted surface, before smoothing. Only for a
+    job with certify. The bytes of each file are decoded by an independent reader. The distance
+    is measured at all vertices and at the centres of all triangles. It is the exact distance
+    from each point to the triangles of the other surface. Distances are stored in single
+    precision."""
 
-    #: Of several files the one that is farthest, which these are the distances of.
+    #: The file with the largest distance. The distances are those of this file.
     file: MeshFormat
-    #: The largest distance, both ways.
+    #: The largest distance in both directions.
     max_mm: float
-    #: From the file to the extracted surface; shows what has been added.
+    #: From the file to the extracted surface. Shows what was added.
     from_mesh: DistanceSummary
-    #: From the extracted surface to the file; shows what has been left out.
+    #: From the extracted surface to the file. Shows what was removed.
     from_extracted: DistanceSummary
-    #: How max_error_mm was shared out; the three make it up.
+    #: How max_error_mm was divided among three causes.
     budget_mm: NotRequired[MeshCertificateBudgetMm]
 
 
@@ -644,21 +646,21 @@ class DistanceSummary(TypedDict):
     max_mm: float
     mean_mm: float
     rms_mm: float
-    #: 99 of 100 points are this near.
+    #: 99 % of the points are at most this far.
     p99_mm: float
-    #: Points in equal bins from 0 to max_mm.
+    #: The number of points in equal bins from 0 to max_mm.
     histogram: Sequence[int]
 
 
 class LabelSummary(TypedDict):
-    """A label's samples and its own surface after smoothing. What two labels share is in
+    """The samples and the smoothed surface of one label. A wall between two labels is part of
     both."""
 
     label: int
     name: Optional[str]
     color: Optional[str]
     voxels: int
-    #: The volume of so many voxels.
+    #: The volume of these voxels.
     voxels_mm3: float
     triangles: int
     vertices: int
@@ -667,84 +669,85 @@ class LabelSummary(TypedDict):
     oriented: bool
     components: int
     area_mm2: float
-    #: What the surface encloses.
+    #: The volume that the surface encloses.
     volume_mm3: float
-    #: Those in the ZIP, one for each format.
+    #: The label's files in the ZIP, one for each format.
     files: Mapping[str, LabelFile]
 
 
 class LabelFile(TypedDict):
     bytes: int
     sha256: str
-    #: Of its first byte in the ZIP.
+    #: The offset of its first byte in the ZIP.
     offset: int
-    #: Where it is downloaded from.
+    #: The address to download it from.
     href: str
 
 
 class MeshQualitySelfIntersections(TypedDict):
-    """Pairs of triangles that intersect beyond the corners and edges that they share, decided
-    exactly. Of a job with certify."""
+    """Pairs of triangles that intersect at more than their shared corners and edges, computed
+    exactly. Only for a job with certify."""
 
     pairs: int
-    #: That intersect any other.
+    #: Triangles that intersect another one.
     triangles: int
-    #: Of the first pairs, in millimetres, LPS.
+    #: The places of the first pairs, in LPS millimetres.
     places: Sequence[Vector]
 
 
 class MeshQuality(TypedDict):
-    """How good the mesh is. All of it is found out on the mesh itself, in each job."""
+    """The quality of the mesh. Each job measures all values on the mesh itself."""
 
     #: No edge belongs to one triangle only.
     closed: bool
-    #: At most two triangles share an edge, and the triangles around a vertex are one fan, open or
-    #: closed.
+    #: At most two triangles share an edge, and the triangles around each vertex are one fan, open
+    #: or closed.
     manifold: bool
-    #: Triangles that share an edge run through it in opposite directions.
+    #: Triangles that share an edge use it in opposite directions.
     oriented: bool
-    #: Pieces that do not touch.
+    #: The number of connected components.
     components: int
-    #: The handles of all pieces together; null for a mesh that is open or no manifold.
+    #: The sum of the handles of all connected components. Null if the mesh is open or not a
+    #: manifold.
     genus: Optional[int]
-    #: Of each triangle twice the radius of its inscribed circle over that of its circumscribed
-    #: one: 1 is equilateral, 0 is flat. Bins of 0.05.
+    #: For each triangle: twice the radius of the inscribed circle divided by the radius of the
+    #: circumscribed circle. 1 is equilateral, 0 is flat. The bins are 0.05 wide.
     aspect_ratio: QualityStages
-    #: The smallest angle of each triangle, at most 60 degrees. Bins of 3 degrees.
+    #: The smallest angle of each triangle, at most 60 degrees. The bins are 3 degrees wide.
     smallest_angle_deg: QualityStages
-    #: Whether the volumes are what the surface encloses: it is closed and oriented. Those of an
-    #: open surface depend on the point that they are summed from.
+    #: Whether the surface is closed and oriented, so that the volumes are those that it encloses.
+    #: Otherwise they depend on the point of reference.
     encloses_volume: bool
-    #: Pairs of triangles that intersect beyond the corners and edges that they share, decided
-    #: exactly. Of a job with certify.
+    #: Pairs of triangles that intersect at more than their shared corners and edges, computed
+    #: exactly. Only for a job with certify.
     self_intersections: NotRequired[MeshQualitySelfIntersections]
 
 
 class QualityStages(TypedDict):
     """Before and after smoothing."""
 
-    #: Over all triangles, or, when they are more than 1 048 576, over some half a million that are
-    #: spread over the mesh; the histogram's sum says how many. 0 when there are none.
+    #: Over all triangles. If there are more than 1 048 576, over about half a million that are
+    #: spread over the mesh; the sum of the histogram is their number. 0 if there are none.
     extracted: Distribution
-    #: Over all triangles, or, when they are more than 1 048 576, over some half a million that are
-    #: spread over the mesh; the histogram's sum says how many. 0 when there are none.
+    #: Over all triangles. If there are more than 1 048 576, over about half a million that are
+    #: spread over the mesh; the sum of the histogram is their number. 0 if there are none.
     smoothed: Distribution
 
 
 class Distribution(TypedDict):
-    """Over all triangles, or, when they are more than 1 048 576, over some half a million that
-    are spread over the mesh; the histogram's sum says how many. 0 when there are none."""
+    """Over all triangles. If there are more than 1 048 576, over about half a million that are
+    spread over the mesh; the sum of the histogram is their number. 0 if there are none."""
 
     mean: float
     min: float
-    #: Measured triangles in equal bins from 0 on; the last bin includes its end.
+    #: The number of measured triangles in equal bins from 0. The last bin includes its end.
     histogram: Sequence[int]
 
 
 class MeshFile(TypedDict):
     bytes: int
     sha256: str
-    #: Where it is downloaded from.
+    #: The address to download it from.
     href: str
 
 
@@ -766,25 +769,25 @@ class OrderRequestSource(TypedDict):
 
 
 class OrderRequestCallback(TypedDict):
-    """As of a job. What is sent tells id, state, rule, job, created, finished and the type of
-    an error: nothing of a patient."""
+    """As for a job. The request holds id, state, rule, job, created, finished and the type of
+    an error. It holds no patient data."""
 
     url: str
 
 
 class OrderRequest(TypedDict):
     source: OrderRequestSource
-    #: The name of a configured rule, which says what is left out here.
+    #: The name of a configured rule. It supplies what is left out here.
     rule: NotRequired[str]
-    #: As in POST /v1/jobs, without volume, priority and callback; formats is [stl] unless it is
-    #: given. Where a rule is named, these members take the place of its own.
+    #: As in POST /v1/jobs, without volume, priority and callback. The default of formats is [stl].
+    #: These members take precedence over those of a rule.
     parameters: NotRequired[Mapping[str, Any]]
-    #: Where the mesh goes; may be empty.
+    #: The destinations of the mesh. May be empty.
     send: NotRequired[Sequence[SendTarget]]
     #: Jobs start in order of priority, then of age.
     priority: NotRequired[Priority]
-    #: As of a job. What is sent tells id, state, rule, job, created, finished and the type of an
-    #: error: nothing of a patient.
+    #: As for a job. The request holds id, state, rule, job, created, finished and the type of an
+    #: error. It holds no patient data.
     callback: NotRequired[OrderRequestCallback]
 
 
@@ -793,32 +796,32 @@ class OrderResult(TypedDict):
 
     pacs: str
     format: str
-    #: Of an order by labels.
+    #: Only for an order by labels.
     label: Optional[int]
     series_uid: str
     sop_instance_uid: str
     bytes: int
-    #: The PACS has said that it stored it and finds it.
+    #: Whether the PACS has confirmed the object and finds it.
     stored: bool
 
 
 class OrderSource(TypedDict):
-    #: A PACS, or dimse:TITLE for what was sent to that title by C-STORE.
+    #: A PACS, or dimse:TITLE for objects that were sent to that AE title by C-STORE.
     pacs: str
     study: str
     series: str
-    #: How many the series has, once it is known to be whole.
+    #: The number of objects of the series, once it is complete.
     instances: Optional[int]
 
 
 class Order(TypedDict):
     id: str
-    #: waiting until the series is there and does not grow, fetching it, meshing in its job,
-    #: sending what that made; succeeded when all is stored and found.
+    #: waiting until the series is there and has stopped growing, fetching the series, meshing in a
+    #: job, sending the result. succeeded when all objects are stored and found.
     state: OrderState
     rule: Optional[str]
     source: OrderSource
-    #: As of a job.
+    #: As for a job.
     parameters: Mapping[str, Any]
     #: Jobs start in order of priority, then of age.
     priority: Priority
@@ -826,19 +829,19 @@ class Order(TypedDict):
     volume: Optional[str]
     job: Optional[str]
     results: Sequence[OrderResult]
-    #: How many have failed.
+    #: The number of failed attempts.
     attempts: int
-    #: When a failed attempt is made again.
+    #: The time of the next attempt after a failed one.
     next_attempt: Optional[str]
     created: str
     finished: Optional[str]
-    #: Why the order failed, or what its last attempt met with.
+    #: The reason why the order, or its last attempt, failed.
     error: Optional[Problem]
 
 
 class OrderList(TypedDict):
     orders: Sequence[Order]
-    #: The cursor of the next page; null on the last.
+    #: The cursor of the next page. Null on the last page.
     next: Optional[str]
 
 
@@ -846,7 +849,7 @@ class PacsListPacs(TypedDict):
     name: str
     last_success: Optional[str]
     last_failure: Optional[str]
-    #: Of that failure, in a word.
+    #: The reason of that failure, in one word.
     reason: Optional[str]
 
 
@@ -860,17 +863,17 @@ class ProblemErrors(TypedDict):
 
 
 class ProblemChoices(TypedDict):
-    #: Of the query.
+    #: The query parameter to add.
     parameter: Literal['series', 'member', 'volume']
     value: str
-    #: What the value stands for, for people.
+    #: A description of the value, for people.
     title: str
 
 
 class Problem(TypedDict):
-    """What went wrong (RFC 9457)."""
+    """Describes what went wrong (RFC 9457)."""
 
-    #: A name that stays, for programs.
+    #: A stable name, for programs.
     type: Literal['urn:isomesh:problem:invalid-parameter', 'urn:isomesh:problem:digest-mismatch', 'urn:isomesh:problem:unauthorized', 'urn:isomesh:problem:forbidden', 'urn:isomesh:problem:not-found', 'urn:isomesh:problem:method-not-allowed', 'urn:isomesh:problem:not-ready', 'urn:isomesh:problem:gone', 'urn:isomesh:problem:length-required', 'urn:isomesh:problem:too-large', 'urn:isomesh:problem:uri-too-long', 'urn:isomesh:problem:unsupported-media', 'urn:isomesh:problem:range-not-satisfiable', 'urn:isomesh:problem:unusable-volume', 'urn:isomesh:problem:key-reused', 'urn:isomesh:problem:too-many-requests', 'urn:isomesh:problem:internal', 'urn:isomesh:problem:unavailable', 'urn:isomesh:problem:out-of-space', 'urn:isomesh:problem:cancelled', 'urn:isomesh:problem:request-timeout', 'urn:isomesh:problem:precondition-failed', 'urn:isomesh:problem:headers-too-large', 'urn:isomesh:problem:pacs-unreachable', 'urn:isomesh:problem:pacs-refused', 'urn:isomesh:problem:series-incomplete']
     #: The type in words.
     title: str
@@ -880,26 +883,26 @@ class Problem(TypedDict):
     detail: str
     #: The path of the request or of the job.
     instance: NotRequired[str]
-    #: The parameters or members that are at fault.
+    #: The parameters or members that are wrong.
     errors: NotRequired[Sequence[ProblemErrors]]
-    #: The code that the query accept takes to have the same request not refused for this reason,
-    #: where a person may overrule it.
+    #: If a user may override the rejection: the code to add to the query accept to have the same
+    #: request accepted.
     overridable: NotRequired[AcceptableNote]
-    #: What can be chosen where the request leaves it open; at most a thousand.
+    #: The possible choices if the request is ambiguous, at most 1000.
     choices: NotRequired[Sequence[ProblemChoices]]
 
 
 class SucceededJob(TypedDict):
     """A job that has succeeded: its mesh is never None."""
 
-    #: A UUID; younger jobs have greater ones.
+    #: A UUID. Newer jobs have greater ids.
     id: str
     state: Literal['succeeded']
-    #: What a job does at the moment, or did last.
+    #: The current stage of a job, or its last one.
     stage: Stage
-    #: Of the whole job.
+    #: The progress of the whole job.
     progress: float
-    #: All of them, with the defaults of those that were left out.
+    #: All parameters. Parameters that the request left out have their defaults.
     parameters: CompleteJobParameters
     #: The volume's id, as in the parameters.
     volume: str
@@ -908,16 +911,16 @@ class SucceededJob(TypedDict):
     created: str
     started: str
     finished: str
-    #: Milliseconds of each stage; 0 for one that has not ended yet.
+    #: The milliseconds of each stage. 0 for a stage that has not ended.
     timing: Timing
     mesh: MeshSummary
     #: Null unless the job has failed.
     error: Optional[Problem]
-    #: Whether the job took the mesh of an earlier job with the same volume and parameters instead
-    #: of making it again; priority and callback may differ.
+    #: Whether the job used the mesh of an earlier job with the same volume and parameters.
+    #: Priority and callback may differ.
     reused: bool
-    #: What a queued job waits for besides a worker: disk is room for its files, and it is run when
-    #: there is some. Null otherwise.
+    #: What a queued job waits for, other than a worker. disk means that it runs when there is
+    #: space for its files. Otherwise null.
     waiting_for: Optional[Literal['disk']]
 
 
@@ -1058,11 +1061,10 @@ class JobOptions(TypedDict, total=False):
         themselves.
 
     callback
-        Whom to tell that the job has ended, whichever way: a POST of the job, as GET gives it.
-        Only addresses that the operator has listed are called. It is signed as the Standard
-        Webhooks specification says (webhook-id, webhook-timestamp, webhook-signature), repeated
-        until it is answered with success, for a day, and may come more than once with the same
-        webhook-id.
+        Receives a POST with the job when the job ends, whatever the result. The body is that of
+        GET. Only addresses that the operator has listed are called. The request is signed as in
+        Standard Webhooks (webhook-id, webhook-timestamp, webhook-signature). It is repeated for
+        a day until it succeeds. It may arrive more than once with the same webhook-id.
     """
 
     iso: Iso

@@ -79,17 +79,17 @@ TEST(DicomDose, WithoutPlaceOrScaleIsRefused) {
   const auto error_with = [](const std::string& offsets) {
     return import_dose(dose(dose_series(), offsets)).error;
   };
-  EXPECT_THAT(error_with("0\\2.5"), HasSubstr("3 planes, and 2 offsets"));
-  EXPECT_THAT(error_with(""), HasSubstr("3 planes, and 0 offsets"));
-  EXPECT_THAT(error_with("7\\9.5\\12"), HasSubstr("begin neither with 0"));
+  EXPECT_THAT(error_with("0\\2.5"), HasSubstr("3 planes, but 2 offsets"));
+  EXPECT_THAT(error_with(""), HasSubstr("3 planes, but 0 offsets"));
+  EXPECT_THAT(error_with("7\\9.5\\12"), HasSubstr("do not begin with 0"));
   EXPECT_THAT(error_with("0\\2.5\\9"), HasSubstr("slice"));
   DicomSeries oblique = dose_series();
   oblique.along_column = {0, 0.6, 0.8};
-  EXPECT_THAT(import_dose(dose(oblique, "30\\32.5\\35")).error, HasSubstr("begin neither with 0"));
+  EXPECT_THAT(import_dose(dose(oblique, "30\\32.5\\35")).error, HasSubstr("do not begin with 0"));
   for (const char* scaling : {"", "0", "-1", "x", "1\\2"}) {
     DicomObject object = dose(dose_series(), "0\\2.5\\5");
     object.text(kDoseGridScaling, "DS", scaling);
-    EXPECT_THAT(import_dose(object).error, HasSubstr("not one positive number")) << scaling;
+    EXPECT_THAT(import_dose(object).error, HasSubstr("not a positive number")) << scaling;
   }
 }
 

@@ -72,7 +72,7 @@ TEST(DicomFrames, ThatAreMissingOrDoubledAreNamed) {
   };
   EXPECT_THAT(error_of({0, 1, 2, 4, 5}), HasSubstr("slice 4 of 6 is missing"));
   EXPECT_THAT(error_of({5, 4, 2, 1, 0}), HasSubstr("slice 3 of 6 is missing"));
-  EXPECT_THAT(error_of({0, 1, 2, 3, 3, 4, 5}), HasSubstr("Slice 4 of 6 is there more than once"));
+  EXPECT_THAT(error_of({0, 1, 2, 3, 3, 4, 5}), HasSubstr("Slice 4 of 6 occurs more than once"));
   EXPECT_THAT(error_of({0, 1, 0, 2, 1, 2}), HasSubstr("2 slices at each of its 3 positions"));
   EXPECT_THAT(error_of({3}), HasSubstr("single slice"));
 }
@@ -82,7 +82,7 @@ TEST(DicomFrames, MustAllBeDescribed) {
   DicomObject object = series.enhanced({0, 1, 2, 3, 4, 5});
   object.text(kNumberOfFrames, "IS", "5");
   EXPECT_THAT(import_objects({{"one", object.file()}}).error,
-              HasSubstr("5 frames and describes 6"));
+              HasSubstr("5 frames, but describes 6"));
 }
 
 TEST(DicomSniffing, NeedsItsFourLettersInTheirPlace) {

@@ -72,13 +72,13 @@ TEST(DicomMosaic, TellsTheNumberInTwoPlaces) {
 
 TEST(DicomMosaic, IsRefusedWhenItDoesNotSayWhereSlicesLie) {
   EXPECT_THAT(import_one(siemens_mosaic().erase(kCsaImageHeader)).error, HasSubstr("header"));
-  EXPECT_THAT(import_one(siemens_mosaic({})).error, HasSubstr("how many"));
+  EXPECT_THAT(import_one(siemens_mosaic({})).error, HasSubstr("number of slices is unknown"));
   EXPECT_THAT(import_one(siemens_mosaic(csa_fields({}))).error, HasSubstr("SliceNormalVector"));
   EXPECT_THAT(import_one(siemens_mosaic(csa_fields({"0", "1", "0"}))).error, HasSubstr("normal"));
   EXPECT_THAT(import_one(siemens_mosaic(csa_fields({"0", "0", "3"}))).error,
               HasSubstr("unit vectors"));
   EXPECT_THAT(import_one(siemens_mosaic().erase(kSpacingBetweenSlices)).error,
-              HasSubstr("how far apart"));
+              HasSubstr("the distance between its slices"));
   EXPECT_THAT(
       import_one(
           siemens_mosaic().number(kBitsAllocated, 1).number(kBitsStored, 1).number(kHighBit, 0))
@@ -86,9 +86,10 @@ TEST(DicomMosaic, IsRefusedWhenItDoesNotSayWhereSlicesLie) {
       HasSubstr("single bits"));
   CsaFields many = csa_fields({"0", "0", "1"});
   many[1].second = {"17"};
-  EXPECT_THAT(import_one(siemens_mosaic(many)).error, HasSubstr("no 5 x 5 tiles"));
+  EXPECT_THAT(import_one(siemens_mosaic(many)).error,
+              HasSubstr("cannot be divided into 5 x 5 tiles"));
   many[1].second = {"1e9"};
-  EXPECT_THAT(import_one(siemens_mosaic(many)).error, HasSubstr("no number of slices"));
+  EXPECT_THAT(import_one(siemens_mosaic(many)).error, HasSubstr("not a valid number of slices"));
 }
 
 TEST(DicomMosaic, TakesTheThicknessWhereNoDistanceIsTold) {
@@ -121,7 +122,7 @@ TEST(DicomMosaic, IsAVolumeOfItsSeries) {
                            .file());
   }
   const Outcome all = import_objects(files);
-  EXPECT_THAT(all.error, HasSubstr("3 volumes, which differ in AcquisitionTime"));
+  EXPECT_THAT(all.error, HasSubstr("3 volumes that differ in AcquisitionTime"));
   ASSERT_EQ(all.remedy.choices.size(), 3);
   EXPECT_EQ(all.remedy.choices[1], (Choice{"volume", "1", "AcquisitionTime 120002, 5 slices"}));
   const Outcome second = import_objects(files, {.volume = 1});
@@ -142,8 +143,9 @@ TEST(DicomGrid, HasAPlaceForEachSlice) {
 
 TEST(DicomGrid, IsRefusedWhenPlacesAreMissing) {
   EXPECT_THAT(import_one(united_imaging_grid().text(kGridImages, "DS", "6")).error,
-              HasSubstr("a grid of 6 slices, and 5 are described"));
-  EXPECT_THAT(import_one(united_imaging_grid().items(kGridFrames, {})).error, HasSubstr("0 are"));
+              HasSubstr("a grid of 6 slices, but it describes 5"));
+  EXPECT_THAT(import_one(united_imaging_grid().items(kGridFrames, {})).error,
+              HasSubstr("it describes 0"));
   EXPECT_THAT(
       import_one(united_imaging_grid().items(kGridFrames, std::vector<DicomObject>(kTiles))).error,
       HasSubstr("position"));

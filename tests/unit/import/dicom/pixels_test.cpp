@@ -163,7 +163,7 @@ TEST(DicomFragments, ThatAreMissingAreNoticed) {
   };
   EXPECT_THAT(error_of({stream, stream}),
               AllOf(HasSubstr("3 frames"), HasSubstr("2 compressed fragments")));
-  EXPECT_THAT(error_of({stream, stream, stream, stream}), HasSubstr("cannot be told apart"));
+  EXPECT_THAT(error_of({stream, stream, stream, stream}), HasSubstr("cannot be separated"));
 }
 
 TEST(DicomFragments, OfAnIconAreNoPixels) {
@@ -254,7 +254,8 @@ TEST(DicomReals, AreScaled) {
 TEST(DicomReals, AreRefusedWhenSomeAreMissing) {
   DicomObject object = real_object<double>(kDoubleFloatPixelData, "OD");
   object.bytes(kDoubleFloatPixelData, "OD", std::string(400, 'x'));
-  EXPECT_THAT(import_objects({{"map", object.file()}}).error, HasSubstr("take 480 bytes, and 400"));
+  EXPECT_THAT(import_objects({{"map", object.file()}}).error,
+              HasSubstr("take 480 bytes, but the file has 400"));
 }
 
 }  // namespace

@@ -68,7 +68,7 @@ TEST(DicomRefusal, NamesADoubledSlice) {
   files.emplace_back("again", DicomSeries{}.slice(2).text(kContentTime, "TM", "1200").file());
   const Outcome outcome = import_objects(files);
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-  EXPECT_THAT(outcome.error, HasSubstr("Slice 3 of 6 is there more than once"));
+  EXPECT_THAT(outcome.error, HasSubstr("Slice 3 of 6 occurs more than once"));
 }
 
 TEST(DicomRefusal, NamesUnevenSlices) {
@@ -149,13 +149,14 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Fault{"NoPixels", [](DicomObject& object) { object.erase(kPixelData); }, "no pixel data"},
         Fault{"FewPixels", [](DicomObject& object) { object.pixels(std::string(38, 'x'), 2); },
-              "5 x 4 x 1 samples take 40 bytes, and 38 are there"},
+              "5 x 4 x 1 samples take 40 bytes, but the file has 38"},
         Fault{"HugeSize",
               [](DicomObject& object) { object.number(kRows, 65535).number(kColumns, 65535); },
-              "65535 x 65535 x 1 samples take 8589672450 bytes, and 40 are there"},
+              "65535 x 65535 x 1 samples take 8589672450 bytes, but the file has 40"},
         Fault{"NoRows", [](DicomObject& object) { object.erase(kRows); }, "rows (0028,0010)"},
         Fault{"ZeroRows", [](DicomObject& object) { object.number(kRows, 0); }, "size is 0"},
-        Fault{"Bits", [](DicomObject& object) { object.number(kBitsStored, 17); }, "17 stored"},
+        Fault{"Bits", [](DicomObject& object) { object.number(kBitsStored, 17); },
+              "it stores 17 bits"},
         Fault{"PackedBits", [](DicomObject& object) { object.number(kBitsAllocated, 12); },
               "12 bits"},
         Fault{"Colour",
@@ -187,15 +188,15 @@ INSTANTIATE_TEST_SUITE_P(
               [](DicomObject& object) {
                 object.text(kImageOrientation, "DS", "1\\0\\0\\0.6\\0.8\\0");
               },
-              "right angles"},
+              "perpendicular"},
         Fault{"Table",
               [](DicomObject& object) { object.items(kModalityLutSequence, {DicomObject{}}); },
-              "by a table"},
+              "by a lookup table"},
         Fault{"UnplacedFrames",
               [](DicomObject& object) {
                 object.text(kNumberOfFrames, "IS", "2").pixels(std::string(80, 'x'), 2);
               },
-              "does not tell where each of them lies"},
+              "no position for each of them"},
         Fault{"FramesOfWords",
               [](DicomObject& object) { object.text(kNumberOfFrames, "IS", "-1"); }, "\"-1\""}),
     [](const auto& each) { return std::string(each.param.name); });
@@ -219,17 +220,18 @@ TEST(DicomRefusal, OfAFileThatInflatesWithoutEnd) {
   const Outcome outcome =
       import_objects({{"bomb", object.file(kDeflate)}}, {}, {.max_sample_bytes = 1 << 20});
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-  EXPECT_THAT(outcome.error, HasSubstr("deflated file holds more"));
+  EXPECT_THAT(outcome.error, HasSubstr("deflated file unpacks to more"));
 }
 
 TEST(DicomRefusal, OfACompressedFileThatHoldsMoreThanItsHeaderTells) {
   const std::string zeros(std::size_t{80} << 20, '\0');
   const DicomObject enhanced = DicomSeries{}.enhanced({0, 1, 2, 3, 4, 5});
   EXPECT_TRUE(import_bytes(gzip(enhanced.file())).imported());
-  EXPECT_THAT(import_bytes(gzip(enhanced.file() + zeros)).error, HasSubstr("holds more"));
-  EXPECT_THAT(import_bytes(gzip(enhanced.file(kImplicit) + zeros)).error, HasSubstr("holds more"));
+  EXPECT_THAT(import_bytes(gzip(enhanced.file() + zeros)).error, HasSubstr("unpacks to more"));
+  EXPECT_THAT(import_bytes(gzip(enhanced.file(kImplicit) + zeros)).error,
+              HasSubstr("unpacks to more"));
   EXPECT_THAT(import_bytes(zip({{"a.dcm", enhanced.file() + zeros}})).error,
-              HasSubstr("that its header lets it have"));
+              HasSubstr("that its header allows"));
 }
 
 TEST(DicomRefusal, OfEveryTruncation) {
@@ -250,7 +252,7 @@ TEST(DicomRefusal, OfSequencesThatLieTooDeep) {
   }
   DicomObject object = DicomSeries{}.slice(0);
   object.items(kPlanePositionSequence, {deep});
-  EXPECT_THAT(import_objects({{"deep", object.file()}}).error, HasSubstr("lie in one another"));
+  EXPECT_THAT(import_objects({{"deep", object.file()}}).error, HasSubstr("nested more than"));
 }
 
 // --- Several series and other objects ------------------------------------------------------------
@@ -319,18 +321,19 @@ TEST(DicomIgnored, AreNamedWithTheirReasons) {
                      scout.slice(0).text(kImageType, "CS", "ORIGINAL\\PRIMARY\\LOCALIZER").file());
   const Outcome outcome = import_objects(files);
   ASSERT_EQ(outcome.error, "");
-  EXPECT_THAT(outcome.volume.ignored,
-              testing::ElementsAre(IgnoredObject{"report.dcm", "it is no image (modality \"SR\")"},
-                                   IgnoredObject{"DICOMDIR", "it is a directory of DICOM files"},
-                                   IgnoredObject{"readme.txt", "it is no DICOM file"},
-                                   IgnoredObject{"empty", "it is no DICOM file"},
-                                   IgnoredObject{"scout", "it is a localiser"}));
+  EXPECT_THAT(
+      outcome.volume.ignored,
+      testing::ElementsAre(IgnoredObject{"report.dcm", "it is not an image (modality \"SR\")"},
+                           IgnoredObject{"DICOMDIR", "it is a directory of DICOM files"},
+                           IgnoredObject{"readme.txt", "it is not a DICOM file"},
+                           IgnoredObject{"empty", "it is not a DICOM file"},
+                           IgnoredObject{"scout", "it is a localiser"}));
 }
 
 TEST(DicomIgnored, MakeNoVolume) {
   DicomObject report;
   report.text(kModality, "CS", "SR");
-  EXPECT_THAT(import_objects({{"a", report.file()}}).error, HasSubstr("no image"));
+  EXPECT_THAT(import_objects({{"a", report.file()}}).error, HasSubstr("not an image"));
   EXPECT_THAT(import_objects({{"a", report.file()}, {"b", "text"}}).error,
               HasSubstr("None of the upload's 2 files"));
 }

@@ -79,7 +79,7 @@ TEST(DicomSegmentation, WithOverlapsNumbersTheirCombinations) {
   EXPECT_THAT(outcome.volume.labels,
               testing::ElementsAre(entry(1, "liver", {1, 3}), entry(2, "spleen", {2, 3})));
   EXPECT_THAT(note_detail(outcome, NoteCode::kOverlappingSegments),
-              HasSubstr("1 sample is of several segments"));
+              HasSubstr("1 sample belongs to several segments"));
   // Frames may come in any order.
   std::swap(object.frames[1], object.frames[2]);
   EXPECT_EQ(import_labels(object).canonical, outcome.canonical);
@@ -91,7 +91,7 @@ TEST(DicomSegmentation, WithOverlapsNumbersTheirCombinations) {
   EXPECT_EQ(label_at(chosen, 1, 1), 2);
   EXPECT_EQ(chosen.volume.geometry.origin[2], 2);
   EXPECT_THAT(chosen.volume.labels, testing::ElementsAre(entry(2, "spleen")));
-  EXPECT_THAT(import_labels(object, {.volume = 2}).error, HasSubstr("none of them is volume 2"));
+  EXPECT_THAT(import_labels(object, {.volume = 2}).error, HasSubstr("It has no volume 2"));
 }
 
 TEST(DicomSegmentation, WithOverlapsBeyondEightBitsHasWiderValues) {
@@ -152,7 +152,7 @@ TEST(DicomSegmentation, OfUnevenFramesIsRefused) {
 TEST(DicomSegmentation, TellsTheSegmentOfEachFrame) {
   SegmentObject object = two_segments();
   object.frames[2].segment = 0;
-  EXPECT_THAT(import_labels(object).error, HasSubstr("which segment its frame 3 shows"));
+  EXPECT_THAT(import_labels(object).error, HasSubstr("the segment of its frame 3"));
 }
 
 TEST(DicomSegmentation, OfOneFractionalSegmentKeepsItsSamples) {

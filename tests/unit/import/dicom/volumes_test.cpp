@@ -65,13 +65,12 @@ void expect_all_volumes(const NamedFiles& files) {
 TEST(DicomVolumes, AreOfferedWithWhatTheyDifferIn) {
   const Outcome outcome = import_objects(with_echoes());
   EXPECT_EQ(outcome.code, ErrorCode::kUnusableVolume);
-  EXPECT_THAT(outcome.error, HasSubstr("3 volumes, which differ in EchoTime"));
+  EXPECT_THAT(outcome.error, HasSubstr("3 volumes that differ in EchoTime"));
   EXPECT_THAT(outcome.remedy.choices, ElementsAre(Choice{"volume", "0", "EchoTime 5.25, 6 slices"},
                                                   Choice{"volume", "1", "EchoTime 10.50, 6 slices"},
                                                   Choice{"volume", "2", "EchoTime 100, 6 slices"}));
   expect_all_volumes(with_echoes());
-  EXPECT_THAT(import_objects(with_echoes(), {.volume = 3}).error,
-              HasSubstr("none of them is volume 3"));
+  EXPECT_THAT(import_objects(with_echoes(), {.volume = 3}).error, HasSubstr("It has no volume 3"));
 }
 
 TEST(DicomVolumes, AreToldApartByTheAttributeThatDoes) {
@@ -95,7 +94,7 @@ TEST(DicomVolumes, AreToldApartByTheAttributeThatDoes) {
   };
   for (const auto& [name, change] : changes) {
     EXPECT_THAT(import_objects(several(change)).error,
-                HasSubstr("3 volumes, which differ in " + std::string(name)));
+                HasSubstr("3 volumes that differ in " + std::string(name)));
   }
 }
 
@@ -123,7 +122,7 @@ TEST(DicomVolumes, AreToldApartByTwoAttributes) {
     }
   }
   const Outcome outcome = import_objects(files);
-  EXPECT_THAT(outcome.error, HasSubstr("4 volumes, which differ in EchoTime and InversionTime"));
+  EXPECT_THAT(outcome.error, HasSubstr("4 volumes that differ in EchoTime and InversionTime"));
   EXPECT_EQ(outcome.remedy.choices.at(1).title, "EchoTime 5, InversionTime 700, 6 slices");
   EXPECT_EQ(import_objects(files, {.volume = 3}).error, "");
 }
@@ -157,7 +156,7 @@ TEST(DicomVolumes, OfSeveralFramesAreOneAnObject) {
         "E" + std::to_string(number),
         series.enhanced({0, 1, 2, 3}).text(kInstanceNumber, "IS", std::to_string(number)).file());
   }
-  EXPECT_THAT(import_objects(files).error, HasSubstr("2 volumes, which differ in InstanceNumber"));
+  EXPECT_THAT(import_objects(files).error, HasSubstr("2 volumes that differ in InstanceNumber"));
   EXPECT_EQ(import_objects(files, {.volume = 1}).volume.dims[2], 4);
 }
 
@@ -167,7 +166,8 @@ TEST(DicomVolumes, ThatWereBrokenOffAreNotTaken) {
   const Outcome outcome = import_objects(files);
   EXPECT_EQ(outcome.remedy.choices.at(2).title, "EchoTime 100, 5 slices of 6");
   EXPECT_EQ(import_objects(files, {.volume = 1}).error, "");
-  EXPECT_THAT(import_objects(files, {.volume = 2}).error, HasSubstr("broken off: 5 of its 6"));
+  EXPECT_THAT(import_objects(files, {.volume = 2}).error,
+              HasSubstr("is incomplete: it has 5 of 6 slices"));
 }
 
 TEST(DicomVolumes, OfOtherOrientationsAreOffered) {
@@ -192,7 +192,7 @@ TEST(DicomVolumes, OfOtherOrientationsAreOffered) {
 TEST(DicomVolumes, ThatAreAloneNeedNoChoice) {
   EXPECT_EQ(import_objects(DicomSeries{}.files(), {.volume = 0}).error, "");
   EXPECT_THAT(import_objects(DicomSeries{}.files(), {.volume = 1}).error,
-              HasSubstr("holds 1 volume, and none of them is volume 1"));
+              HasSubstr("holds 1 volume. It has no volume 1"));
 }
 
 // --- Frames of reference -------------------------------------------------------------------------
@@ -229,7 +229,7 @@ TEST(DicomFramesOfReference, ThatFormGroupsMayBeAccepted) {
   EXPECT_THAT(refused.error, HasSubstr("2 frames of reference"));
   const Outcome accepted = import_objects(files, {.accept = {"frame-of-reference"}});
   ASSERT_EQ(accepted.error, "");
-  EXPECT_THAT(note_detail(accepted, NoteCode::kFrameOfReference), HasSubstr("was accepted"));
+  EXPECT_THAT(note_detail(accepted, NoteCode::kFrameOfReference), HasSubstr("The request accepts"));
 }
 
 // What is wrong with the lattice is never overlooked, and nothing else is offered then.
@@ -256,8 +256,7 @@ TEST(DicomUpload, TakesAFileOnceThatCameTwice) {
   EXPECT_THAT(outcome.volume.ignored,
               ElementsAre(IgnoredObject{"copy", "it is the same as \"IM9\""},
                           IgnoredObject{"another", "it is the same as \"IM10\""}));
-  EXPECT_THAT(note_detail(outcome, NoteCode::kDuplicateFile),
-              HasSubstr("2 files came more than once"));
+  EXPECT_THAT(note_detail(outcome, NoteCode::kDuplicateFile), HasSubstr("2 files are copies"));
   // The same name for another content is no copy.
   files.back().second = DicomSeries{}.slice(2).number(kRows, 4).text(kStudyId, "SH", "x").file();
   EXPECT_THAT(import_objects(files).error, HasSubstr("more than once"));
@@ -312,16 +311,16 @@ TEST(DicomUpload, NamesTheOneThatDiffersWhereverItComes) {
     }
     EXPECT_THAT(import_objects(files).error,
                 AllOf(HasSubstr("1 of its 6 slices differs in pixel spacing"),
-                      HasSubstr("\"F" + std::to_string(odd) + "\" from")));
+                      HasSubstr("\"F" + std::to_string(odd) + "\" differs from")));
   }
 }
 
 TEST(DicomUpload, OfOneSliceSaysThatItIsOne) {
   DicomObject object = DicomSeries{}.slice(0);
   object.erase(kImagePosition).erase(kImageOrientation);
-  EXPECT_THAT(
-      import_objects({{"one", object.file()}}).error,
-      AllOf(HasSubstr("one slice"), HasSubstr("position (0020,0032)"), Not(HasSubstr("frames"))));
+  EXPECT_THAT(import_objects({{"one", object.file()}}).error,
+              AllOf(HasSubstr("a single slice"), HasSubstr("position (0020,0032)"),
+                    Not(HasSubstr("frames"))));
 }
 
 }  // namespace

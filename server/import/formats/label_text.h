@@ -1,0 +1,20 @@
+// Tables of labels in text, as programs write them beside a label volume.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "proto/types.h"
+
+namespace isomesh::import {
+
+// The labels of a table. Each line is a label's number with its name, and possibly its colour:
+//   1 Left-Thalamus 0 118 14 0              FreeSurfer's and 3D Slicer's colour tables
+//   1 255 0 0 1 1 1 "Left thalamus"         ITK-SNAP's label descriptions
+//   1 0.2 0.4 0.9 Left thalamus             FSLeyes' lookup tables
+//   1 Left thalamus
+// Lines that begin with "#", "%" or "//" are comments. Returns none unless every other line is such
+// an entry, and for more than Volume::kMostLabels. Not in order. Never throws for what it reads.
+std::vector<LabelEntry> labels_of_text(std::string_view text);
+
+}  // namespace isomesh::import

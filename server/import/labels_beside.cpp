@@ -1,0 +1,129 @@
+#include "server/import/labels_beside.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/files.h"
+#include "base/text.h"
+#include "server/import/formats/label_text.h"
+#include "server/import/label_table.h"
+#include "server/import/reader.h"
+#include "server/import/readers.h"
+
+namespace isomesh::import {
+namespace {
+
+struct Table {
+  std::string name;
+  std::vector<LabelEntry> labels;
+};
+
+std::string base_of(const std::string& name) {
+  return lower(std::filesystem::path(name).filename().string());
+}
+
+// "head" of "head.nii.gz".
+std::string stem_of(const std::string& name) {
+  std::filesystem::path base = base_of(name);
+  if (base.extension() == ".gz") base = base.stem();
+  return base.stem().string();
+}
+
+// Whether a file's name is the stem with more behind it, as "head_labels.txt" is of "head".
+bool begins_with(const std::string& name, const std::string& stem) {
+  const auto is_word = [](char letter) {
+    return (letter >= 'a' && letter <= 'z') || (letter >= '0' && letter <= '9');
+  };
+  const std::string base = base_of(name);
+  return !stem.empty() && base.starts_with(stem) &&
+         (base.size() == stem.size() || !is_word(base[stem.size()]));
+}
+
+bool is_text(std::string_view bytes) {
+  return std::ranges::none_of(bytes, [](char letter) {
+    return static_cast<unsigned char>(letter) < ' ' && letter != '\t' && letter != '\r' &&
+           letter != '\n';
+  });
+}
+
+// The labels of a file that is a table; none of any other.
+std::vector<LabelEntry> labels_of(const std::filesystem::path& path) {
+  const InputFile file(path);
+  // An archive's larger members are there in part only.
+  if (file.size() >= kBeginningBytes || !is_text(file.text(0, kSniffBytes))) return {};
+  try {
+    return label_table(labels_of_text(file.text(0, kBeginningBytes)));
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kUnusableVolume) throw;
+    return {};  // names are an extra; the samples are there without
+  }
+}
+
+template <class IsWanted>
+std::vector<Table> tables_in(const Companions& companions, const IsWanted& is_wanted) {
+  std::vector<Table> tables;
+  for (const auto& [name, path] : companions.files) {
+    auto labels = labels_of(path);
+    if (!labels.empty() && is_wanted(name)) tables.push_back({name, std::move(labels)});
+  }
+  return tables;
+}
+
+// The stems of the other files that are of a format of volumes.
+std::vector<std::string> stems_of_volumes(const Companions& companions) {
+  std::vector<std::string> stems;
+  for (const auto& [name, path] : companions.files) {
+    if (sniff(InputFile(path)) != nullptr) stems.push_back(stem_of(name));
+  }
+  return stems;
+}
+
+// Those whose names have nothing but suffixes behind the stem, as "head.txt" and "head.nii.txt".
+std::vector<Table> named_as(const std::string& stem, std::vector<Table> tables) {
+  std::erase_if(tables, [&](const Table& table) {
+    return stem_of(table.name) != stem && stem_of(stem_of(table.name)) != stem;
+  });
+  return tables;
+}
+
+std::vector<Table> tables_beside(const Companions& companions) {
+  const std::string stem = stem_of(companions.name);
+  const auto is_own = [&](const std::string& name) { return begins_with(name, stem); };
+  std::vector<Table> tables = tables_in(companions, is_own);
+  if (tables.empty()) {
+    const std::vector<std::string> others = stems_of_volumes(companions);
+    tables = tables_in(companions, [&](const std::string& name) {
+      return std::ranges::none_of(
+          others, [&](const std::string& other) { return begins_with(name, other); });
+    });
+  } else if (tables.size() > 1) {
+    std::vector<Table> exact = named_as(stem, tables);
+    if (!exact.empty()) return exact;
+  }
+  return tables;
+}
+
+}  // namespace
+
+void take_labels_beside(const Companions& companions, Volume& volume) {
+  const auto note =
+      std::ranges::find(volume.notes, describe(NoteCode::kLooksLikeLabels).name, &Note::code);
+  if (!volume.labels.empty() || note == volume.notes.end()) return;
+  std::vector<Table> tables = tables_beside(companions);
+  if (tables.empty()) return;
+  if (tables.size() > 1) {
+    note->detail +=
+        " Several tables of label names fit, so none was used: " + in_quotes(tables[0].name) +
+        " and " + in_quotes(tables[1].name) + (tables.size() > 2 ? ", among others." : ".");
+    return;
+  }
+  volume.labels = std::move(tables.front().labels);
+  note->detail += " The names of the labels are from " + in_quotes(tables.front().name) + '.';
+}
+
+}  // namespace isomesh::import

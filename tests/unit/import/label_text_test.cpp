@@ -1,0 +1,185 @@
+// Names of labels in a file of their own, beside the volume.
+#include "server/import/formats/label_text.h"
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/import/archives.h"
+#include "tests/unit/import/files.h"
+#include "tests/unit/import/writers.h"
+
+namespace isomesh::import::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+LabelEntry entry(std::int64_t label, std::string name, std::optional<std::string> color = {}) {
+  return {.label = label, .name = std::move(name), .color = std::move(color)};
+}
+
+TEST(LabelText, IsThatOfFreeSurfer) {
+  EXPECT_THAT(labels_of_text("#$Id: FreeSurferColorLUT.txt,v 1.10 $\n\n"
+                             "#No. Label Name:                R   G   B   A\n"
+                             "0   Unknown                     0   0   0   0\n"
+                             "10  Left-Thalamus               0   118 14  0\r\n"
+                             "3   3rd-Ventricle               204 182 142 0\n"),
+              ElementsAre(entry(0, "Unknown", "#000000"), entry(10, "Left-Thalamus", "#00760e"),
+                          entry(3, "3rd-Ventricle", "#ccb68e")));
+}
+
+TEST(LabelText, IsThatOfSlicerWithItsSpaces) {
+  const std::string lines =
+      "0 Background 0 0 0 0\n3 connective_tissue 111 184 210 255\n4 (none) 0 0 0 0\n";
+  EXPECT_THAT(
+      labels_of_text("# Color table file C:/x/Segmentation-label_ColorTable.ctbl\n"
+                     "# 3 values\n" +
+                     lines),
+      ElementsAre(entry(0, "Background", "#000000"), entry(3, "connective tissue", "#6fb8d2")));
+  EXPECT_EQ(labels_of_text(lines)[1].name, "connective_tissue");
+}
+
+TEST(LabelText, IsThatOfItkSnap) {
+  EXPECT_THAT(labels_of_text("################################################\n"
+                             "# ITK-SnAP Label Description File\n"
+                             "# IDX   -R-  -G-  -B-  -A--  VIS MSH  LABEL\n"
+                             "    0     0    0    0        0  0  0    \"Clear Label\"\n"
+                             "  200   186  194  212      0.5  1  1    \"Deep R\"\n"),
+              ElementsAre(entry(0, "Clear Label", "#000000"), entry(200, "Deep R", "#bac2d4")));
+}
+
+TEST(LabelText, IsThatOfFslEyes) {
+  EXPECT_THAT(
+      labels_of_text("1 0.93 0.2 0 Frontal Pole\n2 0 1 0.5 Insular Cortex\n"),
+      ElementsAre(entry(1, "Frontal Pole", "#ed3300"), entry(2, "Insular Cortex", "#00ff80")));
+  EXPECT_THAT(labels_of_text("1 255 0 0 255 liver"), ElementsAre(entry(1, "liver", "#ff0000")));
+}
+
+TEST(LabelText, IsPlainNumbersAndNames) {
+  EXPECT_THAT(
+      labels_of_text("\xef\xbb\xbf"
+                     "0\tUnclassified\r\n1\tPontine tract (a part of MCP)\r\n-2 \"left 2\""),
+      ElementsAre(entry(0, "Unclassified"), entry(1, "Pontine tract (a part of MCP)"),
+                  entry(-2, "left 2")));
+  EXPECT_THAT(labels_of_text("// organs\n% organs\n5 R\xe9gion"),
+              ElementsAre(entry(5, "R\xef\xbf\xbdgion")));
+}
+
+// MRIcron's atlases number their regions twice.
+TEST(LabelText, HasNoNumberBehindNamesThatDifferWithoutIt) {
+  EXPECT_THAT(labels_of_text("1 Precentral_L 2001\n2 Precentral_R 2002\n"),
+              ElementsAre(entry(1, "Precentral_L"), entry(2, "Precentral_R")));
+  EXPECT_THAT(labels_of_text("1 Vertebra 1\n2 Vertebra 2\n"),
+              ElementsAre(entry(1, "Vertebra 1"), entry(2, "Vertebra 2")));
+}
+
+TEST(LabelText, OfOtherTextIsNone) {
+  for (const std::string text :
+       {"", "# only a comment\n", "liver\n", "1\n", "1 liver\nspleen\n", "1 0 0 0\n0 1 0 0\n",
+        "1 2 name\n", "1 300 0 0 name\n", "1 nan 0 0 name\n", "1.5 name\n", "1, name\n",
+        "99999999999999999999 name\n", "0.1 0 0 0\n"}) {
+    EXPECT_THAT(labels_of_text(text), IsEmpty()) << text;
+  }
+  EXPECT_THAT(labels_of_text(std::string("1 li\0ver\n", 9)), IsEmpty());
+  EXPECT_THAT(labels_of_text("1 a\x1b[31m\n"), IsEmpty());
+  std::string many;
+  for (int at = 0; at < 65'536; ++at) many += std::to_string(at) + " a\n";
+  EXPECT_THAT(labels_of_text(many), IsEmpty());
+}
+
+// --- Beside a volume -----------------------------------------------------------------------------
+
+constexpr std::string_view kTable = "1 liver 255 0 0 0\n5 spleen 0 0 255 0\n";
+
+std::string label_volume() {
+  std::string samples;
+  for (const char value : {0, 1, 2, 5}) samples += std::string(6, value);
+  return nifti({.dim = {3, 6, 4, 1, 1, 1, 1, 1}}, samples);
+}
+
+std::vector<LabelEntry> labels_in(const std::vector<Member>& members,
+                                  const std::string& chosen = "") {
+  const Outcome outcome = import_bytes(zip(members), {}, {.member = chosen});
+  EXPECT_EQ(outcome.error, "");
+  return outcome.volume.labels;
+}
+
+TEST(LabelsBeside, AreThoseOfTheTableInItsFolder) {
+  const auto both = ElementsAre(entry(1, "liver", "#ff0000"), entry(5, "spleen", "#0000ff"));
+  for (const std::string name : {"seg.nii.txt", "seg.lut", "Seg_labels.ctbl",
+                                 "FreeSurferColorLUT.txt", "tables/labels.txt"}) {
+    EXPECT_THAT(labels_in({{"a/seg.nii", label_volume()},
+                           {"a/" + name, std::string(kTable)},
+                           {"a/readme.txt", "Labels of the abdomen.\n"},
+                           {"a/seg.png", std::string("\x89PNG\0", 5)}}),
+                both)
+        << name;
+  }
+  const Outcome outcome =
+      import_bytes(tar({{"seg.nii.gz", gzip(label_volume())}, {"seg.txt", std::string(kTable)}}));
+  EXPECT_THAT(outcome.volume.labels, both);
+  ASSERT_THAT(codes_of(outcome), ElementsAre("looks-like-labels"));
+  EXPECT_THAT(outcome.volume.notes[0].detail,
+              HasSubstr("The names of the labels are from \"seg.txt\"."));
+}
+
+TEST(LabelsBeside, AreNotThoseOfAnotherVolume) {
+  const std::vector<Member> members = {
+      {"a.nii", label_volume()}, {"b.nii", label_volume() + '\0'}, {"a.txt", std::string(kTable)}};
+  EXPECT_THAT(labels_in(members, "a.nii"), SizeIs(2));
+  EXPECT_THAT(labels_in(members, "b.nii"), IsEmpty());
+  EXPECT_THAT(labels_in({{"seg1.nii", label_volume()},
+                         {"b.nii", label_volume() + '\0'},
+                         {"seg10.txt", std::string(kTable)}},
+                        "b.nii"),
+              SizeIs(2));
+}
+
+TEST(LabelsBeside, AreNoneWhereSeveralTablesWouldDo) {
+  const std::string table(kTable);
+  const Member volume = {"seg.nii", label_volume()};
+  const Outcome outcome = import_bytes(zip({volume, {"x.txt", table}, {"y.txt", table}}));
+  EXPECT_THAT(outcome.volume.labels, IsEmpty());
+  ASSERT_THAT(codes_of(outcome), ElementsAre("looks-like-labels"));
+  EXPECT_THAT(outcome.volume.notes[0].detail,
+              HasSubstr("so none was used: \"x.txt\" and \"y.txt\"."));
+  EXPECT_THAT(labels_in({volume, {"seg_x.txt", table}, {"seg_y.txt", table}}), IsEmpty());
+  EXPECT_THAT(labels_in({volume, {"seg_x.txt", "9 x"}, {"seg.txt", table}}), SizeIs(2));
+}
+
+TEST(LabelsBeside, AreNotForImagesNorForFilesThatNameTheirOwn) {
+  const Outcome image = import_bytes(
+      zip({{"ct.nii", nifti({}, kSmallSamples)}, {"labels.txt", std::string(kTable)}}));
+  EXPECT_EQ(image.error, "");
+  EXPECT_THAT(image.volume.labels, IsEmpty());
+  EXPECT_THAT(codes_of(image), IsEmpty());
+  std::string own =
+      nrrd(with(with(small_nrrd(), "sizes", "6 4 1"), "type", "uint8"), label_volume().substr(352));
+  own.insert(own.find("\n\n") + 1,
+             "Segment0_Name:=kidney\nSegment0_LabelValue:=2\nSegment0_Layer:=0\n");
+  EXPECT_THAT(labels_in({{"seg.nrrd", own}, {"seg.txt", std::string(kTable)}}),
+              ElementsAre(entry(2, "kidney")));
+}
+
+TEST(LabelsBeside, ThatAreTooLongAreNone) {
+  std::string longest(kTable);
+  longest.append("# ").append(std::size_t{1} << 20, '-');
+  EXPECT_THAT(labels_in({{"seg.nii", label_volume()}, {"seg.txt", longest}}), IsEmpty());
+}
+
+TEST(LabelsBeside, OfMricronsAtlases) {
+  const std::filesystem::path folder = "/usr/share/mricron/templates";
+  if (!std::filesystem::exists(folder / "aal.nii.gz")) GTEST_SKIP() << "mricron-data is missing";
+  const auto labels = labels_in({{"aal.nii.gz", read_file(folder / "aal.nii.gz")},
+                                 {"aal.nii.lut", read_file(folder / "aal.nii.lut")},
+                                 {"aal.nii.txt", read_file(folder / "aal.nii.txt")}});
+  ASSERT_THAT(labels, SizeIs(116));
+  EXPECT_EQ(labels.front(), entry(1, "Precentral_L"));
+}
+
+}  // namespace
+}  // namespace isomesh::import::test
