@@ -157,7 +157,7 @@ void add_model(const StlObject& object, DataSet& data) {
 StlEnvelope make_envelope(const StlObject& object, std::uint64_t stl_bytes) {
   if (stl_bytes > kMostDocumentBytes) {
     throw Error(ErrorCode::kTooLarge, "the mesh has " + std::to_string(stl_bytes) +
-                                          " bytes, and a DICOM object holds " +
+                                          " bytes, but a DICOM object holds at most " +
                                           std::to_string(kMostDocumentBytes));
   }
   const Moment made = moment_of(object.made);

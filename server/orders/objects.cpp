@@ -125,7 +125,7 @@ void copy(const store::BlobReader& from, const Part& part, store::BlobWriter& to
     const auto piece =
         std::span(buffer).first(std::min<std::uint64_t>(buffer.size(), part.bytes - at));
     const std::size_t count = from.read_at(part.offset + at, piece);
-    if (count == 0) throw Error(ErrorCode::kInternal, "a mesh is shorter than it was");
+    if (count == 0) throw Error(ErrorCode::kInternal, "a stored mesh became shorter");
     to.write(piece.first(count));
     at += count;
   }
@@ -177,7 +177,7 @@ constexpr std::uint64_t kGrowthOfText = 400;
 [[noreturn]] void throw_too_large(std::uint64_t bytes, std::uint64_t most_bytes,
                                   const OrderWork& work) {
   std::string text = "the object has " + std::to_string(bytes) +
-                     " bytes, and the PACS takes at most " + std::to_string(most_bytes) +
+                     " bytes, but the PACS accepts at most " + std::to_string(most_bytes) +
                      " (max-send-bytes)";
   if (work.max_error_mm) {
     text += "; within " + number_text(*work.max_error_mm) +

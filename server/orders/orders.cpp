@@ -88,7 +88,7 @@ void Orders::stop() {
   try {
     services_.audit.add({.event = store::AuditEvent::kStop});
   } catch (const std::exception& error) {
-    spdlog::error("the end of the orders is not in the audit trail: {}", error.what());
+    spdlog::error("the audit trail lacks the entry of this stop: {}", error.what());
   }
 }
 
@@ -102,10 +102,10 @@ std::pair<Order, bool> Orders::submit(const Orderer& orderer, const OrderRequest
                                .request_digest = request_digest},
                               hospital_.most_open);
   if (submission.kind == Kind::kConflict) {
-    throw Error(ErrorCode::kKeyReused, "the idempotency key came with another request before");
+    throw Error(ErrorCode::kKeyReused, "the idempotency key was used for another request");
   }
   if (submission.kind == Kind::kBusy) {
-    throw Error(ErrorCode::kUnavailable, "as many orders are open as may be");
+    throw Error(ErrorCode::kUnavailable, "too many orders are open");
   }
   changed();
   return {submission.order, submission.kind == Kind::kNew};

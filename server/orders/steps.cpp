@@ -90,7 +90,7 @@ Time OrderSteps::advance(store::OrderRecord& record, const std::stop_token& stop
 Pacs& OrderSteps::pacs(const std::string& name) const {
   const auto found = services_.pacs.find(name);
   if (found != services_.pacs.end()) return *found->second;
-  throw PacsFailure(PacsFault::kUnreachable, "the PACS is not configured any more");
+  throw PacsFailure(PacsFault::kUnreachable, "the PACS is no longer configured");
 }
 
 Time OrderSteps::save(store::OrderRecord& record, Time next) const {
@@ -259,7 +259,7 @@ bool OrderSteps::is_same_patient(const store::OrderRecord& record, const OrderRe
   if (patient) return *patient == identity.patient_id;
   // A PACS that the images did not come from need not know the study.
   if (result.pacs != record.order.source.pacs) return true;
-  throw PacsFailure(PacsFault::kChanged, "the study is not in the PACS any more");
+  throw PacsFailure(PacsFault::kChanged, "the study is no longer in the PACS");
 }
 
 void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
@@ -290,7 +290,7 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
     // What it says is one thing.
     if (peer.has_instance(place, stop) == false) {
       throw PacsFailure(PacsFault::kNotStored,
-                        "the PACS says that it has stored the mesh, and does not find it");
+                        "the PACS confirmed that it stored the mesh, but does not find it");
     }
   } catch (const Error&) {
     services_.audit.add(entry);

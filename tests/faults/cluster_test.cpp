@@ -236,7 +236,7 @@ TEST_F(Cluster, ANodeThatStandsStillCannotFinishAndADrainedOneGivesItsJobsBack) 
   }));
   node(0).send_signal(SIGCONT);
   EXPECT_TRUE(
-      eventually([&] { return node(0).errors().find("had lost its lease") != std::string::npos; }));
+      eventually([&] { return node(0).errors().find("lost its lease") != std::string::npos; }));
   EXPECT_EQ(ask("SELECT attempts FROM jobs WHERE id = '" + before.id + "'"), "1");
   const Job second = node(1).client().job(before.id);
   EXPECT_EQ(second.state, JobState::kRunning);

@@ -22,7 +22,7 @@ constexpr const char* kSession =
 std::string message_of(const PGresult* result) {
   const char* text = PQresultErrorField(result, PG_DIAG_MESSAGE_PRIMARY);
   const char* state = PQresultErrorField(result, PG_DIAG_SQLSTATE);
-  return std::string("the database: ") + (text == nullptr ? "no answer" : text) + " (" +
+  return std::string("the database: ") + (text == nullptr ? "no response" : text) + " (" +
          (state == nullptr ? "-" : state) + ")";
 }
 
@@ -137,12 +137,14 @@ void check_url(const std::string& url) {
   const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> parts(
       PQconninfoParse(url.c_str(), &complaint), &PQconninfoFree);
   PQfreemem(complaint);  // it repeats what it complains of
-  if (!parts) refuse("is no URL that PostgreSQL's library reads");
+  if (!parts) refuse("is not a valid PostgreSQL URL");
   for (const PQconninfoOption* part = parts.get(); part->keyword != nullptr; ++part) {
     const std::string_view name = part->keyword;
     const bool is_secret = name == "password" || name == "sslpassword";
     if (is_secret && part->val != nullptr) {
-      refuse("must hold no password: PGPASSFILE names a file of them");
+      refuse(
+          "must not contain a password: put it into a password file and set PGPASSFILE to its "
+          "name");
     }
   }
 }
@@ -158,7 +160,7 @@ Connection::Connection(const std::string& url) {
   if (PQstatus(handle_) != CONNECTION_OK) {
     // libpq's own text may name hosts, users and files.
     PQfinish(handle_);
-    throw Interrupted(ErrorCode::kUnavailable, "the database does not answer");
+    throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
   }
   PQsetNoticeReceiver(handle_, take_notice, this);
   try {
@@ -189,7 +191,7 @@ void Connection::script(const std::string& sql) { checked(PQexec(handle_, sql.c_
 
 std::vector<std::string> Connection::take_messages() {
   if (PQconsumeInput(handle_) == 0) {
-    throw Interrupted(ErrorCode::kUnavailable, "the database does not answer");
+    throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
   }
   std::vector<std::string> messages;
   while (PGnotify* message = PQnotifies(handle_)) {
@@ -221,11 +223,11 @@ Rows Connection::checked(pg_result* result) {
   Rows rows(result);
   const ExecStatusType status = PQresultStatus(result);
   if (std::exchange(is_warned_, false)) {
-    throw Interrupted(ErrorCode::kUnavailable, "the database's standby does not answer");
+    throw Interrupted(ErrorCode::kUnavailable, "the database's standby does not respond");
   }
   if (status == PGRES_TUPLES_OK || status == PGRES_COMMAND_OK) return rows;
   if (!is_open()) {
-    throw Interrupted(ErrorCode::kUnavailable, "the database does not answer");
+    throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
   }
   throw_error(result);
 }
