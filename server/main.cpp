@@ -381,10 +381,26 @@ int run(const Options& options, const sigset_t& signals) {
   return 0;
 }
 
+// A daemon that cannot start says why whatever its log's level is, and in the log's form where that
+// is read by machines.
+void tell_failure(LogFormat format, const std::string& reason) {
+  if (format == LogFormat::kText) {
+    std::cerr << "isomeshd: " << reason << std::endl;
+    return;
+  }
+  spdlog::set_level(spdlog::level::critical);
+  spdlog::critical("isomeshd: {}", reason);
+}
+
+std::string usage_message(const CLI::App* cli, const CLI::Error& error) {
+  return "isomeshd: " + CLI::FailureMessage::simple(cli, error);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   constexpr int kWrongUsage = 2;
+  LogFormat log_format = LogFormat::kText;
   try {
     const sigset_t signals = block_signals();
     jobs::keep_freed_memory();
@@ -392,12 +408,13 @@ int main(int argc, char** argv) {
     start_log(LogFormat::kText, LogLevel::kInfo);
     Options options;
     CLI::App cli("isomeshd turns medical volumes into surface meshes over HTTP", "isomeshd");
+    cli.failure_message(usage_message);
     add_options(cli, options);
     Commands commands(cli, options);
     try {
       cli.parse(argc, argv);
     } catch (const CLI::ConfigError& error) {
-      std::cerr << describe_config_error(error.what()) << '\n';
+      tell_failure(log_format, describe_config_error(error.what()));
       return kWrongUsage;
     } catch (const CLI::ParseError& error) {
       return cli.exit(error) == 0 ? 0 : kWrongUsage;  // 0 for --help and --version
@@ -408,11 +425,12 @@ int main(int argc, char** argv) {
       if (!std::cout) throw Error(ErrorCode::kInternal, "standard output cannot be written to");
       return status;
     }
-    start_log(options.log_format, options.log_level);
+    log_format = options.log_format;
+    start_log(log_format, options.log_level);
     if (options.check_only) return tell_configuration(options, cli);
     return run(options, signals);
   } catch (const std::exception& error) {
-    spdlog::critical("{}", error.what());
+    tell_failure(log_format, error.what());
     return 1;
   }
 }

@@ -225,7 +225,7 @@ void Orders::work(const std::stop_token& stop) {
         sleep = std::clamp(wait, milliseconds(1), kLongestSleep);
       }
     } catch (const std::exception& error) {
-      spdlog::error("orders: {}", error.what());
+      spdlog::error("orders could not be processed and are retried: {}", error.what());
       is_in_trouble = true;  // such as a database that cannot be written: not at once again
     }
     Lock lock(mutex_);
@@ -297,7 +297,9 @@ void Orders::fail_step(store::OrderRecord& record, const Error& error, bool may_
   order.next_attempt = timestamp_of(next);
   services_.orders.save(record, next);
   log(record, std::string(describe(error.code()).name));
-  if (error.code() == ErrorCode::kInternal) spdlog::error("orders: {}", error.what());
+  if (error.code() == ErrorCode::kInternal) {
+    spdlog::error("a step of order {} failed and is retried: {}", order.id, error.what());
+  }
   changed();
 }
 

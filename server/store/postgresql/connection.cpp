@@ -7,6 +7,7 @@
 
 #include <libpq-fe.h>
 
+#include "base/text.h"
 #include "proto/error.h"
 
 namespace isomesh::store::postgresql {
@@ -149,16 +150,35 @@ void check_url(const std::string& url) {
   }
 }
 
-Connection::Connection(const std::string& url) {
+namespace {
+
+// To be finished by the caller, also where it has failed.
+pg_conn* connected(const std::string& url) {
   // What the URL says comes later and wins.
   const std::array<const char*, 9> names = {
       "connect_timeout",      "tcp_user_timeout", "keepalives_idle", "fallback_application_name",
       "target_session_attrs", "dbname",           "client_encoding", nullptr};
   const std::array<const char*, 9> values = {"5",          "10000",     "10",   "isomeshd",
                                              "read-write", url.c_str(), "UTF8", nullptr};
-  handle_ = PQconnectdbParams(names.data(), values.data(), 1);
+  return PQconnectdbParams(names.data(), values.data(), 1);
+}
+
+}  // namespace
+
+std::string reason_of_no_connection(const std::string& url) {
+  const std::unique_ptr<pg_conn, decltype(&PQfinish)> handle(connected(url), &PQfinish);
+  if (PQstatus(handle.get()) == CONNECTION_OK) return "";
+  // A line for each address that was tried.
+  std::string reason;
+  for (const std::string_view line : split(PQerrorMessage(handle.get()), '\n')) {
+    if (!line.empty()) reason += (reason.empty() ? "" : "; ") + std::string(trimmed(line));
+  }
+  return reason;
+}
+
+Connection::Connection(const std::string& url) : handle_(connected(url)) {
   if (PQstatus(handle_) != CONNECTION_OK) {
-    // libpq's own text may name hosts, users and files.
+    // libpq's own text may name hosts, users and files, and this one goes to clients.
     PQfinish(handle_);
     throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
   }
