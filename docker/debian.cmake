@@ -1,5 +1,5 @@
-# The Debian packages, made by CPack: isomeshd, isomesh and libisomesh-dev. The build must be configured with
-# -D CMAKE_INSTALL_PREFIX=/usr. Dependencies are found from the binaries.
+# CPack makes the Debian packages isomeshd, isomesh and libisomesh-dev from a build that was configured with
+# -D CMAKE_INSTALL_PREFIX=/usr. Their dependencies are read from the binaries.
 set(ISOMESH_MAINTAINER "isomesh <isomesh@localhost>" CACHE STRING "Maintainer of the packages: NAME <ADDRESS>")
 string(TIMESTAMP ISOMESH_BUILT "%a, %d %b %Y %H:%M:%S +0000" UTC)
 set(changelog ${PROJECT_BINARY_DIR}/changelog)
@@ -29,7 +29,7 @@ set(CPACK_PACKAGE_VENDOR isomesh)
 set(CPACK_PACKAGE_CONTACT ${ISOMESH_MAINTAINER})
 set(CPACK_PRE_BUILD_SCRIPTS ${PROJECT_SOURCE_DIR}/server/install/compress_manuals.cmake)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_PACKAGE_RELEASE 1 CACHE STRING "The packages' revision")
+set(CPACK_DEBIAN_PACKAGE_RELEASE 1 CACHE STRING "Revision of the packages")
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 
 set(scripts ${PROJECT_SOURCE_DIR}/server/install)
