@@ -9,72 +9,73 @@ namespace {
 constexpr NoteDescription kNoteDescriptions[] = {
     {.code = NoteCode::kFormsDiffer,
      .name = "forms-differ",
-     .meaning = "The sform and the qform of a NIfTI header place the samples differently; the "
-                "detail says by how much, and which one was used.",
+     .meaning = "A NIfTI header's sform and qform place the samples differently; the detail says "
+                "by how much and which was taken.",
      .is_in_mesh = true},
     {.code = NoteCode::kPixdimDiffers,
      .name = "pixdim-differs",
-     .meaning = "The voxel sizes of a NIfTI header differ from the lengths of the sform's steps; "
-                "the sform was used.",
+     .meaning = "A NIfTI header's voxel sizes are not the lengths of its sform's steps; the sform "
+                "was taken.",
      .is_in_mesh = true},
     {.code = NoteCode::kVolumeChosen,
      .name = "volume-chosen",
-     .meaning = "The file holds several volumes, and the request chose this one.",
+     .meaning = "The file holds several volumes, of which the request chose this one.",
      .is_in_mesh = true},
     {.code = NoteCode::kSpaceAssumed,
      .name = "space-assumed",
-     .meaning = "The file does not say how its axes are oriented in the patient; the detail says "
-                "what was assumed.",
+     .meaning = "The file does not say how its axes lie in the patient; the detail says what was "
+                "assumed.",
      .is_in_mesh = true},
     {.code = NoteCode::kUnitUnknown,
      .name = "unit-unknown",
-     .meaning = "The file's unit is not a length; one unit was taken as one millimetre.",
+     .meaning = "The file's unit is no length; one unit was taken for one millimetre.",
      .is_in_mesh = true},
     {.code = NoteCode::kNonFiniteSamples,
      .name = "non-finite-samples",
-     .meaning = "Some samples are infinite or not a number; they got the value of the smallest "
-                "sample and lie outside the surface.",
+     .meaning = "Some samples are no numbers or infinite; they have the smallest sample's value "
+                "and are outside of the surface.",
      .is_in_mesh = true},
     {.code = NoteCode::kTrailingBytes,
      .name = "trailing-bytes",
-     .meaning = "The data is longer than the header says; the excess was ignored."},
+     .meaning = "The data is longer than the header tells; what is too much was left out."},
     {.code = NoteCode::kValuesRescaled,
      .name = "values-rescaled",
-     .meaning =
-         "The samples were rescaled by the header's slope and offset, which other programs ignore.",
+     .meaning = "The samples were changed by the header's slope and offset, which other programs "
+                "pass over.",
      .is_in_mesh = true},
     {.code = NoteCode::kDuplicateFile,
      .name = "duplicate-file",
-     .meaning = "A file was sent more than once; one copy was used."},
+     .meaning = "A file came more than once and was taken once."},
     {.code = NoteCode::kLooksLikeLabels,
      .name = "looks-like-labels",
-     .meaning = "The samples are labels: the file says so, or they are few whole values in flat "
-                "regions. A job with `labels` gives each label its surface; an iso-value gives one "
-                "surface of everything above it."},
+     .meaning = "The samples are labels, as the file says or as few whole values in flat regions "
+                "look: a job's `labels` suits them, and an iso-value makes one surface of all that "
+                "lie above it."},
     {.code = NoteCode::kFrameOfReference,
      .name = "frame-of-reference",
-     .meaning = "The DICOM slices do not share one frame of reference; their positions were taken "
-                "to be in one space.",
+     .meaning = "The DICOM slices do not share one frame of reference; that they lie in one space "
+                "is taken from their positions.",
      .is_acceptable = true,
      .is_in_mesh = true},
     {.code = NoteCode::kEmptyPlanes,
      .name = "empty-planes",
-     .meaning = "A DICOM segmentation omits frames that show nothing; they became planes of zeros.",
+     .meaning =
+         "A DICOM segmentation leaves out frames that show nothing; they are planes of zeros.",
      .is_in_mesh = true},
     {.code = NoteCode::kDistanceAssumed,
      .name = "distance-assumed",
-     .meaning = "The DICOM image does not give the distance between its slices; the slice "
-                "thickness was used.",
+     .meaning = "The DICOM image does not tell how far apart its slices are; the thickness of a "
+                "slice was taken.",
      .is_in_mesh = true},
     {.code = NoteCode::kOverlappingSegments,
      .name = "overlapping-segments",
-     .meaning = "Segments overlap; a sample in several segments has a value that numbers their "
-                "combination, and a label stands for all values that its segment is in.",
+     .meaning = "Segments overlap; samples of several have values that number their combinations, "
+                "and a label is all values that its segment is in.",
      .is_in_mesh = true},
     {.code = NoteCode::kFractionalSegments,
      .name = "fractional-segments",
-     .meaning = "A DICOM segmentation holds fractions or probabilities; a segment is where they "
-                "are half of their maximum or more.",
+     .meaning = "A DICOM segmentation tells shares or probabilities; a segment is where they are "
+                "half of their maximum or more.",
      .is_in_mesh = true},
 };
 
