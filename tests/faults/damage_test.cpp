@@ -83,7 +83,7 @@ TEST_F(Damage, AMeshThatCannotBeMadeAgainSaysWhy) {
   spoil(job.parameters.volume);
   EXPECT_TRUE(is_problem(daemon().get(mesh(job).href), ErrorCode::kUnavailable));
   ASSERT_TRUE(eventually([&] { return daemon().get(mesh(job).href).status == 422; }));
-  EXPECT_THAT(daemon().get(mesh(job).href).body, HasSubstr("upload the volume again"));
+  EXPECT_THAT(daemon().get(mesh(job).href).body, HasSubstr("upload it again"));
   EXPECT_EQ(daemon().client().jobs().jobs.size(), 2U);
   // Which mends it, with the next job like it.
   finished_job(daemon());
