@@ -112,7 +112,7 @@ void add_token(const TokenRequest& request) {
       const TokenLine other = parsed(each);
       if (other.name == request.name && other.role != request.role) {
         throw invalid_parameter(
-            "role", request.name + " is " + other.role + " already; a name has one role");
+            "role", request.name + " already has the role " + other.role + "; a name has one role");
       }
     }
     lines.push_back(line);
@@ -153,16 +153,16 @@ void revoke_tokens(const TokenRequest& request) {
   }
   if (revoked == 0) {
     throw invalid_parameter("name",
-                            request.name + " has no such token; `isomeshd token list` has all");
+                            request.name + " has no such token; `isomeshd token list` lists all");
   }
   if (left == 0) {
     throw invalid_parameter("name",
-                            "no token would be left, and a daemon does not take such a file: "
-                            "add another one first, or stop the daemon");
+                            "no token would be left, and a daemon rejects a file without tokens: "
+                            "add another token first, or stop the daemon");
   }
   replace(request.file, kept);
   std::cout << "revoked " << revoked << (revoked == 1 ? " token" : " tokens")
-            << "; a running daemon knows after SIGHUP" << std::endl;
+            << "; send SIGHUP to a running daemon" << std::endl;
 }
 
 }  // namespace isomesh

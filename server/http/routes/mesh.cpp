@@ -68,7 +68,7 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
   if (labels && labels->values.size() != 1 && files_of(parameters) != parameters.formats) {
     throw invalid_parameter(
         "format",
-        "must hold all labels, as glb, ply, obj and zip do, because the response is one file");
+        "must hold all labels, such as glb, ply, obj or zip, because the response is one file");
   }
   const process::ImportOptions options = import_options_of(request);
   const std::string key = idempotency_key_of(request);
