@@ -33,8 +33,8 @@ std::array<double, N> array_of(const std::string& name, std::string_view text) {
 std::array<std::uint32_t, 3> dims_of(std::string_view text) {
   const std::vector<std::string_view> parts = split(text, ',');
   std::array<std::uint32_t, 3> dims = {};
-  const Error wrong =
-      invalid_parameter("dims", "must be 3 whole numbers up to 4294967295, separated by commas");
+  const Error wrong = invalid_parameter(
+      "dims", "must be 3 whole numbers from 1 to 4294967295, separated by commas");
   if (parts.size() != dims.size()) throw wrong;
   for (std::size_t i = 0; i < dims.size(); ++i) {
     const auto number = whole_number(parts[i]);
