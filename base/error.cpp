@@ -24,14 +24,14 @@ void throw_system_error(std::string_view call, int error_number) {
   }
   if (error_number == EMFILE || error_number == ENFILE || error_number == ENOMEM ||
       error_number == ENOBUFS || error_number == EAGAIN) {
-    throw Error(ErrorCode::kUnavailable, "the service has not enough descriptors or memory");
+    throw Error(ErrorCode::kUnavailable, "the service is out of file descriptors or memory");
   }
   throw Error(ErrorCode::kInternal,
               std::string(call) + ": " + std::generic_category().message(error_number));
 }
 
 void throw_file_error(std::string_view call, int error_number) {
-  if (error_number == ENOENT) throw Error(ErrorCode::kNotFound, "the file is not there");
+  if (error_number == ENOENT) throw Error(ErrorCode::kNotFound, "the file does not exist");
   throw_system_error(call, error_number);
 }
 

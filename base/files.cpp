@@ -33,7 +33,7 @@ void InputFile::look() {
   if (::fstat(file_.number(), &status) != 0) fail("reading a file's size", errno);
   if (!S_ISREG(status.st_mode)) {
     throw shown_.empty() ? Error(ErrorCode::kInternal, "not a regular file")
-                         : Error(ErrorCode::kInvalidParameter, shown_ + ": is not a regular file");
+                         : Error(ErrorCode::kInvalidParameter, shown_ + " is not a regular file");
   }
   size_ = static_cast<std::uint64_t>(status.st_size);
 }
@@ -61,7 +61,7 @@ void InputFile::read_exactly(std::uint64_t offset, std::span<std::byte> target) 
   if (read(offset, target) == target.size()) return;
   throw shown_.empty()
       ? Error(ErrorCode::kInternal, "a file became shorter while it was read")
-      : Error(ErrorCode::kInvalidParameter, shown_ + ": became shorter while it was read");
+      : Error(ErrorCode::kInvalidParameter, shown_ + " became shorter while it was read");
 }
 
 std::string InputFile::text(std::uint64_t offset, std::size_t count) const {

@@ -38,15 +38,15 @@ set(CPACK_DEBIAN_DAEMON_PACKAGE_DEPENDS "adduser")
 set(CPACK_DEBIAN_DAEMON_PACKAGE_CONTROL_EXTRA
   ${scripts}/postinst ${scripts}/prerm ${scripts}/postrm ${scripts}/conffiles)
 set(CPACK_COMPONENT_DAEMON_DESCRIPTION
-  "daemon that turns medical volumes into surface meshes\nReads NIfTI, NRRD, MetaImage, VTK images, DICOM and raw samples over HTTP,\nextracts and smooths iso-surfaces and labels, and sends Draco, GLB, STL, 3MF,\nPLY, OBJ, OFF, VTK and GIFTI. It has a web page.")
+  "daemon that turns medical volumes into surface meshes\nisomeshd has an HTTP API and a web page. It reads NIfTI, NRRD, MetaImage, VTI\nand DICOM files, ZIP and TAR archives of them, and raw samples. It extracts and\nsmooths the surfaces of iso-values and labels, and writes Draco, GLB, STL, PLY,\nOBJ, 3MF, OFF, VTK, VTP and GIFTI files.\nThe package contains isomeshd and the programs that it runs: isomesh-import\nreads uploads, isomesh-job makes meshes, and isomesh-dimse sends and receives\nDICOM objects.")
 
 set(CPACK_DEBIAN_CLIENT_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_CLIENT_PACKAGE_SUGGESTS isomeshd)
 set(CPACK_COMPONENT_CLIENT_DESCRIPTION
-  "command that makes meshes with an isomesh daemon\nSends a medical volume to the daemon and downloads its surface, in one step or\nin several.")
+  "command that turns medical volumes into surface meshes\nisomesh uploads a volume to an isomesh daemon, starts a job and downloads the\nmesh, in one step or in several. It takes NIfTI, NRRD, MetaImage, VTI and DICOM\nfiles and folders, and saves Draco, GLB, STL, PLY, OBJ, 3MF, OFF, VTK, VTP and\nGIFTI files. With the package isomeshd it also works without a server.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libcurl4-openssl-dev | libcurl4-gnutls-dev, libssl-dev")
 set(CPACK_COMPONENT_DEV_DESCRIPTION
-  "C++ library that makes meshes with an isomesh daemon\nHeaders, static libraries, and files for CMake and pkg-config.")
+  "C++ library for clients of isomesh daemons\nPrograms upload volumes, start jobs and download meshes with it. The package\ncontains headers, static libraries, and files for CMake and pkg-config.")
 include(CPack)

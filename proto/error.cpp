@@ -39,12 +39,12 @@ constexpr std::array kDescriptions = {
     ErrorDescription{ErrorCode::kPreconditionFailed, 412, "precondition-failed",
                      "Precondition failed"},
     ErrorDescription{ErrorCode::kHeadersTooLarge, 431, "headers-too-large", "Headers too large"},
-    ErrorDescription{ErrorCode::kUnreachable, 503, "unreachable", "The server is not reachable"},
+    ErrorDescription{ErrorCode::kUnreachable, 503, "unreachable", "The server cannot be reached"},
     ErrorDescription{ErrorCode::kPacsUnreachable, 503, "pacs-unreachable",
-                     "The PACS is not reachable"},
-    ErrorDescription{ErrorCode::kPacsRefused, 502, "pacs-refused", "The PACS has refused this"},
+                     "The PACS cannot be reached"},
+    ErrorDescription{ErrorCode::kPacsRefused, 502, "pacs-refused", "The PACS rejected the request"},
     ErrorDescription{ErrorCode::kSeriesIncomplete, 503, "series-incomplete",
-                     "The series has not come whole"},
+                     "The series is incomplete"},
 };
 
 }  // namespace

@@ -101,7 +101,8 @@ constexpr bool kIsOptional<std::optional<T>> = true;
 
 // Throws as nlohmann's own readers do, where those would take another kind for an empty one.
 inline void check_kind(bool right) {
-  if (!right) throw Error(ErrorCode::kInternal, "the server's answer has a member of a wrong kind");
+  if (!right)
+    throw Error(ErrorCode::kInternal, "the server's response has a member of the wrong type");
 }
 
 inline bool may_be_absent(const char* /*name*/) { return false; }
@@ -134,7 +135,7 @@ void read(const Json& json, T& value) {
     value = json.get<int>() == 5 ? Scheme::kFive : Scheme::kSix;
   } else if constexpr (Enumeration<T>) {
     const auto known = from_string<T>(json.get<std::string>());
-    if (!known) throw Error(ErrorCode::kInternal, "the server's answer names an unknown value");
+    if (!known) throw Error(ErrorCode::kInternal, "the server's response has an unknown value");
     value = *known;
   } else if constexpr (kIsPerFormat<T>) {
     check_kind(json.is_object());
@@ -170,7 +171,7 @@ void read(const Json& json, T& value) {
       if (const auto found = json.find(key); found != json.end()) {
         read_field(*found, member);
       } else if (!kMayBeMissing && !may_be_absent(name)) {
-        throw Error(ErrorCode::kInternal, std::string("the server's answer lacks ") + key);
+        throw Error(ErrorCode::kInternal, std::string("the server's response lacks ") + key);
       }
     });
   }
@@ -218,7 +219,7 @@ T from_record(std::string_view text) {
     read(json, value);
     return value;
   } catch (const Json::exception&) {
-    throw Error(ErrorCode::kInternal, "a record is not what a version of this service wrote");
+    throw Error(ErrorCode::kInternal, "a record was not written by a version of this service");
   }
 }
 

@@ -59,6 +59,7 @@ void visit(Is<OrderWork> auto& self, auto&& field) {
   field("callback", self.callback);
   field("max_error_mm", self.max_error_mm);
   field("triangles", self.triangles);
+  field("queried", self.queried);
 }
 
 void visit(Is<PacsStatus> auto& self, auto&& field) {

@@ -56,7 +56,7 @@ class Faults {
   std::string uid(const Json& object, const std::string& prefix, const char* name) {
     std::string text = this->text(object, prefix, name);
     if (object.contains(name) && object[name].is_string() && !is_uid(text)) {
-      add(prefix + name, "must be a UID: numbers with dots between, at most 64 characters");
+      add(prefix + name, "must be a UID: numbers separated by dots, at most 64 characters");
     }
     return text;
   }
@@ -95,7 +95,7 @@ std::vector<SendTarget> read_targets(const Json& list, Faults& faults) {
     faults.check_known(each, "send.", {"pacs", "format"});
     targets.push_back({.pacs = faults.text(each, "send.", "pacs")});
     if (each.contains("format") && each["format"] != "stl") {
-      faults.add("send.format", "must be \"stl\": a PACS takes no other meshes");
+      faults.add("send.format", "must be \"stl\": no other format can be sent to a PACS");
     }
   }
   return targets;
@@ -214,8 +214,9 @@ OrderRequest parse_order_request(std::string_view body) {
       request.callback = Callback{faults.text(callback, "callback.", "url")};
     }
   }
-  if (!request.rule && !request.parameters) faults.add("parameters", "is required, or rule");
-  if (!request.rule && !request.send) faults.add("send", "is required, or rule");
+  if (!request.rule && !request.parameters)
+    faults.add("parameters", "is required unless rule is given");
+  if (!request.rule && !request.send) faults.add("send", "is required unless rule is given");
   faults.throw_if_any();
   return request;
 }

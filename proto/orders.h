@@ -95,6 +95,7 @@ struct OrderWork {
   // How far a mesh may be from the surface that is simplified to fit into what its PACS takes.
   std::optional<double> max_error_mm = {};
   std::optional<std::uint32_t> triangles = {};  // that fit, once it is known that all do not
+  std::optional<std::string> queried = {};      // when the query of the audit trail was made
 
   bool operator==(const OrderWork&) const = default;
 };

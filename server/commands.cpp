@@ -29,24 +29,20 @@ const command_line::Manual& manual() {
       .name = "turn medical volumes into surface meshes over HTTP",
       .sections = {
           {"Configuration",
-           "Every option also comes from the environment and from the file of --config, which is "
-           "TOML: "
-           "lines such as\n\n  max-queue = 500\n\nWhat is nearer to the command line wins. A key "
-           "that is no "
-           "option is refused. `isomeshd config` prints such a file with every option in it, and "
-           "`isomeshd check` what would be used."},
+           "Every option can also be set in the environment and in the file of --config. The file "
+           "is TOML, with lines such as\n\n  max-queue = 500\n\nThe command line overrides the "
+           "environment, which overrides the file. An unknown key is an error. `isomeshd config` "
+           "prints such a file with every option in it. `isomeshd check` checks the options and "
+           "prints those that would be used."},
           {"Signals",
-           "SIGTERM and SIGINT drain: no job is accepted any more, running ones have "
-           "--drain-seconds to "
-           "finish and are put back otherwise. SIGHUP reads tokens, certificate and secrets of "
-           "callbacks "
-           "again."},
+           "SIGTERM and SIGINT drain: isomeshd accepts no new jobs, and running jobs have "
+           "--drain-seconds to finish. Jobs that do not finish go back to the queue. SIGHUP "
+           "reloads the tokens, the certificate and the keys of callbacks."},
           {"Exit status",
-           "0 when it was asked to end, 1 when it could not start or go on, 2 for wrong usage."},
+           "0 after it was asked to stop, 1 if it could not start or continue, 2 for wrong usage."},
           {"Files",
-           "/etc/isomesh/isomeshd.toml is what the systemd unit starts it with. /var/lib/isomesh "
-           "is the data "
-           "folder there."},
+           "The systemd unit starts isomeshd with /etc/isomesh/isomeshd.toml. The data folder is "
+           "then /var/lib/isomesh."},
           {"See also", "isomesh(1)"}}};
   return text;
 }
@@ -79,113 +75,115 @@ struct Commands::State {
   }
 
   void add_token_commands() {
-    CLI::App& tokens = *cli.add_subcommand("token", "Handle the file of --tokens");
+    CLI::App& tokens = *cli.add_subcommand("token", "Manage the file of --tokens");
     tokens.require_subcommand(1)->fallthrough()->configurable(false);
     CLI::App& added =
-        add(tokens, "add", "Make a token and print it, once", [this] { add_token(with_file()); });
-    added.add_option("NAME", token.name, "Whose it is, as jobs and the log name it")->required();
+        add(tokens, "add", "Create a token and print it once", [this] { add_token(with_file()); });
+    added.add_option("NAME", token.name, "User of the token; jobs and the log show this name")
+        ->required();
     added
-        .add_option("--role", token.role,
-                    "user: its own volumes and jobs; admin: everybody's, and /metrics; monitor: "
-                    "/metrics alone")
+        .add_option(
+            "--role", token.role,
+            "user: own volumes and jobs; admin: everyone's, and /metrics; monitor: only /metrics")
         ->type_name("user|admin|monitor")
         ->capture_default_str();
     added
         .add_option("--into", token.file,
-                    "Add the token's hash to this file; that of --tokens otherwise, and without "
-                    "either its line is printed")
+                    "File to add the token's hash to. Default: the file of --tokens. Without "
+                    "either, the line for it is printed")
         ->type_name("FILE");
-    add(tokens, "list", "Print name, role and the beginning of the hash of each token",
+    add(tokens, "list", "Print each token's name, role and the beginning of its hash",
         [this] { list_tokens(with_file()); });
-    CLI::App& revoked = add(tokens, "revoke", "Take tokens of a name out of the file",
+    CLI::App& revoked = add(tokens, "revoke", "Remove the tokens of a user from the file",
                             [this] { revoke_tokens(with_file()); });
-    revoked.add_option("NAME", token.name, "Whose")->required();
+    revoked.add_option("NAME", token.name, "User of the tokens")->required();
     revoked
         .add_option("HASH", token.hash,
-                    "The beginning of one token's hash; all of the name without it")
+                    "Beginning of one token's hash. Without it, all tokens of the user are removed")
         ->check(CLI::Validator(
-            [](const std::string& text) { return text.empty() ? "it must not be empty" : ""; },
-            ""));
+            [](const std::string& text) { return text.empty() ? "must not be empty" : ""; }, ""));
   }
 
   void check_is_whole() const {
     if (options.blobs.place.empty()) return;
-    throw invalid_parameter("blobs",
-                            "a backup is of a data folder that has its files in it; docs/blobs.md "
-                            "says how records and files that are apart are copied");
+    throw invalid_parameter(
+        "blobs",
+        "backup and restore need a data folder that has its files in it. docs/blobs.md says how to "
+        "copy records and files that are stored separately");
   }
 
   void add_backup_commands() {
-    CLI::App& backup =
-        add(cli, "backup", "Copy the data folder, also while a daemon uses it", [this] {
-          refuse_database("pg_dump copies the records (docs/cluster.md)");
-          check_is_whole();
-          tell("copied", store::back_up(options.data, folder));
-        });
-    backup.add_option("DIR", folder, "The folder to make, which must not be there")->required();
-    CLI::App& restored = add(
-        cli, "restore", "Make the data folder from a backup; it must be missing or empty", [this] {
-          refuse_database("pg_restore puts the records back (docs/cluster.md)");
-          check_is_whole();
-          tell("put back", store::restore(folder, options.data));
-        });
-    restored.add_option("DIR", folder, "The folder that `isomeshd backup` made")->required();
+    CLI::App& backup = add(cli, "backup", "Copy the data folder; a daemon may be using it", [this] {
+      refuse_database("use pg_dump to copy them (docs/cluster.md)");
+      check_is_whole();
+      tell("copied", store::back_up(options.data, folder));
+    });
+    backup.add_option("DIR", folder, "Folder to create; it must not exist")->required();
+    CLI::App& restored =
+        add(cli, "restore",
+            "Restore the data folder from a backup; the folder must be missing or empty", [this] {
+              refuse_database("use pg_restore to restore them (docs/cluster.md)");
+              check_is_whole();
+              tell("restored", store::restore(folder, options.data));
+            });
+    restored.add_option("DIR", folder, "Folder that `isomeshd backup` created")->required();
   }
 
   void add_move_command() {
-    CLI::App& move = add(
-        cli, "move",
-        "Bring the records of the folder of --data, which no daemon may use meanwhile, to an empty "
-        "database; its files of volumes and meshes stay where they are",
-        [this] {
-          store::postgresql::check_url(target);
-          const store::DataFolder folder_of_data(options.data, options.disk_reserve);
-          const auto moved = store::postgresql::move_records(folder_of_data, target);
-          std::cout << "moved " << moved.volumes << " volumes, " << moved.jobs << " jobs and "
-                    << moved.orders << " orders" << std::endl;
-        });
-    move.add_option("--to", target, "postgresql://... of the database")->required();
+    CLI::App& move =
+        add(cli, "move",
+            "Move the records of the folder of --data to an empty database. No daemon may use the "
+            "folder meanwhile. The files of volumes and meshes stay where they are",
+            [this] {
+              store::postgresql::check_url(target);
+              const store::DataFolder folder_of_data(options.data, options.disk_reserve);
+              const auto moved = store::postgresql::move_records(folder_of_data, target);
+              std::cout << "moved " << moved.volumes << " volumes, " << moved.jobs << " jobs and "
+                        << moved.orders << " orders" << std::endl;
+            });
+    move.add_option("--to", target, "The database, as postgresql://USER@HOST/NAME")->required();
   }
 
   // May be asked for while a daemon runs.
   void add_audit_command() {
-    CLI::App& audit =
-        add(cli, "audit",
-            "Print the audit trail of the folder of --data, or of --store, one JSON object a line",
-            [this] {
-              read_audit_trail(options, after,
-                               [](std::string_view line) { std::cout << line << '\n'; });
-              std::cout.flush();
-              if (!std::cout) {
-                throw Error(ErrorCode::kInternal, "standard output takes no more of the trail");
-              }
-            });
-    audit.add_option("--after", after, "Only what has a greater id")->capture_default_str();
+    CLI::App& audit = add(
+        cli, "audit",
+        "Print the audit trail of the folder of --data, or of --store, as one JSON object per line",
+        [this] {
+          read_audit_trail(options, after,
+                           [](std::string_view line) { std::cout << line << '\n'; });
+          std::cout.flush();
+          if (!std::cout) {
+            throw Error(ErrorCode::kInternal,
+                        "the audit trail cannot be written to standard output");
+          }
+        });
+    audit.add_option("--after", after, "Print only entries with a greater id")
+        ->capture_default_str();
   }
 
   // Half a copy is none.
   void refuse_database(const std::string& instead) const {
     if (options.store.empty()) return;
-    throw Error(
-        ErrorCode::kInvalidParameter,
-        "the records are in the database of --store and not in the data folder: " + instead);
+    throw Error(ErrorCode::kInvalidParameter,
+                "the records are in the database of --store, not in the data folder: " + instead);
   }
 
   void tell(const char* what, const store::Copied& copied) {
     std::cout << what << ' ' << copied.blobs << " files of volumes and meshes, " << copied.bytes
               << " bytes" << std::endl;
     for (const std::string& lost : copied.damaged) {
-      spdlog::warn("damaged: {}; its bytes are not what they were", lost);
+      spdlog::warn("{} is damaged: its bytes have changed", lost);
     }
-    for (const std::string& lost : copied.missing) spdlog::warn("missing: {}", lost);
+    for (const std::string& lost : copied.missing) spdlog::warn("{} is missing", lost);
     if (!copied.damaged.empty() || !copied.missing.empty()) status = 1;
   }
 
   void add_description_commands() {
-    add(cli, "config", "Print a file for --config with every option and what it means",
+    add(cli, "config", "Print a file for --config with every option and its meaning",
         [this] { std::cout << as_config(cli, Remarks::kYes) << std::flush; });
     CLI::App& completion =
-        add(cli, "completion", "Print what a shell completes arguments with", [this] {
+        add(cli, "completion", "Print a script that completes arguments in a shell", [this] {
           const auto shell_asked = command_line::shell_from(shell);
           if (!shell_asked) throw invalid_parameter("SHELL", "must be bash, zsh or fish");
           std::cout << command_line::completion(cli, *shell_asked) << std::flush;

@@ -68,8 +68,9 @@ std::filesystem::path program_of_ours(const std::string& name) {
        {folder / name, (folder / ISOMESH_LIBEXEC / name).lexically_normal()}) {
     if (::access(program.c_str(), X_OK) == 0) return program;
   }
-  throw Error(ErrorCode::kInternal, "the program " + name + " is missing beside isomeshd and in " +
-                                        ISOMESH_LIBEXEC + " from there");
+  throw Error(ErrorCode::kInternal, "the program " + name +
+                                        " is missing: it is neither beside isomeshd nor in " +
+                                        ISOMESH_LIBEXEC + " relative to it");
 }
 
 // A quarter of the time that things are kept, within bounds: what expired goes soon, and the disk
@@ -117,12 +118,13 @@ Files open_files(const Options& options, const net::Address& address, http::Read
 void check_reach(const Options& options, const net::Address& address, const Files& files) {
   if (address.is_loopback()) return;
   if (!files.tokens && !options.open_network) {
-    throw invalid_parameter("listen",
-                            "requests are not authenticated, so only loopback or a Unix socket is "
-                            "listened on; --tokens or --open-network allow other addresses");
+    throw invalid_parameter(
+        "listen",
+        "requests are not authenticated, so only loopback addresses and Unix sockets are allowed. "
+        "Use --tokens or --open-network for other addresses");
   }
   if (files.tokens && !files.tls) {
-    spdlog::warn("tokens and volumes cross the network in plain: --tls-cert encrypts them");
+    spdlog::warn("tokens and volumes cross the network unencrypted; --tls-cert encrypts them");
   }
 }
 
@@ -132,8 +134,7 @@ std::vector<std::string> callback_secrets(const Options& options) {
   }
   if (options.callback_targets.empty()) return {};
   throw invalid_parameter("callback-secret-file",
-                          "callbacks are signed, so it is needed with "
-                          "--callback-allow");
+                          "is required with --callback-allow, because callbacks are signed");
 }
 
 callbacks::CallbackOptions callback_options(const Options& options) {
@@ -148,12 +149,12 @@ void reload_one(const std::function<void()>& read) {
   try {
     read();
   } catch (const Error& error) {
-    spdlog::error("{}; what was there before stays", error.what());
+    spdlog::error("{}; the previous content stays in use", error.what());
   }
 }
 
 void reload(const Options& options, const Files& files, callbacks::Callbacks& callbacks) {
-  spdlog::info("signal {}: reading files again", SIGHUP);
+  spdlog::info("signal {}: reloading files", SIGHUP);
   if (files.tokens) reload_one([&] { files.tokens->reload(); });
   if (files.tls) reload_one([&] { files.tls->reload(); });
   reload_one([&] { callbacks.set_secrets(callback_secrets(options)); });
@@ -165,7 +166,7 @@ void check_places(const Options& options) {
   if (options.data.empty()) throw invalid_parameter("data", "must name a folder");
   if (std::filesystem::exists(options.data, absent) &&
       !std::filesystem::is_directory(options.data, absent)) {
-    throw invalid_parameter("data", options.data.string() + " is no folder");
+    throw invalid_parameter("data", options.data.string() + " is not a folder");
   }
   const auto& authorities = options.callback_authorities;
   if (!authorities.empty() && ::access(authorities.c_str(), R_OK) != 0) {
@@ -291,7 +292,7 @@ int run(const Options& options, const sigset_t& signals) {
   store::VolumeStore& volumes = records->volumes();
   store::JobStore& jobs = records->jobs();
   if (const std::size_t count = jobs.reap()) {
-    spdlog::warn("{} jobs ran when a daemon ended; they are run again", count);
+    spdlog::warn("{} jobs were running when a daemon stopped; they are run again", count);
   }
   store::RetentionOptions retention_options;
   retention_options.keep = keep;
@@ -344,7 +345,7 @@ int run(const Options& options, const sigset_t& signals) {
       dimse_listener = std::make_unique<dimse::DimseListener>(
           dimse::ListenerServices{folder, blobs, received, audit, *hospital->dimse},
           *hospital->settings.dimse);
-      spdlog::info("series are received by C-STORE on {}", dimse_listener->authority());
+      spdlog::info("receiving series by C-STORE on {}", dimse_listener->authority());
     }
   }
   const http::Services services = {
@@ -371,7 +372,8 @@ int run(const Options& options, const sigset_t& signals) {
   server.begin_drain();
   if (dimse_listener) dimse_listener->stop();
   if (!workers.drain(std::chrono::seconds(options.drain_seconds))) {
-    spdlog::warn("jobs still run after {} s; they are stopped", options.drain_seconds);
+    spdlog::warn("jobs are still running after {} s; they are stopped and put back",
+                 options.drain_seconds);
   }
   if (orders) orders->stop();
   if (audit_sender) audit_sender->stop();
@@ -379,10 +381,26 @@ int run(const Options& options, const sigset_t& signals) {
   return 0;
 }
 
+// A daemon that cannot start says why whatever its log's level is, and in the log's form where that
+// is read by machines.
+void tell_failure(LogFormat format, const std::string& reason) {
+  if (format == LogFormat::kText) {
+    std::cerr << "isomeshd: " << reason << std::endl;
+    return;
+  }
+  spdlog::set_level(spdlog::level::critical);
+  spdlog::critical("isomeshd: {}", reason);
+}
+
+std::string usage_message(const CLI::App* cli, const CLI::Error& error) {
+  return "isomeshd: " + CLI::FailureMessage::simple(cli, error);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   constexpr int kWrongUsage = 2;
+  LogFormat log_format = LogFormat::kText;
   try {
     const sigset_t signals = block_signals();
     jobs::keep_freed_memory();
@@ -390,12 +408,13 @@ int main(int argc, char** argv) {
     start_log(LogFormat::kText, LogLevel::kInfo);
     Options options;
     CLI::App cli("isomeshd turns medical volumes into surface meshes over HTTP", "isomeshd");
+    cli.failure_message(usage_message);
     add_options(cli, options);
     Commands commands(cli, options);
     try {
       cli.parse(argc, argv);
     } catch (const CLI::ConfigError& error) {
-      std::cerr << describe_config_error(error.what()) << '\n';
+      tell_failure(log_format, describe_config_error(error.what()));
       return kWrongUsage;
     } catch (const CLI::ParseError& error) {
       return cli.exit(error) == 0 ? 0 : kWrongUsage;  // 0 for --help and --version
@@ -406,11 +425,12 @@ int main(int argc, char** argv) {
       if (!std::cout) throw Error(ErrorCode::kInternal, "standard output cannot be written to");
       return status;
     }
-    start_log(options.log_format, options.log_level);
+    log_format = options.log_format;
+    start_log(log_format, options.log_level);
     if (options.check_only) return tell_configuration(options, cli);
     return run(options, signals);
   } catch (const std::exception& error) {
-    spdlog::critical("{}", error.what());
+    tell_failure(log_format, error.what());
     return 1;
   }
 }

@@ -59,7 +59,7 @@ CLI::Validator number_between(double least, double most) {
   return {[range](std::string& text) {
             double number = 0;
             const bool is_nan = CLI::detail::lexical_cast(text, number) && std::isnan(number);
-            return is_nan ? text + " is no number" : range(text);
+            return is_nan ? text + " is not a number" : range(text);
           },
           range.get_description()};
 }
@@ -73,7 +73,7 @@ CLI::Validator size_of_bytes(std::uint64_t least = 0) {
         const std::string given = text;
         std::uint64_t number = 0;
         if (std::from_chars(given.data(), given.data() + given.size(), number).ec != std::errc()) {
-          return given + " is no number of bytes";
+          return given + " is not a number of bytes";
         }
         std::string wrong = with_unit(text);
         if (!wrong.empty()) return wrong;
@@ -86,21 +86,22 @@ CLI::Validator size_of_bytes(std::uint64_t least = 0) {
 // Of a page: "https://viewer.example", or all of them.
 std::string wrong_origin(const std::string& text) {
   const bool is_origin = text == "*" || text.starts_with("http://") || text.starts_with("https://");
-  return is_origin ? "" : text + " is no origin, such as https://viewer.example";
+  return is_origin ? "" : text + " is not an origin such as https://viewer.example";
 }
 
 std::string wrong_host(const std::string& text) {
   const bool is_name = !text.empty() && text.find_first_of(" \t/") == std::string::npos;
-  return is_name ? "" : '"' + text + "\" is no name of a host";
+  return is_name ? "" : '"' + text + "\" is not a host name";
 }
 
 void add_log_options(CLI::App& cli, Options& options) {
-  cli.add_option("--log-level", options.log_level, "debug, info, warn, error or off")
+  cli.add_option("--log-level", options.log_level,
+                 "Least severe messages to log: debug, info, warn, error or off")
       ->envname("ISOMESH_LOG_LEVEL")
       ->transform(CLI::CheckedTransformer(kLogLevels).description(""))
       ->default_str("info");
   cli.add_option("--log-format", options.log_format,
-                 "The form of the log's lines on standard error: text or json")
+                 "Format of the log lines on standard error: text or json")
       ->envname("ISOMESH_LOG_FORMAT")
       ->transform(CLI::CheckedTransformer(kLogFormats).description(""))
       ->default_str("text");
@@ -108,14 +109,14 @@ void add_log_options(CLI::App& cli, Options& options) {
 
 void add_security_options(CLI::App& cli, Options& options) {
   cli.add_option("--tokens", options.tokens,
-                 "File of tokens that requests must have; `isomeshd token add` makes them. SIGHUP "
-                 "reads it again")
+                 "File of the tokens that requests need; `isomeshd token add` creates them. SIGHUP "
+                 "reloads it")
       ->envname("ISOMESH_TOKENS");
   auto* certificate =
       cli.add_option("--tls-cert", options.tls_certificate,
-                     "File of the certificate (PEM) to listen with https; SIGHUP reads it again")
+                     "Certificate file (PEM), to listen with https. SIGHUP reloads it and the key")
           ->envname("ISOMESH_TLS_CERT");
-  cli.add_option("--tls-key", options.tls_key, "File of the certificate's key (PEM)")
+  cli.add_option("--tls-key", options.tls_key, "File of the certificate's private key (PEM)")
       ->envname("ISOMESH_TLS_KEY")
       ->needs(certificate);
 }
@@ -123,20 +124,22 @@ void add_security_options(CLI::App& cli, Options& options) {
 void add_callback_options(CLI::App& cli, Options& options) {
   cli.add_option(
          "--callback-allow", options.callback_targets,
-         "Beginning of URLs that jobs may call back, such as https://ris.example.org/hooks; "
-         "may be repeated; private: before it lets its name lead to private addresses")
+         "Allow callbacks to URLs that begin with this, such as https://ris.example.org/hooks. May "
+         "be repeated. Prefix `private:` to allow private addresses")
       ->envname("ISOMESH_CALLBACK_ALLOW")
       ->type_name("URL")
       ->delimiter(',')
       ->allow_extra_args(false);
   cli.add_option("--callback-secret-file", options.callback_secrets,
-                 "File of the key that signs callbacks; SIGHUP reads it again")
+                 "File of the keys that sign callbacks, one per line. SIGHUP reloads it")
       ->envname("ISOMESH_CALLBACK_SECRET_FILE");
-  cli.add_option("--callback-ca", options.callback_authorities,
-                 "File of the certificate authorities that callbacks trust; the system's otherwise")
+  cli.add_option(
+         "--callback-ca", options.callback_authorities,
+         "File of the certificate authorities to trust for callbacks, instead of the system's")
       ->envname("ISOMESH_CALLBACK_CA");
-  cli.add_option("--callback-retry-seconds", options.callback_retry_seconds,
-                 "Pause after a callback's first failure; it doubles up to an hour")
+  cli.add_option(
+         "--callback-retry-seconds", options.callback_retry_seconds,
+         "Seconds until a failed callback is retried; they double with each failure, up to an hour")
       ->envname("ISOMESH_CALLBACK_RETRY_SECONDS")
       ->check(number_between(0.01, 3600.0))
       ->capture_default_str();
@@ -144,35 +147,34 @@ void add_callback_options(CLI::App& cli, Options& options) {
 
 void add_blob_options(CLI::App& cli, Options& options) {
   cli.add_option("--blobs", options.blobs.place,
-                 "Where the files of volumes and meshes are, when not in the folder of --data: "
-                 "s3://BUCKET[/PREFIX]?endpoint=URL&region=NAME, or a folder that other daemons "
+                 "Where to store the files of volumes and meshes, if not in the folder of --data: "
+                 "s3://BUCKET[/PREFIX]?endpoint=URL&region=NAME, or a folder that several daemons "
                  "may share")
       ->envname("ISOMESH_BLOBS")
       ->type_name("URL|DIR");
   cli.add_option("--blob-cache", options.blobs.cache,
-                 "Bytes of copies of files in S3 that are kept in the folder of --data")
+                 "Size of the cache for files from S3, in bytes; it is in the folder of --data")
       ->envname("ISOMESH_BLOB_CACHE")
       ->transform(size_of_bytes())
       ->capture_default_str();
   cli.add_option("--blob-credentials", options.blobs.credentials,
-                 "File of the keys for S3, as AWS' tools have it, read again for each request; "
-                 "AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY otherwise")
+                 "File of the keys for S3, in the format of AWS' tools. Each request reads it "
+                 "again. Without it, AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY are used")
       ->envname("ISOMESH_BLOB_CREDENTIALS");
-  cli.add_option(
-         "--blob-ca", options.blobs.authorities,
-         "File of the certificate authorities that S3 is trusted by; the system's otherwise")
+  cli.add_option("--blob-ca", options.blobs.authorities,
+                 "File of the certificate authorities to trust for S3, instead of the system's")
       ->envname("ISOMESH_BLOB_CA");
-  cli.add_flag(
-         "--blob-redirect", options.http.blob_redirect,
-         "Answer downloads of meshes in S3 that say `Prefer: redirect` with an address there, "
-         "valid for a minute")
+  cli.add_flag("--blob-redirect", options.http.blob_redirect,
+               "Redirect mesh downloads that say `Prefer: redirect` to a link into S3, valid for "
+               "one minute")
       ->envname("ISOMESH_BLOB_REDIRECT");
 }
 
 void add_check(CLI::App& cli, Options& options) {
-  constexpr const char* kMeaning = "Tell which options would be used, and end; as `isomeshd check`";
+  constexpr const char* kMeaning =
+      "Check the options, print those that would be used, and exit; same as `isomeshd check`";
   cli.add_flag("--check-config", options.check_only, kMeaning)->configurable(false);
-  cli.add_subcommand("check", "Tell which options would be used, and end")
+  cli.add_subcommand("check", "Check the options, print those that would be used, and exit")
       ->fallthrough()
       ->configurable(false)
       ->callback([&options] { options.check_only = true; });
@@ -182,12 +184,10 @@ void add_check(CLI::App& cli, Options& options) {
 void add_operators_word(CLI::App& cli, Options& options) {
   cli.add_flag("--adopt", options.word.adopt,
                "Start although the database and the files of volumes and meshes do not belong "
-               "together; for this start only")
+               "together. For this start only")
       ->configurable(false);
-  cli.add_flag(
-         "--trust-clock", options.word.trust_clock,
-         "The clock is right although it is far ahead of what was stored last; for this start "
-         "only")
+  cli.add_flag("--trust-clock", options.word.trust_clock,
+               "Trust the clock although it is far ahead of the newest record. For this start only")
       ->configurable(false);
 }
 
@@ -200,113 +200,115 @@ void add_options(CLI::App& cli, Options& options) {
                  "Read options from this file (TOML or INI); also ISOMESH_CONFIG",
                  config != nullptr);
   cli.allow_config_extras(CLI::config_extras_mode::error);
-  cli.add_option("--listen", options.listen, "HOST:PORT, HOST:0 for a free port, or unix:PATH")
+  cli.add_option("--listen", options.listen,
+                 "Address to listen on: HOST:PORT, HOST:0 for a free port, or unix:PATH")
       ->envname("ISOMESH_LISTEN")
       ->capture_default_str();
-  cli.add_option("--data", options.data, "Folder for volumes and meshes; created when missing")
+  cli.add_option("--data", options.data, "Folder for volumes and meshes; created if missing")
       ->envname("ISOMESH_DATA")
       ->capture_default_str();
-  cli.add_option(
-         "--store", options.store,
-         "postgresql://... of the database that several daemons share; SQLite in the folder "
-         "of --data unless set")
+  cli.add_option("--store", options.store,
+                 "PostgreSQL database that several daemons share, as postgresql://USER@HOST/NAME. "
+                 "Without it, records are in SQLite in the folder of --data")
       ->envname("ISOMESH_STORE");
-  cli.add_option("--workers", options.workers,
-                 "Jobs that run at the same time; 0: none, this daemon only answers")
+  cli.add_option(
+         "--workers", options.workers,
+         "Jobs to run at the same time. 0: this daemon runs no jobs and only answers requests")
       ->envname("ISOMESH_WORKERS")
       ->check(CLI::Range(0, 64))
       ->capture_default_str();
-  cli.add_option("--threads", options.threads, "Threads of each job; 0: one a processor")
+  cli.add_option("--threads", options.threads, "Threads per job. 0: one per processor")
       ->envname("ISOMESH_THREADS")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
-  cli.add_option("--max-queue", options.jobs.max_queued, "Jobs that may wait; more get 503")
+  cli.add_option("--max-queue", options.jobs.max_queued,
+                 "Jobs that may wait in the queue; further jobs are rejected with 503")
       ->envname("ISOMESH_MAX_QUEUE")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   cli.add_option("--keep-days", options.keep_days,
-                 "How long finished jobs are kept with their meshes, and volumes that none used")
+                 "Days to keep finished jobs with their meshes, and volumes after their last use")
       ->envname("ISOMESH_KEEP_DAYS")
       ->check(number_between(0.0, 100000.0))
       ->capture_default_str();
-  cli.add_option(
-         "--max-disk", options.max_disk,
-         "Bytes of all volumes and meshes; the oldest of whoever has most go first; 0: what the "
-         "disk holds")
+  cli.add_option("--max-disk", options.max_disk,
+                 "Space for all volumes and meshes, in bytes. When it is full, isomeshd deletes "
+                 "the oldest data of the largest user first. 0: the whole disk")
       ->envname("ISOMESH_MAX_DISK")
       ->transform(size_of_bytes())
       ->capture_default_str();
   cli.add_option("--disk-reserve", options.disk_reserve,
-                 "Bytes kept on the disk so that a full one can be freed; a 32nd of it, 64 MiB at "
-                 "most, unless set")
+                 "Bytes to reserve so that a full disk can be cleaned up. Default: 1/32 of the "
+                 "disk, at most 64 MiB")
       ->envname("ISOMESH_DISK_RESERVE")
       ->transform(size_of_bytes());
   cli.add_option("--lease-seconds", options.lease_seconds,
-                 "How long a job stays with a worker that shows no sign of life")
+                 "Seconds after which a job is taken from a worker that shows no sign of life")
       ->envname("ISOMESH_LEASE_SECONDS")
       ->check(CLI::Range(1, 3600))
       ->capture_default_str();
   cli.add_option("--max-job-minutes", options.longest_job_minutes,
-                 "How long a job may run; one that takes longer fails")
+                 "Minutes that a job may run; a longer job fails")
       ->envname("ISOMESH_MAX_JOB_MINUTES")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  cli.add_option("--max-upload", options.http.upload.max_bytes, "Bytes of one upload")
+  cli.add_option("--max-upload", options.http.upload.max_bytes,
+                 "Largest size of one upload, in bytes")
       ->envname("ISOMESH_MAX_UPLOAD")
       ->transform(size_of_bytes(1))
       ->capture_default_str();
   cli.add_option("--upload-places", options.http.upload_places,
-                 "Uploads at the same time; one owner or address has a share of them")
+                 "Uploads at the same time; one user or address may use only a share of them")
       ->envname("ISOMESH_UPLOAD_PLACES")
       ->check(CLI::Range(1, 24))
       ->capture_default_str();
   cli.add_option(
          "--cors-origin", options.http.cors_origins,
-         "Origins whose pages may use the service, such as https://viewer.example; * for all")
+         "Origins whose pages may use this service, such as https://viewer.example; * allows all")
       ->envname("ISOMESH_CORS_ORIGIN")
       ->check(CLI::Validator(wrong_origin, ""))
       ->delimiter(',');
   cli.add_option("--allow-host", options.http.hosts,
-                 "Names of this service beside those of loopback, for requests without tokens")
+                 "Host names of this service besides loopback's, for requests without tokens")
       ->envname("ISOMESH_ALLOW_HOST")
       ->check(CLI::Validator(wrong_host, ""))
       ->delimiter(',');
   cli.add_option("--max-volume", options.import.max_sample_bytes,
-                 "Bytes of one volume's samples, unpacked")
+                 "Largest size of one volume's uncompressed samples, in bytes")
       ->envname("ISOMESH_MAX_VOLUME")
       ->transform(size_of_bytes(1))
       ->capture_default_str();
   cli.add_option("--imports", options.runner.at_once,
-                 "Uploads that are read at the same time; others wait")
+                 "Uploads to read at the same time; others wait")
       ->envname("ISOMESH_IMPORTS")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   cli.add_option("--import-memory", options.runner.bounds.memory_bytes,
-                 "Bytes of memory that reading one upload may take, beside the volume itself")
+                 "Memory for reading one upload, in bytes, besides the volume itself")
       ->envname("ISOMESH_IMPORT_MEMORY")
       ->transform(size_of_bytes())
       ->check(CLI::Range(std::uint64_t{64} << 20, std::uint64_t{1} << 50))
       ->capture_default_str();
-  cli.add_option("--import-seconds", options.import_seconds, "How long reading one upload may take")
+  cli.add_option("--import-seconds", options.import_seconds,
+                 "Seconds that reading one upload may take")
       ->envname("ISOMESH_IMPORT_SECONDS")
       ->check(CLI::Range(1, 86400))
       ->capture_default_str();
-  cli.add_option(
-         "--job-memory", options.job_memory,
-         "Bytes of memory one job may take; 0: its share of three quarters of what the machine, "
-         "or its control group, has")
+  cli.add_option("--job-memory", options.job_memory,
+                 "Memory for one job, in bytes. 0: three quarters of the memory of the machine or "
+                 "control group, divided by --workers")
       ->envname("ISOMESH_JOB_MEMORY")
       ->transform(size_of_bytes());
   cli.add_option("--drain-seconds", options.drain_seconds,
-                 "How long running jobs may finish after SIGTERM")
+                 "Seconds that running jobs have to finish after SIGTERM")
       ->envname("ISOMESH_DRAIN_SECONDS")
       ->capture_default_str();
   cli.add_flag("--open-network", options.open_network,
                "Listen beyond loopback although requests are not authenticated")
       ->envname("ISOMESH_OPEN_NETWORK");
   cli.add_option("--hospital", options.hospital,
-                 "File of PACS and rules (TOML), from which orders take images and to which they "
-                 "send meshes")
+                 "File of PACS and rules (TOML): orders fetch images from these PACS and send "
+                 "meshes to them")
       ->envname("ISOMESH_HOSPITAL");
   add_log_options(cli, options);
   add_security_options(cli, options);
@@ -320,10 +322,9 @@ std::string as_config(const CLI::App& cli, Remarks remarks) {
   std::string text;
   if (remarks == Remarks::kYes) {
     text =
-        "# Options of isomeshd, with their defaults; see isomeshd(8). Options of the command line "
-        "and of the\n"
-        "# environment go before these. `isomeshd check --config FILE` tells what would be "
-        "used.\n\n";
+        "# Options of isomeshd with their defaults; see isomeshd(8). The command line and the "
+        "environment\n# override them. `isomeshd check --config FILE` prints the options that "
+        "would be used.\n\n";
   }
   for (const CLI::Option* option : cli.get_options()) {
     const bool is_set = option->count() > 0;
@@ -341,7 +342,7 @@ std::string describe_config_error(const std::string& library_text) {
   constexpr std::string_view kUnknown = "INI was not able to parse ";
   if (!library_text.starts_with(kUnknown)) return "the file of --config: " + library_text;
   return "the file of --config: there is no option \"" + library_text.substr(kUnknown.size()) +
-         "\"; `isomeshd --help` names them all";
+         "\"; `isomeshd --help` lists all options";
 }
 
 }  // namespace isomesh

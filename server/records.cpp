@@ -105,8 +105,9 @@ class PostgresRecords : public Records {
   void take_orders() override {
     turn_.emplace(url_, "orders");
     if (turn_->is_taken()) return;
-    throw Error(ErrorCode::kUnavailable,
-                "another isomeshd of this database has --hospital: one carries out all orders");
+    throw Error(
+        ErrorCode::kUnavailable,
+        "another isomeshd with this database already has --hospital: only one may process orders");
   }
 
  private:

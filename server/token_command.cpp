@@ -23,11 +23,11 @@ namespace fs = std::filesystem;
 constexpr std::size_t kShownDigits = 12;  // of a hash: enough to tell tokens apart
 
 [[noreturn]] void cannot_write() {
-  throw Error(ErrorCode::kInternal, "cannot write to the file of tokens");
+  throw Error(ErrorCode::kInternal, "the file of tokens cannot be written");
 }
 
 void check_is_given(const fs::path& file) {
-  if (file.empty()) throw invalid_parameter("tokens", "say which file: --tokens FILE");
+  if (file.empty()) throw invalid_parameter("tokens", "name the file with --tokens FILE");
 }
 
 // Held while the file is read and written, so that two commands do not lose each other's lines. Of
@@ -36,7 +36,7 @@ Descriptor lock_folder_of(const fs::path& file) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
   Descriptor lock(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (lock.number() < 0) {
-    throw invalid_parameter("tokens", "the folder of " + file.string() + " is not there");
+    throw invalid_parameter("tokens", "the folder of " + file.string() + " does not exist");
   }
   if (::flock(lock.number(), LOCK_EX) != 0) cannot_write();
   return lock;
@@ -112,7 +112,7 @@ void add_token(const TokenRequest& request) {
       const TokenLine other = parsed(each);
       if (other.name == request.name && other.role != request.role) {
         throw invalid_parameter(
-            "role", request.name + " is " + other.role + " already; a name has one role");
+            "role", request.name + " already has the role " + other.role + "; a name has one role");
       }
     }
     lines.push_back(line);
@@ -153,16 +153,16 @@ void revoke_tokens(const TokenRequest& request) {
   }
   if (revoked == 0) {
     throw invalid_parameter("name",
-                            request.name + " has no such token; `isomeshd token list` has all");
+                            request.name + " has no such token; `isomeshd token list` lists all");
   }
   if (left == 0) {
     throw invalid_parameter("name",
-                            "no token would be left, and a daemon does not take such a file: "
-                            "add another one first, or stop the daemon");
+                            "no token would be left, and a daemon rejects a file without tokens: "
+                            "add another token first, or stop the daemon");
   }
   replace(request.file, kept);
   std::cout << "revoked " << revoked << (revoked == 1 ? " token" : " tokens")
-            << "; a running daemon knows after SIGHUP" << std::endl;
+            << "; send SIGHUP to a running daemon" << std::endl;
 }
 
 }  // namespace isomesh

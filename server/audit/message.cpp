@@ -142,7 +142,7 @@ std::string audit_message(std::string_view text, const AuditSource& source) {
            "><AuditSourceTypeCode csd-code=\"4\"/></AuditSourceIdentification>" + content.objects +
            "</AuditMessage>";
   } catch (const Entry::exception&) {
-    throw Error(ErrorCode::kInternal, "an entry of the audit trail is no JSON");
+    throw Error(ErrorCode::kInternal, "an entry of the audit trail is not JSON");
   }
 }
 

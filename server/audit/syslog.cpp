@@ -60,13 +60,14 @@ void SyslogSender::run(const std::stop_token& stop) {
     const bool is_last = stop.stop_requested();
     try {
       send_new(cut_.get_token());
-      if (is_cut_off) spdlog::info("the collector takes the audit trail again");
+      if (is_cut_off) spdlog::info("the audit trail reaches its collector again");
       is_cut_off = false;
       wait = kLook;
     } catch (const std::exception& error) {
       connection_.reset();
       if (!is_cut_off && !is_last) {
-        spdlog::warn("the audit trail waits for its collector: {}", error.what());
+        spdlog::warn("the audit trail cannot be sent to its collector and is retried: {}",
+                     error.what());
       }
       is_cut_off = true;
       wait = std::min(2 * wait, kLongestPause);

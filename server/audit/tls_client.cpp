@@ -40,7 +40,7 @@ struct TlsClient::Session {
 
   Session(const TlsServer& server, int socket)
       : context(SSL_CTX_new(TLS_client_method()), &::SSL_CTX_free), ssl(nullptr, &::SSL_free) {
-    if (!context) throw Error(ErrorCode::kInternal, "there is no TLS");
+    if (!context) throw Error(ErrorCode::kInternal, "TLS is not available");
     SSL_CTX_set_min_proto_version(context.get(), TLS1_2_VERSION);
     SSL_CTX_set_verify(context.get(), SSL_VERIFY_PEER, nullptr);
     SSL_CTX_set_mode(context.get(), SSL_MODE_AUTO_RETRY);
@@ -59,9 +59,9 @@ struct TlsClient::Session {
     if (SSL_connect(ssl.get()) == 1) return;
     const bool is_stranger = SSL_get_verify_result(ssl.get()) != X509_V_OK;
     ERR_clear_error();
-    throw Error(ErrorCode::kUnreachable,
-                is_stranger ? "the collector's certificate is not one that is trusted"
-                            : "no TLS connection to the collector came about");
+    throw Error(ErrorCode::kUnreachable, is_stranger
+                                             ? "the collector's certificate is not trusted"
+                                             : "the TLS connection to the collector failed");
   }
 
   void load_files(const TlsServer& server) const {

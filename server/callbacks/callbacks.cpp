@@ -98,7 +98,7 @@ class Callbacks::Sender {
         begin_due(now);
         sleep = turn(now);
       } catch (const std::exception& error) {
-        spdlog::error("callbacks: {}", error.what());
+        spdlog::error("callbacks could not be sent and are retried: {}", error.what());
         sleep = kPause;
       }
       if (stop.stop_requested()) return;
@@ -117,7 +117,7 @@ class Callbacks::Sender {
 
   void begin(store::Delivery delivery) {
     const auto reach = targets_.reach_of(delivery.url);
-    if (!reach) return give_up(delivery, "the receiver is not allowed any more");
+    if (!reach) return give_up(delivery, "the receiver is no longer allowed");
     auto attempt = std::make_unique<Attempt>();
     attempt->delivery = std::move(delivery);
     attempt->reach = *reach;
@@ -200,10 +200,11 @@ class Callbacks::Sender {
       outbox_.remove(attempt.delivery.job);
       return observer_(attempt.delivery, CallbackOutcome::kDelivered, "");
     }
-    const std::string reason = attempt.out_of_reach
-                                   ? "its name leads to an address that it may not reach"
-                               : result == CURLE_OK ? "status " + std::to_string(status)
-                                                    : curl_easy_strerror(result);
+    const std::string reason =
+        attempt.out_of_reach
+            ? "the host name of the receiver resolves to an address that is not allowed"
+        : result == CURLE_OK ? "status " + std::to_string(status)
+                             : curl_easy_strerror(result);
     constexpr long kGone = 410;
     const auto age = std::chrono::system_clock::now() - attempt.delivery.created;
     if ((result == CURLE_OK && status == kGone) || age > options_.give_up_after) {

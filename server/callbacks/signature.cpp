@@ -35,11 +35,11 @@ std::vector<std::string> read_callback_secrets(const std::filesystem::path& file
     if (line.empty()) continue;
     const auto key =
         line.starts_with(kPrefix) ? from_base64(line.substr(kPrefix.size())) : std::optional(line);
-    if (!key) throw at_fault("behind whsec_ there must be base64");
-    if (key->size() < kShortestKey) throw at_fault("a key must have 24 bytes at least");
+    if (!key) throw at_fault("whsec_ must be followed by base64");
+    if (key->size() < kShortestKey) throw at_fault("a key must have at least 24 bytes");
     secrets.push_back(*key);
   }
-  if (secrets.empty()) throw at_fault("the file holds no key");
+  if (secrets.empty()) throw at_fault("the file contains no key");
   return secrets;
 }
 

@@ -203,7 +203,8 @@ void CallbackTargets::check(const std::string& url) const {
     throw invalid_parameter(kField, "must be a plain http or https URL of at most 2000 bytes");
   }
   if (!reach_of(url)) {
-    throw invalid_parameter(kField, "is not among the addresses that this service may call");
+    throw invalid_parameter(
+        kField, "is not among the addresses that this service may call (--callback-allow)");
   }
 }
 

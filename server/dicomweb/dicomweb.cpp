@@ -26,7 +26,7 @@ constexpr const char* kPatientField = "includefield=00100020";
 void check_status(const PeerAnswerHead& head) {
   const int status = head.status;
   if (status >= 200 && status < 300) return;
-  const std::string said = "the PACS answers with status " + std::to_string(status);
+  const std::string said = "the PACS responded with status " + std::to_string(status);
   if (status == 401 || status == 403) throw PacsFailure(PacsFault::kUnauthorized, said);
   if (status == 408 || status == 425 || status == 429 || status >= 500) {
     throw PacsFailure(PacsFault::kBusy, said, head.retry_after);
@@ -76,7 +76,7 @@ class MultipartBody {
       const std::uint64_t left = object_end - at_;
       const auto piece = buffer.first(std::min<std::uint64_t>(left, buffer.size()));
       count = object_.read(at_ - before_.size(), piece);
-      if (count == 0) throw Error(ErrorCode::kInternal, "an object is shorter than it was");
+      if (count == 0) throw Error(ErrorCode::kInternal, "a stored object became shorter");
     } else {
       count = copy(after_, at_ - object_end, buffer);
     }
@@ -107,8 +107,8 @@ bool names(const std::vector<PeersObject>& objects, const std::string& instance)
 [[noreturn]] void throw_not_stored(std::optional<std::uint16_t> reason) {
   constexpr std::uint16_t kOutOfResources = 0xA700;
   const std::string said =
-      reason ? "the PACS has not stored the mesh, for reason " + std::to_string(*reason)
-             : "the PACS has not stored the mesh, and gives no reason";
+      reason ? "the PACS did not store the mesh and gave the reason " + std::to_string(*reason)
+             : "the PACS did not store the mesh and gave no reason";
   const bool may_pass = !reason || (*reason & 0xFF00) == kOutOfResources;
   throw PacsFailure(may_pass ? PacsFault::kBusy : PacsFault::kRefused, said);
 }
@@ -149,7 +149,7 @@ std::vector<PeersObject> DicomWeb::search_all(const std::string& target,
     const std::size_t before = known.size();
     for (const PeersObject& object : page) {
       if ((object.*name).empty()) {
-        throw PacsFailure(PacsFault::kUnreadable, "the PACS tells of objects without their UIDs");
+        throw PacsFailure(PacsFault::kUnreadable, "the PACS lists objects without UIDs");
       }
       if (known.insert(object.*name).second) all.push_back(object);
     }
@@ -157,8 +157,8 @@ std::vector<PeersObject> DicomWeb::search_all(const std::string& target,
     // asked for: only a page without anything new is the end.
     if (known.size() == before) return all;
   }
-  throw Error(ErrorCode::kTooLarge, "the PACS finds more than " + std::to_string(kMost) +
-                                        " objects, which are more than are accepted");
+  throw Error(ErrorCode::kTooLarge, "the PACS found more than " + std::to_string(kMost) +
+                                        " objects, the most that are accepted");
 }
 
 std::vector<FoundSeries> DicomWeb::find_recent(const std::string& from_day,
@@ -209,7 +209,7 @@ std::string DicomWeb::fetch_series(const std::string& study, const std::string& 
   constexpr int kPartialContent = 206;
   constexpr int kNotFound = 404;
   if (head.status == kPartialContent || head.status == kNotFound) {
-    throw PacsFailure(PacsFault::kIncomplete, "the PACS does not have all of the series any more");
+    throw PacsFailure(PacsFault::kIncomplete, "the PACS no longer has the whole series");
   }
   check_status(head);
   return head.content_type;
@@ -257,9 +257,9 @@ void DicomWeb::store(const orders::OutgoingObject& object, const std::stop_token
   const auto failed = std::ranges::find(said.failed, instance, &PeersObject::instance);
   if (failed != said.failed.end()) throw_not_stored(failed->failure);
   if (head.status == kConflict) {
-    throw PacsFailure(PacsFault::kRefused, "the PACS answers with status 409");
+    throw PacsFailure(PacsFault::kRefused, "the PACS responded with status 409");
   }
-  throw PacsFailure(PacsFault::kNotStored, "the PACS does not say that it has stored the mesh");
+  throw PacsFailure(PacsFault::kNotStored, "the PACS did not confirm that it stored the mesh");
 }
 
 }  // namespace isomesh::dicomweb

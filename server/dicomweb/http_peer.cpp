@@ -26,7 +26,7 @@ std::string secret_in(const std::filesystem::path& file) {
   }
   if (secret.empty() || has_control_characters(secret)) {
     throw PacsFailure(PacsFault::kUnauthorized,
-                      "the file of the password or token for the PACS cannot be used");
+                      "the password file or token file of the PACS cannot be used");
   }
   return secret;
 }
@@ -119,20 +119,20 @@ class Transfer {
   [[noreturn]] static void throw_failure(CURLcode result) {
     switch (result) {
       case CURLE_OPERATION_TIMEDOUT:
-        throw PacsFailure(PacsFault::kTimeout, "the PACS does not answer");
+        throw PacsFailure(PacsFault::kTimeout, "the PACS does not respond");
       case CURLE_PEER_FAILED_VERIFICATION:
       case CURLE_SSL_CONNECT_ERROR:
       case CURLE_SSL_CACERT_BADFILE:
         throw PacsFailure(PacsFault::kUnreachable,
-                          "no trusted TLS connection to the PACS can be made");
+                          "a trusted TLS connection to the PACS cannot be made");
       case CURLE_PARTIAL_FILE:
       case CURLE_RECV_ERROR:
       case CURLE_SEND_ERROR:
       case CURLE_GOT_NOTHING:
         throw PacsFailure(PacsFault::kUnreachable,
-                          "the PACS has closed the connection before its answer was complete");
+                          "the PACS closed the connection before its response was complete");
       default:
-        throw PacsFailure(PacsFault::kUnreachable, "the PACS cannot be connected to");
+        throw PacsFailure(PacsFault::kUnreachable, "the connection to the PACS failed");
     }
   }
 
@@ -160,7 +160,7 @@ class Transfer {
       const std::size_t bytes = size * count;
       transfer.received_ += bytes;
       if (transfer.received_ > transfer.request_.most_bytes) {
-        throw Error(ErrorCode::kTooLarge, "the answer of the PACS is more than the " +
+        throw Error(ErrorCode::kTooLarge, "the response of the PACS exceeds the " +
                                               std::to_string(transfer.request_.most_bytes) +
                                               " bytes that are accepted");
       }

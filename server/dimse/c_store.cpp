@@ -29,7 +29,7 @@ void check_stored(std::uint16_t status) {
   // A warning is of what was stored all the same.
   constexpr int kWarning = 0xB;
   if (status == 0 || high_nibble == kWarning) return;
-  const std::string said = "the PACS has not stored the mesh, with status " + hex_of(status);
+  const std::string said = "the PACS did not store the mesh; its status is " + hex_of(status);
   constexpr int kDoesNotMatch = 0xA9;
   constexpr int kCannotUnderstand = 0xC;
   if (high_byte == kDoesNotMatch || high_nibble == kCannotUnderstand) {
@@ -44,19 +44,19 @@ void check_sent(const process::DimseSent& sent) {
     case DimseEnd::kAnswered:
       return check_stored(sent.status);
     case DimseEnd::kRejected:
-      throw PacsFailure(PacsFault::kUnauthorized, "the PACS rejects the association");
+      throw PacsFailure(PacsFault::kUnauthorized, "the PACS rejected the association");
     case DimseEnd::kBusy:
-      throw PacsFailure(PacsFault::kBusy, "the PACS rejects the association for now");
+      throw PacsFailure(PacsFault::kBusy, "the PACS rejected the association for now");
     case DimseEnd::kNotAccepted:
-      throw PacsFailure(PacsFault::kBusy, "the PACS accepts no Encapsulated STL");
+      throw PacsFailure(PacsFault::kBusy, "the PACS does not accept Encapsulated STL");
     case DimseEnd::kBroken:
       throw PacsFailure(PacsFault::kUnreachable, "the PACS ended the association");
     case DimseEnd::kTimeout:
-      throw PacsFailure(PacsFault::kTimeout, "the PACS was still for too long");
+      throw PacsFailure(PacsFault::kTimeout, "the PACS sent nothing for too long");
     case DimseEnd::kUnreadable:
       break;
   }
-  throw PacsFailure(PacsFault::kUnreadable, "the answer of the PACS cannot be read");
+  throw PacsFailure(PacsFault::kUnreadable, "the response of the PACS cannot be read");
 }
 
 process::DimseSent sent_of(const process::Heard& heard) {
@@ -75,10 +75,10 @@ Descriptor connected(const orders::PacsSettings& settings, const std::stop_token
     return net::connect_to(settings.host, settings.port, settings.timeout, stop);
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kUnreachable) {
-      throw PacsFailure(PacsFault::kUnreachable, "there is no connection to the PACS");
+      throw PacsFailure(PacsFault::kUnreachable, "the connection to the PACS failed");
     }
     if (error.code() != ErrorCode::kRequestTimeout) throw;
-    throw PacsFailure(PacsFault::kTimeout, "the PACS does not answer");
+    throw PacsFailure(PacsFault::kTimeout, "the PACS does not respond");
   }
 }
 
@@ -86,7 +86,8 @@ Descriptor connected(const orders::PacsSettings& settings, const std::stop_token
 
 orders::Pacs& CStore::web() const {
   if (web_) return *web_;
-  throw PacsFailure(PacsFault::kRefused, "this PACS is only sent to: it has no dicomweb");
+  throw PacsFailure(PacsFault::kRefused,
+                    "meshes can only be sent to this PACS: it has no dicomweb");
 }
 
 std::vector<orders::FoundSeries> CStore::find_recent(const std::string& from_day,

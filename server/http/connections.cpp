@@ -83,7 +83,7 @@ void Connections::refuse(std::unique_ptr<net::ByteStream> stream, const std::str
 
 void Connections::refuse_one_of_many(Exchange& exchange) {
   refuse(exchange.body.take_stream(), exchange.request.remote_address,
-         {ErrorCode::kUnavailable, "too many requests are under way"});
+         {ErrorCode::kUnavailable, "too many requests are in progress"});
 }
 
 void Connections::enqueue(const std::shared_ptr<Exchange>& exchange, const Answer& answer) {

@@ -33,7 +33,8 @@ std::array<double, N> array_of(const std::string& name, std::string_view text) {
 std::array<std::uint32_t, 3> dims_of(std::string_view text) {
   const std::vector<std::string_view> parts = split(text, ',');
   std::array<std::uint32_t, 3> dims = {};
-  const Error wrong = invalid_parameter("dims", "must be 3 numbers with commas between");
+  const Error wrong = invalid_parameter(
+      "dims", "must be 3 whole numbers from 1 to 4294967295, separated by commas");
   if (parts.size() != dims.size()) throw wrong;
   for (std::size_t i = 0; i < dims.size(); ++i) {
     const auto number = whole_number(parts[i]);
@@ -47,7 +48,8 @@ std::string series_of(std::string_view text) {
   constexpr std::size_t kLongestUid = 64;
   if (text.empty() || text.size() > kLongestUid ||
       text.find_first_not_of("0123456789.") != std::string_view::npos) {
-    throw invalid_parameter("series", "must be a DICOM UID: digits and dots, at most 64 of them");
+    throw invalid_parameter("series",
+                            "must be a UID: numbers separated by dots, at most 64 characters");
   }
   return std::string(text);
 }
@@ -55,7 +57,7 @@ std::string series_of(std::string_view text) {
 std::string member_of(std::string_view text) {
   constexpr std::size_t kLongest = 1024;
   if (text.empty() || text.size() > kLongest || has_control_characters(text)) {
-    throw invalid_parameter("member", "must be the name of an archive's member");
+    throw invalid_parameter("member", "must be the name of a file in the archive");
   }
   return std::string(text);
 }
@@ -63,7 +65,7 @@ std::string member_of(std::string_view text) {
 std::uint32_t volume_of(std::string_view text) {
   const auto number = whole_number(text);
   if (!number || *number > std::numeric_limits<std::uint32_t>::max()) {
-    throw invalid_parameter("volume", "must be a whole number, 0 for the file's first volume");
+    throw invalid_parameter("volume", "must be a whole number; 0 is the file's first volume");
   }
   return static_cast<std::uint32_t>(*number);
 }
@@ -73,8 +75,8 @@ std::vector<std::string> accepted_of(std::string_view text) {
   for (const std::string_view name : split(text, ',')) {
     const NoteDescription* note = find_note(name);
     if (note == nullptr || !note->is_acceptable) {
-      throw invalid_parameter(
-          "accept", in_quotes(name) + " is none of what can be accepted: " + acceptable_notes());
+      throw invalid_parameter("accept", in_quotes(name) + " cannot be accepted; these notes can: " +
+                                            acceptable_notes());
     }
     if (std::ranges::find(codes, name) == codes.end()) codes.emplace_back(name);
   }
@@ -90,7 +92,7 @@ NiftiForm nifti_form_of(std::string_view text) {
 void refuse_choice_in_raw(const Request& request) {
   for (const std::string& name : file_parameters()) {
     if (request.has_parameter(name)) {
-      throw invalid_parameter(name, "raw samples have nothing of the kind to choose or accept");
+      throw invalid_parameter(name, "does not apply to raw samples");
     }
   }
 }

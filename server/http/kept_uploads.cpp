@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kNameBytes = 16;
 
-Error gone() { return {ErrorCode::kGone, "this upload is not kept any more; send it again"}; }
+Error gone() { return {ErrorCode::kGone, "this upload is no longer kept: send it again"}; }
 
 }  // namespace
 
@@ -43,7 +43,7 @@ void KeptUploads::find_left() {
       unknown.erase(file);
       unknown.erase(folder_ / file.stem());
     } catch (const Error& error) {
-      spdlog::info("an upload that has not come whole is let go: {}", error.what());
+      spdlog::info("an incomplete upload is discarded: {}", error.what());
     }
   }
   for (const fs::path& file : unknown) fs::remove(file, absent);
@@ -97,7 +97,7 @@ KeptUploads::Kept KeptUploads::find(const std::string& owner, const std::string&
   const auto entry = found(owner, name);
   if (!entry->partial) return entry->upload;
   if (!entry->partial->note().is_complete) {
-    throw Error(ErrorCode::kNotReady, "this upload has not come whole yet");
+    throw Error(ErrorCode::kNotReady, "this upload is not complete yet");
   }
   Kept body = entry->partial->body();
   if (!body) throw gone();

@@ -43,7 +43,7 @@ PartialNote note_from(const std::filesystem::path& path) {
     const json text = json::parse(read_whole(path));
     // Bytes that had not reached the disk are gone, whatever the file's length says.
     if (this_boot().empty() || text.at("boot") != this_boot()) {
-      throw Error(ErrorCode::kGone, "the machine has started anew since");
+      throw Error(ErrorCode::kGone, "the machine was restarted since");
     }
     PartialNote note = {.owner = text.at("owner"),
                         .query = text.at("query").get<Parameters>(),
@@ -54,7 +54,7 @@ PartialNote note_from(const std::filesystem::path& path) {
     if (!text.at("length").is_null()) note.length = text.at("length").get<std::uint64_t>();
     return note;
   } catch (const json::exception&) {
-    throw Error(ErrorCode::kGone, "the note is damaged");
+    throw Error(ErrorCode::kGone, "its record is damaged");
   }
 }
 
@@ -143,7 +143,7 @@ void PartialUpload::tell_length(const Turn& turn, std::uint64_t length) {
   check(turn);
   if (note_.length == length) return;
   if (note_.length || length < bytes_) {
-    throw invalid_parameter("Upload-Length", "is not the length that this upload has");
+    throw invalid_parameter("Upload-Length", "differs from the length of this upload");
   }
   note_.length = length;
   write_note();
@@ -153,7 +153,7 @@ void PartialUpload::write(const Turn& turn, std::span<const std::byte> bytes) {
   const Lock lock(mutex_);
   check(turn);
   if (note_.length && bytes.size() > *note_.length - bytes_) {
-    throw invalid_parameter("Upload-Length", "the body goes on beyond the upload's length");
+    throw invalid_parameter("Upload-Length", "the body exceeds the upload's length");
   }
   try {
     write_all(file_, bytes);
@@ -176,7 +176,7 @@ void PartialUpload::complete(const Turn& turn) {
   check(turn);
   if (bytes_ == 0) throw Error(ErrorCode::kInvalidParameter, "the body is empty");
   if (note_.length.value_or(bytes_) != bytes_) {
-    throw invalid_parameter("Upload-Complete", "there are fewer bytes than the upload's length");
+    throw invalid_parameter("Upload-Complete", "the upload has fewer bytes than its length");
   }
   note_.length = bytes_;
   note_.is_complete = true;
@@ -213,10 +213,10 @@ void PartialUpload::cut(std::uint64_t bytes) {
 
 void PartialUpload::check(const Turn& turn) const {
   if (turn.number != turn_) {
-    throw Error(ErrorCode::kUnavailable, "another request goes on with this upload");
+    throw Error(ErrorCode::kUnavailable, "another request continues this upload");
   }
   if (note_.is_complete) {
-    throw invalid_parameter("Upload-Complete", "this upload is complete already");
+    throw invalid_parameter("Upload-Complete", "this upload is already complete");
   }
 }
 

@@ -88,7 +88,7 @@ std::optional<std::uint64_t> whole_number(std::string_view text) {
 
 std::vector<double> numbers_of(const std::string& name, std::string_view text, std::size_t count) {
   const Error wrong =
-      invalid_parameter(name, "must be " + std::to_string(count) + " numbers with commas between");
+      invalid_parameter(name, "must be " + std::to_string(count) + " numbers separated by commas");
   const std::vector<std::string_view> parts = split(text, ',');
   if (parts.size() != count) throw wrong;
   std::vector<double> numbers;
@@ -229,7 +229,7 @@ bool matches_etag(const Request& request, std::string_view etag) {
 void check_if_match(const Request& request, std::string_view etag) {
   if (!request.has_header("If-Match")) return;
   if (names_etag(request.header("If-Match"), etag, Comparison::kStrong)) return;
-  throw Error(ErrorCode::kPreconditionFailed, "what If-Match names is not what is there");
+  throw Error(ErrorCode::kPreconditionFailed, "the resource does not match If-Match");
 }
 
 std::string cursor_after(std::string_view kind, std::string_view id) {
@@ -249,7 +249,7 @@ std::string id_after(const Request& request, std::string_view kind) {
 }
 
 Error wrong_cursor() {
-  return invalid_parameter("cursor", "must be the `next` of another page of this list");
+  return invalid_parameter("cursor", "must be the `next` of a page of this list");
 }
 
 std::optional<std::uint64_t> last_event_id(const Request& request) {

@@ -49,7 +49,7 @@ const Handler& handler_of_method(const Route& route, const Request& request, Res
   const auto found = route.handlers().find(request.method);
   if (found != route.handlers().end()) return found->second;
   response.set_header("Allow", route.methods());
-  throw Error(ErrorCode::kMethodNotAllowed, "this resource knows " + route.methods());
+  throw Error(ErrorCode::kMethodNotAllowed, "this resource supports " + route.methods());
 }
 
 std::optional<Continuation> checked_answer(App& app, Request& request, Response& response) {
@@ -83,7 +83,7 @@ void watch_jobs(App& app) {
       }
       if (is_heard) app.connections.wake_sources();
     } catch (const Error& error) {
-      spdlog::error("events of jobs cannot be read: {}", error.what());
+      spdlog::error("job events cannot be read and are retried: {}", error.what());
       std::this_thread::sleep_for(kLongestWatch);
     }
   }

@@ -21,7 +21,7 @@ void refuse_encoded(const Request& request) {
   const std::string_view encoding = request.header("Content-Encoding");
   if (!encoding.empty() && encoding != "identity") {
     throw Error(ErrorCode::kUnsupportedMedia,
-                "Content-Encoding is not supported: send the body as it is");
+                "Content-Encoding is not supported: send the body without an encoding");
   }
 }
 
@@ -35,16 +35,15 @@ void check_length(const Request& request, std::uint64_t max_bytes, std::uint64_t
 }
 
 Error other_digest() {
-  return {ErrorCode::kDigestMismatch,
-          "the body's SHA-256 is not the one that Content-Digest names"};
+  return {ErrorCode::kDigestMismatch, "the body's SHA-256 differs from the one in Content-Digest"};
 }
 
 Error incomplete(const BodyReader& body) {
   if (body.was_too_slow()) {
-    return {ErrorCode::kRequestTimeout, "the body came too slowly"};
+    return {ErrorCode::kRequestTimeout, "the body arrived too slowly"};
   }
   if (body.was_malformed()) {
-    return invalid_parameter("Transfer-Encoding", "the body is no sequence of chunks");
+    return invalid_parameter("Transfer-Encoding", "the body is not in chunks");
   }
   return {ErrorCode::kInvalidParameter, "the body ended before its length"};
 }
@@ -56,7 +55,7 @@ void check_room(const store::DataFolder& folder, const Request& request) {
   std::error_code error;
   const auto space = std::filesystem::space(folder.scratch(), error);
   if (!error && *request.content_length > space.available) {
-    throw Error(ErrorCode::kOutOfSpace, "there is no room for this upload");
+    throw Error(ErrorCode::kOutOfSpace, "there is not enough disk space for this upload");
   }
 }
 
@@ -100,7 +99,7 @@ class Receiver {
     file_name_ = plain_file_name(file_name);
     if (name != "file" || ++fields_ > 1) {
       failure_ = std::make_exception_ptr(
-          invalid_parameter("file", "a form must have the one field `file`"));
+          invalid_parameter("file", "a form must have exactly one field, `file`"));
       return false;
     }
     return true;
@@ -165,7 +164,8 @@ Upload::Upload(const store::DataFolder& folder, const UploadLimits& limits,
   const std::optional<std::string> expected = sha256_of_content_digest(request);
   const bool is_form = request.is_form();
   if (is_form && expected) {
-    throw invalid_parameter("Content-Digest", "is not supported with a form: send the bare file");
+    throw invalid_parameter("Content-Digest",
+                            "is not supported with a form: send the file without a form");
   }
   const auto write = [this](std::span<const std::byte> piece) { file_.write(piece); };
   Receiver receiver(write, folder.reserve(), limits, stopping, expected.has_value());

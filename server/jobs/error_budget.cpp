@@ -53,10 +53,10 @@ MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh&
   codec::Grid grid = codec::grid_of(mesh, bits);
   for (; quantisation_of(grid) > most; grid.bits = bits) {
     if (bits == kMostBits) {
-      throw invalid_parameter("max_error_mm",
-                              number_text(*parameters.max_error_mm) +
-                                  " is less than Draco's coordinates can tell on a surface of this "
-                                  "size");
+      throw invalid_parameter(
+          "max_error_mm",
+          number_text(*parameters.max_error_mm) +
+              " is finer than Draco's coordinates can represent on a surface of this size");
     }
     ++bits;
   }

@@ -16,16 +16,16 @@ void enforce(store::Retention& retention) {
       spdlog::info("removed {} jobs, {} volumes and {} files", jobs, volumes, blobs);
     }
     if (quarantined > 0) {
-      spdlog::warn("{} files that no record names are in quarantine now", quarantined);
+      spdlog::warn("{} files that no record names were put into quarantine", quarantined);
     }
     if (left > 0) {
       spdlog::error(
-          "{} more files that no record names stay where they are: is this the "
-          "database that belongs to them?",
+          "{} more files that no record names were left in place: does this database belong to "
+          "them?",
           left);
     }
   } catch (const std::exception& error) {
-    spdlog::error("what is too old could not be removed, and is tried again: {}", error.what());
+    spdlog::error("expired data could not be removed and is retried: {}", error.what());
   }
 }
 

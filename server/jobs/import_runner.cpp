@@ -30,11 +30,11 @@ std::string while_reading(const process::ImportReport& report) {
 [[noreturn]] void refuse_dead(const std::string& how, const process::ImportReport& report) {
   const std::string what = "The import ended " + how + while_reading(report);
   spdlog::error("{}", what);
-  volume::throw_unusable(what + "; the file is damaged, or made to do harm.");
+  volume::throw_unusable(what + "; the file is damaged or malicious.");
 }
 
 [[noreturn]] void throw_lying() {
-  throw Error(ErrorCode::kInternal, "An import's answer is not what its canonical file holds.");
+  throw Error(ErrorCode::kInternal, "An import's response does not match its canonical file.");
 }
 
 // The process may have been taken over by the file that it read, so its answer is compared with the
@@ -58,7 +58,7 @@ void check(const Volume& volume, const process::ImportTask& task) {
 
 Volume volume_of(process::ImportReport report, const process::ImportTask& task) {
   if (report.error) {
-    spdlog::info("an import was refused{}: {}", while_reading(report),
+    spdlog::info("an import was rejected{}: {}", while_reading(report),
                  describe(report.error->code()).name);
     throw *report.error;
   }
@@ -91,7 +91,7 @@ process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::Impo
 ImportRunner::ImportRunner(const RunnerOptions& options)
     : options_(options), prepared_(options.program, options.at_once) {
   if (!process::has_landlock()) {
-    spdlog::warn("this kernel has no Landlock: imports and jobs could read files of this user");
+    spdlog::warn("this kernel has no Landlock: imports and jobs could read this user's files");
   }
 }
 
@@ -112,7 +112,7 @@ process::PeersAnswer ImportRunner::read_answer(const std::filesystem::path& file
     return *std::move(report.answer);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kUnusableVolume) throw;
-    throw Error(ErrorCode::kPacsUnreachable, "the answer of the PACS cannot be read");
+    throw Error(ErrorCode::kPacsUnreachable, "the response of the PACS cannot be read");
   }
 }
 
@@ -127,9 +127,9 @@ process::ImportReport ImportRunner::report_of(const std::string& message) {
   constexpr int kMostIdleDeaths = 3;
   for (int tries = 0; tries < kMostIdleDeaths; ++tries) {
     if (auto report = run_in(prepared_.take(), message)) return *std::move(report);
-    spdlog::warn("a prepared process had ended before its import began");
+    spdlog::warn("a prepared import process ended before its import began; another one takes over");
   }
-  throw Error(ErrorCode::kInternal, "The importing processes end before their imports begin.");
+  throw Error(ErrorCode::kInternal, "Import processes end before their imports begin.");
 }
 
 std::optional<process::ImportReport> ImportRunner::run_in(process::Child child,

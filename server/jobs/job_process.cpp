@@ -69,7 +69,7 @@ JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink>
       child_->say(to_line(order), file.descriptor());
       auto end = follow(talk);
       if (!end) {
-        spdlog::warn("a process had ended before its job began");
+        spdlog::warn("a prepared job process ended before its job began; another one takes over");
         child_.reset();
         continue;
       }
@@ -87,7 +87,7 @@ JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink>
       throw;
     }
   }
-  throw Error(ErrorCode::kInternal, "The processes that make meshes end before they begin.");
+  throw Error(ErrorCode::kInternal, "Job processes end before their jobs begin.");
 }
 
 void JobProcess::start() {
@@ -110,7 +110,7 @@ std::optional<JobAnswer> JobProcess::follow(Talk& talk) {
                std::holds_alternative<MadeMesh>(answer) == is_mesh) {
       return answer;
     } else {
-      throw Error(ErrorCode::kInternal, "A job's process answers another order.");
+      throw Error(ErrorCode::kInternal, "A job process answered another request.");
     }
   }
   if (!talk.stage) return std::nullopt;
@@ -129,7 +129,7 @@ void JobProcess::pass_on(const JobProgress& progress, Talk& talk) {
 
 void JobProcess::pass_on(const JobPiece& piece, Talk& talk) {
   if (piece.file >= talk.sinks.size()) {
-    throw Error(ErrorCode::kInternal, "A job's process makes a file that nobody has ordered.");
+    throw Error(ErrorCode::kInternal, "A job process made a file that was not requested.");
   }
   for (std::size_t left = piece.bytes; left > 0;) {
     if (begin_ == end_ && !hear(talk)) throw_ended(talk);
@@ -159,7 +159,7 @@ std::optional<std::string_view> JobProcess::next_line(Talk& talk) {
     }
     const std::size_t known = end_ - begin_;
     if (known >= kLongestLine) {
-      throw Error(ErrorCode::kInternal, "A job's process has more to say than it should.");
+      throw Error(ErrorCode::kInternal, "A job process sent too much text.");
     }
     if (known == heard_.size()) heard_.resize(2 * heard_.size());
     if (!hear(talk)) return std::nullopt;
@@ -203,7 +203,7 @@ void JobProcess::throw_ended(const Talk& talk) {
   child_.reset();
   const std::string stage(to_string(talk.stage.value_or(Stage::kLoad)));
   if (talk.failure) std::rethrow_exception(talk.failure);
-  throw ProcessEnded("The process that made it ended " + how + " in the stage \"" + stage + "\".");
+  throw ProcessEnded("The job process ended " + how + " in the stage \"" + stage + "\".");
 }
 
 }  // namespace isomesh::jobs

@@ -221,9 +221,9 @@ Ending work(Task task, const std::stop_token& stop, Speaker& speaker, Workspace&
     return {error};
   } catch (const std::bad_alloc&) {
     constexpr std::uint64_t kMebibyte = 1 << 20;
-    return {Error(ErrorCode::kTooLarge, "the job takes more memory than the " +
+    return {Error(ErrorCode::kTooLarge, "the job needs more than the " +
                                             std::to_string(memory_bytes / kMebibyte) +
-                                            " MiB that it may have"),
+                                            " MiB of memory that it may use"),
             true};
   } catch (const std::exception& error) {
     return {Error(ErrorCode::kInternal,

@@ -132,7 +132,7 @@ std::vector<LabelVoxels> count_values(const volume::CanonicalFile& canonical,
       return count_values<Sample>(canonical, volume);
     } else {
       volume::throw_unusable("The volume's samples are " + std::string(to_string(volume.type)) +
-                             ", and labels are whole numbers.");
+                             ", but labels are whole numbers.");
     }
   });
 }

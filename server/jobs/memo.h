@@ -40,7 +40,7 @@ class Memo {
           answer.valid() && answer.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
       if (is_ready) return answer.get();
       if (waiting_ >= most_waiting_) {
-        throw Error(ErrorCode::kUnavailable, "too many requests of this kind are under way");
+        throw Error(ErrorCode::kUnavailable, "too many requests of this kind are in progress");
       }
       ++waiting_;
       if (!answer.valid()) {

@@ -87,8 +87,8 @@ void check_memory(const mesh::SurfaceSize& surface, const MeshRequest& request) 
   constexpr std::uint64_t kMebibyte = 1 << 20;
   throw Error(ErrorCode::kTooLarge,
               "the surface has " + std::to_string(surface.triangles) + " triangles and " +
-                  std::to_string(surface.vertices) + " vertices; the job would take about " +
-                  std::to_string(needed / kMebibyte) + " MiB of memory, and " +
+                  std::to_string(surface.vertices) + " vertices; the job would need about " +
+                  std::to_string(needed / kMebibyte) + " MiB of memory, but " +
                   std::to_string(allowed_bytes / kMebibyte) + " MiB are allowed");
 }
 
@@ -99,9 +99,9 @@ void check_disk(const mesh::Mesh& mesh, const MeshRequest& request) {
   if (needed <= allowed_bytes) return;
   constexpr std::uint64_t kKibibyte = 1 << 10;
   throw Error(ErrorCode::kTooLarge, "the surface has " + std::to_string(surface.triangles) +
-                                        " triangles; its files would take " +
+                                        " triangles; its files would need at least " +
                                         std::to_string(needed / kKibibyte) +
-                                        " KiB or more, and the disk can never hold more than " +
+                                        " KiB, but the disk can hold at most " +
                                         std::to_string(allowed_bytes / kKibibyte) + " KiB of them");
 }
 

@@ -17,7 +17,7 @@ void keep_chosen(const std::vector<std::int64_t>& chosen, std::map<std::int64_t,
 }  // namespace
 
 void throw_no_labels(SampleType type) {
-  throw invalid_parameter("labels", "are for volumes of integers; this one has samples of type " +
+  throw invalid_parameter("labels", "need a volume of integers; this one has samples of type " +
                                         std::string(to_string(type)));
 }
 
@@ -27,11 +27,10 @@ JobParameters settle_labels(JobParameters parameters, const store::Viewer& viewe
     throw_no_labels(volume.type);
   }
   if (std::ranges::min(volume.dims) < 2) {
-    throw Error(
-        ErrorCode::kUnusableVolume,
-        "labels have surfaces in volumes of two samples or more along each axis; this one is " +
-            std::to_string(volume.dims[0]) + " x " + std::to_string(volume.dims[1]) + " x " +
-            std::to_string(volume.dims[2]));
+    throw Error(ErrorCode::kUnusableVolume,
+                "labels need a volume with at least two samples along each axis; this one is " +
+                    std::to_string(volume.dims[0]) + " x " + std::to_string(volume.dims[1]) +
+                    " x " + std::to_string(volume.dims[2]));
   }
   for (const auto& [label, values] : values_of(volume)) {
     parameters.label_values.try_emplace(label, values);

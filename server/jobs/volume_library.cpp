@@ -33,7 +33,7 @@ std::pair<Volume, DicomIdentity> VolumeLibrary::add_peers(const std::string& own
                                                           const process::PeersSeries& series) {
   const store::ScratchFolder scratch(folder_.scratch());
   Volume volume = import_file(answer, {.peers = series}, scratch);
-  if (!volume.dicom) throw Error(ErrorCode::kInternal, "images of a PACS have no identity");
+  if (!volume.dicom) throw Error(ErrorCode::kInternal, "images from a PACS have no DICOM identity");
   DicomIdentity identity = *volume.dicom;
   return {keep(owner, std::move(volume), scratch).first, std::move(identity)};
 }

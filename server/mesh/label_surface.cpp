@@ -106,7 +106,8 @@ LabelTriangles::LabelTriangles(const SeparatingSurface& surface)
     : ends_(surface.labels.size() + 1, 0) {
   constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
   if (surface.sides.size() > kMost) {
-    throw Error(ErrorCode::kTooLarge, "the walls have " + std::to_string(surface.sides.size()) +
+    throw Error(ErrorCode::kTooLarge, "the surfaces of the labels have " +
+                                          std::to_string(surface.sides.size()) +
                                           " triangles; more than " + std::to_string(kMost) +
                                           " cannot be numbered with 32 bits");
   }

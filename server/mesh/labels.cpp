@@ -121,7 +121,7 @@ void add_voxels(const LabelVoxels& part, LabelVoxels& whole) {
 void throw_too_many_labels() {
   throw Error(ErrorCode::kUnusableVolume,
               "the volume has more than " + std::to_string(kMostLabels) +
-                  " different values beside its background; these are no labels");
+                  " different values besides its background, so they are not labels");
 }
 
 template <class T>
@@ -184,7 +184,7 @@ std::vector<std::int64_t> select_labels(std::span<const LabelVoxels> present,
     labels = *wanted;
     std::ranges::sort(labels);
     labels.erase(std::unique(labels.begin(), labels.end()), labels.end());
-    if (labels.empty()) throw invalid_parameter("labels", "must name one label at least");
+    if (labels.empty()) throw invalid_parameter("labels", "must name at least one label");
     if (std::ranges::binary_search(labels, background)) {
       throw invalid_parameter("labels",
                               "must not name the background, " + std::to_string(background));

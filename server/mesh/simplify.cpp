@@ -443,7 +443,7 @@ SimplificationEffect simplify(const SimplifyOptions& options, const Context& con
   const std::uint64_t points = std::uint64_t{mesh.positions.size()} + mesh.triangles.size();
   if (points >= TriangleGrid::kNone) {
     throw Error(ErrorCode::kTooLarge, "the surface has " + std::to_string(points) +
-                                          " vertices and triangles; 32 bits cannot number them");
+                                          " vertices and triangles; more than 32 bits can number");
   }
   context.throw_if_stopped();
   if (mesh.triangles.size() == 0) return {};

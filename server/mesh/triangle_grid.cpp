@@ -110,7 +110,7 @@ TriangleGrid::TriangleGrid(const SurfaceView& surface, const Context& context) :
   const std::size_t triangles = surface.triangles.size();
   if (triangles >= kNone) {
     throw Error(ErrorCode::kTooLarge, "the surface has " + std::to_string(triangles) +
-                                          " triangles; 32 bits cannot number them");
+                                          " triangles; more than 32 bits can number");
   }
   context.throw_if_stopped();
   if (triangles == 0) return;

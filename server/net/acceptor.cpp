@@ -128,7 +128,7 @@ void Acceptor::accept_some() {
       // The oldest pending connection is closed to free its descriptor. Where there is none,
       // descriptors are held by responses, and some time must go by.
       if (pending_.empty()) {
-        spdlog::warn("no descriptors are left for connections");
+        spdlog::warn("new connections wait: no file descriptors are left");
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
         return;
       }
@@ -156,7 +156,7 @@ void Acceptor::begin(int socket, std::string address) {
     pending.deadline = Clock::now() + limits_.head_time;
     pending.id = ++last_id_;
   } catch (const std::exception& error) {
-    spdlog::warn("a connection could not be begun: {}", error.what());
+    spdlog::warn("a connection could not be accepted: {}", error.what());
     return;
   }
   const auto pending = std::prev(pending_.end());
@@ -250,7 +250,7 @@ void Acceptor::close_overdue() {
     if (pending_.front().received.empty() && !pending_.front().has_head) {
       close(pending_.begin());
     } else {
-      refuse(pending_.begin(), {ErrorCode::kRequestTimeout, "the request did not come in time"});
+      refuse(pending_.begin(), {ErrorCode::kRequestTimeout, "the request did not arrive in time"});
     }
   }
 }

@@ -39,7 +39,7 @@ Address parse_address(const std::string& text) {
     const std::string path = text.substr(kUnix.size());
     constexpr std::size_t kLongestSocketPath = 107;  // what sockaddr_un holds
     if (path.empty() || path.size() > kLongestSocketPath) {
-      throw invalid_parameter("listen", "a socket's path has 1 to 107 bytes");
+      throw invalid_parameter("listen", "the path of a socket must have 1 to 107 bytes");
     }
     return {.host = "", .port = 0, .unix_path = path};
   }

@@ -26,7 +26,7 @@ std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses_of(const std::str
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
   if (::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found) != 0) {
-    throw Error(ErrorCode::kUnreachable, "the name of the host is not known");
+    throw Error(ErrorCode::kUnreachable, "the host name cannot be resolved");
   }
   return {found, &::freeaddrinfo};
 }
@@ -38,7 +38,7 @@ bool await_connection(const Descriptor& socket, Clock::time_point deadline,
   while (::poll(&waiting, 1, kLookMs) <= 0) {
     if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "stopped");
     if (Clock::now() >= deadline) {
-      throw Error(ErrorCode::kRequestTimeout, "there is no answer to a connection");
+      throw Error(ErrorCode::kRequestTimeout, "the host does not respond");
     }
   }
   int error = 0;
@@ -65,7 +65,7 @@ Descriptor connect_to(const std::string& host, std::uint16_t port, std::chrono::
     ::fcntl(socket.number(), F_SETFL, 0);
     return socket;
   }
-  throw Error(ErrorCode::kUnreachable, "there is no connection to the host");
+  throw Error(ErrorCode::kUnreachable, "the connection to the host failed");
 }
 
 }  // namespace isomesh::net

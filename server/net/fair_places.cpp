@@ -23,10 +23,10 @@ FairPlaces::Place::~Place() {
 FairPlaces::Place FairPlaces::take(const std::string& party) {
   const Lock lock(mutex_);
   const std::size_t free = count_ - taken_;
-  if (free == 0) throw Error(ErrorCode::kUnavailable, "too many " + what_ + " are under way");
+  if (free == 0) throw Error(ErrorCode::kUnavailable, "too many " + what_ + " are in progress");
   const auto holder = parties_.try_emplace(party, 0).first;
   if (!has_share(party, holder->second, free)) {
-    throw Error(ErrorCode::kTooManyRequests, "you have too many " + what_ + " under way");
+    throw Error(ErrorCode::kTooManyRequests, "you have too many " + what_ + " in progress");
   }
   ++holder->second;
   ++taken_;

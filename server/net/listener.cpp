@@ -82,7 +82,7 @@ Listener::Listener(Address address)
       socket_(address_.is_unix() ? listening_at(address_.unix_path)
                                  : listening_at(address_.host, address_.port)) {
   if (socket_.number() < 0) {
-    throw Error(ErrorCode::kUnavailable, "cannot listen there: is the address in use?");
+    throw Error(ErrorCode::kUnavailable, "cannot listen on this address: is it already in use?");
   }
   if (!address_.is_unix()) address_.port = port_of(socket_.number());
 }

@@ -50,7 +50,7 @@ void parse_request_line(std::string_view line, RequestHead& head) {
   head.method = line.substr(0, first);
   head.version = line.substr(last + 1);
   const std::string_view target = line.substr(first + 1, last - first - 1);
-  if (!is_token(head.method)) throw malformed("its method is none");
+  if (!is_token(head.method)) throw malformed("its method is not valid");
   if (head.version != "HTTP/1.1" && head.version != "HTTP/1.0") {
     throw malformed("its version is neither HTTP/1.1 nor HTTP/1.0");
   }
@@ -58,7 +58,7 @@ void parse_request_line(std::string_view line, RequestHead& head) {
       std::ranges::all_of(target, [](char c) { return c > 0x20 && c < 0x7F && c != '#'; });
   head.target = path_and_query(target);
   if (!printable || (!head.target.starts_with('/') && head.target != "*")) {
-    throw malformed("its target is no path");
+    throw malformed("its target is not a path");
   }
 }
 
@@ -112,10 +112,11 @@ std::optional<std::size_t> HeadScanner::scan(std::string_view received) {
     if (c != '\n') {
       const bool after_return = length > 0 && received[scanned_ - 1] == '\r';
       if (after_return || (is_control(c) && c != '\r'))
-        throw malformed("it has a control character");
+        throw malformed("it contains a control character");
       continue;
     }
-    if (length == 0 || received[scanned_ - 1] != '\r') throw malformed("a line has no return");
+    if (length == 0 || received[scanned_ - 1] != '\r')
+      throw malformed("a line does not end with CR and LF");
     const bool is_empty = length == 1;
     line_begin_ = scanned_ + 1;
     if (is_empty && has_request_line_) return ++scanned_;
@@ -161,7 +162,7 @@ BodyFraming framing_of(const RequestHead& head) {
     }
   }
   if (framing.chunked && framing.length) {
-    throw invalid_parameter("Transfer-Encoding", "must be without a Content-Length");
+    throw invalid_parameter("Transfer-Encoding", "cannot be combined with Content-Length");
   }
   return framing;
 }

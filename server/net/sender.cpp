@@ -26,7 +26,7 @@ Source::More next_of(Source& source, std::string& bytes) {
   try {
     return source.next(bytes);
   } catch (const std::exception& error) {
-    spdlog::error("a response was cut off: {}", error.what());
+    spdlog::error("a response was cut off by an error: {}", error.what());
     return Source::More::kBroken;
   }
 }

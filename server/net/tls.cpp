@@ -23,7 +23,7 @@ class TlsStream : public ByteStream {
   // Owns the socket from the beginning, also when this throws.
   TlsStream(SSL_CTX* context, int socket) : plain_(socket), ssl_(SSL_new(context), &SSL_free) {
     if (!ssl_ || SSL_set_fd(ssl_.get(), socket) != 1) {
-      throw Error(ErrorCode::kInternal, "a TLS connection cannot be begun");
+      throw Error(ErrorCode::kInternal, "a TLS connection cannot be started");
     }
     SSL_set_accept_state(ssl_.get());
   }
@@ -78,7 +78,7 @@ int no_passphrase(char* /*buffer*/, int /*size*/, int /*writing*/, void* /*nothi
 void warn_if_readable(const std::filesystem::path& key) {
   struct stat status = {};
   if (::stat(key.c_str(), &status) == 0 && (status.st_mode & S_IROTH) != 0) {
-    spdlog::warn("everybody on this machine can read the key of the TLS certificate");
+    spdlog::warn("every user of this machine can read the private key of the TLS certificate");
   }
 }
 
@@ -115,16 +115,16 @@ TlsFiles::Context TlsFiles::read() const {
                             SSL_MODE_RELEASE_BUFFERS);
   SSL_CTX_set_default_passwd_cb(raw, no_passphrase);
   if (SSL_CTX_set_cipher_list(raw, kCiphers) != 1) {
-    throw Error(ErrorCode::kInternal, "TLS has none of the ciphers that are wanted");
+    throw Error(ErrorCode::kInternal, "TLS has none of the required ciphers");
   }
   if (SSL_CTX_use_certificate_chain_file(raw, certificate_.c_str()) != 1) {
-    throw invalid_parameter("tls-cert", "holds no certificate in PEM form that can be read");
+    throw invalid_parameter("tls-cert", "contains no readable certificate in PEM form");
   }
   if (SSL_CTX_use_PrivateKey_file(raw, key_.c_str(), SSL_FILETYPE_PEM) != 1 ||
       SSL_CTX_check_private_key(raw) != 1) {
-    throw invalid_parameter("tls-key",
-                            "holds no key in PEM form, without a passphrase, of the "
-                            "certificate of --tls-cert");
+    throw invalid_parameter(
+        "tls-key",
+        "must contain the key of the certificate of --tls-cert in PEM form, without a passphrase");
   }
   return context;
 }

@@ -12,7 +12,7 @@ namespace isomesh::net {
 namespace {
 
 int checked(int descriptor) {
-  if (descriptor < 0) throw Error(ErrorCode::kUnavailable, "there are no descriptors left");
+  if (descriptor < 0) throw Error(ErrorCode::kUnavailable, "no file descriptors are left");
   return descriptor;
 }
 

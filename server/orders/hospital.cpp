@@ -41,7 +41,7 @@ class Section {
     const toml::node* node = find(key);
     if (node == nullptr) return;
     const auto text = node->value_exact<std::string>();
-    if (!text || has_control_characters(*text)) refuse(key_of(key), "must be a text on one line");
+    if (!text || has_control_characters(*text)) refuse(key_of(key), "must be a string on one line");
     value = *text;
   }
 
@@ -58,8 +58,8 @@ class Section {
     if (node == nullptr) return;
     const auto number = node->value_exact<std::int64_t>();
     if (!number || *number < low || *number > high) {
-      refuse(key_of(key), "must be a whole number between " + std::to_string(low) + " and " +
-                              std::to_string(high));
+      refuse(key_of(key),
+             "must be a whole number from " + std::to_string(low) + " to " + std::to_string(high));
     }
     value = static_cast<Number>(*number);
   }
@@ -84,10 +84,10 @@ class Section {
     const toml::node* node = find(key);
     if (node == nullptr) return;
     const toml::array* list = node->as_array();
-    if (list == nullptr) refuse(key_of(key), "must be a list of texts");
+    if (list == nullptr) refuse(key_of(key), "must be a list of strings");
     for (const toml::node& each : *list) {
       const auto text = each.value_exact<std::string>();
-      if (!text) refuse(key_of(key), "must be a list of texts");
+      if (!text) refuse(key_of(key), "must be a list of strings");
       values.push_back(*text);
     }
   }
@@ -148,7 +148,7 @@ void read_orders(Section section, Hospital& hospital) {
   constexpr std::size_t kLongestLo = 64;
   if (hospital.station_name.size() > kLongestLo ||
       hospital.station_name.find('\\') != std::string::npos) {
-    refuse(section.key_of("station-name"), "must have at most 64 characters, and no backslash");
+    refuse(section.key_of("station-name"), "must have at most 64 characters and no backslash");
   }
   section.finish();
 }
@@ -161,7 +161,8 @@ void check_name(const Section& section, const std::string& name) {
                                  (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
                         });
   if (!is_plain) {
-    refuse(section.key_of("name"), "must be at most 40 letters, digits, dots, dashes and _");
+    refuse(section.key_of("name"),
+           "must have at most 40 characters: letters, digits, dots, dashes and underscores");
   }
 }
 
@@ -190,7 +191,7 @@ void read_send_by(Section& section, PacsSettings& pacs) {
   }
   if (send_by != "stow") refuse(section.key_of("send-by"), "must be \"stow\" or \"c-store\"");
   if (!pacs.aet.empty() || !pacs.host.empty() || pacs.port != 0) {
-    refuse(section.key_of("send-by"), "must be \"c-store\" where there are aet, host or port");
+    refuse(section.key_of("send-by"), "must be \"c-store\" if aet, host or port is given");
   }
   section.require("dicomweb", pacs.dicomweb);
 }
@@ -209,10 +210,10 @@ PacsSettings read_pacs(Section section) {
   section.read("password-file", pacs.password_file);
   section.read("token-file", pacs.token_file);
   if (pacs.user.empty() != pacs.password_file.empty()) {
-    refuse(section.key_of("user"), "needs password-file, and the other way round");
+    refuse(section.key_of("user"), "must be given together with password-file");
   }
   if (!pacs.user.empty() && !pacs.token_file.empty()) {
-    refuse(section.key_of("token-file"), "excludes user");
+    refuse(section.key_of("token-file"), "cannot be combined with user");
   }
   section.read("ca-file", pacs.ca_file);
   section.read("timeout-seconds", pacs.timeout, 1, 3600);
@@ -268,7 +269,7 @@ Rule read_rule(Section section) {
   section.read("label", rule.label);
   constexpr std::size_t kLongestLo = 64;
   if (rule.label.size() > kLongestLo || rule.label.find('\\') != std::string::npos) {
-    refuse(section.key_of("label"), "must have at most 64 characters, and no backslash");
+    refuse(section.key_of("label"), "must have at most 64 characters and no backslash");
   }
   section.read("series-number", rule.series_number, 0, std::numeric_limits<std::int32_t>::max());
   section.read("max-error-mm", rule.max_error_mm);
@@ -299,7 +300,8 @@ DimseSettings read_dimse(Section section) {
   section.read("max-held-bytes", dimse.max_held_bytes, 1, kMostBytes);
   section.read("calling", dimse.calling);
   for (const std::string& title : dimse.calling) check_title(section.key_of("calling"), title);
-  if (dimse.calling.empty()) refuse(section.key_of("calling"), "is required: nobody may send");
+  if (dimse.calling.empty())
+    refuse(section.key_of("calling"), "is required: without it, nobody may send");
   auto routes = section.section("routes");
   if (!routes || routes->table().empty()) refuse(section.key_of("routes"), "is required");
   for (const auto& [title, unused] : routes->table()) {
@@ -320,7 +322,7 @@ std::optional<SyslogSettings> read_audit(Section section) {
   section.finish();
   section.require("syslog", url);
   if (syslog.certificate_file.empty() != syslog.key_file.empty()) {
-    refuse(section.key_of("certificate-file"), "needs key-file, and the other way round");
+    refuse(section.key_of("certificate-file"), "must be given together with key-file");
   }
   constexpr std::string_view kScheme = "tls://";
   const std::size_t colon = url.rfind(':');
@@ -341,12 +343,12 @@ void check_names(const Hospital& hospital) {
   std::set<std::string> names;
   for (const PacsSettings& pacs : hospital.pacs) {
     if (!names.insert(pacs.name).second)
-      refuse("pacs.name", "\"" + pacs.name + "\" is there twice");
+      refuse("pacs.name", "\"" + pacs.name + "\" is given twice");
   }
   std::set<std::string> rules;
   for (const Rule& rule : hospital.rules) {
     if (!rules.insert(rule.name).second) {
-      refuse("rules.name", "\"" + rule.name + "\" is there twice");
+      refuse("rules.name", "\"" + rule.name + "\" is given twice");
     }
     std::vector<std::string> used;
     if (rule.watch) used.push_back(*rule.watch);
@@ -362,7 +364,7 @@ void check_names(const Hospital& hospital) {
   if (!hospital.dimse) return;
   for (const auto& [title, rule] : hospital.dimse->routes) {
     if (!rules.contains(rule)) {
-      refuse("dimse.routes." + title, "names the rule \"" + rule + "\", which is not there");
+      refuse("dimse.routes." + title, "names the rule \"" + rule + "\", which is not configured");
     }
   }
 }
@@ -376,7 +378,7 @@ Hospital hospital_of(const toml::table& table) {
   if (auto dimse = all.section("dimse")) hospital.dimse = read_dimse(std::move(*dimse));
   if (auto audit = all.section("audit")) hospital.syslog = read_audit(std::move(*audit));
   all.finish();
-  if (hospital.pacs.empty()) refuse("pacs", "is required: there is nobody to speak to");
+  if (hospital.pacs.empty()) refuse("pacs", "is required: orders need a PACS");
   check_names(hospital);
   return hospital;
 }

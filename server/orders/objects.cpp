@@ -125,7 +125,7 @@ void copy(const store::BlobReader& from, const Part& part, store::BlobWriter& to
     const auto piece =
         std::span(buffer).first(std::min<std::uint64_t>(buffer.size(), part.bytes - at));
     const std::size_t count = from.read_at(part.offset + at, piece);
-    if (count == 0) throw Error(ErrorCode::kInternal, "a mesh is shorter than it was");
+    if (count == 0) throw Error(ErrorCode::kInternal, "a stored mesh became shorter");
     to.write(piece.first(count));
     at += count;
   }
@@ -139,9 +139,7 @@ void write(const std::string& text, store::BlobWriter& to) {
 std::vector<Part> parts_of_surface(const Job& job) {
   std::vector<Part> parts = parts_of(job);
   if (job.mesh && job.mesh->triangles > 0 && !parts.empty()) return parts;
-  throw Error(ErrorCode::kUnusableVolume,
-              "the surface is empty: no sample of the images is on the other side of the "
-              "iso-value");
+  throw Error(ErrorCode::kUnusableVolume, "the surface is empty");
 }
 
 // Names the object, too.
@@ -177,7 +175,7 @@ constexpr std::uint64_t kGrowthOfText = 400;
 [[noreturn]] void throw_too_large(std::uint64_t bytes, std::uint64_t most_bytes,
                                   const OrderWork& work) {
   std::string text = "the object has " + std::to_string(bytes) +
-                     " bytes, and the PACS takes at most " + std::to_string(most_bytes) +
+                     " bytes, but the PACS accepts at most " + std::to_string(most_bytes) +
                      " (max-send-bytes)";
   if (work.max_error_mm) {
     text += "; within " + number_text(*work.max_error_mm) +
@@ -187,6 +185,20 @@ constexpr std::uint64_t kGrowthOfText = 400;
 }
 
 }  // namespace
+
+Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range) {
+  const auto because = [](const std::string& why) {
+    return Error(ErrorCode::kUnusableVolume, "the surface is empty: " + why);
+  };
+  if (mesh.dropped.components > 0) return because("none of its connected components was kept");
+  if (!mesh.iso) return because("the labels have no boundary");
+  const auto [low, high] = range;
+  const std::string iso = "the iso-value " + number_text(*mesh.iso);
+  const std::string samples =
+      "the samples, which range from " + number_text(low) + " to " + number_text(high);
+  const bool is_outside = *mesh.iso <= low || *mesh.iso > high;
+  return because(iso + (is_outside ? " is outside " : " separates none of ") + samples);
+}
 
 std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
                                      const std::string& station_name, std::uint64_t most_bytes,

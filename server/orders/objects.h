@@ -1,11 +1,13 @@
 // A finished job's meshes as DICOM objects.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "base/error.h"
 #include "proto/orders.h"
 #include "proto/types.h"
 #include "server/store/blob_store.h"
@@ -29,6 +31,9 @@ std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job
                                      const std::string& station_name, std::uint64_t most_bytes,
                                      std::chrono::system_clock::time_point made,
                                      const store::BlobStore& blobs);
+
+// Why a mesh without triangles has none, of samples in that range: kUnusableVolume.
+Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range);
 
 // How many triangles the job's mesh may have for no object to have more than `most_bytes`; empty
 // when none has. Throws Error kTooLarge when not even one triangle fits.

@@ -88,7 +88,7 @@ void Orders::stop() {
   try {
     services_.audit.add({.event = store::AuditEvent::kStop});
   } catch (const std::exception& error) {
-    spdlog::error("the end of the orders is not in the audit trail: {}", error.what());
+    spdlog::error("the audit trail lacks the entry of this stop: {}", error.what());
   }
 }
 
@@ -102,10 +102,10 @@ std::pair<Order, bool> Orders::submit(const Orderer& orderer, const OrderRequest
                                .request_digest = request_digest},
                               hospital_.most_open);
   if (submission.kind == Kind::kConflict) {
-    throw Error(ErrorCode::kKeyReused, "the idempotency key came with another request before");
+    throw Error(ErrorCode::kKeyReused, "the idempotency key was used for another request");
   }
   if (submission.kind == Kind::kBusy) {
-    throw Error(ErrorCode::kUnavailable, "as many orders are open as may be");
+    throw Error(ErrorCode::kUnavailable, "too many orders are open");
   }
   changed();
   return {submission.order, submission.kind == Kind::kNew};
@@ -225,7 +225,7 @@ void Orders::work(const std::stop_token& stop) {
         sleep = std::clamp(wait, milliseconds(1), kLongestSleep);
       }
     } catch (const std::exception& error) {
-      spdlog::error("orders: {}", error.what());
+      spdlog::error("orders could not be processed and are retried: {}", error.what());
       is_in_trouble = true;  // such as a database that cannot be written: not at once again
     }
     Lock lock(mutex_);
@@ -297,7 +297,9 @@ void Orders::fail_step(store::OrderRecord& record, const Error& error, bool may_
   order.next_attempt = timestamp_of(next);
   services_.orders.save(record, next);
   log(record, std::string(describe(error.code()).name));
-  if (error.code() == ErrorCode::kInternal) spdlog::error("orders: {}", error.what());
+  if (error.code() == ErrorCode::kInternal) {
+    spdlog::error("a step of order {} failed and is retried: {}", order.id, error.what());
+  }
   changed();
 }
 

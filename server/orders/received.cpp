@@ -72,8 +72,8 @@ std::string Received::fetch_series(const std::string& study, const std::string& 
     if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "the order was cancelled");
     if (each.blob.empty()) {
       throw PacsFailure(PacsFault::kIncomplete,
-                        "some instances of the series were received before and are not held any "
-                        "more; the series has to be sent again as a whole");
+                        "some instances of the series were received earlier and are no longer "
+                        "stored: send the whole series again");
     }
     append(file, "\r\n--" + boundary + "\r\nContent-Type: application/dicom\r\n\r\n");
     append(file, *blobs_.open(each.blob));
@@ -91,7 +91,7 @@ std::optional<bool> Received::has_instance(const InstancePlace&, const std::stop
 }
 
 void Received::store(const OutgoingObject&, const std::stop_token&) {
-  throw PacsFailure(PacsFault::kRefused, "nothing is stored in what was received");
+  throw PacsFailure(PacsFault::kRefused, "meshes cannot be stored among received images");
 }
 
 // What was held for the order, or came once more, goes when that has ended.
@@ -142,7 +142,7 @@ void Orders::receive(const std::stop_token& stop) {
         }
       }
     } catch (const std::exception& error) {
-      spdlog::error("what was received waits: {}", error.what());
+      spdlog::error("received series could not be processed and are retried: {}", error.what());
     }
     Lock lock(mutex_);
     changed_.wait_for(lock, stop, kPause, [] { return false; });

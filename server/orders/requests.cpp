@@ -16,7 +16,7 @@ constexpr std::int64_t kSeriesNumber = 9000;
 const Rule* rule_of(const Hospital& hospital, const Orderer& orderer, const OrderRequest& request) {
   if (!request.rule) return nullptr;
   const Rule* rule = hospital.find_rule(*request.rule);
-  if (rule == nullptr) throw invalid_parameter("rule", "is not one that is configured");
+  if (rule == nullptr) throw invalid_parameter("rule", "is not configured");
   if (!orderer.is_administrator && rule->owner != orderer.name) {
     throw Error(ErrorCode::kForbidden, "the rule belongs to another owner");
   }
@@ -27,14 +27,14 @@ const Rule* rule_of(const Hospital& hospital, const Orderer& orderer, const Orde
 const PacsSettings& pacs_of(const Hospital& hospital, const std::string& name,
                             std::string_view field) {
   const PacsSettings* pacs = hospital.find_pacs(name);
-  if (pacs == nullptr) throw invalid_parameter(std::string(field), "is not one that is configured");
+  if (pacs == nullptr) throw invalid_parameter(std::string(field), "is not configured");
   return *pacs;
 }
 
 void check_owner(const PacsSettings& pacs, const Orderer& orderer) {
   if (orderer.is_administrator || pacs.owners.empty()) return;
   if (std::ranges::find(pacs.owners, orderer.name) != pacs.owners.end()) return;
-  throw Error(ErrorCode::kForbidden, "this PACS may be ordered from by a rule only");
+  throw Error(ErrorCode::kForbidden, "this PACS can be used only by a rule");
 }
 
 // Whatever else is asked for, an object is made of the STL.
@@ -68,7 +68,7 @@ store::OrderRecord make_order(const Hospital& hospital, const Orderer& orderer,
     order.send = rule->send;
   }
   if (source.dicomweb.empty()) {
-    throw invalid_parameter("source.pacs", "is one that is only sent to");
+    throw invalid_parameter("source.pacs", "is a PACS to which meshes are only sent");
   }
   if (rule == nullptr) check_owner(source, orderer);
   for (const SendTarget& target : order.send) {

@@ -90,7 +90,7 @@ Time OrderSteps::advance(store::OrderRecord& record, const std::stop_token& stop
 Pacs& OrderSteps::pacs(const std::string& name) const {
   const auto found = services_.pacs.find(name);
   if (found != services_.pacs.end()) return *found->second;
-  throw PacsFailure(PacsFault::kUnreachable, "the PACS is not configured any more");
+  throw PacsFailure(PacsFault::kUnreachable, "the PACS is no longer configured");
 }
 
 Time OrderSteps::save(store::OrderRecord& record, Time next) const {
@@ -106,20 +106,33 @@ Time OrderSteps::start_over(store::OrderRecord& record) const {
   return save(record, now_());
 }
 
+// Later queries of an order ask for the same again, so that only its first one is kept.
+void OrderSteps::note_query(store::OrderRecord& record, bool success) const {
+  const OrderSource& source = record.order.source;
+  if (record.work.queried || is_received(source.pacs)) return;
+  services_.audit.add({.event = store::AuditEvent::kQuery,
+                       .success = success,
+                       .order = record.order.id,
+                       .owner = record.owner,
+                       .pacs = source.pacs,
+                       .study = source.study});
+  record.work.queried = timestamp_of(now_());
+}
+
 Time OrderSteps::wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const {
   OrderSource& source = record.order.source;
   OrderWork& work = record.work;
-  if (work.looks == 0 && !work.listed_since && !is_received(source.pacs)) {
-    services_.audit.add({.event = store::AuditEvent::kQuery,
-                         .order = record.order.id,
-                         .owner = record.owner,
-                         .pacs = source.pacs,
-                         .study = source.study});
-  }
   Pacs& peer = pacs(source.pacs);
-  const auto series = peer.find_series(source.study, source.series, stop);
+  std::optional<FoundSeries> series;
   std::vector<std::string> listed;
-  if (series) listed = peer.list_instances(source.study, source.series, stop);
+  try {
+    series = peer.find_series(source.study, source.series, stop);
+    if (series) listed = peer.list_instances(source.study, source.series, stop);
+  } catch (const Error&) {
+    note_query(record, false);
+    throw;
+  }
+  note_query(record, true);
   const Time now = now_();
   if (listed.empty()) {
     if (++work.looks >= kMostLooks) {
@@ -215,6 +228,10 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
   record.work.blobs.clear();
   std::vector<MadeObject> objects;
   if (!record.order.send.empty()) {
+    if (job.mesh && job.mesh->triangles == 0) {
+      throw empty_surface(*job.mesh,
+                          services_.volumes.get(record.owner, *record.order.volume).range);
+    }
     if (!can_make_objects(job, services_.blobs)) {
       record.order.job = services_.jobs.remake(job.id).id;
       return save(record, now_() + kJobLook);
@@ -259,7 +276,7 @@ bool OrderSteps::is_same_patient(const store::OrderRecord& record, const OrderRe
   if (patient) return *patient == identity.patient_id;
   // A PACS that the images did not come from need not know the study.
   if (result.pacs != record.order.source.pacs) return true;
-  throw PacsFailure(PacsFault::kChanged, "the study is not in the PACS any more");
+  throw PacsFailure(PacsFault::kChanged, "the study is no longer in the PACS");
 }
 
 void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
@@ -290,7 +307,7 @@ void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
     // What it says is one thing.
     if (peer.has_instance(place, stop) == false) {
       throw PacsFailure(PacsFault::kNotStored,
-                        "the PACS says that it has stored the mesh, and does not find it");
+                        "the PACS confirmed that it stored the mesh, but does not find it");
     }
   } catch (const Error&) {
     services_.audit.add(entry);

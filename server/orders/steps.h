@@ -61,6 +61,8 @@ class OrderSteps {
   static std::string pacs_of(const store::OrderRecord& record);
 
  private:
+  // Puts a query of the order's PACS into the audit trail, with its outcome.
+  void note_query(store::OrderRecord& record, bool success) const;
   store::Time wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const;
   store::Time fetch(store::OrderRecord& record, const std::stop_token& stop) const;
   store::Time mesh(store::OrderRecord& record) const;

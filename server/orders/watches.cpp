@@ -67,9 +67,9 @@ void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
     note_failure(*rule.watch, failure, "");
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kCancelled)
-      spdlog::error("watch {}: {}", rule.name, error.what());
+      spdlog::error("the watch of rule {} failed and is retried: {}", rule.name, error.what());
   } catch (const std::exception& error) {
-    spdlog::error("watch {}: {}", rule.name, error.what());
+    spdlog::error("the watch of rule {} failed and is retried: {}", rule.name, error.what());
   }
 }
 
@@ -87,7 +87,7 @@ void Orders::watch(const std::stop_token& stop) {
         services_.received.forget(now - options_.keep);
       }
     } catch (const std::exception& error) {
-      spdlog::error("orders that have ended are kept for longer: {}", error.what());
+      spdlog::error("ended orders could not be removed and are retried: {}", error.what());
     }
     Lock lock(mutex_);
     changed_.wait_for(lock, stop, hospital_.poll, [] { return false; });

@@ -161,7 +161,7 @@ bool Child::reap(bool waiting) {
 }
 
 std::string how_it_ended(const std::optional<int>& status) {
-  if (!status) return "without an answer";
+  if (!status) return "without a response";
   if (!WIFSIGNALED(*status)) return "with status " + std::to_string(WEXITSTATUS(*status));
   const char* const known = ::sigdescr_np(WTERMSIG(*status));
   std::string name = known == nullptr ? "unknown" : known;

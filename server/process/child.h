@@ -86,7 +86,7 @@ class Child {
   bool reaped_ = false;
 };
 
-// "with signal 9 (killed)", "with status 1", "without an answer": of a status as waitpid gives it,
+// "with signal 9 (killed)", "with status 1", "without a response": of a status as waitpid gives it,
 // and of none. Ends a sentence.
 std::string how_it_ended(const std::optional<int>& status);
 

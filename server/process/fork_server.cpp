@@ -90,7 +90,7 @@ Child copy_of(const Child& server, const std::stop_token& stop) {
     if (number < 0) throw_system_error("fork", -number);
     return {number, std::move(sockets.ours)};
   }
-  throw Error(ErrorCode::kInternal, "A program that makes copies of itself does not answer.");
+  throw Error(ErrorCode::kInternal, "A program that prepares processes does not respond.");
 }
 
 }  // namespace isomesh::process

@@ -59,7 +59,7 @@ void PreparedProcesses::keep(const std::stop_token& stop) {
       prepare_one(stop);
     } catch (const std::exception& error) {
       if (stop.stop_requested()) break;
-      spdlog::error("a process was not prepared: {}", error.what());
+      spdlog::error("a process could not be prepared and is retried: {}", error.what());
       server_.reset();
       const Lock lock(mutex_);
       ++failures_;
@@ -95,7 +95,7 @@ Child PreparedProcesses::copy(std::uint64_t generation, const std::stop_token& s
       return copy_of(*server_, stop);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::kInternal) throw;
-      spdlog::warn("{} It is started anew.", error.what());
+      spdlog::warn("{} It is restarted.", error.what());
     }
   }
   server_ = start_program(program_);

@@ -218,7 +218,7 @@ bool is_in(const fs::path& path, const fs::path& folder) {
 void check_is_data_folder(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_regular_file(folder / kRecords, error) || !fs::is_directory(folder / kBlobs, error)) {
-    refuse(folder, "is no data folder of isomeshd");
+    refuse(folder, "is not a data folder of isomeshd");
   }
 }
 
@@ -242,7 +242,7 @@ Copied copy_consistently(const fs::path& data, const fs::path& target) {
     copy.sync();
     return described(copy.copied(), missed, target / kRecords);
   }
-  throw Error(ErrorCode::kUnavailable, "too much changed while it was copied; try again");
+  throw Error(ErrorCode::kUnavailable, "too much changed during the copy: try again");
 }
 
 // --- Putting back --------------------------------------------------------------------------------
@@ -282,11 +282,13 @@ Copied back_up(const fs::path& data, const fs::path& named) {
   std::error_code error;
   // Shells complete the name of a folder with a slash.
   const fs::path target = named.has_filename() ? named : named.parent_path();
-  if (is_in(target, data)) refuse(target, "is in the data folder, and would be gone with it");
-  if (fs::exists(fs::symlink_status(target, error))) refuse(target, "is there already");
+  if (is_in(target, data)) refuse(target, "is inside the data folder and would be lost with it");
+  if (fs::exists(fs::symlink_status(target, error))) refuse(target, "already exists");
   const fs::path part = target.string() + ".part";
   if (fs::exists(fs::symlink_status(part, error))) {
-    refuse(part, "is there: another backup runs, or one did not end; remove it in the latter case");
+    refuse(
+        part,
+        "exists: another backup is running, or one was interrupted. Remove it if none is running");
   }
   try {
     const Copied copied = copy_consistently(data, part);
@@ -301,11 +303,11 @@ Copied back_up(const fs::path& data, const fs::path& named) {
 
 Copied restore(const fs::path& backup, const fs::path& data) {
   check_is_data_folder(backup);
-  if (is_in(data, backup)) refuse(data, "is in the backup");
+  if (is_in(data, backup)) refuse(data, "is inside the backup");
   std::error_code error;
   const bool is_there = fs::exists(data, error);
   if (is_there && (!fs::is_directory(data, error) || !fs::is_empty(data, error))) {
-    refuse(data, "is not empty: a backup is put back into a new folder");
+    refuse(data, "is not empty: a backup is restored into a new folder");
   }
   fs::create_directories(data, error);
   if (error) throw Error(ErrorCode::kInternal, data.string() + ": " + error.message());

@@ -11,10 +11,10 @@ namespace isomesh::store {
 
 const Job& job_of(const Submission& submission) {
   if (submission.kind == Submission::Kind::kOwnersShare) {
-    throw Error(ErrorCode::kTooManyRequests, "too many of your jobs wait already");
+    throw Error(ErrorCode::kTooManyRequests, "too many of your jobs are already waiting");
   }
   if (submission.kind == Submission::Kind::kConflict) {
-    throw Error(ErrorCode::kKeyReused, "the idempotency key came with another request before");
+    throw Error(ErrorCode::kKeyReused, "the idempotency key was used for another request");
   }
   if (submission.kind == Submission::Kind::kBusy) {
     throw Error(ErrorCode::kUnavailable, "the queue is full or the service is shutting down");
@@ -94,14 +94,14 @@ bool is_intact(const MeshSummary& mesh, const BlobStore& blobs) {
 
 void throw_other_version() {
   throw Error(ErrorCode::kGone,
-              "the stored mesh is damaged, and this version would make another one: submit the job "
-              "again");
+              "the stored mesh is damaged, and this version would make a different one: submit the "
+              "job again");
 }
 
 void throw_volume_gone() {
-  throw Error(ErrorCode::kGone,
-              "the stored mesh is damaged, and the volume that it was made of is not there any "
-              "more: upload it again");
+  throw Error(
+      ErrorCode::kGone,
+      "the stored mesh is damaged, and its volume no longer exists: upload the volume again");
 }
 
 bool concerns(const Event& event, const Viewer& viewer, const std::string& job) {

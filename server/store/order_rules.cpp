@@ -31,7 +31,7 @@ void cancel_order(OrderRecord& record) {
 
 void begin_anew(OrderRecord& record) {
   if (record.order.state != OrderState::kFailed) {
-    throw Error(ErrorCode::kNotReady, "only an order that has failed is tried again");
+    throw Error(ErrorCode::kNotReady, "only a failed order can be retried");
   }
   Order& order = record.order;
   order.state = OrderState::kWaiting;

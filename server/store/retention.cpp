@@ -44,7 +44,7 @@ void Retention::make_room(std::uint64_t bytes) {
   const Lock lock(mutex_);
   Gone gone;
   if (bytes <= options_.max_bytes && shrink_to(options_.max_bytes - bytes, gone)) return;
-  throw Error(ErrorCode::kOutOfSpace, "the room for volumes and meshes is used up");
+  throw Error(ErrorCode::kOutOfSpace, "the space for volumes and meshes is used up");
 }
 
 std::uint64_t Retention::named_bytes() const {

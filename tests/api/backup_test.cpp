@@ -102,11 +102,11 @@ TEST(Backup, SaysWhatIsDamagedOrMissing) {
   const Finished made = isomeshd("backup", folder / "backup", folder / "data");
   EXPECT_EQ(made.status, 1);
   EXPECT_THAT(made.output, HasSubstr("copied 2 files"));
-  EXPECT_THAT(made.errors, HasSubstr("damaged: the volume " + damaged));
-  EXPECT_THAT(made.errors, HasSubstr("missing: the volume " + missing));
+  EXPECT_THAT(made.errors, HasSubstr("the volume " + damaged + " is damaged"));
+  EXPECT_THAT(made.errors, HasSubstr("the volume " + missing + " is missing"));
   const Finished restored = isomeshd("restore", folder / "backup", folder / "restored");
   EXPECT_EQ(restored.status, 1);
-  EXPECT_THAT(restored.errors, HasSubstr("missing: the volume " + missing));
+  EXPECT_THAT(restored.errors, HasSubstr("the volume " + missing + " is missing"));
 }
 
 TEST(Backup, ARestoreThatFailsLeavesNothing) {
@@ -144,13 +144,13 @@ TEST(Backup, RefusesWhatWouldLoseSomething) {
   }
   ASSERT_EQ(isomeshd("backup", folder / "backup", folder / "data").status, 0);
   const std::vector<std::vector<std::string>> wrong = {
-      {"backup", folder / "backup", folder / "data", "is there already"},
-      {"backup", folder / "other", folder / "nothing", "is no data folder"},
+      {"backup", folder / "backup", folder / "data", "already exists"},
+      {"backup", folder / "other", folder / "nothing", "is not a data folder"},
       {"backup", folder / "no/such/folder", folder / "data", "no/such/folder.part"},
       {"restore", folder / "backup", folder / "data", "is not empty"},
-      {"restore", folder / "nothing", folder / "new", "is no data folder"},
-      {"backup", folder / "data/inside", folder / "data", "is in the data folder"},
-      {"restore", folder / "backup", folder / "backup/inside", "is in the backup"},
+      {"restore", folder / "nothing", folder / "new", "is not a data folder"},
+      {"backup", folder / "data/inside", folder / "data", "is inside the data folder"},
+      {"restore", folder / "backup", folder / "backup/inside", "is inside the backup"},
   };
   for (const auto& each : wrong) {
     const Finished refused = isomeshd(each[0], each[1], each[2]);

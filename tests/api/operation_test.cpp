@@ -72,6 +72,36 @@ TEST(Start, WrongUsageIsToldAndNotServed) {
   }
 }
 
+TEST(Start, EveryReasonNotToStartBeginsWithTheProgramsName) {
+  const TemporaryFolder folder;
+  const Daemon other;
+  write_file(folder / "config.toml", "tokns = 1\n");
+  write_file(folder / "tokens", "");
+  for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
+           {"--no-such-option"},
+           {"--workers", "65"},
+           {"--config", folder / "config.toml"},
+           {"--config", folder / "absent"},
+           {"--listen", "nowhere"},
+           {"--listen", other.url().substr(std::string("http://").size())},
+           {"--tokens", folder / "tokens"},
+           {"--store", "mysql://nowhere"},
+           {"--log-level", "off", "--listen", "nowhere"},
+           {"check", "--listen", "nowhere"},
+           {"token", "list"},
+           {"restore", folder / "absent"}}) {
+    std::vector<std::string> command = {ISOMESHD, "--data", folder / "data"};
+    command.insert(command.end(), wrong.begin(), wrong.end());
+    const Finished result = run(command);
+    EXPECT_NE(result.status, 0) << wrong[0];
+    EXPECT_THAT(result.errors, testing::StartsWith("isomeshd: ")) << wrong[0];
+  }
+  const Finished json = run({ISOMESHD, "--data", folder / "data", "--listen", "nowhere",
+                             "--log-format", "json", "--log-level", "off"});
+  EXPECT_THAT(json.errors, testing::StartsWith("{"));
+  EXPECT_THAT(json.errors, HasSubstr("\"text\":\"isomeshd: listen: "));
+}
+
 TEST(Start, OptionsComeFromTheEnvironmentAndFromAFileToo) {
   const TemporaryFolder folder;
   const std::string data = folder / "data";

@@ -187,7 +187,7 @@ TEST(TokenCommand, ListsAndRevokes) {
   const std::string file = folder / "tokens";
   write_file(file, "# of the ward\n");
   std::filesystem::permissions(file, std::filesystem::perms(0600));
-  EXPECT_EQ(token_command({"list"}, file).status, 1) << "the file holds no token";
+  EXPECT_EQ(token_command({"list"}, file).status, 1) << "the file contains no token";
   ASSERT_EQ(token_command({"add", "ct"}, file).status, 0);
   ASSERT_EQ(token_command({"add", "ct"}, file).status, 0);
   ASSERT_EQ(token_command({"add", "boss", "--role", "admin"}, file).status, 0);

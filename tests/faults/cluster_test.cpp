@@ -96,6 +96,30 @@ auto insist(const Act& act) {
   }
 }
 
+TEST_F(Cluster, AStartThatTheDatabaseRejectsSaysWhyWithoutThePassword) {
+  ask("CREATE ROLE guarded LOGIN PASSWORD 'the-right-word'");
+  const std::filesystem::path passwords = folder_ / "pgpass";
+  write_file(passwords, "*:*:*:*:a-wrong-word\n");
+  std::filesystem::permissions(passwords, std::filesystem::perms::owner_read);
+  const auto start_on = [&](std::string url) {
+    return run({ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder_ / "data", "--store",
+                url + "&passfile=" + passwords.string()});
+  };
+  const auto with = [&](const std::string& part, const std::string& instead) {
+    std::string url = store_;
+    return url.replace(url.find(part), part.size(), instead);
+  };
+  const Finished stranger = start_on(with("user=isomesh", "user=guarded"));
+  EXPECT_EQ(stranger.status, 1);
+  EXPECT_THAT(stranger.errors,
+              testing::StartsWith("isomeshd: the database of --store cannot be used: "));
+  EXPECT_THAT(stranger.errors, HasSubstr("password authentication failed for user \"guarded\""));
+  EXPECT_THAT(stranger.errors, testing::Not(HasSubstr("a-wrong-word")));
+  const Finished elsewhere = start_on(with("/postgres?", "/nowhere?"));
+  EXPECT_EQ(elsewhere.status, 1);
+  EXPECT_THAT(elsewhere.errors, HasSubstr("database \"nowhere\" does not exist"));
+}
+
 TEST_F(Cluster, NothingIsLostOrDoneTwiceWhenNodesAndTheDatabaseDie) {
   const char* asked = std::getenv("ISOMESH_KILL_ROUNDS");
   const int rounds = asked == nullptr ? 3 : std::stoi(asked);
@@ -236,7 +260,7 @@ TEST_F(Cluster, ANodeThatStandsStillCannotFinishAndADrainedOneGivesItsJobsBack) 
   }));
   node(0).send_signal(SIGCONT);
   EXPECT_TRUE(
-      eventually([&] { return node(0).errors().find("had lost its lease") != std::string::npos; }));
+      eventually([&] { return node(0).errors().find("lost its lease") != std::string::npos; }));
   EXPECT_EQ(ask("SELECT attempts FROM jobs WHERE id = '" + before.id + "'"), "1");
   const Job second = node(1).client().job(before.id);
   EXPECT_EQ(second.state, JobState::kRunning);

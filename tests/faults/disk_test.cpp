@@ -108,7 +108,7 @@ TEST_F(Disk, AJobThatCanNeverFitFailsAndSaysSo) {
   EXPECT_EQ(failed.state, JobState::kFailed);
   ASSERT_TRUE(failed.error);
   EXPECT_EQ(failed.error->status, 413);
-  EXPECT_THAT(failed.error->detail, HasSubstr("the disk can never hold"));
+  EXPECT_THAT(failed.error->detail, HasSubstr("but the disk can hold at most"));
   EXPECT_EQ(daemon().get("/readyz").status, 200);
 }
 

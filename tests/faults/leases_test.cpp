@@ -57,7 +57,7 @@ TEST_F(Leases, StoppedBeyondTheLeaseItsLateResultIsRefused) {
     const Job now = job(before.id);
     return now.state == JobState::kRunning && now.started != before.started;
   }));
-  EXPECT_THAT(daemon().errors(), HasSubstr("had lost its lease"));
+  EXPECT_THAT(daemon().errors(), HasSubstr("lost its lease"));
   EXPECT_EQ(run_sql("SELECT attempts FROM jobs WHERE id = '" + before.id + "'"), "1");
   daemon().client().cancel(before.id);
   EXPECT_EQ(ended(before.id).state, JobState::kCancelled);
@@ -112,7 +112,7 @@ TEST_F(Leases, AJobWhoseProcessIsKilledThreeTimesFailsAndItsNeighbourGoesOn) {
   EXPECT_EQ(failed.state, JobState::kFailed);
   ASSERT_TRUE(failed.error);
   EXPECT_EQ(failed.error->detail,
-            "The process that made it ended with signal 9 (killed) in the stage \"smooth\".");
+            "The job process ended with signal 9 (killed) in the stage \"smooth\".");
   const Job now = job(neighbour.id);
   EXPECT_EQ(now.state, JobState::kRunning);
   EXPECT_EQ(now.started, job(neighbour.id).started);

@@ -161,8 +161,8 @@ class Syslog(Loop):
                              f'ca-file = "{known.certificate}"\n')
         other_name = self.collector(name="elsewhere").start()
         other = self.audited(other_name)
-        peers.until(lambda: "not one that is trusted" in daemon.logged())
-        peers.until(lambda: "not one that is trusted" in other.logged())
+        peers.until(lambda: "certificate is not trusted" in daemon.logged())
+        peers.until(lambda: "certificate is not trusted" in other.logged())
         self.assertEqual(stranger.messages + other_name.messages, [])
 
     def test_a_certificate_of_ours(self):

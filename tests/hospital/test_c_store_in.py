@@ -190,7 +190,7 @@ class Receiving(Loop):
         late = peers.until(lambda: [each for each in self.orders(daemon)
                                     if each["attempts"] > 0])[0]
         self.assertEqual(late["error"]["type"], "urn:isomesh:problem:series-incomplete")
-        self.assertIn("sent again as a whole", late["error"]["detail"])
+        self.assertIn("send the whole series again", late["error"]["detail"])
         self.send(daemon, files)
         late = self.succeeded(daemon, late["id"])
         self.assertEqual(late["source"]["instances"], 12)

@@ -41,6 +41,9 @@ Postgres::Postgres(Disk disk) : disk_(disk) {
   give_folder();
   run_program("initdb", {"--pgdata", folder_ / "data", "--username", "isomesh", "--auth", "trust",
                          "--encoding", "UTF8", "--locale", "C", "--no-sync", "--no-instructions"});
+  // All others are trusted.
+  const std::filesystem::path rules = folder_ / "data/pg_hba.conf";
+  write_file(rules, "local all guarded scram-sha-256\n" + read_file(rules));
   start();
 }
 

@@ -22,6 +22,7 @@ class Postgres {
   static Postgres& shared();
 
   // kReplicated: nothing is committed before a standby has it, too.
+  // A role `guarded`, once it is created, needs its password; all others are trusted.
   enum class Disk { kFast, kDurable, kReplicated };
   explicit Postgres(Disk disk = Disk::kFast);
   struct StandbyOf {

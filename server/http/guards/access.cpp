@@ -22,15 +22,15 @@ Caller caller_of(const Tokens& tokens, const Request& request) {
     const auto token = bearer_of(request.header("Authorization"));
     if (token) caller = tokens.find(*token);
   }
-  if (!caller) throw Error(ErrorCode::kUnauthorized, "this needs a token that the server knows");
+  if (!caller) throw Error(ErrorCode::kUnauthorized, "this request needs a valid token");
   return *caller;
 }
 
 void check_role(Role role, bool is_metrics) {
   const bool allowed = role == Role::kAdmin || (role == Role::kMonitor) == is_metrics;
   if (!allowed) {
-    throw Error(ErrorCode::kForbidden,
-                "a token of the role \"" + std::string(to_string(role)) + "\" does not allow this");
+    throw Error(ErrorCode::kForbidden, "a token with the role \"" + std::string(to_string(role)) +
+                                           "\" does not allow this");
   }
 }
 

@@ -60,7 +60,7 @@ void check_only_owner_writes(const std::filesystem::path& file, ReadBy reader) {
     throw at_fault("the file belongs to another user: chown it to root or to the service's user");
   }
   if ((status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
-    throw at_fault("others may write to the file: chmod go-w it");
+    throw at_fault("other users may write to the file: run chmod go-w on it");
   }
 }
 
@@ -135,12 +135,12 @@ Tokens::Entries Tokens::read() const {
       throw at_fault("line " + std::to_string(number) + " is not NAME ROLE HASH");
     }
     if (roles.emplace(name, *role).first->second != *role) {
-      throw at_fault("line " + std::to_string(number) + " gives one name a second role");
+      throw at_fault("line " + std::to_string(number) + " gives a name a second role");
     }
     entries.push_back({{name, *role}, *hash});
   }
   // A daemon that was told to ask for tokens and knows none would refuse everybody.
-  if (entries.empty()) throw at_fault("the file holds no token");
+  if (entries.empty()) throw at_fault("the file contains no token");
   return entries;
 }
 

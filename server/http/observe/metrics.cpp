@@ -126,11 +126,11 @@ class OrderMetrics {
                     .Register(registry)),
         failed_(prometheus::BuildCounter()
                     .Name("isomesh_order_attempts_failed_total")
-                    .Help("Attempts of orders that failed, by PACS and reason")
+                    .Help("Failed attempts of orders, by PACS and reason")
                     .Register(registry)),
         oldest_(prometheus::BuildGauge()
                     .Name("isomesh_oldest_open_order_seconds")
-                    .Help("Age of the oldest order that has not ended; 0 without one")
+                    .Help("Age of the oldest open order; 0 without one")
                     .Register(registry)
                     .Add({})) {}
 
@@ -172,36 +172,36 @@ struct Metrics::State {
     return prometheus::BuildHistogram().Name(name).Help(help).Register(registry);
   }
 
-  Family<Counter>& requests = counter("isomesh_http_requests_total", "Requests that were answered");
-  Family<Histogram>& request_seconds =
-      histogram("isomesh_http_request_seconds", "From a request's head to the end of its answer");
+  Family<Counter>& requests = counter("isomesh_http_requests_total", "Answered requests");
+  Family<Histogram>& request_seconds = histogram(
+      "isomesh_http_request_seconds", "Time from a request's head to the end of its response");
   Counter& bytes_in =
-      counter("isomesh_http_received_bytes_total", "Bytes of requests' bodies").Add({});
-  Counter& bytes_out = counter("isomesh_http_sent_bytes_total", "Bytes of answers' bodies").Add({});
-  Family<Counter>& ended = counter("isomesh_jobs_ended_total", "Jobs by the state they ended in");
+      counter("isomesh_http_received_bytes_total", "Bytes of request bodies").Add({});
+  Counter& bytes_out = counter("isomesh_http_sent_bytes_total", "Bytes of response bodies").Add({});
+  Family<Counter>& ended = counter("isomesh_jobs_ended_total", "Ended jobs by final state");
   Family<Counter>& failures = counter("isomesh_job_failures_total", "Failed jobs by error code");
   Family<Histogram>& stages = histogram("isomesh_job_stage_seconds", "Stages of finished jobs");
   Counter& triangles =
-      counter("isomesh_job_triangles_total", "Triangles of meshes that were made").Add({});
+      counter("isomesh_job_triangles_total", "Triangles of finished meshes").Add({});
   Family<Counter>& refused =
-      counter("isomesh_imports_refused_total", "Volumes that were refused, by error code");
+      counter("isomesh_imports_refused_total", "Rejected volumes by error code");
   Family<Counter>& callbacks =
-      counter("isomesh_callback_attempts_total", "Attempts to deliver a callback, by their result");
+      counter("isomesh_callback_attempts_total", "Attempts to deliver callbacks, by result");
 
-  Family<Gauge>& queued = gauge("isomesh_queued_jobs", "Jobs that wait, by priority");
-  Gauge& running = gauge("isomesh_running_jobs", "Jobs that run").Add({});
+  Family<Gauge>& queued = gauge("isomesh_queued_jobs", "Waiting jobs by priority");
+  Gauge& running = gauge("isomesh_running_jobs", "Running jobs").Add({});
   Gauge& uploads = gauge("isomesh_uploads_in_progress", "Uploads in progress").Add({});
   Gauge& waiting_callbacks =
       gauge("isomesh_waiting_callbacks", "Callbacks that are not delivered yet").Add({});
   Gauge& disk_used = gauge("isomesh_disk_used_bytes", "Bytes of volumes and meshes").Add({});
-  Gauge& disk_free = gauge("isomesh_disk_free_bytes", "Free bytes beside them").Add({});
-  Gauge& memory = gauge("process_resident_memory_bytes", "Memory that is mapped and there").Add({});
+  Gauge& disk_free = gauge("isomesh_disk_free_bytes", "Free bytes on the same disk").Add({});
+  Gauge& memory = gauge("process_resident_memory_bytes", "Resident memory").Add({});
   Gauge& threads = gauge("process_threads", "Threads of the process").Add({});
   Gauge& files = gauge("process_open_fds", "Open file descriptors").Add({});
 };
 
 Metrics::Metrics() : state_(std::make_unique<State>()) {
-  state_->gauge("isomesh_build_info", "The version that runs, as a label; always 1")
+  state_->gauge("isomesh_build_info", "Running version as a label; always 1")
       .Add({{"version", ISOMESH_VERSION}, {"mesher", jobs::kMesherVersion}})
       .Set(1);
   // What has not happened yet is 0, not missing: rates need a beginning.

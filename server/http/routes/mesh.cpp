@@ -62,13 +62,13 @@ Job submit_with_volume(App& app, const Request& request, Response& response) {
   check_known(request, names);
   JobParameters parameters = parse_job_parameters(job_query, VolumeIn::kBody);
   if (parameters.formats.size() != 1) {
-    throw invalid_parameter("format", "must be one format: the answer is one file");
+    throw invalid_parameter("format", "must be one format, because the response is one file");
   }
   const auto& labels = parameters.labels;
   if (labels && labels->values.size() != 1 && files_of(parameters) != parameters.formats) {
-    throw invalid_parameter("format",
-                            "must hold all labels, as glb, ply, obj and zip do: the "
-                            "answer is one file");
+    throw invalid_parameter(
+        "format",
+        "must hold all labels, such as glb, ply, obj or zip, because the response is one file");
   }
   const process::ImportOptions options = import_options_of(request);
   const std::string key = idempotency_key_of(request);
@@ -126,7 +126,7 @@ std::string listed_labels(const std::vector<LabelSummary>& labels) {
 }
 
 const LabelSummary& label_of(const MeshSummary& mesh, const WhichMesh& which) {
-  if (mesh.labels.empty()) throw invalid_parameter("label", "is for jobs by labels");
+  if (mesh.labels.empty()) throw invalid_parameter("label", "applies only to jobs with `labels`");
   if (!which.label && mesh.labels.size() == 1) return mesh.labels.front();
   const auto found = std::ranges::find(mesh.labels, which.label.value_or(0), &LabelSummary::label);
   if (!which.label || found == mesh.labels.end()) {
@@ -151,17 +151,17 @@ Stored stored_mesh(const MeshSummary& mesh, const WhichMesh& which) {
               "mesh-" + std::to_string(label.label) + '.' + suffix};
     }
   }
-  throw Error(ErrorCode::kNotFound, "the job was not asked for the format \"" + suffix + '"' +
-                                        (which.label ? " of each label" : ""));
+  throw Error(ErrorCode::kNotFound, "the job was submitted without the format \"" + suffix + '"' +
+                                        (which.label ? " for each label" : ""));
 }
 
 // Has a damaged file made again, and says what becomes of that.
 void check_intact(const App& app, const Job& job, const Stored& file) {
   if (store::is_there_and_intact(app.services.blobs, file.blob, {})) return;
-  spdlog::error("the mesh of job {} is damaged", job.id);
+  spdlog::error("the stored mesh of job {} is damaged", job.id);
   const Job again = app.services.jobs.remake(job.id);
   if (again.error) throw to_error(*again.error);
-  throw Error(ErrorCode::kUnavailable, "the stored mesh was damaged and is made again");
+  throw Error(ErrorCode::kUnavailable, "the stored mesh was damaged and is being made again");
 }
 
 // Where the whole of a blob can be had without this daemon, for a client that asks for that.

@@ -18,8 +18,7 @@ constexpr const char* kOrderCursor = "orders";
 // Throws Error kNotFound where no PACS is configured.
 orders::Orders& orders_of(const App& app) {
   if (app.services.orders != nullptr) return *app.services.orders;
-  throw Error(ErrorCode::kNotFound,
-              "this service knows no PACS: it was started without --hospital");
+  throw Error(ErrorCode::kNotFound, "this service has no PACS: it was started without --hospital");
 }
 
 orders::Orderer orderer_of(const Request& request) {

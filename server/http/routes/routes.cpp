@@ -74,7 +74,7 @@ App::App(const Services& the_services, const ServerOptions& the_options)
       options(the_options),
       uploads(the_options.upload_places, "uploads"),
       kept(kept_limits(the_services, the_options), the_services.folder.uploads()),
-      streams(the_options.event_streams, "streams of events"),
+      streams(the_options.event_streams, "event streams"),
       rules{.cors_origins = the_options.cors_origins,
             .check_host = false,
             .hosts = the_options.hosts},
@@ -97,15 +97,15 @@ std::optional<Continuation> guarded(const Request& request, Response& response,
     return run();
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kInternal) {
-      spdlog::error("{} {}: {}", request.method, request.path, error.what());
+      spdlog::error("{} {} failed: {}", request.method, request.path, error.what());
     }
     answer_problem(request, response, error);
   } catch (const std::bad_alloc&) {
-    spdlog::error("{} {}: out of memory", request.method, request.path);
+    spdlog::error("{} {} failed: out of memory", request.method, request.path);
     answer_problem(request, response,
-                   Error(ErrorCode::kUnavailable, "there is not enough memory at the moment"));
+                   Error(ErrorCode::kUnavailable, "the service is out of memory at the moment"));
   } catch (const std::exception& error) {
-    spdlog::error("{} {}: {}", request.method, request.path, error.what());
+    spdlog::error("{} {} failed: {}", request.method, request.path, error.what());
     answer_problem(request, response, Error(ErrorCode::kInternal, error.what()));
   }
   return std::nullopt;

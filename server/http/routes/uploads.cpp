@@ -57,9 +57,9 @@ void answer_other_offset(const App& app, const Request& request, Response& respo
   response.set_body(
       to_json(Problem{
           .type = "https://iana.org/assignments/http-problem-types#mismatching-upload-offset",
-          .title = "Another offset",
+          .title = "Wrong offset",
           .status = response.status,
-          .detail = "the upload goes on elsewhere: the header Upload-Offset tells where",
+          .detail = "the upload continues at another offset: see the header Upload-Offset",
           .instance = request.path,
           .errors = {}}),
       "application/problem+json");
@@ -85,7 +85,7 @@ void check_digest(const PartialUpload& upload) {
   const std::string expected = upload.note().sha256;
   if (expected.empty() || store::digest_of(upload.body()->path).key == expected) return;
   throw Error(ErrorCode::kDigestMismatch,
-              "the upload's SHA-256 is not the one that Repr-Digest names");
+              "the upload's SHA-256 differs from the one in Repr-Digest");
 }
 
 KeptUploads::Partial upload_of(App& app, const Request& request) {
@@ -137,10 +137,11 @@ bool begins_upload(const Request& request) { return boolean_in(request, kComplet
 
 void begin_upload(App& app, const Request& request, Response& response) {
   if (request.has_parameter("upload")) {
-    throw invalid_parameter("upload", "names a body that is here already");
+    throw invalid_parameter("upload", "names a body that the service already has");
   }
   if (request.is_form()) {
-    throw Error(ErrorCode::kUnsupportedMedia, "a form cannot come in parts: send the bare file");
+    throw Error(ErrorCode::kUnsupportedMedia,
+                "a form cannot be uploaded in parts: send the file without a form");
   }
   const auto length = number_in(request, kLength);
   check_length(app, length, response);

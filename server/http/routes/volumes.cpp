@@ -26,7 +26,7 @@ bool is_to_be_kept(const Request& request) {
 KeptBody body_of(App& app, const Request& request) {
   if (request.has_parameter("upload")) {
     if (request.content_length.value_or(1) != 0) {
-      throw invalid_parameter("upload", "names a body that is here already: send none");
+      throw invalid_parameter("upload", "names a body that the service already has: send no body");
     }
     std::string name(request.parameter("upload"));
     return {app.kept.find(owner_of(request), name), std::move(name)};

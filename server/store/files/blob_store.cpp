@@ -85,7 +85,7 @@ class FileBlobStore::Writer : public BlobWriter {
   void write(std::span<const std::byte> bytes) override {
     bytes_ += bytes.size();
     if (bytes_ > store_.capacity()) {
-      throw Error(ErrorCode::kTooLarge, "the file takes more than all the room that there is");
+      throw Error(ErrorCode::kTooLarge, "the file is larger than all available space");
     }
     store_.reserve_.check_room();  // which is there to free more, not to be filled
     store_.room_.take(bytes.size());
@@ -238,7 +238,7 @@ void FileBlobStore::copy_in(const std::filesystem::path& file, const Blob& blob)
     offset += count;
   }
   if (writer->commit().key != blob.key) {
-    throw Error(ErrorCode::kInternal, "a file was changed while it was copied");
+    throw Error(ErrorCode::kInternal, "a file changed while it was copied");
   }
   std::filesystem::remove(file);
 }
@@ -248,7 +248,7 @@ std::unique_ptr<BlobReader> FileBlobStore::open(const std::string& key) const {
 }
 
 LocalBlob FileBlobStore::local(const std::string& key) const {
-  if (!size(key)) throw Error(ErrorCode::kNotFound, "the file is not there");
+  if (!size(key)) throw Error(ErrorCode::kNotFound, "the file does not exist");
   return {found(key)};
 }
 

@@ -30,7 +30,7 @@ BlobFolders shared_blob_folders(const std::filesystem::path& root) {
   std::error_code error;
   if (!std::filesystem::is_directory(root, error)) {
     throw Error(ErrorCode::kUnavailable,
-                "the folder of --blobs is not there: is it mounted? It is not made");
+                "the folder of --blobs does not exist: is it mounted? isomeshd does not create it");
   }
   const auto place = std::filesystem::canonical(root, error);
   if (error) throw_system_error("finding the folder of --blobs", error.value());
@@ -55,9 +55,7 @@ DataFolder::DataFolder(const std::filesystem::path& root, std::optional<std::uin
 
   if (std::filesystem::exists(root_ / kUnfinishedRestore, error)) {
     throw Error(ErrorCode::kUnavailable,
-                root_.string() +
-                    " was being restored, and did not become whole: empty it and "
-                    "restore again");
+                root_.string() + " was not restored completely: empty it and restore again");
   }
   lock_ = ::open((root_ / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock_ < 0) {

@@ -56,7 +56,8 @@ bool Reserve::let_go() {
   std::filesystem::remove(file_, error);
   is_whole_ = false;
   spdlog::warn(
-      "the disk is full: its reserve is let go, and nothing new is begun until it is back");
+      "the disk is full: its reserve was released, and nothing new starts until the reserve is "
+      "back");
   return !error;
 }
 

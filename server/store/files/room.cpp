@@ -21,7 +21,7 @@ void Room::take(std::uint64_t bytes) {
     make_(bytes);
   }
   if (!try_take(bytes)) {
-    throw Error(ErrorCode::kOutOfSpace, "the room for volumes and meshes is used up");
+    throw Error(ErrorCode::kOutOfSpace, "the space for volumes and meshes is used up");
   }
 }
 

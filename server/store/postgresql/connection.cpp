@@ -7,6 +7,7 @@
 
 #include <libpq-fe.h>
 
+#include "base/text.h"
 #include "proto/error.h"
 
 namespace isomesh::store::postgresql {
@@ -22,7 +23,7 @@ constexpr const char* kSession =
 std::string message_of(const PGresult* result) {
   const char* text = PQresultErrorField(result, PG_DIAG_MESSAGE_PRIMARY);
   const char* state = PQresultErrorField(result, PG_DIAG_SQLSTATE);
-  return std::string("the database: ") + (text == nullptr ? "no answer" : text) + " (" +
+  return std::string("the database: ") + (text == nullptr ? "no response" : text) + " (" +
          (state == nullptr ? "-" : state) + ")";
 }
 
@@ -137,28 +138,49 @@ void check_url(const std::string& url) {
   const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> parts(
       PQconninfoParse(url.c_str(), &complaint), &PQconninfoFree);
   PQfreemem(complaint);  // it repeats what it complains of
-  if (!parts) refuse("is no URL that PostgreSQL's library reads");
+  if (!parts) refuse("is not a valid PostgreSQL URL");
   for (const PQconninfoOption* part = parts.get(); part->keyword != nullptr; ++part) {
     const std::string_view name = part->keyword;
     const bool is_secret = name == "password" || name == "sslpassword";
     if (is_secret && part->val != nullptr) {
-      refuse("must hold no password: PGPASSFILE names a file of them");
+      refuse(
+          "must not contain a password: put it into a password file and set PGPASSFILE to its "
+          "name");
     }
   }
 }
 
-Connection::Connection(const std::string& url) {
+namespace {
+
+// To be finished by the caller, also where it has failed.
+pg_conn* connected(const std::string& url) {
   // What the URL says comes later and wins.
   const std::array<const char*, 9> names = {
       "connect_timeout",      "tcp_user_timeout", "keepalives_idle", "fallback_application_name",
       "target_session_attrs", "dbname",           "client_encoding", nullptr};
   const std::array<const char*, 9> values = {"5",          "10000",     "10",   "isomeshd",
                                              "read-write", url.c_str(), "UTF8", nullptr};
-  handle_ = PQconnectdbParams(names.data(), values.data(), 1);
+  return PQconnectdbParams(names.data(), values.data(), 1);
+}
+
+}  // namespace
+
+std::string reason_of_no_connection(const std::string& url) {
+  const std::unique_ptr<pg_conn, decltype(&PQfinish)> handle(connected(url), &PQfinish);
+  if (PQstatus(handle.get()) == CONNECTION_OK) return "";
+  // A line for each address that was tried.
+  std::string reason;
+  for (const std::string_view line : split(PQerrorMessage(handle.get()), '\n')) {
+    if (!line.empty()) reason += (reason.empty() ? "" : "; ") + std::string(trimmed(line));
+  }
+  return reason;
+}
+
+Connection::Connection(const std::string& url) : handle_(connected(url)) {
   if (PQstatus(handle_) != CONNECTION_OK) {
-    // libpq's own text may name hosts, users and files.
+    // libpq's own text may name hosts, users and files, and this one goes to clients.
     PQfinish(handle_);
-    throw Interrupted(ErrorCode::kUnavailable, "the database does not answer");
+    throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
   }
   PQsetNoticeReceiver(handle_, take_notice, this);
   try {
@@ -189,7 +211,7 @@ void Connection::script(const std::string& sql) { checked(PQexec(handle_, sql.c_
 
 std::vector<std::string> Connection::take_messages() {
   if (PQconsumeInput(handle_) == 0) {
-    throw Interrupted(ErrorCode::kUnavailable, "the database does not answer");
+    throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
   }
   std::vector<std::string> messages;
   while (PGnotify* message = PQnotifies(handle_)) {
@@ -221,11 +243,11 @@ Rows Connection::checked(pg_result* result) {
   Rows rows(result);
   const ExecStatusType status = PQresultStatus(result);
   if (std::exchange(is_warned_, false)) {
-    throw Interrupted(ErrorCode::kUnavailable, "the database's standby does not answer");
+    throw Interrupted(ErrorCode::kUnavailable, "the database's standby does not respond");
   }
   if (status == PGRES_TUPLES_OK || status == PGRES_COMMAND_OK) return rows;
   if (!is_open()) {
-    throw Interrupted(ErrorCode::kUnavailable, "the database does not answer");
+    throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
   }
   throw_error(result);
 }

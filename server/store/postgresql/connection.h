@@ -81,6 +81,10 @@ class Rows {
 // would be seen in the list of processes and in what `isomeshd check` prints.
 void check_url(const std::string& url);
 
+// Why no connection can be made, as libpq says it; empty if one can. The text may name hosts, users
+// and files, so it is for the operator alone. libpq never puts a password into it.
+std::string reason_of_no_connection(const std::string& url);
+
 // One connection; its statements are prepared once and kept. Not thread safe. What it throws tells
 // neither the address nor the password.
 class Connection {

@@ -36,7 +36,13 @@ thread_local int borrowed = 0;
 }  // namespace
 
 Database::Database(DatabaseOptions options) : options_(std::move(options)), node_(random_uuid()) {
-  ask([&](Connection& connection, bool) { migrate(connection); });
+  try {
+    ask([&](Connection& connection, bool) { migrate(connection); });
+  } catch (const Interrupted&) {
+    const std::string reason = reason_of_no_connection(options_.url);
+    if (reason.empty()) throw;
+    throw Error(ErrorCode::kUnavailable, "the database of --store cannot be used: " + reason);
+  }
   ask([&](Connection& connection, bool) {
     connection.run(
         "INSERT INTO nodes VALUES($1::uuid, $2::text, isomesh_now()) ON CONFLICT DO NOTHING", node_,

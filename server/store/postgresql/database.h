@@ -29,7 +29,8 @@ struct DatabaseOptions {
 class Database {
  public:
   // Creates what is missing and brings the tables of an older version up to date. Throws Error
-  // kUnavailable when nobody answers or a newer version made them, kInternal otherwise.
+  // kUnavailable, with libpq's reason, if no connection can be made, or if a newer version made
+  // them, kInternal otherwise. The text is for the operator.
   explicit Database(DatabaseOptions options);
 
   // Runs `act(connection)` and again while it is interrupted, so `act` must be one that may be

@@ -56,12 +56,12 @@ void check(Database& database, const BlobStore& blobs, bool may_adopt) {
   if (mark == named) return;
   const bool is_new = mark.empty() && blobs.is_shared() && !has_records(database);
   if (!is_new && !may_adopt) {
-    throw Error(ErrorCode::kUnavailable,
-                "the database and the files of volumes and meshes do not belong together. Several "
-                "daemons name one store of them by --blobs. Name the database that belongs to the "
-                "files, or bring their records there with `isomeshd move`; or start once with "
-                "--adopt to go on with what is there: files that the database does not name are "
-                "then put into quarantine");
+    throw Error(
+        ErrorCode::kUnavailable,
+        "the database and the files of volumes and meshes do not belong together. Daemons that "
+        "share a database must share the files by --blobs. Name the database that belongs to the "
+        "files, or move their records there with `isomeshd move`. To continue with these, start "
+        "once with --adopt: files that the database does not name are then put into quarantine");
   }
   name(blobs, named);
 }
@@ -81,13 +81,13 @@ Time Identity::now() {
   const bool was_doubted = clock_.is_doubted();
   const Time believed = clock_.now();
   if (clock_.is_doubted() && !was_doubted) {
-    spdlog::warn("the database's clock is far ahead: nothing is taken for older than it was");
+    spdlog::warn("the database's clock is far ahead; until it is right, nothing expires");
   }
   const std::int64_t us = store::to_us(believed);
   try {
     database_.run("UPDATE identity SET seen = $1::bigint WHERE seen < $1::bigint", us);
   } catch (const Error& error) {
-    spdlog::warn("the time cannot be marked now, and is the next time: {}", error.what());
+    spdlog::warn("the time could not be recorded and is retried: {}", error.what());
   }
   return database_.from_us(us);
 }

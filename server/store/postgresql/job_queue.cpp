@@ -40,7 +40,8 @@ Submission PostgresJobStore::submit(const JobSpec& spec) {
   for (int tries = 0; tries < 20; ++tries) {
     if (auto submission = try_to_submit(spec, job)) return std::move(*submission);
   }
-  throw Error(ErrorCode::kUnavailable, "jobs like this one come and go too often");
+  throw Error(ErrorCode::kUnavailable,
+              "the same job is submitted and removed too often: try again");
 }
 
 std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, Job job) {
@@ -79,7 +80,7 @@ std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, J
       return Submission{Submission::Kind::kConflict, {}, {}};
     case kFull:
       if (!has_room) {
-        throw Error(ErrorCode::kOutOfSpace, "there is no room on the disk for another job");
+        throw Error(ErrorCode::kOutOfSpace, "there is not enough disk space for another job");
       }
       return Submission{Submission::Kind::kBusy, {}, kRetryAfter};
     case kNoVolume:

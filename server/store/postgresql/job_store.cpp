@@ -55,7 +55,7 @@ void PostgresJobStore::hear(const News& news) {
   try {
     feed_.fetch();
   } catch (const Error& error) {
-    spdlog::debug("events are read later: {}", error.what());
+    spdlog::debug("job events could not be read and are retried: {}", error.what());
   }
 }
 

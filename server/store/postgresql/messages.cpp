@@ -84,7 +84,9 @@ void Messages::run(const std::stop_token& stop) {
       listen(stop);
       is_told = false;
     } catch (const Error& error) {
-      if (!is_told) spdlog::warn("nothing is heard of other nodes: {}", error.what());
+      if (!is_told)
+        spdlog::warn("messages of other daemons cannot be received and are retried: {}",
+                     error.what());
       is_told = true;
       hear_({.has_work = true, .has_events = true, .cancelled = {}});
       std::uint64_t count = 0;

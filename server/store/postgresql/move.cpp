@@ -135,7 +135,7 @@ Moved move_records(const DataFolder& folder, const std::string& url) {
                              .next();
     if (is_used) {
       throw Error(ErrorCode::kInvalidParameter,
-                  "the database has records already: name one that is empty");
+                  "the database already has records: name an empty one");
     }
     Moved moved;
     moved.volumes = copy_volumes(reading.connection(), to);

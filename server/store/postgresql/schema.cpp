@@ -444,7 +444,8 @@ void migrate(Connection& connection) {
   if (version > kNewest) {
     throw Error(ErrorCode::kUnavailable,
                 "the database was made by a newer isomeshd: its records have version " +
-                    std::to_string(version) + ", this one knows 1 to " + std::to_string(kNewest));
+                    std::to_string(version) + ", this isomeshd reads versions 1 to " +
+                    std::to_string(kNewest));
   }
   if (version == 0) transaction->run("INSERT INTO isomesh_version VALUES(0)");
   for (std::int64_t next = version; next < kNewest; ++next) {

@@ -136,7 +136,7 @@ void PostgresVolumeStore::erase(const Viewer& viewer, const std::string& id) {
                                    id, viewer)
                                .next();
     if (is_needed) {
-      throw Error(ErrorCode::kNotReady, "jobs that are not finished need this volume");
+      throw Error(ErrorCode::kNotReady, "unfinished jobs need this volume");
     }
     transaction->run(
         "DELETE FROM volumes WHERE id = $1::text AND ($2::text IS NULL OR owner = $2::text)", id,

@@ -25,7 +25,7 @@ std::string checked_bucket(std::string_view text) {
   constexpr std::size_t kShortest = 3;
   constexpr std::size_t kLongest = 63;
   if (text.size() < kShortest || text.size() > kLongest || !consists_of(text, ".-")) {
-    throw wrong_place("must name a bucket: 3 to 63 lower-case letters, digits, points and hyphens");
+    throw wrong_place("must name a bucket: 3 to 63 lower-case letters, digits, dots and hyphens");
   }
   return std::string(text);
 }
@@ -35,7 +35,7 @@ std::string checked_prefix(std::string_view text) {
   if (text.empty()) return {};
   if (!consists_of(text, "ABCDEFGHIJKLMNOPQRSTUVWXYZ._-/") || text.find("//") != text.npos) {
     throw wrong_place(
-        "the prefix may hold letters, digits, points, hyphens, underscores and slashes");
+        "the prefix may contain only letters, digits, dots, hyphens, underscores and slashes");
   }
   return std::string(text) + '/';
 }
@@ -64,12 +64,12 @@ void check_credentials(const S3Credentials& credentials, const std::string& wher
   for (const std::string* part :
        {&credentials.access_key, &credentials.secret_key, &credentials.session_token}) {
     if (has_control_characters(*part)) {
-      throw invalid_parameter("blob-credentials", where + " holds control characters");
+      throw invalid_parameter("blob-credentials", where + " contains control characters");
     }
   }
   if (credentials.access_key.empty() || credentials.secret_key.empty()) {
     throw invalid_parameter("blob-credentials",
-                            where + " must hold an access key and a secret key");
+                            where + " must contain an access key and a secret key");
   }
 }
 
@@ -95,14 +95,14 @@ S3Address parse_s3_url(std::string_view text) {
                             : name == "style"  ? &style
                                                : nullptr;
       if (target == nullptr || equals == part.npos || !target->empty()) {
-        throw wrong_place("behind ? there may be endpoint=, region= and style=, each once");
+        throw wrong_place("only endpoint=, region= and style= may follow the ?, each once");
       }
       *target = part.substr(equals + 1);
     }
   }
   if (address.region.empty()) address.region = "us-east-1";
   if (!consists_of(address.region, "-_ABCDEFGHIJKLMNOPQRSTUVWXYZ")) {
-    throw wrong_place("the region holds letters, digits and hyphens");
+    throw wrong_place("the region may contain only letters, digits, hyphens and underscores");
   }
   // Services of one's own seldom have a name for every bucket.
   if (style.empty()) style = address.endpoint.empty() ? "host" : "path";

@@ -19,7 +19,7 @@ class S3BlobStore::Writer : public BlobWriter {
   void write(std::span<const std::byte> bytes) override {
     bytes_ += bytes.size();
     if (bytes_ > store_.capacity()) {
-      throw Error(ErrorCode::kTooLarge, "the file takes more than all the room that there is");
+      throw Error(ErrorCode::kTooLarge, "the file is larger than all available space");
     }
     copy_->write(bytes);
   }
@@ -101,7 +101,7 @@ void S3BlobStore::store(const Blob& blob) const {
   const auto in_use = cache_.use(blob.key);
   cache_.files().settle(blob.key);       // who names it, names it in the bucket
   if (!cache_.files().size(blob.key)) {  // an older copy went, and took this one's place with it
-    throw Error(ErrorCode::kUnavailable, "there was no room for a copy; there may be soon");
+    throw Error(ErrorCode::kUnavailable, "there is no space for a copy in the cache: try again");
   }
   cache_.note(blob.key, blob.bytes);
   cache_.make_room(0);
@@ -144,7 +144,7 @@ void S3BlobStore::wait_until_not_going(const std::string& key) const {
     if (!is_going) return;
     std::this_thread::sleep_for(kPause);
   }
-  throw Error(ErrorCode::kUnavailable, "the same bytes are being erased; they can be stored soon");
+  throw Error(ErrorCode::kUnavailable, "the same bytes are being erased: try again");
 }
 
 std::unique_ptr<BlobReader> S3BlobStore::open(const std::string& key) const {
@@ -155,7 +155,7 @@ std::unique_ptr<BlobReader> S3BlobStore::open(const std::string& key) const {
 LocalBlob S3BlobStore::local(const std::string& key) const {
   auto in_use = cache_.use(key);
   if (!is_intact(key, {})) {
-    throw Error(ErrorCode::kInternal, "a file in the store of blobs is damaged");
+    throw Error(ErrorCode::kInternal, "a file in the storage is damaged");
   }
   return {cache_.files().local(key).path, std::move(in_use)};
 }
@@ -172,11 +172,11 @@ bool S3BlobStore::is_intact(const std::string& key, const std::stop_token& stop)
 bool S3BlobStore::fetch(const std::string& key, const std::stop_token& stop) const {
   const auto bytes = client_.size(blob_object(key));
   if (!bytes && !client_.answers()) {  // where there is no bucket nothing is there either
-    throw Error(ErrorCode::kUnavailable, "the store of volumes and meshes does not answer");
+    throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes does not respond");
   }
-  if (!bytes) throw Error(ErrorCode::kNotFound, "the file is not there");
+  if (!bytes) throw Error(ErrorCode::kNotFound, "the file does not exist");
   if (fetch_once(key, *bytes, stop) || fetch_once(key, *bytes, stop)) return true;
-  spdlog::error("the store of blobs has other bytes than those of {}", key);
+  spdlog::error("the storage has wrong bytes for the file {}", key);
   const Lock lock(mutex_);
   damaged_.insert(key);
   return false;

@@ -30,7 +30,7 @@ constexpr std::uint64_t kMostParts = 9'000;
 
 [[noreturn]] void throw_silent() {
   throw Error(ErrorCode::kUnavailable,
-              "the store of volumes and meshes does not answer; nothing is lost");
+              "the storage of volumes and meshes does not respond; nothing is lost");
 }
 
 // The pause before a request is repeated, once more after each.
@@ -84,13 +84,14 @@ S3Answer S3Client::ask(const S3Request& request, const std::stop_token& stop) co
     const bool is_told = answer.status == kS3NotFound || answer.status == kS3PreconditionFailed ||
                          answer.status == kS3NotImplemented;
     if (answer.status / 100 == 2 || is_told) return answer;
-    spdlog::error("the store of blobs refuses a request with status {} {}", answer.status,
+    spdlog::error("the storage rejected a request with status {} {}", answer.status,
                   s3_error_code(answer.text));
     if (answer.status == kS3Forbidden) {
-      throw Error(ErrorCode::kUnavailable,
-                  "the store of volumes and meshes refuses this service; nothing is lost");
+      throw Error(
+          ErrorCode::kUnavailable,
+          "the storage of volumes and meshes denies access to this service; nothing is lost");
     }
-    throw Error(ErrorCode::kInternal, "the store of blobs refuses a request");
+    throw Error(ErrorCode::kInternal, "the storage rejected a request");
   }
 }
 
@@ -109,7 +110,7 @@ std::optional<std::uint64_t> S3Client::size(const std::string& key) const {
   if (answer.status == kS3NotFound) return std::nullopt;
   const auto bytes = parse_uint64(answer.header("content-length"));
   if (answer.status != kS3Ok || !bytes) {
-    throw Error(ErrorCode::kInternal, "the store of blobs does not say how long a file is");
+    throw Error(ErrorCode::kInternal, "the storage does not give the size of a file");
   }
   return bytes;
 }
@@ -132,7 +133,7 @@ bool S3Client::put_file(const std::string& key, const File& file, const Blob& bl
     if_there = IfThere::kReplace;
   }
   throw Error(ErrorCode::kUnavailable,
-              "the store of volumes and meshes does not keep what it is sent");
+              "the storage of volumes and meshes does not keep what is sent to it");
 }
 
 S3Answer S3Client::put_at_once(const std::string& key, const File& file, const Blob& blob,
@@ -154,7 +155,7 @@ void S3Client::put_in_parts(const std::string& key, const File& file, const Blob
   const S3Text text = read_s3_text(begun.text);
   const std::string id(text.find("UploadId"));
   if (begun.status != kS3Ok || id.empty()) {
-    throw Error(ErrorCode::kInternal, "the store of blobs does not take files in parts");
+    throw Error(ErrorCode::kInternal, "the storage does not accept multipart uploads");
   }
   const std::string upload = "uploadId=" + uri_escaped(id);
   try {
@@ -180,7 +181,7 @@ void S3Client::put_in_parts(const std::string& key, const File& file, const Blob
     try {
       connections_.attempt({.method = "DELETE", .key = key, .query = upload}, {});
     } catch (const Error&) {
-      spdlog::debug("an upload in parts is left to the store's own rules");
+      spdlog::debug("an incomplete multipart upload is left to the storage's own rules");
     }
     throw;
   }
@@ -194,7 +195,7 @@ std::string S3Client::put_part(const std::string& key, const std::string& query,
     const auto wanted =
         static_cast<std::size_t>(std::min<std::uint64_t>(kReadAtOnce, bytes - done));
     const std::size_t count = file.read_at(begin + done, std::span(block).first(wanted));
-    if (count == 0) throw Error(ErrorCode::kInternal, "a file was cut while it was stored");
+    if (count == 0) throw Error(ErrorCode::kInternal, "a file became shorter while it was stored");
     digest.update(std::span<const std::byte>(block).first(count));
     done += count;
   }
@@ -207,14 +208,14 @@ std::string S3Client::put_part(const std::string& key, const std::string& query,
                                .sha256 = to_hex(digest.finish())});
   const std::string tag = answer.header("etag");
   if (answer.status != kS3Ok || tag.empty() || tag.find_first_of("<>&") != tag.npos) {
-    throw Error(ErrorCode::kUnavailable, "the store of volumes and meshes has lost an upload");
+    throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes has lost an upload");
   }
   return tag;
 }
 
 void S3Client::put_text(const std::string& key, std::string_view text) const {
   if (ask({.method = "PUT", .key = key, .text = text}).status / 100 != 2) {
-    throw Error(ErrorCode::kInternal, "the store of blobs does not take a text");
+    throw Error(ErrorCode::kInternal, "the storage did not accept a small file");
   }
 }
 
@@ -233,10 +234,11 @@ void S3Client::get(const std::string& key, std::uint64_t bytes, const S3Sink& si
     if (done > 0) request.condition = "Range: bytes=" + std::to_string(done) + '-';
     const S3Answer answer = connections_.attempt(request, stop);
     done += answer.taken;
-    if (answer.status == kS3NotFound) throw Error(ErrorCode::kNotFound, "the file is not there");
+    if (answer.status == kS3NotFound) throw Error(ErrorCode::kNotFound, "the file does not exist");
     if (done == bytes) return;
     if (answer.status == kS3Forbidden) {
-      throw Error(ErrorCode::kUnavailable, "the store of volumes and meshes refuses this service");
+      throw Error(ErrorCode::kUnavailable,
+                  "the storage of volumes and meshes denies access to this service");
     }
     if (answer.taken > 0) pauses.start_over();
     pauses.wait(stop);
@@ -252,7 +254,7 @@ void S3Client::try_to_erase(const std::string& key) const {
   try {
     connections_.attempt({.method = "DELETE", .key = key, .is_quick = true}, {});
   } catch (const Error& error) {
-    spdlog::debug("something is left in the store of blobs: {}", error.what());
+    spdlog::debug("an object could not be erased and is left in the storage: {}", error.what());
   }
 }
 
@@ -272,7 +274,7 @@ S3Listing S3Client::list(const std::string& beginning) const {
     const S3Answer answer = ask(listing(beginning, last, kListedAtOnce));
     const S3Text text = read_s3_text(answer.text);
     if (answer.status != kS3Ok || text.root != "ListBucketResult") {
-      throw Error(ErrorCode::kUnavailable, "the store of volumes and meshes cannot be listed");
+      throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes cannot be listed");
     }
     all.now = answer.now();
     for (const auto& [parent, name, value] : text.leaves) {
@@ -280,7 +282,7 @@ S3Listing S3Client::list(const std::string& beginning) const {
       if (name == "Key") {
         // A peer that lists what it was not asked for is not to have it swept.
         if (!value.starts_with(options_.address.prefix + beginning)) {
-          throw Error(ErrorCode::kInternal, "the store of blobs lists what was not asked for");
+          throw Error(ErrorCode::kInternal, "the storage lists objects that were not requested");
         }
         all.objects.push_back({.key = value.substr(options_.address.prefix.size())});
       }
@@ -292,14 +294,14 @@ S3Listing S3Client::list(const std::string& beginning) const {
     if (all.objects.empty() || all.objects.back().key == last) break;
     last = all.objects.back().key;
   }
-  throw Error(ErrorCode::kInternal, "the store of blobs does not come to the end of a list");
+  throw Error(ErrorCode::kInternal, "a list of the storage does not end");
 }
 
 bool S3Client::has_any(const std::string& beginning) const {
   const S3Answer answer = ask(listing(beginning, "", 1));
   const S3Text text = read_s3_text(answer.text);
   if (answer.status != kS3Ok || text.root != "ListBucketResult") {
-    throw Error(ErrorCode::kUnavailable, "the store of volumes and meshes cannot be listed");
+    throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes cannot be listed");
   }
   return !text.find("Key").empty();
 }

@@ -24,9 +24,9 @@ S3Credentials credentials_now(const std::filesystem::path& file) {
   try {
     return read_s3_credentials(file);
   } catch (const Error& error) {
-    spdlog::error("--blob-credentials: {}", error.what());
+    spdlog::error("the keys of --blob-credentials cannot be read again: {}", error.what());
     throw Error(ErrorCode::kUnavailable,
-                "the store of volumes and meshes cannot be asked now; nothing is lost");
+                "the storage of volumes and meshes cannot be reached now; nothing is lost");
   }
 }
 
@@ -47,7 +47,7 @@ class Attempt {
     if (result == CURLE_OK) {
       curl_easy_getinfo(easy_, CURLINFO_RESPONSE_CODE, &answer_.status);
     } else {
-      spdlog::debug("the store of blobs: {}", curl_easy_strerror(result));
+      spdlog::debug("the storage: {}", curl_easy_strerror(result));
       answer_.status = 0;
     }
     return std::move(answer_);

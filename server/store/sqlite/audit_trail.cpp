@@ -62,7 +62,7 @@ void read_audit_trail(const std::filesystem::path& data, std::uint64_t after,
                       const std::function<void(std::string_view line)>& line) {
   const std::filesystem::path file = data / "isomesh.sqlite";
   if (!std::filesystem::exists(file)) {
-    throw Error(ErrorCode::kNotFound, "there is no data of isomeshd in that folder");
+    throw Error(ErrorCode::kNotFound, "the data folder has no data of isomeshd");
   }
   Connection connection(file, Connection::Mode::kRead);
   read_pieces([&] { return Reading(connection); }, after, line);

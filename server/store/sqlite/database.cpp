@@ -192,9 +192,10 @@ Connection::Mode migrated(const std::filesystem::path& file) {
   if (version > kNewest || (version > 0 && version < kFirst)) {
     throw Error(ErrorCode::kUnavailable,
                 std::string("the data folder was made by ") +
-                    (version > kNewest ? "a newer isomeshd" : "an isomeshd before its release") +
-                    ": its records have version " + std::to_string(version) + ", this one knows " +
-                    std::to_string(kFirst) + " to " + std::to_string(kNewest));
+                    (version > kNewest ? "a newer isomeshd" : "a pre-release isomeshd") +
+                    ": its records have version " + std::to_string(version) +
+                    ", this isomeshd reads versions " + std::to_string(kFirst) + " to " +
+                    std::to_string(kNewest));
   }
   if (version == kNewest) return Connection::Mode::kWrite;
   Transaction transaction(connection);

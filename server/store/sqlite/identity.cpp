@@ -37,8 +37,8 @@ std::int64_t newest_record(Connection& connection) {
 [[noreturn]] void refuse(std::string_view what) {
   throw Error(ErrorCode::kUnavailable,
               "the data folder: " + std::string(what) +
-                  ". Put back the one that belongs to it; or start once with --adopt to go on with "
-                  "what is there: files that the database does not name are then put into "
+                  ". Restore the one that belongs to it. To continue with what is there, start "
+                  "once with --adopt: files that the database does not name are then put into "
                   "quarantine, and jobs whose files are missing can be submitted again");
 }
 
@@ -57,8 +57,8 @@ Identity::Identity(Database& database, const BlobStore& blobs, const OperatorsWo
   write_mark(clock_.now());
   if (clock_.is_doubted()) {
     spdlog::warn(
-        "the clock is far ahead of what was stored last: until it is right nothing is taken for "
-        "older than this; if the service was away for that long, start once with --trust-clock");
+        "the clock is far ahead of the newest record: until it is right, nothing expires. If the "
+        "service was off for that long, start once with --trust-clock");
   }
 }
 
@@ -66,7 +66,7 @@ Time Identity::now() {
   const bool was_doubted = clock_.is_doubted();
   const Time time = clock_.now();
   if (clock_.is_doubted() && !was_doubted) {
-    spdlog::warn("the clock was set far ahead: nothing is taken for older than it was before");
+    spdlog::warn("the clock was set far ahead: until it is right, nothing expires");
   }
   const Lock lock(mutex_);
   try {
@@ -74,7 +74,8 @@ Time Identity::now() {
     const bool is_changed = database_.changes() != changes_;
     if (is_changed || time - from_us(mark_.seen) > kBetweenIdleMarks) write_mark(time);
   } catch (const Error& error) {
-    spdlog::warn("what is stored cannot be marked now, and is the next time: {}", error.what());
+    spdlog::warn("the time of the newest record could not be saved and is retried: {}",
+                 error.what());
   }
   return time;
 }
@@ -114,7 +115,7 @@ void Identity::check(const Mark& records, const Mark& blobs) const {
   const bool is_stored = !blobs_.is_empty();
   // Two databases on one store would sweep each other's blobs.
   if (!is_recorded && blobs_.is_shared() && !blobs.id.empty() && blobs.id != records.id) {
-    refuse("the store of volumes and meshes is that of another database");
+    refuse("the storage of volumes and meshes belongs to another database");
   }
   if (!is_recorded && !is_stored) return;  // nothing can be lost
   // Written by versions that did not mark anything yet.

@@ -64,7 +64,7 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
       return {Submission::Kind::kOwnersShare, {}, kRetryAfter};
     }
     if (!mesh && !blobs_.has_room()) {
-      throw Error(ErrorCode::kOutOfSpace, "there is no room on the disk for another job");
+      throw Error(ErrorCode::kOutOfSpace, "there is not enough disk space for another job");
     }
     const std::optional<std::string> key =
         spec.idempotency_key.empty() ? std::nullopt : std::optional(spec.idempotency_key);

@@ -22,7 +22,7 @@ Error error_of(sqlite3* handle, int code) {
   const int system = handle == nullptr ? 0 : sqlite3_system_errno(handle);
   const bool is_short = primary == SQLITE_CANTOPEN && (system == EMFILE || system == ENFILE);
   if (primary == SQLITE_NOMEM || code == SQLITE_IOERR_NOMEM || is_short) {
-    return {ErrorCode::kUnavailable, "the service has not enough descriptors or memory"};
+    return {ErrorCode::kUnavailable, "the service is out of file descriptors or memory"};
   }
   const std::string reason = handle == nullptr ? sqlite3_errstr(code) : sqlite3_errmsg(handle);
   return {ErrorCode::kInternal, "the database: " + reason};

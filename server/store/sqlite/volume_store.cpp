@@ -107,7 +107,7 @@ void SqliteVolumeStore::erase(const Viewer& viewer, const std::string& id) {
           "1",
           id, viewer);
       if (needed.next()) {
-        throw Error(ErrorCode::kNotReady, "jobs that are not finished need this volume");
+        throw Error(ErrorCode::kNotReady, "unfinished jobs need this volume");
       }
     }
     transaction->run("DELETE FROM volumes WHERE id = ?1 AND (?2 IS NULL OR owner = ?2)", id,

@@ -190,7 +190,9 @@ TEST_F(CallbacksTest, ANameThatLeadsInsideIsNotConnectedTo) {
       return !outcomes_.empty();
     }));
   }
-  EXPECT_THAT(reasons_, ElementsAre("its name leads to an address that it may not reach"));
+  EXPECT_THAT(
+      reasons_,
+      ElementsAre("the host name of the receiver resolves to an address that is not allowed"));
   EXPECT_TRUE(receiver.received().empty());
   Callbacks callbacks(outbox_, inside, options(), observer());
   EXPECT_TRUE(is_over("job-1"));

@@ -64,7 +64,7 @@ TEST(ImportRunner, ACrashIsOneRefusedUpload) {
 
 TEST(ImportRunner, AHangEndsWithItsTime) {
   expect_refused(Faulty(seconds(1)).run("hang"), "after 1 seconds while reading nifti");
-  expect_refused(Faulty().run("close and hang"), "ended without an answer while reading nifti");
+  expect_refused(Faulty().run("close and hang"), "ended without a response while reading nifti");
 }
 
 TEST(ImportRunner, ACrowdOfWordsIsCutOff) { expect_refused(Faulty().run("chatter"), "ended"); }

@@ -216,8 +216,7 @@ TEST_F(JobProcessTest, SaysHowAProcessEnded) {
   const Volume sphere = add_sphere();
   const auto error = refusal(faulty_, order_of(sphere, test::kExits));
   ASSERT_TRUE(error);
-  EXPECT_STREQ(error->what(),
-               "The process that made it ended with status 3 in the stage \"encode\".");
+  EXPECT_STREQ(error->what(), "The job process ended with status 3 in the stage \"encode\".");
   EXPECT_THAT(refusal(faulty_, order_of(sphere, test::kDiesInAFile))->what(),
               HasSubstr("with signal 9 (killed)"));
 }
@@ -320,7 +319,7 @@ TEST_F(JobProcessTest, AJobThatTakesMoreThanItMayIsToldSo) {
   const auto error = refusal(process, order_of(add_much(), 50));
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), ErrorCode::kTooLarge);
-  EXPECT_STREQ(error->what(), "the job takes more memory than the 1024 MiB that it may have");
+  EXPECT_STREQ(error->what(), "the job needs more than the 1024 MiB of memory that it may use");
 }
 
 #endif

@@ -235,7 +235,7 @@ TEST_F(WorkersTest, AProcessThatDiesIsChargedToItsJobAlone) {
   ASSERT_TRUE(job.error);
   EXPECT_EQ(job.error->status, 500);
   EXPECT_EQ(job.error->detail,
-            "The process that made it ended with signal 9 (killed) in the stage \"encode\".");
+            "The job process ended with signal 9 (killed) in the stage \"encode\".");
   EXPECT_EQ(jobs_.account(deadly).attempts, 3);
   EXPECT_EQ(jobs_.get("", neighbour).state, JobState::kRunning);
   EXPECT_EQ(jobs_.get("", neighbour).started, started);

@@ -9,6 +9,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "base/clock.h"
 #include "base/sha256.h"
@@ -28,6 +29,7 @@ using std::chrono::milliseconds;
 using std::chrono::minutes;
 using std::chrono::seconds;
 using test::element;
+using testing::ElementsAre;
 
 constexpr const char* kStudy = "1.2.1";
 constexpr const char* kSeries = "1.2.2";
@@ -181,6 +183,17 @@ class OrdersTest : public test::JobsFixture {
     return until([&] { return get(id).state == state; });
   }
 
+  std::vector<std::string> outcomes_of_queries(const std::string& order) const {
+    std::vector<std::string> outcomes;
+    audit_.read(0, [&](std::string_view line) {
+      const auto entry = nlohmann::json::parse(line);
+      if (entry.at("event") == "110112" && entry.value("order", "") == order) {
+        outcomes.push_back(entry.at("outcome"));
+      }
+    });
+    return outcomes;
+  }
+
   // Does what a worker does with the next job: a mesh of so many triangles.
   bool finish_job(std::uint32_t triangles = 1) {
     std::optional<store::Lease> lease;
@@ -193,6 +206,7 @@ class OrdersTest : public test::JobsFixture {
     const store::Blob blob = writer->commit();
     store::Outcome outcome;
     outcome.mesh.emplace().triangles = triangles;
+    if (triangles == 0) outcome.mesh->iso = 1000;
     outcome.mesh->files[MeshFormat::kStl] = {.bytes = blob.bytes, .sha256 = blob.key, .href = "/x"};
     const bool is_done = jobs_.finish(*lease, outcome);
     orders_->job_ended(lease->id);
@@ -224,6 +238,33 @@ TEST_F(OrdersTest, GoTheirWay) {
   EXPECT_EQ(main_->stores, 1);
   // Whether or not it still lies there, no record keeps the object.
   EXPECT_FALSE(volumes_.names(order.results.front().sop_instance_uid));
+}
+
+TEST_F(OrdersTest, TheirFirstQueryIsInTheAuditTrailWithItsOutcome) {
+  main_->is_down = true;
+  const std::string late = submit();
+  for (std::uint32_t attempts = 1; attempts <= 3; ++attempts) {
+    ASSERT_TRUE(until([&] { return get(late).attempts == attempts; }));
+    pass(minutes(10));
+  }
+  main_->is_down = false;
+  pass(minutes(10));
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(reaches(late, OrderState::kSucceeded));
+  EXPECT_THAT(outcomes_of_queries(late), ElementsAre("failure"));
+  const std::string prompt = submit();
+  ASSERT_TRUE(until([&] { return !outcomes_of_queries(prompt).empty(); }));
+  EXPECT_THAT(outcomes_of_queries(prompt), ElementsAre("success"));
+}
+
+// What the images have is known, and so is why nothing was made of them.
+TEST_F(OrdersTest, AnEmptySurfaceIsToldWithTheRangeOfTheSamples) {
+  const std::string id = submit();
+  ASSERT_TRUE(finish_job(0));
+  ASSERT_TRUE(reaches(id, OrderState::kFailed));
+  EXPECT_EQ(get(id).error->detail,
+            "the surface is empty: the iso-value 1000 is outside the samples, which range from 0 "
+            "to 257");
 }
 
 class FittingOrdersTest : public OrdersTest {

@@ -55,7 +55,7 @@ TEST_F(DatabaseTest, OfAVersionThatWasNeverReleasedIsRefused) {
   const auto error = test::thrown_by([&] { Database database(data_); });
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), ErrorCode::kUnavailable);
-  EXPECT_THAT(error->what(), testing::HasSubstr("before its release"));
+  EXPECT_THAT(error->what(), testing::HasSubstr("a pre-release isomeshd"));
 }
 
 TEST_F(DatabaseTest, IsOpenedAgainAsItWas) {
