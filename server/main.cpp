@@ -17,6 +17,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "base/command_line/help.h"
 #include "base/log.h"
 #include "base/niceness.h"
 #include "server/audit/syslog.h"
@@ -409,6 +410,7 @@ int main(int argc, char** argv) {
     Options options;
     CLI::App cli("isomeshd turns medical volumes into surface meshes over HTTP", "isomeshd");
     cli.failure_message(usage_message);
+    cli.formatter(command_line::wrapped_help());
     add_options(cli, options);
     Commands commands(cli, options);
     try {

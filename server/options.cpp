@@ -4,8 +4,11 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <istream>
 #include <map>
+#include <memory>
 #include <string_view>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -180,6 +183,27 @@ void add_check(CLI::App& cli, Options& options) {
       ->callback([&options] { options.check_only = true; });
 }
 
+// CLI11 lets the file win over the environment. Here the environment wins, so that a container's or
+// a unit's variables change what an installed file says.
+class FileBelowEnvironment : public CLI::ConfigTOML {
+ public:
+  explicit FileBelowEnvironment(const CLI::App& cli) : cli_(cli) {}
+
+  std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
+    std::vector<CLI::ConfigItem> items = CLI::ConfigTOML::from_config(input);
+    std::erase_if(items, [&](const CLI::ConfigItem& item) {
+      const CLI::Option* option = cli_.get_option_no_throw("--" + item.name);
+      if (option == nullptr || option->get_envname().empty()) return false;
+      const char* value = std::getenv(option->get_envname().c_str());
+      return value != nullptr && *value != '\0';
+    });
+    return items;
+  }
+
+ private:
+  const CLI::App& cli_;
+};
+
 // Of one start only, so neither in a file nor in the environment.
 void add_operators_word(CLI::App& cli, Options& options) {
   cli.add_flag("--adopt", options.word.adopt,
@@ -199,6 +223,7 @@ void add_options(CLI::App& cli, Options& options) {
   cli.set_config("--config", config == nullptr ? "" : config,
                  "Read options from this file (TOML or INI); also ISOMESH_CONFIG",
                  config != nullptr);
+  cli.config_formatter(std::make_shared<FileBelowEnvironment>(cli));
   cli.allow_config_extras(CLI::config_extras_mode::error);
   cli.add_option("--listen", options.listen,
                  "Address to listen on: HOST:PORT, HOST:0 for a free port, or unix:PATH")

@@ -160,6 +160,18 @@ TEST(Configuration, IsToldWithoutAStart) {
   EXPECT_EQ(again.output, told.output) << again.errors;
 }
 
+TEST(Configuration, TheCommandLineIsBeforeTheEnvironmentAndThatBeforeTheFile) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "config.toml";
+  write_file(file, "workers = 7\nmax-queue = 7\nkeep-days = 7\n");
+  const std::vector<std::string> environment = {"ISOMESH_WORKERS=3", "ISOMESH_MAX_QUEUE=3"};
+  const Finished told = run({ISOMESHD, "check", "--config", file, "--workers", "1"}, environment);
+  EXPECT_EQ(told.status, 0) << told.errors;
+  for (const std::string line : {"workers = 1\n", "max-queue = 3\n", "keep-days = 7\n"}) {
+    EXPECT_THAT('\n' + told.output, HasSubstr('\n' + line));
+  }
+}
+
 TEST(Configuration, WhatAStartWouldRefuseIsToldToo) {
   const TemporaryFolder folder;
   const Finished open = run({ISOMESHD, "check", "--listen", "0.0.0.0:0"});
