@@ -190,14 +190,14 @@ class FileBelowEnvironment : public CLI::ConfigTOML {
   explicit FileBelowEnvironment(const CLI::App& cli) : cli_(cli) {}
 
   std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
-    std::vector<CLI::ConfigItem> items = CLI::ConfigTOML::from_config(input);
-    std::erase_if(items, [&](const CLI::ConfigItem& item) {
+    std::vector<CLI::ConfigItem> found = CLI::ConfigTOML::from_config(input);
+    std::erase_if(found, [&](const CLI::ConfigItem& item) {
       const CLI::Option* option = cli_.get_option_no_throw("--" + item.name);
       if (option == nullptr || option->get_envname().empty()) return false;
       const char* value = std::getenv(option->get_envname().c_str());
       return value != nullptr && *value != '\0';
     });
-    return items;
+    return found;
   }
 
  private:
