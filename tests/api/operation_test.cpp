@@ -96,10 +96,10 @@ TEST(Start, EveryReasonNotToStartBeginsWithTheProgramsName) {
     EXPECT_NE(result.status, 0) << wrong[0];
     EXPECT_THAT(result.errors, testing::StartsWith("isomeshd: ")) << wrong[0];
   }
-  const Finished json = run({ISOMESHD, "--data", folder / "data", "--listen", "nowhere",
-                             "--log-format", "json", "--log-level", "off"});
-  EXPECT_THAT(json.errors, testing::StartsWith("{"));
-  EXPECT_THAT(json.errors, HasSubstr("\"text\":\"isomeshd: listen: "));
+  const Finished as_json = run({ISOMESHD, "--data", folder / "data", "--listen", "nowhere",
+                                "--log-format", "json", "--log-level", "off"});
+  EXPECT_THAT(as_json.errors, testing::StartsWith("{"));
+  EXPECT_THAT(as_json.errors, HasSubstr("\"text\":\"isomeshd: listen: "));
 }
 
 TEST(Start, OptionsComeFromTheEnvironmentAndFromAFileToo) {
