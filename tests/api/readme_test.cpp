@@ -112,33 +112,47 @@ std::vector<ShownCommand> commands_in(const std::string& line) {
   return commands;
 }
 
-// Of "  --workers UINT:INT in [1 - 64]=2" or, of CLI11 2.4, "  --workers UINT:INT in [1 - 64] [2]".
-std::string default_of(const std::string& option) {
-  static const std::regex form(R"((?:=|(?:[A-Z]|\]) \[)([^=\[\]()]+)\]?$)");
-  std::smatch found;
-  return std::regex_search(option, found, form) ? '`' + found[1].str() + '`' : "";
+// An option of the help: its name and its text, whose lines are joined.
+struct HelpEntry {
+  std::string name;
+  std::string text;
+};
+
+// The help has names in the first columns, and texts beside them or, below a long name, on the next
+// line.
+std::vector<HelpEntry> entries_of(const std::string& help) {
+  constexpr std::size_t kTextColumn = 30;
+  static const std::regex name("^  (?:-[a-zA-Z], ?)?(--[a-z-]+).*");
+  std::istringstream lines(help);
+  std::vector<HelpEntry> entries;
+  std::string line;
+  bool is_option = false;  // and not of the list of subcommands
+  while (std::getline(lines, line)) {
+    std::smatch found;
+    const bool continues = line.starts_with(std::string(kTextColumn, ' '));
+    if (!continues) is_option = std::regex_match(line, found, name);
+    if (!is_option) continue;
+    if (!continues) entries.push_back({found[1], ""});
+    const bool has_text = line.size() > kTextColumn && line.compare(kTextColumn - 2, 2, "  ") == 0;
+    if (!has_text) continue;
+    std::string& text = entries.back().text;
+    text += (text.empty() ? "" : " ") + line.substr(kTextColumn);
+  }
+  return entries;
 }
 
-// The rows of the table, as Markdown.
+// The rows of the table, as Markdown: without what a value must be and the variable of the
+// environment.
 std::string table_of(const std::string& help) {
-  std::istringstream lines(help);
+  static const std::regex form(
+      R"((.*?)(?:; within \[[^\]]*\])?(?: \(default: ([^)]*)\))?\.?(?: Environment: \w+)?)");
   std::string table;
-  std::string line;
-  while (std::getline(lines, line)) {
-    const std::size_t begin = line.find_first_not_of(' ');
-    if (begin == std::string::npos || !line.substr(begin).starts_with("--")) continue;
-    const std::string name = line.substr(begin, line.find_first_of(" \n", begin) - begin);
-    if (name == "--version" || name == "--config") continue;
-    // Beside a short name, or on the next line.
-    const std::size_t variable = line.find(" (Env:");
-    const std::size_t beside = line.find("  ", begin);
-    const bool is_beside = variable == std::string::npos && beside != std::string::npos;
-    std::string meaning = is_beside ? line.substr(beside) : "";
-    std::string option = line.substr(0, is_beside ? beside : variable);
-    option.erase(option.find_last_not_of(' ') + 1);
-    if (meaning.empty()) std::getline(lines, meaning);
-    meaning.erase(0, meaning.find_first_not_of(' '));
-    table += "| `" + name + "` | " + default_of(option) + " | " + meaning + " |\n";
+  for (const HelpEntry& entry : entries_of(help)) {
+    if (entry.name == "--version" || entry.name == "--config" || entry.name == "--help") continue;
+    std::smatch found;
+    std::regex_match(entry.text, found, form);
+    const std::string standard = found[2].matched ? '`' + found[2].str() + '`' : "";
+    table += "| `" + entry.name + "` | " + standard + " | " + found[1].str() + " |\n";
   }
   return table;
 }

@@ -193,7 +193,7 @@ TEST(TokenCommand, ListsAndRevokes) {
   ASSERT_EQ(token_command({"add", "boss", "--role", "admin"}, file).status, 0);
   const Finished two_roles = token_command({"add", "boss"}, file);
   EXPECT_EQ(two_roles.status, 1);
-  EXPECT_THAT(two_roles.errors, HasSubstr("boss is admin already"));
+  EXPECT_THAT(two_roles.errors, HasSubstr("boss already has the role admin"));
 
   const Finished list = token_command({"list"}, file);
   EXPECT_THAT(list.output,

@@ -85,6 +85,6 @@ describe('orders', () => {
     await expect.poll(() => page.getByRole('link', { name: 'Orders', exact: true }).isVisible()).toBe(false);
     expect(missing).toEqual([]);
     await page.goto(`${daemon.url}/#/orders`);
-    await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/knows no PACS/);
+    await expect.poll(() => page.locator('.refusal').innerText()).toMatch(/has no PACS/);
   });
 });

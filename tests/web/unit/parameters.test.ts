@@ -159,8 +159,8 @@ describe('jobs that are compared', () => {
   it('are named by what differs, whichever parameter it is', () => {
     expect(differences(jobs({ passes: 0 }, { passes: 5 }))).toEqual(['0 passes', '5 passes']);
     expect(differences(jobs({ max_displacement_mm: null }, { max_displacement_mm: 0.5 }))).toEqual([
-      'move at most: no limit',
-      'move at most: 0.5 mm',
+      'largest displacement: no limit',
+      'largest displacement: 0.5 mm',
     ]);
     expect(differences(jobs({ formats: ['glb'] }, { formats: ['glb', 'stl'] }))).toEqual(
       Array(2).fill('the same parameters'),

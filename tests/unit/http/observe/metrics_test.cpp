@@ -21,7 +21,7 @@ TEST(Metrics, AreOpenMetrics) {
   const std::string text = metrics.text({});
   EXPECT_THAT(text, EndsWith("\n# EOF\n"));
   EXPECT_THAT(text, HasSubstr("# TYPE isomesh_jobs_ended counter\n"));
-  EXPECT_THAT(text, HasSubstr("# HELP isomesh_jobs_ended Jobs"));
+  EXPECT_THAT(text, HasSubstr("# HELP isomesh_jobs_ended Ended jobs"));
   EXPECT_THAT(text, HasSubstr("\nisomesh_jobs_ended_total{state=\"failed\"} 0\n"));
   EXPECT_THAT(text, Not(ContainsRegex("# [A-Z]+ [a-z_]+_total ")));
   EXPECT_THAT(text,
