@@ -143,7 +143,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
     parameter(
         Parameter{.name = "label_values",
                   .title = "Label values",
-                  .help = "Labels that consist of several sample values: the values of each label.",
+                  .help = "The sample values of each label, for labels that have several.",
                   .more = "A value may belong to several labels, which then overlap there. Labels "
                           "that are not listed keep the values from the volume's file.",
                   .minimum = kLeast,
@@ -212,7 +212,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
       Parameter{
           .name = "pass_band",
           .title = "Pass band",
-          .help = "For `taubin`: frequencies along the surface below this are kept.",
+          .help = "For `taubin`: keep surface frequencies below this, and smooth higher ones.",
           .more =
               "They range from 0 (constant) to 2 (the sign changes from each vertex to the next).",
           .above = 0,
@@ -249,7 +249,8 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
         Parameter{
             .name = "fill_cavities",
             .title = "Fill cavities",
-            .help = "Remove the walls of enclosed cavities and everything that floats in them.",
+            .help =
+                "Remove enclosed cavities: their walls and all connected components inside them.",
             .more = "A cavity is enclosed if no opening leads to it.",
             .jobs = JobKind::kAtIso,
             .may_be_absent = true},
@@ -269,9 +270,11 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
   if (is_told(self, self.max_error_mm.has_value())) {
     parameter(Parameter{.name = "max_error_mm",
                         .title = "Largest error",
-                        .help = "Largest distance between a file's surface and the extracted "
-                                "surface, measured both ways.",
-                        .more = "In millimetres. Smoothing may use half of it. Simplification then "
+                        .help = "The measured distance between each file and the extracted surface "
+                                "is at most this.",
+                        .more = "In millimetres, in both directions. The samples are all vertices "
+                                "and the centres of all triangles; other points may be farther "
+                                "away. Smoothing may use half of it. Simplification then "
                                 "removes as many triangles as the rest allows, and Draco's "
                                 "coordinates get as many bits as that takes. The error is measured "
                                 "on the files' own bytes: see `certify`, which is switched on.",
@@ -302,10 +305,12 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                       .help = "Options of the `drc` format, and of the Draco streams in `glb`."},
             self.draco);
   parameter(
-      Parameter{.name = "normals",
-                .title = "Write vertex normals to GLB",
-                .help = "Write vertex normals, weighted by the areas around them, to `glb`.",
-                .more = "Without normals, viewers shade each triangle flat or compute their own."},
+      Parameter{
+          .name = "normals",
+          .title = "Write vertex normals to GLB",
+          .help =
+              "Write vertex normals to `glb`: means of the triangles' normals, weighted by area.",
+          .more = "Without normals, viewers shade each triangle flat or compute their own."},
       self.normals);
   if (is_told(self, self.distances)) {
     parameter(
@@ -322,15 +327,15 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
   }
   if (is_told(self, !self.lods.empty())) {
     parameter(
-        Parameter{
-            .name = "lods",
-            .title = "Levels of detail",
-            .help = "Levels of detail in `glb`, as fractions of the triangles, from 1 downwards.",
-            .more = "At most 8. They use the extension MSFT_lod; readers that do not know it "
-                    "ignore them. The formats must include `glb`.",
-            .above = 0,
-            .maximum = 1,
-            .may_be_absent = true},
+        Parameter{.name = "lods",
+                  .title = "Levels of detail",
+                  .help = "Levels of detail in `glb`, as decreasing fractions of the triangles; "
+                          "the first is 1.",
+                  .more = "At most 8. They use the extension MSFT_lod; readers that do not know it "
+                          "ignore them. The formats must include `glb`.",
+                  .above = 0,
+                  .maximum = 1,
+                  .may_be_absent = true},
         self.lods);
   }
   if (is_told(self, self.merge)) {
@@ -338,7 +343,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
         Parameter{
             .name = "merge",
             .title = "One primitive in GLB",
-            .help = "Write the surface to `glb` as one primitive, or as one per label.",
+            .help = "Write the surface to `glb` as one primitive; with labels, as one per label.",
             .more =
                 "For programs that take each primitive for a separate object. Otherwise there is "
                 "one per hundred thousand triangles or so; they are written and read in parallel.",

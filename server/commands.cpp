@@ -89,8 +89,8 @@ struct Commands::State {
         ->capture_default_str();
     added
         .add_option("--into", token.file,
-                    "File to add the token's hash to. Default: the file of --tokens. Without "
-                    "either, the line for it is printed")
+                    "Add the token's hash to this file. Default: the file of --tokens. Without "
+                    "either, print the line to add")
         ->type_name("FILE");
     add(tokens, "list", "Print each token's name, role and the beginning of its hash",
         [this] { list_tokens(with_file()); });

@@ -56,6 +56,19 @@ std::string value_of(const CLI::Option& option) {
   return value;
 }
 
+// CLI::CheckedTransformer, with an error that lists the names only.
+template <class Enum>
+CLI::Validator one_of(const std::map<std::string, Enum>& names) {
+  const CLI::CheckedTransformer checked(names);
+  return {[checked, &names](std::string& text) {
+            if (checked(text).empty()) return std::string();
+            std::string list;
+            for (const auto& entry : names) list += (list.empty() ? "" : ", ") + entry.first;
+            return text + " is not one of " + list;
+          },
+          ""};
+}
+
 // CLI::Range lets NaN through.
 CLI::Validator number_between(double least, double most) {
   const CLI::Range range(least, most);
@@ -101,12 +114,12 @@ void add_log_options(CLI::App& cli, Options& options) {
   cli.add_option("--log-level", options.log_level,
                  "Least severe messages to log: debug, info, warn, error or off")
       ->envname("ISOMESH_LOG_LEVEL")
-      ->transform(CLI::CheckedTransformer(kLogLevels).description(""))
+      ->transform(one_of(kLogLevels))
       ->default_str("info");
   cli.add_option("--log-format", options.log_format,
                  "Format of the log lines on standard error: text or json")
       ->envname("ISOMESH_LOG_FORMAT")
-      ->transform(CLI::CheckedTransformer(kLogFormats).description(""))
+      ->transform(one_of(kLogFormats))
       ->default_str("text");
 }
 
@@ -140,9 +153,9 @@ void add_callback_options(CLI::App& cli, Options& options) {
          "--callback-ca", options.callback_authorities,
          "File of the certificate authorities to trust for callbacks, instead of the system's")
       ->envname("ISOMESH_CALLBACK_CA");
-  cli.add_option(
-         "--callback-retry-seconds", options.callback_retry_seconds,
-         "Seconds until a failed callback is retried; they double with each failure, up to an hour")
+  cli.add_option("--callback-retry-seconds", options.callback_retry_seconds,
+                 "Seconds before a failed callback is retried; each further failure doubles them, "
+                 "up to an hour")
       ->envname("ISOMESH_CALLBACK_RETRY_SECONDS")
       ->check(number_between(0.01, 3600.0))
       ->capture_default_str();
@@ -161,7 +174,7 @@ void add_blob_options(CLI::App& cli, Options& options) {
       ->transform(size_of_bytes())
       ->capture_default_str();
   cli.add_option("--blob-credentials", options.blobs.credentials,
-                 "File of the keys for S3, in the format of AWS' tools. Each request reads it "
+                 "File of the keys for S3, in the format of AWS' tools. Each S3 request reads it "
                  "again. Without it, AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY are used")
       ->envname("ISOMESH_BLOB_CREDENTIALS");
   cli.add_option("--blob-ca", options.blobs.authorities,
@@ -268,7 +281,7 @@ void add_options(CLI::App& cli, Options& options) {
       ->envname("ISOMESH_DISK_RESERVE")
       ->transform(size_of_bytes());
   cli.add_option("--lease-seconds", options.lease_seconds,
-                 "Seconds after which a job is taken from a worker that shows no sign of life")
+                 "Seconds without a sign of life after which a worker loses its job")
       ->envname("ISOMESH_LEASE_SECONDS")
       ->check(CLI::Range(1, 3600))
       ->capture_default_str();
@@ -283,7 +296,7 @@ void add_options(CLI::App& cli, Options& options) {
       ->transform(size_of_bytes(1))
       ->capture_default_str();
   cli.add_option("--upload-places", options.http.upload_places,
-                 "Uploads at the same time; one user or address may use only a share of them")
+                 "Uploads to receive at the same time; one user or address may use at most half")
       ->envname("ISOMESH_UPLOAD_PLACES")
       ->check(CLI::Range(1, 24))
       ->capture_default_str();
@@ -294,7 +307,7 @@ void add_options(CLI::App& cli, Options& options) {
       ->check(CLI::Validator(wrong_origin, ""))
       ->delimiter(',');
   cli.add_option("--allow-host", options.http.hosts,
-                 "Host names of this service besides loopback's, for requests without tokens")
+                 "Host names that requests without tokens may use, besides loopback names")
       ->envname("ISOMESH_ALLOW_HOST")
       ->check(CLI::Validator(wrong_host, ""))
       ->delimiter(',');

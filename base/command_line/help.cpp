@@ -40,7 +40,9 @@ class WrappedHelp : public CLI::Formatter {
   std::string make_footer(const CLI::App* app) const override {
     const std::string footer = app->get_footer();
     if (app->get_parent() == nullptr) return footer.empty() ? "" : footer + '\n';
-    return footer + (footer.empty() ? "" : "\n") + '`' + app->get_parent()->get_name() +
+    const CLI::App* program = app->get_parent();
+    while (program->get_parent() != nullptr) program = program->get_parent();
+    return footer + (footer.empty() ? "" : "\n") + '`' + program->get_name() +
            " --help` lists the options of all commands.\n";
   }
 

@@ -180,10 +180,10 @@ double preset_of(const Volume& volume, const std::string& name) {
     if (folded(preset.name) == folded(name)) return preset.iso;
     names.push_back('"' + preset.name + '"');
   }
-  const std::string has =
-      names.empty()
-          ? "only CTs in Hounsfield units have presets, and only for values that occur in them"
-          : "it has " + listed(names);
+  const std::string has = names.empty()
+                              ? "it has none. Only CTs in Hounsfield units and fractional "
+                                "segmentations have presets, and only for values that occur in them"
+                              : "it has " + listed(names);
   throw Error(ErrorCode::kInvalidParameter,
               "--iso: the volume has no preset \"" + name + "\"; " + has);
 }

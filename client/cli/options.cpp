@@ -132,7 +132,7 @@ class Parser {
     add_name<JobState>(list, "--state", "Only jobs in this state",
                        [&](JobState state) { options_.state = state; });
     list.add_option("--cursor", options_.cursor,
-                    "Page to show; the page before it prints its cursor")
+                    "Cursor of the page to show; the previous page prints it")
         ->type_name("CURSOR");
     list.add_flag("--volumes", options_.volumes, "List volumes instead");
 
@@ -165,7 +165,7 @@ class Parser {
       std::ostringstream out;
       std::ostringstream err;
       if (app_.exit(error, out, err) == 0) throw EarlyExit(0, out.str());
-      wrong_usage(error.what() + ("\n" + help_of_command()));
+      wrong_usage(in_words(error) + "\n" + help_of_command());
     }
     describe_itself();
     options_.outputs = outputs_from(outputs_);
@@ -182,6 +182,20 @@ class Parser {
   }
 
  private:
+  // The library's "--iso excludes --labels" and "--passes: 1 required N missing" in plain words.
+  static std::string in_words(const CLI::ParseError& error) {
+    constexpr std::string_view kExcludes = " excludes ";
+    std::string text = error.what();
+    if (error.get_name() == "ExcludesError") {
+      const std::size_t at = text.find(kExcludes);
+      if (at != std::string::npos) text.replace(at, kExcludes.size(), " cannot be used with ");
+    } else if (error.get_name() == "ArgumentMismatch") {
+      const std::size_t at = text.find(": 1 required ");
+      if (at != std::string::npos) text = text.substr(0, at) + " needs a value";
+    }
+    return text;
+  }
+
   CLI::App& command(Command value, const std::string& name, const std::string& help) {
     CLI::App* app = app_.add_subcommand(name, help);
     app->footer(footer_of(name));

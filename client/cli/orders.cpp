@@ -125,7 +125,8 @@ void add_orders_options(CLI::App& app, Options& options) {
         if (!order.state) refuse("--state", "there is no state " + name);
       });
   app.add_option("--rule", order.rule, "Only orders of this rule");
-  app.add_option("--cursor", options.cursor, "Page to show; the page before it prints its cursor");
+  app.add_option("--cursor", options.cursor,
+                 "Cursor of the page to show; the previous page prints it");
   auto* cancel = app.add_flag("--cancel", order.cancels, "Cancel this order")->needs("ORDER");
   app.add_flag("--retry", order.retries, "Retry this order if it has failed")
       ->needs("ORDER")

@@ -85,7 +85,8 @@ std::vector<Output> outputs_from(const GivenOutputs& given) {
   bool is_format_used = false;
   for (const std::string& path : given.paths) {
     if (path == "-") {
-      if (given.formats.size() != 1) refuse_output("- needs exactly one --format");
+      if (given.formats.size() != 1)
+        refuse_output("- is standard output and needs one --format, such as --format stl");
       outputs.push_back({path, given.formats.front()});
       is_format_used = true;
     } else if (is_folder(path)) {

@@ -102,7 +102,7 @@ class ParameterOptions {
     if (value) {
       const std::string off = "--no-" + name.substr(2);
       app_.add_flag_callback(
-              off, [&value] { value = false; }, "The opposite of " + name)
+              off, [&value] { value = false; }, "Switch off " + name)
           ->excludes(on)
           ->group("Job");
     }
@@ -142,7 +142,9 @@ class ParameterOptions {
       std::ranges::replace(each, ' ', '-');
       type += '|' + each;
     }
-    const std::string more = is_iso ? ". CTs also have presets by name" : "";
+    const std::string more = is_iso ? ". A CT also has the presets skin, soft-tissue and bone; a "
+                                      "fractional segmentation has segment"
+                                    : "";
     return isomesh::cli::add(app_, name, type, help + more,
                              [this, &value, name, word, words, shown](const std::string& text) {
                                value = number_from<Number>(text);
@@ -256,7 +258,8 @@ class ParameterOptions {
       const auto last =
           dash == std::string_view::npos ? first : number_from<std::int64_t>(each.substr(dash + 1));
       if (!first || !last || *last < *first) {
-        refuse(name, "must be whole numbers or ranges separated by commas, such as 1,3-5");
+        refuse(name,
+               "must be whole numbers or ascending ranges separated by commas, such as 1,3-5");
       }
       if (*first < kLeast || *last > kMost) refuse(name, "must be whole numbers " + range);
       for (std::int64_t label = *first; label <= *last; ++label) {

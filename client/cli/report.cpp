@@ -97,8 +97,8 @@ void tell_error(const MeshSummary& mesh, Rows& rows) {
   rows.push_back({"certified", fixed(certificate.max_mm, 4) + " mm from the extracted surface, " +
                                    "measured on the " + std::string(to_string(certificate.file)) +
                                    " file"});
-  rows.push_back({"  mesh to scan", way_of(certificate.from_mesh)});
-  rows.push_back({"  scan to mesh", way_of(certificate.from_extracted)});
+  rows.push_back({"  from the file", way_of(certificate.from_mesh)});
+  rows.push_back({"  to the file", way_of(certificate.from_extracted)});
   if (certificate.budget_mm) {
     const ErrorBudget& budget = *certificate.budget_mm;
     rows.push_back({"  budget", fixed(budget.smoothing, 4) + " mm smoothing, " +

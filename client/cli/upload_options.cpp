@@ -33,7 +33,9 @@ void add_file(CLI::App& app, Options& options, Inputs inputs) {
              "A volume: NIfTI, NRRD, MetaImage, VTI or DICOM, a folder or archive of it, or "
              "raw samples with --dims and --type. Several files may belong together, such "
              "as .hdr and .img. - reads standard input") +
-             (takes_ids ? ". A stored volume may be given by its id, whole or shortened" : ""))
+             (takes_ids ? ". The id of a stored volume also works; its beginning or end is enough "
+                          "if unique"
+                        : ""))
       ->type_name("FILE")
       ->required();
   add(app, "--series", "UID", "UID of the DICOM series to use, if there are several",
@@ -47,13 +49,14 @@ void add_file(CLI::App& app, Options& options, Inputs inputs) {
                             [&](std::uint32_t number) { options.upload.volume = number; })
       ->group(kUploadGroup);
   add(app, "--accept", "CODE,..",
-      "Accept the volume despite these warnings, by the codes that the error names",
+      "Accept the volume despite these notes; the error names their codes",
       [&](const std::string& text) {
         for (const std::string_view code : split(text, ','))
           options.upload.accept.emplace_back(code);
       })
       ->group(kUploadGroup);
-  add_name<NiftiForm>(app, "--nifti-form", "The form of a NIfTI header to use for the geometry",
+  add_name<NiftiForm>(app, "--nifti-form",
+                      "Use the sform or the qform of a NIfTI header for the geometry",
                       [&](NiftiForm form) { options.upload.nifti_form = form; })
       ->group(kUploadGroup);
   add(app, "--name", "TEXT", "Name of the volume (default: the name of the series or the file)",

@@ -97,7 +97,7 @@ Error several_volumes(const std::vector<UploadedVolume>& volumes) {
   Remedy remedy;
   for (const UploadedVolume& each : volumes) {
     remedy.choices.push_back(
-        {"member", each.member, each.problem ? each.problem->detail : "stored"});
+        {"member", each.member, each.problem ? each.problem->detail : "can be meshed"});
   }
   return Error(ErrorCode::kUnusableVolume, "the upload contains " + std::to_string(volumes.size()) +
                                                " volumes, but one is needed")

@@ -18,7 +18,7 @@ namespace {
   }
   throw Error(
       ErrorCode::kUnsupportedMedia,
-      "The file is not " + titles + ". If it holds raw samples, add dims=X,Y,Z and type=T.");
+      "The file is not " + titles + ". If it holds raw samples, give their dims (X,Y,Z) and type.");
 }
 
 }  // namespace

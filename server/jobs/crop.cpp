@@ -37,8 +37,9 @@ SampleRange samples_in(const Box& box, const Geometry& geometry,
     const double begin = std::clamp(std::ceil(low[axis] - kTolerance), 0.0, count);
     const double end = std::clamp(std::floor(high[axis] + kTolerance) + 1, 0.0, count);
     if (end - begin < 2) {
-      throw invalid_parameter("crop", "has fewer than two samples of the volume along axis " +
-                                          std::string(1, "xyz"[axis]) + ", so it has no surface");
+      throw invalid_parameter("crop",
+                              "the box contains fewer than two samples along the volume's axis " +
+                                  std::string(1, "xyz"[axis]) + ", so there is no surface");
     }
     range.begin[axis] = static_cast<std::uint32_t>(begin);
     range.end[axis] = static_cast<std::uint32_t>(end);

@@ -118,7 +118,8 @@ TlsFiles::Context TlsFiles::read() const {
     throw Error(ErrorCode::kInternal, "TLS has none of the required ciphers");
   }
   if (SSL_CTX_use_certificate_chain_file(raw, certificate_.c_str()) != 1) {
-    throw invalid_parameter("tls-cert", "contains no readable certificate in PEM form");
+    throw invalid_parameter("tls-cert",
+                            "the file cannot be read, or contains no certificate in PEM form");
   }
   if (SSL_CTX_use_PrivateKey_file(raw, key_.c_str(), SSL_FILETYPE_PEM) != 1 ||
       SSL_CTX_check_private_key(raw) != 1) {

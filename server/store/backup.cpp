@@ -218,7 +218,7 @@ bool is_in(const fs::path& path, const fs::path& folder) {
 void check_is_data_folder(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_regular_file(folder / kRecords, error) || !fs::is_directory(folder / kBlobs, error)) {
-    refuse(folder, "is not a data folder of isomeshd");
+    refuse(folder, "is not a data folder of isomeshd or a backup of one");
   }
 }
 

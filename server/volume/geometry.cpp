@@ -54,9 +54,9 @@ std::optional<FieldError> direction_fault(const Geometry& geometry) {
   }
   for (int axis = 0; axis < 3; ++axis) {
     if (std::abs(length(column(geometry.direction, axis)) - 1) <= kUnitTolerance) continue;
-    return FieldError{"direction", "the direction's column for " +
+    return FieldError{"direction", "the direction of axis " +
                                        axis_name(static_cast<std::size_t>(axis)) +
-                                       " is not a unit vector"};
+                                       " (a column) is not a unit vector"};
   }
   if (std::abs(determinant(geometry.direction)) < kFlattestDeterminant) {
     return FieldError{"direction", "the directions of i, j and k lie in one plane"};

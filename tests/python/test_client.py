@@ -63,7 +63,7 @@ class Files(DaemonTest):
         answers = self.client.upload_all(folder)
         self.assertEqual([each["member"] for each in answers], ["a.mhd", "b.mhd"])
         self.assertTrue(all(each["volume"] for each in answers))
-        with self.assertRaisesRegex(isomesh.Refused, "member='a.mhd': stored") as refused:
+        with self.assertRaisesRegex(isomesh.Refused, "member='a.mhd': can be meshed") as refused:
             self.client.upload(folder)
         self.assertEqual(len(refused.exception.choices), 2)
         chosen = self.client.upload(folder, member="b.mhd", name="the second")

@@ -248,7 +248,7 @@ Volume read_file(const FoundVolume& found, Members& members, const Input& input)
   const std::string reason = asked.empty()
                                  ? "The archive holds " + std::to_string(choices.size()) +
                                        " volumes. Choose one with member=NAME: " + names + "."
-                                 : "The archive has no volume " + in_quotes(asked) +
+                                 : "The upload has no volume " + in_quotes(asked) +
                                        ". Choose one with member=NAME: " + names + ".";
   throw_choice(reason, std::move(choices));
 }

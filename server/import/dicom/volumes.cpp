@@ -334,11 +334,11 @@ bool same_lattice(const Slice& a, const Slice& b) {
   return same_size(a, b) && same_orientation(a, b) && same_spacing(a, b);
 }
 
-// " of 256 x 256 samples across (0, 0, 1)"
+// " of 256 x 256 samples with normal (0, 0, 1)"
 std::string described(const Slice& slice) {
   const Plane& plane = slice.frame->plane;
   std::string text = " of " + std::to_string(slice.image->layout.columns) + " x " +
-                     std::to_string(slice.image->layout.rows) + " samples across ";
+                     std::to_string(slice.image->layout.rows) + " samples with normal ";
   char before = '(';
   for (const double part : cross(plane.along_row, plane.along_column)) {
     text += std::string(1, before) + (before == '(' ? "" : " ") +

@@ -149,14 +149,14 @@ StoredType type_of(const Fields& fields) {
     if (row.name == name) return row.type;
   }
   throw_unusable("The MetaImage header's ElementType " + in_quotes(name) +
-                 " is not supported. Samples must be single numbers.");
+                 " is not supported. A sample must be one real number.");
 }
 
 void check_samples_are_plain(const Fields& fields) {
   const std::string_view channels = optional(fields, "ElementNumberOfChannels");
   if (!channels.empty() && parse_uint64(channels) != 1) {
     throw_unusable("Each sample has " + in_quotes(channels) +
-                   " channels. Samples must be single numbers.");
+                   " channels. A sample must be one real number.");
   }
 }
 

@@ -55,8 +55,8 @@ std::string title_of(const NiftiHeader& header, std::uint64_t index) {
 Difference difference_of(const NiftiHeader& header) {
   const bool by_time = header.dim[4] > 1;
   const bool by_value = header.dim[0] >= 5;
-  return {.what = by_time && by_value ? "time and value"
-                  : by_value          ? "value"
+  return {.what = by_time && by_value ? "time and dimension 5 (value)"
+                  : by_value          ? "dimension 5 (value)"
                                       : "time",
           .title = [header](std::uint64_t index) { return title_of(header, index); }};
 }
@@ -98,7 +98,7 @@ StoredType type_of(const NiftiHeader& header) {
   for (const Name& other : kOthers) {
     if (other.code != header.datatype) continue;
     throw_unusable(std::string("The samples are ") + other.name +
-                   ". Samples must be single numbers.");
+                   ". A sample must be one real number.");
   }
   throw_unusable("The NIfTI header's datatype " + std::to_string(header.datatype) + " is unknown.");
 }

@@ -116,7 +116,7 @@ StoredType type_of(const Fields& fields) {
     if (std::find(names.begin(), names.end(), name) != names.end()) return type;
   }
   throw_unusable("The NRRD header's type " + in_quotes(name) +
-                 " is not supported. Samples must be single numbers.");
+                 " is not supported. A sample must be one real number.");
 }
 
 std::vector<std::uint64_t> sizes_of(const Fields& fields) {

@@ -323,7 +323,7 @@ NrrdSizes nrrd_sizes(const NrrdFields& fields, const std::vector<std::uint64_t>&
     if (!is_volume_kind(kind) && !is_lattice_kind(kind)) {
       throw_unusable("Each sample has " + std::to_string(sizes[axis]) +
                      " components (an axis of kind " + in_quotes(kind) +
-                     "). Samples must be single numbers.");
+                     "). A sample must be one real number.");
     }
     if (!is_at_end || result.volumes > 1) {
       throw_unusable("The NRRD header's axis " + axis_name(axis) + " holds several volumes (kind " +

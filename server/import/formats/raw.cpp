@@ -16,7 +16,7 @@ void check_size(const InputFile& file, const RawDescription& description, std::u
   throw invalid_parameter("dims", std::to_string(dims[0]) + " x " + std::to_string(dims[1]) +
                                       " x " + std::to_string(dims[2]) + " samples of type " +
                                       std::string(to_string(description.type)) + " take " +
-                                      std::to_string(expected) + " bytes, but the body has " +
+                                      std::to_string(expected) + " bytes, but the upload has " +
                                       std::to_string(file.size()) + " bytes");
 }
 

@@ -91,7 +91,7 @@ StoredType type_of(const VtiArray& array) {
     if (row.name == name) return row.type;
   }
   throw_unusable("The VTK array's type " + in_quotes(name) +
-                 " is not supported. Samples must be single numbers.");
+                 " is not supported. A sample must be one real number.");
 }
 
 // The image's samples: the array that the point data names as its scalars, or the only one.
@@ -117,7 +117,7 @@ void check_components(const VtiArray& array) {
   const std::string_view count = attribute_of(array.attributes, "NumberOfComponents");
   if (count.empty() || parse_uint64(count) == 1) return;
   throw_unusable("Each sample has " + in_quotes(count) +
-                 " components. Samples must be single numbers.");
+                 " components. A sample must be one real number.");
 }
 
 bool is_big_endian(const VtiDocument& document) {

@@ -99,7 +99,7 @@ TEST(MeshReport, TellsTheIsoValueAndTheError) {
   EXPECT_THAT(report, HasSubstr("from 5,000 triangles, bound by the number of triangles\n"));
   EXPECT_THAT(report,
               HasSubstr("0.0988 mm from the extracted surface, measured on the stl file\n"));
-  EXPECT_THAT(report, HasSubstr("scan to mesh      0.0988 mm at most, 0.0300 mm for 99 %"));
+  EXPECT_THAT(report, HasSubstr("to the file       0.0988 mm at most, 0.0300 mm for 99 %"));
   EXPECT_THAT(report, HasSubstr("0.0500 mm smoothing, 0.0400 mm simplification, 0.0100 mm"));
   EXPECT_THAT(report, HasSubstr("self-intersections  3 pairs of triangles\n"));
 }

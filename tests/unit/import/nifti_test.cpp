@@ -215,7 +215,7 @@ TEST(Nifti, OffersTheVolumesOfASeries) {
     EXPECT_EQ(import_bytes(bytes, {}, {.volume = 2}).remedy.choices.size(), 2);
   }
   EXPECT_THAT(import_bytes(nifti({.dim = {5, 2, 2, 2, 1, 3, 1, 1}}, kSmallSamples)).error,
-              HasSubstr("3 volumes that differ in value"));
+              HasSubstr("3 volumes that differ in dimension 5 (value)"));
   EXPECT_THAT(import_bytes(nifti({}, kSmallSamples), {}, {.volume = 1}).error,
               HasSubstr("only volume 0"));
 }

@@ -83,9 +83,10 @@ TEST(Readers, AreNamedWhereNoneReadsAFile) {
   const Outcome outcome = import_bytes("plain text");
   EXPECT_EQ(outcome.code, ErrorCode::kUnsupportedMedia);
   EXPECT_THAT(outcome.error, testing::StartsWith("The file is not NIfTI, NRRD, "));
-  EXPECT_THAT(outcome.error,
-              testing::EndsWith(
-                  ", or a ZIP or TAR of one. If it holds raw samples, add dims=X,Y,Z and type=T."));
+  EXPECT_THAT(
+      outcome.error,
+      testing::EndsWith(
+          ", or a ZIP or TAR of one. If it holds raw samples, give their dims (X,Y,Z) and type."));
   for (const Reader& reader : readers()) {
     if (reader.sniff == nullptr) continue;
     EXPECT_THAT(outcome.error, testing::HasSubstr(std::string(reader.title)));

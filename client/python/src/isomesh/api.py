@@ -952,9 +952,9 @@ class JobOptions(TypedDict, total=False):
         from the volume's file, or get one of a fixed series.
 
     label_values
-        Labels that consist of several sample values: the values of each label. A value may
-        belong to several labels, which then overlap there. Labels that are not listed keep the
-        values from the volume's file.
+        The sample values of each label, for labels that have several. A value may belong to
+        several labels, which then overlap there. Labels that are not listed keep the values
+        from the volume's file.
 
     scheme
         Number of tetrahedra per cell. With 5, every second cell is mirrored; the cell (0,0,0)
@@ -979,8 +979,8 @@ class JobOptions(TypedDict, total=False):
         for laplacian, 0.33 for taubin, which takes at most 0.66.
 
     pass_band
-        For taubin: frequencies along the surface below this are kept. They range from 0
-        (constant) to 2 (the sign changes from each vertex to the next).
+        For taubin: keep surface frequencies below this, and smooth higher ones. They range from
+        0 (constant) to 2 (the sign changes from each vertex to the next).
 
     max_displacement_mm
         Smoothing moves no vertex farther than this from its extracted position. In millimetres.
@@ -998,8 +998,8 @@ class JobOptions(TypedDict, total=False):
         Without members all are kept. Labels do not allow it.
 
     fill_cavities
-        Remove the walls of enclosed cavities and everything that floats in them. A cavity is
-        enclosed if no opening leads to it.
+        Remove enclosed cavities: their walls and all connected components inside them. A cavity
+        is enclosed if no opening leads to it.
 
     crop
         Mesh only what lies in this box: its smallest and its largest corner in millimetres
@@ -1008,10 +1008,12 @@ class JobOptions(TypedDict, total=False):
         surface: close is true.
 
     max_error_mm
-        Largest distance between a file's surface and the extracted surface, measured both ways.
-        In millimetres. Smoothing may use half of it. Simplification then removes as many
-        triangles as the rest allows, and Draco's coordinates get as many bits as that takes.
-        The error is measured on the files' own bytes: see certify, which is switched on.
+        The measured distance between each file and the extracted surface is at most this. In
+        millimetres, in both directions. The samples are all vertices and the centres of all
+        triangles; other points may be farther away. Smoothing may use half of it.
+        Simplification then removes as many triangles as the rest allows, and Draco's
+        coordinates get as many bits as that takes. The error is measured on the files' own
+        bytes: see certify, which is switched on.
 
     triangles
         Simplify the surface to at most this many triangles. If max_error_mm is given too, the
@@ -1025,8 +1027,8 @@ class JobOptions(TypedDict, total=False):
         Options of the drc format, and of the Draco streams in glb.
 
     normals
-        Write vertex normals, weighted by the areas around them, to glb. Without normals,
-        viewers shade each triangle flat or compute their own.
+        Write vertex normals to glb: means of the triangles' normals, weighted by area. Without
+        normals, viewers shade each triangle flat or compute their own.
 
     distances
         Write each vertex's distance to the extracted surface to glb, in millimetres. The vertex
@@ -1034,14 +1036,14 @@ class JobOptions(TypedDict, total=False):
         thousandth of the largest. The page shows them as colours. The formats must include glb.
 
     lods
-        Levels of detail in glb, as fractions of the triangles, from 1 downwards. At most 8.
-        They use the extension MSFT_lod; readers that do not know it ignore them. The formats
-        must include glb.
+        Levels of detail in glb, as decreasing fractions of the triangles; the first is 1. At
+        most 8. They use the extension MSFT_lod; readers that do not know it ignore them. The
+        formats must include glb.
 
     merge
-        Write the surface to glb as one primitive, or as one per label. For programs that take
-        each primitive for a separate object. Otherwise there is one per hundred thousand
-        triangles or so; they are written and read in parallel.
+        Write the surface to glb as one primitive; with labels, as one per label. For programs
+        that take each primitive for a separate object. Otherwise there is one per hundred
+        thousand triangles or so; they are written and read in parallel.
 
     glb_codec
         How the surface in glb is compressed. draco is KHR_draco_mesh_compression and makes

@@ -370,7 +370,7 @@ class Client:
             {
                 "parameter": "member",
                 "value": each["member"],
-                "title": each["problem"]["detail"] if each["problem"] else "stored",
+                "title": each["problem"]["detail"] if each["problem"] else "can be meshed",
             }
             for each in answers
         ]

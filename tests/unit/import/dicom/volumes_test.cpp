@@ -183,9 +183,10 @@ TEST(DicomVolumes, OfOtherOrientationsAreOffered) {
         coronal.slice(k).text(kSopInstanceUid, "UI", "1.9." + std::to_string(k)).file());
   }
   const Outcome outcome = import_objects(files);
-  EXPECT_THAT(outcome.remedy.choices,
-              ElementsAre(Choice{"volume", "0", "6 slices of 5 x 4 samples across (0, 0, 1)"},
-                          Choice{"volume", "1", "4 slices of 5 x 4 samples across (0, 1, 0)"}));
+  EXPECT_THAT(
+      outcome.remedy.choices,
+      ElementsAre(Choice{"volume", "0", "6 slices of 5 x 4 samples with normal (0, 0, 1)"},
+                  Choice{"volume", "1", "4 slices of 5 x 4 samples with normal (0, 1, 0)"}));
   EXPECT_EQ(import_objects(files, {.volume = 1}).volume.dims[2], 4);
 }
 
