@@ -27,7 +27,8 @@ make_debian() {
 
 # remove_debian FOLDER: also what make_debian did not finish.
 remove_debian() {
-  ! mountpoint --quiet "$1/proc" || umount "$1/proc"
+  # Also if a process in there is still ending.
+  ! mountpoint --quiet "$1/proc" || umount --lazy "$1/proc"
   rm -rf --one-file-system "$1"
 }
 

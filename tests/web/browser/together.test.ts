@@ -39,7 +39,7 @@ describe('surfaces in one scene', () => {
     await surfaceLoaded(page);
     expect((await silhouette(page, view)).part).toBeLessThan(0.6 * whole);
     expect((await hues(page, view)).red).toBeGreaterThan(1000);
-    await large.getByRole('link', { name: 'alone' }).click();
+    await large.getByRole('link', { name: 'open' }).click();
     await page.waitForURL(new RegExp(`#/jobs/${jobs[0]?.id ?? ''}`));
   });
 
@@ -53,11 +53,11 @@ describe('surfaces in one scene', () => {
     const own = await hues(page, view);
     expect(own.red).toBeGreaterThan(1000);
     expect(own.blue).toBeGreaterThan(1000);
-    await page.getByRole('checkbox', { name: /labels.* colours/ }).uncheck();
+    await page.getByRole('checkbox', { name: 'colours of its labels' }).uncheck();
     await page.getByLabel(/^Colour/).fill('#2040e0');
     await surfaceLoaded(page);
     await expect.poll(async () => (await hues(page, view)).red).toBe(0);
-    await page.getByRole('checkbox', { name: /labels.* colours/ }).check();
+    await page.getByRole('checkbox', { name: 'colours of its labels' }).check();
     await expect.poll(async () => (await hues(page, view)).red).toBeGreaterThan(1000);
   });
 
