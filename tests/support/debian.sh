@@ -14,6 +14,11 @@ make_debian() {
   fi
   cp -a "$base" "$there"
   cp /etc/resolv.conf "$there/etc/resolv.conf"
+  # The machine's way to the network, such as a proxy that signs with its own authority.
+  if compgen -G "/usr/local/share/ca-certificates/*.crt" >/dev/null; then
+    mkdir -p "$there/usr/local/share/ca-certificates"
+    cp /usr/local/share/ca-certificates/*.crt "$there/usr/local/share/ca-certificates/"
+  fi
   # The machine's own package sources, if they are of that suite.
   if grep -qs "$suite" /etc/apt/sources.list.d/debian.sources; then
     cp /etc/apt/sources.list.d/debian.sources "$there/etc/apt/sources.list.d/"
