@@ -16,7 +16,7 @@ concept Enumeration = std::is_enum_v<T>;
 template <class Self, class T>
 concept Is = std::same_as<std::remove_const_t<Self>, T>;
 
-// What differs for one kind of smoothing.
+// The values that differ for one kind of smoothing.
 struct SmoothingCase {
   Smoothing smoothing;
   std::optional<double> standard = {};  // the default for this kind
@@ -38,7 +38,7 @@ struct Parameter {
   std::optional<double> maximum = {};
   const char* when_empty = nullptr;        // the word for no value, instead of JSON's null
   std::array<const char*, 4> values = {};  // the meanings of an enumeration's values, in order
-  // What differs between kinds of smoothing; empty if nothing does.
+  // Kinds of smoothing that differ; empty if none does.
   std::array<std::optional<SmoothingCase>, 2> cases = {};
   bool is_required = false;
   const char* unless = nullptr;  // a required parameter may be missing if this one is given

@@ -1,4 +1,4 @@
-// What the commands share: a client, and messages to people; private to this folder.
+// The commands share this: a client, and messages to people. Private to this folder.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ class Lost : public Error {
   explicit Lost(const std::string& detail) : Error(ErrorCode::kUnreachable, detail) {}
 };
 
-// What to do if no server answers.
+// The hint for a user if no server responds.
 void suggest_local();
 
 // The exit status for an error that ended a command.

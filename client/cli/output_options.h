@@ -1,4 +1,4 @@
-// Where meshes go: -o and --format; private to this folder.
+// The options for the files of meshes: -o and --format. Private to this folder.
 #pragma once
 
 #include <string>

@@ -11,7 +11,7 @@
 
 namespace isomesh::cli {
 
-// What the client measured of a job, in milliseconds; the rest comes from the server.
+// The times of a job that the client measured, in milliseconds. The server measures the others.
 struct ClientTiming {
   std::optional<double> upload = {};
   std::optional<double> download = {};

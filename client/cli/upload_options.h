@@ -11,7 +11,7 @@ namespace isomesh::cli {
 inline constexpr const char* kUploadGroup = "Upload";
 inline constexpr const char* kRawGroup = "Raw samples";
 
-// What the argument FILE may name.
+// The things that the argument FILE may name.
 enum class Inputs { kFiles, kFilesAndVolumes };
 
 // FILE and the options that choose a volume in it.

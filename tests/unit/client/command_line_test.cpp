@@ -1,4 +1,4 @@
-// What the command line accepts, how it rejects the rest, and the help texts.
+// The command line: accepted and rejected options, and the help texts.
 #include <map>
 #include <sstream>
 #include <string>

@@ -31,7 +31,7 @@ beforeAll(async () => {
 
 afterAll(() => rmSync(project, { recursive: true }));
 
-// What the compiler says about the code; nothing if it is right.
+// The messages of the compiler about the code; empty if it is right.
 async function faultsOf(code: string, lib: string[], types: string[], resolution = 'bundler'): Promise<string> {
   const module = resolution === 'bundler' ? 'esnext' : 'nodenext';
   const compilerOptions = {
@@ -98,7 +98,7 @@ describe('the module in Node', () => {
   beforeAll(() => daemon.start());
   afterAll(() => daemon.stop());
 
-  // What the program prints.
+  // The output of the program.
   async function outputOf(code: string, ...options: string[]): Promise<string> {
     writeFileSync(join(project, 'program.js'), code.replace('http://127.0.0.1:8080', daemon.address));
     const { stdout } = await run('node', [...options, 'program.js'], { cwd: project, timeout: 20_000 });

@@ -1,4 +1,4 @@
-// What a user can add to a rejected upload so that the server accepts it.
+// The options that a user can add to a rejected upload so that the server accepts it.
 import { choicesOf, type ApiError } from '../api/problem';
 import type { Choice } from '../api/types';
 import { button, field, h } from '../ui/dom';

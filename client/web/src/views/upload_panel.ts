@@ -17,7 +17,7 @@ import { UploadProgress } from './upload_progress';
 
 const arrow = 'M8 11V2.5M4.5 6 8 2.5 11.5 6M2.5 10.5v3h11v-3';
 
-// What a user added to a rejected upload.
+// The options that a user added to a rejected upload.
 interface Addition {
   raw?: RawDescription;
   choices?: Choices;
