@@ -2,45 +2,24 @@
 
 #include <array>
 #include <cstdio>
+#include <new>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include <nlohmann/json.hpp>
-#include <spdlog/formatter.h>
-#include <spdlog/sinks/stdout_sinks.h>
-#include <spdlog/spdlog.h>
 
 #include "base/clock.h"
 
 namespace isomesh {
 namespace {
 
-using Level = spdlog::level::level_enum;
 using Json = nlohmann::ordered_json;
 
-// Lines of LogLine come through this logger; their text is the members as they are to be written.
-constexpr const char* kEvents = "events";
+constexpr std::array<const char*, 5> kLevelNames = {"debug", "info", "warning", "error",
+                                                    "critical"};
 
 // Constant once start_log has returned.
 LogFormat chosen_format = LogFormat::kText;
-std::shared_ptr<spdlog::logger> events;
-
-Level level_of(LogLevel level) {
-  switch (level) {
-    case LogLevel::kDebug:
-      return Level::debug;
-    case LogLevel::kInfo:
-      return Level::info;
-    case LogLevel::kWarn:
-      return Level::warn;
-    case LogLevel::kError:
-      return Level::err;
-    case LogLevel::kOff:
-      break;
-  }
-  return Level::off;
-}
+LogLevel lowest_level = LogLevel::kOff;
 
 std::string quoted(std::string_view text) {
   // ASCII alone: other characters can reverse or hide a line on a terminal.
@@ -64,76 +43,71 @@ std::string text_member(std::string_view name, std::string_view value) {
   return member(name, bare ? std::string(value) : quoted(value));
 }
 
-class Formatter : public spdlog::formatter {
- public:
-  void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& line) override {
-    const std::string_view name(message.logger_name.data(), message.logger_name.size());
-    const std::string_view payload(message.payload.data(), message.payload.size());
-    const auto level = spdlog::level::to_string_view(message.level);
-    std::string text;
-    const std::string body =
-        name == kEvents ? std::string(payload) : event("message") + text_member("text", payload);
-    if (chosen_format == LogFormat::kJson) {
-      text = "{\"time\":\"" + timestamp() + "\",\"level\":\"" +
-             std::string(level.data(), level.size()) + '"' + body + "}\n";
-    } else {
-      text = timestamp() + ' ' + std::string(level.data(), level.size()) + body + '\n';
-    }
-    line.append(text.data(), text.data() + text.size());
-  }
+// What an event's members follow.
+std::string event_member(std::string_view name) {
+  return chosen_format == LogFormat::kJson ? ",\"event\":" + quoted(name) : ' ' + std::string(name);
+}
 
-  std::unique_ptr<spdlog::formatter> clone() const override {
-    return std::make_unique<Formatter>();
-  }
-
-  // What an event's members follow.
-  static std::string event(std::string_view name) {
-    return chosen_format == LogFormat::kJson ? ",\"event\":" + quoted(name)
-                                             : ' ' + std::string(name);
-  }
-};
+bool is_logged(LogLevel level) { return level >= lowest_level && level != LogLevel::kOff; }
 
 }  // namespace
 
-struct LogLine::State {
-  Level level;
-  std::string text;
-};
-
 void start_log(LogFormat format, LogLevel level) {
   chosen_format = format;
-  const auto sink = std::make_shared<spdlog::sinks::stderr_sink_mt>();
-  spdlog::set_default_logger(std::make_shared<spdlog::logger>("isomeshd", sink));
-  events = std::make_shared<spdlog::logger>(kEvents, sink);
-  events->set_level(level_of(level));
-  sink->set_formatter(std::make_unique<Formatter>());
-  spdlog::set_level(level_of(level));
+  lowest_level = level;
 }
 
-LogLine::LogLine(std::string_view event, LogLevel level) {
-  if (!events || !events->should_log(level_of(level))) return;
-  state_ = std::make_unique<State>(State{level_of(level), Formatter::event(event)});
+LogLine::LogLine(std::string_view event, LogLevel level) : level_(level) {
+  if (is_logged(level)) text_ = event_member(event);
 }
 
 LogLine::~LogLine() {
-  if (state_) events->log(state_->level, std::string_view(state_->text));
+  if (text_.empty()) return;
+  try {
+    const std::string level = kLevelNames.at(static_cast<std::size_t>(level_));
+    const std::string line =
+        chosen_format == LogFormat::kJson
+            ? "{\"time\":\"" + timestamp() + "\",\"level\":\"" + level + '"' + text_ + "}\n"
+            : timestamp() + ' ' + level + text_ + '\n';
+    std::fwrite(line.data(), 1, line.size(),
+                stderr);  // stderr has no buffer: one call writes it whole
+  } catch (const std::bad_alloc&) {
+    // Whoever waits for an answer is served nevertheless.
+  }
 }
 
 LogLine& LogLine::add(std::string_view name, std::string_view value) {
-  if (state_) state_->text += text_member(name, value);
+  if (!text_.empty()) text_ += text_member(name, value);
   return *this;
 }
 
 LogLine& LogLine::add_number(std::string_view name, std::int64_t value) {
-  if (state_) state_->text += member(name, std::to_string(value));
+  if (!text_.empty()) text_ += member(name, std::to_string(value));
   return *this;
 }
 
 LogLine& LogLine::add(std::string_view name, double value) {
   std::array<char, 32> text = {};
   std::snprintf(text.data(), text.size(), "%.3f", value);
-  if (state_) state_->text += member(name, text.data());
+  if (!text_.empty()) text_ += member(name, text.data());
   return *this;
+}
+
+void log_message(LogLevel level, std::string_view text,
+                 std::initializer_list<LogValue> values) noexcept {
+  if (!is_logged(level)) return;
+  try {
+    std::string message;
+    for (const LogValue& value : values) {
+      const std::size_t place = text.find("{}");
+      if (place == std::string_view::npos) break;
+      message.append(text.substr(0, place)).append(value.text());
+      text.remove_prefix(place + 2);
+    }
+    LogLine("message", level).add("text", message.append(text));
+  } catch (const std::bad_alloc&) {
+    // As in LogLine.
+  }
 }
 
 }  // namespace isomesh

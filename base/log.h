@@ -9,22 +9,25 @@
 // uploaded files, queries or tokens: callers see to that.
 #pragma once
 
+#include <array>
+#include <charconv>
 #include <concepts>
+#include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <initializer_list>
+#include <string>
 #include <string_view>
 
 namespace isomesh {
 
 enum class LogFormat { kText, kJson };
-enum class LogLevel { kDebug, kInfo, kWarn, kError, kOff };
+enum class LogLevel { kDebug, kInfo, kWarn, kError, kCritical, kOff };
 
-// To be called before threads start; without it LogLine writes nothing. spdlog's own calls
-// (spdlog::error and the like) take the same form afterwards: an event "message" with one member
-// "text".
+// To be called before threads start; until then nothing is written.
 void start_log(LogFormat format, LogLevel level);
 
-// One line, written when it goes. Not thread safe; lines of several threads do not mix.
+// One line, written when it goes, unless no memory is left for it. Not thread safe; lines of
+// several threads do not mix.
 class LogLine {
  public:
   explicit LogLine(std::string_view event, LogLevel level = LogLevel::kInfo);
@@ -45,8 +48,51 @@ class LogLine {
  private:
   LogLine& add_number(std::string_view name, std::int64_t value);
 
-  struct State;
-  std::unique_ptr<State> state_;  // null when the level is not logged
+  LogLevel level_;
+  std::string text_;  // empty when the level is not logged
 };
+
+// What takes the place of a {} in a message. It allocates nothing, and refers to a text that
+// outlives it.
+class LogValue {
+ public:
+  LogValue(std::string_view text) : text_(text) {}
+  LogValue(const std::string& text) : text_(text) {}
+  LogValue(const char* text) : text_(text) {}
+  LogValue(std::integral auto number)
+      : length_(std::to_chars(digits_.data(), digits_.data() + digits_.size(), number).ptr -
+                digits_.data()) {}
+  std::string_view text() const {
+    return length_ == 0 ? text_
+                        : std::string_view(digits_.data(), static_cast<std::size_t>(length_));
+  }
+
+ private:
+  std::string_view text_;
+  std::array<char, 24> digits_ = {};
+  std::ptrdiff_t length_ = 0;
+};
+
+// An event "message" with one member "text": `text` with each {} replaced by the next of `values`.
+// Thread safe; never throws: a message that no memory is left for is lost.
+void log_message(LogLevel level, std::string_view text,
+                 std::initializer_list<LogValue> values) noexcept;
+
+template <typename... Values>
+void log_debug(std::string_view text, const Values&... values) {
+  log_message(LogLevel::kDebug, text, {LogValue(values)...});
+}
+template <typename... Values>
+void log_info(std::string_view text, const Values&... values) {
+  log_message(LogLevel::kInfo, text, {LogValue(values)...});
+}
+template <typename... Values>
+void log_warning(std::string_view text, const Values&... values) {
+  log_message(LogLevel::kWarn, text, {LogValue(values)...});
+}
+template <typename... Values>
+void log_error(std::string_view text, const Values&... values) {
+  log_message(LogLevel::kError, text, {LogValue(values)...});
+}
 
 }  // namespace isomesh

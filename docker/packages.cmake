@@ -75,7 +75,6 @@ if(ISOMESH_DAEMON)
   isomesh_find(liblzma-dev LibLZMA)
   isomesh_find(zlib1g-dev ZLIB)
   isomesh_find(libexpat1-dev EXPAT)
-  isomesh_find(libspdlog-dev spdlog)
   # By its own file: that of pkg-config names no folder on Debian 13.
   isomesh_find(libdraco-dev draco)
   isomesh_find(libmeshoptimizer-dev meshoptimizer)

@@ -7,10 +7,10 @@
 #include <string_view>
 
 #include <CLI/CLI.hpp>
-#include <spdlog/spdlog.h>
 
 #include "base/command_line/completion.h"
 #include "base/command_line/manual.h"
+#include "base/log.h"
 #include "server/options.h"
 #include "server/records.h"
 #include "server/store/backup.h"
@@ -173,9 +173,9 @@ struct Commands::State {
     std::cout << what << ' ' << copied.blobs << " files of volumes and meshes, " << copied.bytes
               << " bytes" << std::endl;
     for (const std::string& lost : copied.damaged) {
-      spdlog::warn("{} is damaged: its bytes have changed", lost);
+      log_warning("{} is damaged: its bytes have changed", lost);
     }
-    for (const std::string& lost : copied.missing) spdlog::warn("{} is missing", lost);
+    for (const std::string& lost : copied.missing) log_warning("{} is missing", lost);
     if (!copied.damaged.empty() || !copied.missing.empty()) status = 1;
   }
 

@@ -14,7 +14,6 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include "base/command_line/help.h"
@@ -125,7 +124,7 @@ void check_reach(const Options& options, const net::Address& address, const File
         "Use --tokens or --open-network for other addresses");
   }
   if (files.tokens && !files.tls) {
-    spdlog::warn("tokens and volumes cross the network unencrypted; --tls-cert encrypts them");
+    log_warning("tokens and volumes cross the network unencrypted; --tls-cert encrypts them");
   }
 }
 
@@ -150,12 +149,12 @@ void reload_one(const std::function<void()>& read) {
   try {
     read();
   } catch (const Error& error) {
-    spdlog::error("{}; the previous content stays in use", error.what());
+    log_error("{}; the previous content stays in use", error.what());
   }
 }
 
 void reload(const Options& options, const Files& files, callbacks::Callbacks& callbacks) {
-  spdlog::info("signal {}: reloading files", SIGHUP);
+  log_info("signal {}: reloading files", SIGHUP);
   if (files.tokens) reload_one([&] { files.tokens->reload(); });
   if (files.tls) reload_one([&] { files.tls->reload(); });
   reload_one([&] { callbacks.set_secrets(callback_secrets(options)); });
@@ -293,7 +292,7 @@ int run(const Options& options, const sigset_t& signals) {
   store::VolumeStore& volumes = records->volumes();
   store::JobStore& jobs = records->jobs();
   if (const std::size_t count = jobs.reap()) {
-    spdlog::warn("{} jobs were running when a daemon stopped; they are run again", count);
+    log_warning("{} jobs were running when a daemon stopped; they are run again", count);
   }
   store::RetentionOptions retention_options;
   retention_options.keep = keep;
@@ -346,7 +345,7 @@ int run(const Options& options, const sigset_t& signals) {
       dimse_listener = std::make_unique<dimse::DimseListener>(
           dimse::ListenerServices{folder, blobs, received, audit, *hospital->dimse},
           *hospital->settings.dimse);
-      spdlog::info("receiving series by C-STORE on {}", dimse_listener->authority());
+      log_info("receiving series by C-STORE on {}", dimse_listener->authority());
     }
   }
   const http::Services services = {
@@ -369,12 +368,12 @@ int run(const Options& options, const sigset_t& signals) {
 
   int signal = 0;
   while (::sigwait(&signals, &signal) == 0 && signal == SIGHUP) reload(options, files, callbacks);
-  spdlog::info("signal {}: draining", signal);
+  log_info("signal {}: draining", signal);
   server.begin_drain();
   if (dimse_listener) dimse_listener->stop();
   if (!workers.drain(std::chrono::seconds(options.drain_seconds))) {
-    spdlog::warn("jobs are still running after {} s; they are stopped and put back",
-                 options.drain_seconds);
+    log_warning("jobs are still running after {} s; they are stopped and put back",
+                options.drain_seconds);
   }
   if (orders) orders->stop();
   if (audit_sender) audit_sender->stop();
@@ -389,8 +388,8 @@ void tell_failure(LogFormat format, const std::string& reason) {
     std::cerr << "isomeshd: " << reason << std::endl;
     return;
   }
-  spdlog::set_level(spdlog::level::critical);
-  spdlog::critical("isomeshd: {}", reason);
+  start_log(format, LogLevel::kCritical);
+  log_message(LogLevel::kCritical, "isomeshd: {}", {reason});
 }
 
 std::string usage_message(const CLI::App* cli, const CLI::Error& error) {

@@ -6,9 +6,9 @@
 #include <string>
 
 #include <nlohmann/json.hpp>
-#include <spdlog/spdlog.h>
 
 #include "base/error.h"
+#include "base/log.h"
 
 namespace isomesh::audit {
 namespace {
@@ -60,14 +60,14 @@ void SyslogSender::run(const std::stop_token& stop) {
     const bool is_last = stop.stop_requested();
     try {
       send_new(cut_.get_token());
-      if (is_cut_off) spdlog::info("the audit trail reaches its collector again");
+      if (is_cut_off) log_info("the audit trail reaches its collector again");
       is_cut_off = false;
       wait = kLook;
     } catch (const std::exception& error) {
       connection_.reset();
       if (!is_cut_off && !is_last) {
-        spdlog::warn("the audit trail cannot be sent to its collector and is retried: {}",
-                     error.what());
+        log_warning("the audit trail cannot be sent to its collector and is retried: {}",
+                    error.what());
       }
       is_cut_off = true;
       wait = std::min(2 * wait, kLongestPause);

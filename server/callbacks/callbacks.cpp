@@ -8,9 +8,9 @@
 #include <utility>
 
 #include <curl/curl.h>
-#include <spdlog/spdlog.h>
 
 #include "base/curl.h"
+#include "base/log.h"
 #include "base/mutex.h"
 #include "server/callbacks/signature.h"
 
@@ -98,7 +98,7 @@ class Callbacks::Sender {
         begin_due(now);
         sleep = turn(now);
       } catch (const std::exception& error) {
-        spdlog::error("callbacks could not be sent and are retried: {}", error.what());
+        log_error("callbacks could not be sent and are retried: {}", error.what());
         sleep = kPause;
       }
       if (stop.stop_requested()) return;

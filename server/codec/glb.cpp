@@ -93,7 +93,7 @@ void write_glb(std::span<const GlbPart> parts, const Grid& grid, const Provenanc
                const Sink& sink) {
   const GlbLayout layout(parts);
   const std::size_t binary_bytes = layout.bytes();
-  std::string json = glb_document(parts, layout, grid, provenance).dump();
+  std::string json = glb_document(parts, layout, grid, provenance);
   json.resize(glb_padded(json.size()), ' ');
 
   constexpr std::size_t kHeaderBytes = 12;
@@ -128,10 +128,7 @@ GlbPart part_of(const LabelSummary& label) {
   GlbPart part = {.name = title_of(label), .material = title_of(label)};
   part.color = color_of(label);
   for (double& channel : part.color) channel = linear_of(channel);
-  part.extras = {{"label", label.label},
-                 {"voxels", label.voxels},
-                 {"volume_mm3", label.volume_mm3},
-                 {"area_mm2", label.area_mm2}};
+  part.label = label;
   return part;
 }
 

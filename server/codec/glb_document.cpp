@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include <nlohmann/json.hpp>
+
 #include "server/codec/provenance_json.h"
 
 namespace isomesh::codec {
@@ -192,6 +194,13 @@ void add_mesh(Json& gltf, const std::string& name, const GlbLevel& level, std::s
 // Down to which share of the screen's height or width each level is drawn: where the next one has
 // as many triangles for a part of the screen as the finest has when it fills it. The last one
 // always is.
+Json extras_of(const LabelSummary& label) {
+  return {{"label", label.label},
+          {"voxels", label.voxels},
+          {"volume_mm3", label.volume_mm3},
+          {"area_mm2", label.area_mm2}};
+}
+
 Json screen_coverage(const GlbPart& part) {
   Json coverage = Json::array();
   for (std::size_t level = 1; level < part.levels.size(); ++level) {
@@ -213,7 +222,7 @@ class Nodes {
   // Empty parts have no mesh.
   Json node_of(const GlbPart& part, std::size_t number, Json node, std::size_t levels_from) {
     const Json bare = node;
-    if (!part.extras.is_null()) node["extras"] = part.extras;
+    if (part.label) node["extras"] = extras_of(*part.label);
     if (part.levels.empty()) return node;
     node["mesh"] = gltf_["meshes"].size();
     gltf_["materials"].push_back(material_of(part));
@@ -262,8 +271,8 @@ GlbLayout::GlbLayout(std::span<const GlbPart> parts) : begins_(parts.size()) {
   }
 }
 
-Json glb_document(std::span<const GlbPart> parts, const GlbLayout& layout, const Grid& grid,
-                  const Provenance& provenance) {
+std::string glb_document(std::span<const GlbPart> parts, const GlbLayout& layout, const Grid& grid,
+                         const Provenance& provenance) {
   const bool is_draco = provenance.parameters.glb_codec == GlbCodec::kDraco;
   const Steps steps(grid, provenance.parameters);
   Json gltf;
@@ -305,7 +314,7 @@ Json glb_document(std::span<const GlbPart> parts, const GlbLayout& layout, const
   for (const Json& level : nodes.levels()) all.push_back(level);
   if (!nodes.levels().empty()) gltf["extensionsUsed"].push_back(kLodExtension);
   gltf["nodes"] = all;
-  return gltf;
+  return gltf.dump();
 }
 
 }  // namespace isomesh::codec

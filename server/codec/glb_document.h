@@ -4,15 +4,15 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "server/codec/draco_chunk.h"
 #include "server/codec/encode.h"
+#include "server/codec/encode_labels.h"
 #include "server/codec/meshopt_chunk.h"
 
 namespace isomesh::codec {
@@ -50,7 +50,7 @@ struct GlbPart {
   std::string name;
   std::string material;
   std::array<double, 3> color = {0.8, 0.8, 0.8};  // linear
-  nlohmann::ordered_json extras = {};             // of the node; none where it is null
+  std::optional<LabelSummary> label = {};         // whose members the node has as extras
   // From the finest to the coarsest, each with fewer triangles than the one before; none of an
   // empty surface.
   std::vector<GlbLevel> levels = {};
@@ -85,7 +85,7 @@ class GlbLayout {
 // nodes below it. Coarser levels of either are nodes behind all others that MSFT_lod names. Where
 // the chunks' positions are steps on the grid, the nodes that have meshes turn them into LPS
 // millimetres.
-nlohmann::ordered_json glb_document(std::span<const GlbPart> parts, const GlbLayout& layout,
-                                    const Grid& grid, const Provenance& provenance);
+std::string glb_document(std::span<const GlbPart> parts, const GlbLayout& layout, const Grid& grid,
+                         const Provenance& provenance);
 
 }  // namespace isomesh::codec

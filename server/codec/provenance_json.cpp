@@ -26,9 +26,13 @@ Json provenance_json(const Provenance& provenance) {
   return json;
 }
 
+std::string provenance_text(const Provenance& provenance) {
+  return provenance_json(provenance).dump();
+}
+
 std::string provenance_for_xml(const Provenance& provenance) {
   std::string result;
-  for (const char c : provenance_json(provenance).dump()) {
+  for (const char c : provenance_text(provenance)) {
     if (c == '&') {
       result += "\\u0026";
     } else if (c == '<') {

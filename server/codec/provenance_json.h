@@ -11,6 +11,9 @@ namespace isomesh::codec {
 // units and space of the positions; the volume's notes where there are some.
 nlohmann::ordered_json provenance_json(const Provenance& provenance);
 
+// As text.
+std::string provenance_text(const Provenance& provenance);
+
 // As text without what XML escapes: some readers leave the text of elements as it stands.
 std::string provenance_for_xml(const Provenance& provenance);
 

@@ -4,8 +4,6 @@
 #include <string_view>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "server/codec/block_writer.h"
 #include "server/codec/encode.h"
 #include "server/codec/encode_labels.h"
@@ -59,7 +57,7 @@ void write_file(const mesh::Mesh& mesh, const std::vector<FaceRun>& runs, const 
       "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
       "header_type=\"UInt64\">\n<PolyData>\n<FieldData>\n" +
       text_array("SPACE", letters_of(space)) +  // by which 3D Slicer goes
-      text_array("isomesh:provenance", provenance_json(provenance).dump()) +
+      text_array("isomesh:provenance", provenance_text(provenance)) +
       "</FieldData>\n<Piece NumberOfPoints=\"" + std::to_string(vertices) +
       "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" +
       std::to_string(faces) + "\">\n";

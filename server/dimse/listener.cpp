@@ -6,7 +6,6 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -104,7 +103,7 @@ void DimseListener::serve(const std::stop_token& stop) {
       if (peer.number() >= 0) serve_association(peer, stop);
     } catch (const std::exception& error) {
       if (stop.stop_requested()) return;
-      spdlog::error("an association was ended by an error: {}", error.what());
+      log_error("an association was ended by an error: {}", error.what());
       std::this_thread::sleep_for(kPause);
     }
   }
@@ -133,8 +132,8 @@ void DimseListener::serve_association(const Descriptor& peer, const std::stop_to
   if (stop.stop_requested()) return;
   // It neither ended well nor did it say why: what it has read may be the reason.
   services_.processes.renew();
-  spdlog::error("the process of an association ended {}",
-                process::how_it_ended(child.ended_within(std::chrono::seconds(2))));
+  log_error("the process of an association ended {}",
+            process::how_it_ended(child.ended_within(std::chrono::seconds(2))));
 }
 
 bool DimseListener::has_room(std::uint64_t more_bytes) const {
@@ -153,8 +152,7 @@ DimseVerdict DimseListener::keep(const DimseObject& object, const std::filesyste
     services_.blobs.settle(blob.key);
     return DimseVerdict::kStored;
   } catch (const Error& error) {
-    spdlog::error("a received object could not be stored, and its sender is told so: {}",
-                  error.what());
+    log_error("a received object could not be stored, and its sender is told so: {}", error.what());
     return DimseVerdict::kNoRoom;
   }
 }

@@ -6,9 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include <spdlog/spdlog.h>
-
 #include "base/ids.h"
+#include "base/log.h"
 #include "proto/error.h"
 
 namespace isomesh::http {
@@ -43,7 +42,7 @@ void KeptUploads::find_left() {
       unknown.erase(file);
       unknown.erase(folder_ / file.stem());
     } catch (const Error& error) {
-      spdlog::info("an incomplete upload is discarded: {}", error.what());
+      log_info("an incomplete upload is discarded: {}", error.what());
     }
   }
   for (const fs::path& file : unknown) fs::remove(file, absent);

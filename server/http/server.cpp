@@ -5,8 +5,7 @@
 #include <thread>
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
+#include "base/log.h"
 #include "server/http/observe/outcomes.h"
 #include "server/http/routes/routes.h"
 #include "server/net/listener.h"
@@ -83,7 +82,7 @@ void watch_jobs(App& app) {
       }
       if (is_heard) app.connections.wake_sources();
     } catch (const Error& error) {
-      spdlog::error("job events cannot be read and are retried: {}", error.what());
+      log_error("job events cannot be read and are retried: {}", error.what());
       std::this_thread::sleep_for(kLongestWatch);
     }
   }

@@ -5,7 +5,7 @@
 #include <memory>
 #include <span>
 
-#include <spdlog/spdlog.h>
+#include "base/log.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -54,8 +54,8 @@ void BlobEraser::erase_now(const std::string& key) {
     // Whoever of another daemon has stored it, at any time, may be about to name it.
     blobs_.erase_unnamed(std::span(&key, 1), store::Steady(), names);
   } catch (const std::exception& error) {
-    spdlog::error("the samples of a deleted volume could not be erased and are removed later: {}",
-                  error.what());
+    log_error("the samples of a deleted volume could not be erased and are removed later: {}",
+              error.what());
   }
 }
 

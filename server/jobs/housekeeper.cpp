@@ -2,8 +2,7 @@
 
 #include <exception>
 
-#include <spdlog/spdlog.h>
-
+#include "base/log.h"
 #include "base/mutex.h"
 
 namespace isomesh::jobs {
@@ -13,19 +12,19 @@ void enforce(store::Retention& retention) {
   try {
     const auto [jobs, volumes, blobs, quarantined, left] = retention.enforce();
     if (jobs + volumes + blobs > 0) {
-      spdlog::info("removed {} jobs, {} volumes and {} files", jobs, volumes, blobs);
+      log_info("removed {} jobs, {} volumes and {} files", jobs, volumes, blobs);
     }
     if (quarantined > 0) {
-      spdlog::warn("{} files that no record names were put into quarantine", quarantined);
+      log_warning("{} files that no record names were put into quarantine", quarantined);
     }
     if (left > 0) {
-      spdlog::error(
+      log_error(
           "{} more files that no record names were left in place: does this database belong to "
           "them?",
           left);
     }
   } catch (const std::exception& error) {
-    spdlog::error("expired data could not be removed and is retried: {}", error.what());
+    log_error("expired data could not be removed and is retried: {}", error.what());
   }
 }
 

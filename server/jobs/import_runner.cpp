@@ -6,8 +6,7 @@
 #include <string>
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
+#include "base/log.h"
 #include "proto/error.h"
 #include "server/process/sandbox.h"
 #include "server/volume/canonical.h"
@@ -29,7 +28,7 @@ std::string while_reading(const process::ImportReport& report) {
 
 [[noreturn]] void refuse_dead(const std::string& how, const process::ImportReport& report) {
   const std::string what = "The import ended " + how + while_reading(report);
-  spdlog::error("{}", what);
+  log_error("{}", what);
   volume::throw_unusable(what + "; the file is damaged or malicious.");
 }
 
@@ -58,8 +57,8 @@ void check(const Volume& volume, const process::ImportTask& task) {
 
 Volume volume_of(process::ImportReport report, const process::ImportTask& task) {
   if (report.error) {
-    spdlog::info("an import was rejected{}: {}", while_reading(report),
-                 describe(report.error->code()).name);
+    log_info("an import was rejected{}: {}", while_reading(report),
+             describe(report.error->code()).name);
     throw *report.error;
   }
   if (!report.volume) throw_lying();
@@ -91,7 +90,7 @@ process::ImportBounds bounds_for(std::uint64_t upload_bytes, const process::Impo
 ImportRunner::ImportRunner(const RunnerOptions& options)
     : options_(options), prepared_(options.program, options.at_once) {
   if (!process::has_landlock()) {
-    spdlog::warn("this kernel has no Landlock: imports and jobs could read this user's files");
+    log_warning("this kernel has no Landlock: imports and jobs could read this user's files");
   }
 }
 
@@ -127,7 +126,7 @@ process::ImportReport ImportRunner::report_of(const std::string& message) {
   constexpr int kMostIdleDeaths = 3;
   for (int tries = 0; tries < kMostIdleDeaths; ++tries) {
     if (auto report = run_in(prepared_.take(), message)) return *std::move(report);
-    spdlog::warn("a prepared import process ended before its import began; another one takes over");
+    log_warning("a prepared import process ended before its import began; another one takes over");
   }
   throw Error(ErrorCode::kInternal, "Import processes end before their imports begin.");
 }

@@ -5,10 +5,10 @@
 #include <utility>
 
 #include <poll.h>
-#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
 #include "base/files.h"
+#include "base/log.h"
 #include "proto/error.h"
 
 namespace isomesh::jobs {
@@ -69,7 +69,7 @@ JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink>
       child_->say(to_line(order), file.descriptor());
       auto end = follow(talk);
       if (!end) {
-        spdlog::warn("a prepared job process ended before its job began; another one takes over");
+        log_warning("a prepared job process ended before its job began; another one takes over");
         child_.reset();
         continue;
       }

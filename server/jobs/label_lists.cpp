@@ -93,10 +93,10 @@ double voxel_mm3(const Volume& volume) {
 
 // All values that the samples have, ascending; some megabytes for each thread.
 template <class Sample>
-std::vector<LabelVoxels> count_values(const volume::CanonicalFile& canonical,
+std::vector<LabelVoxels> count_labels(const volume::CanonicalFile& canonical,
                                       const Volume& volume) {
-  constexpr std::uint64_t kBlockBytes = std::uint64_t{4} << 20;
-  const Blocks blocks(canonical.header().dims, kBlockBytes / sizeof(Sample));
+  constexpr std::uint64_t kBytesAtOnce = std::uint64_t{4} << 20;
+  const Blocks blocks(canonical.header().dims, kBytesAtOnce / sizeof(Sample));
   const std::size_t parts =
       std::min(blocks.count(), static_cast<std::size_t>(mesh::thread_count()));
   std::vector<Table> tables(parts);
@@ -124,12 +124,12 @@ std::vector<LabelVoxels> count_values(const volume::CanonicalFile& canonical,
   return labels;
 }
 
-std::vector<LabelVoxels> count_values(const volume::CanonicalFile& canonical,
+std::vector<LabelVoxels> count_labels(const volume::CanonicalFile& canonical,
                                       const Volume& volume) {
   return with_sample(volume.type, [&](auto sample) -> std::vector<LabelVoxels> {
     using Sample = decltype(sample);
     if constexpr (std::is_integral_v<Sample>) {
-      return count_values<Sample>(canonical, volume);
+      return count_labels<Sample>(canonical, volume);
     } else {
       volume::throw_unusable("The volume's samples are " + std::string(to_string(volume.type)) +
                              ", but labels are whole numbers.");
@@ -191,7 +191,7 @@ std::shared_ptr<const std::vector<LabelVoxels>> LabelLists::counts(const store::
   return counts_.get({viewer, volume.id}, [&] {
     const store::LocalBlob file = stored_samples(blobs_, volume.id);
     return made_of_intact(blobs_, volume.id, {},
-                          [&] { return count_values(volume::CanonicalFile(file.path), volume); });
+                          [&] { return count_labels(volume::CanonicalFile(file.path), volume); });
   });
 }
 

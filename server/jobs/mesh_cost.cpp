@@ -28,11 +28,11 @@ std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
 std::uint64_t error_bytes(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
                           bool certify) {
   // What simplify.h and triangle_grid.h say that they take, and a little more.
-  constexpr std::uint64_t kSimplifyPerTriangle = 200;
+  constexpr std::uint64_t kSimplifyBytesPerTriangle = 200;
   constexpr std::uint64_t kGridsPerTriangle = 130;
   std::uint64_t simplifying = 0;
   if (parameters.max_error_mm || parameters.triangles) {
-    simplifying = surface.triangles * kSimplifyPerTriangle;
+    simplifying = surface.triangles * kSimplifyBytesPerTriangle;
   }
   const bool keeps_extracted = parameters.max_error_mm || parameters.distances;
   // While files are encoded.

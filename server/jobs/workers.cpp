@@ -7,8 +7,9 @@
 #include <optional>
 #include <utility>
 
-#include <spdlog/spdlog.h>
 #include <unistd.h>
+
+#include "base/log.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -136,7 +137,7 @@ void Workers::work(const std::stop_token& stop, const std::string& name) {
         jobs_.wait_for_work(stop, kLongestIdle);
       }
     } catch (const std::exception& error) {
-      spdlog::error("the queue cannot be read and is retried: {}", error.what());
+      log_error("the queue cannot be read and is retried: {}", error.what());
       pause(stop, kLongestIdle);
     }
   }
@@ -167,24 +168,23 @@ void Workers::run(const store::Lease& lease, JobProcess& process) {
     outcome.error = to_problem(end, path);
     outcome.error->detail = end.what();  // of the job rather than of the service, so it is told
     outcome.may_retry = true;
-    spdlog::error("job {}, attempt {} failed: {}", lease.id, lease.attempt, end.what());
+    log_error("job {}, attempt {} failed: {}", lease.id, lease.attempt, end.what());
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kOutOfSpace) run->stop(Reason::kFullDisk);
     if (error.code() == ErrorCode::kUnavailable) run->stop(Reason::kExhausted);
     if (error.code() != ErrorCode::kCancelled) {
       outcome.error = to_problem(error, path);
       outcome.may_retry = error.code() == ErrorCode::kInternal;
-      spdlog::error("job {}, attempt {} failed: {}", lease.id, lease.attempt, error.what());
+      log_error("job {}, attempt {} failed: {}", lease.id, lease.attempt, error.what());
     }
   } catch (const std::bad_alloc&) {
     // The service's memory, not the job's.
     run->stop(Reason::kExhausted);
-    spdlog::error("job {}, attempt {} failed: the service is out of memory", lease.id,
-                  lease.attempt);
+    log_error("job {}, attempt {} failed: the service is out of memory", lease.id, lease.attempt);
   } catch (const std::exception& error) {
     outcome.error = to_problem({ErrorCode::kInternal, error.what()}, path);
     outcome.may_retry = true;
-    spdlog::error("job {}, attempt {} failed: {}", lease.id, lease.attempt, error.what());
+    log_error("job {}, attempt {} failed: {}", lease.id, lease.attempt, error.what());
   }
   run->end();
   {
@@ -214,7 +214,7 @@ void Workers::conclude(const Run& run, store::Outcome outcome) {
     }
     if (!outcome.mesh && run.reason() == Reason::kFullDisk) {
       const milliseconds delay = full_disk_delay(lease.id);
-      spdlog::warn("job {} waits {} s for disk space", lease.id, delay.count() / 1000);
+      log_warning("job {} waits {} s for disk space", lease.id, delay.count() / 1000);
       return jobs_.put_back(lease, delay, WaitingFor::kDisk);
     }
     if (!outcome.mesh && run.reason() == Reason::kExhausted) {
@@ -224,14 +224,14 @@ void Workers::conclude(const Run& run, store::Outcome outcome) {
   };
   while (true) {
     try {
-      if (!tell()) spdlog::warn("job {} lost its lease; its result is discarded", lease.id);
+      if (!tell()) log_warning("job {} lost its lease; its result is discarded", lease.id);
       return;
     } catch (const Error& error) {
       const bool may_pass =
           error.code() == ErrorCode::kOutOfSpace || error.code() == ErrorCode::kUnavailable;
       if (!may_pass || running_.stop_requested()) throw;
-      spdlog::error("the end of job {} could not be recorded and is retried: {}", lease.id,
-                    error.what());
+      log_error("the end of job {} could not be recorded and is retried: {}", lease.id,
+                error.what());
     }
     pause(running_.get_token(), kEndRetry);
   }
@@ -250,7 +250,7 @@ void Workers::renew(Run& run) {
   try {
     run.renew(jobs_, options_.lease);
   } catch (const std::exception& error) {
-    spdlog::error("the lease of job {} could not be renewed: {}", run.lease().id, error.what());
+    log_error("the lease of job {} could not be renewed: {}", run.lease().id, error.what());
   }
 }
 
@@ -277,9 +277,9 @@ void Workers::look_after_leases(const std::stop_token& stop) {
 void Workers::reap() {
   try {
     if (const std::size_t count = jobs_.reap())
-      spdlog::warn("{} leases expired; their jobs are run again", count);
+      log_warning("{} leases expired; their jobs are run again", count);
   } catch (const std::exception& error) {
-    spdlog::error("expired leases could not be released and are retried: {}", error.what());
+    log_error("expired leases could not be released and are retried: {}", error.what());
   }
 }
 

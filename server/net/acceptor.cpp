@@ -8,11 +8,11 @@
 
 #include <arpa/inet.h>
 #include <fcntl.h>
-#include <spdlog/spdlog.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "base/log.h"
 #include "server/net/address.h"
 
 namespace isomesh::net {
@@ -128,7 +128,7 @@ void Acceptor::accept_some() {
       // The oldest pending connection is closed to free its descriptor. Where there is none,
       // descriptors are held by responses, and some time must go by.
       if (pending_.empty()) {
-        spdlog::warn("new connections wait: no file descriptors are left");
+        log_warning("new connections wait: no file descriptors are left");
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
         return;
       }
@@ -156,7 +156,7 @@ void Acceptor::begin(int socket, std::string address) {
     pending.deadline = Clock::now() + limits_.head_time;
     pending.id = ++last_id_;
   } catch (const std::exception& error) {
-    spdlog::warn("a connection could not be accepted: {}", error.what());
+    log_warning("a connection could not be accepted: {}", error.what());
     return;
   }
   const auto pending = std::prev(pending_.end());

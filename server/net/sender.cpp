@@ -6,10 +6,10 @@
 #include <limits>
 #include <utility>
 
-#include <spdlog/spdlog.h>
 #include <sys/epoll.h>
 #include <unistd.h>
 
+#include "base/log.h"
 #include "base/niceness.h"
 
 namespace isomesh::net {
@@ -26,7 +26,7 @@ Source::More next_of(Source& source, std::string& bytes) {
   try {
     return source.next(bytes);
   } catch (const std::exception& error) {
-    spdlog::error("a response was cut off by an error: {}", error.what());
+    log_error("a response was cut off by an error: {}", error.what());
     return Source::More::kBroken;
   }
 }

@@ -7,10 +7,11 @@
 #include <fcntl.h>
 #include <openssl/err.h>
 #include <openssl/ssl.h>
-#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "base/log.h"
 
 namespace isomesh::net {
 namespace {
@@ -78,7 +79,7 @@ int no_passphrase(char* /*buffer*/, int /*size*/, int /*writing*/, void* /*nothi
 void warn_if_readable(const std::filesystem::path& key) {
   struct stat status = {};
   if (::stat(key.c_str(), &status) == 0 && (status.st_mode & S_IROTH) != 0) {
-    spdlog::warn("every user of this machine can read the private key of the TLS certificate");
+    log_warning("every user of this machine can read the private key of the TLS certificate");
   }
 }
 

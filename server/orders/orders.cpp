@@ -4,8 +4,6 @@
 #include <exception>
 #include <random>
 
-#include <spdlog/spdlog.h>
-
 #include "base/clock.h"
 #include "base/log.h"
 #include "proto/error.h"
@@ -88,7 +86,7 @@ void Orders::stop() {
   try {
     services_.audit.add({.event = store::AuditEvent::kStop});
   } catch (const std::exception& error) {
-    spdlog::error("the audit trail lacks the entry of this stop: {}", error.what());
+    log_error("the audit trail lacks the entry of this stop: {}", error.what());
   }
 }
 
@@ -225,7 +223,7 @@ void Orders::work(const std::stop_token& stop) {
         sleep = std::clamp(wait, milliseconds(1), kLongestSleep);
       }
     } catch (const std::exception& error) {
-      spdlog::error("orders could not be processed and are retried: {}", error.what());
+      log_error("orders could not be processed and are retried: {}", error.what());
       is_in_trouble = true;  // such as a database that cannot be written: not at once again
     }
     Lock lock(mutex_);
@@ -298,7 +296,7 @@ void Orders::fail_step(store::OrderRecord& record, const Error& error, bool may_
   services_.orders.save(record, next);
   log(record, std::string(describe(error.code()).name));
   if (error.code() == ErrorCode::kInternal) {
-    spdlog::error("a step of order {} failed and is retried: {}", order.id, error.what());
+    log_error("a step of order {} failed and is retried: {}", order.id, error.what());
   }
   changed();
 }

@@ -3,11 +3,11 @@
 #include <algorithm>
 
 #include <fcntl.h>
-#include <spdlog/spdlog.h>
 
 #include "base/clock.h"
 #include "base/descriptor.h"
 #include "base/ids.h"
+#include "base/log.h"
 #include "server/orders/orders.h"
 
 namespace isomesh::orders {
@@ -142,7 +142,7 @@ void Orders::receive(const std::stop_token& stop) {
         }
       }
     } catch (const std::exception& error) {
-      spdlog::error("received series could not be processed and are retried: {}", error.what());
+      log_error("received series could not be processed and are retried: {}", error.what());
     }
     Lock lock(mutex_);
     changed_.wait_for(lock, stop, kPause, [] { return false; });

@@ -3,8 +3,7 @@
 #include <ctime>
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
+#include "base/log.h"
 #include "server/orders/orders.h"
 
 namespace isomesh::orders {
@@ -67,9 +66,9 @@ void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
     note_failure(*rule.watch, failure, "");
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kCancelled)
-      spdlog::error("the watch of rule {} failed and is retried: {}", rule.name, error.what());
+      log_error("the watch of rule {} failed and is retried: {}", rule.name, error.what());
   } catch (const std::exception& error) {
-    spdlog::error("the watch of rule {} failed and is retried: {}", rule.name, error.what());
+    log_error("the watch of rule {} failed and is retried: {}", rule.name, error.what());
   }
 }
 
@@ -87,7 +86,7 @@ void Orders::watch(const std::stop_token& stop) {
         services_.received.forget(now - options_.keep);
       }
     } catch (const std::exception& error) {
-      spdlog::error("ended orders could not be removed and are retried: {}", error.what());
+      log_error("ended orders could not be removed and are retried: {}", error.what());
     }
     Lock lock(mutex_);
     changed_.wait_for(lock, stop, hospital_.poll, [] { return false; });

@@ -2,8 +2,7 @@
 
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
+#include "base/log.h"
 #include "proto/error.h"
 #include "server/process/fork_server.h"
 
@@ -59,7 +58,7 @@ void PreparedProcesses::keep(const std::stop_token& stop) {
       prepare_one(stop);
     } catch (const std::exception& error) {
       if (stop.stop_requested()) break;
-      spdlog::error("a process could not be prepared and is retried: {}", error.what());
+      log_error("a process could not be prepared and is retried: {}", error.what());
       server_.reset();
       const Lock lock(mutex_);
       ++failures_;
@@ -95,7 +94,7 @@ Child PreparedProcesses::copy(std::uint64_t generation, const std::stop_token& s
       return copy_of(*server_, stop);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::kInternal) throw;
-      spdlog::warn("{} It is restarted.", error.what());
+      log_warning("{} It is restarted.", error.what());
     }
   }
   server_ = start_program(program_);

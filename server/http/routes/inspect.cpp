@@ -90,11 +90,11 @@ void labels(App& app, const Request& request, Response& response) {
   check_known(request, {"background"});
   const Volume volume = app.services.volumes.get(viewer_of(request), request.path_parameter("id"));
   const std::int64_t background = whole_number_of(request, "background", 0);
-  auto json = app.services.labels.json_of(viewer_of(request), volume, background);
-  if (is_known(request, response, etag_of(*json), kAskEachTime)) return;
-  const std::size_t length = json->size();
+  auto list = app.services.labels.json_of(viewer_of(request), volume, background);
+  if (is_known(request, response, etag_of(*list), kAskEachTime)) return;
+  const std::size_t length = list->size();
   response.status = 200;
-  response.stream = {.source = text_source(std::move(json)),
+  response.stream = {.source = text_source(std::move(list)),
                      .media_type = "application/json",
                      .framing = Framing::kLength,
                      .length = length};

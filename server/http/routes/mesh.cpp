@@ -6,8 +6,7 @@
 #include <set>
 #include <vector>
 
-#include <spdlog/spdlog.h>
-
+#include "base/log.h"
 #include "base/sha256.h"
 #include "proto/json.h"
 #include "server/codec/encode.h"
@@ -158,7 +157,7 @@ Stored stored_mesh(const MeshSummary& mesh, const WhichMesh& which) {
 // Has a damaged file made again, and says what becomes of that.
 void check_intact(const App& app, const Job& job, const Stored& file) {
   if (store::is_there_and_intact(app.services.blobs, file.blob, {})) return;
-  spdlog::error("the stored mesh of job {} is damaged", job.id);
+  log_error("the stored mesh of job {} is damaged", job.id);
   const Job again = app.services.jobs.remake(job.id);
   if (again.error) throw to_error(*again.error);
   throw Error(ErrorCode::kUnavailable, "the stored mesh was damaged and is being made again");

@@ -4,8 +4,6 @@
 #include <filesystem>
 #include <new>
 
-#include <spdlog/spdlog.h>
-
 #include "base/log.h"
 #include "base/sha256.h"
 #include "base/text.h"
@@ -97,15 +95,15 @@ std::optional<Continuation> guarded(const Request& request, Response& response,
     return run();
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kInternal) {
-      spdlog::error("{} {} failed: {}", request.method, request.path, error.what());
+      log_error("{} {} failed: {}", request.method, request.path, error.what());
     }
     answer_problem(request, response, error);
   } catch (const std::bad_alloc&) {
-    spdlog::error("{} {} failed: out of memory", request.method, request.path);
+    log_error("{} {} failed: out of memory", request.method, request.path);
     answer_problem(request, response,
                    Error(ErrorCode::kUnavailable, "the service is out of memory at the moment"));
   } catch (const std::exception& error) {
-    spdlog::error("{} {} failed: {}", request.method, request.path, error.what());
+    log_error("{} {} failed: {}", request.method, request.path, error.what());
     answer_problem(request, response, Error(ErrorCode::kInternal, error.what()));
   }
   return std::nullopt;

@@ -16,7 +16,7 @@
 namespace isomesh::import {
 namespace {
 
-constexpr std::size_t kPieceBytes = std::size_t{1} << 20;
+constexpr std::size_t kBytesAtOnce = std::size_t{1} << 20;
 constexpr std::size_t kLongestHead = 64 * 1024;  // of a part
 constexpr std::size_t kLongestBoundary = 70;
 
@@ -36,7 +36,7 @@ class Window {
   bool more() {
     buffer_.erase(0, begin_);
     begin_ = 0;
-    const std::string next = file_.text(at_, kPieceBytes);
+    const std::string next = file_.text(at_, kBytesAtOnce);
     at_ += next.size();
     buffer_ += next;
     return !next.empty();

@@ -6,10 +6,10 @@
 #include <utility>
 
 #include <fcntl.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include "base/descriptor.h"
+#include "base/log.h"
 #include "proto/error.h"
 
 namespace isomesh::store {
@@ -55,7 +55,7 @@ bool Reserve::let_go() {
   std::error_code error;
   std::filesystem::remove(file_, error);
   is_whole_ = false;
-  spdlog::warn(
+  log_warning(
       "the disk is full: its reserve was released, and nothing new starts until the reserve is "
       "back");
   return !error;

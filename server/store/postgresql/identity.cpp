@@ -1,8 +1,7 @@
 #include "server/store/postgresql/identity.h"
 
-#include <spdlog/spdlog.h>
-
 #include "base/ids.h"
+#include "base/log.h"
 #include "proto/error.h"
 #include "server/store/microseconds.h"
 
@@ -81,13 +80,13 @@ Time Identity::now() {
   const bool was_doubted = clock_.is_doubted();
   const Time believed = clock_.now();
   if (clock_.is_doubted() && !was_doubted) {
-    spdlog::warn("the database's clock is far ahead; until it is right, nothing expires");
+    log_warning("the database's clock is far ahead; until it is right, nothing expires");
   }
   const std::int64_t us = store::to_us(believed);
   try {
     database_.run("UPDATE identity SET seen = $1::bigint WHERE seen < $1::bigint", us);
   } catch (const Error& error) {
-    spdlog::warn("the time could not be recorded and is retried: {}", error.what());
+    log_warning("the time could not be recorded and is retried: {}", error.what());
   }
   return database_.from_us(us);
 }

@@ -4,9 +4,8 @@
 
 #include <algorithm>
 
-#include <spdlog/spdlog.h>
-
 #include "base/clock.h"
+#include "base/log.h"
 #include "proto/json.h"
 #include "server/store/job_rules.h"
 #include "server/store/microseconds.h"
@@ -55,7 +54,7 @@ void PostgresJobStore::hear(const News& news) {
   try {
     feed_.fetch();
   } catch (const Error& error) {
-    spdlog::debug("job events could not be read and are retried: {}", error.what());
+    log_debug("job events could not be read and are retried: {}", error.what());
   }
 }
 

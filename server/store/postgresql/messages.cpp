@@ -8,10 +8,10 @@
 #include <utility>
 
 #include <poll.h>
-#include <spdlog/spdlog.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include "base/log.h"
 #include "proto/error.h"
 
 namespace isomesh::store::postgresql {
@@ -85,8 +85,8 @@ void Messages::run(const std::stop_token& stop) {
       is_told = false;
     } catch (const Error& error) {
       if (!is_told)
-        spdlog::warn("messages of other daemons cannot be received and are retried: {}",
-                     error.what());
+        log_warning("messages of other daemons cannot be received and are retried: {}",
+                    error.what());
       is_told = true;
       hear_({.has_work = true, .has_events = true, .cancelled = {}});
       std::uint64_t count = 0;

@@ -4,9 +4,8 @@
 #include <thread>
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
 #include "base/ids.h"
+#include "base/log.h"
 #include "proto/error.h"
 #include "server/store/s3/objects.h"
 
@@ -176,7 +175,7 @@ bool S3BlobStore::fetch(const std::string& key, const std::stop_token& stop) con
   }
   if (!bytes) throw Error(ErrorCode::kNotFound, "the file does not exist");
   if (fetch_once(key, *bytes, stop) || fetch_once(key, *bytes, stop)) return true;
-  spdlog::error("the storage has wrong bytes for the file {}", key);
+  log_error("the storage has wrong bytes for the file {}", key);
   const Lock lock(mutex_);
   damaged_.insert(key);
   return false;

@@ -2,8 +2,7 @@
 #include <algorithm>
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
+#include "base/log.h"
 #include "proto/error.h"
 #include "server/store/s3/blob_store.h"
 #include "server/store/s3/objects.h"

@@ -5,11 +5,10 @@
 #include <thread>
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
 #include "base/clock.h"
 #include "base/hex.h"
 #include "base/ids.h"
+#include "base/log.h"
 #include "base/sha256.h"
 #include "base/text.h"
 #include "proto/error.h"
@@ -84,8 +83,8 @@ S3Answer S3Client::ask(const S3Request& request, const std::stop_token& stop) co
     const bool is_told = answer.status == kS3NotFound || answer.status == kS3PreconditionFailed ||
                          answer.status == kS3NotImplemented;
     if (answer.status / 100 == 2 || is_told) return answer;
-    spdlog::error("the storage rejected a request with status {} {}", answer.status,
-                  s3_error_code(answer.text));
+    log_error("the storage rejected a request with status {} {}", answer.status,
+              s3_error_code(answer.text));
     if (answer.status == kS3Forbidden) {
       throw Error(
           ErrorCode::kUnavailable,
@@ -181,7 +180,7 @@ void S3Client::put_in_parts(const std::string& key, const File& file, const Blob
     try {
       connections_.attempt({.method = "DELETE", .key = key, .query = upload}, {});
     } catch (const Error&) {
-      spdlog::debug("an incomplete multipart upload is left to the storage's own rules");
+      log_debug("an incomplete multipart upload is left to the storage's own rules");
     }
     throw;
   }
@@ -254,7 +253,7 @@ void S3Client::try_to_erase(const std::string& key) const {
   try {
     connections_.attempt({.method = "DELETE", .key = key, .is_quick = true}, {});
   } catch (const Error& error) {
-    spdlog::debug("an object could not be erased and is left in the storage: {}", error.what());
+    log_debug("an object could not be erased and is left in the storage: {}", error.what());
   }
 }
 

@@ -5,9 +5,8 @@
 #include <exception>
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
 #include "base/error.h"
+#include "base/log.h"
 #include "base/sha256.h"
 #include "base/text.h"
 
@@ -24,7 +23,7 @@ S3Credentials credentials_now(const std::filesystem::path& file) {
   try {
     return read_s3_credentials(file);
   } catch (const Error& error) {
-    spdlog::error("the keys of --blob-credentials cannot be read again: {}", error.what());
+    log_error("the keys of --blob-credentials cannot be read again: {}", error.what());
     throw Error(ErrorCode::kUnavailable,
                 "the storage of volumes and meshes cannot be reached now; nothing is lost");
   }
@@ -47,7 +46,7 @@ class Attempt {
     if (result == CURLE_OK) {
       curl_easy_getinfo(easy_, CURLINFO_RESPONSE_CODE, &answer_.status);
     } else {
-      spdlog::debug("the storage: {}", curl_easy_strerror(result));
+      log_debug("the storage: {}", curl_easy_strerror(result));
       answer_.status = 0;
     }
     return std::move(answer_);

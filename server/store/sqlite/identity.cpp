@@ -5,9 +5,8 @@
 #include <chrono>
 #include <string_view>
 
-#include <spdlog/spdlog.h>
-
 #include "base/ids.h"
+#include "base/log.h"
 #include "proto/error.h"
 
 namespace isomesh::store {
@@ -56,7 +55,7 @@ Identity::Identity(Database& database, const BlobStore& blobs, const OperatorsWo
   mark_.number = std::max(mark_.number, theirs.id == mark_.id ? theirs.number : 0);
   write_mark(clock_.now());
   if (clock_.is_doubted()) {
-    spdlog::warn(
+    log_warning(
         "the clock is far ahead of the newest record: until it is right, nothing expires. If the "
         "service was off for that long, start once with --trust-clock");
   }
@@ -66,7 +65,7 @@ Time Identity::now() {
   const bool was_doubted = clock_.is_doubted();
   const Time time = clock_.now();
   if (clock_.is_doubted() && !was_doubted) {
-    spdlog::warn("the clock was set far ahead: until it is right, nothing expires");
+    log_warning("the clock was set far ahead: until it is right, nothing expires");
   }
   const Lock lock(mutex_);
   try {
@@ -74,8 +73,8 @@ Time Identity::now() {
     const bool is_changed = database_.changes() != changes_;
     if (is_changed || time - from_us(mark_.seen) > kBetweenIdleMarks) write_mark(time);
   } catch (const Error& error) {
-    spdlog::warn("the time of the newest record could not be saved and is retried: {}",
-                 error.what());
+    log_warning("the time of the newest record could not be saved and is retried: {}",
+                error.what());
   }
   return time;
 }

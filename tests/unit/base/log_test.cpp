@@ -7,7 +7,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <spdlog/spdlog.h>
 
 namespace isomesh::http {
 namespace {
@@ -53,7 +52,7 @@ TEST_F(LogTest, ALineOfJsonIsOneObject) {
 TEST_F(LogTest, NoValueBreaksOutOfItsPlace) {
   const auto write = [&] {
     LogLine("event").add("name", hostile_).add("next", 1);
-    spdlog::error("said {}", hostile_);
+    log_error("said {}", hostile_);
   };
   const std::string text = logged(LogFormat::kText, LogLevel::kInfo, write);
   EXPECT_EQ(std::ranges::count(text, '\n'), 2);
@@ -69,9 +68,24 @@ TEST_F(LogTest, NoValueBreaksOutOfItsPlace) {
               testing::StartsWith("said a\"b=c\nd\r"));
 }
 
+TEST_F(LogTest, AMessageTakesItsValuesInTheirOrder) {
+  const std::string text = logged(LogFormat::kText, LogLevel::kInfo, [] {
+    log_warning("{} of {} {} are late", 3, std::uint64_t{18446744073709551615U},
+                std::string("trains {}"));
+    log_info("no place", "for a value");
+    log_info("{} {}", -1);
+  });
+  EXPECT_THAT(text,
+              HasSubstr("warning message text=\"3 of 18446744073709551615 trains {} are late\""));
+  EXPECT_THAT(text, HasSubstr("info message text=\"no place\""));
+  EXPECT_THAT(text, HasSubstr("text=\"-1 {}\""));
+}
+
 TEST_F(LogTest, WhatIsBelowTheLevelIsNotWritten) {
   EXPECT_EQ(logged(LogFormat::kText, LogLevel::kWarn, [] { LogLine("request").add("a", 1); }), "");
-  EXPECT_EQ(logged(LogFormat::kText, LogLevel::kOff, [] { spdlog::critical("end"); }), "");
+  EXPECT_EQ(
+      logged(LogFormat::kText, LogLevel::kOff, [] { log_message(LogLevel::kCritical, "end", {}); }),
+      "");
 }
 
 }  // namespace

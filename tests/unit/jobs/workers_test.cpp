@@ -7,9 +7,9 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <spdlog/spdlog.h>
 #include <sys/resource.h>
 
+#include "base/log.h"
 #include "server/mesh/parallel.h"
 #include "tests/support/jobs.h"
 #include "tests/support/process.h"
@@ -107,7 +107,7 @@ TEST_F(WorkersTest, AJobThatFindsNoDescriptorIsPutBackUncharged) {
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
   const rlimit none = {3, before.rlim_max};
   // What the sanitizer has not seen yet it looks at by a descriptor: so the log has been used.
-  spdlog::info("no descriptors from now on");
+  log_info("no descriptors from now on");
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
   const Workers workers(threads(1), jobs_, volumes_, blobs_);
   const bool is_put_back = eventually([&] {

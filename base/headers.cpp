@@ -1,0 +1,1 @@
+// The precompiled headers of most libraries belong to this source.

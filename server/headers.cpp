@@ -1,1 +1,0 @@
-// The precompiled header of most libraries belongs to this source.
