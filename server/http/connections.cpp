@@ -1,6 +1,11 @@
 #include "server/http/connections.h"
 
+#include <algorithm>
+#include <chrono>
+#include <string_view>
 #include <utility>
+
+#include <poll.h>
 
 #include "base/niceness.h"
 #include "server/http/library.h"
@@ -30,6 +35,18 @@ struct Connections::Exchange {
         body(connection, limits, stopping),
         request(request_of(connection)) {}
 
+  // Whether nobody is there any more who would read the answer, which changes nothing and has had
+  // to wait. A client may end its own sending and still read, so one that has not waited is
+  // answered.
+  bool is_abandoned(std::chrono::milliseconds patience) const {
+    const bool only_reads = request.method == "GET" || request.method == "HEAD";
+    if (!only_reads || std::chrono::steady_clock::now() - arrived < patience) return false;
+    pollfd connection = {body.descriptor(), POLLRDHUP, 0};
+    return ::poll(&connection, 1, 0) == 1 &&
+           (connection.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0;
+  }
+
+  const std::chrono::steady_clock::time_point arrived = std::chrono::steady_clock::now();
   std::string party;
   net::IncomingBody body;
   Request request;
@@ -47,6 +64,7 @@ void Connections::open(int listening) {
   sender_.emplace(options_.sender);
   computing_.emplace(options_.computing_threads, options_.backlog, kComputingNiceness);
   tasks_.emplace(options_.threads, options_.backlog);
+  probes_.emplace(1, options_.backlog);
   parked_.emplace(handlers_.has_ended);
   acceptor_.emplace(
       listening, options_.acceptor, places_, options_.stream_of,
@@ -69,6 +87,7 @@ void Connections::close(std::chrono::milliseconds patience) {
   if (acceptor_) acceptor_->stop();
   if (parked_) parked_->close();
   if (tasks_) tasks_->shutdown();
+  if (probes_) probes_->shutdown();
   if (computing_) computing_->shutdown();
   if (sender_) sender_->stop(patience);
 }
@@ -87,13 +106,26 @@ void Connections::refuse_one_of_many(Exchange& exchange) {
 }
 
 void Connections::enqueue(const std::shared_ptr<Exchange>& exchange, const Answer& answer) {
-  if (tasks_->try_enqueue(exchange->party, [this, exchange, answer] { serve(exchange, answer); })) {
+  const bool is_for_probes = is_probe(exchange->request);
+  if (!is_for_probes && sender_->held_bytes() > options_.most_answer_bytes) {
+    return refuse(exchange->body.take_stream(), exchange->request.remote_address,
+                  {ErrorCode::kUnavailable, "too many answers are on their way to slow receivers"});
+  }
+  net::BoundedTaskQueue& queue = is_for_probes ? *probes_ : *tasks_;
+  if (queue.try_enqueue(exchange->party, [this, exchange, answer] { serve(exchange, answer); })) {
     return;
   }
   refuse_one_of_many(*exchange);
 }
 
+bool Connections::is_probe(const Request& request) const {
+  const std::string_view path =
+      std::string_view(request.target).substr(0, request.target.find('?'));
+  return std::ranges::find(options_.probes, path) != options_.probes.end();
+}
+
 void Connections::serve(const std::shared_ptr<Exchange>& exchange, const Answer& answer) {
+  if (exchange->is_abandoned(options_.client_patience)) return;
   std::optional<Continuation> continuation;
   WrittenResponse written =
       pass_through_library(exchange->request, exchange->body, exchange->response,

@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/http/request.h"
 #include "server/http/response.h"
@@ -31,6 +32,14 @@ struct ConnectionOptions {
   // Of those that are computed (Continuation::computing_for), how many at once; as many as the
   // others may wait.
   std::size_t computing_threads = 12;
+  // Of answers that are on their way to slow receivers: with more, requests are refused until they
+  // have gone.
+  std::size_t most_answer_bytes = std::size_t{256} << 20;
+  // Paths that orchestrators ask whether the service lives. They have a thread of their own, which
+  // waits for no other request.
+  std::vector<std::string> probes = {};
+  // A client that ends its own sending is waited with for so long; then it is taken for gone.
+  std::chrono::milliseconds client_patience{1'000};
   net::AcceptorLimits acceptor;
   net::BodyLimits body;
   net::SenderLimits sender;
@@ -89,6 +98,7 @@ class Connections {
   void refuse(std::unique_ptr<net::ByteStream> stream, const std::string& address,
               const Error& error);
   void refuse_one_of_many(Exchange& exchange);
+  bool is_probe(const Request& request) const;
   void enqueue(const std::shared_ptr<Exchange>& exchange, const Answer& answer);
   void serve(const std::shared_ptr<Exchange>& exchange, const Answer& answer);
   void park(const std::shared_ptr<Exchange>& exchange, const Continuation& continuation);
@@ -105,6 +115,7 @@ class Connections {
   std::optional<net::Parked> parked_;
   std::optional<net::BoundedTaskQueue> computing_;
   std::optional<net::BoundedTaskQueue> tasks_;
+  std::optional<net::BoundedTaskQueue> probes_;
   std::optional<net::Acceptor> acceptor_;
 };
 

@@ -74,6 +74,7 @@ void Sender::send(Response response, bool request_is_whole) {
   {
     const Lock lock(mutex_);
     if (end_ != Clock::time_point::max()) return;  // its stream is closed
+    held_bytes_ += response.bytes.size();
     arrived_.push_back(std::move(response));
     ++count_;
   }
@@ -117,6 +118,7 @@ void Sender::work() {
   sending_.clear();
   parting_.clear();
   count_ = 0;
+  held_bytes_ = 0;
 }
 
 void Sender::serve_event(const epoll_event& event) {
@@ -150,6 +152,7 @@ void Sender::begin(Response response) {
   const auto sending = sending_.emplace(sending_.end());
   sending->id = ++last_id_;
   sending->response = std::move(response);
+  sending->held = sending->response.bytes.size();
   sending->deadline = Clock::now() + limits_.patience;
   by_id_.emplace(sending->id, sending);
   if (sending->response.is_refusal) part(*sending);
@@ -213,13 +216,20 @@ bool Sender::send_some(Sending& sending) {
 // closed.
 bool Sender::refill(Sending& sending) {
   Response& response = sending.response;
-  response.bytes.clear();
+  let_go(sending);
   sending.sent = 0;
   sending.waits_for_source = false;
   if (!response.source) return go_on_with(sending, Source::More::kEnd);
   sending.events = response.source->ends_with_reader() ? EPOLLRDHUP : 0U;
   if (response.source->computes()) return have_computed(sending);
   return go_on_with(sending, next_of(*response.source, response.bytes));
+}
+
+// A response that came whole gives its memory back, though its connection may linger.
+void Sender::let_go(Sending& sending) {
+  held_bytes_ -= std::exchange(sending.held, 0);
+  sending.response.bytes.clear();
+  if (!sending.response.source) sending.response.bytes.shrink_to_fit();
 }
 
 // What the source has said, which may have made bytes. False as above.
@@ -317,6 +327,7 @@ bool Sender::watch(Sending& sending) {
 // Closing the descriptor takes it out of epoll.
 void Sender::close(SendingList::iterator sending) {
   by_id_.erase(sending->id);
+  let_go(*sending);
   (sending->is_parting ? parting_ : sending_).erase(sending);
   --count_;
 }

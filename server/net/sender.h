@@ -90,6 +90,9 @@ class Sender {
   // Responses that the sender's thread is busy with.
   std::size_t sending() const { return count_; }
 
+  // The memory that those hold, without what sources make on the way.
+  std::size_t held_bytes() const { return held_bytes_; }
+
   // Ends when all is sent, or after `patience`; sources that have nothing are cut off. Nothing is
   // taken any more.
   void stop(std::chrono::milliseconds patience) ISOMESH_EXCLUDES(mutex_);
@@ -102,6 +105,7 @@ class Sender {
     std::uint64_t id = 0;  // to epoll and to the computing threads
     Response response;
     std::size_t sent = 0;  // of response.bytes
+    std::size_t held = 0;  // of response.bytes as they came, until all are sent
     Phase phase = Phase::kSending;
     bool waits_for_source = false;
     bool is_computed = false;        // its source is with a computing thread
@@ -133,6 +137,7 @@ class Sender {
   void close_overdue();
   bool send_some(Sending& sending);
   bool refill(Sending& sending);
+  void let_go(Sending& sending);
   bool go_on_with(Sending& sending, Source::More more);
   bool have_computed(Sending& sending);
   void part(Sending& sending);
@@ -144,6 +149,7 @@ class Sender {
   const int epoll_;
   Wakeup wakeup_;
   std::atomic<std::size_t> count_ = 0;
+  std::atomic<std::size_t> held_bytes_ = 0;
   Mutex mutex_;
   std::vector<Response> arrived_ ISOMESH_GUARDED_BY(mutex_);
   std::vector<Computed> computed_ ISOMESH_GUARDED_BY(mutex_);

@@ -20,6 +20,7 @@ ConnectionOptions connection_options(const ServerOptions& options) {
   connections.connections = options.connections;
   connections.threads = options.threads;
   connections.backlog = options.backlog;
+  connections.probes = {"/livez", "/readyz"};
   connections.acceptor.head_time = options.request_time;
   if (const net::TlsFiles* tls = options.tls) {
     connections.stream_of = [tls](int socket) { return tls->accept(socket); };
@@ -57,6 +58,17 @@ bool has_ended(const Services& services, const std::string& id) {
   }
 }
 
+// Why the service takes no work at the moment.
+std::string unready_reason(const Services& services) {
+  if (!services.jobs.answers()) return "the database does not respond";
+  if (services.jobs.is_full()) return "the queue is full";
+  if (!services.blobs.answers()) return "the storage of volumes and meshes does not respond";
+  if (!services.blobs.has_room()) return "the disk is full: nothing new is accepted";
+  if (services.jobs.depth(std::nullopt).waiting_for_disk > 0)
+    return "jobs are waiting for disk space";
+  return "";
+}
+
 // Browsers let pages of other origins send plain text without asking the server first, but not what
 // is declared as JSON.
 void check_is_json(const Request& request) {
@@ -76,6 +88,7 @@ App::App(const Services& the_services, const ServerOptions& the_options)
       rules{.cors_origins = the_options.cors_origins,
             .check_host = false,
             .hosts = the_options.hosts},
+      readiness([&used = services] { return unready_reason(used); }),
       connections(
           connection_options(the_options),
           {.answer = [this](Request& request,

@@ -18,6 +18,7 @@
 #include "server/http/guards/access.h"
 #include "server/http/guards/origin.h"
 #include "server/http/kept_uploads.h"
+#include "server/http/observe/readiness.h"
 #include "server/http/request_values.h"
 #include "server/http/response.h"
 #include "server/http/router.h"
@@ -44,6 +45,7 @@ struct App {
   std::atomic<bool> draining = false;  // running jobs are finished, others are not accepted
   std::atomic<bool> stopping = false;  // nobody is waited for any more
   Router router;
+  Readiness readiness;
   Connections connections;
 };
 

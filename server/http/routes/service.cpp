@@ -12,19 +12,8 @@ void add_service_routes(App& app) {
           [](const auto& /*request*/, auto& response) { response.set_body("ok\n", "text/plain"); });
   add_get(app, "/readyz", [&app](const auto& /*request*/, auto& response) {
     if (app.draining) throw Error(ErrorCode::kUnavailable, "the service is shutting down");
-    if (!app.services.jobs.answers()) {
-      throw Error(ErrorCode::kUnavailable, "the database does not respond");
-    }
-    if (app.services.jobs.is_full()) throw Error(ErrorCode::kUnavailable, "the queue is full");
-    if (!app.services.blobs.answers()) {
-      throw Error(ErrorCode::kUnavailable, "the storage of volumes and meshes does not respond");
-    }
-    if (!app.services.blobs.has_room()) {
-      throw Error(ErrorCode::kUnavailable, "the disk is full: nothing new is accepted");
-    }
-    if (app.services.jobs.depth(std::nullopt).waiting_for_disk > 0) {
-      throw Error(ErrorCode::kUnavailable, "jobs are waiting for disk space");
-    }
+    const std::string reason = app.readiness.reason();
+    if (!reason.empty()) throw Error(ErrorCode::kUnavailable, reason);
     response.set_body("ok\n", "text/plain");
   });
   add_get(app, "/version", [&app](const auto& request, auto& response) {

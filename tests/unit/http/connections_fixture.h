@@ -137,6 +137,13 @@ class ConnectionsTest : public testing::Test {
       response.stream = {std::make_unique<Words>(said_), "text/plain",
                          Framing::kUntilConnectionEnds, 0};
     });
+    add("GET", "/large", [](const Request&, Response& response) {
+      response.set_body(std::string(std::size_t{12} << 20, 'x'), "text/plain");
+    });
+    add("POST", "/do", [this](const Request&, Response& response) {
+      ++runs_;
+      response.set_body("done", "text/plain");
+    });
     add("GET", "/flood", [this](const Request&, Response& response) {
       response.stream = {std::make_unique<Flood>(made_), "text/plain", Framing::kLength,
                          std::uint64_t{1} << 40};
