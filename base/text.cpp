@@ -19,6 +19,23 @@ std::optional<Number> parse(std::string_view text) {
   return value;
 }
 
+// The length in UTF-8 of the control character or noncharacter that the text begins with; 0: of
+// neither.
+std::size_t unseen_bytes(std::string_view text) {
+  const auto byte = [&](std::size_t at) -> unsigned {
+    return at < text.size() ? static_cast<unsigned char>(text[at]) : 0;
+  };
+  if (byte(0) < 0x20 || byte(0) == 0x7F) return 1;
+  if (byte(0) == 0xC2 && byte(1) >= 0x80 && byte(1) < 0xA0) return 2;  // U+0080 to U+009F
+  if (byte(0) == 0xEF && byte(1) == 0xB7 && byte(2) >= 0x90 && byte(2) < 0xB0)
+    return 3;  // U+FDD0 to U+FDEF
+  // The last two of every plane: U+FFFE, U+FFFF, U+1FFFE, ...
+  if (byte(0) == 0xEF && byte(1) == 0xBF && byte(2) >= 0xBE) return 3;
+  const bool ends_a_plane =
+      byte(0) >= 0xF0 && (byte(1) & 0xCFU) == 0x8F && byte(2) == 0xBF && byte(3) >= 0xBE;
+  return ends_a_plane ? 4 : 0;
+}
+
 }  // namespace
 
 std::string_view trimmed(std::string_view text) {
@@ -36,19 +53,22 @@ std::string lower(std::string_view text) {
 }
 
 bool has_control_characters(std::string_view text) {
-  return std::any_of(text.begin(), text.end(), [](char letter) {
-    return (static_cast<unsigned char>(letter) < ' ' && letter != '\t') || letter == '\x7f';
-  });
+  for (; !text.empty(); text.remove_prefix(1)) {
+    if (text.front() != '\t' && unseen_bytes(text) > 0) return true;
+  }
+  return false;
 }
 
 std::string printable(std::string_view text) {
   std::string result;
-  for (const char letter : text) {
-    if (static_cast<unsigned char>(letter) < ' ' || letter == '\x7f') {
+  while (!text.empty()) {
+    const std::size_t unseen = unseen_bytes(text);
+    if (unseen > 0) {
       result += "\xef\xbf\xbd";
     } else {
-      result += letter;
+      result += text.front();
     }
+    text.remove_prefix(std::max<std::size_t>(unseen, 1));
   }
   return result;
 }

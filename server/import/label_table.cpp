@@ -8,6 +8,7 @@
 #include "base/hex.h"
 #include "base/text.h"
 #include "server/import/names.h"
+#include "server/volume/names.h"
 
 namespace isomesh::import {
 namespace {
@@ -41,7 +42,8 @@ void check_size(const std::vector<LabelEntry>& entries) {
 std::string label_name(std::string_view text) {
   // More than the bytes that can remain, before others are replaced by longer ones.
   const std::string_view first = beginning(trimmed(text), LabelEntry::kMostNameBytes);
-  return std::string(beginning(printable(valid_utf8(first)), LabelEntry::kMostNameBytes));
+  const std::string name = volume::normalized(printable(valid_utf8(first)));
+  return std::string(beginning(name, LabelEntry::kMostNameBytes));
 }
 
 std::optional<std::string> label_color(const std::array<double, 3>& parts) {

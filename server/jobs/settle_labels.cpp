@@ -4,6 +4,7 @@
 #include <string>
 
 #include "server/mesh/labels.h"
+#include "server/volume/names.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -35,6 +36,7 @@ JobParameters settle_labels(JobParameters parameters, const store::Viewer& viewe
   for (const auto& [label, values] : values_of(volume)) {
     parameters.label_values.try_emplace(label, values);
   }
+  for (auto& [label, name] : parameters.label_names) name = volume::normalized(name);
   const auto counts = lists.counts(viewer, volume);
   const auto chosen = mesh::chosen_labels(*counts, parameters);
   std::vector<std::int64_t> labels;

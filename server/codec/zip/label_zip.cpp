@@ -35,7 +35,7 @@ class FileNames {
     }
     name.resize(beginning(name, kMostBytes).size());
     while (!name.empty() && (name.back() == '.' || name.back() == ' ')) name.pop_back();
-    if (name.starts_with('.') || name.empty()) name.insert(name.begin(), '_');
+    if (name.starts_with('.') || name.empty() || is_device(name)) name.insert(name.begin(), '_');
     const std::string title = name;
     for (int more = 0; !taken_.insert(lowered(name)).second; ++more) {
       name =
@@ -48,6 +48,14 @@ class FileNames {
   // So that no file's name, with its suffix and what tells it from others, is too long for a
   // system.
   static constexpr std::size_t kMostBytes = 200;
+
+  // Whether Windows takes it for a device, whatever follows a dot.
+  static bool is_device(const std::string& name) {
+    const std::string stem = lowered(name.substr(0, name.find('.')));
+    const bool is_numbered = (stem.starts_with("com") || stem.starts_with("lpt")) &&
+                             stem.size() == 4 && stem[3] >= '1' && stem[3] <= '9';
+    return is_numbered || stem == "con" || stem == "prn" || stem == "aux" || stem == "nul";
+  }
 
   static std::string lowered(std::string name) {
     for (char& c : name) {

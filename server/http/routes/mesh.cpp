@@ -8,6 +8,7 @@
 
 #include "base/log.h"
 #include "base/sha256.h"
+#include "proto/fields.h"
 #include "proto/json.h"
 #include "server/codec/encode.h"
 #include "server/http/answers/sources.h"
@@ -23,15 +24,12 @@ constexpr std::chrono::hours kLongestJob{24};
 
 std::string server_timing(const Timing& timing) {
   std::string text;
-  for (const auto& [name, milliseconds] :
-       {std::pair{"queue", timing.queue}, std::pair{"load", timing.load},
-        std::pair{"extract", timing.extract}, std::pair{"smooth", timing.smooth},
-        std::pair{"encode", timing.encode}}) {
+  visit(timing, [&](const char* name, double milliseconds) {
     std::array<char, 64> entry = {};
     std::snprintf(entry.data(), entry.size(), "%s%s;dur=%.3f", text.empty() ? "" : ", ", name,
                   milliseconds);
     text += entry.data();
-  }
+  });
   return text;
 }
 

@@ -4,6 +4,7 @@
 #include "server/http/request_values.h"
 #include "server/http/routes/routes.h"
 #include "server/http/routes/uploads.h"
+#include "server/volume/names.h"
 
 namespace isomesh::http {
 namespace {
@@ -147,7 +148,8 @@ void get(App& app, const Request& request, Response& response) {
 void rename(App& app, const Request& request, Response& response) {
   check_known(request, {});
   const std::string id = request.path_parameter("id");
-  const std::optional<std::string> name = parse_volume_name(json_body(app, request));
+  std::optional<std::string> name = parse_volume_name(json_body(app, request));
+  if (name) name = volume::normalized(*name);
   if (request.has_header("If-Match")) {
     check_if_match(request, etag_of(to_json(app.services.volumes.get(viewer_of(request), id))));
   }

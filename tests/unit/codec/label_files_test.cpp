@@ -112,6 +112,19 @@ TEST_F(LabelFilesTest, TitlesThatAreAlikeOrNoFileNamesMakeNoTwoFilesOne) {
                                              "same-3.stl"}));
 }
 
+TEST_F(LabelFilesTest, NoNameInAZipIsADeviceOfWindows) {
+  labels_[0].name = "con";
+  labels_[1].name = "LPT1.left";
+  labels_[2].name = "Aux";
+  labels_[3].name = "com10";
+  labels_[4].name = "console";
+  std::vector<std::string> names;
+  for (const auto& [name, bytes] : unzipped(zipped({MeshFormat::kStl}).bytes))
+    names.push_back(name);
+  EXPECT_THAT(names, testing::UnorderedElementsAre("_con.stl", "_LPT1.left.stl", "_Aux.stl",
+                                                   "com10.stl", "console.stl"));
+}
+
 TEST_F(LabelFilesTest, NamesInAZipAreNoLongerThanSystemsTake) {
   labels_[0].name = std::string(254, 'x');
   labels_[1].name = std::string(254, 'x') + 'y';

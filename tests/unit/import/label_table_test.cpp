@@ -20,6 +20,8 @@ TEST(LabelName, IsShortUtf8WithoutControlCharacters) {
             "a\xef\xbf\xbd"
             "b\xef\xbf\xbd");
   EXPECT_EQ(label_name("a\xff"), "a\xef\xbf\xbd");
+  EXPECT_EQ(label_name("a\ufffe\u0085"), "a\ufffd\ufffd");
+  EXPECT_EQ(label_name("Lo\u0308ffel"), "L\u00f6ffel");
   EXPECT_EQ(label_name(std::string(300, 'x')), std::string(255, 'x'));
   // Characters of two bytes are not cut in two, and what becomes longer is cut again.
   std::string umlauts;
