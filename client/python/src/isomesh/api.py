@@ -540,8 +540,10 @@ class MeshSummarySimplified(TypedDict):
     """Only for a job with max_error_mm or triangles."""
 
     triangles_before: int
-    #: What stopped the simplification: the error or the number of triangles.
-    bound_by: Literal['error', 'triangles']
+    #: What stopped the simplification: the error, the number of triangles, or, if there are more
+    #: than triangles, the topology. Fewer would open or fold the surface, or change its boundary,
+    #: junction curves or handles: a closed connected component has at least 4 triangles.
+    bound_by: Literal['error', 'triangles', 'topology']
 
 
 class MeshSummaryVolumeMm3(TypedDict):
