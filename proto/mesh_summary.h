@@ -135,10 +135,11 @@ struct MeshCertificate {
 
 // What simplification did.
 struct Simplification {
-  enum class Bound { kError, kTriangles };
+  enum class Bound { kError, kTriangles, kTopology };
 
   std::uint64_t triangles_before = 0;
-  // What kept it from going on: the error or the number of triangles that it was to reach.
+  // What kept it from going on: the error, the number of triangles that it was to reach, or, above
+  // that number, the surface itself: whatever goes, it would be of another kind.
   Bound bound_by = Bound::kError;
 
   bool operator==(const Simplification&) const = default;

@@ -277,7 +277,7 @@ void visit(Is<MeshParameters> auto& self, auto&& parameter) {
                                 "away. Smoothing may use half of it. Simplification then "
                                 "removes as many triangles as the rest allows, and Draco's "
                                 "coordinates get as many bits as that takes. The error is measured "
-                                "on the files' own bytes: see `certify`, which is switched on.",
+                                "on what the files hold: see `certify`, which is switched on.",
                         .unit = "mm",
                         .minimum = 0.001,
                         .maximum = 1000,

@@ -95,7 +95,8 @@ struct Names<WaitingFor> {
 template <>
 struct Names<Simplification::Bound> {
   static constexpr std::array kTable = {std::pair{Simplification::Bound::kError, "error"},
-                                        std::pair{Simplification::Bound::kTriangles, "triangles"}};
+                                        std::pair{Simplification::Bound::kTriangles, "triangles"},
+                                        std::pair{Simplification::Bound::kTopology, "topology"}};
 };
 
 template <class Enum>

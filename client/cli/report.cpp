@@ -84,13 +84,24 @@ std::string way_of(const DistanceSummary& distances) {
          " mm for 99 %, " + fixed(distances.mean_mm, 4) + " mm on average";
 }
 
+std::string bound_of(const Simplification& simplified) {
+  switch (simplified.bound_by) {
+    case Simplification::Bound::kError:
+      return "error";
+    case Simplification::Bound::kTriangles:
+      return "number of triangles";
+    case Simplification::Bound::kTopology:
+      break;
+  }
+  return "topology: fewer triangles would open or fold the surface, or change its boundary";
+}
+
 void tell_error(const MeshSummary& mesh, Rows& rows) {
   if (mesh.simplified) {
-    const bool is_error = mesh.simplified->bound_by == Simplification::Bound::kError;
     rows.push_back(
-        {"simplified",
-         "from " + grouped(static_cast<std::int64_t>(mesh.simplified->triangles_before)) +
-             " triangles, bound by the " + (is_error ? "error" : "number of triangles")});
+        {"simplified", "from " +
+                           grouped(static_cast<std::int64_t>(mesh.simplified->triangles_before)) +
+                           " triangles, bound by the " + bound_of(*mesh.simplified)});
   }
   if (!mesh.certificate) return;
   const MeshCertificate& certificate = *mesh.certificate;

@@ -210,6 +210,12 @@ constexpr std::array kFormats = {
 
 }  // namespace
 
+bool rounds(MeshFormat format, const MeshParameters& parameters) {
+  if (format != MeshFormat::kZip) return format == MeshFormat::kDrc || format == MeshFormat::kGlb;
+  return std::ranges::any_of(zipped_formats(parameters),
+                             [&](MeshFormat each) { return rounds(each, parameters); });
+}
+
 const Format& describe(MeshFormat format) {
   const auto found = std::ranges::find(kFormats, format, &Format::format);
   if (found == kFormats.end()) throw Error(ErrorCode::kInternal, "a format has no encoder");

@@ -120,6 +120,11 @@ struct Format {
   bool (*shows_topology)(const MeshParameters& parameters);
 };
 
+// Whether a job's file of that format rounds coordinates, or holds files that do: drc, glb, and a
+// ZIP of drc. All others hold the floats of the mesh, turned to the file's space, which rounds
+// nothing, and its triangles; of labels the triangles of each label's own surface.
+bool rounds(MeshFormat format, const MeshParameters& parameters);
+
 // The format's row in the one table of them; constant time.
 const Format& describe(MeshFormat format);
 

@@ -1,6 +1,6 @@
 #include "server/jobs/certify_stage.h"
 
-#include <algorithm>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -8,26 +8,28 @@
 #include "server/codec/decode/decode.h"
 #include "server/jobs/error_budget.h"
 #include "server/mesh/distance.h"
+#include "server/mesh/parallel.h"
 #include "server/mesh/self_intersections.h"
 
 namespace isomesh::jobs {
 namespace {
 
-// The files as a stranger decodes them, with their formats: those in a ZIP, format by format.
-std::vector<std::pair<MeshFormat, codec::DecodedSurface>> decoded(std::span<const std::byte> file,
-                                                                  MeshFormat format,
-                                                                  const MeshParameters& parameters,
-                                                                  const mesh::Context& context) {
+// What other programs find in the file of that format, or in all labels' files of it.
+codec::DecodedSurface decoded(const KeptFiles& files, MeshFormat format,
+                              const MeshParameters& parameters,
+                              const std::vector<LabelSummary>& labels,
+                              const mesh::Context& context) {
   const Space space = space_of(format, parameters);
-  std::vector<std::pair<MeshFormat, codec::DecodedSurface>> surfaces;
-  if (format != MeshFormat::kZip) {
-    surfaces.emplace_back(format, codec::decode(file, format, space, context));
-    return surfaces;
+  if (!parameters.labels || holds_all_labels(format)) {
+    return codec::decode(files.bytes(format), format, space, context);
   }
-  for (auto& [inner, surface] : codec::decode_zip(file, space, context)) {
-    surfaces.emplace_back(inner, std::move(surface));
-  }
-  return surfaces;
+  const std::span<const std::byte> zip = files.bytes(MeshFormat::kZip);
+  std::vector<codec::DecodedSurface> parts(labels.size());
+  mesh::parallel_for(context, parts.size(), [&](std::size_t n) {
+    const LabelFile& file = labels[n].files.at(format);
+    parts[n] = codec::decode(zip.subspan(file.offset, file.bytes), format, space, context);
+  });
+  return codec::join(std::move(parts), context);
 }
 
 SelfIntersections summary_of(const mesh::SelfIntersections& found) {
@@ -47,10 +49,12 @@ ErrorBudget budget_of(const MeshParameters& parameters, const mesh::Mesh& mesh,
 }  // namespace
 
 KeptFiles::KeptFiles(const MeshRequest& request, std::span<const codec::Sink> sinks)
-    : bytes_(sinks.size()), sinks_(sinks.begin(), sinks.end()) {
+    : sinks_(sinks.begin(), sinks.end()) {
   if (!request.certify) return;
+  const std::vector<MeshFormat> files = files_of(request.parameters);
   for (std::size_t i = 0; i < sinks.size(); ++i) {
-    sinks_[i] = [&kept = bytes_[i], &sink = sinks[i]](std::span<const std::byte> bytes) {
+    if (!codec::rounds(files[i], request.parameters)) continue;
+    sinks_[i] = [&kept = bytes_[files[i]], &sink = sinks[i]](std::span<const std::byte> bytes) {
       kept.insert(kept.end(), bytes.begin(), bytes.end());
       sink(bytes);
     };
@@ -63,24 +67,23 @@ void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted
   if (!request.certify) return;
   const MeshParameters& parameters = request.parameters;
   progress.enter(Stage::kCertify, shares_of(request).certify, &Timing::certify);
-  const std::vector<MeshFormat> formats = files_of(parameters);
+  const std::vector<MeshFormat> formats = measured_formats(parameters);
   const double part = 1.0 / static_cast<double>(formats.size() + 1);
-  const mesh::SurfaceView reference = extracted.view();
   MeshCertificate& certificate = summary.certificate.emplace();
-  bool is_first = true;
   for (std::size_t i = 0; i < formats.size(); ++i) {
-    const double begin = part * static_cast<double>(i);
-    for (const auto& [format, surface] :
-         decoded(files.bytes(i), formats[i], parameters, progress.quiet())) {
-      const mesh::Certificate measured =
-          mesh::certify(surface.view(), reference, progress.context(begin, begin + part));
-      if (!is_first && measured.max_mm() <= certificate.max_mm) continue;
-      is_first = false;
-      certificate.file = format;
-      certificate.max_mm = measured.max_mm();
-      certificate.from_mesh = measured.from_mesh;
-      certificate.from_extracted = measured.from_reference;
+    std::optional<codec::DecodedSurface> file;
+    if (codec::rounds(formats[i], parameters)) {
+      file = decoded(files, formats[i], parameters, summary.labels, progress.quiet());
     }
+    const double begin = part * static_cast<double>(i);
+    const mesh::Certificate measured =
+        mesh::certify(file ? file->view() : mesh::SurfaceView(mesh), extracted.view(),
+                      progress.context(begin, begin + part));
+    if (i > 0 && measured.max_mm() <= certificate.max_mm) continue;
+    certificate.file = formats[i];
+    certificate.max_mm = measured.max_mm();
+    certificate.from_mesh = measured.from_mesh;
+    certificate.from_extracted = measured.from_reference;
   }
   if (parameters.max_error_mm) {
     if (certificate.max_mm > *parameters.max_error_mm) {

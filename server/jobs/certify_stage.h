@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -11,8 +12,8 @@
 
 namespace isomesh::jobs {
 
-// The bytes of a job's files, which pass through on their way to where they go, kept where they are
-// to be measured. Not thread safe, but for different files.
+// The bytes of a job's files that round coordinates, which pass through on their way to where they
+// go, kept if they are to be measured. Not thread safe, but for different files.
 class KeptFiles {
  public:
   KeptFiles(const MeshRequest& request, std::span<const codec::Sink> sinks);
@@ -20,17 +21,18 @@ class KeptFiles {
 
   // One for each of the job's files, in their order.
   std::span<const codec::Sink> sinks() const { return sinks_; }
-  std::span<const std::byte> bytes(std::size_t file) const { return bytes_[file]; }
+  std::span<const std::byte> bytes(MeshFormat file) const { return bytes_.at(file); }
 
  private:
-  std::vector<std::vector<std::byte>> bytes_;
+  std::map<MeshFormat, std::vector<std::byte>> bytes_;
   std::vector<codec::Sink> sinks_;
 };
 
-// Where the job asks for it: decodes the files as a stranger does, measures them against the
-// surface as it was extracted, both ways, and looks for triangles of the mesh that intersect.
-// Throws Error kInternal where a file is not what was encoded, or is farther than max_error_mm, and
-// kCancelled.
+// Where the job asks for it: measures against the surface as it was extracted, both ways, what
+// other programs decode from each file that rounds coordinates, and, once for all other files,
+// which hold it exactly, the mesh. Looks for triangles of the mesh that intersect. `summary` has
+// the labels' files. Throws Error kInternal where a file is not what was encoded, or is farther
+// than max_error_mm, and kCancelled.
 void certify_stage(const MeshRequest& request, const ExtractedSurface& extracted,
                    const KeptFiles& files, Progress& progress, const mesh::Mesh& mesh,
                    MeshSummary& summary);

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <string>
 
 #include "proto/parameters.h"
 #include "server/codec/draco/grid.h"
+#include "server/codec/encode.h"
 
 namespace isomesh::jobs {
 namespace {
@@ -16,10 +18,9 @@ constexpr double kSmoothingShare = 0.5;
 constexpr double kQuantisationShare = 0.1;
 constexpr int kMostBits = 30;  // of Draco
 
-bool has_draco(const MeshParameters& parameters) {
-  return std::ranges::any_of(parameters.formats, [](MeshFormat format) {
-    return format == MeshFormat::kDrc || format == MeshFormat::kGlb;
-  });
+bool has_rounded_files(const MeshParameters& parameters) {
+  return std::ranges::any_of(files_of(parameters),
+                             [&](MeshFormat file) { return codec::rounds(file, parameters); });
 }
 
 // Single precision moves a decoded coordinate by a few units of the largest one's last place.
@@ -47,7 +48,7 @@ double most_displacement(const MeshParameters& parameters) {
 
 MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh& mesh) {
   MeshParameters result = parameters;
-  if (!parameters.max_error_mm || !has_draco(parameters)) return result;
+  if (!parameters.max_error_mm || !has_rounded_files(parameters)) return result;
   int& bits = result.draco.position_bits;
   const double most = kQuantisationShare * *parameters.max_error_mm;
   codec::Grid grid = codec::grid_of(mesh, bits);
@@ -64,8 +65,23 @@ MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh&
 }
 
 double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh) {
-  if (!has_draco(parameters) || mesh.positions.size() == 0) return 0;
+  if (!has_rounded_files(parameters) || mesh.positions.size() == 0) return 0;
   return quantisation_of(codec::grid_of(mesh, parameters.draco.position_bits));
+}
+
+std::vector<MeshFormat> measured_formats(const MeshParameters& parameters) {
+  std::vector<MeshFormat> formats = files_of(parameters);
+  if (std::erase(formats, MeshFormat::kZip) > 0) {
+    std::ranges::copy(zipped_formats(parameters), std::back_inserter(formats));
+  }
+  std::vector<MeshFormat> measured;
+  bool has_exact = false;
+  for (const MeshFormat format : formats) {
+    const bool is_exact = !codec::rounds(format, parameters);
+    if (!is_exact || !has_exact) measured.push_back(format);
+    has_exact = has_exact || is_exact;
+  }
+  return measured;
 }
 
 }  // namespace isomesh::jobs

@@ -1,7 +1,7 @@
 // How the error that a job may have is shared out.
 #pragma once
 
-#include <optional>
+#include <vector>
 
 #include "proto/types.h"
 #include "server/mesh/mesh.h"
@@ -22,5 +22,9 @@ MeshParameters with_bits_for(const MeshParameters& parameters, const mesh::Mesh&
 // The most that rounding to the files' coordinates moves a point of the mesh, in millimetres: half
 // the diagonal of a cell of Draco's grid, and what single precision cannot tell.
 double quantisation_mm(const MeshParameters& parameters, const mesh::Mesh& mesh);
+
+// The formats whose surface a certificate measures, in the files' order: each that rounds
+// coordinates, and the first of the others, which all hold the mesh itself.
+std::vector<MeshFormat> measured_formats(const MeshParameters& parameters);
 
 }  // namespace isomesh::jobs

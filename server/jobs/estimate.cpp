@@ -6,6 +6,7 @@
 
 #include "proto/json.h"
 #include "server/codec/encode.h"
+#include "server/jobs/error_budget.h"
 #include "server/jobs/mesh_cost.h"
 #include "server/jobs/stored_samples.h"
 
@@ -60,8 +61,8 @@ double simplify_ms(const SurfaceSize& surface, const MeshParameters& parameters)
 double certify_ms(const SurfaceSize& surface, const SurfaceSize& written,
                   const JobParameters& parameters) {
   if (!parameters.certify) return 0;
-  const auto files = static_cast<double>(files_of(parameters).size());
-  return files * kCertifyPerTriangle * as_double(surface.triangles + written.triangles);
+  const auto measured = static_cast<double>(measured_formats(parameters).size());
+  return measured * kCertifyPerTriangle * as_double(surface.triangles + written.triangles);
 }
 
 // Formats are written side by side, so the slowest counts whole and the others by half.

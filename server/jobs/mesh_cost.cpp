@@ -24,7 +24,8 @@ std::uint64_t label_bytes(const mesh::SurfaceSize& surface) {
 }
 
 // What simplifying and certifying take, one after the other, beside what the job has anyway: the
-// surface as it was extracted, grids of triangles, and files as bytes and as what they decode to.
+// surface as it was extracted, grids of triangles, and files that round coordinates, as bytes and
+// as what they decode to.
 std::uint64_t error_bytes(const mesh::SurfaceSize& surface, const MeshParameters& parameters,
                           bool certify) {
   // What simplify.h and triangle_grid.h say that they take, and a little more.
@@ -40,9 +41,11 @@ std::uint64_t error_bytes(const mesh::SurfaceSize& surface, const MeshParameters
   if (!certify) return std::max(simplifying, grid) + (keeps_extracted ? mesh_bytes(surface) : 0);
   double files = 0;
   for (const MeshFormat format : files_of(parameters)) {
+    if (!codec::rounds(format, parameters)) continue;
     files += 2 * codec::describe(format).bytes(surface, parameters);  // a vector that grows
   }
-  const std::uint64_t certifying = static_cast<std::uint64_t>(files) + 3 * mesh_bytes(surface) +
+  const std::uint64_t certifying = static_cast<std::uint64_t>(files) +
+                                   (files > 0 ? 3 * mesh_bytes(surface) : 0) +
                                    surface.triangles * kGridsPerTriangle;
   return mesh_bytes(surface) + std::max({simplifying, certifying, grid});
 }

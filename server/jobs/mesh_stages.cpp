@@ -38,6 +38,13 @@ std::vector<mesh::HalfSpace> sides_of_caps(const SampleArray& samples,
   return box;
 }
 
+Simplification::Bound bound_of(const MeshParameters& parameters,
+                               const mesh::SimplificationEffect& effect) {
+  if (effect.is_least) return Simplification::Bound::kTopology;
+  const bool is_by_triangles = parameters.triangles && effect.reached_triangles;
+  return is_by_triangles ? Simplification::Bound::kTriangles : Simplification::Bound::kError;
+}
+
 void set_extent(const mesh::Extent& extent, MeshSummary& summary) {
   summary.area_mm2 = extent.area_mm2;
   summary.volume_mm3.smoothed = extent.volume_mm3;
@@ -119,10 +126,7 @@ void simplify_stage(const MeshRequest& request, const ExtractedSurface& extracte
   const mesh::SimplificationEffect effect =
       walls != nullptr ? mesh::simplify(options, progress.context(), *walls)
                        : mesh::simplify(options, progress.context(), mesh);
-  const bool is_by_triangles =
-      parameters.triangles && (effect.reached_triangles || !parameters.max_error_mm);
-  summary.simplified = {effect.triangles_before, is_by_triangles ? Simplification::Bound::kTriangles
-                                                                 : Simplification::Bound::kError};
+  summary.simplified = {effect.triangles_before, bound_of(parameters, effect)};
   set_extent(measure_extent(mesh, progress.quiet()), summary);
 }
 

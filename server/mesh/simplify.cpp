@@ -11,68 +11,17 @@
 #include "server/mesh/measure.h"
 #include "server/mesh/parallel.h"
 #include "server/mesh/simplify_block.h"
+#include "server/mesh/simplify_cubes.h"
+#include "server/mesh/simplify_last.h"
 #include "server/mesh/simplify_layers.h"
 #include "server/mesh/simplify_lines.h"
 
 namespace isomesh::mesh {
 namespace {
 
-// Larger blocks have fewer seams, smaller ones stay in the cache and are sooner made again.
-constexpr double kTrianglesPerBlock = 6'000;
-// Of a cube's side, how near the seams of one round the next one looks.
-constexpr double kSeamWidth = 0.08;
 constexpr int kMostRounds = 6;
 constexpr int kMostRepairs = 12;  // of seams; the second half leaves blocks as they were
 constexpr std::uint32_t kNoBlock = ~std::uint32_t{0};
-constexpr double kMostCubesPerAxis = 64;
-
-// Cuts space into cubes. Those of the odd rounds are moved by half a side along each axis.
-class Cubes {
- public:
-  Cubes(const Extent& extent, std::size_t triangles) : low_(extent.low) {
-    if (!std::isfinite(extent.area_mm2)) {
-      throw Error(ErrorCode::kUnusableVolume, "a position of the mesh is not a finite number");
-    }
-    const double area_per_triangle = extent.area_mm2 / static_cast<double>(triangles);
-    side_ = std::sqrt(kTrianglesPerBlock * area_per_triangle);
-    double longest = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      longest = std::max(longest, extent.high[axis] - extent.low[axis]);
-    }
-    side_ = std::max(side_, longest / kMostCubesPerAxis);
-    if (!(side_ > 0)) side_ = 1;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      count_[axis] = static_cast<std::uint32_t>((extent.high[axis] - extent.low[axis]) / side_) + 2;
-    }
-  }
-
-  std::uint32_t count() const { return count_[0] * count_[1] * count_[2]; }
-
-  std::uint32_t at(const Point& point, int round) const {
-    const double shift = round % 2 == 1 ? 0.5 : 0;
-    std::uint32_t cube = 0;
-    for (std::size_t axis = 3; axis-- > 0;) {
-      const double place = (point[axis] - low_[axis]) / side_ + shift;
-      const auto at = static_cast<std::uint32_t>(std::clamp(place, 0.0, count_[axis] - 1.0));
-      cube = cube * count_[axis] + at;
-    }
-    return cube;
-  }
-
-  // Whether a face between cubes of the round before is near.
-  bool is_near_seam(const Point& point, int round) const {
-    const double shift = round % 2 == 1 ? 0 : 0.5;
-    return std::ranges::any_of(std::array<std::size_t, 3>{0, 1, 2}, [&](std::size_t axis) {
-      const double place = (point[axis] - low_[axis]) / side_ + shift;
-      return std::abs(place - std::round(place)) < kSeamWidth;
-    });
-  }
-
- private:
-  Point low_;
-  double side_ = 1;
-  std::array<std::uint32_t, 3> count_ = {1, 1, 1};
-};
 
 // Numbers of things, one group after the other, in their order within a group.
 struct Groups {
@@ -112,7 +61,8 @@ class Simplifier {
         walls_(walls),
         original_(options.before.empty() ? mesh.positions.span() : options.before,
                   mesh.triangles.span()),
-        cubes_(measure_extent(mesh, quiet_), mesh.triangles.size()),
+        extent_(measure_extent(mesh, quiet_)),
+        cubes_(extent_, mesh.triangles.size()),
         current_(mesh.triangles.begin(), mesh.triangles.end()) {
     if (walls != nullptr) sides_.assign(walls->sides.begin(), walls->sides.end());
     if (!std::isfinite(options.max_error_mm)) return;
@@ -133,6 +83,8 @@ class Simplifier {
     for (int round = 0; round < kMostRounds; ++round) {
       const std::size_t before = current_.size();
       if (is_enough()) break;
+      // Cubes grow with the triangles, so that in the end few seams are left to keep them.
+      if (options_.triangles > 0) cubes_ = Cubes(extent_, before);
       run_round(round);
       if (round == 0) continue;
       // The second round is for the seams of the first; more are for a number of triangles, as long
@@ -140,8 +92,9 @@ class Simplifier {
       if (options_.triangles == 0) break;
       if (10 * (before - current_.size()) < before - options_.triangles) break;
     }
-    effect_.triangles_after = current_.size();
     effect_.reached_triangles = options_.triangles == 0 || is_enough();
+    if (!effect_.reached_triangles) conclude();
+    effect_.triangles_after = current_.size();
     return effect_;
   }
 
@@ -151,6 +104,15 @@ class Simplifier {
 
  private:
   bool is_enough() const { return options_.triangles > 0 && current_.size() <= options_.triangles; }
+
+  // Blocks have not come to as few triangles as was aimed at.
+  void conclude() {
+    if (!grid_) {
+      simplify_last(options_.triangles, quiet_, mesh_, current_, sides_);
+      effect_.reached_triangles = is_enough();
+    }
+    effect_.is_least = !effect_.reached_triangles && (!grid_ || is_least(mesh_, current_, sides_));
+  }
 
   std::uint32_t cube_of(std::size_t triangle, int round) const {
     const SurfaceView view(mesh_.positions.span(), {&current_[triangle], 1});
@@ -428,7 +390,8 @@ class Simplifier {
   const Mesh& mesh_;
   const SeparatingSurface* walls_;
   const SurfaceView original_;  // what the error is measured from
-  const Cubes cubes_;
+  const Extent extent_;
+  Cubes cubes_;
   std::optional<TriangleGrid> grid_;
   std::vector<Triangle> current_;
   std::vector<WallSides> sides_;  // of each triangle, where they are walls

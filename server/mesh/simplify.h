@@ -38,13 +38,16 @@ struct SimplificationEffect {
   std::uint64_t taken_back = 0;
   // Whether there are as few triangles as was aimed at; true where nothing was.
   bool reached_triangles = true;
+  // Where they are not: whether the surface's kind needs them all, whatever the error.
+  bool is_least = false;
 };
 
 // Simplifies the mesh in place. Its vertices are some of those that it had, in the same order and
 // at the same places; those on a boundary are all kept, and of Mesh::on_line where no walls are
 // given. What is an
-// oriented manifold stays one, of the same boundary, Euler characteristic and orientation. No
-// triangle has an area of zero that had one before. The layers are joined into fewer, deeper ones:
+// oriented manifold stays one, of the same boundary, Euler characteristic and orientation, and no
+// two triangles lie back to back: a closed surface has four at least. No triangle has an area of
+// zero that had one before. The layers are joined into fewer, deeper ones:
 // as few as let a triangle name vertices of two at most, which is what the encoders walk along.
 //
 // Takes some 100 bytes a triangle beside the mesh, and what TriangleGrid takes. The same mesh for

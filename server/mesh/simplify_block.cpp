@@ -77,11 +77,31 @@ Shape look_at_fans(std::size_t vertices, std::span<const Triangle> triangles, co
     Topology here;
     check_vertex(around, here);
     topology.boundary_edges += here.boundary_edges;
-    if (faults != nullptr && exempt[v] == 0 && !(here.manifold && here.oriented)) (*faults)[v] = 1;
+    // Two triangles back to back enclose nothing, and no file need be able to hold them.
+    const bool is_double = around.size() == 2 && here.boundary_edges == 0;
+    const bool is_sound = here.manifold && here.oriented && !is_double;
+    if (faults != nullptr && exempt[v] == 0 && !is_sound) (*faults)[v] = 1;
   }
   const auto count = static_cast<std::int64_t>(triangles.size());
   const auto boundary = static_cast<std::int64_t>(topology.boundary_edges);
   return {topology.boundary_edges, named - (3 * count + boundary) / 2 + count};
+}
+
+// Triangles that share no edge with another one.
+std::vector<std::uint32_t> lone_triangles(std::size_t vertices,
+                                          std::span<const Triangle> triangles) {
+  const TrianglesOfVertices lists(vertices, triangles);
+  const auto is_shared = [&](std::uint32_t t, std::uint32_t from, std::uint32_t to) {
+    return std::ranges::any_of(lists.of(from), [&](std::uint32_t other) {
+      return other != t && std::ranges::find(triangles[other], to) != triangles[other].end();
+    });
+  };
+  std::vector<std::uint32_t> alone;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    const auto& [a, b, c] = triangles[t];
+    if (!is_shared(t, a, b) && !is_shared(t, b, c) && !is_shared(t, c, a)) alone.push_back(t);
+  }
+  return alone;
 }
 
 // Of a triangle without area, the corner that lies on the edge between the other two.
@@ -164,6 +184,7 @@ class BlockSimplifier {
         mesh_(goal.mesh, block.triangles),
         exempt_(mesh_.positions.size(), 0),
         is_flat_(mesh_.positions.size(), 0),
+        was_alone_(mesh_.positions.size(), 0),
         held_(mesh_.positions.size(), 0) {
     for (std::size_t v = 0; v < exempt_.size(); ++v) {
       exempt_[v] = goal.mesh.is_on_line(mesh_.origin[v]) ? 1 : 0;
@@ -175,6 +196,9 @@ class BlockSimplifier {
     for (const Triangle& triangle : mesh_.triangles) {
       if (mesh_.has_area(triangle)) continue;
       for (const std::uint32_t vertex : triangle) is_flat_[vertex] = held_[vertex] = 1;
+    }
+    for (const std::uint32_t t : lone_triangles(was_alone_.size(), mesh_.triangles)) {
+      for (const std::uint32_t vertex : mesh_.triangles[t]) was_alone_[vertex] = 1;
     }
     faults_.assign(held_.size(), 0);
     for (const std::uint32_t vertex : held) {
@@ -226,6 +250,11 @@ class BlockSimplifier {
     for (const Triangle& triangle : proposed_) {
       const auto was_flat = [&](std::uint32_t vertex) { return is_flat_[vertex] != 0; };
       if (!mesh_.has_area(triangle) && !std::ranges::all_of(triangle, was_flat)) mark(triangle);
+    }
+    // The block beyond the three edges of a lone one may come to the same one, back to back.
+    for (const std::uint32_t t : lone_triangles(held_.size(), proposed_)) {
+      const auto was_alone = [&](std::uint32_t vertex) { return was_alone_[vertex] != 0; };
+      if (!std::ranges::all_of(proposed_[t], was_alone)) mark(proposed_[t]);
     }
     const Shape after = look_at_fans(held_.size(), proposed_, exempt_, &faults_);
     if (after.euler != before_.euler) mark_lost_parts();
@@ -321,8 +350,9 @@ class BlockSimplifier {
   const double squared_bound_;
   const LocalMesh mesh_;
   Shape before_;
-  Flags exempt_;   // vertices whose fans were no manifold's
-  Flags is_flat_;  // of triangles that had no area
+  Flags exempt_;     // vertices whose fans were no manifold's
+  Flags is_flat_;    // of triangles that had no area
+  Flags was_alone_;  // of triangles that shared no edge
   Flags held_;
   Flags faults_;
   std::vector<Triangle> proposed_;

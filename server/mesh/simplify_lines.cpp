@@ -5,43 +5,29 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <optional>
 #include <queue>
 #include <utility>
 #include <vector>
 
+#include "server/mesh/edge_collapses.h"
 #include "server/mesh/point_triangle.h"
 
 namespace isomesh::mesh {
 namespace {
 
-// No triangle is turned farther than this by one collapse.
-constexpr double kLeastCosine = 0.25;
-
-using Numbers = std::vector<std::uint32_t>;
-
-bool has(std::span<const std::uint32_t> numbers, std::uint32_t number) {
-  return std::ranges::find(numbers, number) != numbers.end();
-}
-
-class LineSimplifier {
+class LineSimplifier : private EdgeCollapses {
  public:
   LineSimplifier(const BlockGoal& goal, std::span<const std::uint8_t> is_free, SurfaceBlock& block)
-      : goal_(goal),
+      : EdgeCollapses(goal.mesh, block.triangles),
+        goal_(goal),
         block_(block),
         squared_bound_(std::pow(kWithin * goal.max_error_mm, 2)),
         squared_line_bound_(std::pow(kFirstError * goal.max_error_mm, 2)),
-        mesh_(goal.mesh, block.triangles),
-        is_gone_(mesh_.triangles.size(), false),
-        around_(mesh_.origin.size()),
         points_(mesh_.triangles.size()),
         on_line_beside_(mesh_.origin.size()),
         version_(mesh_.origin.size(), 0) {
-    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-      for (const std::uint32_t vertex : mesh_.triangles[t]) around_[vertex].push_back(t);
-    }
     for (std::uint32_t n = 0; n < block.homes.size(); ++n) points_[block.homes[n]].push_back(n);
     find_lines();
     is_free_.resize(mesh_.origin.size());
@@ -134,11 +120,6 @@ class LineSimplifier {
     return seen == around_[v].size();
   }
 
-  std::uint32_t third(std::uint32_t triangle, std::uint32_t a, std::uint32_t b) const {
-    const auto& corners = mesh_.triangles[triangle];
-    return *std::ranges::find_if(corners, [&](std::uint32_t c) { return c != a && c != b; });
-  }
-
   void put_in_queue(std::uint32_t v) {
     const Edge beside = edge(on_line_beside_[v][0], on_line_beside_[v][1]);
     const Corners segment = {mesh_.at(beside.first), mesh_.at(beside.second),
@@ -166,11 +147,7 @@ class LineSimplifier {
   }
 
   bool collapse(std::uint32_t v, std::uint32_t into, std::uint32_t beyond) {
-    Numbers gone;
-    Numbers kept;
-    for (const std::uint32_t t : around_[v]) {
-      (has(mesh_.triangles[t], into) ? gone : kept).push_back(t);
-    }
+    const auto [gone, kept] = split_star(v, into);
     if (has(on_line_beside_[into], beyond) || !links_meet_at_edge(v, into, gone)) return false;
     if (!stays_upright(v, into, kept)) return false;
     std::vector<std::pair<std::uint32_t, std::uint32_t>> moves;
@@ -178,49 +155,6 @@ class LineSimplifier {
     move(v, into, beyond, gone, kept);
     for (const auto& [n, t] : moves) points_[t].push_back(n);
     return true;
-  }
-
-  Numbers neighbours(std::uint32_t v) const {
-    Numbers found;
-    for (const std::uint32_t t : around_[v]) {
-      for (const std::uint32_t vertex : mesh_.triangles[t]) {
-        if (vertex != v) found.push_back(vertex);
-      }
-    }
-    std::ranges::sort(found);
-    found.erase(std::unique(found.begin(), found.end()), found.end());
-    return found;
-  }
-
-  // Whether the vertices next to both ends of an edge are those of its own triangles, `gone`, each
-  // of one, and no edge is beyond both.
-  bool links_meet_at_edge(std::uint32_t v, std::uint32_t into, const Numbers& gone) const {
-    Numbers apexes;
-    for (const std::uint32_t t : gone) apexes.push_back(third(t, v, into));
-    std::ranges::sort(apexes);
-    Numbers common;
-    std::ranges::set_intersection(neighbours(v), neighbours(into), std::back_inserter(common));
-    if (common != apexes) return false;
-    return std::ranges::none_of(around_[v], [&](std::uint32_t t) {
-      return std::ranges::all_of(mesh_.triangles[t], [&](std::uint32_t vertex) {
-        return vertex == v || std::ranges::binary_search(apexes, vertex);
-      });
-    });
-  }
-
-  Triangle moved(std::uint32_t triangle, std::uint32_t v, std::uint32_t into) const {
-    Triangle corners = mesh_.triangles[triangle];
-    std::ranges::replace(corners, v, into);
-    return corners;
-  }
-
-  bool stays_upright(std::uint32_t v, std::uint32_t into, const Numbers& kept) const {
-    return std::ranges::all_of(kept, [&](std::uint32_t t) {
-      const Point before = mesh_.normal(mesh_.triangles[t]);
-      const Point after = mesh_.normal(moved(t, v, into));
-      const double lengths = std::sqrt(dot(before, before) * dot(after, after));
-      return lengths > 0 && dot(before, after) > kLeastCosine * lengths;
-    });
   }
 
   // Whether all that was near the triangles around the vertex is near those that stay, of the same
@@ -266,14 +200,8 @@ class LineSimplifier {
 
   void move(std::uint32_t v, std::uint32_t into, std::uint32_t beyond, const Numbers& gone,
             const Numbers& kept) {
-    for (const std::uint32_t t : gone) {
-      is_gone_[t] = true;
-      points_[t].clear();
-      for (const std::uint32_t vertex : mesh_.triangles[t]) std::erase(around_[vertex], t);
-    }
-    for (const std::uint32_t t : kept) mesh_.triangles[t] = moved(t, v, into);
-    around_[into].insert(around_[into].end(), kept.begin(), kept.end());
-    around_[v].clear();
+    for (const std::uint32_t t : gone) points_[t].clear();
+    collapse_edge(v, into, gone, kept);
     Numbers& passed = passed_[edge(into, beyond)];
     for (const std::uint32_t end : {into, beyond}) {
       const auto before = passed_.find(edge(v, end));
@@ -312,9 +240,6 @@ class LineSimplifier {
   SurfaceBlock& block_;
   const double squared_bound_;
   const double squared_line_bound_;
-  LocalMesh mesh_;
-  std::vector<bool> is_gone_;            // of triangles
-  std::vector<Numbers> around_;          // triangles of each vertex
   std::vector<Numbers> points_;          // of each triangle, by their places in the block
   std::vector<Numbers> on_line_beside_;  // of each vertex its neighbours along lines
   std::vector<bool> is_at_end_;          // whether a surface ends at the vertex

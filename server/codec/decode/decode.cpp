@@ -19,7 +19,7 @@ constexpr std::size_t kElementsPerTask = std::size_t{1} << 16;
 // Whether that holds for all elements, looked at side by side.
 template <class T, class Holds>
 bool all_of(const mesh::Buffer<T>& elements, const mesh::Context& context, const Holds& holds) {
-  std::vector<char> fine(tasks_of(elements.size(), kElementsPerTask));
+  std::vector<char> fine((elements.size() + kElementsPerTask - 1) / kElementsPerTask);
   mesh::parallel_for({context.stop, nullptr}, fine.size(), [&](std::size_t task) {
     const std::size_t begin = task * kElementsPerTask;
     const std::size_t count = std::min(kElementsPerTask, elements.size() - begin);
@@ -40,36 +40,10 @@ void check(const DecodedSurface& surface, MeshFormat format, const mesh::Context
   if (!is_there) refuse(format, "a triangle names a vertex that does not exist");
 }
 
-DecodedSurface decode_unchecked(Bytes file, MeshFormat format, Space space,
-                                const mesh::Context& context) {
-  switch (format) {
-    case MeshFormat::kDrc:
-      return decode_drc(file, context);
-    case MeshFormat::kGlb:
-      return decode_glb(file, context);
-    case MeshFormat::kStl:
-      return decode_stl(file, context);
-    case MeshFormat::kPly:
-      return decode_ply(file, context);
-    case MeshFormat::kObj:
-      return decode_obj(file, context);
-    case MeshFormat::k3mf:
-      return decode_3mf(file, context);
-    case MeshFormat::kOff:
-      return decode_off(file, context);
-    case MeshFormat::kVtk:
-      return decode_vtk(file, context);
-    case MeshFormat::kVtp:
-      return decode_vtp(file, context);
-    case MeshFormat::kGii:
-      return decode_gii(file, context);
-    case MeshFormat::kZip:
-      break;
-  }
-  std::vector<DecodedSurface> parts;
-  for (auto& [each, surface] : decode_zip(file, space, context))
-    parts.push_back(std::move(surface));
-  return join(std::move(parts), context);
+DecodedSurface decode_unchecked(Bytes file, MeshFormat format, const mesh::Context& context) {
+  if (format == MeshFormat::kDrc) return decode_drc(file);
+  if (format == MeshFormat::kGlb) return decode_glb(file, context);
+  refuse(format, "nothing decodes this format");
 }
 
 }  // namespace
@@ -77,6 +51,19 @@ DecodedSurface decode_unchecked(Bytes file, MeshFormat format, Space space,
 void refuse(MeshFormat format, const std::string& why) {
   throw Error(ErrorCode::kInternal, "the " + std::string(to_string(format)) +
                                         " file that was written cannot be read: " + why);
+}
+
+}  // namespace decoding
+
+DecodedSurface decode(std::span<const std::byte> file, MeshFormat format, Space space,
+                      const mesh::Context& context) {
+  context.throw_if_stopped();
+  DecodedSurface surface = decoding::decode_unchecked(file, format, context);
+  decoding::check(surface, format, context);
+  if (space == Space::kRas) {
+    for (mesh::Vec3& position : surface.positions) position = in_space(position, space);
+  }
+  return surface;
 }
 
 DecodedSurface join(std::vector<DecodedSurface>&& parts, const mesh::Context& context) {
@@ -104,20 +91,6 @@ DecodedSurface join(std::vector<DecodedSurface>&& parts, const mesh::Context& co
         });
   });
   return all;
-}
-
-}  // namespace decoding
-
-DecodedSurface decode(std::span<const std::byte> file, MeshFormat format, Space space,
-                      const mesh::Context& context) {
-  context.throw_if_stopped();
-  DecodedSurface surface = decoding::decode_unchecked(file, format, space, context);
-  if (format == MeshFormat::kZip) return surface;  // of which each file was checked and turned
-  decoding::check(surface, format, context);
-  if (space == Space::kRas) {
-    for (mesh::Vec3& position : surface.positions) position = in_space(position, space);
-  }
-  return surface;
 }
 
 }  // namespace isomesh::codec

@@ -1,11 +1,12 @@
-// Bytes of a file format -> mesh, as a stranger who is given the file reads it: by the formats' own
-// libraries where there are some, and never from the arrays that the file was made of. For
-// measuring what was written; only the program that makes meshes has it.
+// Bytes of a file that rounds coordinates -> mesh, as another program reads it: by the formats' own
+// libraries, and never from the arrays that the file was made of. For measuring what was written;
+// only the program that makes meshes has it. All other formats hold the mesh itself
+// (codec/encode.h, `rounds`).
 #pragma once
 
 #include <cstddef>
-#include <map>
 #include <span>
+#include <vector>
 
 #include "proto/types.h"
 #include "server/mesh/buffer.h"
@@ -15,8 +16,7 @@
 
 namespace isomesh::codec {
 
-// Millimetres in LPS; in no layers. Whether vertices that several triangles have in common are one
-// is up to the format: in GLB not across the blocks, in 3MF not across the labels.
+// Millimetres in LPS; in no layers. In GLB, vertices on the seam of two blocks are there twice.
 struct DecodedSurface {
   mesh::Buffer<mesh::Vec3> positions;
   mesh::Buffer<mesh::Triangle> triangles;
@@ -24,24 +24,17 @@ struct DecodedSurface {
   mesh::SurfaceView view() const { return {positions.span(), triangles.span()}; }
 };
 
-// What is in a file that one of our encoders wrote:
-//  - drc, glb: what libdraco's decoder makes of it; of glb the finest level of the default scene,
-//    block by block, side by side.
-//  - stl: corners at the same place become one vertex, in the order of the file.
-//  - ply, obj, 3mf, off, vtk, vtp, gii: the file's vertices and triangles; with labels those of all
-//    of them, so that a wall is there for each label that it belongs to.
-//  - zip: all its files, one after the other; see decode_zip.
-// `space` is that of the file's coordinates, of a ZIP that of the files in it for which space_of
-// does not say another one. Positions are finite and triangles name vertices that are there. The
-// same for any number of threads. Takes what the surface takes, and as much again for parts that
-// are put together; of stl 40 bytes a triangle and of zip the unpacked files beside it. Thread
-// safe. Throws Error kInternal with what is wrong of a file that is not as our encoders write it,
-// kTooLarge where 32 bits cannot number the vertices, and kCancelled.
+// What libdraco's decoder makes of a file of the format drc or glb, or meshoptimizer's of a packed
+// glb; of glb the finest level of the default scene, its blocks joined. `space` is that of the
+// file's coordinates. Positions are finite and triangles name vertices that are there. The same for
+// any number of threads. Takes what the surface takes, and as much again for blocks that are
+// joined. Thread safe. Throws Error kInternal if the file is not as our encoders write it, or of
+// another format; kTooLarge as join does; and kCancelled.
 DecodedSurface decode(std::span<const std::byte> file, MeshFormat format, Space space,
                       const mesh::Context& context);
 
-// The files in a ZIP of labels, those of each format put together. Throws as decode does.
-std::map<MeshFormat, DecodedSurface> decode_zip(std::span<const std::byte> file, Space space,
-                                                const mesh::Context& context);
+// All parts as one surface, in their order; takes their memory. Throws Error kTooLarge if 32 bits
+// cannot number the vertices, and kCancelled.
+DecodedSurface join(std::vector<DecodedSurface>&& parts, const mesh::Context& context);
 
 }  // namespace isomesh::codec

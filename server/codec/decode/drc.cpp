@@ -52,7 +52,7 @@ DecodedSurface decode_draco_stream(Bytes stream, int position_id) {
   return surface;
 }
 
-DecodedSurface decode_drc(Bytes file, const mesh::Context& /*context*/) {
+DecodedSurface decode_drc(Bytes file) {
   constexpr int kFirstOfPositions = -1;
   return decode_draco_stream(file, kFirstOfPositions);
 }

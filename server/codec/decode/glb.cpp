@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <cstring>
 #include <set>
 
 #include <meshoptimizer.h>
@@ -14,6 +14,13 @@ namespace isomesh::codec::decoding {
 namespace {
 
 using Json = nlohmann::json;
+
+// The little-endian number at an offset; the caller has checked that it is there.
+std::uint32_t word_at(Bytes bytes, std::size_t offset) {
+  std::uint32_t value = 0;
+  std::memcpy(&value, bytes.data() + offset, sizeof value);
+  return value;
+}
 
 // Of glTF's specification, section 4.4.
 constexpr std::uint32_t kMagic = 0x46546C67;
@@ -30,16 +37,16 @@ struct Chunks {
 };
 
 Chunks chunks_of(Bytes file) {
-  if (file.size() < kHeaderBytes || value_at<std::uint32_t>(file, 0) != kMagic ||
-      value_at<std::uint32_t>(file, 4) != 2 || value_at<std::uint32_t>(file, 8) != file.size()) {
+  if (file.size() < kHeaderBytes || word_at(file, 0) != kMagic || word_at(file, 4) != 2 ||
+      word_at(file, 8) != file.size()) {
     refuse_glb("its header is not that of a complete file of version 2");
   }
   Bytes rest = file.subspan(kHeaderBytes);
   const auto take = [&](std::uint32_t type, const char* name) {
-    if (rest.size() < kChunkHeaderBytes || value_at<std::uint32_t>(rest, 4) != type) {
+    if (rest.size() < kChunkHeaderBytes || word_at(rest, 4) != type) {
       refuse_glb(std::string("its chunk of ") + name + " is missing");
     }
-    const std::size_t bytes = value_at<std::uint32_t>(rest, 0);
+    const std::size_t bytes = word_at(rest, 0);
     if (bytes > rest.size() - kChunkHeaderBytes) {
       refuse_glb(std::string("it ends within its chunk of ") + name);
     }
@@ -198,7 +205,8 @@ class Scene {
 std::vector<Primitive> primitives_of(Bytes file) {
   const Chunks chunks = chunks_of(file);
   try {
-    const Json gltf = Json::parse(as_text(chunks.json));
+    const auto* json = reinterpret_cast<const char*>(chunks.json.data());
+    const Json gltf = Json::parse(json, json + chunks.json.size());
     return Scene(gltf, chunks.binary).primitives();
   } catch (const Json::exception& error) {
     refuse_glb(std::string("its JSON is malformed: ") + error.what());

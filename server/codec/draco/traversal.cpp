@@ -27,6 +27,9 @@ bool Traversal::run(const Fans& fans, Starts& starts, const mesh::Context& conte
       return false;
     }
   }
+  // Draco's decoder takes at most four faces for three symbols, as tetrahedra have. Two triangles
+  // back to back have one symbol.
+  if (surface_.faces > count_ + count_ / 3) return false;
   resolve_events();
   return true;
 }

@@ -37,8 +37,8 @@ class Traversal {
   void prepare(const Connectivity& surface, const Fans& fans);
 
   // Once after prepare. Fills what is below, and `starts` on the way, which it leaves open. Returns
-  // false where a vertex has a second closed fan, which Draco has no code for. Throws Error
-  // kCancelled.
+  // false where a vertex has a second closed fan, which Draco has no code for, and where too many
+  // triangles lie back to back for its decoder. Throws Error kCancelled.
   bool run(const Fans& fans, Starts& starts, const mesh::Context& context);
 
   std::span<const std::uint8_t> symbols() const { return {symbols_.data(), count_}; }

@@ -102,6 +102,8 @@ TEST(MeshReport, TellsTheIsoValueAndTheError) {
   EXPECT_THAT(report, HasSubstr("to the file       0.0988 mm at most, 0.0300 mm for 99 %"));
   EXPECT_THAT(report, HasSubstr("0.0500 mm smoothing, 0.0400 mm simplification, 0.0100 mm"));
   EXPECT_THAT(report, HasSubstr("self-intersections  3 pairs of triangles\n"));
+  mesh.simplified->bound_by = Simplification::Bound::kTopology;
+  EXPECT_THAT(mesh_report(mesh), HasSubstr("bound by the topology: fewer triangles would open"));
 }
 
 TEST(VolumeReport, NamesWhatTheVolumeIs) {

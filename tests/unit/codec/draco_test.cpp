@@ -248,6 +248,29 @@ TEST(OwnDraco, PositionsThatAreNoPlacesAreAnError) {
   }
 }
 
+// Draco's decoder refuses streams with more than four faces for three symbols.
+TEST(OwnDraco, LeavesTrianglesBackToBackToLibdraco) {
+  for (const std::uint32_t pairs : {1U, 2U, 5U, 50U}) {
+    SCOPED_TRACE(pairs);
+    std::vector<mesh::Vec3> positions;
+    std::vector<mesh::Triangle> triangles;
+    for (std::uint32_t n = 0; n < pairs; ++n) {
+      const auto x = static_cast<float>(2 * n);
+      positions.insert(positions.end(), {{x, 0, 0}, {x + 1, 0, 0}, {x, 1, 1}});
+      triangles.push_back({3 * n, 3 * n + 1, 3 * n + 2});
+      triangles.push_back({3 * n, 3 * n + 2, 3 * n + 1});
+    }
+    const mesh::Mesh mesh = mesh_of(positions, triangles);
+    EXPECT_FALSE(ours(mesh));
+    EXPECT_EQ(decode_in_process(test::encoded(mesh, MeshFormat::kDrc)).triangles.size(), 2 * pairs);
+    std::size_t in_glb = 0;
+    for (const auto& primitive : test::read_with_node(test::encoded(mesh, MeshFormat::kGlb))) {
+      in_glb += primitive.mesh.triangles.size();
+    }
+    EXPECT_EQ(in_glb, 2 * pairs);
+  }
+}
+
 // Whatever comes: the right triangles, by whoever encodes them.
 TEST(OwnDraco, WhateverComesDecodes) {
   Encoder encoder(0);

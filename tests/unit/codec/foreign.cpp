@@ -9,6 +9,8 @@
 
 #include "tests/support/files.h"
 #include "tests/support/process.h"
+#include "tests/unit/codec/foreign_3mf.h"
+#include "tests/unit/codec/foreign_cgal.h"
 
 namespace isomesh::test {
 namespace {
@@ -112,6 +114,41 @@ ForeignSurface read_with_python(const std::string& bytes, MeshFormat format) {
   rest.take(std::span(text.data(), text.size()));
   surface.told = nlohmann::json::parse(text);
   return surface;
+}
+
+std::vector<std::array<mesh::Vec3, 3>> read_exactly(const std::string& bytes, MeshFormat format) {
+  std::vector<std::array<mesh::Vec3, 3>> triangles;
+  const auto add = [&](const auto& points, const auto& corners) {
+    for (const auto& [a, b, c] : corners) triangles.push_back({points[a], points[b], points[c]});
+  };
+  switch (format) {
+    case MeshFormat::kStl:
+    case MeshFormat::kPly:
+      return read_with_assimp(bytes, std::string(to_string(format)));
+    case MeshFormat::kObj:
+    case MeshFormat::kOff: {
+      const DecodedMesh mesh = read_with_cgal(bytes, format);
+      add(mesh.points, mesh.triangles);
+      break;
+    }
+    case MeshFormat::k3mf:
+      for (const Object3mf& object : read_with_lib3mf(bytes).objects) {
+        add(object.points, object.triangles);
+      }
+      break;
+    case MeshFormat::kVtk:
+    case MeshFormat::kVtp:
+    case MeshFormat::kGii: {
+      const DecodedMesh mesh = read_with_python(bytes, format).mesh;
+      add(mesh.points, mesh.triangles);
+      break;
+    }
+    case MeshFormat::kDrc:
+    case MeshFormat::kGlb:
+    case MeshFormat::kZip:
+      throw std::runtime_error("nothing reads this format exactly");
+  }
+  return triangles;
 }
 
 }  // namespace isomesh::test

@@ -1,7 +1,6 @@
-// Files of one surface and of labels, read back by what measures them.
+// Files that round coordinates, read back by what measures them.
 #include <algorithm>
-#include <map>
-#include <set>
+#include <array>
 #include <span>
 #include <stop_token>
 #include <string>
@@ -11,7 +10,6 @@
 
 #include "server/codec/decode/decode.h"
 #include "server/codec/encode.h"
-#include "server/mesh/label_surface.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/unit/codec/label_files.h"
@@ -33,27 +31,9 @@ test::DecodedMesh to_test(const DecodedSurface& surface) {
           {surface.triangles.begin(), surface.triangles.end()}};
 }
 
-using Corners = std::array<mesh::Vec3, 3>;
-
-std::vector<Corners> corners_of(const mesh::SurfaceView& surface) {
-  std::vector<Corners> result;
-  for (const auto& [a, b, c] : surface.triangles) {
-    result.push_back({surface.positions[a], surface.positions[b], surface.positions[c]});
-  }
-  return result;
-}
-
 void expect_read_back(const mesh::Mesh& mesh, MeshFormat format) {
   const DecodedSurface surface = decoded(encoded(mesh, format), format);
-  if (format == MeshFormat::kDrc || format == MeshFormat::kGlb) {
-    test::expect_same_mesh(test::welded({to_test(surface)}), mesh, DracoParameters{}.position_bits);
-    return;
-  }
-  EXPECT_EQ(surface.positions.size(), mesh.positions.size());
-  EXPECT_TRUE(corners_of(surface.view()) == corners_of(mesh));
-  if (format != MeshFormat::kStl) {
-    EXPECT_TRUE(std::ranges::equal(surface.positions, mesh.positions));
-  }
+  test::expect_same_mesh(test::welded({to_test(surface)}), mesh, DracoParameters{}.position_bits);
 }
 
 class ReadBack : public testing::TestWithParam<MeshFormat> {};
@@ -87,27 +67,16 @@ TEST_P(ReadBack, IsTheSameOnAnyNumberOfThreads) {
   }
 }
 
-// Where a file ends too soon it is refused, or, of text that ends at a line's end, read as shorter.
 TEST_P(ReadBack, OfAFileThatEndsTooSoonIsRefused) {
-  const auto meshes = test::meshes_to_encode();
-  const mesh::Mesh& mesh = meshes.at(2).mesh;
-  const std::string file = encoded(mesh, GetParam());
+  const std::string file = encoded(test::meshes_to_encode().at(2).mesh, GetParam());
   const std::size_t step = std::max<std::size_t>(1, file.size() / 500);
-  std::size_t refused = 0;
-  std::size_t cuts = 0;
-  for (std::size_t bytes = 0; bytes < file.size(); bytes += step, ++cuts) {
-    try {
-      const DecodedSurface surface = decoded(file.substr(0, bytes), GetParam());
-      EXPECT_LT(surface.triangles.size(), mesh.triangles.size()) << bytes;
-      EXPECT_EQ(GetParam(), MeshFormat::kObj) << bytes;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::kInternal) << error.what();
-      EXPECT_NE(std::string(error.what()).find(to_string(GetParam())), std::string::npos)
-          << error.what();
-      ++refused;
-    }
+  for (std::size_t bytes = 0; bytes < file.size(); bytes += step) {
+    const auto error = test::thrown_by([&] { decoded(file.substr(0, bytes), GetParam()); });
+    ASSERT_TRUE(error.has_value()) << bytes;
+    EXPECT_EQ(error->code(), ErrorCode::kInternal) << error->what();
+    const std::string file_of = std::string(to_string(GetParam())) + " file";
+    EXPECT_NE(std::string(error->what()).find(file_of), std::string::npos) << error->what();
   }
-  EXPECT_GT(refused, GetParam() == MeshFormat::kObj ? cuts / 4 : cuts - 1);
 }
 
 TEST_P(ReadBack, OfWrongBytesIsRefusedOrReadButNeverWorse) {
@@ -137,27 +106,12 @@ TEST_P(ReadBack, EndsWhenItIsCancelled) {
             ErrorCode::kCancelled);
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, ReadBack, testing::ValuesIn(test::formats_of_a_surface()),
+INSTANTIATE_TEST_SUITE_P(Formats, ReadBack, testing::Values(MeshFormat::kDrc, MeshFormat::kGlb),
                          [](const auto& test) { return std::string(to_string(test.param)); });
 
-TEST(ReadBackStl, MakesCornersAtOnePlaceOneVertexWhateverTheSignOfZero) {
-  const mesh::Mesh mesh =
-      test::mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {-0.0F, 0, -0.0F}, {0, 1, 0}, {0, 0, 1}},
-                    {{0, 1, 2}, {4, 5, 3}});
-  const DecodedSurface surface = decoded(encoded(mesh, MeshFormat::kStl), MeshFormat::kStl);
-  EXPECT_EQ(surface.positions.size(), 4U);
-  EXPECT_EQ(surface.triangles[0], (mesh::Triangle{0, 1, 2}));
-  EXPECT_EQ(surface.triangles[1], (mesh::Triangle{2, 3, 0}));
-}
-
-TEST(ReadBackStl, RefusesPositionsThatAreNoNumbers) {
-  const float infinite = std::numeric_limits<float>::infinity();
-  const mesh::Mesh mesh = test::mesh_of({{0, 0, 0}, {1, 0, 0}, {0, infinite, 0}}, {{0, 1, 2}});
-  const auto error =
-      test::thrown_by([&] { decoded(encoded(mesh, MeshFormat::kStl), MeshFormat::kStl); });
-  ASSERT_TRUE(error.has_value());
-  EXPECT_EQ(error->code(), ErrorCode::kInternal);
-  EXPECT_NE(std::string(error->what()).find("finite"), std::string::npos) << error->what();
+TEST(ReadBackOthers, IsRefused) {
+  const std::string stl = encoded(test::meshes_to_encode().at(2).mesh, MeshFormat::kStl);
+  EXPECT_EQ(test::code_thrown_by([&] { decoded(stl, MeshFormat::kStl); }), ErrorCode::kInternal);
 }
 
 TEST(ReadBackGlb, RefusesAnotherSpace) {
@@ -170,66 +124,39 @@ TEST(ReadBackGlb, RefusesAnotherSpace) {
   EXPECT_NE(std::string(error->what()).find("LPS"), std::string::npos) << error->what();
 }
 
-// With the places of each label's own surface, as many times as it has them.
-using Triangles = std::multiset<Corners>;
+class ReadBackLabels : public test::LabelFilesTest {};
 
-class ReadBackLabels : public test::LabelFilesTest {
- protected:
-  Triangles labels_triangles() const {
-    Triangles triangles;
-    for (std::size_t n = 1; n <= kLabels; ++n) {
-      mesh::Mesh mesh;
-      extract_label(walls_, *triangles_, n, mesh);
-      for (const Corners& corners : corners_of(mesh)) triangles.insert(corners);
-    }
-    return triangles;
-  }
-
-  static Triangles triangles_of(const DecodedSurface& surface) {
-    const auto corners = corners_of(surface.view());
-    return {corners.begin(), corners.end()};
-  }
-};
-
-// By where a triangle begins, which is up to the encoder of labels.
-Triangles turned(const Triangles& triangles) {
-  Triangles result;
-  for (Corners corners : triangles) {
-    std::rotate(corners.begin(), std::ranges::min_element(corners), corners.end());
-    result.insert(corners);
-  }
-  return result;
-}
-
-TEST_F(ReadBackLabels, FilesOfAllLabelsHaveEachLabelsTriangles) {
-  const Triangles expected = turned(labels_triangles());
-  for (const MeshFormat format :
-       {MeshFormat::kPly, MeshFormat::kObj, MeshFormat::k3mf, MeshFormat::kVtk, MeshFormat::kVtp}) {
-    SCOPED_TRACE(to_string(format));
-    EXPECT_TRUE(turned(triangles_of(decoded(encoded(format), format))) == expected);
-  }
+TEST_F(ReadBackLabels, AreTheTrianglesOfAllLabels) {
+  std::size_t triangles = 0;
+  for (const LabelSummary& label : labels_) triangles += label.triangles;
   const DecodedSurface glb = decoded(encoded(MeshFormat::kGlb), MeshFormat::kGlb);
-  EXPECT_EQ(glb.triangles.size(), expected.size());
+  EXPECT_EQ(glb.triangles.size(), triangles);
   // Each of two labels has the corners of their wall, which is there once before encoding.
   EXPECT_GT(glb.positions.size(), walls_.mesh.positions.size());
 }
 
-TEST_F(ReadBackLabels, AZipIsReadFileByFile) {
-  const std::string zip = zipped({MeshFormat::kStl, MeshFormat::kPly, MeshFormat::kDrc}).bytes;
-  const auto surfaces = decode_zip(std::as_bytes(std::span(zip)), Space::kLps, {});
-  ASSERT_EQ(surfaces.size(), 3U);
-  const Triangles expected = turned(labels_triangles());
-  EXPECT_TRUE(turned(triangles_of(surfaces.at(MeshFormat::kStl))) == expected);
-  EXPECT_TRUE(turned(triangles_of(surfaces.at(MeshFormat::kPly))) == expected);
-  EXPECT_EQ(surfaces.at(MeshFormat::kDrc).triangles.size(), expected.size());
-  EXPECT_EQ(decoded(zip, MeshFormat::kZip).triangles.size(), 3 * expected.size());
-}
-
-TEST_F(ReadBackLabels, AZipWithAWrongFileIsRefused) {
-  std::string zip = zipped({MeshFormat::kStl}).bytes;
-  zip[1000] = static_cast<char>(zip[1000] ^ 1);
-  EXPECT_EQ(test::code_thrown_by([&] { decoded(zip, MeshFormat::kZip); }), ErrorCode::kInternal)
-      << "its sum is not looked at";
+TEST_F(ReadBackLabels, AreJoinedOneBehindTheOther) {
+  const Zip zip = zipped({MeshFormat::kDrc});
+  std::vector<DecodedSurface> parts;
+  std::vector<mesh::Vec3> positions;
+  std::vector<std::array<mesh::Vec3, 3>> triangles;
+  const auto add_triangles = [](const mesh::SurfaceView& from, auto& to) {
+    for (const auto& [a, b, c] : from.triangles) {
+      to.push_back({from.positions[a], from.positions[b], from.positions[c]});
+    }
+  };
+  for (const LabelFiles& files : zip.files) {
+    const LabelFile& file = files.at(MeshFormat::kDrc);
+    parts.push_back(decoded(zip.bytes.substr(file.offset, file.bytes), MeshFormat::kDrc));
+    positions.insert(positions.end(), parts.back().positions.begin(), parts.back().positions.end());
+    add_triangles(parts.back().view(), triangles);
+  }
+  const DecodedSurface all = join(std::move(parts), {});
+  EXPECT_TRUE(std::ranges::equal(all.positions, positions));
+  std::vector<std::array<mesh::Vec3, 3>> joined;
+  add_triangles(all.view(), joined);
+  EXPECT_TRUE(joined == triangles);
+  EXPECT_EQ(join({}, {}).triangles.size(), 0U);
 }
 
 }  // namespace

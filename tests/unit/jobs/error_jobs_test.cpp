@@ -1,5 +1,6 @@
 // Jobs whose error is bound or measured, and what they leave out of the surface.
 #include <algorithm>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -30,23 +31,47 @@ test::SampleVolume<float> hollow() {
       {46, 41, 41}, geometry);
 }
 
+struct Soup {
+  std::vector<mesh::Vec3> positions;
+  std::vector<mesh::Triangle> triangles;
+
+  mesh::SurfaceView view() const { return {positions, triangles}; }
+};
+
 class ErrorJobsTest : public test::JobsFixture {
  protected:
   MeshSummary run(const JobParameters& parameters) {
     return run_pipeline(volume_, parameters, {}, blobs_, process_, {}, kSilent).mesh;
   }
 
+  // Of the formats that round coordinates.
   codec::DecodedSurface decoded(const MeshSummary& mesh, MeshFormat format) {
     const std::string bytes = blob(mesh.files.at(format).sha256);
     return codec::decode(std::as_bytes(std::span(bytes)), format, space_of(format, {}), {});
   }
 
-  // The surface as it is extracted: in STL, which rounds nothing.
-  codec::DecodedSurface extracted() {
+  // The corners in the STL file, three for each triangle.
+  Soup stl(const MeshSummary& mesh) {
+    constexpr std::size_t kHeaderBytes = 84;
+    constexpr std::size_t kFacetBytes = 50;
+    const std::string bytes = blob(mesh.files.at(MeshFormat::kStl).sha256);
+    Soup soup;
+    for (std::size_t at = kHeaderBytes; at < bytes.size(); at += kFacetBytes) {
+      const auto first = static_cast<std::uint32_t>(soup.positions.size());
+      soup.triangles.push_back({first, first + 1, first + 2});
+      soup.positions.resize(first + 3);
+      std::memcpy(&soup.positions[first], bytes.data() + at + sizeof(mesh::Vec3),
+                  3 * sizeof(mesh::Vec3));
+    }
+    return soup;
+  }
+
+  // The surface as it is extracted.
+  Soup extracted() {
     JobParameters parameters = parameters_of(volume_, 0);
     parameters.passes = 0;
     parameters.formats = {MeshFormat::kStl};
-    return decoded(run(parameters), MeshFormat::kStl);
+    return stl(run(parameters));
   }
 
   Volume volume_ = add(hollow(), SampleType::kFloat32);
@@ -54,7 +79,7 @@ class ErrorJobsTest : public test::JobsFixture {
 };
 
 TEST_F(ErrorJobsTest, KeepEveryFileWithinTheError) {
-  const codec::DecodedSurface reference = extracted();
+  const Soup reference = extracted();
   for (const double error : {0.02, 0.1, 0.4}) {
     JobParameters parameters = parameters_of(volume_, 0);
     parameters.formats = {MeshFormat::kDrc, MeshFormat::kGlb, MeshFormat::kStl, MeshFormat::k3mf};
@@ -66,13 +91,15 @@ TEST_F(ErrorJobsTest, KeepEveryFileWithinTheError) {
     EXPECT_EQ(mesh.simplified->triangles_before, reference.triangles.size());
     EXPECT_EQ(mesh.simplified->bound_by, Simplification::Bound::kError);
     double farthest = 0;
-    for (const MeshFormat format : parameters.formats) {
-      const codec::DecodedSurface file = decoded(mesh, format);
-      EXPECT_EQ(file.triangles.size(), mesh.triangles) << to_string(format);
-      const double max = certify(file.view(), reference.view(), {}).max_mm();
-      EXPECT_LE(max, error) << to_string(format);
+    const auto expect_near = [&](const mesh::SurfaceView& file) {
+      EXPECT_EQ(file.triangles.size(), mesh.triangles);
+      const double max = certify(file, reference.view(), {}).max_mm();
+      EXPECT_LE(max, error);
       farthest = std::max(farthest, max);
-    }
+    };
+    expect_near(decoded(mesh, MeshFormat::kDrc).view());
+    expect_near(decoded(mesh, MeshFormat::kGlb).view());
+    expect_near(stl(mesh).view());
     EXPECT_DOUBLE_EQ(mesh.certificate->max_mm, farthest);
     const auto& budget = mesh.certificate->budget_mm.value();
     EXPECT_NEAR(budget.smoothing + budget.simplification + budget.quantisation, error, 1e-12);
@@ -102,8 +129,8 @@ TEST_F(ErrorJobsTest, SayWhatTheirTrianglesCost) {
   const MeshSummary mesh = run(parameters);
   EXPECT_LE(mesh.triangles, 500U);
   EXPECT_EQ(mesh.simplified->bound_by, Simplification::Bound::kTriangles);
-  const codec::DecodedSurface file = decoded(mesh, MeshFormat::kStl);
-  EXPECT_DOUBLE_EQ(mesh.certificate->max_mm, certify(file.view(), extracted().view(), {}).max_mm());
+  EXPECT_DOUBLE_EQ(mesh.certificate->max_mm,
+                   certify(stl(mesh).view(), extracted().view(), {}).max_mm());
   EXPECT_FALSE(mesh.certificate->budget_mm);
   parameters.max_error_mm = 0.05;  // which 500 triangles cannot keep
   const MeshSummary both = run(parameters);
@@ -121,6 +148,20 @@ TEST_F(ErrorJobsTest, MeasureWithoutChangingAnything) {
   EXPECT_EQ(certified.files.at(MeshFormat::kDrc).sha256, plain.files.at(MeshFormat::kDrc).sha256);
   EXPECT_GE(certified.certificate->max_mm, 0.9 * plain.displacement_mm.max / 2);
   EXPECT_TRUE(certified.quality.self_intersections);
+}
+
+// All files that round nothing hold the mesh, so they have its certificate, under the first's name.
+TEST_F(ErrorJobsTest, MeasureTheMeshOnceForAllFilesThatHoldIt) {
+  JobParameters parameters = parameters_of(volume_, 0);
+  parameters.max_error_mm = 0.1;
+  parameters.certify = true;
+  parameters.formats = {MeshFormat::kOff, MeshFormat::kStl, MeshFormat::k3mf};
+  const MeshSummary mesh = run(parameters);
+  EXPECT_EQ(mesh.certificate->file, MeshFormat::kOff);
+  EXPECT_EQ(mesh.certificate->from_mesh.points, mesh.vertices + mesh.triangles);
+  const mesh::Certificate again = certify(stl(mesh).view(), extracted().view(), {});
+  EXPECT_DOUBLE_EQ(mesh.certificate->max_mm, again.max_mm());
+  EXPECT_EQ(mesh.certificate->budget_mm->quantisation, 0);
 }
 
 TEST_F(ErrorJobsTest, TellTheStagesApart) {
@@ -224,6 +265,31 @@ TEST_F(ErrorJobsTest, OfLabelsAreWithinTheErrorInEveryFile) {
   for (const LabelSummary& label : mesh.labels) {
     EXPECT_TRUE(label.closed && label.manifold && label.oriented) << label.label;
   }
+}
+
+// Each label's Draco stream lies in the ZIP, of which all together are one file to be measured.
+TEST_F(ErrorJobsTest, OfLabelsMeasureDracoInTheZip) {
+  const Volume labels =
+      add(test::sample<std::uint8_t>([](const test::Point& p) { return p[0] < 9 ? 1.0 : 2.0; },
+                                     {20, 20, 20}),
+          SampleType::kUint8);
+  JobParameters parameters = label_parameters({});
+  parameters.volume = labels.id;
+  parameters.close = true;
+  parameters.formats = {MeshFormat::kDrc};
+  parameters.draco.position_bits = 8;  // so that it is far
+  parameters.certify = true;
+  const auto certified = [&] {
+    return *run_pipeline(labels, parameters, {}, blobs_, process_, {}, kSilent).mesh.certificate;
+  };
+  const MeshCertificate rounded = certified();
+  EXPECT_EQ(rounded.file, MeshFormat::kDrc);
+  parameters.formats = {MeshFormat::kStl, MeshFormat::kDrc};
+  EXPECT_EQ(certified(), rounded);
+  parameters.formats = {MeshFormat::kStl, MeshFormat::kPly};
+  const MeshCertificate exact = certified();
+  EXPECT_EQ(exact.file, MeshFormat::kPly);  // the files of all labels come first
+  EXPECT_LT(exact.max_mm, rounded.max_mm);
 }
 
 TEST_F(ErrorJobsTest, AreCancelledAndRefusedAsOthersAre) {

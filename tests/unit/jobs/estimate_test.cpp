@@ -208,6 +208,22 @@ TEST(CostModel, LearnsWhatAnErrorLeaves) {
   EXPECT_EQ(costs.simplified(surface, parameters, 1).triangles, 1000U);
 }
 
+TEST(CostModel, FilesThatHoldTheMeshExactlyAreCertifiedOnce) {
+  const SurfaceSize surface = {1'000'000, 500'000};
+  const auto certifying_ms = [&](const std::vector<MeshFormat>& formats) {
+    JobParameters parameters;
+    parameters.formats = formats;
+    const double without = CostModel().milliseconds(surface, surface, 1000, parameters);
+    parameters.certify = true;
+    return CostModel().milliseconds(surface, surface, 1000, parameters) - without;
+  };
+  const double once = certifying_ms({MeshFormat::kStl});
+  EXPECT_NEAR(certifying_ms({MeshFormat::kStl, MeshFormat::kPly, MeshFormat::kObj}), once, 1e-6);
+  EXPECT_NEAR(certifying_ms({MeshFormat::kDrc}), once, 1e-6);
+  EXPECT_NEAR(certifying_ms({MeshFormat::kDrc, MeshFormat::kStl, MeshFormat::kGlb}), 3 * once,
+              1e-6);
+}
+
 TEST(CostModel, LevelsOfDetailTakeTime) {
   JobParameters parameters;
   parameters.formats = {MeshFormat::kGlb};

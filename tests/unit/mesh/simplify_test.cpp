@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "server/mesh/distance.h"
+#include "server/mesh/measure.h"
 #include "server/mesh/separate.h"
 #include "server/mesh/smooth.h"
 #include "server/mesh/topology.h"
@@ -166,6 +167,62 @@ TEST(Simplify, ReachesANumberOfTriangles) {
     EXPECT_TRUE(effect.reached_triangles);
     EXPECT_EQ(measure_topology(mesh, {}), measure_topology(handles(true), {}));
   }
+}
+
+// Two of three and of four samples a side.
+Mesh two_cubes() {
+  auto samples = test::constant<std::uint8_t>(0, {10, 14, 17});
+  for (std::uint32_t k = 0; k < 9; ++k) {
+    for (std::uint32_t j = 0; j < 9; ++j) {
+      for (std::uint32_t i = 0; i < 9; ++i) {
+        const auto [low, high] = std::minmax({i, j, k});
+        if ((low >= 1 && high < 4) || low >= 5) samples.at(i, j, k) = 1;
+      }
+    }
+  }
+  return test::extracted(samples, {0.5, Scheme::kSix, Interpolation::kLinear, true});
+}
+
+// As sets of vertices, each is there once: none lie back to back.
+void expect_no_doubles(const Mesh& mesh) {
+  std::vector<Triangle> triangles(mesh.triangles.begin(), mesh.triangles.end());
+  for (Triangle& triangle : triangles) std::ranges::sort(triangle);
+  std::ranges::sort(triangles);
+  EXPECT_TRUE(std::ranges::adjacent_find(triangles) == triangles.end());
+}
+
+TEST(Simplify, ReachesEveryNumberThatTheSurfaceCanHave) {
+  constexpr std::uint64_t kLeast = 8;  // two tetrahedra
+  const Topology before = measure_topology(two_cubes(), {});
+  for (std::uint64_t triangles = 1; triangles <= 100; ++triangles) {
+    SCOPED_TRACE(triangles);
+    Mesh mesh = two_cubes();
+    const SimplificationEffect effect = simplify({.triangles = triangles}, {}, mesh);
+    EXPECT_EQ(mesh.triangles.size(), effect.triangles_after);
+    EXPECT_LE(mesh.triangles.size(), std::max(triangles, kLeast));
+    EXPECT_EQ(effect.reached_triangles, triangles >= kLeast);
+    EXPECT_EQ(effect.is_least, triangles < kLeast);
+    EXPECT_EQ(measure_topology(mesh, {}), before);
+    EXPECT_TRUE(test::is_sound(test::surface_of(mesh)));
+    EXPECT_GT(measure_extent(mesh, {}).volume_mm3, 0);
+    expect_no_doubles(mesh);
+    expect_layers(mesh);
+  }
+}
+
+TEST(Simplify, GoesOnUntilTheSurfaceNeedsAllThatIsLeft) {
+  const Topology before = measure_topology(half_ball(false), {});
+  Mesh open = half_ball(false);
+  EXPECT_TRUE(simplify({.triangles = 4}, {}, open).is_least);
+  EXPECT_EQ(measure_topology(open, {}), before);
+  EXPECT_LE(open.triangles.size(), before.boundary_edges);  // which all stay
+  Mesh holes = handles(true);
+  EXPECT_TRUE(simplify({.triangles = 4}, {}, holes).is_least);
+  EXPECT_EQ(measure_topology(holes, {}), measure_topology(handles(true), {}));
+  EXPECT_LT(holes.triangles.size(), 400U);
+  expect_no_doubles(holes);
+  Mesh near = half_ball(false);
+  EXPECT_FALSE(simplify({.max_error_mm = 0.01, .triangles = 4}, {}, near).is_least);
 }
 
 TEST(Simplify, SaysWhichOfErrorAndTrianglesHasBound) {

@@ -1,4 +1,5 @@
 // Simplified walls between labels.
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <vector>
@@ -87,6 +88,26 @@ TEST(SimplifyWalls, ReachANumberOfTriangles) {
   EXPECT_TRUE(effect.reached_triangles);
   EXPECT_LE(surface.mesh.triangles.size(), aim);
   EXPECT_EQ(surface.sides.size(), surface.mesh.triangles.size());
+}
+
+TEST(SimplifyWalls, LeaveEachLabelASurfaceWhateverTheNumber) {
+  const SeparateOptions options = {.labels = {1, 2, 3}, .close = true};
+  const SeparatingSurface original = smooth_cells(4, options);
+  for (const std::uint64_t aim : {1, 4, 7, 10, 20, 50, 100}) {
+    SCOPED_TRACE(aim);
+    SeparatingSurface surface = smooth_cells(4, options);
+    const SimplificationEffect effect = simplify({.triangles = aim}, {}, surface);
+    EXPECT_EQ(effect.reached_triangles, surface.mesh.triangles.size() <= aim);
+    EXPECT_EQ(effect.is_least, !effect.reached_triangles);
+    for (std::size_t number = 1; number <= 3; ++number) {
+      const Mesh after = label_mesh(surface, number);
+      EXPECT_EQ(measure_topology(after, {}), measure_topology(label_mesh(original, number), {}));
+      std::vector<Triangle> triangles(after.triangles.begin(), after.triangles.end());
+      for (Triangle& triangle : triangles) std::ranges::sort(triangle);
+      std::ranges::sort(triangles);
+      EXPECT_TRUE(std::ranges::adjacent_find(triangles) == triangles.end()) << number;
+    }
+  }
 }
 
 TEST(SimplifyWalls, AreTheSameOnAnyNumberOfThreads) {

@@ -540,8 +540,10 @@ class MeshSummarySimplified(TypedDict):
     """Only for a job with max_error_mm or triangles."""
 
     triangles_before: int
-    #: What stopped the simplification: the error or the number of triangles.
-    bound_by: Literal['error', 'triangles']
+    #: What stopped the simplification: the error, the number of triangles, or, if there are more
+    #: than triangles, the topology. Fewer would open or fold the surface, or change its boundary,
+    #: junction curves or handles: a closed connected component has at least 4 triangles.
+    bound_by: Literal['error', 'triangles', 'topology']
 
 
 class MeshSummaryVolumeMm3(TypedDict):
@@ -605,9 +607,11 @@ class MeshSummary(TypedDict):
     #: For a job by labels, in ascending order. Lists of jobs leave it out.
     labels: NotRequired[Sequence[LabelSummary]]
     #: The distance between the files and the extracted surface, before smoothing. Only for a job
-    #: with certify. The bytes of each file are decoded by an independent reader. The distance is
-    #: measured at all vertices and at the centres of all triangles. It is the exact distance from
-    #: each point to the triangles of the other surface. Distances are stored in single precision.
+    #: with certify. The bytes of drc and glb, which round coordinates, are decoded by an
+    #: independent reader. All other formats hold the mesh exactly, so the mesh is measured once
+    #: for all of them. The distance is measured at all vertices and at the centres of all
+    #: triangles. It is the exact distance from each point to the triangles of the other surface.
+    #: Distances are stored in single precision.
     certificate: NotRequired[MeshCertificate]
 
 
@@ -624,12 +628,14 @@ class MeshCertificateBudgetMm(TypedDict):
 
 class MeshCertificate(TypedDict):
     """The distance between the files and the extracted surface, before smoothing. Only for a
-    job with certify. The bytes of each file are decoded by an independent reader. The distance
-    is measured at all vertices and at the centres of all triangles. It is the exact distance
-    from each point to the triangles of the other surface. Distances are stored in single
-    precision."""
+    job with certify. The bytes of drc and glb, which round coordinates, are decoded by an
+    independent reader. All other formats hold the mesh exactly, so the mesh is measured once
+    for all of them. The distance is measured at all vertices and at the centres of all
+    triangles. It is the exact distance from each point to the triangles of the other surface.
+    Distances are stored in single precision."""
 
-    #: The file with the largest distance. The distances are those of this file.
+    #: The file with the largest distance. The distances are those of this file. Of several files
+    #: that hold the mesh exactly, the first.
     file: MeshFormat
     #: The largest distance in both directions.
     max_mm: float
@@ -1012,8 +1018,8 @@ class JobOptions(TypedDict, total=False):
         millimetres, in both directions. The samples are all vertices and the centres of all
         triangles; other points may be farther away. Smoothing may use half of it.
         Simplification then removes as many triangles as the rest allows, and Draco's
-        coordinates get as many bits as that takes. The error is measured on the files' own
-        bytes: see certify, which is switched on.
+        coordinates get as many bits as that takes. The error is measured on what the files
+        hold: see certify, which is switched on.
 
     triangles
         Simplify the surface to at most this many triangles. If max_error_mm is given too, the

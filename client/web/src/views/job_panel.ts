@@ -44,7 +44,11 @@ export function makeVariant(job: Job): (variant: Partial<JobParameters>) => void
 
 function trianglesText({ triangles, simplified }: MeshSummary): Child {
   if (!simplified) return formatCount(triangles);
-  const bound = { error: 'stopped at the allowed error', triangles: 'stopped at the requested number' }[simplified.bound_by];
+  const bound = {
+    error: 'stopped at the allowed error',
+    triangles: 'stopped at the requested number',
+    topology: 'fewer would open or fold the surface, or change its boundary',
+  }[simplified.bound_by];
   return h(
     'span',
     { title: `Simplification ${bound}` },
