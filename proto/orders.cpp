@@ -3,6 +3,8 @@
 #include <array>
 #include <set>
 
+#include <nlohmann/json.hpp>
+
 #include "base/text.h"
 #include "proto/json.h"
 #include "proto/json_values.h"
@@ -140,13 +142,11 @@ bool is_uid(std::string_view text) {
 std::string to_json(const Order& order) { return json_values::to_text(order); }
 
 std::string to_json(const std::vector<Order>& orders, const std::string& next) {
-  return json_values::page("orders", json_values::write(orders), next);
+  return json_values::page("orders", orders, next);
 }
 
 std::string to_json(const std::vector<PacsStatus>& pacs) {
-  Json json;
-  json_values::write_field(json, "pacs", pacs);
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_values::object("pacs", pacs);
 }
 
 std::string to_callback_json(const Order& order) {
@@ -162,7 +162,7 @@ std::string to_callback_json(const Order& order) {
   if (order.error) {
     json["error"] = {{"type", order.error->type}, {"title", order.error->title}};
   }
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return dump(json);
 }
 
 std::string to_json(const OrderRequest& request) {
@@ -175,7 +175,7 @@ std::string to_json(const OrderRequest& request) {
   if (request.send) json_values::write_field(json, "send", *request.send);
   if (request.priority) json_values::write_field(json, "priority", *request.priority);
   if (request.callback) json["callback"] = {{"url", request.callback->url}};
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return dump(json);
 }
 
 Order order_from_json(std::string_view text) { return json_values::from_text<Order>(text); }
