@@ -124,7 +124,9 @@ void visit(Is<Volume> auto& self, auto&& field) {
   }
 }
 
-void visit(Is<Callback> auto& self, auto&& field) { field(Parameter{.name = "url"}, self.url); }
+void visit(Is<Callback> auto& self, auto&& field) {
+  field(Parameter{.name = "url", .is_required = true}, self.url);
+}
 
 void visit(Is<Timing> auto& self, auto&& field) {
   field("queue", self.queue);
