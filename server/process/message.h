@@ -55,7 +55,8 @@ class ReadLine {
     try {
       read();
     } catch (const Error& error) {
-      throw error.with_detail(std::string("A message between processes ") + error.what() + '.');
+      throw error.with_detail(std::string("A message between processes is malformed: it ") +
+                              error.what() + '.');
     }
   }
 
