@@ -2,6 +2,7 @@
 // it.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <new>
 #include <string>
@@ -44,6 +45,21 @@ inline Easy make_easy() {
   Easy easy(curl_easy_init());
   if (!easy) throw Error(ErrorCode::kInternal, "libcurl cannot be used");
   return easy;
+}
+
+// Connections go straight to the server that was named: volumes and secrets must not pass by a
+// machine that a proxy of the environment or a redirect names. `authorities` is a file of trusted
+// certificates; empty: the system's.
+inline void connect_directly(CURL* easy, const std::filesystem::path& authorities) {
+  curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, "http,https");
+  curl_easy_setopt(easy, CURLOPT_FOLLOWLOCATION, 0L);
+  curl_easy_setopt(easy, CURLOPT_PROXY, "");
+  curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
+  curl_easy_setopt(easy, CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
+  if (authorities.empty()) return;
+  curl_easy_setopt(easy, CURLOPT_CAINFO, authorities.c_str());
+  // libcurl would trust the system's folder of certificates besides.
+  curl_easy_setopt(easy, CURLOPT_CAPATH, static_cast<char*>(nullptr));
 }
 
 // Adds a header's line, which holds no control characters.

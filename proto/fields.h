@@ -1,11 +1,9 @@
 // The fields of every type that has a JSON form, each name once: `visit(value, field)` calls
 // field(name, member) for each, in the order in which they are written. Those of a job's parameters
-// are in parameters.h. Private to this folder.
+// are in parameters.h. For json_values.h and request_reader.h.
 #pragma once
 
 #include <type_traits>
-
-#include <nlohmann/json.hpp>
 
 #include "proto/error.h"
 #include "proto/parameters.h"
@@ -13,10 +11,17 @@
 
 namespace isomesh {
 
-using Json = nlohmann::ordered_json;
-
 // The word for all labels that a volume has.
 inline constexpr const char* kAllLabels = "all";
+
+void visit(Is<RawDescription> auto& self, auto&& field) {
+  field("dims", self.dims);
+  field("type", self.type);
+  field("origin", self.geometry.origin);
+  field("spacing", self.geometry.spacing);
+  field("direction", self.geometry.direction);
+  field("big_endian", self.big_endian);
+}
 
 void visit(Is<Preset> auto& self, auto&& field) {
   field("name", self.name);
@@ -119,7 +124,9 @@ void visit(Is<Volume> auto& self, auto&& field) {
   }
 }
 
-void visit(Is<Callback> auto& self, auto&& field) { field(Parameter{.name = "url"}, self.url); }
+void visit(Is<Callback> auto& self, auto&& field) {
+  field(Parameter{.name = "url", .is_required = true}, self.url);
+}
 
 void visit(Is<Timing> auto& self, auto&& field) {
   field("queue", self.queue);

@@ -5,10 +5,9 @@
 namespace isomesh {
 using json_values::from_record;
 using json_values::from_text;
+using json_values::object;
 using json_values::page;
 using json_values::to_text;
-using json_values::write;
-using json_values::write_field;
 
 std::string to_json(const Volume& volume) { return to_text(volume); }
 std::string to_json(const Job& job) { return to_text(job); }
@@ -21,29 +20,25 @@ std::string to_json(const Estimate& estimate) { return to_text(estimate); }
 std::string to_json(const JobEvent& event) { return to_text(event); }
 
 std::string to_json(const std::vector<Volume>& volumes, const std::string& next) {
-  return page("volumes", write(volumes), next);
+  return page("volumes", volumes, next);
 }
 
 std::string to_json(const std::vector<UploadedVolume>& volumes) {
-  Json list;
-  write_field(list, "volumes", volumes);
-  return list.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return object("volumes", volumes);
 }
 
 std::string to_json(const std::vector<Job>& jobs, const std::string& next) {
-  return page("jobs", write(jobs), next);
+  return page("jobs", jobs, next);
 }
 
 std::string volume_name_to_json(const std::optional<std::string>& name) {
-  Json body;
-  write_field(body, "name", name);
-  return body.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return object("name", name);
 }
 
 std::string to_record(const Volume& volume) {
-  Json record = write(volume);
-  if (!volume.labels.empty()) write_field(record, "labels", volume.labels);
-  return record.dump(-1, ' ', false, Json::error_handler_t::replace);
+  JsonTree record;
+  json_values::write_record(record.root(), volume);
+  return dump(record.root());
 }
 
 Volume volume_from_record(std::string_view text) { return from_record<Volume>(text); }

@@ -1,18 +1,19 @@
-// JSON <-> types of which `visit` tells the fields, for the sources of this folder alone.
+// JSON <-> types of which `visit` tells the fields: one writer and one reader for requests,
+// answers, records and the messages between processes. They throw as json_tree.h does.
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
-#include <utility>
-
-#include <nlohmann/json.hpp>
+#include <vector>
 
 #include "base/text.h"
 #include "proto/fields.h"
+#include "proto/json_tree.h"
 
 namespace isomesh::json_values {
 
@@ -23,73 +24,115 @@ constexpr bool kIsPerFormat<std::map<MeshFormat, T>> = true;
 template <class T>
 constexpr bool kIsPerLabel = std::is_same_v<T, LabelTexts> || std::is_same_v<T, LabelValues>;
 
+// An enumeration whose values have no names crosses as a number. `last_of(value)` is its last one.
+template <class T>
+concept Numbered = Enumeration<T> && requires(T value) {
+  last_of(value);
+};
+template <class T>
+concept Path = requires(T value) {
+  value.native();
+};
+template <class T>
+concept Duration = requires(T value) {
+  value.count();
+};
+
 // --- Writing -------------------------------------------------------------------------------------
 
 template <class T>
-Json write(const T& value);
+void write(Json& place, const T& value);
 
 template <class T>
-Json write_optional(const std::optional<T>& value) {
-  return value ? write(*value) : Json(nullptr);
+void write_optional(Json& place, const std::optional<T>& value) {
+  value ? write(place, *value) : assign_null(place);
 }
 
 template <class T>
 void write_field(Json& object, const char* name, const T& value) {
-  object[name] = write(value);
+  write(member(object, name), value);
 }
 
 template <class T>
 void write_field(Json& object, const char* name, const std::optional<T>& value) {
-  object[name] = write_optional(value);
+  write_optional(member(object, name), value);
 }
 
 template <class T>
 void write_field(Json& object, const Parameter& parameter, const std::optional<T>& value) {
+  Json& place = member(object, parameter.name);
   const bool has_word = !value && parameter.when_empty != nullptr;
-  object[parameter.name] = has_word ? Json(parameter.when_empty) : write_optional(value);
+  has_word ? assign(place, std::string_view(parameter.when_empty)) : write_optional(place, value);
 }
 
 template <class T>
-Json write(const T& value) {
-  if constexpr (std::is_same_v<T, Scheme>) {
-    return static_cast<int>(value);
+void write(Json& place, const T& value) {
+  if constexpr (std::is_same_v<T, Scheme> || Numbered<T>) {
+    assign(place, static_cast<std::int64_t>(value));
   } else if constexpr (Enumeration<T>) {
-    return std::string(to_string(value));
+    assign(place, to_string(value));
   } else if constexpr (kIsPerFormat<T>) {
-    Json object = Json::object();
-    for (const auto& [format, file] : value) object[std::string(to_string(format))] = write(file);
-    return object;
+    make_object(place);
+    for (const auto& [format, file] : value) write(member(place, to_string(format)), file);
   } else if constexpr (kIsPerLabel<T>) {
-    Json object = Json::object();
-    for (const auto& [label, text] : value) object[std::to_string(label)] = write(text);
-    return object;
+    make_object(place);
+    for (const auto& [label, text] : value) write(member(place, std::to_string(label)), text);
   } else if constexpr (std::is_same_v<T, LabelChoice>) {
-    return value.is_all() ? Json(kAllLabels) : write(value.values);
-  } else if constexpr (std::is_arithmetic_v<T> || std::is_same_v<T, std::string>) {
-    return Json(value);
+    value.is_all() ? assign(place, std::string_view(kAllLabels)) : write(place, value.values);
+  } else if constexpr (std::is_same_v<T, bool>) {
+    assign(place, value);
+  } else if constexpr (std::is_floating_point_v<T>) {
+    assign(place, static_cast<double>(value));
+  } else if constexpr (std::is_unsigned_v<T>) {
+    assign(place, std::uint64_t{value});
+  } else if constexpr (std::is_integral_v<T>) {
+    assign(place, std::int64_t{value});
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    assign(place, std::string_view(value));
+  } else if constexpr (Path<T>) {
+    assign(place, std::string_view(value.native()));
+  } else if constexpr (Duration<T>) {
+    assign(place, std::int64_t{value.count()});
   } else if constexpr (requires { value.begin(); }) {
-    Json array = Json::array();
-    for (const auto& element : value) array.push_back(write(element));
-    return array;
+    make_array(place);
+    for (const auto& element : value) write(append(place), element);
   } else {
-    Json object = Json::object();
-    visit(value, [&](const auto& name, const auto& member) { write_field(object, name, member); });
-    return object;
+    make_object(place);
+    visit(value, [&](const auto& name, const auto& member) { write_field(place, name, member); });
   }
 }
 
 template <class T>
 std::string to_text(const T& value) {
-  // A volume's name or a message may hold bytes that are not UTF-8: replaced, never thrown on.
-  return write(value).dump(-1, ' ', false, Json::error_handler_t::replace);
+  JsonTree tree;
+  write(tree.root(), value);
+  return dump(tree.root());
 }
 
-inline std::string page(const char* name, Json items, const std::string& next) {
-  return Json{{name, std::move(items)}, {"next", next.empty() ? Json(nullptr) : Json(next)}}.dump(
-      -1, ' ', false, Json::error_handler_t::replace);
+// {"NAME": value}
+template <class T>
+std::string object(const char* name, const T& value) {
+  JsonTree tree;
+  write_field(tree.root(), name, value);
+  return dump(tree.root());
 }
 
-// --- Reading answers -----------------------------------------------------------------------------
+// {"NAME": [...], "next": cursor}; `next` is null on the last page.
+template <class T>
+std::string page(const char* name, const std::vector<T>& items, const std::string& next) {
+  JsonTree tree;
+  write_field(tree.root(), name, items);
+  write_field(tree.root(), "next", next.empty() ? std::nullopt : std::optional(next));
+  return dump(tree.root());
+}
+
+// A volume with its labels.
+inline void write_record(Json& place, const Volume& volume) {
+  write(place, volume);
+  if (!volume.labels.empty()) write_field(place, "labels", volume.labels);
+}
+
+// --- Reading -------------------------------------------------------------------------------------
 
 template <class T>
 void read(const Json& json, T& value);
@@ -99,25 +142,19 @@ constexpr bool kIsOptional = false;
 template <class T>
 constexpr bool kIsOptional<std::optional<T>> = true;
 
-// Throws as nlohmann's own readers do, where those would take another kind for an empty one.
-inline void check_kind(bool right) {
-  if (!right)
-    throw Error(ErrorCode::kInternal, "the server's response has a member of the wrong type");
-}
-
 inline bool may_be_absent(const char* /*name*/) { return false; }
 inline bool may_be_absent(const Parameter& parameter) { return parameter.may_be_absent; }
 
 // What a label is called as a member's name.
 inline std::int64_t label_from(const std::string& text) {
   const auto label = parse_int64(text);
-  check_kind(label.has_value());
+  if (!label) throw_wrong_kind();
   return *label;
 }
 
 template <class T>
 void read_field(const Json& json, std::optional<T>& value) {
-  if (json.is_null() || (json.is_string() && std::is_same_v<T, double>)) {
+  if (is_null(json) || (is_string(json) && std::is_same_v<T, double>)) {
     value.reset();
     return;
   }
@@ -130,95 +167,115 @@ void read_field(const Json& json, T& value) {
 }
 
 template <class T>
+void read_members(const Json& json, T& value) {
+  check_object(json);
+  visit(value, [&](const auto& name, auto& member) {
+    // RFC 9457 requires no member of a problem; lists of other things came after the first version,
+    // or are left out where they are empty.
+    using Member = std::remove_reference_t<decltype(member)>;
+    constexpr bool kMayHaveNoList = std::is_same_v<T, Volume> || std::is_same_v<T, MeshSummary> ||
+                                    std::is_same_v<T, Estimate> || std::is_same_v<T, DicomIdentity>;
+    constexpr bool kMayBeMissing = std::is_same_v<T, Problem> || kIsOptional<Member> ||
+                                   (kMayHaveNoList && !std::is_same_v<Member, std::string> &&
+                                    requires { member.emplace_back(); });
+    const char* const key = name;
+    if (const Json* found = find(json, key)) {
+      read_field(*found, member);
+    } else if (!kMayBeMissing && !may_be_absent(name)) {
+      throw Error(ErrorCode::kInternal, std::string("lacks ") + key);
+    }
+  });
+}
+
+template <class T>
 void read(const Json& json, T& value) {
   if constexpr (std::is_same_v<T, Scheme>) {
-    value = json.get<int>() == 5 ? Scheme::kFive : Scheme::kSix;
+    value = whole(json, 9) == 5 ? Scheme::kFive : Scheme::kSix;
+  } else if constexpr (Numbered<T>) {
+    value = static_cast<T>(whole(json, static_cast<std::uint64_t>(last_of(value))));
   } else if constexpr (Enumeration<T>) {
-    const auto known = from_string<T>(json.get<std::string>());
-    if (!known) throw Error(ErrorCode::kInternal, "the server's response has an unknown value");
+    const auto known = from_string<T>(text(json));
+    if (!known) throw Error(ErrorCode::kInternal, "has an unknown value");
     value = *known;
   } else if constexpr (kIsPerFormat<T>) {
-    check_kind(json.is_object());
-    for (const auto& [name, file] : json.items()) {
+    for_each_member(json, [&](const std::string& name, const Json& file) {
       if (const auto format = from_string<MeshFormat>(name)) read(file, value[*format]);
-    }
-  } else if constexpr (kIsPerLabel<T>) {
-    check_kind(json.is_object());
-    for (const auto& [name, text] : json.items()) read(text, value[label_from(name)]);
-  } else if constexpr (std::is_same_v<T, LabelChoice>) {
-    if (json != kAllLabels) read(json, value.values);
-  } else if constexpr (std::is_arithmetic_v<T> || std::is_same_v<T, std::string>) {
-    value = json.get<T>();
-  } else if constexpr (requires { value.emplace_back(); }) {
-    check_kind(json.is_array());
-    value.clear();
-    for (const auto& element : json) read(element, value.emplace_back());
-  } else if constexpr (requires { value.begin(); }) {
-    for (std::size_t i = 0; i < value.size(); ++i) read(json.at(i), value[i]);
-  } else {
-    check_kind(json.is_object());
-    visit(value, [&](const auto& name, auto& member) {
-      // RFC 9457 requires no member of a problem; lists of other things came after the first
-      // version, or are left out where they are empty.
-      using Member = std::remove_reference_t<decltype(member)>;
-      constexpr bool kMayHaveNoList = std::is_same_v<T, Volume> || std::is_same_v<T, MeshSummary> ||
-                                      std::is_same_v<T, Estimate> ||
-                                      std::is_same_v<T, DicomIdentity>;
-      constexpr bool kMayBeMissing = std::is_same_v<T, Problem> || kIsOptional<Member> ||
-                                     (kMayHaveNoList && !std::is_same_v<Member, std::string> &&
-                                      requires { member.emplace_back(); });
-      const char* const key = name;
-      if (const auto found = json.find(key); found != json.end()) {
-        read_field(*found, member);
-      } else if (!kMayBeMissing && !may_be_absent(name)) {
-        throw Error(ErrorCode::kInternal, std::string("the server's response lacks ") + key);
-      }
     });
+  } else if constexpr (kIsPerLabel<T>) {
+    for_each_member(json, [&](const std::string& name, const Json& of_label) {
+      read(of_label, value[label_from(name)]);
+    });
+  } else if constexpr (std::is_same_v<T, LabelChoice>) {
+    if (!is_string(json) || text(json) != kAllLabels) read(json, value.values);
+  } else if constexpr (std::is_same_v<T, bool>) {
+    value = boolean(json);
+  } else if constexpr (std::is_floating_point_v<T>) {
+    value = static_cast<T>(number(json));
+  } else if constexpr (std::is_unsigned_v<T>) {
+    value = static_cast<T>(whole(json, std::numeric_limits<T>::max()));
+  } else if constexpr (std::is_integral_v<T>) {
+    using Limits = std::numeric_limits<T>;
+    value = static_cast<T>(whole(json, std::int64_t{Limits::min()}, std::int64_t{Limits::max()}));
+  } else if constexpr (std::is_same_v<T, std::string> || Path<T>) {
+    value = text(json);
+  } else if constexpr (Duration<T>) {
+    typename T::rep count = 0;
+    read(json, count);
+    value = T(count);
+  } else if constexpr (requires { value.emplace_back(); }) {
+    value.clear();
+    const std::size_t size = array_size(json);
+    for (std::size_t i = 0; i < size; ++i) read(element(json, i), value.emplace_back());
+  } else if constexpr (requires { value.begin(); }) {
+    for (std::size_t i = 0; i < value.size(); ++i) read(element(json, i), value[i]);
+  } else {
+    read_members(json, value);
   }
 }
 
 template <class T>
 T from_text(std::string_view text, const char* list = nullptr) {
   try {
-    const Json json = Json::parse(text);
+    const JsonTree tree(text);
+    const Json* const json = list == nullptr ? &tree.root() : find(tree.root(), list);
+    if (json == nullptr) throw Error(ErrorCode::kInternal, std::string("lacks ") + list);
     T value{};
-    read(list ? json.at(list) : json, value);
+    read(*json, value);
     return value;
-  } catch (const Json::exception&) {
-    throw Error(ErrorCode::kInternal, "the server's response does not match the API");
-  }
-}
-
-// Adds the members that `defaults` has and `record` lacks, at every depth.
-inline void fill(Json& record, const Json& defaults) {
-  if (!record.is_object() || !defaults.is_object()) return;
-  for (const auto& [name, value] : defaults.items()) {
-    const auto found = record.find(name);
-    if (found == record.end()) {
-      record[name] = value;
-    } else {
-      fill(*found, value);
-    }
+  } catch (const Error& error) {
+    throw error.with_detail(std::string("the server's response ") + error.what());
   }
 }
 
 template <class T>
+void fill_with_defaults(Json& record) {
+  static const JsonTree defaults = [] {
+    JsonTree tree;
+    write(tree.root(), T{});
+    return tree;
+  }();
+  fill(record, defaults.root());
+}
+
+// Members that an older version did not write have their defaults.
+template <class T>
 T from_record(std::string_view text) {
   try {
-    Json json = Json::parse(text);
-    static const Json defaults = write(T{});
-    fill(json, defaults);
+    JsonTree tree(text);
+    check_object(tree.root());
+    fill_with_defaults<T>(tree.root());
     if constexpr (std::is_same_v<T, Job>) {
-      static const Json mesh_defaults = write(MeshSummary{});
-      fill(json["mesh"], mesh_defaults);
+      fill_with_defaults<MeshSummary>(member(tree.root(), "mesh"));
     }
     if constexpr (std::is_same_v<T, Volume>) {
-      if (json.contains("dicom")) fill(json["dicom"], write(DicomIdentity{}));
+      if (find(tree.root(), "dicom") != nullptr) {
+        fill_with_defaults<DicomIdentity>(member(tree.root(), "dicom"));
+      }
     }
     T value{};
-    read(json, value);
+    read(tree.root(), value);
     return value;
-  } catch (const Json::exception&) {
+  } catch (const Error&) {
     throw Error(ErrorCode::kInternal, "a record was not written by a version of this service");
   }
 }

@@ -1,4 +1,5 @@
-// The fields of orders, as fields.h has those of everything else. Private to this folder.
+// The fields of orders, as fields.h has those of everything else; those of requests have rows, for
+// request_reader.h. Private to this folder.
 #pragma once
 
 #include "proto/fields.h"
@@ -7,15 +8,15 @@
 namespace isomesh {
 
 void visit(Is<OrderSource> auto& self, auto&& field) {
-  field("pacs", self.pacs);
-  field("study", self.study);
-  field("series", self.series);
-  field("instances", self.instances);
+  field(Parameter{.name = "pacs", .is_required = true}, self.pacs);
+  field(Parameter{.name = "study", .is_required = true}, self.study);
+  field(Parameter{.name = "series", .is_required = true}, self.series);
+  field(Parameter{.name = "instances"}, self.instances);
 }
 
 void visit(Is<SendTarget> auto& self, auto&& field) {
-  field("pacs", self.pacs);
-  field("format", self.format);
+  field(Parameter{.name = "pacs", .is_required = true}, self.pacs);
+  field(Parameter{.name = "format"}, self.format);
 }
 
 void visit(Is<OrderResult> auto& self, auto&& field) {
@@ -44,6 +45,15 @@ void visit(Is<Order> auto& self, auto&& field) {
   field("created", self.created);
   field("finished", self.finished);
   field("error", self.error);
+}
+
+// Without `parameters`, which parse_order_parameters reads.
+void visit(Is<OrderRequest> auto& self, auto&& field) {
+  field(Parameter{.name = "source", .is_required = true}, self.source);
+  field(Parameter{.name = "rule"}, self.rule);
+  field(Parameter{.name = "send"}, self.send);
+  field(Parameter{.name = "priority"}, self.priority);
+  field(Parameter{.name = "callback"}, self.callback);
 }
 
 void visit(Is<OrderWork> auto& self, auto&& field) {

@@ -1,14 +1,22 @@
 #include "proto/orders.h"
 
 #include <array>
-#include <set>
+
+#include <nlohmann/json.hpp>
 
 #include "base/text.h"
 #include "proto/json.h"
 #include "proto/json_values.h"
 #include "proto/order_fields.h"
+#include "proto/request_reader.h"
 
 namespace isomesh {
+
+template <>
+constexpr bool kIsRequestObject<OrderSource> = true;
+template <>
+constexpr bool kIsRequestObject<SendTarget> = true;
+
 namespace {
 
 constexpr std::array kStates = {
@@ -25,87 +33,29 @@ Json object_of(std::string_view text, const std::string& what) {
   return json;
 }
 
-// Collects what is wrong with a request.
-class Faults {
- public:
-  void add(const std::string& field, const std::string& message) {
-    constexpr std::size_t kMost = 20;
-    constexpr std::size_t kLongestName = 64;
-    if (faults_.size() < kMost) faults_.push_back({field.substr(0, kLongestName), message});
-  }
-
-  void check_known(const Json& object, const std::string& prefix,
-                   const std::set<std::string>& known) {
-    for (const auto& [name, unused] : object.items()) {
-      if (!known.contains(name)) add(prefix + name, "is not a known member");
+// What is wrong with members whose type alone does not tell.
+void check(const Json& json, const OrderRequest& request, RequestReader& reader) {
+  for (const char* name : {"study", "series"}) {
+    const Json::json_pointer place(std::string("/source/") + name);
+    if (!json.contains(place) || !json[place].is_string()) continue;
+    if (!is_uid(json[place].get<std::string>())) {
+      reader.add(std::string("source.") + name,
+                 "must be a UID: numbers separated by dots, at most 64 characters");
     }
   }
-
-  std::string text(const Json& object, const std::string& prefix, const char* name) {
-    const auto found = object.find(name);
-    if (found == object.end()) {
-      add(prefix + name, "is required");
-    } else if (!found->is_string()) {
-      add(prefix + name, "must be a string");
-    } else {
-      return found->get<std::string>();
-    }
-    return "";
+  if (json.contains(Json::json_pointer("/source/instances"))) {
+    reader.add("source.instances", "is not a known member");
   }
-
-  std::string uid(const Json& object, const std::string& prefix, const char* name) {
-    std::string text = this->text(object, prefix, name);
-    if (object.contains(name) && object[name].is_string() && !is_uid(text)) {
-      add(prefix + name, "must be a UID: numbers separated by dots, at most 64 characters");
-    }
-    return text;
-  }
-
-  void throw_if_any() {
-    if (!faults_.empty()) throw invalid_parameters(std::move(faults_));
-  }
-
- private:
-  std::vector<FieldError> faults_;
-};
-
-OrderSource read_source(const Json& body, Faults& faults) {
-  const auto found = body.find("source");
-  if (found == body.end() || !found->is_object()) {
-    faults.add("source", "must be an object with pacs, study and series");
-    return {};
-  }
-  faults.check_known(*found, "source.", {"pacs", "study", "series"});
-  return {.pacs = faults.text(*found, "source.", "pacs"),
-          .study = faults.uid(*found, "source.", "study"),
-          .series = faults.uid(*found, "source.", "series")};
-}
-
-std::vector<SendTarget> read_targets(const Json& list, Faults& faults) {
-  std::vector<SendTarget> targets;
-  if (!list.is_array()) {
-    faults.add("send", "must be a list of objects with pacs and format");
-    return targets;
-  }
-  for (const Json& each : list) {
-    if (!each.is_object()) {
-      faults.add("send", "must be a list of objects with pacs and format");
-      continue;
-    }
-    faults.check_known(each, "send.", {"pacs", "format"});
-    targets.push_back({.pacs = faults.text(each, "send.", "pacs")});
-    if (each.contains("format") && each["format"] != "stl") {
-      faults.add("send.format", "must be \"stl\": no other format can be sent to a PACS");
+  for (const SendTarget& target : request.send.value_or(std::vector<SendTarget>())) {
+    if (target.format != MeshFormat::kStl) {
+      reader.add("send.format", "must be \"stl\": no other format can be sent to a PACS");
     }
   }
-  return targets;
-}
-
-std::optional<Priority> read_priority(const Json& json, Faults& faults) {
-  const auto known =
-      json.is_string() ? from_string<Priority>(json.get<std::string>()) : std::nullopt;
-  if (!known) faults.add("priority", "must be " + names_of<Priority>());
-  return known;
+  for (const char* name : {"parameters", "send"}) {
+    if (!request.rule && !json.contains(name)) {
+      reader.add(name, "is required unless rule is given");
+    }
+  }
 }
 
 }  // namespace
@@ -140,13 +90,11 @@ bool is_uid(std::string_view text) {
 std::string to_json(const Order& order) { return json_values::to_text(order); }
 
 std::string to_json(const std::vector<Order>& orders, const std::string& next) {
-  return json_values::page("orders", json_values::write(orders), next);
+  return json_values::page("orders", orders, next);
 }
 
 std::string to_json(const std::vector<PacsStatus>& pacs) {
-  Json json;
-  json_values::write_field(json, "pacs", pacs);
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_values::object("pacs", pacs);
 }
 
 std::string to_callback_json(const Order& order) {
@@ -162,7 +110,7 @@ std::string to_callback_json(const Order& order) {
   if (order.error) {
     json["error"] = {{"type", order.error->type}, {"title", order.error->title}};
   }
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return dump(json);
 }
 
 std::string to_json(const OrderRequest& request) {
@@ -175,7 +123,7 @@ std::string to_json(const OrderRequest& request) {
   if (request.send) json_values::write_field(json, "send", *request.send);
   if (request.priority) json_values::write_field(json, "priority", *request.priority);
   if (request.callback) json["callback"] = {{"url", request.callback->url}};
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return dump(json);
 }
 
 Order order_from_json(std::string_view text) { return json_values::from_text<Order>(text); }
@@ -193,31 +141,18 @@ OrderWork order_work_from_record(std::string_view text) {
 }
 
 OrderRequest parse_order_request(std::string_view body) {
-  const Json json = object_of(body.empty() ? "null" : body, "the body");
-  Faults faults;
-  faults.check_known(json, "", {"source", "rule", "parameters", "send", "priority", "callback"});
+  RequestReader reader;
+  const Json json = request_body(body, reader);
+  Json others = json;
   OrderRequest request;
-  request.source = read_source(json, faults);
-  if (json.contains("rule")) request.rule = faults.text(json, "", "rule");
-  if (json.contains("parameters")) {
-    if (!json["parameters"].is_object()) faults.add("parameters", "must be an object");
-    request.parameters = json["parameters"].dump();
+  if (const auto parameters = others.find("parameters"); parameters != others.end()) {
+    if (!parameters->is_object()) reader.add("parameters", "must be an object");
+    request.parameters = dump(*parameters);
+    others.erase(parameters);
   }
-  if (json.contains("send")) request.send = read_targets(json["send"], faults);
-  if (json.contains("priority")) request.priority = read_priority(json["priority"], faults);
-  if (json.contains("callback")) {
-    const Json& callback = json["callback"];
-    if (!callback.is_object()) {
-      faults.add("callback", "must be an object with url");
-    } else {
-      faults.check_known(callback, "callback.", {"url"});
-      request.callback = Callback{faults.text(callback, "callback.", "url")};
-    }
-  }
-  if (!request.rule && !request.parameters)
-    faults.add("parameters", "is required unless rule is given");
-  if (!request.rule && !request.send) faults.add("send", "is required unless rule is given");
-  faults.throw_if_any();
+  reader.read_whole_object(others, request, "");
+  check(json, request, reader);
+  reader.throw_if_any();
   return request;
 }
 

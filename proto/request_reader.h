@@ -1,4 +1,5 @@
-// Reads the members of a request, by the table of parameters. Private to this folder.
+// Reads the members of a request by the rows of `visit`, such as the table of parameters. Private
+// to this folder.
 #pragma once
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -19,6 +21,10 @@
 #include "proto/json.h"
 
 namespace isomesh {
+
+// Types that a request has as objects: their `visit` has rows.
+template <class T>
+constexpr bool kIsRequestObject = ParameterGroup<T> || std::is_same_v<T, Callback>;
 
 // Collects the errors of all members, so that one response names them all.
 class RequestReader {
@@ -42,6 +48,17 @@ class RequestReader {
         add(prefix + name, "is not a known member");
       }
     }
+  }
+
+  // The same for a whole object: a member whose row says that it is required must be there.
+  template <class T>
+  void read_whole_object(const Json& json, T& value, const std::string& prefix) {
+    read_object(json, value, prefix);
+    visit(value, [&](const Parameter& parameter, const auto& /*member*/) {
+      if (parameter.is_required && !json.contains(parameter.name)) {
+        add(prefix + parameter.name, "is required");
+      }
+    });
   }
 
   void add(const std::string& field, const std::string& message) {
@@ -284,22 +301,37 @@ class RequestReader {
     return range;
   }
 
+  template <class T>
+  requires kIsRequestObject<T>
   void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
-                   ParameterGroup auto& value) {
+                   T& value) {
     if (!json.is_object()) return add(path, "must be an object");
-    read_object(json, value, path + ".");
+    read_whole_object(json, value, path + ".");
   }
 
-  void read_member(const Json& json, const std::string& path, const Parameter& /*parameter*/,
-                   std::optional<Callback>& value) {
-    if (json.is_null()) return value.reset();
-    if (!json.is_object()) return add(path, "must be an object");
-    read_object(json, value.emplace(), path + ".");
-    if (!json.contains("url")) add(path + ".url", "is required");
+  template <class T>
+  requires kIsRequestObject<T>
+  void read_member(const Json& json, const std::string& path, const Parameter& parameter,
+                   std::vector<T>& values) {
+    if (!json.is_array()) return add(path, "must be a list of objects");
+    for (const Json& element : json) read_member(element, path, parameter, values.emplace_back());
+  }
+
+  // Null is for members that may be nothing.
+  template <class T>
+  requires(!std::is_arithmetic_v<T>) void read_member(const Json& json, const std::string& path,
+                                                      const Parameter& parameter,
+                                                      std::optional<T>& value) {
+    if (json.is_null() && parameter.may_be_absent) return value.reset();
+    read_member(json, path, parameter, value.emplace());
   }
 
   Spelling spelling_ = nullptr;
   std::vector<FieldError> errors_;
 };
+
+// A request's body. Adds an error for each member that an object has twice: readers differ in which
+// one they use. Throws Error kInvalidParameter if the body is not one JSON object.
+Json request_body(std::string_view body, RequestReader& reader);
 
 }  // namespace isomesh

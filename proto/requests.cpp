@@ -63,7 +63,7 @@ Json::json_pointer pointer_to(std::string path) {
   return Json::json_pointer('/' + path);
 }
 
-// Finds members that an object has twice: readers differ in which one they use.
+// Finds members that an object has twice.
 class Repetitions {
  public:
   void see(Json::parse_event_t event, const Json& parsed) {
@@ -206,6 +206,15 @@ JobParameters read_parameters(const Json& json, bool with_volume, RequestReader&
   return parameters;
 }
 
+// The body of PATCH /v1/volumes/{id}.
+struct VolumeName {
+  std::optional<std::string> name;
+};
+
+void visit(VolumeName& self, auto&& field) {
+  field(Parameter{.name = "name", .is_required = true, .may_be_absent = true}, self.name);
+}
+
 // True for members of a body that a query lacks or spells differently.
 bool is_for_bodies(const std::string& name) {
   bool found = false;
@@ -253,10 +262,9 @@ std::string text_of(const Json& value) {
 
 }  // namespace
 
-JobParameters parse_job_parameters(std::string_view body) {
-  RequestReader reader;
+Json request_body(std::string_view body, RequestReader& reader) {
   Repetitions repetitions;
-  const Json json = Json::parse(
+  Json json = Json::parse(
       body,
       [&](int, Json::parse_event_t event, const Json& parsed) {
         repetitions.see(event, parsed);
@@ -267,25 +275,26 @@ JobParameters parse_job_parameters(std::string_view body) {
     throw Error(ErrorCode::kInvalidParameter, "the body must be one JSON object");
   }
   for (const std::string& name : repetitions.names()) reader.add(name, "is given twice");
-  return read_parameters(json, true, reader);
+  return json;
+}
+
+JobParameters parse_job_parameters(std::string_view body) {
+  RequestReader reader;
+  return read_parameters(request_body(body, reader), true, reader);
 }
 
 std::optional<std::string> parse_volume_name(std::string_view body) {
   constexpr std::size_t kLongest = 255;
-  const Json json = Json::parse(body, nullptr, false);
-  if (!json.is_object()) {
-    throw Error(ErrorCode::kInvalidParameter, "the body must be one JSON object");
+  RequestReader reader;
+  VolumeName request;
+  reader.read_whole_object(request_body(body, reader), request, "");
+  const std::optional<std::string>& name = request.name;
+  if (name &&
+      (trimmed(*name).empty() || name->size() > kLongest || has_control_characters(*name))) {
+    reader.add("name", "must be null or a text of 1 to 255 bytes on one line");
   }
-  for (const auto& [name, unused] : json.items()) {
-    if (name != "name") throw invalid_parameter(name.substr(0, 64), "is not a known member");
-  }
-  if (!json.contains("name")) throw invalid_parameter("name", "is required");
-  if (json["name"].is_null()) return std::nullopt;
-  const std::string name = json["name"].is_string() ? json["name"].get<std::string>() : "";
-  if (trimmed(name).empty() || name.size() > kLongest || has_control_characters(name)) {
-    throw invalid_parameter("name", "must be null or a text of 1 to 255 bytes on one line");
-  }
-  return std::string(trimmed(name));
+  reader.throw_if_any();
+  return name ? std::optional(std::string(trimmed(*name))) : std::nullopt;
 }
 
 JobParameters parse_job_parameters(const QueryParameters& query, VolumeIn volume_in) {

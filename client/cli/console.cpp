@@ -60,19 +60,11 @@ void tell_folders(const std::vector<std::filesystem::path>& files) {
   for (const std::filesystem::path& path : files) {
     std::error_code error;
     if (!std::filesystem::is_directory(path, error)) continue;
-    const auto [sent, left_out] = files_of_folder(path);
+    const std::vector<PackedFile> sent = files_of_upload(path);
     std::uint64_t bytes = 0;
     for (const PackedFile& file : sent) bytes += std::filesystem::file_size(file.path, error);
     complain("sending " + files_in_words(sent) + " of " + path.string() + ", " +
              human_bytes(bytes));
-    if (left_out.empty()) continue;
-    constexpr std::size_t kNamed = 3;
-    std::string names;
-    for (const PackedFile& file : std::span(left_out).first(std::min(kNamed, left_out.size()))) {
-      names += (names.empty() ? "" : ", ") + file.name;
-    }
-    if (left_out.size() > kNamed) names += ", ...";
-    complain("skipping " + files_in_words(left_out) + " that cannot be a volume: " + names);
   }
 }
 

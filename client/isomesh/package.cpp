@@ -4,11 +4,8 @@
 #include <array>
 #include <cstdio>
 #include <optional>
-#include <set>
 #include <string_view>
 #include <utility>
-
-#include <unistd.h>
 
 #include "base/files.h"
 #include "base/text.h"
@@ -24,32 +21,11 @@ constexpr std::size_t kBlock = 512;
 
 // --- Which files ---------------------------------------------------------------------------------
 
-bool is_hidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
-
-// Of what lies beside scans and is none; nothing that the server reads.
-constexpr auto kOtherSuffixes = std::to_array<std::string_view>(
-    {".txt",  ".md",  ".rst",   ".log",  ".csv",  ".tsv",  ".json", ".yaml", ".yml",
-     ".toml", ".ini", ".cfg",   ".html", ".htm",  ".pdf",  ".doc",  ".docx", ".xls",
-     ".xlsx", ".ppt", ".pptx",  ".odt",  ".ods",  ".tex",  ".png",  ".jpg",  ".jpeg",
-     ".gif",  ".bmp", ".svg",   ".webp", ".tif",  ".tiff", ".mp4",  ".avi",  ".mov",
-     ".mkv",  ".py",  ".ipynb", ".sh",   ".js",   ".c",    ".cpp",  ".h",    ".exe",
-     ".dll",  ".so",  ".o",     ".bval", ".bvec", ".drc",  ".glb",  ".gltf", ".stl",
-     ".ply",  ".obj", ".mtl",   ".3mf",  ".off",  ".vtk",  ".vtp",  ".gii"});
-
-bool has_other_suffix(const fs::path& path) {
-  const std::string suffix = lower(path.extension().string());
-  return std::ranges::find(kOtherSuffixes, suffix) != kOtherSuffixes.end();
-}
-
 std::vector<PackedFile> files_below(const fs::path& folder) {
   std::vector<PackedFile> files;
   std::error_code error;
   fs::recursive_directory_iterator at(folder, error);
   for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
-    if (is_hidden(at->path())) {
-      if (at->is_directory()) at.disable_recursion_pending();
-      continue;
-    }
     if (at->is_symlink() || !at->is_regular_file()) continue;
     files.push_back({at->path().lexically_relative(folder).generic_string(), at->path()});
     if (files.size() > kMostFiles) {
@@ -58,6 +34,9 @@ std::vector<PackedFile> files_below(const fs::path& folder) {
     }
   }
   if (error) throw Error(ErrorCode::kInvalidParameter, folder.string() + ": " + error.message());
+  if (files.empty()) {
+    throw Error(ErrorCode::kInvalidParameter, folder.string() + ": contains no files");
+  }
   std::ranges::sort(files, {}, &PackedFile::name);
   return files;
 }
@@ -75,23 +54,6 @@ std::vector<std::string> lines_of(const fs::path& path) {
     next = end + 1;
   }
   return lines;
-}
-
-// Whether a text begins with a number and a name on each line. The server reads such a table of
-// label names beside a label volume.
-bool is_label_text(const fs::path& path) {
-  if (lower(path.extension().string()) != ".txt") return false;
-  if (::access(path.c_str(), R_OK) != 0) return false;
-  std::size_t entries = 0;
-  for (const std::string& line : lines_of(path)) {
-    const bool is_comment =
-        line.starts_with('#') || line.starts_with('%') || line.starts_with("//");
-    if (line.empty() || is_comment) continue;
-    const auto parts = words(line);
-    if (parts.size() < 2 || !parse_int64(parts.front())) return false;
-    ++entries;
-  }
-  return entries > 0;
 }
 
 // The value of the field `name` where the line, "Name = value" or "name: value", is that field.
@@ -226,35 +188,8 @@ std::string lead_of(const Member& member) {
 
 }  // namespace
 
-FolderFiles files_of_folder(const std::filesystem::path& folder) {
-  FolderFiles result;
-  std::vector<PackedFile> all = files_below(folder);
-  std::set<fs::path> data;
-  for (const PackedFile& file : all) {
-    const std::string suffix = lower(file.path.extension().string());
-    if (suffix != ".mhd" && suffix != ".nhdr") continue;
-    for (const PackedFile& named : files_of_upload(file.path)) {
-      data.insert(named.path.lexically_normal());
-    }
-  }
-  for (PackedFile& file : all) {
-    std::error_code error;
-    const bool is_data = data.contains(file.path.lexically_normal());
-    const bool is_empty = fs::file_size(file.path, error) == 0;
-    const bool is_other = is_empty || (has_other_suffix(file.path) && !is_label_text(file.path));
-    (is_other && !is_data ? result.left_out : result.sent).push_back(std::move(file));
-  }
-  if (result.sent.empty()) {
-    throw Error(
-        ErrorCode::kInvalidParameter,
-        folder.string() + (result.left_out.empty() ? ": contains no files"
-                                                   : ": contains no files that could be a volume"));
-  }
-  return result;
-}
-
 std::vector<PackedFile> files_of_upload(const std::filesystem::path& path) {
-  if (fs::is_directory(path)) return files_of_folder(path).sent;
+  if (fs::is_directory(path)) return files_below(path);
   const std::string suffix = lower(path.extension().string());
   if (suffix == ".mhd") return header_and_data(path, '=', "elementdatafile");
   if (suffix == ".nhdr") return header_and_data(path, ':', "datafile");

@@ -19,23 +19,11 @@ struct PackedFile {
   std::filesystem::path path;
 };
 
-// The files of a folder, sorted by name.
-struct FolderFiles {
-  std::vector<PackedFile> sent;
-  std::vector<PackedFile> left_out;  // which cannot be part of a volume
-};
-
-// All regular files below the folder but hidden ones and links. Left out are those that are empty,
-// or whose suffix says that they are text, a program, a picture, a document or a mesh; a header's
-// own data is not, whatever it is called. Throws Error kInvalidParameter for a folder from which
-// there is nothing to send, or one of more than 20000 files.
-FolderFiles files_of_folder(const std::filesystem::path& folder);
-
-// The files that belong to an upload of `path`: of a folder those that files_of_folder sends; of a
-// MetaImage or NRRD header (.mhd, .nhdr) it and the files
-// beside it that it names, or that a pattern in it may name; of a NIfTI or Analyze header (.hdr) or
-// its image (.img) both; of any other file itself.
-// Throws as files_of_folder does.
+// The files that belong to an upload of `path`: of a folder all regular files below it, without
+// links, sorted by name (the server skips what is no part of a volume); of a MetaImage or NRRD
+// header (.mhd, .nhdr) it and the files beside it that it names, or that a pattern in it may name;
+// of a NIfTI or Analyze header (.hdr) or its image (.img) both; of any other file itself. Throws
+// Error kInvalidParameter for a folder without files, or one of more than 20000.
 std::vector<PackedFile> files_of_upload(const std::filesystem::path& path);
 // The same for several paths that are sent together: all of them as if they lay in one folder.
 // Throws also for two files of one name.

@@ -1,7 +1,6 @@
 #include "client/isomesh/transport.h"
 
 #include <algorithm>
-#include <exception>
 #include <memory>
 #include <new>
 #include <optional>
@@ -11,6 +10,7 @@
 #include <poll.h>
 
 #include "base/curl.h"
+#include "base/curl_transfer.h"
 #include "base/text.h"
 
 namespace isomesh {
@@ -92,7 +92,7 @@ class Transfer {
 
   HttpAnswer answer() {
     const std::optional<CURLcode> end = run();
-    if (failure_) std::rethrow_exception(failure_);
+    guard_.rethrow();
     if (!end) {
       if (options_.stop.stop_requested()) throw Error(ErrorCode::kCancelled, "interrupted");
       throw no_answer("the server did not respond in time", is_sending());
@@ -124,21 +124,14 @@ class Transfer {
   void set_connection() {
     set(CURLOPT_URL, (options_.server.origin + request_.target).c_str());
     set(CURLOPT_PATH_AS_IS, 1L);
-    set(CURLOPT_PROTOCOLS_STR, "http,https");
+    curl::connect_directly(easy_.get(), options_.authorities);
     set(CURLOPT_HTTP_VERSION, static_cast<long>(CURL_HTTP_VERSION_1_1));
-    set(CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
-    set(CURLOPT_PROXY, "");
-    set(CURLOPT_NOSIGNAL, 1L);
     // A transfer that is given up does not wait for the thread that looks up the server's name.
     set(CURLOPT_QUICK_EXIT, 1L);
     set(CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(options_.connect_timeout.count()));
     if (!options_.server.socket.empty()) {
       set(CURLOPT_UNIX_SOCKET_PATH, options_.server.socket.c_str());
     }
-    if (options_.authorities.empty()) return;
-    set(CURLOPT_CAINFO, options_.authorities.c_str());
-    // libcurl would trust the system's folder of certificates besides.
-    set(CURLOPT_CAPATH, static_cast<char*>(nullptr));
   }
 
   void set_request() {
@@ -213,25 +206,13 @@ class Transfer {
     return {"no response from " + options_.server_url + ": " + reason, broken};
   }
 
-  // An exception must not pass through libcurl, which is C. It ends the transfer, and `answer`
-  // throws it again.
-  template <class Action>
-  std::size_t guarded(std::size_t failed, const Action& action) {
-    try {
-      return action();
-    } catch (...) {
-      failure_ = std::current_exception();
-      return failed;
-    }
-  }
-
   // Lines of the answer's head, and of interim answers (1xx) ahead of it.
   static std::size_t on_head(char* line, std::size_t, std::size_t size, void* self) {
     auto& transfer = *static_cast<Transfer*>(self);
     const std::string_view text(line, size);
     transfer.head_bytes_ += size;
     if (transfer.head_bytes_ > kLongestHead) return 0;
-    return transfer.guarded(0, [&] {
+    return transfer.guard_(0, [&] {
       transfer.take_head(trimmed(text));
       return size;
     });
@@ -239,7 +220,7 @@ class Transfer {
 
   static std::size_t on_body(char* bytes, std::size_t, std::size_t size, void* self) {
     auto& transfer = *static_cast<Transfer*>(self);
-    return transfer.guarded(0, [&] {
+    return transfer.guard_(0, [&] {
       transfer.take({bytes, size});
       return size;
     });
@@ -247,7 +228,7 @@ class Transfer {
 
   static std::size_t on_source(char* bytes, std::size_t, std::size_t size, void* self) {
     auto& transfer = *static_cast<Transfer*>(self);
-    return transfer.guarded(CURL_READFUNC_ABORT, [&] { return transfer.provide({bytes, size}); });
+    return transfer.guard_(CURL_READFUNC_ABORT, [&] { return transfer.provide({bytes, size}); });
   }
 
   void take_head(std::string_view line) {
@@ -302,7 +283,7 @@ class Transfer {
   Easy easy_ = make_easy();
 
   HttpAnswer answer_;
-  std::exception_ptr failure_;
+  curl::Guard guard_;
   std::uint64_t provided_ = 0;  // of the source
   bool sink_has_begun_ = false;
   bool is_paused_ = false;  // the source waits until what the server says is read

@@ -144,11 +144,7 @@ class Callbacks::Sender {
     }
     CURL* easy = attempt.easy.get();
     curl_easy_setopt(easy, CURLOPT_URL, delivery.url.c_str());
-    curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, "http,https");
-    curl_easy_setopt(easy, CURLOPT_FOLLOWLOCATION, 0L);
-    curl_easy_setopt(easy, CURLOPT_PROXY, "");
-    curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
-    curl_easy_setopt(easy, CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
+    curl::connect_directly(easy, options_.authorities);
     curl_easy_setopt(easy, CURLOPT_TIMEOUT_MS, static_cast<long>(options_.timeout.count()));
     curl_easy_setopt(easy, CURLOPT_POSTFIELDS, delivery.body.data());
     curl_easy_setopt(easy, CURLOPT_POSTFIELDSIZE_LARGE,
@@ -162,9 +158,6 @@ class Callbacks::Sender {
     curl_easy_setopt(easy, CURLOPT_FRESH_CONNECT, 1L);
     curl_easy_setopt(easy, CURLOPT_FORBID_REUSE, 1L);
     curl_easy_setopt(easy, CURLOPT_PRIVATE, &attempt);
-    if (!options_.authorities.empty()) {
-      curl_easy_setopt(easy, CURLOPT_CAINFO, options_.authorities.c_str());
-    }
   }
 
   // Lets all attempts go on and ends those that have ended; returns how long nothing is to be done

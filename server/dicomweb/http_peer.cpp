@@ -1,11 +1,11 @@
 #include "server/dicomweb/http_peer.h"
 
 #include <cerrno>
-#include <exception>
 
 #include <fcntl.h>
 
 #include "base/curl.h"
+#include "base/curl_transfer.h"
 #include "base/descriptor.h"
 #include "base/files.h"
 #include "base/text.h"
@@ -31,10 +31,10 @@ std::string secret_in(const std::filesystem::path& file) {
   return secret;
 }
 
-// A transfer under way; libcurl is given pointers to it.
-class Transfer {
+// A request under way.
+class Exchange {
  public:
-  Transfer(const orders::PacsSettings& settings, const PeerRequest& request, std::stop_token stop)
+  Exchange(const orders::PacsSettings& settings, const PeerRequest& request, std::stop_token stop)
       : request_(request),
         stop_(std::move(stop)),
         target_(::open(request.answer.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600)),
@@ -45,9 +45,7 @@ class Transfer {
   }
 
   PeerAnswerHead perform() {
-    const CURLcode result = curl_easy_perform(easy_.get());
-    if (thrown_) std::rethrow_exception(thrown_);
-    if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "the transfer was stopped");
+    const CURLcode result = curl::Transfer(easy_.get(), callbacks(), stop_).perform();
     if (result != CURLE_OK) throw_failure(result);
     PeerAnswerHead head;
     long status = 0;
@@ -68,14 +66,7 @@ class Transfer {
   void set_connection(const orders::PacsSettings& settings) {
     CURL* easy = easy_.get();
     curl_easy_setopt(easy, CURLOPT_URL, (settings.dicomweb + request_.target).c_str());
-    curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, "http,https");
-    curl_easy_setopt(easy, CURLOPT_FOLLOWLOCATION, 0L);
-    curl_easy_setopt(easy, CURLOPT_PROXY, "");
-    curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
-    curl_easy_setopt(easy, CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
-    if (!settings.ca_file.empty()) {
-      curl_easy_setopt(easy, CURLOPT_CAINFO, settings.ca_file.c_str());
-    }
+    curl::connect_directly(easy, settings.ca_file);
     const auto timeout = static_cast<long>(settings.timeout.count());
     curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT, timeout);
     // Slow is not bad: only what stands still is given up. A PACS is silent while it stores what it
@@ -104,16 +95,25 @@ class Transfer {
       curl::append(headers_, "Expect:");
       curl_easy_setopt(easy, CURLOPT_POST, 1L);
       curl_easy_setopt(easy, CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(body->bytes));
-      curl_easy_setopt(easy, CURLOPT_READFUNCTION, read);
-      curl_easy_setopt(easy, CURLOPT_READDATA, this);
       curl_easy_setopt(easy, CURLOPT_UPLOAD_BUFFERSIZE, 512L * 1024);
     }
     curl_easy_setopt(easy, CURLOPT_HTTPHEADER, headers_.get());
-    curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, write);
-    curl_easy_setopt(easy, CURLOPT_WRITEDATA, this);
-    curl_easy_setopt(easy, CURLOPT_NOPROGRESS, 0L);
-    curl_easy_setopt(easy, CURLOPT_XFERINFOFUNCTION, is_over);
-    curl_easy_setopt(easy, CURLOPT_XFERINFODATA, this);
+  }
+
+  curl::TransferCallbacks callbacks() {
+    curl::TransferCallbacks callbacks;
+    if (request_.body != nullptr) callbacks.source = request_.body->read;
+    callbacks.sink = [this](std::span<const std::byte> bytes) {
+      received_ += bytes.size();
+      if (received_ > request_.most_bytes) {
+        throw Error(ErrorCode::kTooLarge, "the response of the PACS exceeds the " +
+                                              std::to_string(request_.most_bytes) +
+                                              " bytes that are accepted");
+      }
+      write_all(target_, bytes);
+      return true;
+    };
+    return callbacks;
   }
 
   [[noreturn]] static void throw_failure(CURLcode result) {
@@ -136,49 +136,10 @@ class Transfer {
     }
   }
 
-  // Exceptions do not cross libcurl: they are kept, and end the transfer.
-  template <class Run>
-  std::size_t guarded(std::size_t on_failure, const Run& run) {
-    try {
-      return run();
-    } catch (...) {
-      thrown_ = std::current_exception();
-      return on_failure;
-    }
-  }
-
-  static std::size_t read(char* buffer, std::size_t size, std::size_t count, void* self) {
-    auto& transfer = *static_cast<Transfer*>(self);
-    return transfer.guarded(CURL_READFUNC_ABORT, [&] {
-      return transfer.request_.body->read(std::as_writable_bytes(std::span(buffer, size * count)));
-    });
-  }
-
-  static std::size_t write(char* data, std::size_t size, std::size_t count, void* self) {
-    auto& transfer = *static_cast<Transfer*>(self);
-    return transfer.guarded(0, [&] {
-      const std::size_t bytes = size * count;
-      transfer.received_ += bytes;
-      if (transfer.received_ > transfer.request_.most_bytes) {
-        throw Error(ErrorCode::kTooLarge, "the response of the PACS exceeds the " +
-                                              std::to_string(transfer.request_.most_bytes) +
-                                              " bytes that are accepted");
-      }
-      write_all(transfer.target_, std::as_bytes(std::span(data, bytes)));
-      return bytes;
-    });
-  }
-
-  static int is_over(void* self, curl_off_t /*all*/, curl_off_t /*now*/, curl_off_t /*up_all*/,
-                     curl_off_t /*up_now*/) {
-    return static_cast<Transfer*>(self)->stop_.stop_requested() ? 1 : 0;
-  }
-
   const PeerRequest& request_;
   const std::stop_token stop_;
   const Descriptor target_;
   std::uint64_t received_ = 0;
-  std::exception_ptr thrown_;
   curl::Headers headers_;
   const curl::Easy easy_;  // last: knows all of the above
 };
@@ -186,7 +147,7 @@ class Transfer {
 }  // namespace
 
 PeerAnswerHead HttpPeer::send(const PeerRequest& request, const std::stop_token& stop) const {
-  return Transfer(settings_, request, stop).perform();
+  return Exchange(settings_, request, stop).perform();
 }
 
 }  // namespace isomesh::dicomweb

@@ -110,6 +110,8 @@ std::vector<Table> tables_beside(const Companions& companions) {
 
 }  // namespace
 
+bool is_label_table(const std::filesystem::path& path) { return !labels_of(path).empty(); }
+
 void take_labels_beside(const Companions& companions, Volume& volume) {
   const auto note =
       std::ranges::find(volume.notes, describe(NoteCode::kLooksLikeLabels).name, &Note::code);

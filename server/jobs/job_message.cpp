@@ -1,194 +1,97 @@
 #include "server/jobs/job_message.h"
 
-#include <vector>
-
-#include <nlohmann/json.hpp>
-
-#include "proto/json.h"
+#include "server/process/message.h"
 
 namespace isomesh::jobs {
+
+using process::ReadLine;
+
+constexpr JobOrder::Work last_of(JobOrder::Work /*value*/) { return JobOrder::Work::kCount; }
+
+void visit(Is<JobSetup> auto& self, auto&& field) { field("threads", self.threads); }
+
+void visit(Is<JobOrder> auto& self, auto&& field) {
+  field("work", self.work);
+  field("volume", self.volume.id);
+  field("notes", self.volume.notes);
+  field("parameters", self.parameters);
+  field("iso", self.iso);
+  field("certify", self.certify);
+  field("memory_bytes", self.memory_bytes);
+  field("disk_bytes", self.disk_bytes);
+}
+
+void visit(Is<JobProgress> auto& self, auto&& field) {
+  field("stage", self.stage);
+  field("share", self.share);
+  field("timing", self.timing);
+}
+
+void visit(Is<JobPiece> auto& self, auto&& field) {
+  field("file", self.file);
+  field("bytes", self.bytes);
+}
+
+void visit(Is<MadeMesh> auto& self, auto&& field) {
+  field("summary", self.summary);
+  field("timing", self.timing);
+}
+
+void visit(Is<CountedSurface> auto& self, auto&& field) {
+  field("triangles", self.size.triangles);
+  field("vertices", self.size.vertices);
+  field("layers", self.size.layers);
+  field("largest_layer", self.size.largest_layer);
+  field("labels", self.labels);
+}
+
 namespace {
 
-using Json = nlohmann::json;
+constexpr const char* kSetup = "setup";
+constexpr const char* kOrder = "order";
+constexpr const char* kCancel = "cancel";
+constexpr const char* kProgress = "progress";
+constexpr const char* kPiece = "piece";
+constexpr const char* kMade = "made";
+constexpr const char* kCounted = "counted";
+constexpr const char* kError = "error";
 
-[[noreturn]] void throw_malformed() {
-  throw Error(ErrorCode::kInternal, "A message between the daemon and a job is malformed.");
-}
-
-// Stands before a job's record, where a line has one. Within JSON it is always escaped.
-constexpr char kBeforeRecord = '\t';
-
-std::string line_of(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
-}
-
-// The record as it is: within the other JSON it would be escaped, and read twice.
-std::string line_of(const Json& json, const Job& job) {
-  std::string line = line_of(json);
-  line.back() = kBeforeRecord;
-  return line + isomesh::to_json(job) + '\n';
-}
-
-// Reads a line; what JSON finds wrong with it makes it malformed.
-template <class Read>
-auto read_line(std::string_view line, const Read& read) {
-  try {
-    return read(Json::parse(line.substr(0, line.find(kBeforeRecord))));
-  } catch (const Json::exception&) {
-    throw_malformed();
-  }
-}
-
-Job record_of(std::string_view line) {
-  const std::size_t before = line.find(kBeforeRecord);
-  if (before == std::string_view::npos) throw_malformed();
-  return job_from_record(line.substr(before + 1));
-}
-
-Json json_of(const std::vector<Note>& notes) {
-  Json json = Json::array();
-  for (const Note& note : notes) json.push_back({note.code, note.detail});
-  return json;
-}
-
-std::vector<Note> notes_from(const Json& json) {
-  std::vector<Note> notes;
-  for (const Json& note : json) {
-    notes.push_back({note.at(0).get<std::string>(), note.at(1).get<std::string>()});
-  }
-  return notes;
-}
-
-// Parameters and summaries have a form as parts of a job.
-Job job_with(const MeshParameters& parameters) {
-  Job job;
-  static_cast<MeshParameters&>(job.parameters) = parameters;
-  return job;
-}
-
-Job job_with(const MeshSummary& summary) {
-  Job job;
-  job.mesh = summary;
-  return job;
-}
-
-Json json_of(const Timing& timing) {
-  return {timing.queue,    timing.load,   timing.extract, timing.smooth,
-          timing.simplify, timing.encode, timing.certify, timing.total};
-}
-
-Timing timing_from(const Json& json) {
-  return {.queue = json.at(0),
-          .load = json.at(1),
-          .extract = json.at(2),
-          .smooth = json.at(3),
-          .simplify = json.at(4),
-          .encode = json.at(5),
-          .certify = json.at(6),
-          .total = json.at(7)};
-}
-
-Json json_of(const JobProgress& progress) {
-  return {{"stage", static_cast<int>(progress.stage)},
-          {"share", progress.share},
-          {"timing", json_of(progress.timing)}};
-}
-
-Json json_of(const JobPiece& piece) { return {{"file", piece.file}, {"bytes", piece.bytes}}; }
-
-Json json_of(const CountedSurface& counted) {
-  const auto& [triangles, vertices, layers, largest_layer] = counted.size;
-  Json labels = Json::array();
-  for (const auto& [label, count] : counted.labels) labels.push_back({label, count});
-  return {{"counted", {triangles, vertices, layers, largest_layer}}, {"labels", labels}};
-}
-
-Json json_of(const Error& error) {
-  return {{"code", std::string(describe(error.code()).name)}, {"detail", error.what()}};
-}
-
-std::string line_for(const auto& answer) { return line_of(json_of(answer)); }
-
-std::string line_for(const MadeMesh& made) {
-  return line_of({{"made", json_of(made.timing)}}, job_with(made.summary));
-}
-
-JobProgress progress_from(const Json& json) {
-  const int stage = json.at("stage").get<int>();
-  if (stage < 0 || stage > static_cast<int>(Stage::kDone)) throw_malformed();
-  return {static_cast<Stage>(stage), json.at("share").get<double>(),
-          timing_from(json.at("timing"))};
-}
-
-MadeMesh made_from(const Json& json, const Job& job) {
-  if (!job.mesh) throw_malformed();
-  return {*job.mesh, timing_from(json.at("made"))};
-}
-
-CountedSurface counted_from(const Json& json) {
-  const Json& size = json.at("counted");
-  CountedSurface counted = {.size = {.triangles = size.at(0),
-                                     .vertices = size.at(1),
-                                     .layers = size.at(2),
-                                     .largest_layer = size.at(3)}};
-  for (const Json& label : json.at("labels")) counted.labels.push_back({label.at(0), label.at(1)});
-  return counted;
-}
-
-Error error_from(const Json& json) {
-  return {error_code_of(json.at("code").get<std::string>()), json.at("detail").get<std::string>()};
-}
+std::string line_for(const JobProgress& progress) { return process::line_of(kProgress, progress); }
+std::string line_for(const JobPiece& piece) { return process::line_of(kPiece, piece); }
+std::string line_for(const MadeMesh& made) { return process::line_of(kMade, made); }
+std::string line_for(const CountedSurface& counted) { return process::line_of(kCounted, counted); }
+std::string line_for(const Error& error) { return process::line_of(kError, error); }
 
 }  // namespace
 
-std::string to_line(const JobSetup& setup) { return line_of({{"threads", setup.threads}}); }
-
-std::string to_line(const JobOrder& order) {
-  return line_of({{"work", static_cast<int>(order.work)},
-                  {"volume", order.volume.id},
-                  {"notes", json_of(order.volume.notes)},
-                  {"iso", order.iso},
-                  {"certify", order.certify},
-                  {"memory_bytes", order.memory_bytes},
-                  {"disk_bytes", order.disk_bytes}},
-                 job_with(order.parameters));
-}
+std::string to_line(const JobSetup& setup) { return process::line_of(kSetup, setup); }
+std::string to_line(const JobOrder& order) { return process::line_of(kOrder, order); }
 
 std::string to_line(const JobAnswer& answer) {
   return std::visit([](const auto& one) { return line_for(one); }, answer);
 }
 
 JobSetup setup_from(std::string_view line) {
-  return read_line(
-      line, [](const Json& json) { return JobSetup{.threads = json.at("threads").get<int>()}; });
+  if (const auto setup = ReadLine(line).find<JobSetup>(kSetup)) return *setup;
+  process::throw_malformed();
 }
 
 std::optional<JobOrder> order_from(std::string_view line) {
-  return read_line(line, [&](const Json& json) -> std::optional<JobOrder> {
-    if (json.contains("cancel")) return std::nullopt;
-    JobOrder order = {.work = static_cast<JobOrder::Work>(json.at("work").get<int>()),
-                      .file = {},
-                      .volume = {},
-                      .parameters = record_of(line).parameters,
-                      .iso = json.at("iso").get<double>(),
-                      .certify = json.at("certify").get<bool>(),
-                      .memory_bytes = json.at("memory_bytes").get<std::uint64_t>(),
-                      .disk_bytes = json.at("disk_bytes").get<std::uint64_t>()};
-    order.volume.id = json.at("volume").get<std::string>();
-    order.volume.notes = notes_from(json.at("notes"));
-    return order;
-  });
+  const ReadLine message(line);
+  if (message.find<bool>(kCancel)) return std::nullopt;
+  auto order = message.find<JobOrder>(kOrder);
+  if (!order) process::throw_malformed();
+  return order;
 }
 
 JobAnswer answer_from(std::string_view line) {
-  return read_line(line, [&](const Json& json) -> JobAnswer {
-    if (json.contains("stage")) return progress_from(json);
-    if (json.contains("file")) return JobPiece{json.at("file"), json.at("bytes")};
-    if (json.contains("made")) return made_from(json, record_of(line));
-    if (json.contains("counted")) return counted_from(json);
-    if (json.contains("code")) return error_from(json);
-    throw_malformed();
-  });
+  const ReadLine message(line);
+  if (const auto piece = message.find<JobPiece>(kPiece)) return *piece;
+  if (const auto progress = message.find<JobProgress>(kProgress)) return *progress;
+  if (auto made = message.find<MadeMesh>(kMade)) return *std::move(made);
+  if (auto counted = message.find<CountedSurface>(kCounted)) return *std::move(counted);
+  if (const auto problem = message.find<Problem>(kError)) return to_error(*problem);
+  process::throw_malformed();
 }
 
 }  // namespace isomesh::jobs

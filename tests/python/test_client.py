@@ -36,7 +36,8 @@ class Files(DaemonTest):
         planes = [f"plane{n:02}.raw" for n in range(24)]
         many = self.write_meta_image(self.folder / "many", "plane%02d.raw 0 23 1", planes)
         listed = self.write_meta_image(self.folder / "list", "LIST\n" + "\n".join(planes), planes)
-        (self.folder / "one" / ".hidden").write_bytes(b"nothing of the volume")
+        for name in (".hidden", "README.txt", "report.pdf", "Thumbs.db", "empty"):
+            (self.folder / "one" / name).write_bytes(b"nothing of the volume" if name != "empty" else b"")
         bare = isomesh.Raw((40, 32, 24), "float32")
         for source, more in (
             (one, {}),

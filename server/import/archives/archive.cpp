@@ -45,8 +45,15 @@ std::uint64_t octal(std::string_view text) {
   return value;
 }
 
+// Whether the member or a folder that it is in is hidden, as those of version control are, or holds
+// what macOS adds to an archive.
 bool is_hidden(std::string_view name) {
-  return base_of(name).starts_with('.') || name.starts_with("__MACOSX/");
+  while (!name.empty()) {
+    const std::string_view part = name.substr(0, name.find('/'));
+    if (part == "__MACOSX" || (part.starts_with('.') && part != "." && part != "..")) return true;
+    name.remove_prefix(std::min(part.size() + 1, name.size()));
+  }
+  return false;
 }
 
 // The part of a member's name that is safe to use in a path of ours.

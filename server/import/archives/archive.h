@@ -37,10 +37,11 @@ struct ArchiveMember {
 using MemberBound = std::function<std::optional<std::uint64_t>(const std::filesystem::path&)>;
 
 // Unpacks the regular files of a ZIP or a plain TAR, large ones as far as `bound` says. Each gets a
-// folder of its own below `folder`, which exists and is empty. Links, devices and empty or hidden
-// files are passed over. Throws Error kUnusableVolume when the archive is damaged, truncated or
-// encrypted, when anything follows its end, when two members have one name, and when a member has
-// more bytes than its bound or all tell more than most_unpacked_bytes; kTooLarge beyond the limits.
+// folder of its own below `folder`, which exists and is empty. Links, devices, empty and hidden
+// files, and those in hidden folders are passed over. Throws Error kUnusableVolume when the archive
+// is damaged, truncated or encrypted, when anything follows its end, when two members have one
+// name, and when a member has more bytes than its bound or all tell more than most_unpacked_bytes;
+// kTooLarge beyond the limits.
 std::vector<ArchiveMember> unpack(const std::filesystem::path& archive,
                                   const std::filesystem::path& folder, const ArchiveLimits& limits,
                                   const MemberBound& bound);

@@ -14,11 +14,16 @@
 #include "proto/error.h"
 #include "server/import/archives/archive.h"
 #include "server/import/dicom/import.h"
+#include "server/import/formats/vti.h"
+#include "server/import/labels_beside.h"
 #include "server/import/readers.h"
 #include "server/import/scratch_folder.h"
 
 namespace isomesh::import {
 namespace {
+
+// So many ignored files are named.
+constexpr std::size_t kMostNamed = 100;
 
 // A member that is of a format that is read.
 struct FoundVolume {
@@ -106,18 +111,33 @@ void Members::complete(const FoundVolume& found) {
   }
 }
 
+// Whether a file of a format of volumes lies beside them for another reason: documents of office
+// programs are ZIPs, and VTK's XML holds surfaces too.
+bool is_beside(const Reader& reader, const InputFile& file) {
+  return reader.content == Content::kFiles ||
+         (reader.sniff == is_vti && !may_hold_image(file.text(0, kSniffBytes)));
+}
+
 std::vector<FoundVolume> files_of_formats(const std::vector<ArchiveMember>& members) {
   std::vector<FoundVolume> found;
   for (const ArchiveMember& member : members) {
-    const Reader* reader = sniff(InputFile(member.path));
-    if (reader == nullptr) continue;
-    if (reader->content == Content::kFiles) {
-      throw_unusable("The archive contains another archive, " + in_quotes(member.name) +
-                     ". Send that one by itself.");
-    }
-    found.push_back({member, reader});
+    const InputFile file(member.path);
+    const Reader* reader = sniff(file);
+    if (reader != nullptr && !is_beside(*reader, file)) found.push_back({member, reader});
   }
   return found;
+}
+
+[[noreturn]] void throw_no_volume(const std::vector<ArchiveMember>& members) {
+  for (const ArchiveMember& member : members) {
+    const Reader* reader = sniff(InputFile(member.path));
+    if (reader == nullptr || reader->content != Content::kFiles) continue;
+    throw_unusable("The archive contains another archive, " + in_quotes(member.name) +
+                   ". Send that one by itself.");
+  }
+  throw Error(ErrorCode::kUnsupportedMedia,
+              "None of the " + std::to_string(members.size()) +
+                  " files in the archive is a volume in a supported format.");
 }
 
 // Files that hold the samples of a header among them. A header that is damaged names none here;
@@ -175,7 +195,7 @@ struct Contents {
   std::vector<FoundVolume> volumes;
   std::vector<ArchiveMember> slices;
   const Reader* slice_reader = nullptr;
-  // Files that are no volume; they are told as ignored beside slices.
+  // Files that are no volume. They are listed as ignored.
   std::vector<ArchiveMember> others;
 };
 
@@ -212,7 +232,18 @@ Volume read_slices(const Contents& contents, const Input& input) {
   return volume;
 }
 
-Volume read_file(const FoundVolume& found, Members& members, const Input& input) {
+// Lists files beside a volume, without tables of the names of its labels.
+void ignore(const std::vector<ArchiveMember>& others, Volume& volume) {
+  for (const ArchiveMember& other : others) {
+    if (volume.ignored.size() >= kMostNamed) return;
+    if (is_label_table(other.path)) continue;
+    volume.ignored.push_back(
+        {printable(base_of(other.name)), "it is not a volume in a supported format"});
+  }
+}
+
+Volume read_file(const FoundVolume& found, const Contents& contents, Members& members,
+                 const Input& input) {
   const auto& [member, reader, doubles] = found;
   members.complete(found);
   Volume volume = read_input(*reader, {.path = member.path,
@@ -220,12 +251,11 @@ Volume read_file(const FoundVolume& found, Members& members, const Input& input)
                                        .task = input.task,
                                        .listener = input.listener});
   volume.name = std::string(base_of(member.name));
-  if (doubles.empty()) return volume;
-  volume.notes.push_back(duplicate_note(doubles.size()));
-  constexpr std::size_t kMostNamed = 100;
+  if (!doubles.empty()) volume.notes.push_back(duplicate_note(doubles.size()));
   for (std::size_t at = 0; at < std::min(kMostNamed, doubles.size()); ++at) {
     volume.ignored.push_back({std::string(base_of(doubles[at])), reason_of_double(member.name)});
   }
+  ignore(contents.others, volume);
   return volume;
 }
 
@@ -257,21 +287,19 @@ Volume read_members(Members& members, const Input& input) {
   const Contents contents = contents_of(members);
   const std::string& asked = input.task.options.member;
   const std::size_t count = contents.volumes.size() + (contents.slices.empty() ? 0 : 1);
-  if (count == 0) {
-    throw Error(ErrorCode::kUnsupportedMedia,
-                "None of the " + std::to_string(members.all().size()) +
-                    " files in the archive is a volume in a supported format.");
-  }
+  if (count == 0) throw_no_volume(members.all());
   if (!contents.slices.empty() &&
       (asked == process::kDicomMember || (asked.empty() && count == 1))) {
     return read_slices(contents, input);
   }
-  if (asked.empty() && count == 1) return read_file(contents.volumes.front(), members, input);
+  if (asked.empty() && count == 1) {
+    return read_file(contents.volumes.front(), contents, members, input);
+  }
   const auto found = std::ranges::find_if(contents.volumes, [&](const FoundVolume& volume) {
     return volume.member.name == asked || std::ranges::count(volume.doubles, asked) > 0;
   });
   if (found == contents.volumes.end()) offer_members(contents, asked);
-  return read_file(*found, members, input);
+  return read_file(*found, contents, members, input);
 }
 
 }  // namespace

@@ -222,6 +222,13 @@ bool is_vti(std::string_view head) {
   return trimmed(head).starts_with('<') && head.find("<VTKFile") != std::string_view::npos;
 }
 
+bool may_hold_image(std::string_view head) {
+  const std::size_t begin = std::min(head.find("<VTKFile"), head.size());
+  const std::size_t end = head.find('>', begin);
+  return end == std::string_view::npos ||
+         head.substr(begin, end - begin).find("ImageData") != std::string_view::npos;
+}
+
 SourceVolume parse_vti(const InputFile& file, const Companions& /*companions*/,
                        const ImportOptions& options) {
   const VtiDocument document = read_vti_document(file);

@@ -12,6 +12,9 @@ namespace isomesh::import {
 // True for all of VTK's XML files; those that hold no image are refused with the reason.
 bool is_vti(std::string_view head);
 
+// Whether such a file may hold an image, as far as its beginning tells.
+bool may_hold_image(std::string_view head);
+
 // Reads the XML up to the samples. They are the scalars of the point data, of one component, in one
 // piece that fills the whole extent. VTK does not say how its space lies in the patient; it is
 // taken for LPS, as programs made with ITK write it. Throws Error kUnusableVolume.

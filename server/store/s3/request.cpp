@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <ctime>
-#include <exception>
+#include <span>
 #include <utility>
 
+#include "base/curl_transfer.h"
 #include "base/error.h"
 #include "base/log.h"
 #include "base/sha256.h"
@@ -40,9 +41,7 @@ class Attempt {
   }
 
   S3Answer perform() {
-    const CURLcode result = curl_easy_perform(easy_);
-    if (thrown_) std::rethrow_exception(thrown_);
-    if (stop_.stop_requested()) throw Error(ErrorCode::kCancelled, "cancelled");
+    const CURLcode result = curl::Transfer(easy_, callbacks(), stop_).perform();
     if (result == CURLE_OK) {
       curl_easy_getinfo(easy_, CURLINFO_RESPONSE_CODE, &answer_.status);
     } else {
@@ -54,15 +53,8 @@ class Attempt {
 
  private:
   void set_connection() {
-    curl_easy_setopt(easy_, CURLOPT_PROTOCOLS_STR, "http,https");
+    curl::connect_directly(easy_, options_.authorities);
     curl_easy_setopt(easy_, CURLOPT_HTTP_VERSION, static_cast<long>(CURL_HTTP_VERSION_1_1));
-    curl_easy_setopt(easy_, CURLOPT_FOLLOWLOCATION, 0L);
-    curl_easy_setopt(easy_, CURLOPT_PROXY, "");
-    curl_easy_setopt(easy_, CURLOPT_NOSIGNAL, 1L);
-    curl_easy_setopt(easy_, CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
-    if (!options_.authorities.empty()) {
-      curl_easy_setopt(easy_, CURLOPT_CAINFO, options_.authorities.c_str());
-    }
     constexpr long kQuick = 2'000;
     const auto connect = static_cast<long>(options_.connect.count());
     curl_easy_setopt(easy_, CURLOPT_CONNECTTIMEOUT_MS,
@@ -95,13 +87,6 @@ class Attempt {
     if (!request_.condition.empty()) curl::append(headers_, request_.condition);
     set_method();
     curl_easy_setopt(easy_, CURLOPT_HTTPHEADER, headers_.get());
-    curl_easy_setopt(easy_, CURLOPT_WRITEFUNCTION, take);
-    curl_easy_setopt(easy_, CURLOPT_WRITEDATA, this);
-    curl_easy_setopt(easy_, CURLOPT_HEADERFUNCTION, take_header);
-    curl_easy_setopt(easy_, CURLOPT_HEADERDATA, this);
-    curl_easy_setopt(easy_, CURLOPT_NOPROGRESS, 0L);
-    curl_easy_setopt(easy_, CURLOPT_XFERINFOFUNCTION, is_over);
-    curl_easy_setopt(easy_, CURLOPT_XFERINFODATA, this);
   }
 
   void set_method() {
@@ -114,8 +99,6 @@ class Attempt {
       if (body_bytes() < kAskedFor) curl_easy_setopt(easy_, CURLOPT_EXPECT_100_TIMEOUT_MS, 1L);
       curl_easy_setopt(easy_, CURLOPT_UPLOAD, 1L);
       curl_easy_setopt(easy_, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(body_bytes()));
-      curl_easy_setopt(easy_, CURLOPT_READFUNCTION, give);
-      curl_easy_setopt(easy_, CURLOPT_READDATA, this);
       curl_easy_setopt(easy_, CURLOPT_SEEKFUNCTION, seek);
       curl_easy_setopt(easy_, CURLOPT_SEEKDATA, this);
     } else if (method == "POST") {
@@ -135,31 +118,24 @@ class Attempt {
     return request_.file == nullptr ? request_.text.size() : request_.bytes;
   }
 
-  // Exceptions do not cross libcurl: they are kept, and end the transfer.
-  template <class Run>
-  std::size_t guarded(std::size_t on_failure, const Run& run) {
-    try {
-      return run();
-    } catch (...) {
-      thrown_ = std::current_exception();
-      return on_failure;
-    }
+  curl::TransferCallbacks callbacks() {
+    return {.source = [this](std::span<std::byte> buffer) { return give(buffer); },
+            .sink = [this](std::span<const std::byte> bytes) { return take(bytes); },
+            .header = [this](std::string_view line) { take_header(line); }};
   }
 
-  static std::size_t give(char* buffer, std::size_t size, std::size_t count, void* self) {
-    auto& attempt = *static_cast<Attempt*>(self);
-    return attempt.guarded(CURL_READFUNC_ABORT, [&] {
-      const auto left = std::min<std::uint64_t>(size * count, attempt.body_bytes() - attempt.sent_);
-      const auto target = std::as_writable_bytes(std::span(buffer, static_cast<std::size_t>(left)));
-      std::size_t read = target.size();
-      if (attempt.request_.file != nullptr) {
-        read = attempt.request_.file->read_at(attempt.request_.begin + attempt.sent_, target);
-      } else {
-        attempt.request_.text.copy(buffer, target.size(), static_cast<std::size_t>(attempt.sent_));
-      }
-      attempt.sent_ += read;
-      return read;
-    });
+  std::size_t give(std::span<std::byte> buffer) {
+    const auto left = std::min<std::uint64_t>(buffer.size(), body_bytes() - sent_);
+    const auto target = buffer.first(static_cast<std::size_t>(left));
+    std::size_t read = target.size();
+    if (request_.file != nullptr) {
+      read = request_.file->read_at(request_.begin + sent_, target);
+    } else {
+      const auto text = std::as_bytes(std::span(request_.text));
+      std::ranges::copy(text.subspan(static_cast<std::size_t>(sent_), read), target.begin());
+    }
+    sent_ += read;
+    return read;
   }
 
   static int seek(void* self, curl_off_t offset, int /*origin*/) {
@@ -167,22 +143,18 @@ class Attempt {
     return CURL_SEEKFUNC_OK;
   }
 
-  static std::size_t take(char* data, std::size_t size, std::size_t count, void* self) {
-    auto& attempt = *static_cast<Attempt*>(self);
-    return attempt.guarded(0, [&] {
-      const std::span<const char> bytes(data, size * count);
-      long status = 0;
-      curl_easy_getinfo(attempt.easy_, CURLINFO_RESPONSE_CODE, &status);
-      const bool is_wanted = status == kS3Ok || status == kS3Partial;
-      if (attempt.request_.sink != nullptr && is_wanted) {
-        attempt.pass_on(std::as_bytes(bytes), status == kS3Partial);
-      } else if (attempt.answer_.text.size() + bytes.size() <= kLongestText) {
-        attempt.answer_.text.append(bytes.data(), bytes.size());
-      } else {
-        return std::size_t{0};
-      }
-      return bytes.size();
-    });
+  bool take(std::span<const std::byte> bytes) {
+    long status = 0;
+    curl_easy_getinfo(easy_, CURLINFO_RESPONSE_CODE, &status);
+    const bool is_wanted = status == kS3Ok || status == kS3Partial;
+    if (request_.sink != nullptr && is_wanted) {
+      pass_on(bytes, status == kS3Partial);
+    } else if (answer_.text.size() + bytes.size() <= kLongestText) {
+      answer_.text.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    } else {
+      return false;
+    }
+    return true;
   }
 
   // A peer that does not know ranges sends all of it again.
@@ -199,24 +171,14 @@ class Attempt {
     answer_.taken += bytes.size();
   }
 
-  static std::size_t take_header(char* data, std::size_t size, std::size_t count, void* self) {
-    auto& attempt = *static_cast<Attempt*>(self);
-    return attempt.guarded(0, [&] {
-      const std::string_view line(data, size * count);
-      const std::size_t colon = line.find(':');
-      // "100 Continue" comes before, with headers of its own.
-      if (line.starts_with("HTTP/")) attempt.answer_.headers.clear();
-      constexpr std::size_t kMostHeaders = 100;
-      if (colon != line.npos && attempt.answer_.headers.size() < kMostHeaders) {
-        attempt.answer_.headers[lower(line.substr(0, colon))] = trimmed(line.substr(colon + 1));
-      }
-      return line.size();
-    });
-  }
-
-  static int is_over(void* self, curl_off_t /*all*/, curl_off_t /*now*/, curl_off_t /*up_all*/,
-                     curl_off_t /*up_now*/) {
-    return static_cast<Attempt*>(self)->stop_.stop_requested() ? 1 : 0;
+  void take_header(std::string_view line) {
+    const std::size_t colon = line.find(':');
+    // "100 Continue" comes before, with headers of its own.
+    if (line.starts_with("HTTP/")) answer_.headers.clear();
+    constexpr std::size_t kMostHeaders = 100;
+    if (colon != line.npos && answer_.headers.size() < kMostHeaders) {
+      answer_.headers[lower(line.substr(0, colon))] = trimmed(line.substr(colon + 1));
+    }
   }
 
   const S3ClientOptions& options_;
@@ -225,7 +187,6 @@ class Attempt {
   CURL* const easy_;
   curl::Headers headers_;
   S3Answer answer_;
-  std::exception_ptr thrown_;
   std::uint64_t sent_ = 0;
   std::uint64_t received_ = 0;
 };

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/unit/import/archives.h"
+#include "tests/unit/import/dicom/objects.h"
 #include "tests/unit/import/files.h"
 #include "tests/unit/import/vti_writer.h"
 #include "tests/unit/import/writers.h"
@@ -189,6 +190,39 @@ TEST(Archive, LinksDevicesAndHiddenFilesArePassedOver) {
   const Outcome tarred = import_bytes(
       tar({volume, {"again.nii", "head.nii", Kind::kHardLink}, {"null", "", Kind::kDevice}}));
   EXPECT_EQ(tarred.error, "");
+}
+
+// Clients send all files of a folder.
+TEST(Archive, FilesThatAreNoPartOfAVolumeAreIgnored) {
+  const std::vector<Member> beside = {{"README.txt", "what this is"},
+                                      {"report.pdf", "%PDF-1.7\n%\xe2\xe3\xcf\xd3"},
+                                      {"report.docx", zip({{"word/document.xml", "<w/>"}})},
+                                      {"head.vtp", vti({.kind = "PolyData"}, "")},
+                                      {"head.stl", "solid head\nendsolid head\n"},
+                                      {"Thumbs.db", "\xd0\xcf\x11\xe0"},
+                                      {".DS_Store", "junk"},
+                                      {".git/head.nii", nifti({}, kSamples)},
+                                      {"a/.hidden/head.nii", nifti({}, kSamples)},
+                                      {"a/__MACOSX/head.nii", "junk"},
+                                      {"empty", ""}};
+  const auto names = [](const Volume& volume) {
+    std::vector<std::string> all;
+    for (const IgnoredObject& ignored : volume.ignored) all.push_back(ignored.name);
+    return all;
+  };
+  const auto named = testing::UnorderedElementsAre("README.txt", "report.pdf", "report.docx",
+                                                   "head.vtp", "head.stl", "Thumbs.db");
+  std::vector<Member> series = beside;
+  for (const auto& [name, bytes] : DicomSeries{}.files()) series.push_back({"a/" + name, bytes});
+  std::vector<Member> single = beside;
+  single.push_back({"./head.nii", nifti({}, kSamples)});
+  for (const std::vector<Member>& members : {series, single}) {
+    for (const std::string& file : forms(members)) {
+      const Outcome outcome = import_bytes(file);
+      EXPECT_EQ(outcome.error, "");
+      EXPECT_THAT(names(outcome.volume), named);
+    }
+  }
 }
 
 TEST(Archive, DataMayLieInAFolderBelowItsHeader) {

@@ -276,10 +276,33 @@ TEST(JobMessage, ArrivesAsItWasSent) {
   EXPECT_STREQ(error.what(), "too\tlarge");
 }
 
+TEST(JobMessage, ACountComesAsItWent) {
+  CountedSurface counted = {
+      .size = {.triangles = 1, .vertices = 2, .layers = 3, .largest_layer = 4},
+      .labels = {{.label = -5, .triangles = 6}}};
+  const auto again = std::get<CountedSurface>(answer_from(to_line(counted)));
+  EXPECT_EQ(again.size.triangles, 1U);
+  EXPECT_EQ(again.size.vertices, 2U);
+  EXPECT_EQ(again.size.layers, 3U);
+  EXPECT_EQ(again.size.largest_layer, 4U);
+  EXPECT_EQ(again.labels, counted.labels);
+  const JobProgress progress = {
+      .stage = Stage::kSmooth, .share = 0.25, .timing = {.load = 1, .extract = 2}};
+  const auto told = std::get<JobProgress>(answer_from(to_line(progress)));
+  EXPECT_EQ(told.stage, progress.stage);
+  EXPECT_EQ(told.share, progress.share);
+  EXPECT_EQ(told.timing, progress.timing);
+}
+
 TEST(JobMessage, AnotherFormIsRefused) {
   EXPECT_FALSE(order_from(kCancelMessage));
-  for (const char* line : {"", "{}", "[]", "{\"stage\":9,\"share\":0,\"timing\":[0,0,0,0,0,0]}",
-                           "{\"made\":[0,0,0,0,0,0]}", "{\"made\":[0,0,0,0,0,0]}\t{}"}) {
+  for (const char* line :
+       {"", "{}", "[]", "7", R"({"progress":{"stage":"none","share":0,"timing":{}}})",
+        R"({"progress":{"stage":"load","share":0}})", R"({"piece":{"file":-1,"bytes":0}})",
+        R"({"piece":{"file":0,"bytes":0.5}})", R"({"piece":{"file":true,"bytes":0}})",
+        R"({"piece":{"file":0,"bytes":18446744073709551616}})", R"({"piece":[0,0]})",
+        R"({"made":{}})", R"({"made":null})", R"({"order":{"work":2}})",
+        R"({"counted":{"labels":7}})"}) {
     EXPECT_EQ(test::code_thrown_by([&] { answer_from(line); }), ErrorCode::kInternal) << line;
     EXPECT_EQ(test::code_thrown_by([&] { order_from(line); }), ErrorCode::kInternal) << line;
   }

@@ -62,7 +62,9 @@ TEST(DimseMessage, ReportsThatWouldDoHarmAreRefused) {
   }
   for (const char* line :
        {"", "{}", "[]", R"({"sent":{"end":7,"status":0}})", R"({"sent":{"end":0,"status":-1}})",
-        R"({"ended":{"refusal":4}})", R"({"ended":{"refusal":"x"}})"}) {
+        R"({"sent":{"end":0,"status":65536}})", R"({"sent":{"end":-1,"status":0}})",
+        R"({"sent":{"end":0}})", R"({"sent":{"end":0,"status":1.5}})", R"({"ended":{"refusal":4}})",
+        R"({"ended":{"refusal":"x"}})"}) {
     EXPECT_TRUE(test::thrown_by([&] { dimse_report_from(line); })) << line;
   }
 }

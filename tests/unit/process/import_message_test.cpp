@@ -101,5 +101,28 @@ TEST(ImportMessage, AReportHasWhatWasSaid) {
   EXPECT_EQ(report.error->remedy(), remedy);
 }
 
+TEST(ImportMessage, AVolumeComesWithItsLabels) {
+  Volume volume;
+  volume.id = "ab";
+  volume.format = "nifti";
+  volume.dims = {2, 3, 4};
+  volume.labels = {{.label = 3, .name = "liver"}};
+  volume.dicom.emplace().modality = "CT";
+  const ImportReport report = report_from(volume_message(volume));
+  ASSERT_TRUE(report.volume);
+  EXPECT_EQ(*report.volume, volume);
+}
+
+// The process that reports may have been taken over by what it read.
+TEST(ImportMessage, AReportOfAnotherFormIsRefused) {
+  for (const std::string line :
+       {"", "7", "[]", R"({"begun":"yes"})", R"({"reading":7})", R"({"reading":"[error] forged"})",
+        R"({"volume":{}})", R"({"volume":[]})", R"({"error":7})", R"({"answer":{"objects":[]}})",
+        R"({"answer":{"objects":[{}],"stored":[],"failed":[]}})"}) {
+    EXPECT_EQ(test::code_thrown_by([&] { report_from(line + '\n'); }), ErrorCode::kInternal)
+        << line;
+  }
+}
+
 }  // namespace
 }  // namespace isomesh::process

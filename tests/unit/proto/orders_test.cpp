@@ -127,6 +127,21 @@ TEST(OrderRequests, NameWhatIsWrong) {
   EXPECT_EQ(fault_of(R"({"source": {"pacs": "m", "study": "1", "series": "1", "url": "x"},
                          "rule": "b"})"),
             "source.url");
+  EXPECT_EQ(fault_of(R"({"source": {"pacs": "m", "study": "1", "series": "1", "instances": 7},
+                         "rule": "b"})"),
+            "source.instances");
+  EXPECT_EQ(fault_of(R"({"source": "x", "rule": "b"})"), "source");
+  EXPECT_EQ(fault_of(R"({"source": {"pacs": 7, "study": "1", "series": ""}, "rule": "b"})"),
+            "source.pacs");
+  EXPECT_EQ(fault_of(R"({"source": {"pacs": "m", "study": "1", "series": ""}, "rule": "b"})"),
+            "source.series");
+  EXPECT_EQ(fault_of('{' + source + R"(, "rule": "b", "rule": "c"})"), "rule");
+  EXPECT_EQ(fault_of('{' + source + R"(, "rule": null})"), "rule");
+  EXPECT_EQ(fault_of('{' + source + R"(, "rule": "b", "parameters": []})"), "parameters");
+  EXPECT_EQ(fault_of('{' + source + R"(, "rule": "b", "send": {}})"), "send");
+  EXPECT_EQ(fault_of('{' + source + R"(, "rule": "b", "send": ["x"]})"), "send");
+  EXPECT_EQ(fault_of('{' + source + R"(, "rule": "b", "send": [{"format": "stl"}]})"), "send.pacs");
+  EXPECT_EQ(fault_of('{' + source + R"(, "rule": "b", "callback": {}})"), "callback.url");
   EXPECT_EQ(fault_of('{' + source + "}"), "parameters");
   EXPECT_EQ(fault_of('{' + source + R"(, "parameters": {"iso": 1}})"), "send");
   EXPECT_EQ(fault_of('{' + source + R"(, "rule": "b", "priority": "soon"})"), "priority");

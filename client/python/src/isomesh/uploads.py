@@ -37,8 +37,8 @@ def of_bytes(data: Union[bytes, bytearray, memoryview], name: str = "") -> Body:
 
 
 def of_paths(paths: Sequence[Path]) -> Body:
-    """The files of all paths. A folder means every file below it except hidden files and links; a
-    header brings the data files that it names."""
+    """The files of all paths. A folder means every file below it except links; the server skips what is
+    no part of a volume. A header brings the data files that it names."""
     members: Dict[str, Path] = {}
     for path in paths:
         for name, file in _files_of(path):
@@ -72,10 +72,10 @@ def _files_of(path: Path) -> List[Tuple[str, Path]]:
 def _files_below(folder: Path) -> List[Tuple[str, Path]]:
     found = []
     for at, folders, files in os.walk(folder):
-        folders[:] = sorted(each for each in folders if not each.startswith("."))
+        folders.sort()
         for name in files:
             file = Path(at, name)
-            if name.startswith(".") or file.is_symlink() or not file.is_file():
+            if file.is_symlink() or not file.is_file():
                 continue
             found.append((file.relative_to(folder).as_posix(), file))
     if not found:

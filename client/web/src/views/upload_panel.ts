@@ -64,7 +64,7 @@ export class UploadPanel {
   take(files: NamedFile[]): void {
     const gathered = gather(files);
     if (!gathered) {
-      if (!this.running) this.showUnusable(new ApiError(-1, 'Nothing to upload', 'All files are empty, or there are none.'));
+      if (!this.running) this.showUnusable(new ApiError(-1, 'Nothing to upload', 'There are no files.'));
     } else if (this.running) {
       this.waiting.push(gathered);
       this.showQueue();

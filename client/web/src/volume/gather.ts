@@ -1,9 +1,6 @@
 // Packs the dropped or chosen files into one body to upload.
 import { packTar, type NamedFile } from './tar';
 
-// Files that operating systems put into folders by themselves.
-const systemFiles = /(^|\/)(\.DS_Store|Thumbs\.db|desktop\.ini|\._[^/]*|__MACOSX\/.*)$/i;
-
 function readEntries(reader: FileSystemDirectoryReader): Promise<FileSystemEntry[]> {
   return new Promise((resolve, reject) => reader.readEntries(resolve, reject));
 }
@@ -45,17 +42,12 @@ export interface Gathered {
   kept?: string;
 }
 
-// One file goes as it is, several are packed. Null when there is none.
+// One file goes as it is, several are packed: all of them, since the server skips what is no part of a
+// volume. Null when there is none.
 export function gather(files: NamedFile[]): Gathered | null {
-  const wanted = files.filter(({ path, file }) => !systemFiles.test(path) && file.size > 0);
-  const [first] = wanted;
+  const [first] = files;
   if (first === undefined) return null;
-  if (wanted.length === 1) return { name: first.path, count: 1, files: wanted, body: first.file };
+  if (files.length === 1) return { name: first.path, count: 1, files, body: first.file };
   const folder = first.path.includes('/') ? first.path.split('/')[0] : undefined;
-  return {
-    name: folder ?? `${wanted.length} files`,
-    count: wanted.length,
-    files: wanted,
-    body: packTar(wanted),
-  };
+  return { name: folder ?? `${files.length} files`, count: files.length, files, body: packTar(files) };
 }
