@@ -136,7 +136,7 @@ void CStore::store(const orders::OutgoingObject& object, const std::stop_token& 
       .timeout = settings_.timeout,
       .answer_timeout = settings_.timeout + std::chrono::seconds(object.bytes / kBytesPerSecond)};
   const Descriptor peer = connected(settings_, stop);
-  process::Child child = processes_.take();
+  process::Child child = processes_.take(std::chrono::steady_clock::now() + settings_.timeout);
   child.say(process::to_line(order), peer.number());
   const process::Heard heard =
       child.listen(kMostAnswerBytes, std::chrono::steady_clock::now() + kLongest, stop);

@@ -111,7 +111,7 @@ void DimseListener::serve(const std::stop_token& stop) {
 
 void DimseListener::serve_association(const Descriptor& peer, const std::stop_token& stop) {
   const store::ScratchFolder scratch(services_.folder.scratch());
-  process::Child child = services_.processes.take();
+  process::Child child = services_.processes.take(Clock::now() + settings_.idle);
   child.say(process::to_line(process::DimseReceiving{.called = titles_of(settings_),
                                                      .calling = settings_.calling,
                                                      .folder = scratch.path(),

@@ -19,9 +19,11 @@ Error gone() { return {ErrorCode::kGone, "this upload is no longer kept: send it
 
 }  // namespace
 
-KeptUploads::KeptUploads(const KeptLimits& limits, std::filesystem::path folder)
+KeptUploads::KeptUploads(const KeptLimits& limits, std::filesystem::path folder,
+                         std::function<Clock::time_point()> now)
     : limits_(limits),
       folder_(std::move(folder)),
+      now_(std::move(now)),
       thread_([this](const std::stop_token& stop) { run(stop); }) {
   if (!folder_.empty()) find_left();
 }
@@ -60,7 +62,7 @@ void KeptUploads::find_left() {
 
 KeptUploads::Clock::time_point KeptUploads::end_of(const Entry& entry) const {
   const bool comes = entry.partial && !entry.partial->note().is_complete;
-  return Clock::now() + (comes ? limits_.part_time : limits_.time);
+  return now_() + (comes ? limits_.part_time : limits_.time);
 }
 
 std::string KeptUploads::keep(const std::string& owner, Kept upload) {
@@ -75,7 +77,7 @@ std::string KeptUploads::keep(const std::string& owner, Kept upload) {
   } else if (std::cmp_greater_equal(std::ranges::count_if(kept_, is_whole), limits_.all)) {
     kept_.erase(std::ranges::find_if(kept_, is_whole));
   }
-  kept_.push_back({owner, name, std::move(upload), nullptr, Clock::now() + limits_.time});
+  kept_.push_back({owner, name, std::move(upload), nullptr, now_() + limits_.time});
   changed_.notify_all();
   return name;
 }
@@ -85,7 +87,7 @@ KeptUploads::Partial KeptUploads::begin(PartialNote note) {
   const std::string owner = note.owner;
   auto upload = std::make_shared<PartialUpload>(folder_, random_hex(kNameBytes), std::move(note));
   const Lock lock(mutex_);
-  kept_.push_back({owner, upload->name(), nullptr, upload, Clock::now() + limits_.part_time});
+  kept_.push_back({owner, upload->name(), nullptr, upload, now_() + limits_.part_time});
   make_room();
   changed_.notify_all();
   return upload;
@@ -155,6 +157,12 @@ void KeptUploads::let_all_go() {
   }
 }
 
+void KeptUploads::wake() {
+  const Lock lock(mutex_);
+  is_woken_ = true;
+  changed_.notify_all();
+}
+
 void KeptUploads::erase(Entries::iterator entry) {
   if (entry->partial) entry->partial->let_go();
   kept_.erase(entry);
@@ -193,7 +201,7 @@ KeptUploads::Entries::iterator KeptUploads::next_to_go(
 void KeptUploads::run(const std::stop_token& stop) {
   Lock lock(mutex_);
   while (!stop.stop_requested()) {
-    const Clock::time_point now = Clock::now();
+    const Clock::time_point now = now_();
     // Whatever comes meanwhile stays for longer than that.
     Clock::time_point next = now + std::min(limits_.time, limits_.part_time);
     for (auto entry = kept_.begin(); entry != kept_.end();) {
@@ -211,7 +219,9 @@ void KeptUploads::run(const std::stop_token& stop) {
     make_room();
     const auto is_there = [this]() ISOMESH_REQUIRES(mutex_) { return !kept_.empty(); };
     if (!changed_.wait(lock, stop, is_there)) return;
-    changed_.wait_until(lock, stop, next, [] { return false; });
+    changed_.wait_for(lock, stop, next - now, [this]() ISOMESH_REQUIRES(mutex_) {
+      return std::exchange(is_woken_, false);
+    });
   }
 }
 

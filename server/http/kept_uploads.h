@@ -38,10 +38,12 @@ class KeptUploads {
  public:
   using Kept = std::shared_ptr<const ReceivedBody>;
   using Partial = std::shared_ptr<PartialUpload>;
+  using Clock = std::chrono::steady_clock;
 
   // Finds what an earlier process has left in the folder, which is made when it is needed; "": no
   // upload can come in parts.
-  explicit KeptUploads(const KeptLimits& limits = {}, std::filesystem::path folder = {});
+  explicit KeptUploads(const KeptLimits& limits = {}, std::filesystem::path folder = {},
+                       std::function<Clock::time_point()> now = Clock::now);
 
   const KeptLimits& limits() const { return limits_; }
 
@@ -72,8 +74,10 @@ class KeptUploads {
   // For want of room: all that nobody reads or sends just now.
   void let_all_go() ISOMESH_EXCLUDES(mutex_);
 
+  // Looks at what is over: for those who set the clock.
+  void wake() ISOMESH_EXCLUDES(mutex_);
+
  private:
-  using Clock = std::chrono::steady_clock;
   struct Entry {
     std::string owner;
     std::string name;
@@ -100,8 +104,10 @@ class KeptUploads {
 
   const KeptLimits limits_;
   const std::filesystem::path folder_;
+  const std::function<Clock::time_point()> now_;
   Mutex mutex_;
   Condition changed_;
+  bool is_woken_ ISOMESH_GUARDED_BY(mutex_) = false;
   Entries kept_ ISOMESH_GUARDED_BY(mutex_);  // the one that goes first in front
   std::jthread thread_;                      // the last member: it uses the others
 };

@@ -122,10 +122,11 @@ process::ImportReport ImportRunner::report_of(const std::string& message) {
     ~Leave() { runner.give_place_back(); }
   } leave{*this};
 
+  const auto deadline = Clock::now() + options_.bounds.time;
   // One that has died while it waited has not touched the file. More than one is no accident.
   constexpr int kMostIdleDeaths = 3;
   for (int tries = 0; tries < kMostIdleDeaths; ++tries) {
-    if (auto report = run_in(prepared_.take(), message)) return *std::move(report);
+    if (auto report = run_in(prepared_.take(deadline), message)) return *std::move(report);
     log_warning("a prepared import process ended before its import began; another one takes over");
   }
   throw Error(ErrorCode::kInternal, "Import processes end before their imports begin.");

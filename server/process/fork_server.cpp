@@ -24,8 +24,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Getting ready takes some hundredths of a second, on a busy machine some tenths.
-constexpr std::chrono::seconds kLongestAnswer{20};
+// Getting ready takes some hundredths of a second, on a busy machine some tenths; one that is
+// started anew instead of being waited for is not ready sooner.
+constexpr std::chrono::seconds kLongestAnswer{60};
 
 // None when the other end is closed.
 Descriptor receive_descriptor() {
@@ -49,8 +50,20 @@ pid_t fork_sibling() {
   return ::send(kChildDescriptor, &number, sizeof(number), MSG_NOSIGNAL) == sizeof(number);
 }
 
-void become_copy(Descriptor socket, const std::function<void()>& work) {
+// Ends this process with the daemon, which has made the socket. One that is gone already sends no
+// signal, and this process would have another parent by then.
+void die_with_daemon(int socket) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  ucred maker = {};
+  socklen_t size = sizeof(maker);
+  if (::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &maker, &size) != 0 ||
+      maker.pid != ::getppid()) {
+    std::_Exit(EXIT_FAILURE);
+  }
+}
+
+void become_copy(Descriptor socket, const std::function<void()>& work) {
+  die_with_daemon(socket.number());
   be_nicer(kImportNiceness);
   if (::dup2(socket.number(), kChildDescriptor) != kChildDescriptor) std::_Exit(EXIT_FAILURE);
   if (socket.number() != kChildDescriptor) socket = Descriptor();
@@ -62,7 +75,7 @@ void become_copy(Descriptor socket, const std::function<void()>& work) {
 }  // namespace
 
 void serve_copies(const std::function<void()>& work) {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  die_with_daemon(kChildDescriptor);
   for (;;) {
     Descriptor socket = receive_descriptor();
     if (socket.number() < 0) std::_Exit(EXIT_SUCCESS);

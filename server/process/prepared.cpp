@@ -1,5 +1,6 @@
 #include "server/process/prepared.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "base/log.h"
@@ -7,6 +8,15 @@
 #include "server/process/fork_server.h"
 
 namespace isomesh::process {
+namespace {
+
+using std::chrono::milliseconds;
+
+// Before a start that has failed is repeated; doubles.
+constexpr milliseconds kFirstPause{10};
+constexpr milliseconds kLongestPause{1000};
+
+}  // namespace
 
 PreparedProcesses::PreparedProcesses(const std::filesystem::path& program, std::size_t count)
     : program_(program), count_(count), keeper_([this](const std::stop_token& end) {
@@ -18,16 +28,13 @@ PreparedProcesses::PreparedProcesses(const std::filesystem::path& program, std::
 
 PreparedProcesses::~PreparedProcesses() { stop(); }
 
-Child PreparedProcesses::take() {
+Child PreparedProcesses::take(std::chrono::steady_clock::time_point until) {
   Lock lock(mutex_);
   ++takers_;
-  const std::uint64_t failures = failures_;
-  is_failing_ = false;
   for (;;) {
     changed_.notify_all();
-    changed_.wait(lock, stop_.get_token(), [&]() ISOMESH_REQUIRES(mutex_) {
-      return !ready_.empty() || failures_ != failures;
-    });
+    changed_.wait_until(lock, stop_.get_token(), until,
+                        [this]() ISOMESH_REQUIRES(mutex_) { return !ready_.empty(); });
     if (stop_.stop_requested() || ready_.empty()) break;
     Child child = std::move(ready_.front());
     ready_.pop_front();
@@ -53,21 +60,22 @@ void PreparedProcesses::renew() {
 void PreparedProcesses::stop() { stop_.request_stop(); }
 
 void PreparedProcesses::keep(const std::stop_token& stop) {
+  milliseconds pause = kFirstPause;
   while (!stop.stop_requested()) {
     try {
       prepare_one(stop);
+      pause = kFirstPause;
     } catch (const std::exception& error) {
       if (stop.stop_requested()) break;
       log_error("a process could not be prepared and is retried: {}", error.what());
       server_.reset();
-      const Lock lock(mutex_);
-      ++failures_;
-      is_failing_ = true;
-      changed_.notify_all();
+      Lock lock(mutex_);
+      changed_.wait_for(lock, stop, std::exchange(pause, std::min(2 * pause, kLongestPause)),
+                        [] { return false; });
     }
     Lock lock(mutex_);
     changed_.wait(lock, stop, [this]() ISOMESH_REQUIRES(mutex_) {
-      return !is_failing_ && (ready_.size() < count_ || takers_ > ready_.size());
+      return ready_.size() < count_ || takers_ > ready_.size();
     });
   }
   server_.reset();
@@ -89,16 +97,10 @@ void PreparedProcesses::prepare_one(const std::stop_token& stop) {
 }
 
 Child PreparedProcesses::copy(std::uint64_t generation, const std::stop_token& stop) {
-  if (server_ && server_generation_ == generation) {
-    try {
-      return copy_of(*server_, stop);
-    } catch (const Error& error) {
-      if (error.code() != ErrorCode::kInternal) throw;
-      log_warning("{} It is restarted.", error.what());
-    }
+  if (!server_ || server_generation_ != generation) {
+    server_ = start_program(program_);
+    server_generation_ = generation;
   }
-  server_ = start_program(program_);
-  server_generation_ = generation;
   return copy_of(*server_, stop);
 }
 

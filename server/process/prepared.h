@@ -1,6 +1,7 @@
 // Processes that are kept started, so that nobody waits for that.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -24,9 +25,10 @@ class PreparedProcesses {
   PreparedProcesses& operator=(const PreparedProcesses&) = delete;
 
   // One that has been prepared, which another replaces, or waits for one where there is none. Those
-  // that have died meanwhile are passed over. Throws Error kInternal when none can be started, and
+  // that have died meanwhile are passed over. A start that fails is repeated: what a busy machine
+  // refuses now it may allow soon. Throws Error kInternal when there is none by `until`, and
   // kUnavailable once stopped.
-  Child take();
+  Child take(std::chrono::steady_clock::time_point until);
 
   // To be called when one was ended by what it had to read. Copies have their addresses and stack
   // guards in common; so that nobody finds them out by trying, the next ones are made of a program
@@ -48,8 +50,6 @@ class PreparedProcesses {
   std::deque<Child> ready_ ISOMESH_GUARDED_BY(mutex_);
   std::size_t takers_ ISOMESH_GUARDED_BY(mutex_) = 0;        // that wait
   std::uint64_t generation_ ISOMESH_GUARDED_BY(mutex_) = 0;  // of the program: grows with renew()
-  std::uint64_t failures_ ISOMESH_GUARDED_BY(mutex_) = 0;    // to prepare one
-  bool is_failing_ ISOMESH_GUARDED_BY(mutex_) = false;       // the last try was one
   // Used by the keeper alone.
   std::optional<Child> server_;
   std::uint64_t server_generation_ = 0;

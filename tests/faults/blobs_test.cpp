@@ -55,8 +55,10 @@ TEST_F(BlobsInS3, NothingIsLostWhileTheyDoNotAnswer) {
   EXPECT_EQ(readiness(), 200);
   peer_->fail("drop");
   EXPECT_TRUE(eventually([&] { return readiness() == 503; }));
+  const int puts = peer_->count("PUT");
   const std::string id = submit(daemon(), volume, 60).id;
-  std::this_thread::sleep_for(std::chrono::seconds(2));
+  ASSERT_TRUE(eventually([&] { return peer_->count("PUT") >= puts + 2; }))
+      << "it has been tried twice";
   EXPECT_FALSE(is_final(job(id).state));
   peer_->recover();
   EXPECT_EQ(ended(id).state, JobState::kSucceeded);

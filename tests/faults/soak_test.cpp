@@ -126,6 +126,7 @@ TEST_F(Soak, MemoryThreadsDescriptorsAndDiskLevelOff) {
   start({"--max-disk", std::to_string(kMaxDisk), "--log-level", "error"});
   const auto end = std::chrono::steady_clock::now() + duration();
   constexpr std::size_t kFewestSamples = 30;
+  constexpr std::uint64_t kFewestActs = 300;  // however long that takes on a busy machine
   std::atomic<bool> is_over = false;
   std::atomic<std::uint64_t> acts = 0;
   std::vector<Sample> samples;
@@ -141,7 +142,8 @@ TEST_F(Soak, MemoryThreadsDescriptorsAndDiskLevelOff) {
       });
     }
     const auto between = std::max(milliseconds(duration()) / 60, milliseconds(100));
-    while (std::chrono::steady_clock::now() < end || samples.size() < kFewestSamples) {
+    while (std::chrono::steady_clock::now() < end || samples.size() < kFewestSamples ||
+           acts < kFewestActs) {
       std::this_thread::sleep_for(between);
       samples.push_back(look());
       if (samples.size() % 10 == 0) tell(samples.back());

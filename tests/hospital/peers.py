@@ -152,7 +152,7 @@ class Daemon:
 
     def stop(self):
         self.process.terminate()
-        self.process.wait()
+        self.process.wait(120)
         self.process.stdout.close()
         return self.process.returncode
 

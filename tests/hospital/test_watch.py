@@ -2,7 +2,6 @@
 import base64
 import os
 import subprocess
-import time
 
 import dicom
 import peers
@@ -24,6 +23,14 @@ class Watch(Loop):
     def orders(self, daemon):
         return daemon.call("GET", "/v1/orders?rule=found")[2]["orders"]
 
+    def let_it_look(self):
+        """Two questions that begin from now on: the first has been dealt with before the second."""
+        def questions():
+            return sum("/series?StudyDate=" in path and path.endswith("offset=0")
+                       for _, path in list(self.proxy.requests))
+        before = questions()
+        peers.until(lambda: questions() >= before + 2)
+
     def of(self, daemon, series):
         return [each for each in self.orders(daemon) if each["source"]["series"] == series.uid]
 
@@ -35,14 +42,14 @@ class Watch(Loop):
         daemon = self.daemon(rules=WATCH)
         order = peers.until(lambda: self.of(daemon, right))[0]
         self.succeeded(daemon, order["id"])
-        time.sleep(2.5)
+        self.let_it_look()
         self.assertEqual(len(self.of(daemon, right)), 1)
         self.assertEqual(len(self.stored(right)), 1)
         for other in others:
             self.assertEqual(self.of(daemon, other), [])
         daemon.kill()
         daemon.start()
-        time.sleep(2.5)
+        self.let_it_look()
         self.assertEqual(len(self.of(daemon, right)), 1)
 
     def test_late_slices_after_success(self):
@@ -57,7 +64,7 @@ class Watch(Loop):
         late = self.succeeded(daemon, self.of(daemon, series)[0]["id"])
         self.assertEqual((first["source"]["instances"], late["source"]["instances"]), (9, 12))
         self.assertEqual(len(self.stored(series)), 2)
-        time.sleep(2.5)
+        self.let_it_look()
         self.assertEqual(len(self.of(daemon, series)), 2)
 
 

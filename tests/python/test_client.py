@@ -184,27 +184,45 @@ class Jobs(DaemonTest):
         mesh = self.client.mesh(ball(), iso=-5, name="from mesh", spacing=(1, 1, 3))
         self.assertEqual(self.client.volume(mesh.job["parameters"]["volume"])["name"], "from mesh")
 
+    def made(self, before):
+        return [job for job in isomesh.Client(self.url).jobs() if job["id"] not in before]
+
+    def assert_the_one_job_is_cancelled(self, before):
+        (interrupted,) = self.made(before)
+        with self.assertRaisesRegex(isomesh.JobFailed, "cancelled"):
+            self.client.wait(interrupted)
+
     def test_an_interrupt_cancels_the_job(self):
         noise = numpy.random.default_rng(2).random((128, 128, 96), "float32")
-        watcher = isomesh.Client(self.url)
-        before = {job["id"] for job in watcher.jobs()}
-
-        def made():
-            return [job for job in watcher.jobs() if job["id"] not in before]
+        before = {job["id"] for job in self.client.jobs()}
 
         def interrupt():
-            # A job that waits for memory on a busy machine is cancelled just as well.
-            end = time.monotonic() + 30
-            while time.monotonic() < end and not any(job["state"] == "running" for job in made()):
+            # As soon as it is there: its response may still be on the way.
+            while not self.made(before):
                 time.sleep(0.05)
             os.kill(os.getpid(), signal.SIGINT)
 
         threading.Thread(target=interrupt, daemon=True).start()
         with self.assertRaises(KeyboardInterrupt):
             self.client.mesh(noise, iso=0.5, passes=1000)
-        (interrupted,) = made()
-        with self.assertRaisesRegex(isomesh.JobFailed, "cancelled"):
-            self.client.wait(interrupted)
+        self.assert_the_one_job_is_cancelled(before)
+
+    def test_an_interrupt_of_its_response_cancels_the_job(self):
+        noise = numpy.random.default_rng(3).random((128, 128, 96), "float32")
+        before = {job["id"] for job in self.client.jobs()}
+        send = self.client._exchange.send_json
+        interrupts = [KeyboardInterrupt]
+
+        def interrupted(*arguments):
+            answer = send(*arguments)
+            while interrupts:
+                raise interrupts.pop()
+            return answer
+
+        with mock.patch.object(self.client._exchange, "send_json", interrupted):
+            with self.assertRaises(KeyboardInterrupt):
+                self.client.mesh(noise, iso=0.5, passes=1000)
+        self.assert_the_one_job_is_cancelled(before)
 
     def test_a_client_serves_several_threads(self):
         volume = self.client.upload(ball())

@@ -119,6 +119,9 @@ class Connection {
   // Whether a Reading has it or waits for it; another thread may change that at once.
   bool is_busy() const { return readings_ > 0; }
 
+  // How many threads wait to begin a transaction; others may come at once.
+  std::size_t coming() const { return coming_; }
+
  private:
   friend class Reading;
   friend class Transaction;

@@ -32,10 +32,6 @@ using isomesh::test::Connection;
 using isomesh::test::eventually;
 using isomesh::test::request;
 
-// What the daemon promises while others are slow. Sanitizers and busy machines get more.
-inline constexpr auto kPrompt = 50ms;
-inline constexpr auto kPromptEnough = kPrompt * 20;
-
 // Endless words, at once or when the test says so.
 class Words : public net::Source {
  public:
@@ -99,6 +95,15 @@ class ConnectionsTest : public testing::Test {
     ConnectionOptions options;
     options.threads = 4;
     return options;
+  }
+
+  // Nobody is given up, so that whoever waits for a thread that is held has no answer.
+  static ConnectionOptions patient_options() {
+    ConnectionOptions patient = options();
+    patient.acceptor.head_time = 1h;
+    patient.body.patience = 1h;
+    patient.sender.patience = 1h;
+    return patient;
   }
 
   void open(const ConnectionOptions& options) {
@@ -229,17 +234,6 @@ class ConnectionsTest : public testing::Test {
   // Connections that have sent that much and nothing more.
   void hang_on(int count, const std::string& bytes, const std::string& from = {}) {
     for (int n = 0; n < count; ++n) clients_.emplace_back(url_, from).send(bytes);
-  }
-
-  // How long a status takes, at best: the machine has other things to do.
-  Clock::duration time_of_status() {
-    Clock::duration best = Clock::duration::max();
-    for (int n = 0; n < 5; ++n) {
-      const auto began = Clock::now();
-      EXPECT_EQ(get("/status").body, "ok");
-      best = std::min(best, Clock::now() - began);
-    }
-    return best;
   }
 
   net::Listener listener_{net::parse_address("127.0.0.1:0")};

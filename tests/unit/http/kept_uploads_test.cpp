@@ -1,18 +1,36 @@
 #include "server/http/kept_uploads.h"
 
+#include <atomic>
+#include <functional>
 #include <memory>
-#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "proto/error.h"
 #include "tests/support/files.h"
+#include "tests/support/process.h"
 
 namespace isomesh::http {
 namespace {
 
-using std::chrono_literals::operator""ms;
+using std::chrono::minutes;
+using test::eventually;
+
+// One that the test sets.
+class SetClock {
+ public:
+  std::function<KeptUploads::Clock::time_point()> now() {
+    return [this] { return KeptUploads::Clock::time_point(passed_.load()); };
+  }
+  void pass(minutes time, KeptUploads& kept) {
+    passed_ = passed_.load() + time;
+    kept.wake();
+  }
+
+ private:
+  std::atomic<KeptUploads::Clock::duration> passed_{};
+};
 
 // Stands for an upload: whether it is still kept is all that is looked at.
 struct Thing {
@@ -48,18 +66,21 @@ TEST(KeptUploads, AreFoundByTheirOwnersAlone) {
 }
 
 TEST(KeptUploads, GoWhenNobodyAsksForThem) {
-  KeptUploads kept({.time = 300ms});
+  SetClock clock;
+  KeptUploads kept({.time = minutes(3)}, {}, clock.now());
   Thing asked_for;
   Thing forgotten;
   const std::string name = kept.keep("a", asked_for.give());
   kept.keep("b", forgotten.give());
-  std::this_thread::sleep_for(200ms);
+  clock.pass(minutes(2), kept);
   kept.find("a", name);
-  for (int i = 0; i < 100 && forgotten.is_there(); ++i) std::this_thread::sleep_for(10ms);
-  EXPECT_FALSE(forgotten.is_there());
+  clock.pass(minutes(1), kept);
+  EXPECT_TRUE(eventually([&] { return !forgotten.is_there(); }));
+  // What goes in a round goes under one lock: by now it is over.
+  EXPECT_EQ(code_of(kept, "b", name), ErrorCode::kGone);
   EXPECT_TRUE(asked_for.is_there());
-  for (int i = 0; i < 200 && asked_for.is_there(); ++i) std::this_thread::sleep_for(10ms);
-  EXPECT_FALSE(asked_for.is_there());
+  clock.pass(minutes(2), kept);
+  EXPECT_TRUE(eventually([&] { return !asked_for.is_there(); }));
 }
 
 TEST(KeptUploads, StayWhileTheyAreRead) {
@@ -153,11 +174,15 @@ TEST_F(KeptParts, OutliveTheProcess) {
 }
 
 TEST_F(KeptParts, GoWhenNothingMoreComes) {
-  KeptUploads kept({.part_time = 200ms}, folder_.path());
+  SetClock clock;
+  KeptUploads kept({.part_time = minutes(3)}, folder_.path(), clock.now());
   begun(kept, "a", 10);
   const KeptUploads::Partial sent = begun(kept, "a", 10);
-  for (int i = 0; i < 500 && files() > 2; ++i) std::this_thread::sleep_for(10ms);
-  EXPECT_EQ(files(), 2U);
+  clock.pass(minutes(2), kept);
+  EXPECT_NO_THROW(kept.find_partial("a", sent->name()));
+  EXPECT_EQ(files(), 4U);
+  clock.pass(minutes(1), kept);
+  EXPECT_TRUE(eventually([&] { return files() == 2; }));
   EXPECT_NO_THROW(kept.find_partial("a", sent->name()));
 }
 

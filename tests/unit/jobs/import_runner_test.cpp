@@ -86,7 +86,7 @@ TEST(ImportRunner, AVolumeThatWasNotWrittenIsNotBelieved) {
 }
 
 TEST(ImportRunner, AProgramThatIsNotThereIsAnInternalError) {
-  ImportRunner runner({.bounds = {}, .at_once = 1, .program = "/nonexistent"});
+  ImportRunner runner({.bounds = {.time = seconds(1)}, .at_once = 1, .program = "/nonexistent"});
   const TemporaryFolder folder;
   test::write_file(folder / "upload", "x");
   const ImportTask task = {
@@ -148,7 +148,8 @@ TEST(ImportRunner, StoppingEndsThoseThatRunAndThoseThatWait) {
       ++ended;
     });
   }
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  // The program, the copy that runs, and the next one.
+  ASSERT_TRUE(test::eventually([] { return test::children_of(::getpid()).size() == 3; }));
   EXPECT_EQ(ended, 0);
   faulty.runner().stop();
   threads.clear();

@@ -19,6 +19,7 @@
 #include "server/store/sqlite/received_store.h"
 #include "tests/api/dicom_bytes.h"
 #include "tests/support/errors.h"
+#include "tests/support/process.h"
 #include "tests/unit/jobs/fixture.h"
 
 namespace isomesh::orders {
@@ -127,6 +128,37 @@ class FakePacs : public Pacs {
   std::set<std::string> stored_ ISOMESH_GUARDED_BY(mutex_);
 };
 
+// Tells until when nothing was due.
+class WatchedOrders : public store::SqliteOrderStore {
+ public:
+  using SqliteOrderStore::SqliteOrderStore;
+
+  std::vector<store::OrderRecord> due(store::Time now, std::size_t limit) const override {
+    std::vector<store::OrderRecord> found = SqliteOrderStore::due(now, limit);
+    if (found.empty()) idle_at_ = std::max(idle_at_.load(), now);
+    return found;
+  }
+  store::Time idle_at() const { return idle_at_; }
+
+ private:
+  mutable std::atomic<store::Time> idle_at_ = store::Time();
+};
+
+// Counts how often somebody has begun to look at what is held.
+class WatchedReceived : public store::SqliteReceivedStore {
+ public:
+  using SqliteReceivedStore::SqliteReceivedStore;
+
+  std::vector<store::HeldSeries> held() const override {
+    ++looks_;
+    return SqliteReceivedStore::held();
+  }
+  int looks() const { return looks_; }
+
+ private:
+  mutable std::atomic<int> looks_ = 0;
+};
+
 class OrdersTest : public test::JobsFixture {
  protected:
   OrdersTest() {
@@ -146,12 +178,10 @@ class OrdersTest : public test::JobsFixture {
   // As a process that goes on after the last one.
   void begin() {
     orders_.reset();
-    orders_ = std::make_unique<Orders>(
-        OrderServices{data_, blobs_, volumes_, jobs_, library_, labels_, store_, audit_, received_,
-                      pacs_},
-        hospital_,
-        OrderOptions{.now = [this] { return std::chrono::system_clock::now() + ahead_.load(); },
-                     .threads = 3});
+    orders_ = std::make_unique<Orders>(OrderServices{data_, blobs_, volumes_, jobs_, library_,
+                                                     labels_, store_, audit_, received_, pacs_},
+                                       hospital_,
+                                       OrderOptions{.now = [this] { return now(); }, .threads = 3});
     orders_->on_end([](const std::string&) {});
   }
 
@@ -165,20 +195,15 @@ class OrdersTest : public test::JobsFixture {
 
   Order get(const std::string& id) const { return orders_->get(std::nullopt, id); }
 
+  store::Time now() const { return std::chrono::system_clock::now() + ahead_.load(); }
+
   void pass(milliseconds time) {
     ahead_ = ahead_.load() + time;
     orders_->wake();
   }
 
   // Waits for what threads of the orders bring about, not for the clock.
-  template <class Condition>
-  bool until(const Condition& is_so) {
-    for (int tries = 0; tries < 5000; ++tries) {
-      if (is_so()) return true;
-      std::this_thread::sleep_for(milliseconds(2));
-    }
-    return false;
-  }
+  static bool until(const std::function<bool()>& is_so) { return test::eventually(is_so); }
   bool reaches(const std::string& id, OrderState state) {
     return until([&] { return get(id).state == state; });
   }
@@ -219,9 +244,9 @@ class OrdersTest : public test::JobsFixture {
   FakePacs* main_ = nullptr;
   FakePacs* other_ = nullptr;
   jobs::LabelLists labels_{blobs_};
-  store::SqliteOrderStore store_{database_};
+  WatchedOrders store_{database_};
   store::SqliteAuditTrail audit_{database_};
-  store::SqliteReceivedStore received_{database_};
+  WatchedReceived received_{database_};
   JobParameters last_parameters_;  // of the job that was finished last
   std::unique_ptr<Orders> orders_;
 };
@@ -341,11 +366,15 @@ class ReceivedOrdersTest : public OrdersTest {
   }
   std::vector<Order> all() const { return orders_->list(std::nullopt, {}, "", 10); }
   bool is_held() const { return received_.held_bytes() > 0; }
+  // Waits until all that is held was looked at: the second look begins after the first.
+  bool is_looked_at() {
+    return until([&, before = received_.looks()] { return received_.looks() >= before + 2; });
+  }
 };
 
 TEST_F(ReceivedOrdersTest, AreMadeWhenNothingMoreComesAndLeaveNothing) {
   receive(0, kSlices);
-  std::this_thread::sleep_for(milliseconds(700));
+  ASSERT_TRUE(is_looked_at());
   EXPECT_TRUE(all().empty());
   const std::string blob = received_.instances({"BONE", kStudy, kSeries}).front().blob;
   pass(minutes(2));
@@ -371,7 +400,7 @@ TEST_F(ReceivedOrdersTest, AreNotMadeAtOnceAfterAStart) {
   orders_.reset();
   ahead_ = hours(1);
   begin();
-  std::this_thread::sleep_for(milliseconds(700));
+  ASSERT_TRUE(is_looked_at());
   EXPECT_TRUE(all().empty());
   receive(2, kSlices);
   pass(minutes(2));
@@ -447,7 +476,7 @@ TEST_F(OrdersTest, WaitAsLongAsThePacsSays) {
   const std::string id = submit();
   ASSERT_TRUE(until([&] { return get(id).attempts == 1; }));
   pass(seconds(900));
-  std::this_thread::sleep_for(milliseconds(50));
+  ASSERT_TRUE(until([&, passed = now()] { return store_.idle_at() >= passed; }));
   EXPECT_EQ(get(id).attempts, 1U);
   pass(seconds(101));
   EXPECT_TRUE(until([&] { return get(id).attempts == 2; }));
@@ -470,10 +499,10 @@ TEST_F(OrdersTest, ThatAreCancelledStopAtOnce) {
   ASSERT_TRUE(until([&] { return main_->calls > 0; }));
   EXPECT_EQ(test::code_thrown_by([&] { orders_->cancel("somebody", id); }), ErrorCode::kNotFound);
   EXPECT_EQ(orders_->cancel(std::nullopt, id).state, OrderState::kCancelled);
-  main_->hangs = false;
-  std::this_thread::sleep_for(milliseconds(50));
-  EXPECT_EQ(get(id).state, OrderState::kCancelled);
   EXPECT_EQ(orders_->cancel(std::nullopt, id).state, OrderState::kCancelled);
+  main_->hangs = false;
+  orders_.reset();  // returns when the step under way is over
+  EXPECT_EQ(store_.get(std::nullopt, id).state, OrderState::kCancelled);
 }
 
 TEST_F(OrdersTest, CancelTheirJob) {

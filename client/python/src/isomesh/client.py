@@ -118,14 +118,15 @@ class Client:
             stored = self._upload_one(source, "labels" in parameters, of_upload)
         formats = parameters.get("formats", [])
         parameters["formats"] = formats if "ply" in formats else [*formats, "ply"]
-        job = self._submit(stored, "", parameters)
+        key = uuid.uuid4().hex
         try:
-            done = self.wait(job, progress=progress)
+            done = self.wait(self._submit(stored, key, parameters), progress=progress)
         except IsomeshError:
             raise
         except BaseException:  # an interrupt, or an exception of `progress`
-            with contextlib.suppress(IsomeshError):
-                self.cancel(job)
+            with contextlib.suppress(Exception):
+                # The key finds the job even if its response was interrupted.
+                self.cancel(self._submit(stored, key, parameters))
             raise
         if done["mesh"]["empty"]:
             warn(f"the surface is empty: {_why_empty(done, stored)}")
