@@ -9,7 +9,6 @@
 #include "client/cli/console.h"
 #include "client/cli/ids.h"
 #include "client/cli/local_daemon.h"
-#include "client/cli/mesh_command.h"
 #include "client/cli/orders.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/report.h"

@@ -15,4 +15,8 @@ constexpr int kServerUnreachable = 3;
 // waits for.
 int run(const Options& options, const std::stop_token& stop);
 
+// The command `mesh` or `local`: from volumes to files of their meshes. Throws Error as Client does
+// if there is one input; with several inputs, reports each failure and continues.
+int mesh(const Options& options, const std::stop_token& stop);
+
 }  // namespace isomesh::cli

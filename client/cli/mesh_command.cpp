@@ -1,5 +1,3 @@
-#include "client/cli/mesh_command.h"
-
 #include <algorithm>
 #include <atomic>
 #include <cstdio>

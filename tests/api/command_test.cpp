@@ -299,23 +299,6 @@ TEST_F(CommandTest, SaysWhenItsOutputCannotBeWritten) {
   }
 }
 
-TEST_F(CommandTest, NamesWhatItDoesNotKnow) {
-  const std::string file = folder_ / "sphere.raw";
-  const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
-      {{"mesh", file, "--isoo", "100", "-o", "x.stl"},
-       "no option --isoo. Did you mean --iso?\n`isomesh mesh --help`"},
-      {{"mehs", file}, "no command mehs. Did you mean mesh?"},
-      {{"mesh", file, "--callback", "ris.example", "--iso", "1", "-o", "x.stl"}, "--callback"},
-      {{"mesh", file, "--dims", "0,1,1", "--type", "uint8", "--iso", "1", "-o", "x.stl"}, "--dims"},
-      {{"info", "1/histogram"}, "is not an identifier"},
-  };
-  for (const auto& [arguments, told] : wrong) {
-    const Finished refused = daemon_.command(arguments);
-    EXPECT_NE(refused.status, 0) << told;
-    EXPECT_THAT(refused.errors, HasSubstr(told));
-  }
-}
-
 TEST_F(CommandTest, EraseTakesVolumesAndTellsOfThoseThatAreNone) {
   const std::string volume = upload();
   const Finished erased = daemon_.command({"erase", "0123", volume});

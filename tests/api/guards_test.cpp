@@ -232,17 +232,6 @@ TEST_F(GuardsTest, ClientsThatHangOnDoNotStarveOthers) {
   daemon_.client().cancel(job.id);
 }
 
-TEST_F(GuardsTest, WaitersAreAnsweredTogether) {
-  const Job job = long_job(daemon_);
-  std::deque<Connection> waiting;
-  for (int n = 0; n < 40; ++n) {
-    waiting.emplace_back(daemon_.url()).send(request("GET", "/v1/jobs/" + job.id + "?wait=30"));
-  }
-  EXPECT_EQ(daemon_.get("/livez").status, 200);
-  daemon_.client().cancel(job.id);
-  for (const Connection& connection : waiting) EXPECT_EQ(connection.receive().status, 200);
-}
-
 TEST(UploadPlaces, AreBounded) {
   const Daemon daemon(std::vector<std::string>{"--upload-places", "2"});
   const RawUpload sphere = sphere_upload();

@@ -175,18 +175,6 @@ TEST_F(JobsTest, ABodyThatIsTooLargeIsRefused) {
                          ErrorCode::kTooLarge));
 }
 
-// A page of elsewhere may send the other ones without asking first.
-TEST_F(JobsTest, TheMediaTypeOfTheBodyIsJson) {
-  const std::string longer = "\"passes\": 0" + std::string(20'000, ' ');
-  EXPECT_EQ(post_with(longer, {{"Content-Type", "application/json; charset=utf-8"}}).status, 202);
-  for (const std::string type :
-       {"application/x-www-form-urlencoded", "text/plain", "multipart/form-data; boundary=x"}) {
-    EXPECT_TRUE(
-        is_problem(post_with(longer, {{"Content-Type", type}}), ErrorCode::kUnsupportedMedia))
-        << type;
-  }
-}
-
 TEST_F(JobsTest, ListsByStateInPages) {
   for (int n = 0; n < 105; ++n) ASSERT_EQ(post_with("\"passes\": 0").status, 202);
   std::set<std::string> seen;
@@ -257,23 +245,6 @@ TEST(FullQueue, AnswersLater) {
 }
 
 // --- What HTTP lets one say
-
-TEST_F(JobsTest, OneKeyOfManyClientsIsOneJob) {
-  const Volume volume = upload(daemon_, sphere_upload());
-  const std::string body = "{\"volume\": \"" + volume.id + "\", \"iso\": 77}";
-  std::vector<std::string> ids(8);
-  {
-    std::vector<std::jthread> clients;
-    for (std::string& id : ids) {
-      clients.emplace_back([&] {
-        id = job_from_json(daemon_.send("POST", "/v1/jobs", body, {{"Idempotency-Key", "k"}}).body)
-                 .id;
-      });
-    }
-  }
-  EXPECT_THAT(ids, testing::Each(ids[0]));
-  EXPECT_EQ(daemon_.client().jobs().jobs.size(), 1U);
-}
 
 TEST_F(JobsTest, AKeyOfTheWholeMeshIsOneJobToo) {
   const RawUpload sphere = sphere_upload();

@@ -129,38 +129,6 @@ TEST_F(LabelsTest, WhatHoldsOneLabelHasToBeToldWhich) {
   EXPECT_EQ(mesh(finished_job(daemon_), "drc?label=1").status, 400);
 }
 
-TEST_F(LabelsTest, AreRefusedByName) {
-  const auto fault = [&](const std::string& members) {
-    const Answer answer = post(members);
-    return std::to_string(answer.status) + ' ' + json::parse(answer.body).value("detail", "");
-  };
-  EXPECT_EQ(fault(""), "400 iso: is required unless labels is given");
-  EXPECT_THAT(fault(R"("iso": 3, "labels": "all")"), HasSubstr("400 iso: "));
-  EXPECT_THAT(fault(R"("labels": [3, 4, 9])"),
-              HasSubstr("422 the volume has no voxels of the labels 4, 9"));
-  EXPECT_THAT(fault(R"("labels": [0, 3])"), HasSubstr("400 labels: "));
-  EXPECT_THAT(fault(R"("labels": "some")"), HasSubstr("400 labels: "));
-  EXPECT_THAT(fault(R"("labels": [])"), HasSubstr("400 labels: "));
-  EXPECT_THAT(fault(R"("labels": [1.5])"), HasSubstr("400 labels: "));
-  EXPECT_THAT(fault(R"("labels": "all", "interpolation": "linear")"),
-              HasSubstr("400 interpolation: "));
-  EXPECT_THAT(fault(R"("labels": "all", "components": {"keep": 1})"),
-              HasSubstr("400 components: "));
-  EXPECT_THAT(fault(R"("labels": "all", "label_colors": {"3": "red"})"),
-              HasSubstr("400 label_colors.3: "));
-  EXPECT_THAT(fault(R"("labels": "all", "label_names": {"three": "red"})"),
-              HasSubstr("400 label_names.three: "));
-  EXPECT_THAT(fault(R"("iso": 3, "background": 1)"), HasSubstr("400 background: "));
-  EXPECT_THAT(fault(R"("iso": 3, "formats": ["zip"])"), HasSubstr("400 formats: "));
-
-  const Volume floats = upload(
-      daemon_,
-      {.bytes = std::string(4 * 27, '\0'), .query = "dims=3,3,3&type=float32", .options = {}});
-  const Answer answer = post(R"("labels": "all")", floats.id);
-  EXPECT_EQ(answer.status, 400);
-  EXPECT_THAT(answer.body, HasSubstr("float32"));
-}
-
 TEST_F(LabelsTest, AnotherBackgroundIsAnotherMesh) {
   const Job job = made(R"("labels": "all", "background": 3, "formats": ["zip"])");
   ASSERT_EQ(job.mesh->labels.size(), 2U);

@@ -285,40 +285,6 @@ TEST_F(OpenApiTest, DefaultsAreThoseOfTheProgram) {
   EXPECT_GE(compared, 7);
 }
 
-// Ranges, one step inside and one outside.
-TEST_F(OpenApiTest, RangesAreThoseOfTheProgram) {
-  const auto takes = [&](const std::string& name, double value) {
-    json body = {{"volume", "0123"}, {"iso", 1}};
-    const bool of_draco = name == "position_bits" || name == "speed";
-    const bool of_components = name == "keep" || name == "min_triangles";
-    json& owner = of_draco ? body["draco"] : of_components ? body["components"] : body;
-    owner[name] = value;
-    return daemon_.send("POST", "/v1/jobs", body.dump()).status != 400;
-  };
-  for (const auto& [name, schema] :
-       {std::pair{"passes", "Passes"}, std::pair{"position_bits", "PositionBits"},
-        std::pair{"speed", "Speed"}, std::pair{"keep", "Keep"},
-        std::pair{"min_triangles", "MinTriangles"}}) {
-    const auto low = api_.schema(schema)["minimum"].as<double>();
-    const auto high = api_.schema(schema)["maximum"].as<double>();
-    EXPECT_TRUE(takes(name, low) && takes(name, high)) << name;
-    EXPECT_FALSE(takes(name, low - 1) || takes(name, high + 1)) << name;
-  }
-  EXPECT_TRUE(takes("lambda", 1));
-  EXPECT_FALSE(takes("lambda", 0) || takes("lambda", 1.001));
-  EXPECT_TRUE(takes("pass_band", 0.5));
-  EXPECT_FALSE(takes("pass_band", 0) || takes("pass_band", 0.501));
-  EXPECT_TRUE(takes("max_displacement_mm", 0));
-  EXPECT_FALSE(takes("max_displacement_mm", -1e-9));
-}
-
-TEST_F(OpenApiTest, EveryNameIsTaken) {
-  for (const std::string& name : names<Smoothing>()) {
-    const json body = {{"volume", job_.parameters.volume}, {"iso", 100}, {"smoothing", name}};
-    EXPECT_EQ(daemon_.send("POST", "/v1/jobs", body.dump()).status, 202) << name;
-  }
-}
-
 TEST_F(OpenApiTest, TheExamplesAreRequestsThatAreUnderstood) {
   const YAML::Node examples =
       api_.paths()["/v1/jobs"]["post"]["requestBody"]["content"]["application/json"]["examples"];

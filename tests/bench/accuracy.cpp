@@ -1,14 +1,11 @@
 #include "tests/bench/accuracy.h"
 
 #include <algorithm>
-#include <iomanip>
 #include <limits>
-#include <sstream>
 
 #include <meshoptimizer.h>
 
 #include "server/mesh/distance.h"
-#include "tests/bench/decimation_peers.h"
 #include "tests/bench/numbers.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/stages.h"
@@ -142,47 +139,31 @@ CertifyTime measure_certify(const Samples& samples, const AccuracyPlan& plan) {
   return time;
 }
 
-std::vector<std::string> accuracy_head() {
-  return {"",         "triangles", "max to scan", "max from scan", "rms from scan",
-          "simplify", "certify",   "encode",      "whole job",     "bytes"};
+Json to_json(const std::vector<Approximation>& approximations) {
+  Json rows = Json::array();
+  for (const Approximation& row : approximations) {
+    const auto mm = [&](double value) { return row.to_scan.points > 0 ? Json(value) : Json(); };
+    rows.push_back({{"name", row.name},
+                    {"is_peer", row.is_peer},
+                    {"triangles", row.triangles},
+                    {"max_to_scan_mm", mm(row.to_scan.max_mm)},
+                    {"max_from_scan_mm", mm(row.from_scan.max_mm)},
+                    {"rms_from_scan_mm", mm(row.from_scan.rms_mm)},
+                    {"simplify_ms", if_measured(row.simplify_ms)},
+                    {"certify_ms", if_measured(row.certify_ms)},
+                    {"encode_ms", if_measured(row.encode_ms)},
+                    {"job_ms", if_measured(row.job_ms)},
+                    {"bytes", row.bytes > 0 ? Json(row.bytes) : Json()}});
+  }
+  return rows;
 }
 
-std::vector<std::string> accuracy_row(const Approximation& row) {
-  const auto mm = [&](double value) {
-    return row.to_scan.points > 0 ? fixed(value, 4) : std::string("-");
-  };
-  const auto ms = [](double value) { return value > 0 ? milliseconds(value) : std::string("-"); };
-  return {row.name,
-          grouped(row.triangles),
-          mm(row.to_scan.max_mm),
-          mm(row.from_scan.max_mm),
-          mm(row.from_scan.rms_mm),
-          ms(row.simplify_ms),
-          ms(row.certify_ms),
-          ms(row.encode_ms),
-          ms(row.job_ms),
-          row.bytes > 0 ? grouped(row.bytes) : "-"};
-}
-
-std::string to_table(const std::vector<Approximation>& approximations) {
-  std::ostringstream text;
-  const auto line = [&](const std::vector<std::string>& cells) {
-    text << std::left << std::setw(24) << cells.front() << std::right;
-    for (std::size_t n = 1; n < cells.size(); ++n) text << std::setw(14) << cells[n];
-    text << '\n';
-  };
-  line(accuracy_head());
-  for (const Approximation& row : approximations) line(accuracy_row(row));
-  return text.str();
-}
-
-std::string to_text(const CertifyTime& time) {
-  const mesh::Certificate& found = time.certificate;
-  return std::to_string(time.threads) + (time.threads == 1 ? " thread: " : " threads: ") +
-         milliseconds(time.ms) + " for " + grouped(time.points) + " points, " +
-         fixed(1e6 * time.ms / static_cast<double>(std::max<std::uint64_t>(1, time.points)), 0) +
-         " ns a point; smoothed to extracted at most " + fixed(found.from_mesh.max_mm, 3) +
-         " mm, extracted to smoothed " + fixed(found.from_reference.max_mm, 3) + " mm\n";
+Json to_json(const CertifyTime& time) {
+  return {{"threads", time.threads},
+          {"points", time.points},
+          {"certify_ms", time.ms},
+          {"max_to_scan_mm", time.certificate.from_mesh.max_mm},
+          {"max_from_scan_mm", time.certificate.from_reference.max_mm}};
 }
 
 }  // namespace isomesh::bench

@@ -8,6 +8,7 @@
 
 #include "proto/mesh_summary.h"
 #include "server/mesh/distance.h"
+#include "tests/bench/rows.h"
 #include "tests/bench/samples.h"
 
 namespace isomesh::bench {
@@ -51,12 +52,8 @@ struct CertifyTime {
 };
 CertifyTime measure_certify(const Samples& samples, const AccuracyPlan& plan);
 
-// As the cells of a table.
-std::vector<std::string> accuracy_head();
-std::vector<std::string> accuracy_row(const Approximation& row);
-
-// As text for a terminal.
-std::string to_table(const std::vector<Approximation>& approximations);
-std::string to_text(const CertifyTime& time);
+// One object for each.
+Json to_json(const std::vector<Approximation>& approximations);
+Json to_json(const CertifyTime& time);
 
 }  // namespace isomesh::bench

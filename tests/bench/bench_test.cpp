@@ -13,10 +13,13 @@
 #include "tests/bench/ct_head.h"
 #include "tests/bench/label_body.h"
 #include "tests/bench/paper.h"
+#include "tests/bench/ratios.h"
+#include "tests/bench/report.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/stages.h"
-#include "tests/bench/svg_plot.h"
 #include "tests/bench/timing.h"
+#include "tests/support/files.h"
+#include "tests/support/process.h"
 
 namespace isomesh::bench {
 namespace {
@@ -120,20 +123,37 @@ TEST(LabelBody, HasAllItsLabels) {
   EXPECT_EQ(labels.back().label, static_cast<std::int64_t>(kBodyLabels));
 }
 
-TEST(SvgPlot, LeavesOutWhatAnAxisCannotShow) {
-  const std::string svg = to_svg({.title = "a < b & c",
-                                  .x = {"x", Scale::kLog},
-                                  .y = {"y", Scale::kLog},
-                                  .series = {{"one", {{0, 1}, {1, NAN}, {2, -1}, {3, 4}}}}});
-  EXPECT_THAT(svg, HasSubstr("a &lt; b &amp; c"));
-  EXPECT_THAT(svg, Not(HasSubstr("nan")));
-  EXPECT_THAT(svg, Not(HasSubstr("inf")));
-}
+TEST(Report, IsWrittenFromWhatIsMeasured) {
+  ReportPlan plan;
+  plan.sections = {"paper", "passes", "quality", "accuracy"};
+  plan.head = Subject{synthetic_field(24), {{"skin", kFieldIso}, {"bone", kFieldIso + 1}}};
+  plan.cubes = {12, 20};
+  plan.paper_triangles = {20'000, 8'000};
+  Json measured = measure_report(plan);
+  measured["goals"] = to_json({{"ratio/one", "one thing", "2 ms", "4 ms", 0.5, Goal{0.4}}});
+  const Json small = {{"size", 8},          {"samples", 512},     {"triangles", 100},
+                      {"extract_ms", 1},    {"smooth_ms", 2},     {"job_ms", 3},
+                      {"least_bytes", 600}, {"extract_bytes", 1}, {"smooth_bytes", Json()},
+                      {"job_bytes", 3}};
+  Json large = small;
+  large["samples"] = 4096;
+  measured["growth"] = {small, large};
+  const test::TemporaryFolder folder;
+  test::write_file(folder / "report.json", measured.dump());
 
-TEST(SvgPlot, HasAxesWithoutAnyPoint) {
-  const std::string svg = to_svg({.title = "", .x = {"x"}, .y = {"y", Scale::kLog}, .series = {}});
-  EXPECT_THAT(svg, Not(HasSubstr("nan")));
-  EXPECT_THAT(svg, Not(HasSubstr("inf")));
+  const test::Finished finished = test::run({ISOMESH_REPORT_SCRIPT, folder / "report.json"});
+  ASSERT_EQ(finished.status, 0) << finished.errors;
+  const std::string text = test::read_file(folder / "REPORT.md");
+  EXPECT_THAT(text, HasSubstr("| one thing | 2 ms | 4 ms | 0.50 | at most 0.40 | not reached |"));
+  EXPECT_THAT(text, HasSubstr("| field-24 20x20x20, skin | 5 tetrahedra |"));
+  EXPECT_THAT(text, HasSubstr("| E = 0.50 mm |"));
+  EXPECT_THAT(text, HasSubstr("| 8^3 | 0.0 MiB | 0.0 MiB | - | 0.0 MiB |"));
+  EXPECT_THAT(text, HasSubstr("`ch2` is missing"));
+  EXPECT_THAT(text, Not(HasSubstr("nan")));
+  for (const char* figure : {"sub-tables", "time-against-size", "memory-against-size",
+                             "passes-field-24-20x20x20-skin", "error-field-24-24x24x24-bone"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder / (figure + std::string(".svg")))) << figure;
+  }
 }
 
 // A project file of 2 x 2 x 3 samples, or only its first `members` members.

@@ -289,30 +289,6 @@ class MedianReporter : public benchmark::ConsoleReporter {
   }
 };
 
-// Prints through one reporter and keeps what the other makes.
-class BothReporters : public benchmark::BenchmarkReporter {
- public:
-  BothReporters(benchmark::BenchmarkReporter* console, benchmark::BenchmarkReporter& json)
-      : console_(console), json_(json) {}
-
-  bool ReportContext(const Context& context) override {
-    if (console_ != nullptr) console_->ReportContext(context);
-    return json_.ReportContext(context);
-  }
-  void ReportRuns(const std::vector<Run>& runs) override {
-    if (console_ != nullptr) console_->ReportRuns(runs);
-    json_.ReportRuns(runs);
-  }
-  void Finalize() override {
-    if (console_ != nullptr) console_->Finalize();
-    json_.Finalize();
-  }
-
- private:
-  benchmark::BenchmarkReporter* console_;
-  benchmark::BenchmarkReporter& json_;
-};
-
 }  // namespace
 
 std::string run_benchmarks(const Plan& plan) {
@@ -333,10 +309,11 @@ std::string run_benchmarks(const Plan& plan) {
   json.SetOutputStream(&document);
   json.SetErrorStream(&document);
   MedianReporter console;
-  BothReporters reporters(plan.json ? nullptr : &console, json);
-  const std::size_t matched = benchmark::RunSpecifiedBenchmarks(&reporters, plan.filter);
+  benchmark::BenchmarkReporter* reporter = &console;
+  if (plan.json) reporter = &json;
+  benchmark::RunSpecifiedBenchmarks(reporter, plan.filter);
   benchmark::Shutdown();
-  return matched > 0 ? document.str() : "{}";
+  return document.str();
 }
 
 }  // namespace isomesh::bench

@@ -20,9 +20,9 @@ struct Plan {
   bool json = false;
 };
 
-// Runs the benchmarks whose names match and prints medians to standard output, unless the plan is
-// for JSON. Returns Google Benchmark's JSON document. Sets the threads of the stages and of the
-// peers.
+// Runs the benchmarks whose names match. Prints medians to standard output or, if the plan is for
+// JSON, returns Google Benchmark's document; empty if no name matches. Sets the threads of the
+// stages and of the peers.
 std::string run_benchmarks(const Plan& plan);
 
 }  // namespace isomesh::bench

@@ -8,7 +8,7 @@
 #include <vtkPolyData.h>
 #include <vtkQuadricDecimation.h>
 
-#include "tests/bench/decimation_peers.h"
+#include "tests/bench/peers.h"
 
 namespace isomesh::bench {
 namespace {

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <iomanip>
-#include <sstream>
 
 #include "tests/bench/label_body.h"
 #include "tests/bench/label_stages.h"
@@ -155,14 +153,6 @@ class QualityOfWays {
   std::vector<Probe> probes_;
 };
 
-std::string signed_percent(double share) {
-  return (share < 0 ? "" : "+") + fixed(100 * share, 2) + " %";
-}
-
-std::string of_points(std::uint64_t count, std::uint64_t points) {
-  return grouped(count) + " of " + grouped(points);
-}
-
 }  // namespace
 
 std::vector<Samples> segmentations(std::uint32_t body_samples) {
@@ -211,45 +201,23 @@ std::vector<LabelQuality> measure_label_quality(const Samples& samples, const La
   return qualities;
 }
 
-std::vector<std::string> quality_head() {
-  return {"",
-          "triangles",
-          "points in gaps",
-          "points in overlaps",
-          "volume of all",
-          "volume of the worst label"};
-}
-
-std::vector<std::vector<std::string>> quality_rows(const std::vector<LabelQuality>& qualities) {
-  std::vector<std::vector<std::string>> rows;
+Json to_json(const std::vector<LabelQuality>& qualities) {
+  Json rows = Json::array();
   for (const LabelQuality& one : qualities) {
     const Sharing& sharing = one.sharing;
-    rows.push_back({one.way, grouped(one.size.triangles),
-                    of_points(sharing.gaps, sharing.points_within_labels),
-                    of_points(sharing.overlaps, sharing.points),
-                    one.volumes ? signed_percent(one.volumes->all) : "-",
-                    one.volumes ? signed_percent(one.volumes->worst) + " (label " +
-                                      std::to_string(one.volumes->worst_label) + ", " +
-                                      grouped(one.volumes->worst_voxels) + " voxels)"
-                                : "-"});
+    Json row = {{"way", one.way},
+                {"triangles", one.size.triangles},
+                {"gaps", sharing.gaps},
+                {"points_within_labels", sharing.points_within_labels},
+                {"overlaps", sharing.overlaps},
+                {"points", sharing.points}};
+    row["change_of_all"] = one.volumes ? Json(one.volumes->all) : Json();
+    row["change_of_worst"] = one.volumes ? Json(one.volumes->worst) : Json();
+    row["worst_label"] = one.volumes ? Json(one.volumes->worst_label) : Json();
+    row["its_voxels"] = one.volumes ? Json(one.volumes->worst_voxels) : Json();
+    rows.push_back(std::move(row));
   }
   return rows;
-}
-
-std::string to_table(const std::vector<LabelQuality>& qualities) {
-  std::vector<std::vector<std::string>> rows = quality_rows(qualities);
-  rows.insert(rows.begin(), quality_head());
-  std::ostringstream text;
-  for (const auto& row : rows) {
-    for (std::size_t column = 0; column < row.size(); ++column) {
-      std::size_t width = 0;
-      for (const auto& other : rows) width = std::max(width, other[column].size());
-      text << (column == 0 ? std::left : std::right) << std::setw(static_cast<int>(width) + 2)
-           << row[column];
-    }
-    text << '\n';
-  }
-  return text.str();
 }
 
 }  // namespace isomesh::bench

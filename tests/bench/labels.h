@@ -45,10 +45,7 @@ struct LabelQuality {
 // Of ours with two smoothings, and of the peers that there are.
 std::vector<LabelQuality> measure_label_quality(const Samples& samples, const LabelPlan& plan);
 
-// As rows of a table, and its head.
-std::vector<std::string> quality_head();
-std::vector<std::vector<std::string>> quality_rows(const std::vector<LabelQuality>& qualities);
-// As text for a terminal.
-std::string to_table(const std::vector<LabelQuality>& qualities);
+// An object for each.
+Json to_json(const std::vector<LabelQuality>& qualities);
 
 }  // namespace isomesh::bench

@@ -1,7 +1,8 @@
 // isomesh-bench: times every stage and, where VTK was found when it was built, VTK's on the same
-// volume in the same run; and writes the report on the paper.
+// volume in the same run.
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <optional>
 #include <regex>
@@ -73,20 +74,45 @@ Plan plan_of(const Options& options) {
   return plan;
 }
 
+std::string missing_peers() { return peers_available() ? "" : peers_description() + '\n'; }
+
+// Prints tables one by one for a terminal, or all of them as one JSON document at the end.
+class Output {
+ public:
+  explicit Output(bool json) : json_(json) {}
+
+  void add(const std::string& heading, const std::vector<Finding>& findings) {
+    add(heading, to_json(findings), to_table(findings));
+  }
+  void add(const std::string& heading, const Json& rows) { add(heading, rows, to_text(rows)); }
+
+  void end(const std::string& notes = missing_peers()) {
+    document["peers"] = {{"available", peers_available()}, {"description", peers_description()}};
+    std::cout << (json_ ? document.dump(2) + '\n' : notes);
+  }
+
+  Json document;
+
+ private:
+  void add(const std::string& heading, const Json& rows, const std::string& text) {
+    document[heading] = rows;
+    if (!json_ && !rows.empty()) std::cout << heading << '\n' << text << std::endl;
+  }
+
+  const bool json_;
+};
+
 int run(const Options& options) {
   const Plan plan = plan_of(options);
   if (!plan.json) {
     for (const auto& [key, value] : describe_machine()) std::cout << key << ": " << value << '\n';
     std::cout << std::endl;
   }
+  Output output(plan.json);
   const std::string document = run_benchmarks(plan);
-  const std::vector<Finding> findings = measure_findings(plan);
-  if (plan.json) {
-    std::cout << with_findings(document, findings) << '\n';
-    return 0;
-  }
-  if (!findings.empty()) std::cout << '\n' << to_table(findings);
-  if (!peers_available()) std::cout << '\n' << peers_description() << '\n';
+  if (!document.empty()) output.document = Json::parse(document);
+  output.add("ratios", measure_findings(plan));
+  output.end();
   return 0;
 }
 
@@ -100,52 +126,78 @@ int run_service(const Options& options, const std::filesystem::path& daemon) {
                       .iso = options.iso.value_or(kDefaultIso),
                       .threads = options.threads};
   if (!options.volume.empty() && !options.iso) plan.iso = load_volume(plan.volume).suggested_iso;
-  std::cout << to_table(measure_service(plan));
-  if (!peers_available()) std::cout << '\n' << peers_description() << '\n';
+  Output output(options.json);
+  output.add("service", measure_service(plan));
+  output.end();
   return 0;
+}
+
+int run_cluster(const Options& options, const std::filesystem::path& daemon) {
+  Output output(options.json);
+  output.add("cluster", measure_cluster(daemon));
+  output.end("");
+  return 0;
+}
+
+int run_report(const std::filesystem::path& folder, ReportPlan plan,
+               const std::vector<std::string>& sections) {
+  plan.sections = sections;
+  std::filesystem::create_directories(folder);
+  const std::filesystem::path path = folder / "report.json";
+  std::ofstream file(path);
+  file << measure_report(plan).dump(2) << std::endl;
+  if (!file) throw std::runtime_error("cannot write " + path.string());
+  std::cout << path.string() << '\n';
+  return 0;
+}
+
+std::vector<int> thread_counts(const Options& options) {
+  return options.threads > 0 ? std::vector{options.threads} : std::vector{1, 2};
+}
+
+std::string count_of(int threads) {
+  return std::to_string(threads) + (threads == 1 ? " thread" : " threads");
 }
 
 int run_labels(const Options& options, std::uint32_t body_samples) {
   const std::vector<Samples> all = options.volume.empty()
                                        ? segmentations(body_samples)
                                        : std::vector{load_labels(options.volume)};
-  const std::vector<int> counts =
-      options.threads > 0 ? std::vector{options.threads} : std::vector{1, 2};
+  Output output(options.json);
+  const std::vector<int> counts = thread_counts(options);
   for (const int count : counts) {
     for (const Samples& samples : all) {
-      std::cout << count << (count == 1 ? " thread\n" : " threads\n")
-                << to_table(measure_label_findings(samples, {count, options.surface_nets_root}))
-                << std::endl;
+      output.add(samples.name + ", " + count_of(count),
+                 measure_label_findings(samples, {count, options.surface_nets_root}));
     }
   }
   for (const Samples& samples : all) {
-    std::cout << samples.name << '\n'
-              << to_table(
-                     measure_label_quality(samples, {counts.back(), options.surface_nets_root}))
-              << std::endl;
+    output.add(samples.name + ", gaps and overlaps",
+               to_json(measure_label_quality(samples, {counts.back(), options.surface_nets_root})));
   }
-  if (!peers_available()) std::cout << peers_description() << '\n';
-  if (options.surface_nets_root.empty()) std::cout << kNoSurfaceNets << '\n';
+  const bool without_nets = options.surface_nets_root.empty();
+  output.end(missing_peers() + (without_nets ? kNoSurfaceNets + std::string("\n") : ""));
   return 0;
 }
 
-// The real volume, or of none the synthetic field of the first size.
+// The real volume; if there is none, the synthetic field of the first size.
 int run_accuracy(const Options& options, AccuracyPlan plan, bool only_certify) {
   Plan loaded;
   load(options, loaded);
   const Samples samples =
       loaded.volume ? std::move(*loaded.volume) : synthetic_field(options.sizes.front());
   plan.iso = loaded.volume ? loaded.iso : kFieldIso;
-  for (const int threads : options.threads > 0 ? std::vector{options.threads} : std::vector{1, 2}) {
+  Output output(options.json);
+  for (const int threads : thread_counts(options)) {
     plan.threads = threads;
     if (only_certify) {
-      std::cout << to_text(measure_certify(samples, plan)) << std::flush;
+      output.add(count_of(threads), Json::array({to_json(measure_certify(samples, plan))}));
       continue;
     }
     if (threads < 2 && options.threads == 0) continue;  // each run takes minutes
-    std::cout << threads << (threads == 1 ? " thread\n" : " threads\n")
-              << to_table(measure_approximations(samples, plan)) << std::flush;
+    output.add(count_of(threads), to_json(measure_approximations(samples, plan)));
   }
+  output.end();
   return 0;
 }
 
@@ -176,17 +228,18 @@ int run_program(int argc, char** argv) {
   app.add_flag("--json", options.json, "One JSON document instead of text");
 
   app.add_option("--surface-nets-root", options.surface_nets_root,
-                 "For `labels` and `report`: the folder of a Debian 13 with python3-vtk9 and "
+                 "For `labels`: the folder of a Debian 13 with python3-vtk9 and "
                  "python3-numpy, as debootstrap makes it, whose vtkSurfaceNets3D is a peer; left "
                  "out without it")
       ->envname("ISOMESH_SURFACE_NETS_ROOT")
       ->check(CLI::ExistingDirectory);
 
   std::filesystem::path folder;
-  CLI::App* report = app.add_subcommand("report", "Write the report on the paper");
-  report->add_option("DIR", folder, "Where REPORT.md and its plots go")->required();
+  CLI::App* report = app.add_subcommand(
+      "report", "Measure the paper's tables and figures again, for tests/bench/report.py");
+  report->add_option("DIR", folder, "Where report.json goes")->required();
   std::vector<std::string> sections;
-  report->add_option("--only", sections, "Sections to write; several are separated by commas")
+  report->add_option("--only", sections, "Sections to measure; several are separated by commas")
       ->delimiter(',')
       ->check(
           CLI::IsMember(std::vector<std::string>(kReportSections.begin(), kReportSections.end())));
@@ -243,14 +296,11 @@ int run_program(int argc, char** argv) {
   if (*memory) return run_memory_command(stage, size, threads);
   warn_when_busy();
   if (*service) return run_service(options, daemon);
-  if (*cluster) {
-    std::cout << to_table(measure_cluster(daemon));
-    return 0;
-  }
+  if (*cluster) return run_cluster(options, daemon);
   accuracy.with_peers = !only_fast;
   if (*simplify || *certify) return run_accuracy(options, accuracy, bool(*certify));
   if (*labels) return run_labels(options, samples);
-  return *report ? write_report(folder, daemon, options.surface_nets_root, sections) : run(options);
+  return *report ? run_report(folder, usual_plan(daemon), sections) : run(options);
 }
 
 }  // namespace

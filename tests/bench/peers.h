@@ -6,7 +6,9 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "server/mesh/surface_view.h"
 #include "tests/bench/label_walls.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/stages.h"
@@ -56,5 +58,20 @@ class Peers {
   struct Vtk;
   std::unique_ptr<Vtk> vtk_;
 };
+
+// A mesh that another program has simplified.
+struct Decimated {
+  std::vector<mesh::Vec3> positions;
+  std::vector<mesh::Triangle> triangles;
+};
+
+struct DecimationPeer {
+  std::string name;
+  // To about that many triangles; `run` is all that is timed.
+  Decimated (*run)(const mesh::SurfaceView& surface, std::size_t triangles);
+};
+
+// Those of VTK; none without it.
+std::vector<DecimationPeer> decimation_peers();
 
 }  // namespace isomesh::bench

@@ -28,4 +28,6 @@ std::uint64_t Peers::pipeline() { return 0; }
 void Peers::release() {}
 MeshSize Peers::size() const { return {}; }
 
+std::vector<DecimationPeer> decimation_peers() { return {}; }
+
 }  // namespace isomesh::bench

@@ -7,8 +7,6 @@
 #include <regex>
 #include <sstream>
 
-#include <nlohmann/json.hpp>
-
 #include "tests/bench/draco_call.h"
 #include "tests/bench/memory.h"
 #include "tests/bench/numbers.h"
@@ -299,23 +297,21 @@ std::string to_table(const std::vector<Finding>& findings) {
   return text.str();
 }
 
-std::string with_findings(const std::string& document, const std::vector<Finding>& findings) {
-  auto json = nlohmann::ordered_json::parse(document);
-  auto& ratios = json["ratios"] = nlohmann::ordered_json::array();
+Json to_json(const std::vector<Finding>& findings) {
+  Json rows = Json::array();
   for (const Finding& finding : findings) {
-    nlohmann::ordered_json entry = {{"name", finding.name},
-                                    {"what", finding.what},
-                                    {"isomesh", finding.ours},
-                                    {"value", finding.value}};
-    if (!finding.peer.empty()) entry["peer"] = finding.peer;
+    Json row = {{"name", finding.name},
+                {"what", finding.what},
+                {"isomesh", finding.ours},
+                {"value", finding.value}};
+    if (!finding.peer.empty()) row["peer"] = finding.peer;
     if (finding.goal) {
-      entry[finding.goal->at_most ? "goal_at_most" : "goal_at_least"] = finding.goal->value;
-      entry["reached"] = finding.reached();
+      row[finding.goal->at_most ? "goal_at_most" : "goal_at_least"] = finding.goal->value;
+      row["reached"] = finding.reached();
     }
-    ratios.push_back(std::move(entry));
+    rows.push_back(std::move(row));
   }
-  json["peers"] = {{"available", peers_available()}, {"description", peers_description()}};
-  return json.dump(2);
+  return rows;
 }
 
 }  // namespace isomesh::bench

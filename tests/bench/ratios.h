@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/bench/benchmarks.h"
+#include "tests/bench/rows.h"
 
 namespace isomesh::bench {
 
@@ -34,7 +35,8 @@ std::vector<Finding> measure_findings(const Plan& plan);
 // As text for a terminal.
 std::string to_table(const std::vector<Finding>& findings);
 
-// Google Benchmark's document with the findings as its member "ratios", and "peers".
-std::string with_findings(const std::string& document, const std::vector<Finding>& findings);
+// An object for each, with the members name, what, isomesh and value, and peer, goal_at_most or
+// goal_at_least and reached where there is a peer or a goal.
+Json to_json(const std::vector<Finding>& findings);
 
 }  // namespace isomesh::bench

@@ -1,25 +1,53 @@
-// The report: the paper's tables and figures, measured again.
+// The measurements of the report: the paper's tables and figures, measured again. report.py makes
+// Markdown and figures of them.
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "tests/bench/rows.h"
+#include "tests/bench/samples.h"
+
 namespace isomesh::bench {
 
-// Measures for some minutes, on two threads or as many as the machine has, and writes REPORT.md and
-// the plots beside it into `folder`, which is made when it is missing. A volume that is not
-// installed is left out, and the report says so. `daemon` is the program isomeshd;
-// `surface_nets_root` may be empty, see surface_nets.h. Of `only` as many sections as are named are
-// written, all where none is. Returns the exit status. Throws std::runtime_error when a file cannot
-// be written.
-int write_report(const std::filesystem::path& folder, const std::filesystem::path& daemon,
-                 const std::filesystem::path& surface_nets_root,
-                 const std::vector<std::string>& only);
+// A volume and the surfaces of it that the report looks at.
+struct Subject {
+  Samples samples;
+  struct Level {
+    std::string name;
+    double iso = 0;
+  };
+  std::vector<Level> levels;
+};
 
-// What sections are called.
-inline constexpr std::array<const char*, 9> kReportSections = {
-    "service", "cluster", "goals", "paper", "passes", "growth", "quality", "labels", "accuracy"};
+// What the report calls a surface: the volume's name and size, and the level.
+std::string title_of(const Samples& samples, const Subject::Level& level);
+
+inline constexpr std::array kReportSections = {"service", "goals",   "paper",   "passes",
+                                               "growth",  "quality", "accuracy"};
+
+struct ReportPlan {
+  std::vector<std::string> sections;  // of kReportSections; empty: all
+  int threads = 2;
+  std::filesystem::path daemon;      // isomeshd, for the section `service`
+  std::filesystem::path brain_file;  // what it is given
+  // Sections that need a volume which is missing are left out.
+  std::optional<Subject> head;  // resampled to cubes
+  std::optional<Subject> brain;
+  std::vector<std::uint32_t> cubes = {32, 64, 128};  // ascending; most sections use the last
+  std::vector<std::uint32_t> growth = {64, 96, 128, 192, 256, 384, 512};
+  std::vector<std::uint64_t> paper_triangles = {337'863, 71'795};  // of the paper's two meshes
+};
+
+// With the volumes of Debian's packages invesalius-examples and mricron-data that are installed.
+ReportPlan usual_plan(const std::filesystem::path& daemon);
+
+// Takes some minutes; says on standard error what it is doing. Times are medians unless report.py
+// says otherwise. Throws what the sections' measurements throw.
+Json measure_report(const ReportPlan& plan);
 
 }  // namespace isomesh::bench

@@ -174,20 +174,6 @@ TEST_F(Leases, AnOrderlyEndCountsNoAttempt) {
   EXPECT_TRUE(comes_to(endless.id, JobState::kRunning));
 }
 
-// A defect of ours: the folder of unfinished files is none.
-TEST_F(Leases, AJobThatAlwaysFailsIsTriedThreeTimesWithGrowingPauses) {
-  start();
-  const Volume volume = small_volume();
-  const auto scratch = daemon().data() / "scratch";
-  std::filesystem::remove_all(scratch);
-  write_file(scratch, "");
-  const auto begin = std::chrono::steady_clock::now();
-  const Job failed = ended(submit(daemon(), volume, 100).id);
-  EXPECT_EQ(failed.state, JobState::kFailed);
-  EXPECT_EQ(failed.error->status, 500);
-  EXPECT_GE(std::chrono::steady_clock::now() - begin, seconds(1 + 4));
-}
-
 // Holds the database, so that the daemon can store a result but not name it.
 class Blockade {
  public:
@@ -242,21 +228,6 @@ TEST_F(Leases, ACancelledJobStopsAndPublishesNothing) {
   EXPECT_FALSE(job(queued).started);
   EXPECT_EQ(blob_count(), 2U) << "the two volumes and nothing else";
   EXPECT_EQ(scratch_count(), 0U);
-}
-
-TEST_F(Leases, CancelRacingTheEndGivesOneEnd) {
-  start();
-  const Volume volume = small_volume();
-  for (int round = 0; round < 25; ++round) {
-    const std::string id = submit(daemon(), volume, 40 + round).id;
-    std::this_thread::sleep_for(std::chrono::milliseconds(2 * round));
-    daemon().client().cancel(id);
-    const Job end = ended(id);
-    ASSERT_TRUE(end.state == JobState::kCancelled || end.state == JobState::kSucceeded);
-    EXPECT_EQ(end.mesh.has_value(), end.state == JobState::kSucceeded);
-    daemon().client().cancel(id);
-    EXPECT_EQ(job(id), end);
-  }
 }
 
 }  // namespace

@@ -53,44 +53,6 @@ TEST_F(Queue, StatBehindAThousandRoutineJobsIsClaimedNext) {
   EXPECT_EQ(ended(stat.id).state, JobState::kSucceeded);
 }
 
-TEST_F(Queue, TheSameKeyFromEightClientsIsOneJob) {
-  start();
-  const Volume volume = small_volume();
-  for (int round = 0; round < 3; ++round) {
-    std::mutex mutex;
-    std::set<std::string> ids;
-    std::vector<std::jthread> clients;
-    for (int client = 0; client < 8; ++client) {
-      clients.emplace_back([&, round] {
-        const Answer answer = post(body_of(volume, 50 + round), "key-" + std::to_string(round));
-        ASSERT_EQ(answer.status, 202) << answer.body;
-        const std::lock_guard lock(mutex);
-        ids.insert(job_from_json(answer.body).id);
-      });
-    }
-    clients.clear();
-    EXPECT_EQ(ids.size(), 1U);
-  }
-  EXPECT_EQ(daemon().client().jobs().jobs.size(), 3U);
-}
-
-TEST_F(Queue, AFullQueueSaysWhenToComeBackAndStoresTheRetryOnce) {
-  start({"--workers", "1", "--max-queue", "1"});
-  const Job running = endless_job();
-  const Volume volume = small_volume();
-  const Job waiting = job_from_json(post(body_of(volume, 50)).body);
-  const Answer full = post(body_of(volume, 60), "retried");
-  EXPECT_TRUE(is_problem(full, ErrorCode::kUnavailable));
-  EXPECT_GE(std::stoi(full.header("retry-after")), 1);
-  daemon().client().cancel(waiting.id);
-  const Answer stored = post(body_of(volume, 60), "retried");
-  EXPECT_EQ(stored.status, 202);
-  const Answer again = post(body_of(volume, 60), "retried");
-  EXPECT_EQ(again.status, 202);
-  EXPECT_EQ(job_from_json(again.body).id, job_from_json(stored.body).id);
-  EXPECT_EQ(daemon().client().jobs(JobState::kQueued).jobs.size(), 1U);
-}
-
 TEST_F(Queue, AnUploadThatIsCutLeavesNothing) {
   start();
   const RawUpload raw = long_upload();

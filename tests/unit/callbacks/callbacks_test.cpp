@@ -100,29 +100,6 @@ TEST_F(CallbacksTest, AreRepeatedUntilTheyAreAnsweredWithSuccess) {
   }
 }
 
-TEST_F(CallbacksTest, ComeAsSoonAsAJobHasEnded) {
-  const Receiver receiver;
-  const CallbackTargets targets({receiver.url()});
-  Callbacks callbacks(outbox_, targets, options(), observer());
-  ended("job-1", receiver.url());
-  callbacks.wake();
-  EXPECT_TRUE(is_over("job-1"));
-}
-
-TEST_F(CallbacksTest, GoOnInTheNextProcess) {
-  Receiver receiver({500});
-  const CallbackTargets targets({receiver.url()});
-  ended("job-1", receiver.url());
-  {
-    Callbacks callbacks(outbox_, targets, options(), observer());
-    ASSERT_TRUE(receiver.gets(2));
-  }
-  EXPECT_EQ(outbox_.count(), 1U);
-  receiver.answer_with(204);
-  Callbacks callbacks(outbox_, targets, options(), observer());
-  EXPECT_TRUE(is_over("job-1"));
-}
-
 TEST_F(CallbacksTest, AReceiverThatHangsHoldsUpItselfAlone) {
   const Receiver hanging({0});
   const Receiver other;

@@ -73,11 +73,6 @@ TEST(Reachability, AServerThatIsNotThereIsReportedAtOnce) {
   EXPECT_LT(std::chrono::steady_clock::now() - start, ClientOptions{}.connect_timeout);
 }
 
-TEST(Reachability, ASocketThatIsNotThereIsUnreachable) {
-  Client client({.server = "unix:/nowhere/isomesh.sock"});
-  EXPECT_EQ(error_of([&] { client.volumes(); }).code(), ErrorCode::kUnreachable);
-}
-
 TEST(Reachability, AGetWhoseConnectionBrokeIsTriedAgain) {
   std::atomic<int> requests = 0;
   const std::string body = to_json(std::vector<Volume>{some_volume()});
@@ -121,27 +116,6 @@ TEST(Reachability, ASubmissionIsRepeatedWithItsKey) {
   EXPECT_NE(keys[4], keys[0]);
   EXPECT_EQ(error_of([&] { client.submit({}, "mine"); }).code(), ErrorCode::kUnreachable);
   EXPECT_EQ(keys[8], "mine");
-}
-
-TEST(Reachability, SpeaksOverASocketOfThisMachine) {
-  TemporaryFolder folder;
-  httplib::Server http;
-  std::string host;
-  http.Get("/v1/volumes", [&](const httplib::Request& request, httplib::Response& response) {
-    host = request.get_header_value("Host");
-    response.set_content(to_json(std::vector<Volume>{some_volume()}), kJson);
-  });
-  http.set_address_family(AF_UNIX);
-  const std::string path = (folder / "isomesh.sock").string();
-  ASSERT_TRUE(http.bind_to_port(path, 80));
-  std::thread thread([&] { http.listen_after_bind(); });
-  while (!http.is_running()) std::this_thread::yield();
-
-  Client client({.server = "unix:" + path});
-  EXPECT_NO_THROW(EXPECT_THAT(client.volumes(), ElementsAre(some_volume())));
-  EXPECT_EQ(host, "localhost");
-  http.stop();
-  thread.join();
 }
 
 // Volumes and the token go to the server that was named, and to nothing else.
@@ -198,46 +172,6 @@ TEST(Urls, AKeyCannotAddHeaders) {
   FakeServer server;
   Client client({.server = server.start()});
   EXPECT_EQ(error_of([&] { client.submit({}, "a\r\nX: y"); }).code(), ErrorCode::kInvalidParameter);
-}
-
-TEST(Jobs, AreSubmittedListedAndCancelled) {
-  FakeServer server;
-  JobParameters asked;
-  std::string state;
-  std::string cursor;
-  std::string cancelled;
-  server.http.Post("/v1/jobs", [&](const httplib::Request& request, httplib::Response& response) {
-    asked = parse_job_parameters(request.body);
-    response.set_content(to_json(finished_job("7", "mesh")), kJson);
-    response.status = 202;
-  });
-  server.http.Get("/v1/jobs", [&](const httplib::Request& request, httplib::Response& response) {
-    state = request.get_param_value("state");
-    cursor = request.get_param_value("cursor");
-    response.set_content(to_json({finished_job("7", "mesh")}, cursor.empty() ? "a&b" : ""), kJson);
-  });
-  server.http.Delete("/v1/jobs/7",
-                     [&](const httplib::Request& request, httplib::Response& response) {
-                       cancelled = request.path;
-                       response.status = 204;
-                     });
-  Client client({.server = server.start()});
-
-  JobParameters parameters;
-  parameters.volume = "abc";
-  parameters.iso = -600.5;
-  parameters.formats = {MeshFormat::kGlb, MeshFormat::kStl};
-  EXPECT_EQ(client.submit(parameters).id, "7");
-  parameters.lambda = default_lambda(parameters.smoothing);  // what a request that names none means
-  EXPECT_EQ(asked, parameters);
-  const JobPage first = client.jobs(JobState::kSucceeded);
-  EXPECT_EQ(first.jobs.size(), 1U);
-  EXPECT_EQ(state, "succeeded");
-  EXPECT_EQ(first.next, "a&b");
-  EXPECT_EQ(client.jobs({}, first.next).next, "");
-  EXPECT_EQ(cursor, "a&b");
-  client.cancel("7");
-  EXPECT_EQ(cancelled, "/v1/jobs/7");
 }
 
 TEST(Volumes, AreAskedForPageByPage) {
@@ -324,20 +258,6 @@ TEST(Follow, TellsEventsAndComesBackWhereItWas) {
   EXPECT_EQ(job.id, "7");
   EXPECT_THAT(last_ids, ElementsAre("", "4"));
   EXPECT_THAT(seen, ElementsAre(JobEvent{JobState::kRunning, Stage::kLoad, 0.5}));
-}
-
-TEST(Volumes, AreErasedByTheirIds) {
-  FakeServer server;
-  std::string erased;
-  server.http.Delete("/v1/volumes/aa",
-                     [&](const httplib::Request& request, httplib::Response& response) {
-                       erased = request.path;
-                       response.status = 204;
-                     });
-  Client client({.server = server.start()});
-  client.erase_volume("aa");
-  EXPECT_EQ(erased, "/v1/volumes/aa");
-  EXPECT_EQ(error_of([&] { client.erase_volume("bb"); }).code(), ErrorCode::kNotFound);
 }
 
 TEST(Wait, LooksUntilTheJobIsDoneAndShowsEveryStep) {

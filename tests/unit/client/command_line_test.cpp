@@ -256,6 +256,7 @@ TEST(Help, BreaksLinesBetweenWords) {
 TEST(Version, HasAShortOption) {
   EXPECT_EQ(end_of({"-V"}), end_of({"--version"}));
   EXPECT_EQ(end_of({"-V"}).first, 0);
+  EXPECT_THAT(end_of({"-V"}).second, HasSubstr("isomesh "));
 }
 
 TEST(Completion, OffersIdsAndTheWordsOfLists) {

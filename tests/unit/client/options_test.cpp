@@ -40,66 +40,6 @@ class OptionsTest : public testing::Test {
   std::string stl_ = (folder_ / "brain.stl").string();
 };
 
-TEST_F(OptionsTest, ReadsEverythingThatAMeshCanBeAskedFor) {
-  const Options options = parse({"mesh",
-                                 file_.c_str(),
-                                 "--iso",
-                                 "-600.5",
-                                 "--scheme",
-                                 "5",
-                                 "--interpolation",
-                                 "midpoint",
-                                 "--passes",
-                                 "20",
-                                 "--smoothing",
-                                 "taubin",
-                                 "--lambda",
-                                 "0.5",
-                                 "--pass-band",
-                                 "0.05",
-                                 "--max-displacement",
-                                 "0.75",
-                                 "--close",
-                                 "--keep-components",
-                                 "3",
-                                 "--min-triangles",
-                                 "500",
-                                 "--no-normals",
-                                 "--position-bits",
-                                 "11",
-                                 "--speed",
-                                 "0",
-                                 "--priority",
-                                 "stat",
-                                 "-o",
-                                 drc_.c_str(),
-                                 "-o",
-                                 stl_.c_str(),
-                                 "--digest"});
-  EXPECT_EQ(options.command, Command::kMesh);
-  EXPECT_THAT(options.files, ElementsAre(file_));
-  EXPECT_TRUE(options.upload.digest);
-  EXPECT_FALSE(options.upload.raw);
-  JobParameters expected;
-  expected.iso = -600.5;
-  expected.scheme = Scheme::kFive;
-  expected.interpolation = Interpolation::kMidpoint;
-  expected.passes = 20;
-  expected.smoothing = Smoothing::kTaubin;
-  expected.lambda = 0.5;
-  expected.pass_band = 0.05;
-  expected.max_displacement_mm = 0.75;
-  expected.close = true;
-  expected.components = {.keep = 3, .min_triangles = 500, .nearest_to = {}};
-  expected.normals = false;
-  expected.draco = {.position_bits = 11, .speed = 0};
-  expected.priority = Priority::kStat;
-  EXPECT_EQ(options.parameters, expected);
-  ASSERT_EQ(options.outputs.size(), 2U);
-  EXPECT_EQ(options.outputs[0].format, MeshFormat::kDrc);
-  EXPECT_EQ(options.outputs[1].format, MeshFormat::kStl);
-}
-
 TEST_F(OptionsTest, ReadsRawSamples) {
   const Options options = parse({"upload", file_.c_str(), "--dims", "512,512,300", "--type",
                                  "int16", "--spacing", "0.7,0.7,1", "--origin", "-90,0,1.5",
@@ -111,25 +51,6 @@ TEST_F(OptionsTest, ReadsRawSamples) {
   EXPECT_THAT(options.upload.raw->geometry.origin, ElementsAre(-90, 0, 1.5));
   EXPECT_EQ(options.upload.raw->geometry.direction.back(), -1);
   EXPECT_TRUE(options.upload.raw->big_endian);
-}
-
-TEST_F(OptionsTest, RefusesValuesThatTheServerWouldRefuse) {
-  const Options options =
-      parse({"submit", "abc", "--iso", "otsu", "--passes", "0", "--format", "drc,glb"});
-  EXPECT_FALSE(options.parameters.iso);
-  EXPECT_THAT(options.parameters.formats, ElementsAre(MeshFormat::kDrc, MeshFormat::kGlb));
-  const char* file = file_.c_str();
-  const char* drc = drc_.c_str();
-  for (const std::vector<const char*>& wrong : std::vector<std::vector<const char*>>{
-           {"submit", "abc", "--iso", "1", "--passes", "-1"},
-           {"submit", "abc", "--iso", "1", "--scheme", "7"},
-           {"estimate", "abc", "--iso", "bone", "--passes", "1001"},
-           {"mesh", file, "-o", drc, "--iso", "1", "--smoothing", "taubin", "--lambda", "0.9"},
-           {"mesh", file, "-o", drc, "--iso", "1", "--speed", "11"}}) {
-    EXPECT_EQ(ending_of(wrong).first, kWrongUsage) << wrong.back();
-  }
-  EXPECT_THAT(ending_of({"submit", "abc", "--iso", "1", "--passes", "1001"}).second,
-              HasSubstr("--passes: must be a whole number from 0 to 1000"));
 }
 
 TEST_F(OptionsTest, AnIsoValueMayBeAPreset) {
@@ -304,15 +225,6 @@ TEST_F(OptionsTest, EveryParameterHasAnOptionAndItsHelp) {
   }
   EXPECT_THAT(ending_of({"mesh", "--help"}).second,
               testing::Not(HasSubstr("The file formats to write")));
-}
-
-TEST_F(OptionsTest, HelpsOnRequest) {
-  EXPECT_EQ(ending_of({"--help"}).first, 0);
-  EXPECT_THAT(ending_of({"--help"}).second, HasSubstr("Examples:"));
-  EXPECT_EQ(ending_of({"mesh", "--help"}).first, 0);
-  EXPECT_THAT(ending_of({"mesh", "--help"}).second, HasSubstr("--position-bits"));
-  EXPECT_EQ(ending_of({"--version"}).first, 0);
-  EXPECT_THAT(ending_of({"--version"}).second, HasSubstr("isomesh "));
 }
 
 TEST_F(OptionsTest, ReadsWhatLabelsCanBeAskedFor) {

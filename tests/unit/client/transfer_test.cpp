@@ -363,13 +363,6 @@ TEST_F(Fetch, LeavesTheOldFileWhenTooManyBytesCome) {
   EXPECT_THAT(test::files_below(folder_.path()), ElementsAre("brain.drc"));
 }
 
-TEST_F(Fetch, RefusesFormatsThatTheJobWasNotAskedFor) {
-  Client client = client_for("mesh", "mesh");
-  EXPECT_EQ(error_of([&] { client.fetch("7", MeshFormat::kStl, folder_ / "brain.stl"); }).code(),
-            ErrorCode::kNotFound);
-  EXPECT_THAT(test::files_below(folder_.path()), IsEmpty());
-}
-
 TEST_F(Fetch, GivesTheReasonOfAJobThatFailed) {
   Job job = finished_job("7", "mesh");
   job.state = JobState::kFailed;

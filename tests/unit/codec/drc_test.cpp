@@ -112,11 +112,6 @@ TEST(Drc, AnEmptyMeshDecodesByDebiansCommand) {
   EXPECT_TRUE(decoded.triangles.empty());
 }
 
-TEST(Drc, TheSameMeshGivesTheSameBytes) {
-  const mesh::Mesh mesh = test::large_mesh();
-  EXPECT_EQ(encoded(mesh, MeshFormat::kDrc), encoded(mesh, MeshFormat::kDrc));
-}
-
 TEST(Drc, FewerBitsAreFewerBytes) {
   const mesh::Mesh mesh = test::large_mesh();
   EXPECT_LT(encoded(mesh, MeshFormat::kDrc, {8, 7}).size(),

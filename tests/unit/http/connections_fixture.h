@@ -202,9 +202,6 @@ class ConnectionsTest : public testing::Test {
     open.set_value();
     add("GET", "/compute", compute(computing_.get_future().share()));
     add("GET", "/compute-fast", compute(open.get_future().share()));
-    add("GET", "/echo", [](const Request& request, Response& response) {
-      response.set_body(std::string(request.header("X-Echo")), "text/plain");
-    });
     add("GET", "/query", [](const Request& request, Response& response) {
       std::string text;
       for (const auto& [name, value] : request.query) text += '<' + name + '=' + value + '>';

@@ -23,30 +23,6 @@ using Pairs = std::vector<std::pair<std::string, std::string>>;
 
 TEST(RawDescription, IsNoneWithoutDims) { EXPECT_FALSE(raw_description_of(Request())); }
 
-TEST(RawDescription, NeedsDimsAndTypeOnly) {
-  const auto raw = raw_description_of(with_query({{"dims", "3,4,5"}, {"type", "int16"}}));
-  ASSERT_TRUE(raw);
-  EXPECT_EQ(raw->dims, (std::array<std::uint32_t, 3>{3, 4, 5}));
-  EXPECT_EQ(raw->type, SampleType::kInt16);
-  EXPECT_EQ(raw->geometry, Geometry{});
-  EXPECT_FALSE(raw->big_endian);
-}
-
-TEST(RawDescription, TakesEveryParameter) {
-  const auto raw = raw_description_of(with_query({{"dims", "3, 4,5"},
-                                                  {"type", "float64"},
-                                                  {"spacing", "0.5,1e-1,2"},
-                                                  {"origin", "-1,0,1.5"},
-                                                  {"direction", "0,1,0,1,0,0,0,0,-1"},
-                                                  {"byte_order", "big"}}));
-  ASSERT_TRUE(raw);
-  EXPECT_EQ(raw->type, SampleType::kFloat64);
-  EXPECT_EQ(raw->geometry.spacing, (std::array<double, 3>{0.5, 0.1, 2}));
-  EXPECT_EQ(raw->geometry.origin, (std::array<double, 3>{-1, 0, 1.5}));
-  EXPECT_EQ(raw->geometry.direction, (std::array<double, 9>{0, 1, 0, 1, 0, 0, 0, 0, -1}));
-  EXPECT_TRUE(raw->big_endian);
-}
-
 TEST(RawDescription, WhatIsMalformedIsRefusedByName) {
   for (const auto& [name, value] : Pairs{{"dims", ""},
                                          {"dims", "3,4"},

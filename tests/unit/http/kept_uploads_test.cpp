@@ -126,53 +126,6 @@ class KeptParts : public testing::Test {
   const test::TemporaryFolder folder_;
 };
 
-TEST_F(KeptParts, AreTheirOwnersAloneAndAreReadWhenTheyAreWhole) {
-  KeptUploads kept({}, folder_.path());
-  const KeptUploads::Partial upload = begun(kept, "a", 10);
-  EXPECT_EQ(kept.find_partial("a", upload->name()), upload);
-  EXPECT_THROW(kept.find_partial("b", upload->name()), Error);
-  EXPECT_EQ(code_of(kept, "b", upload->name()), ErrorCode::kGone);
-  EXPECT_EQ(code_of(kept, "a", upload->name()), ErrorCode::kNotReady);
-  upload->complete(*upload->begin_turn(10));
-  const KeptUploads::Kept body = kept.find("a", upload->name());
-  EXPECT_EQ(body->name, "a.nii");
-  EXPECT_EQ(std::filesystem::file_size(body->path), 10U);
-}
-
-TEST_F(KeptParts, OnlyTheLatestTurnWrites) {
-  KeptUploads kept({}, folder_.path());
-  const KeptUploads::Partial upload = begun(kept, "a", 10);
-  const PartialTurn old = *upload->begin_turn(10);
-  EXPECT_FALSE(upload->begin_turn(9));
-  EXPECT_THROW(upload->write(old, std::vector<std::byte>(1)), Error);
-  const PartialTurn turn = *upload->begin_turn(10);
-  EXPECT_EQ(upload->end_turns(), 10U);
-  EXPECT_THROW(upload->write(turn, std::vector<std::byte>(1)), Error);
-  EXPECT_EQ(upload->bytes(), 10U);
-}
-
-TEST_F(KeptParts, OutliveTheProcess) {
-  std::string name;
-  std::string volume;
-  {
-    KeptUploads kept({}, folder_.path());
-    const KeptUploads::Partial upload = begun(kept, "a", 10);
-    name = upload->name();
-    const KeptUploads::Partial done = begun(kept, "a", 20);
-    done->complete(*done->begin_turn(20));
-    kept.settle("a", done->name(), "{}");
-    volume = done->name();
-  }
-  KeptUploads kept({}, folder_.path());
-  EXPECT_EQ(kept.find_partial("a", name)->end_turns(), 10U);
-  EXPECT_EQ(kept.became("a", volume), "{}");
-  EXPECT_EQ(kept.find_partial("a", volume)->end_turns(), 20U);
-  EXPECT_EQ(code_of(kept, "a", volume), ErrorCode::kGone);
-  kept.let_go("a", name);
-  kept.let_go("a", volume);
-  EXPECT_EQ(files(), 0U);
-}
-
 TEST_F(KeptParts, GoWhenNothingMoreComes) {
   SetClock clock;
   KeptUploads kept({.part_time = minutes(3)}, folder_.path(), clock.now());

@@ -22,28 +22,6 @@ class EstimateTest : public test::JobsFixture {
   Estimator estimator_{volumes_, blobs_, jobs_, {.memory_bytes = 4 << 20}, job_program()};
 };
 
-TEST_F(EstimateTest, CountsWhatTheJobMakes) {
-  const Volume volume = add_sphere();
-  for (const Scheme scheme : {Scheme::kFive, Scheme::kSix}) {
-    JobParameters parameters = parameters_of(volume, 0.5);
-    parameters.scheme = scheme;
-    parameters.formats = {MeshFormat::kStl, MeshFormat::kDrc};
-    const Estimate estimate = estimator_.estimate("", parameters);
-    const Job job = run(parameters);
-    ASSERT_TRUE(job.mesh);
-    EXPECT_EQ(estimate.triangles, job.mesh->triangles);
-    EXPECT_EQ(estimate.vertices, job.mesh->vertices);
-    EXPECT_EQ(estimate.bytes.at(MeshFormat::kStl), job.mesh->files.at(MeshFormat::kStl).bytes);
-    const auto drc = static_cast<double>(job.mesh->files.at(MeshFormat::kDrc).bytes);
-    EXPECT_NEAR(static_cast<double>(estimate.bytes.at(MeshFormat::kDrc)), drc, drc);
-    EXPECT_GT(estimate.memory_bytes, 12 * (estimate.vertices + estimate.triangles));
-    EXPECT_GT(estimate.milliseconds, 0);
-    EXPECT_EQ(estimate.volume, volume.id);
-    EXPECT_EQ(estimate.iso, 0.5);
-    EXPECT_EQ(estimate.scheme, scheme);
-  }
-}
-
 TEST_F(EstimateTest, CountsTheCapsOfASurfaceThatIsClosed) {
   const Volume volume = add(test::constant<std::uint8_t>(7, {5, 4, 3}), SampleType::kUint8);
   JobParameters parameters = parameters_of(volume, 7);
@@ -245,16 +223,6 @@ TEST(CostModel, AJobWithoutARunTeachesNothing) {
 }
 
 using HistogramsTest = test::JobsFixture;
-
-TEST_F(HistogramsTest, CountAllSamples) {
-  const Volume volume = add_much();
-  Histograms histograms(blobs_);
-  const Histogram two = histograms.of("", volume, 2);
-  EXPECT_EQ(two.volume, volume.id);
-  EXPECT_EQ(two.range, volume.range);
-  EXPECT_EQ(two.counts.at(0) + two.counts.at(1), volume.sample_count());
-  EXPECT_EQ(histograms.of("", volume, 101).counts.at(100), two.counts[1]);
-}
 
 // Mapped, they would end the whole service.
 TEST_F(HistogramsTest, SamplesThatAreCutMeanwhileAreDamaged) {

@@ -185,25 +185,6 @@ INSTANTIATE_TEST_SUITE_P(Stages, KilledIn,
                                          Stage::kEncode),
                          [](const auto& stage) { return std::string(to_string(stage.param)); });
 
-// The file is cut while it is mapped: the signal ends the process, and nothing else.
-TEST_F(JobProcessTest, ADiskThatGivesWayEndsOneJob) {
-  const Volume sphere = add_sphere();
-  const Volume much = add_much();
-  const std::string intact = blob(much.id);
-  std::optional<Error> error;
-  // A process that has read all of it by then shows nothing.
-  for (int tries = 0; tries < 20 && !error; ++tries) {
-    test::write_file(blobs_.path_of(much.id), intact);
-    const JobOrder order = order_of(much, 50, 0);
-    error = refusal(process_, order, [&](Stage stage, double, const Timing&) {
-      if (stage == Stage::kLoad) std::filesystem::resize_file(order.file, 4096);
-    });
-  }
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), ErrorCode::kInternal);
-  EXPECT_GT(make(process_, order_of(sphere, 0)).summary.triangles, 0U);
-}
-
 TEST_F(JobProcessTest, AnIdleProcessThatDiedCostsNoJob) {
   const Volume sphere = add_sphere();
   make(process_, order_of(sphere, 0));
@@ -230,12 +211,6 @@ TEST_F(JobProcessTest, BelievesNothingThatIsNotAsAgreed) {
     EXPECT_EQ(error->code(), ErrorCode::kInternal) << fault;
     EXPECT_NO_THROW(make(faulty_, order_of(sphere, test::kAnswers))) << fault;
   }
-}
-
-TEST_F(JobProcessTest, AProgramThatIsNotThereIsAnError) {
-  const Volume sphere = add_sphere();
-  JobProcess absent(job_program(folder_ / "absent"));
-  EXPECT_EQ(refusal(absent, order_of(sphere, 0))->code(), ErrorCode::kInternal);
 }
 
 TEST(JobMessage, ArrivesAsItWasSent) {

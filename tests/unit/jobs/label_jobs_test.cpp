@@ -182,30 +182,6 @@ TEST_F(LabelJobsTest, AreRefusedWithTheReason) {
   EXPECT_EQ(error->code(), ErrorCode::kUnusableVolume);
 }
 
-TEST_F(LabelJobsTest, AreEstimatedExactly) {
-  const Volume volume = add_labels();
-  Estimator estimator(volumes_, blobs_, jobs_, {}, job_program());
-  JobParameters parameters = label_parameters({});
-  parameters.close = true;
-  parameters.formats = {MeshFormat::kGlb, MeshFormat::kStl};
-  parameters = settled(volume, parameters);
-  const Estimate estimate = estimator.estimate("", parameters);
-  const MeshSummary mesh = run(volume, parameters).mesh;
-  EXPECT_EQ(estimate.triangles, mesh.triangles);
-  EXPECT_EQ(estimate.vertices, mesh.vertices);
-  EXPECT_FALSE(estimate.iso);
-  ASSERT_EQ(estimate.labels.size(), mesh.labels.size());
-  for (std::size_t n = 0; n < mesh.labels.size(); ++n) {
-    EXPECT_EQ(estimate.labels[n].label, mesh.labels[n].label);
-    EXPECT_EQ(estimate.labels[n].triangles, mesh.labels[n].triangles);
-  }
-  EXPECT_TRUE(estimate.bytes.contains(MeshFormat::kZip));
-  EXPECT_FALSE(estimate.bytes.contains(MeshFormat::kStl));
-
-  parameters.labels = LabelChoice{{9}};
-  EXPECT_EQ(estimator.estimate("", parameters).triangles, mesh.labels[2].triangles);
-}
-
 // Their summary is longer than anything else that a process tells.
 TEST_F(LabelJobsTest, MayBeThousands) {
   auto samples = test::constant<std::uint16_t>(0, {14, 14, 14});

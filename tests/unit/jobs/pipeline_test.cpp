@@ -14,7 +14,6 @@
 #include <gtest/gtest.h>
 
 #include "server/codec/encode.h"
-#include "tests/support/draco_decoder.h"
 #include "tests/support/errors.h"
 #include "tests/unit/jobs/fixture.h"
 
@@ -57,20 +56,6 @@ TEST_F(PipelineTest, MakesAMeshOfASphere) {
   EXPECT_TRUE(file.href.empty());
 }
 
-TEST_F(PipelineTest, WhatItStoresIsTheMeshThatItDescribes) {
-  const Volume volume = add_sphere();
-  JobParameters parameters = parameters_of(volume, 0);
-  parameters.formats = {MeshFormat::kStl, MeshFormat::kDrc};
-  const PipelineResult result = run(volume, parameters);
-  ASSERT_EQ(result.mesh.files.size(), 2U);
-  const auto decoded =
-      test::decode_with_command(blob(result.mesh.files.at(MeshFormat::kDrc).sha256));
-  EXPECT_EQ(decoded.triangles.size(), result.mesh.triangles);
-  EXPECT_EQ(decoded.points.size(), result.mesh.vertices);
-  EXPECT_EQ(blob(result.mesh.files.at(MeshFormat::kStl).sha256).size(),
-            84 + 50 * result.mesh.triangles);
-}
-
 TEST_F(PipelineTest, NoPassesLeaveTheVolumeAsExtracted) {
   const Volume volume = add_sphere();
   JobParameters parameters = parameters_of(volume, 0);
@@ -99,14 +84,6 @@ TEST_F(PipelineTest, SaysHowSmoothingChangedTheSurface) {
   const MeshSummary held = run(volume, parameters).mesh;
   EXPECT_LE(held.displacement_mm.max, *parameters.max_displacement_mm);
   EXPECT_GT(held.displacement_mm.max, 0.9 * *parameters.max_displacement_mm);
-}
-
-TEST_F(PipelineTest, WithoutAnIsoItTakesTheVolumesOwn) {
-  const Volume volume = add_sphere();
-  JobParameters parameters = parameters_of(volume, volume.suggested_iso);
-  const std::string expected = mesh_bytes(run(volume, parameters));
-  parameters.iso.reset();
-  EXPECT_EQ(mesh_bytes(run(volume, parameters)), expected);
 }
 
 TEST_F(PipelineTest, AnIsoOutsideTheRangeIsAnEmptyMesh) {
@@ -174,15 +151,6 @@ TEST_F(PipelineTest, AProcessKeepsNothingOfTheJobBefore) {
   const auto result =
       run_pipeline(volume, parameters_of(volume, 0), {}, blobs_, process, {}, kQuiet);
   EXPECT_EQ(mesh_bytes(result), expected);
-}
-
-TEST_F(PipelineTest, EveryStageIsTimed) {
-  const Volume volume = add_much();
-  const Timing timing = run(volume, parameters_of(volume, 50)).timing;
-  EXPECT_GT(timing.load, 0);
-  EXPECT_GT(timing.extract, 0);
-  EXPECT_GT(timing.smooth, 0);
-  EXPECT_GT(timing.encode, 0);
 }
 
 TEST_F(PipelineTest, ReportsItsStagesInOrderAndItsProgressUpToTheEnd) {
@@ -315,18 +283,6 @@ TEST_F(PipelineTest, LeavesSmallPartsOutAndSaysSo) {
   EXPECT_LT(one.volume_mm3.extracted, all.volume_mm3.extracted);
 }
 
-TEST_F(PipelineTest, ALongJobStopsWhenItIsCancelled) {
-  const Volume volume = add_much();
-  JobParameters parameters = parameters_of(volume, 50);
-  parameters.passes = 1000;
-  std::stop_source stop;
-  const Report stop_early = [&](Stage stage, double progress, const Timing&) {
-    if (stage == Stage::kSmooth && progress > 0.07) stop.request_stop();
-  };
-  EXPECT_EQ(test::code_thrown_by([&] { run(volume, parameters, stop_early, stop.get_token()); }),
-            ErrorCode::kCancelled);
-}
-
 TEST_F(PipelineTest, AVolumeWhoseSamplesAreGoneIsUnusable) {
   const Volume volume = add_sphere();
   blobs_.erase(volume.id);
@@ -341,27 +297,6 @@ TEST_F(PipelineTest, AVolumeWhoseSamplesAreCutBeforeTheyAreReadIsUnusable) {
               run_pipeline(volume, parameters_of(volume, 0), {}, cut, process_, {}, kQuiet);
             }),
             ErrorCode::kUnusableVolume);
-}
-
-// It ends the process, and that is nobody's fault but the disk's.
-TEST_F(PipelineTest, AVolumeWhoseSamplesAreCutWhileTheyAreReadIsUnusable) {
-  const Volume volume = add_much();
-  const std::string intact = blob(volume.id);
-  JobParameters parameters = parameters_of(volume, 50);
-  parameters.passes = 0;
-  std::optional<ErrorCode> code;
-  // A process that has read all of it by then shows nothing.
-  for (int tries = 0; tries < 20 && !code; ++tries) {
-    test::write_file(blobs_.path_of(volume.id), intact);
-    bool is_checked = false;  // the second time it loads
-    const Report cut = [&](Stage stage, double, const Timing&) {
-      if (stage != Stage::kLoad) return;
-      if (is_checked) std::filesystem::resize_file(blobs_.path_of(volume.id), 4096);
-      is_checked = true;
-    };
-    code = test::code_thrown_by([&] { run(volume, parameters, cut); });
-  }
-  EXPECT_EQ(code, ErrorCode::kUnusableVolume);
 }
 
 TEST_F(PipelineTest, RefusesAJobThatWouldTakeTooMuchMemory) {

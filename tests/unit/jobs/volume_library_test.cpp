@@ -51,26 +51,6 @@ class VolumeLibraryTest : public test::JobsFixture {
   const std::string bytes_ = "abcdefghijklmnopqrstuvwx";
 };
 
-TEST_F(VolumeLibraryTest, AddsAVolumeWithItsRecordAndItsBlob) {
-  const auto [volume, is_new] = add_bytes(bytes_);
-  EXPECT_TRUE(is_new);
-  EXPECT_EQ(volume.format, "raw");
-  EXPECT_EQ(volume.dims, kDims);
-  EXPECT_EQ(volume.bytes, bytes_.size());
-  EXPECT_EQ(volume.range, (std::array<double, 2>{'a', 'x'}));
-  EXPECT_FALSE(volume.created.empty());
-  EXPECT_EQ(volumes_.get("", volume.id), volume);
-  EXPECT_TRUE(blob(volume.id).ends_with(bytes_));
-  EXPECT_EQ(scratch_count(), 0U);
-}
-
-TEST_F(VolumeLibraryTest, TheSameVolumeAgainIsNotNew) {
-  const Volume first = add_bytes(bytes_).first;
-  EXPECT_EQ(add_bytes(bytes_), std::pair(first, false));
-  EXPECT_EQ(volumes_.list("", {}, 100, store::ListOrder::kOldestFirst).size(), 1U);
-  EXPECT_EQ(blob_count(), 1U);
-}
-
 TEST_F(VolumeLibraryTest, OtherSamplesOrGeometryAreAnotherVolume) {
   const std::string id = add_bytes(bytes_).first.id;
   EXPECT_NE(add_bytes(std::string(bytes_.rbegin(), bytes_.rend())).first.id, id);
@@ -80,41 +60,9 @@ TEST_F(VolumeLibraryTest, OtherSamplesOrGeometryAreAnotherVolume) {
   EXPECT_EQ(volumes_.list("", {}, 100, store::ListOrder::kOldestFirst).size(), 3U);
 }
 
-TEST_F(VolumeLibraryTest, ARefusedUploadLeavesNothing) {
-  EXPECT_EQ(code_thrown_by([&] { add_bytes("too short"); }), ErrorCode::kInvalidParameter);
-  test::write_file(folder_ / "upload", "not a volume");
-  EXPECT_EQ(code_thrown_by([&] { library_.add("", folder_ / "upload"); }),
-            ErrorCode::kUnsupportedMedia);
-  EXPECT_TRUE(volumes_.list("", {}, 100, store::ListOrder::kOldestFirst).empty());
-  EXPECT_EQ(blob_count(), 0U);
-  EXPECT_EQ(scratch_count(), 0U);
-}
-
 TEST_F(VolumeLibraryTest, LeavesTheUploadToItsOwner) {
   add_bytes(bytes_);
   EXPECT_EQ(test::read_file(folder_ / "upload"), bytes_);
-}
-
-TEST_F(VolumeLibraryTest, ErasesRecordAndBlob) {
-  const Volume volume = add_bytes(bytes_).first;
-  library_.erase("", volume.id);
-  EXPECT_FALSE(volumes_.contains("", volume.id));
-  library_.finish_erasing();
-  EXPECT_EQ(blob_count(), 0U);
-  EXPECT_EQ(code_thrown_by([&] { library_.erase("", volume.id); }), ErrorCode::kNotFound);
-  EXPECT_TRUE(add_bytes(bytes_).second);
-}
-
-TEST_F(VolumeLibraryTest, KeepsAVolumeThatAJobNeeds) {
-  const Volume volume = add_bytes(bytes_).first;
-  const std::string job = job_of(jobs_.submit({"", parameters_of(volume, 100), "", ""})).id;
-  EXPECT_EQ(code_thrown_by([&] { library_.erase("", volume.id); }), ErrorCode::kNotReady);
-  EXPECT_EQ(volumes_.get("", volume.id), volume);
-  EXPECT_EQ(blob_count(), 1U);
-  jobs_.cancel("", job);
-  library_.erase("", volume.id);
-  library_.finish_erasing();
-  EXPECT_EQ(blob_count(), 0U);
 }
 
 TEST_F(VolumeLibraryTest, SamplesStayUntilTheirLastOwnerGoes) {
@@ -159,10 +107,6 @@ TEST_F(VolumeLibraryTest, AVolumeIsErasedBeforeItsSamplesAre) {
 TEST_F(VolumeLibraryTest, SamplesThatCameAgainMeanwhileStay) {
   erase_while_somebody_stores([this](const Volume& volume) { volumes_.add("other", volume); });
   EXPECT_EQ(blob_count(), 1U);
-}
-
-TEST_F(VolumeLibraryTest, ErasingAnUnknownOneIsNotFound) {
-  EXPECT_EQ(code_thrown_by([&] { library_.erase("", "x"); }), ErrorCode::kNotFound);
 }
 
 TEST_F(VolumeLibraryTest, OfManyEqualUploadsOneIsNew) {

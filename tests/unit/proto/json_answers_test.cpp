@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -20,88 +19,11 @@ using test::code_thrown_by;
 using test::dicom_volume;
 using test::failed_job;
 using test::queued_job;
-using test::some_parameters;
 using test::some_problem;
 using test::some_volume;
 using test::succeeded_job;
-using testing::ElementsAre;
-
-std::vector<std::string> members_of(const json& object) {
-  std::vector<std::string> names;
-  for (const auto& [name, value] : object.items()) names.push_back(name);
-  return names;
-}
 
 // --- Spelling ------------------------------------------------------------------------------------
-
-TEST(AnswerJson, SpellsAVolumeAsTheContractDoes) {
-  const std::string text = to_json(some_volume());
-  std::vector<std::string> names;
-  const auto in_order = nlohmann::ordered_json::parse(text);
-  for (const auto& [name, value] : in_order.items()) names.push_back(name);
-  EXPECT_THAT(names, ElementsAre("id", "name", "format", "dims", "type", "spacing", "origin",
-                                 "direction", "range", "suggested_iso", "bytes", "created",
-                                 "modality", "presets", "ignored", "notes"));
-  const json written = json::parse(text);
-  EXPECT_TRUE(written["name"].is_null());
-  EXPECT_TRUE(written["modality"].is_null());
-  EXPECT_EQ(written["dims"], json({181, 217, 4294967295}));
-  EXPECT_EQ(written["type"], "float32");
-  EXPECT_EQ(written["direction"], json({0, 1, 0, -1, 0, 0, 0, 0, 1}));
-  EXPECT_EQ(written["range"], json({-1024, 3071.5}));
-  EXPECT_EQ(written["bytes"], 18446744073709551615U);
-}
-
-TEST(AnswerJson, SpellsWhatDicomTellsOfAVolume) {
-  const auto written = json::parse(to_json(dicom_volume()));
-  EXPECT_EQ(written["modality"], "CT");
-  EXPECT_EQ(written["presets"], json::parse(R"([{"name": "skin", "iso": -300},
-                                                {"name": "bone", "iso": 250}])"));
-  EXPECT_EQ(written["ignored"], json::parse(R"([{"name": "DICOMDIR",
-                                      "reason": "it is a directory of DICOM files"}])"));
-  EXPECT_EQ(written["name"], "M\xc3\xbcller CT");
-  EXPECT_EQ(written["notes"], json::parse(R"([{"code": "frame-of-reference",
-                                    "detail": "Every slice has another one."}])"));
-  EXPECT_EQ(written["dicom"]["patient_name"], "M\xc3\xbcller^Eva");
-  EXPECT_EQ(written["dicom"]["instances"][1]["sop_instance_uid"], "1.2.3.4.2");
-}
-
-TEST(AnswerJson, SpellsParametersAsTheContractDoes) {
-  const json written = json::parse(to_json(some_parameters()));
-  const json expected = json::parse(R"({"volume": "0123abcd", "iso": -0.1, "scheme": 5,
-                            "interpolation": "midpoint", "passes": 1000, "smoothing": "taubin",
-                            "lambda": 0.3, "pass_band": 0.2, "max_displacement_mm": 1.5,
-                            "close": true,
-                            "components": {"keep": 4294967295, "min_triangles": null},
-                            "formats": ["stl", "drc"],
-                            "draco": {"position_bits": 30, "speed": 0}, "normals": true,
-                            "priority": "stat"})");
-  for (const auto& [name, value] : expected.items()) EXPECT_EQ(written[name], value) << name;
-}
-
-TEST(AnswerJson, SpellsAnAbsentIsoAsOtsu) {
-  EXPECT_EQ(json::parse(to_json(JobParameters{}))["iso"], "otsu");
-}
-
-TEST(AnswerJson, SpellsAnAbsentLimitAsNull) {
-  EXPECT_TRUE(json::parse(to_json(JobParameters{}))["max_displacement_mm"].is_null());
-}
-
-TEST(AnswerJson, SpellsAJobAsTheContractDoes) {
-  const json job = json::parse(to_json(succeeded_job()));
-  EXPECT_THAT(members_of(job),
-              testing::UnorderedElementsAre("id", "state", "stage", "progress", "parameters",
-                                            "volume", "priority", "created", "started", "finished",
-                                            "timing", "mesh", "error", "reused", "waiting_for"));
-  EXPECT_EQ(job["state"], "succeeded");
-  EXPECT_EQ(job["stage"], "done");
-  EXPECT_EQ(job["volume"], "0123abcd");
-  EXPECT_EQ(job["priority"], "stat");
-  EXPECT_TRUE(job["error"].is_null());
-  EXPECT_EQ(job["timing"], json::parse(R"({"queue": 0.5, "load": 1, "extract": 2, "smooth": 3,
-                                           "simplify": 0, "encode": 4, "certify": 0,
-                                           "total": 11})"));
-}
 
 TEST(AnswerJson, SpellsAMeshAsTheContractDoes) {
   json mesh = json::parse(to_json(succeeded_job()))["mesh"];
@@ -115,63 +37,6 @@ TEST(AnswerJson, SpellsAMeshAsTheContractDoes) {
       "bounds": [[-1, -2, -3], [1, 2, 3]],
       "files": {"drc": {"bytes": 1, "sha256": "aa", "href": "/v1/jobs/7/mesh.drc"},
                 "obj": {"bytes": 2, "sha256": "bb", "href": "/v1/jobs/7/mesh.obj"}}})"));
-}
-
-TEST(AnswerJson, SpellsAMeshsQualityAsTheContractDoes) {
-  json quality = json::parse(to_json(succeeded_job()))["mesh"]["quality"];
-  for (const char* const name : {"aspect_ratio", "smallest_angle_deg"}) {
-    for (const char* const stage : {"extracted", "smoothed"}) {
-      json& histogram = quality[name][stage]["histogram"];
-      EXPECT_EQ(histogram.size(), 20U);
-      EXPECT_EQ(histogram[0], 1);
-      EXPECT_EQ(histogram[19], 5091319);
-      quality[name][stage].erase("histogram");
-    }
-  }
-  EXPECT_EQ(quality, json::parse(R"({
-      "closed": true, "manifold": true, "oriented": false, "components": 12, "genus": 29,
-      "encloses_volume": false, "aspect_ratio": {"extracted": {"mean": 0.5, "min": 0.25},
-                       "smoothed": {"mean": 0.75, "min": 0.25}},
-      "smallest_angle_deg": {"extracted": {"mean": 30.0, "min": 0.25},
-                             "smoothed": {"mean": 40.0, "min": 0.25}}})"));
-  Job job = succeeded_job();
-  job.mesh->quality.genus.reset();
-  EXPECT_TRUE(json::parse(to_json(job))["mesh"]["quality"]["genus"].is_null());
-}
-
-TEST(AnswerJson, SpellsAProblemAsRfc9457Does) {
-  EXPECT_EQ(json::parse(to_json(some_problem())), json::parse(R"({
-      "type": "urn:isomesh:problem:invalid-parameter", "title": "Invalid parameter", "status": 400,
-      "detail": "iso: is required", "instance": "/v1/jobs",
-      "errors": [{"field": "iso", "message": "is required"},
-                 {"field": "volume", "message": "is required"}],
-      "overridable": "frame-of-reference",
-      "choices": [{"parameter": "volume", "value": "0", "title": "0 s"},
-                  {"parameter": "volume", "value": "1", "title": "2 s"}]})"));
-}
-
-TEST(AnswerJson, LeavesOutWhatAProblemDoesNotHave) {
-  Problem bare = some_problem();
-  bare.instance.clear();
-  bare.errors.clear();
-  bare.remedy = {};
-  EXPECT_THAT(members_of(json::parse(to_json(bare))),
-              testing::UnorderedElementsAre("type", "title", "status", "detail"));
-}
-
-TEST(AnswerJson, NothingYetIsNull) {
-  const json job = json::parse(to_json(queued_job()));
-  for (const char* name : {"started", "finished", "mesh", "error"}) {
-    EXPECT_TRUE(job.contains(name) && job[name].is_null()) << name;
-  }
-  EXPECT_EQ(job["timing"]["total"], 0);
-}
-
-TEST(AnswerJson, ListsSayWhereTheNextPageIs) {
-  EXPECT_EQ(json::parse(to_json(std::vector<Job>{})), json::parse(R"({"jobs": [], "next": null})"));
-  EXPECT_EQ(json::parse(to_json(std::vector<Job>{queued_job()}, "018f"))["next"], "018f");
-  EXPECT_EQ(json::parse(to_json(std::vector<Volume>{})),
-            json::parse(R"({"volumes": [], "next": null})"));
 }
 
 // --- Round trips ---------------------------------------------------------------------------------
@@ -257,7 +122,6 @@ TEST(AnswerJson, BytesThatAreNotUtf8AreReplaced) {
 }
 
 // --- From other versions, and from nobody
-// ---------------------------------------------------------
 
 TEST(AnswerJson, VolumesOfTheFirstVersionAreRead) {
   json volume = json::parse(to_json(dicom_volume()));
@@ -382,23 +246,10 @@ TEST(AnswerJson, ListsThatAreNotListsAreRefused) {
   }
 }
 
-TEST(AnswerJson, AnAnswerWithoutAnIdIsNone) {
-  EXPECT_EQ(code_thrown_by([] { volume_from_json("{}"); }), ErrorCode::kInternal);
-  EXPECT_EQ(code_thrown_by([] { job_from_json("{}"); }), ErrorCode::kInternal);
-}
-
 TEST(AnswerJson, NestingWithoutEndIsReadWithoutRecursion) {
   const std::string deep =
       "{\"later\": " + std::string(200'000, '[') + std::string(200'000, ']') + "}";
   EXPECT_EQ(problem_from_json(deep), Problem{});
-}
-
-TEST(AnswerJson, SpellsWhatAJobWaitsFor) {
-  Job job;
-  EXPECT_TRUE(json::parse(to_json(job))["waiting_for"].is_null());
-  job.waiting_for = WaitingFor::kDisk;
-  EXPECT_EQ(json::parse(to_json(job))["waiting_for"], "disk");
-  EXPECT_EQ(job_from_json(to_json(job)), job);
 }
 
 TEST(Records, AreReadBackWhole) {

@@ -75,30 +75,6 @@ Job certified_job() {
   return job;
 }
 
-TEST(JobJson, TellsOfTheErrorAsTheContractDoes) {
-  const json job = json::parse(to_json(certified_job()));
-  const json& parameters = job["parameters"];
-  EXPECT_EQ(parameters["max_error_mm"], 0.1);
-  EXPECT_EQ(parameters["triangles"], 200000);
-  EXPECT_EQ(parameters["lods"], json::parse("[1, 0.25]"));
-  EXPECT_EQ(parameters["crop"], json::parse("[[-1, -2, -3], [4, 5, 6.5]]"));
-  EXPECT_EQ(parameters["fill_cavities"], true);
-  EXPECT_EQ(parameters["distances"], true);
-  EXPECT_EQ(parameters["components"]["nearest_to"], json::parse("[[1, 2, 3], [4, 5, 6]]"));
-  EXPECT_EQ(parameters["certify"], true);
-  const json& mesh = job["mesh"];
-  EXPECT_EQ(mesh["iso"], 61.5);
-  EXPECT_EQ(mesh["empty"], true);
-  EXPECT_EQ(mesh["simplified"], json::parse(R"({"triangles_before": 7, "bound_by": "triangles"})"));
-  EXPECT_EQ(mesh["quality"]["self_intersections"],
-            json::parse(R"({"pairs": 3, "triangles": 5, "places": [[1, 2, 3]]})"));
-  EXPECT_EQ(mesh["certificate"]["file"], "3mf");
-  EXPECT_EQ(mesh["certificate"]["max_mm"], 0.09);
-  EXPECT_EQ(mesh["certificate"]["from_mesh"]["p99_mm"], 0.07);
-  EXPECT_EQ(mesh["certificate"]["budget_mm"],
-            json::parse(R"({"smoothing": 0.05, "simplification": 0.04, "quantisation": 0.01})"));
-}
-
 TEST(JobJson, OfTheErrorComesBackTheSame) {
   EXPECT_EQ(job_from_json(to_json(certified_job())), certified_job());
 }

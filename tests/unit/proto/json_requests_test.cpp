@@ -7,7 +7,6 @@
 
 #include "proto/json.h"
 #include "tests/support/errors.h"
-#include "tests/unit/proto/requests.h"
 
 namespace isomesh {
 namespace {
@@ -103,12 +102,27 @@ TEST(JobBody, NeedsAVolumeAndAnIsoOnly) {
 }
 
 TEST(JobBody, TakesEveryMember) {
+  const JobParameters unusual = {{.iso = -150,
+                                  .scheme = Scheme::kFive,
+                                  .interpolation = Interpolation::kMidpoint,
+                                  .passes = 17,
+                                  .smoothing = Smoothing::kTaubin,
+                                  .lambda = 0.25,
+                                  .pass_band = 0.05,
+                                  .max_displacement_mm = 0.5,
+                                  .close = true,
+                                  .components = {.keep = 2, .min_triangles = 100, .nearest_to = {}},
+                                  .formats = {MeshFormat::kStl, MeshFormat::kGlb},
+                                  .draco = {.position_bits = 11, .speed = 3},
+                                  .normals = true},
+                                 "abc",
+                                 Priority::kBulk};
   EXPECT_EQ(parse_job_parameters(R"({"volume": "abc", "iso": -1.5e2, "scheme": 5,
       "interpolation": "midpoint", "passes": 17, "smoothing": "taubin", "lambda": 0.25,
       "pass_band": 0.05, "max_displacement_mm": 0.5,
       "close": true, "components": {"keep": 2, "min_triangles": 100}, "formats": ["stl", "glb"],
       "draco": {"position_bits": 11, "speed": 3}, "normals": true, "priority": "bulk"})"),
-            test::unusual_parameters("abc"));
+            unusual);
 }
 
 TEST(JobBody, IsWhatToJsonWrites) {
@@ -205,24 +219,6 @@ TEST(JobBody, AFormatNamedTwiceIsMadeOnce) {
               ElementsAre(MeshFormat::kStl, MeshFormat::kDrc));
 }
 
-TEST(JobBody, TakesTheEdgesOfEveryRange) {
-  EXPECT_EQ(parsed(R"("passes": 0)").passes, 0);
-  EXPECT_EQ(parsed(R"("passes": 1000)").passes, 1000);
-  EXPECT_EQ(parsed(R"("passes": 5.0)").passes, 5);
-  EXPECT_EQ(parsed(R"("lambda": 1)").lambda, 1);
-  EXPECT_EQ(parsed(R"("lambda": 5e-324)").lambda, 5e-324);
-  EXPECT_EQ(parsed(R"("smoothing": "taubin", "lambda": 0.66)").lambda, 0.66);
-  EXPECT_EQ(parsed(R"("pass_band": 0.5)").pass_band, 0.5);
-  EXPECT_EQ(parsed(R"("max_displacement_mm": 0)").max_displacement_mm, 0);
-  EXPECT_EQ(parsed(R"("draco": {"position_bits": 8, "speed": 10})").draco,
-            (DracoParameters{8, 10}));
-  EXPECT_EQ(parsed(R"("draco": {"position_bits": 30, "speed": 0})").draco,
-            (DracoParameters{30, 0}));
-  EXPECT_EQ(parsed(R"("scheme": 5)").scheme, Scheme::kFive);
-  EXPECT_EQ(parse_job_parameters(R"({"volume": "a", "iso": 1.7976931348623157e308})").iso,
-            1.7976931348623157e308);
-}
-
 // A member that is out of range or of the wrong type, and the name under which it is refused.
 struct Refused {
   std::string member;
@@ -236,27 +232,13 @@ TEST_P(OneFault, IsRefusedByName) {
       << GetParam().member;
 }
 
+// Bounds: see Parameters.BoundsAreThoseOfTheTable.
 INSTANTIATE_TEST_SUITE_P(
     Ranges, OneFault,
-    testing::Values(Refused{R"("passes": -1)", "passes"}, Refused{R"("passes": 1001)", "passes"},
-                    Refused{R"("passes": 1e300)", "passes"}, Refused{R"("passes": 4.5)", "passes"},
+    testing::Values(Refused{R"("passes": 1e300)", "passes"}, Refused{R"("passes": 4.5)", "passes"},
                     Refused{R"("passes": 18446744073709551621)", "passes"},
-                    Refused{R"("lambda": 0)", "lambda"}, Refused{R"("lambda": -0.5)", "lambda"},
-                    Refused{R"("lambda": 1.0000000000000002)", "lambda"},
-                    Refused{R"("smoothing": "taubin", "lambda": 0.67)", "lambda"},
-                    Refused{R"("pass_band": 0)", "pass_band"},
-                    Refused{R"("pass_band": 0.51)", "pass_band"},
-                    Refused{R"("max_displacement_mm": -0.1)", "max_displacement_mm"},
-                    Refused{R"("scheme": 4)", "scheme"}, Refused{R"("scheme": 7)", "scheme"},
-                    Refused{R"("scheme": 5.5)", "scheme"},
-                    Refused{R"("draco": {"position_bits": 7})", "draco.position_bits"},
-                    Refused{R"("draco": {"position_bits": 31})", "draco.position_bits"},
-                    Refused{R"("draco": {"speed": -1})", "draco.speed"},
-                    Refused{R"("draco": {"speed": 11})", "draco.speed"},
-                    Refused{R"("components": {"keep": 0})", "components.keep"},
+                    Refused{R"("scheme": 4)", "scheme"}, Refused{R"("scheme": 5.5)", "scheme"},
                     Refused{R"("components": {"keep": 1.5})", "components.keep"},
-                    Refused{R"("components": {"keep": 4294967296})", "components.keep"},
-                    Refused{R"("components": {"min_triangles": -1})", "components.min_triangles"},
                     Refused{R"("components": {"min_triangles": 1e300})",
                             "components.min_triangles"}));
 

@@ -8,7 +8,6 @@
 
 #include "proto/json.h"
 #include "tests/support/errors.h"
-#include "tests/unit/proto/requests.h"
 
 namespace isomesh {
 namespace {
@@ -29,30 +28,6 @@ TEST(JobQuery, NeedsAnIsoOnly) {
   expected.lambda = 1;
   EXPECT_EQ(parse_job_parameters(Query{{"iso", "60"}}), expected);
   EXPECT_THAT(query_faults(Query{}), ElementsAre("iso"));
-}
-
-TEST(JobQuery, TakesEveryParameter) {
-  EXPECT_EQ(parse_job_parameters(Query{{"iso", "-1.5e2"},
-                                       {"scheme", "5"},
-                                       {"interpolation", "midpoint"},
-                                       {"passes", "17"},
-                                       {"smoothing", "taubin"},
-                                       {"lambda", "0.25"},
-                                       {"pass_band", "0.05"},
-                                       {"max_displacement_mm", "0.5"},
-                                       {"close", "true"},
-                                       {"keep", "2"},
-                                       {"min_triangles", "100"},
-                                       {"normals", "true"},
-                                       {"format", "stl,glb"},
-                                       {"position_bits", "11"},
-                                       {"speed", "3"},
-                                       {"priority", "bulk"}}),
-            test::unusual_parameters(""));
-}
-
-TEST(JobQuery, OtsuStandsForAnIso) {
-  EXPECT_EQ(parse_job_parameters(Query{{"iso", "otsu"}}).iso, std::nullopt);
 }
 
 // Faults are named as the client spelled them.

@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import type { Volume } from '@/api/types';
 import { foundVolumes } from '@/views/volume_search';
 import { declaredBy } from '@/volume/declared';
-import { noteTexts } from '@/volume/notes';
+import { noteTexts } from '@/volume/names';
 import { sampleHead } from '@/volume/sample';
 import { mayBeVolume } from '@/volume/sniff';
 

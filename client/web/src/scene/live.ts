@@ -25,8 +25,7 @@ import {
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3 } from '../api/types';
 import { blockSize, firstCrossing, type Preview } from '../volume/preview';
-import { compile } from './compile';
-import { whenDrawn } from './fence';
+import { compile, whenDrawn } from './compile';
 import { drawable, letGo, tablesOf, type Drawable } from './live_textures';
 import type { Look } from '../volume/looks';
 import { enlargingFragmentShader, enlargingVertexShader, fragmentShader, vertexShader } from './live_shader';

@@ -4,8 +4,7 @@ import type { Volume } from '../api/types';
 import { button, h } from '../ui/dom';
 import { formatDims, formatNames, formatSpacing, formatValue } from '../ui/format';
 import { askText, tellError } from '../ui/notices';
-import { volumeName } from '../volume/names';
-import { noteTexts } from '../volume/notes';
+import { noteTexts, volumeName } from '../volume/names';
 
 // Lists the skipped files of an upload, because a user may miss them.
 function ignoredNote({ ignored }: Volume): HTMLElement | null {

@@ -9,8 +9,7 @@ import { go, hashOf } from '../ui/route';
 import type { Scope } from '../ui/signal';
 import { axisIndex, slicePlacement, slicePlane } from '../volume/geometry';
 import { KnownVolumes } from '../volume/known';
-import { volumeKind, volumeName } from '../volume/names';
-import { noteTexts } from '../volume/notes';
+import { noteTexts, volumeKind, volumeName } from '../volume/names';
 import { uploads } from './upload_panel';
 import { VolumeSearch } from './volume_search';
 

@@ -1,4 +1,4 @@
-// Names of volumes for users.
+// Names and notes of volumes for users.
 import type { Volume } from '../api/types';
 import { formatDims, formatNames } from '../ui/format';
 
@@ -34,4 +34,14 @@ export function volumeKind(volume: Volume): string {
 // NIfTI and DICOM scale whole samples to values that are not.
 export function isInteger({ type, range }: Pick<Volume, 'type' | 'range'>): boolean {
   return !type.startsWith('float') && range.every(Number.isInteger);
+}
+
+// The button that makes surfaces of labels. Only volumes of whole values have it.
+export const eachLabel = 'Each label';
+
+// The server does not know the page's buttons, so the page adds which one to use.
+export function noteTexts(volume: Volume): string[] {
+  return volume.notes.map(({ code, detail }) =>
+    code === 'looks-like-labels' && isInteger(volume) ? `${detail} The button "${eachLabel}" makes one surface for each label.` : detail,
+  );
 }

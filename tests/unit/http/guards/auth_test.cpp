@@ -106,18 +106,6 @@ TEST_F(TokensTest, AFileThatOthersMayWriteToIsRefused) {
   }
 }
 
-TEST_F(TokensTest, AReloadTakesWhatIsThereOrKeepsWhatWas) {
-  const std::filesystem::path path = file(token_line("ct", Role::kUser, ct_));
-  Tokens tokens(path);
-  file(token_line("boss", Role::kAdmin, admin_));
-  tokens.reload();
-  EXPECT_EQ(tokens.find(ct_), std::nullopt);
-  EXPECT_EQ(tokens.find(admin_), (Caller{"boss", Role::kAdmin}));
-  file("half a line");
-  EXPECT_TRUE(test::thrown_by([&] { tokens.reload(); }));
-  EXPECT_EQ(tokens.find(admin_), (Caller{"boss", Role::kAdmin}));
-}
-
 TEST(TokenLine, TakesPlainNamesOnly) {
   for (const std::string& name : {std::string(), std::string("a b"), std::string("a\nb"),
                                   std::string("#a"), std::string(65, 'a')}) {

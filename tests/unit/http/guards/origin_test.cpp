@@ -25,11 +25,6 @@ bool is_refused(const OriginRules& rules, const Request& request) {
   return code.has_value();
 }
 
-std::string header_of(const Response& response, std::string_view name) {
-  const std::string* value = net::find_header(response.headers, name);
-  return value == nullptr ? "" : *value;
-}
-
 TEST(HostOf, TakesThePortAway) {
   EXPECT_EQ(host_of("LocalHost:8080"), "localhost");
   EXPECT_EQ(host_of("127.0.0.1"), "127.0.0.1");
@@ -70,33 +65,6 @@ TEST(Origin, OfAnotherPageMayChangeNothing) {
   EXPECT_FALSE(is_refused({}, request_of("POST", "localhost:8080")));
   EXPECT_FALSE(is_refused({.cors_origins = {"*"}, .check_host = false, .hosts = {}},
                           request_of("POST", "localhost:8080", "https://evil.example")));
-}
-
-TEST(Cors, AllowedPagesMayRead) {
-  const OriginRules rules = {
-      .cors_origins = {"https://viewer.example"}, .check_host = false, .hosts = {}};
-  const auto allowed_origin = [&](const std::string& origin) {
-    Response response;
-    allow_reading(rules, request_of("GET", "a", origin), response);
-    EXPECT_EQ(header_of(response, "Vary"), "Origin");
-    return header_of(response, "Access-Control-Allow-Origin");
-  };
-  EXPECT_EQ(allowed_origin("https://viewer.example"), "https://viewer.example");
-  EXPECT_EQ(allowed_origin("https://evil.example"), "");
-  EXPECT_EQ(allowed_origin(""), "");
-  Response closed;
-  allow_reading({}, request_of("GET", "a", "https://viewer.example"), closed);
-  EXPECT_TRUE(closed.headers.empty());
-}
-
-TEST(Cors, APreflightIsFromAnAllowedPage) {
-  const OriginRules rules = {
-      .cors_origins = {"https://viewer.example"}, .check_host = false, .hosts = {}};
-  Request request = request_of("OPTIONS", "a", "https://viewer.example");
-  EXPECT_FALSE(is_preflight(rules, request));
-  request.headers.emplace_back("Access-Control-Request-Method", "POST");
-  EXPECT_TRUE(is_preflight(rules, request));
-  EXPECT_FALSE(is_preflight({}, request));
 }
 
 }  // namespace
