@@ -8,7 +8,6 @@
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
-#include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -109,11 +108,6 @@ bool Connection::send(std::string_view bytes) const {
     bytes.remove_prefix(static_cast<std::size_t>(count));
   }
   return true;
-}
-
-bool Connection::is_open() const {
-  pollfd closed = {socket_, POLLRDHUP, 0};
-  return ::poll(&closed, 1, 0) == 0;
 }
 
 void Connection::finish_sending() const { ::shutdown(socket_, SHUT_WR); }

@@ -32,8 +32,6 @@ class Connection {
 
   // False when the server does not listen any more.
   bool send(std::string_view bytes) const;
-  // Whether the server may still send something.
-  bool is_open() const;
   // Nothing more is sent; the server sees the end.
   void finish_sending() const;
   // What comes first, at most some kilobytes; empty at the end.
