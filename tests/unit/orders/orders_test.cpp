@@ -14,9 +14,9 @@
 #include "base/clock.h"
 #include "base/sha256.h"
 #include "server/orders/received.h"
-#include "server/store/sqlite/audit_trail.h"
-#include "server/store/sqlite/order_store.h"
-#include "server/store/sqlite/received_store.h"
+#include "server/store/sql/audit_trail.h"
+#include "server/store/sql/order_store.h"
+#include "server/store/sql/received_store.h"
 #include "tests/api/dicom_bytes.h"
 #include "tests/support/errors.h"
 #include "tests/unit/jobs/fixture.h"
@@ -219,9 +219,9 @@ class OrdersTest : public test::JobsFixture {
   FakePacs* main_ = nullptr;
   FakePacs* other_ = nullptr;
   jobs::LabelLists labels_{blobs_};
-  store::SqliteOrderStore store_{database_};
-  store::SqliteAuditTrail audit_{database_};
-  store::SqliteReceivedStore received_{database_};
+  store::SqlOrderStore store_{database_};
+  store::SqlAuditTrail audit_{database_};
+  store::SqlReceivedStore received_{database_};
   JobParameters last_parameters_;  // of the job that was finished last
   std::unique_ptr<Orders> orders_;
 };
