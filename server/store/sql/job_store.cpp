@@ -62,9 +62,7 @@ bool SqlJobStore::is_full() const {
 }
 
 bool SqlJobStore::is_full(SqlConnection& connection) const {
-  Rows row =
-      connection.query("SELECT count(*) FROM (SELECT 1 FROM jobs WHERE state = 0 LIMIT ?1) AS q",
-                       options_.max_queued);
+  Rows row = connection.query("SELECT count(*) FROM jobs WHERE state = 0");
   row.next();
   return row.count(0) >= options_.max_queued;
 }
