@@ -17,6 +17,7 @@ std::string to_json(const Problem& problem) { return to_text(problem); }
 std::string to_json(const Histogram& histogram) { return to_text(histogram); }
 std::string to_json(const VolumeLabels& labels) { return to_text(labels); }
 std::string to_json(const Estimate& estimate) { return to_text(estimate); }
+std::string to_json(const Timing& timing) { return to_text(timing); }
 std::string to_json(const JobEvent& event) { return to_text(event); }
 
 std::string to_json(const std::vector<Volume>& volumes, const std::string& next) {
@@ -43,6 +44,7 @@ std::string to_record(const Volume& volume) {
 
 Volume volume_from_record(std::string_view text) { return from_record<Volume>(text); }
 Job job_from_record(std::string_view text) { return from_record<Job>(text); }
+Timing timing_from_record(std::string_view text) { return from_record<Timing>(text); }
 
 Volume volume_from_json(std::string_view text) { return from_text<Volume>(text); }
 Job job_from_json(std::string_view text) { return from_text<Job>(text); }

@@ -24,6 +24,7 @@ std::string to_json(const Problem& problem);
 std::string to_json(const Histogram& histogram);
 std::string to_json(const VolumeLabels& labels);
 std::string to_json(const Estimate& estimate);
+std::string to_json(const Timing& timing);
 std::string to_json(const JobEvent& event);
 // {"volumes": [...], "next": cursor}; `next` is null on the last page.
 std::string to_json(const std::vector<Volume>& volumes, const std::string& next = "");
@@ -51,10 +52,11 @@ std::vector<Job> jobs_from_json(std::string_view text);
 // A volume as a store keeps it and as an import tells it: to_json() with its labels.
 std::string to_record(const Volume& volume);
 
-// Reads what to_record(), or to_json() of a job, made in this version or an older one: members that
-// it did not know yet have their defaults. Throws Error kInternal.
+// Reads what to_record(), or to_json() of a job or its timing, made in this version or an older
+// one: members that it did not know yet have their defaults. Throws Error kInternal.
 Volume volume_from_record(std::string_view text);
 Job job_from_record(std::string_view text);
+Timing timing_from_record(std::string_view text);
 
 // Reads the body of POST /v1/jobs. Throws Error kInvalidParameter that names every member which is
 // unknown, missing, of the wrong type or out of range.

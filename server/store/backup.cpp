@@ -163,7 +163,7 @@ void snapshot(const fs::path& data, const fs::path& file) {
 std::set<std::string> named_blobs(const fs::path& records) {
   Connection connection(records, Connection::Mode::kRead);
   std::set<std::string> blobs;
-  Query query = connection.query("SELECT id FROM volumes UNION SELECT blob FROM meshes");
+  Rows query = connection.query("SELECT id FROM volumes UNION SELECT blob FROM meshes");
   while (query.next()) blobs.insert(place_of(query.text(0)));
   return blobs;
 }
@@ -176,7 +176,7 @@ std::vector<std::string> told(const fs::path& records, const std::set<std::strin
        {std::pair("SELECT id FROM volumes WHERE id = ?", "the volume "),
         std::pair("SELECT job FROM meshes WHERE blob = ?", "a mesh of the job ")}) {
     for (const std::string& key : keys) {
-      Query query = connection.query(sql, key);
+      Rows query = connection.query(sql, key);
       while (query.next()) lost.push_back(what + query.text(0));
     }
   }
@@ -197,7 +197,7 @@ Copied described(const Amount& amount, const std::set<std::string>& missing_plac
 // What says that the blobs belong to those records (Identity): they do, as far as these name any.
 void mark_blobs(const fs::path& folder) {
   Connection connection(folder / kRecords, Connection::Mode::kRead);
-  Query query = connection.query("SELECT id, number FROM identity");
+  Rows query = connection.query("SELECT id, number FROM identity");
   if (!query.next()) return;  // of a version that marked nothing yet
   const std::string text = query.text(0) + ' ' + std::to_string(query.integer(1)) + '\n';
   File file = File::create(folder / kBlobs / kIdentity);

@@ -15,7 +15,7 @@
 #include "server/store/files/blob_store.h"
 #include "server/store/postgresql/database.h"
 #include "server/store/postgresql/job_store.h"
-#include "server/store/postgresql/volume_store.h"
+#include "server/store/sql/volume_store.h"
 #include "tests/bench/daemon.h"
 #include "tests/bench/numbers.h"
 #include "tests/bench/samples.h"
@@ -231,7 +231,7 @@ struct Node {
         jobs(database, blobs, {.max_queued = 1'000'000, .mesher_version = "bench"}) {}
 
   store::postgresql::Database database;
-  store::postgresql::PostgresVolumeStore volumes;
+  store::SqlVolumeStore volumes;
   store::postgresql::PostgresJobStore jobs;
 };
 

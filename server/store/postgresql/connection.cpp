@@ -1,7 +1,9 @@
 #include "server/store/postgresql/connection.h"
 
+#include <algorithm>
 #include <array>
-#include <cstdlib>
+#include <charconv>
+#include <cstdint>
 #include <memory>
 #include <utility>
 
@@ -45,89 +47,71 @@ std::string message_of(const PGresult* result) {
   throw Error(ErrorCode::kInternal, text);
 }
 
-template <class T, class Append>
-Parameter array_of(const std::vector<T>& values, const Append& append) {
-  std::string text = "{";
-  for (const T& value : values) {
-    if (text.size() > 1) text += ',';
-    append(text, value);
+// What PostgreSQL's system catalogue calls the types.
+Oid type_of(const Parameter& parameter) {
+  constexpr Oid kBigint = 20;
+  constexpr Oid kText = 25;
+  constexpr Oid kDouble = 701;
+  switch (parameter.type) {
+    case Parameter::Type::kInteger:
+      return kBigint;
+    case Parameter::Type::kReal:
+      return kDouble;
+    case Parameter::Type::kText:
+      return kText;
+    case Parameter::Type::kOfColumn:
+      break;
   }
-  return text + '}';
+  return 0;
+}
+
+std::string text_of(const Parameter& parameter) {
+  if (parameter.type == Parameter::Type::kInteger) return std::to_string(parameter.integer);
+  if (parameter.type != Parameter::Type::kReal) return std::string(parameter.text);
+  std::array<char, 32> text = {};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), parameter.real).ptr;
+  return {text.data(), end};
+}
+
+// With the parameters as PostgreSQL has them.
+std::string with_dollars(std::string_view sql) {
+  std::string text(sql);
+  std::ranges::replace(text, '?', '$');
+  return text;
+}
+
+template <class T>
+T number_of(std::string_view text) {
+  T value = 0;
+  std::from_chars(text.data(), text.data() + text.size(), value);
+  return value;
 }
 
 }  // namespace
 
-Parameter parameter(double value) {
-  std::array<char, 32> text = {};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-  return std::string(text.data(), end);
-}
+class Connection::Answer : public Rows::Source {
+ public:
+  explicit Answer(Result result) : result_(std::move(result)) {}
 
-Parameter parameter(const std::vector<std::string>& values) {
-  return array_of(values, [](std::string& text, const std::string& value) {
-    text += '"';
-    for (const char letter : value) {
-      if (letter == '"' || letter == '\\') text += '\\';
-      text += letter;
-    }
-    text += '"';
-  });
-}
-
-Parameter parameter(const std::vector<std::int64_t>& values) {
-  return array_of(values,
-                  [](std::string& text, std::int64_t value) { text += std::to_string(value); });
-}
-
-Parameter parameter(const std::vector<double>& values) {
-  return array_of(values, [](std::string& text, double value) { text += *parameter(value); });
-}
-
-void Rows::Clear::operator()(pg_result* result) const { PQclear(result); }
-
-Rows::Rows(pg_result* result) : result_(result), count_(PQntuples(result)) {}
-
-bool Rows::is_null(int column) const { return PQgetisnull(result_.get(), row_, column) != 0; }
-
-std::string_view Rows::raw(int column) const {
-  return {PQgetvalue(result_.get(), row_, column),
-          static_cast<std::size_t>(PQgetlength(result_.get(), row_, column))};
-}
-
-std::int64_t Rows::integer(int column) const {
-  const std::string_view text = raw(column);
-  std::int64_t value = 0;
-  std::from_chars(text.data(), text.data() + text.size(), value);
-  return value;
-}
-
-bool Rows::boolean(int column) const { return raw(column) == "t"; }
-
-double Rows::real(int column) const {
-  const std::string_view text = raw(column);
-  double value = 0;
-  std::from_chars(text.data(), text.data() + text.size(), value);
-  return value;
-}
-
-std::string Rows::text(int column) const { return std::string(raw(column)); }
-
-std::vector<double> Rows::reals(int column) const {
-  std::vector<double> values;
-  std::string_view text = raw(column);
-  while (text.size() > 1) {
-    text.remove_prefix(1);  // the brace or a comma
-    double value = 0;
-    const auto end = std::from_chars(text.data(), text.data() + text.size(), value).ptr;
-    values.push_back(value);
-    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  bool next() override { return ++row_ < PQntuples(result_.get()); }
+  bool is_null(int column) const override { return PQgetisnull(result_.get(), row_, column) != 0; }
+  std::int64_t integer(int column) const override {
+    return raw(column) == "t" ? 1 : number_of<std::int64_t>(raw(column));
   }
-  return values;
-}
+  double real(int column) const override { return number_of<double>(raw(column)); }
+  std::string text(int column) const override { return std::string(raw(column)); }
 
-std::size_t Rows::changed() const {
-  return static_cast<std::size_t>(std::strtoull(PQcmdTuples(result_.get()), nullptr, 10));
-}
+ private:
+  std::string_view raw(int column) const {
+    return {PQgetvalue(result_.get(), row_, column),
+            static_cast<std::size_t>(PQgetlength(result_.get(), row_, column))};
+  }
+
+  Result result_;
+  int row_ = -1;
+};
+
+void Connection::Clear::operator()(pg_result* result) const { PQclear(result); }
 
 void check_url(const std::string& url) {
   const auto refuse = [](const std::string& why) { throw invalid_parameter("store", why); };
@@ -221,31 +205,53 @@ std::vector<std::string> Connection::take_messages() {
   return messages;
 }
 
-Rows Connection::execute(std::string_view sql, const std::vector<Parameter>& parameters) {
-  const std::string& name = prepared(sql);
-  std::vector<const char*> texts;
-  texts.reserve(parameters.size());
-  for (const Parameter& each : parameters) texts.push_back(each ? each->c_str() : nullptr);
-  return checked(PQexecPrepared(handle_, name.c_str(), static_cast<int>(texts.size()), texts.data(),
-                                nullptr, nullptr, 0));
+Rows Connection::ask(std::string_view sql, std::span<const Parameter> parameters) {
+  return Rows(std::make_unique<Answer>(execute(sql, parameters)));
 }
 
-const std::string& Connection::prepared(std::string_view sql) {
+std::size_t Connection::tell(std::string_view sql, std::span<const Parameter> parameters) {
+  const Result result = execute(sql, parameters);
+  return number_of<std::size_t>(PQcmdTuples(result.get()));
+}
+
+void Connection::lock_table(const std::string& name) {
+  script("LOCK TABLE " + name + " IN SHARE ROW EXCLUSIVE MODE");
+}
+
+Connection::Result Connection::execute(std::string_view sql,
+                                       std::span<const Parameter> parameters) {
+  const std::string& name = prepared(sql, parameters);
+  std::vector<std::string> texts;
+  std::vector<const char*> values;
+  texts.reserve(parameters.size());
+  for (const Parameter& each : parameters) {
+    texts.push_back(text_of(each));
+    values.push_back(each.is_null ? nullptr : texts.back().c_str());
+  }
+  return checked(PQexecPrepared(handle_, name.c_str(), static_cast<int>(values.size()),
+                                values.data(), nullptr, nullptr, 0));
+}
+
+const std::string& Connection::prepared(std::string_view sql,
+                                        std::span<const Parameter> parameters) {
   const std::string text(sql);
   const auto known = names_.find(text);
   if (known != names_.end()) return known->second;
+  std::vector<Oid> types;
+  for (const Parameter& each : parameters) types.push_back(type_of(each));
   const std::string name = "s" + std::to_string(names_.size());
-  checked(PQprepare(handle_, name.c_str(), text.c_str(), 0, nullptr));
+  checked(PQprepare(handle_, name.c_str(), with_dollars(sql).c_str(),
+                    static_cast<int>(types.size()), types.data()));
   return names_[text] = name;
 }
 
-Rows Connection::checked(pg_result* result) {
-  Rows rows(result);
+Connection::Result Connection::checked(pg_result* result) {
+  Result answer(result);
   const ExecStatusType status = PQresultStatus(result);
   if (std::exchange(is_warned_, false)) {
     throw Interrupted(ErrorCode::kUnavailable, "the database's standby does not respond");
   }
-  if (status == PGRES_TUPLES_OK || status == PGRES_COMMAND_OK) return rows;
+  if (status == PGRES_TUPLES_OK || status == PGRES_COMMAND_OK) return answer;
   if (!is_open()) {
     throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
   }

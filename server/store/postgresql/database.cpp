@@ -44,11 +44,10 @@ Database::Database(DatabaseOptions options) : options_(std::move(options)), node
     throw Error(ErrorCode::kUnavailable, "the database of --store cannot be used: " + reason);
   }
   ask([&](Connection& connection, bool) {
+    connection.run("INSERT INTO nodes VALUES(?1::uuid, ?2, isomesh_now()) ON CONFLICT DO NOTHING",
+                   node_, options_.node);
     connection.run(
-        "INSERT INTO nodes VALUES($1::uuid, $2::text, isomesh_now()) ON CONFLICT DO NOTHING", node_,
-        options_.node);
-    connection.run(
-        "DELETE FROM nodes n WHERE since < isomesh_now() - $1::bigint AND EXISTS (SELECT 1 FROM "
+        "DELETE FROM nodes n WHERE since < isomesh_now() - ?1 AND EXISTS (SELECT 1 FROM "
         "nodes m WHERE m.name = n.name AND m.since > n.since) AND NOT EXISTS (SELECT 1 FROM runs r "
         "WHERE r.node = n.id)",
         kNodesKeptUs);
@@ -58,7 +57,7 @@ Database::Database(DatabaseOptions options) : options_(std::move(options)), node
 bool Database::answers() {
   try {
     const Borrowed borrowed(*this);
-    borrowed.connection().run("SELECT 1");
+    borrowed.connection().query("SELECT 1");
     return true;
   } catch (const Error&) {
     return false;
@@ -93,7 +92,7 @@ void Database::look_at_clock(Connection& connection) {
   std::int64_t beyond = 0;
   for (int tries = 0; tries < 5 && quickest > kQuickUs; ++tries) {
     const std::int64_t asked = steady_us();
-    Rows row = connection.run("SELECT (extract(epoch FROM clock_timestamp()) * 1000000)::bigint");
+    Rows row = connection.query("SELECT (extract(epoch FROM clock_timestamp()) * 1000000)::bigint");
     row.next();
     const std::int64_t took = steady_us() - asked;
     if (took >= quickest) continue;
@@ -101,6 +100,27 @@ void Database::look_at_clock(Connection& connection) {
     beyond = row.integer(0) - asked;
   }
   if (std::abs(beyond - beyond_steady_us_) > kToleranceUs) beyond_steady_us_ = beyond;
+}
+
+void Database::in_transaction(Change, const std::function<void(SqlTransaction&)>& act) {
+  ask([&](Connection& connection, bool is_again) {
+    Transaction transaction(connection);
+    const std::function<void()> commit = [&] { transaction.commit(); };
+    SqlTransaction shown(connection, is_again, commit);
+    act(shown);
+  });
+}
+
+void Database::while_reading(const std::function<void(SqlConnection&)>& act) {
+  ask([&](Connection& connection, bool) { act(connection); });
+}
+
+std::size_t Database::tell(Change, std::string_view sql, std::span<const Parameter> parameters) {
+  return ask([&](Connection& connection, bool) { return connection.tell(sql, parameters); });
+}
+
+Rows Database::ask(std::string_view sql, std::span<const Parameter> parameters) {
+  return ask([&](Connection& connection, bool) { return connection.ask(sql, parameters); });
 }
 
 std::unique_ptr<Connection> Database::take() {

@@ -4,8 +4,11 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -26,7 +29,7 @@ struct DatabaseOptions {
 // The records of a cluster: one PostgreSQL database that any number of processes use, this one with
 // a small pool of connections. What a process does in the database it does under the name of one
 // life, its node. Thread safe.
-class Database {
+class Database : public SqlDatabase {
  public:
   // Creates what is missing and brings the tables of an older version up to date. Throws Error
   // kUnavailable, with libpq's reason, if no connection can be made, or if a newer version made
@@ -48,11 +51,6 @@ class Database {
       pause();
     }
   }
-  // The same for one statement.
-  template <class... Values>
-  Rows run(std::string_view sql, const Values&... values) {
-    return ask([&](Connection& connection, bool) { return connection.run(sql, values...); });
-  }
 
   // Whether the database answers now.
   bool answers();
@@ -65,8 +63,9 @@ class Database {
   // each new connection, and the time that passes is added.
   std::int64_t now_us() const;
   // Of a time by this machine's clock, and back.
-  std::int64_t to_us(Time time) const;
-  Time from_us(std::int64_t us) const;
+  std::int64_t to_us(Time time) const override;
+  Time from_us(std::int64_t us) const override;
+  std::size_t most_at_once() const override { return 1; }
   // When that was, as the time that passes is counted here.
   std::chrono::steady_clock::time_point steady_of(std::int64_t us) const;
   std::int64_t us_of(std::chrono::steady_clock::time_point time) const;
@@ -85,6 +84,12 @@ class Database {
     Database& database_;
     std::unique_ptr<Connection> connection_;
   };
+
+  void in_transaction(Change kind, const std::function<void(SqlTransaction&)>& act) override;
+  void while_reading(const std::function<void(SqlConnection&)>& act) override;
+  std::size_t tell(Change kind, std::string_view sql,
+                   std::span<const Parameter> parameters) override;
+  Rows ask(std::string_view sql, std::span<const Parameter> parameters) override;
 
   std::unique_ptr<Connection> take();
   void give(std::unique_ptr<Connection> connection);

@@ -43,9 +43,9 @@ Event event_of(const Rows& row, const std::string& node) {
 
 EventFeed::EventFeed(Database& database) : database_(database) {
   // Those of a database that was copied to another server may have numbers that come only later.
-  database_.run(
+  database_.query(
       "DELETE FROM events WHERE tx >= pg_snapshot_xmax(pg_current_snapshot())::text::bigint");
-  Rows row = database_.run(std::string("SELECT ") + kHorizon);
+  Rows row = database_.query(std::string("SELECT ") + kHorizon);
   row.next();
   const Lock lock(mutex_);
   end_ = row.integer(0);
@@ -61,10 +61,10 @@ void EventFeed::fetch() {
   }
   // The horizon is there though there may be no event before it.
   Rows rows =
-      database_.run(std::string("SELECT ") + kColumns + ", horizon FROM (SELECT " + kHorizon +
-                        " AS horizon) AS h LEFT JOIN events ON tx >= $1::bigint AND tx < "
-                        "horizon ORDER BY tx, place",
-                    end);
+      database_.query(std::string("SELECT ") + kColumns + ", horizon FROM (SELECT " + kHorizon +
+                          " AS horizon) AS h LEFT JOIN events ON tx >= ?1 AND tx < "
+                          "horizon ORDER BY tx, place",
+                      end);
   const Lock lock(mutex_);
   const bool has_told = !told_.empty();
   bool is_new = false;
@@ -131,13 +131,13 @@ EventFeed::Recent EventFeed::recent(const Viewer& viewer, const std::string& job
 
 std::vector<Event> EventFeed::kept(const Viewer& viewer, const std::string& job,
                                    std::uint64_t since, std::int64_t end) {
-  Rows rows = database_.run(std::string("SELECT ") + kColumns +
-                                " FROM events WHERE (tx, place) > ($1::bigint, $2::int) AND tx < "
-                                "$3::bigint AND " +
-                                (job.empty() ? "$4::text = ''" : "job = $4::text") + " AND " +
-                                (viewer ? "owner = $5::text" : "$5::text IS NULL") +
-                                " ORDER BY tx, place LIMIT $6::int",
-                            transaction_of(since), place_of(since), end, job, viewer, kMostEvents);
+  Rows rows =
+      database_.query(std::string("SELECT ") + kColumns +
+                          " FROM events WHERE (tx, place) > (?1, ?2) AND tx < "
+                          "?3 AND " +
+                          (job.empty() ? "?4 = ''" : "job = ?4") + " AND " +
+                          (viewer ? "owner = ?5" : "?5 IS NULL") + " ORDER BY tx, place LIMIT ?6",
+                      transaction_of(since), place_of(since), end, job, viewer, kMostEvents);
   std::vector<Event> events;
   while (rows.next()) events.push_back(event_of(rows, database_.node()));
   return events;

@@ -20,12 +20,12 @@ void name(const BlobStore& blobs, const std::string& name) { blobs.set_mark(name
 std::string name_of_database(Database& database, const std::string& proposed) {
   return database.ask([&](Connection& connection, bool) {
     Transaction transaction(connection);
-    transaction->run("LOCK TABLE identity IN SHARE ROW EXCLUSIVE MODE");
-    transaction->run(
-        "INSERT INTO identity SELECT $1::text, isomesh_now() WHERE NOT EXISTS (SELECT 1 FROM "
+    transaction->query("LOCK TABLE identity IN SHARE ROW EXCLUSIVE MODE");
+    transaction->query(
+        "INSERT INTO identity SELECT ?1, isomesh_now() WHERE NOT EXISTS (SELECT 1 FROM "
         "identity)",
         proposed);
-    Rows row = transaction->run("SELECT id FROM identity");
+    Rows row = transaction->query("SELECT id FROM identity");
     row.next();
     const std::string name = row.text(0);
     transaction.commit();
@@ -35,7 +35,7 @@ std::string name_of_database(Database& database, const std::string& proposed) {
 
 // Whether anything is recorded that may be in a blob.
 bool has_records(Database& database) {
-  Rows row = database.run(
+  Rows row = database.query(
       "SELECT EXISTS(SELECT 1 FROM volumes) OR EXISTS(SELECT 1 FROM jobs) OR EXISTS(SELECT 1 FROM "
       "expired) OR EXISTS(SELECT 1 FROM received)");
   row.next();
@@ -84,7 +84,7 @@ Time Identity::now() {
   }
   const std::int64_t us = store::to_us(believed);
   try {
-    database_.run("UPDATE identity SET seen = $1::bigint WHERE seen < $1::bigint", us);
+    database_.query("UPDATE identity SET seen = ?1 WHERE seen < ?1", us);
   } catch (const Error& error) {
     log_warning("the time could not be recorded and is retried: {}", error.what());
   }
@@ -92,7 +92,7 @@ Time Identity::now() {
 }
 
 Time Identity::last_seen(Database& database, const OperatorsWord& word) {
-  Rows row = database.run("SELECT seen FROM identity");
+  Rows row = database.query("SELECT seen FROM identity");
   if (word.trust_clock || !row.next()) return store::from_us(database.now_us());
   return store::from_us(row.integer(0));
 }

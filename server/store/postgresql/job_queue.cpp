@@ -1,24 +1,49 @@
-// What changes jobs, one function of the database a verb; job_store.cpp has what can be asked,
-// job_reuse.cpp which meshes serve more than one.
+// What changes jobs, one function of the database a verb; job_store.cpp has what is asked.
 #include <algorithm>
+
+#include <nlohmann/json.hpp>
 
 #include "base/ids.h"
 #include "proto/json.h"
 #include "server/store/job_rules.h"
 #include "server/store/microseconds.h"
 #include "server/store/outbox.h"
-#include "server/store/postgresql/job_rows.h"
+#include "server/store/postgresql/job_store.h"
 
 namespace isomesh::store::postgresql {
+
+// How a run is to end.
+struct PostgresJobStore::Ending {
+  bool ends_others = false;  // it is not this process's own, and its lease is over
+  JobState state = JobState::kQueued;
+  std::string record = {};     // of those that do not run again
+  std::string cancelled = {};  // the record, should it have been asked to stop
+  const MeshSummary* mesh = nullptr;
+  std::chrono::milliseconds delay{0};  // of those that do, until they may
+  std::optional<WaitingFor> waiting_for = {};
+  bool counts = false;  // as an attempt
+};
+
 namespace {
 
 // How often a run tells the database how far it is, and learns that it is to stop if it missed
 // what was told.
 constexpr std::chrono::milliseconds kBetweenRenewals{1000};
 
-std::vector<double> parts_of(const Timing& timing) {
-  return {timing.load,     timing.extract, timing.smooth,
-          timing.simplify, timing.encode,  timing.certify};
+// How the functions of the database are told.
+using Json = nlohmann::json;
+
+std::string text_of(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Json blobs_of(const MeshSummary* mesh) {
+  Json blobs = Json::array();
+  if (mesh == nullptr) return blobs;
+  for (const auto& [format, file] : mesh->files) {
+    blobs.push_back({{"blob", file.sha256}, {"bytes", file.bytes}});
+  }
+  return blobs;
 }
 
 void end(Job& job, JobState state, std::int64_t accepted, std::int64_t now) {
@@ -45,9 +70,10 @@ Submission PostgresJobStore::submit(const JobSpec& spec) {
 }
 
 std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, Job job) {
-  enum Answer { kNew, kKnown, kOther, kFull, kNoVolume, kLookAgain, kShare };
   const std::int64_t accepted = database_.now_us();
-  const std::string key = result_key_of(spec).value_or("");
+  const std::string key =
+      database_.read([&](SqlConnection& connection) { return result_key_of(connection, spec); })
+          .value_or("");
   const auto made = made_like(spec.owner, key);
   const MeshSummary* mesh = made && made->mesh && !refusing_ ? &*made->mesh : nullptr;
   if (mesh != nullptr) {
@@ -56,54 +82,46 @@ std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, J
     end(job, JobState::kSucceeded, accepted, database_.now_us());
   }
   const bool has_room = mesh != nullptr || blobs_.has_room();
-  const std::size_t most = refusing_ || !has_room ? 0 : options_.max_queued;
   const auto& callback = spec.parameters.callback;
-  const NamedBlobs blobs = blobs_of(mesh);
-  Rows row = database_.run(
-      "SELECT kind, job FROM submit_job($1::text, $2::text, $3::int, $4::text, $5::text, $6::text, "
-      "$7::text, $8::text, $9::uuid, $10::int, $11::boolean, $12::text, $13::int, $14::text[], "
-      "$15::bigint[], $16::text, $17::text, $18::bigint)",
-      job.id, spec.owner, spec.parameters.priority, spec.parameters.volume, key,
-      spec.idempotency_key.empty() ? std::nullopt : std::optional(spec.idempotency_key),
-      spec.request_digest, to_json(job), database_.node(), most, has_share(spec),
-      made ? std::optional(made->job) : std::nullopt, mesh != nullptr ? 2 : 0, blobs.keys,
-      blobs.bytes, callback ? std::optional(receiver_of(callback->url)) : std::nullopt,
-      callback ? std::optional(callback->url) : std::nullopt, accepted);
+  const Json asked = {
+      {"id", job.id},
+      {"owner", spec.owner},
+      {"priority", static_cast<int>(spec.parameters.priority)},
+      {"volume", spec.parameters.volume},
+      {"result_key", key},
+      {"accepted", accepted},
+      {"receiver", callback ? Json(receiver_of(callback->url)) : Json()},
+      {"url", callback ? Json(callback->url) : Json()},
+      {"idempotency_key", spec.idempotency_key.empty() ? Json() : Json(spec.idempotency_key)},
+      {"request_digest", spec.request_digest},
+      {"record", to_json(job)},
+      {"node", database_.node()},
+      {"latest", made ? Json(made->job) : Json()},
+      {"reuses", mesh != nullptr},
+      {"blobs", blobs_of(mesh)},
+      {"most", refusing_ || !has_room ? 0 : options_.max_queued},
+      {"has_share",
+       database_.read([&](SqlConnection& connection) { return has_share(connection, spec); })}};
+  Rows row = database_.query("SELECT outcome, job FROM submit_job(?1::jsonb)", text_of(asked));
   row.next();
-  switch (static_cast<Answer>(row.integer(0))) {
-    case kNew:
-      wake_workers();
-      return Submission{Submission::Kind::kNew, job, {}};
-    case kKnown:
-      return Submission{Submission::Kind::kExisting, get(spec.owner, row.text(1)), {}};
-    case kOther:
-      return Submission{Submission::Kind::kConflict, {}, {}};
-    case kFull:
-      if (!has_room) {
-        throw Error(ErrorCode::kOutOfSpace, "there is not enough disk space for another job");
-      }
-      return Submission{Submission::Kind::kBusy, {}, kRetryAfter};
-    case kNoVolume:
-      throw_no_volume(has_expired(spec));
-    case kLookAgain:
-      return std::nullopt;
-    case kShare:
-      return Submission{Submission::Kind::kOwnersShare, {}, kRetryAfter};
+  const std::string outcome = row.text(0);
+  if (outcome == "new") {
+    wake_workers();
+    return Submission{Submission::Kind::kNew, job, {}};
   }
-  return std::nullopt;
-}
-
-bool PostgresJobStore::has_share(const JobSpec& spec) const {
-  if (spec.owner.empty()) return true;
-  const bool is_stat = spec.parameters.priority == Priority::kStat;
-  Rows row = database_.run(
-      "SELECT count(*), count(*) FILTER (WHERE owner = $1::text) FROM jobs WHERE state = 0 AND "
-      "($2::boolean IS FALSE OR priority = $3::int)",
-      spec.owner, is_stat, Priority::kStat);
-  row.next();
-  return has_share_of_queue(
-      spec, {static_cast<std::size_t>(row.integer(0)), static_cast<std::size_t>(row.integer(1))},
-      options_.max_queued);
+  if (outcome == "known") {
+    return Submission{Submission::Kind::kExisting, get(spec.owner, row.text(1)), {}};
+  }
+  if (outcome == "conflict") return Submission{Submission::Kind::kConflict, {}, {}};
+  if (outcome == "no volume") {
+    database_.read([&](SqlConnection& connection) { throw_no_volume_of(connection, spec); });
+  }
+  if (outcome == "no share") return Submission{Submission::Kind::kOwnersShare, {}, kRetryAfter};
+  if (outcome == "look again") return std::nullopt;
+  if (!has_room) {
+    throw Error(ErrorCode::kOutOfSpace, "there is not enough disk space for another job");
+  }
+  return Submission{Submission::Kind::kBusy, {}, kRetryAfter};
 }
 
 std::optional<Lease> PostgresJobStore::claim(const std::string& worker,
@@ -111,24 +129,24 @@ std::optional<Lease> PostgresJobStore::claim(const std::string& worker,
   Steady asked;
   std::optional<Rows> claimed = database_.ask([&](Connection& connection, bool is_again) {
     asked = Steady::clock::now();
+    std::optional<Rows> rows;
     if (is_again) {
       // What it got when it was interrupted: a worker has one run at a time.
-      Rows mine = connection.run(
+      rows = connection.query(
           "SELECT j.id, r.fence, j.attempts, j.owner, j.record, j.accepted, r.claimed, 0 FROM runs "
-          "r JOIN jobs j ON j.id = r.job WHERE r.node = $1::uuid AND r.worker = $2::text AND "
+          "r JOIN jobs j ON j.id = r.job WHERE r.node = ?1::uuid AND r.worker = ?2 AND "
           "r.lease_until > isomesh_now() ORDER BY r.claimed DESC LIMIT 1",
           database_.node(), worker);
-      if (mine.count() > 0) return std::optional(std::move(mine));
+      if (rows->next()) return rows;
     }
-    Rows rows = connection.run(
+    rows = connection.query(
         "SELECT id, fence, attempts, owner, record, accepted, claimed, "
-        "pg_current_xact_id_if_assigned()::text::bigint FROM claim_job($1::uuid, $2::text, "
-        "$3::bigint)",
+        "pg_current_xact_id_if_assigned()::text::bigint FROM claim_job(?1::uuid, ?2, ?3)",
         database_.node(), worker, microseconds(lease));
-    return rows.count() > 0 ? std::optional(std::move(rows)) : std::nullopt;
+    if (!rows->next()) rows.reset();
+    return rows;
   });
   if (!claimed) return std::nullopt;
-  claimed->next();
   Live run;
   run.job = job_from_record(claimed->text(4));
   run.fence = static_cast<std::uint64_t>(claimed->integer(1));
@@ -157,31 +175,30 @@ Standing PostgresJobStore::renew(const Lease& lease, const Progress& progress,
   bool is_fresh = false;
   {
     const Lock lock(live_mutex_);
-    const Live* const run = live(lease);
+    const Live* const run = live(lease.id, lease.fence);
     if (run == nullptr) return Standing::kLost;
     const auto slack = std::min<std::chrono::milliseconds>(length / 3, kBetweenRenewals);
     const bool is_same_stage = run->progress && run->progress->stage == progress.stage;
     is_fresh = is_same_stage && run->lease_until >= asked + length - slack;
   }
   if (!is_fresh) {
-    Rows row = database_.run(
-        "SELECT renew_run($1::text, $2::bigint, $3::bigint, $4::int, $5::float8, $6::float8[])",
-        lease.id, lease.fence, microseconds(length), progress.stage, progress.share,
-        parts_of(progress.timing));
+    Rows row = database_.query("SELECT renew_run(?1, ?2, ?3, ?4::int, ?5, ?6)", lease.id,
+                               lease.fence, microseconds(length), progress.stage, progress.share,
+                               to_json(progress.timing));
     row.next();
     if (row.is_null(0)) {
       forget_run(lease.id, lease.fence);
       return Standing::kLost;
     }
     const Lock lock(live_mutex_);
-    Live* const run = live(lease);
+    Live* const run = live(lease.id, lease.fence);
     if (run == nullptr) return Standing::kLost;
     run->lease_until = asked + length;
     run->cancelling = run->cancelling || row.boolean(0);
   }
-  tell(lease, progress);
+  note(lease, progress);
   const Lock lock(live_mutex_);
-  const Live* const run = live(lease);
+  const Live* const run = live(lease.id, lease.fence);
   if (run == nullptr) return Standing::kLost;
   return run->cancelling ? Standing::kCancel : Standing::kOk;
 }
@@ -232,10 +249,10 @@ bool PostgresJobStore::put_back(const Lease& lease, std::chrono::milliseconds de
 }
 
 std::size_t PostgresJobStore::reap() {
-  Rows rows = database_.run(
-      std::string(kRow) +
+  Rows rows = database_.query(
+      select_ +
           "WHERE r.lease_until < isomesh_now() OR r.node IN (SELECT id FROM nodes WHERE name = "
-          "$1::text AND id <> $2::uuid)",
+          "?1 AND id <> ?2::uuid)",
       database_.node_name(), database_.node());
   std::size_t reaped = 0;
   while (rows.next()) {
@@ -250,28 +267,31 @@ std::size_t PostgresJobStore::reap() {
 
 // Asks until the database has been told of all jobs that end with it.
 bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const Ending& ending) {
-  enum Verdict { kLost, kDone, kThereAreAlike };
-  const NamedBlobs blobs = blobs_of(ending.mesh);
-  std::vector<std::string> alike;
-  std::vector<std::string> records;
-  bool is_again = false;
+  Json asked = {
+      {"id", id},
+      {"fence", fence},
+      {"node", database_.node()},
+      {"is_again", false},
+      {"ends_others", ending.ends_others},
+      {"state", static_cast<int>(ending.state)},
+      {"record", ending.record},
+      {"delay", microseconds(ending.delay)},
+      {"waiting_for", ending.waiting_for ? Json(static_cast<int>(*ending.waiting_for)) : Json()},
+      {"counts", ending.counts},
+      {"cancelled", ending.cancelled},
+      {"blobs", blobs_of(ending.mesh)},
+      {"alike", Json::array()}};
   while (true) {
     Rows rows = database_.ask([&](Connection& connection, bool was_interrupted) {
-      is_again = is_again || was_interrupted;
-      return connection.run(
-          "SELECT verdict, id, record, accepted FROM finish_run($1::text, $2::bigint, $3::uuid, "
-          "$4::boolean, $5::boolean, $6::int, $7::text, $8::text, $9::text[], $10::bigint[], "
-          "$11::bigint, $12::int, $13::boolean, $14::text[], $15::text[])",
-          id, fence, database_.node(), is_again, ending.ends_others, ending.state, ending.record,
-          ending.cancelled, blobs.keys, blobs.bytes, microseconds(ending.delay), ending.waiting_for,
-          ending.counts, alike, records);
+      if (was_interrupted) asked["is_again"] = true;
+      return connection.query("SELECT outcome, id, record, accepted FROM finish_run(?1::jsonb)",
+                              text_of(asked));
     });
     rows.next();
-    const auto verdict = static_cast<Verdict>(rows.integer(0));
-    if (verdict == kLost) return false;
-    if (verdict == kDone) break;
-    alike.clear();
-    records.clear();
+    const std::string outcome = rows.text(0);
+    if (outcome == "lost") return false;
+    if (outcome == "done") break;
+    asked["alike"] = Json::array();
     const std::int64_t now = database_.now_us();
     do {
       Job other = job_from_record(rows.text(2));
@@ -281,8 +301,7 @@ bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const
       other.timing.queue = milliseconds_between(accepted, now);
       give_mesh(other, *ending.mesh);
       end(other, JobState::kSucceeded, accepted, now);
-      alike.push_back(rows.text(1));
-      records.push_back(to_json(other));
+      asked["alike"].push_back({{"id", rows.text(1)}, {"record", to_json(other)}});
     } while (rows.next());
   }
   forget_run(id, fence);
@@ -296,11 +315,12 @@ bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const
 }
 
 Job PostgresJobStore::cancel(const Viewer& viewer, const std::string& id) {
-  const Row row = found(viewer, id);
+  const Row row =
+      database_.read([&](SqlConnection& connection) { return found(connection, viewer, id); });
   if (is_final(row.job.state)) return row.job;
   const Job ended = cancelled(row.job, row.accepted);
-  Rows answer = database_.run("SELECT cancel_job($1::text, $2::text, $3::uuid)", id, to_json(ended),
-                              database_.node());
+  Rows answer =
+      database_.query("SELECT cancel_job(?1, ?2, ?3::uuid)", id, to_json(ended), database_.node());
   answer.next();
   if (answer.is_null(0)) return get(viewer, id);  // gone meanwhile
   const auto state = static_cast<JobState>(answer.integer(0));
@@ -319,49 +339,11 @@ Job PostgresJobStore::cancelled(Job job, std::int64_t accepted) const {
   return job;
 }
 
-PostgresJobStore::Live* PostgresJobStore::live(const Lease& lease) {
-  const auto run = live_.find(lease.id);
-  return run != live_.end() && run->second.fence == lease.fence ? &run->second : nullptr;
-}
-
 std::optional<PostgresJobStore::Live> PostgresJobStore::live_run(const Lease& lease) const {
   const Lock lock(live_mutex_);
   const auto run = live_.find(lease.id);
   if (run == live_.end() || run->second.fence != lease.fence) return std::nullopt;
   return run->second;
-}
-
-void PostgresJobStore::tell(const Lease& lease, const Progress& progress) {
-  const auto now = EventFeed::Clock::now();
-  bool is_other_stage = false;
-  std::int64_t transaction = 0;
-  {
-    const Lock lock(live_mutex_);
-    Live* const run = live(lease);
-    if (run == nullptr) return;
-    const Progress before = run->progress.value_or(Progress{});
-    is_other_stage = before.stage != progress.stage;
-    const bool is_further = before.share != progress.share;
-    run->progress = progress;
-    if (!is_other_stage && (!is_further || now < run->told + kBetweenProgressEvents)) return;
-    run->told = now;
-    transaction = run->transaction;
-  }
-  feed_.tell({.id = 0,
-              .owner = lease.owner,
-              .job = lease.id,
-              .kind = is_other_stage ? EventKind::kStage : EventKind::kProgress,
-              .state = JobState::kRunning,
-              .stage = progress.stage,
-              .progress = progress.share},
-             transaction);
-}
-
-// A later run of the job stays known.
-void PostgresJobStore::forget_run(const std::string& id, std::uint64_t fence) {
-  const Lock lock(live_mutex_);
-  const auto run = live_.find(id);
-  if (run != live_.end() && run->second.fence == fence) live_.erase(run);
 }
 
 }  // namespace isomesh::store::postgresql

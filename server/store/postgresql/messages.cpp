@@ -126,14 +126,15 @@ News Messages::send(Connection& connection) {
     const Lock lock(mutex_);
     news = std::exchange(to_tell_, {});
   }
-  std::vector<std::string> messages;
-  for (const std::string& job : news.cancelled) messages.push_back(kCancelled + job);
+  std::string messages;
+  for (const std::string& job : news.cancelled) messages += std::string(",") + kCancelled + job;
   std::string flags;
   if (news.has_work) flags += kWork;
   if (news.has_events) flags += kEvents;
-  if (!flags.empty()) messages.push_back(flags);
+  if (!flags.empty()) messages += ',' + flags;
   if (!messages.empty()) {
-    connection.run("SELECT pg_notify('isomesh', m) FROM unnest($1::text[]) AS m", messages);
+    connection.query("SELECT pg_notify('isomesh', m) FROM unnest(string_to_array(?1, ',')) AS m",
+                     messages.substr(1));
   }
   return news;
 }

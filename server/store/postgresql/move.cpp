@@ -28,6 +28,8 @@ struct Table {
 
 // Events stay behind: their numbers are of another kind, and nobody waits for them.
 constexpr std::array kAsTheyAre = {
+    Table{"volumes(owner, id, created, used, bytes, record, labelled)",
+          "SELECT owner, id, created, used, bytes, record, labelled FROM volumes", 7},
     Table{"meshes(job, blob, bytes)", "SELECT job, blob, bytes FROM meshes", 3},
     Table{"callbacks(job, receiver, url, body, attempts, created, next)",
           "SELECT job, receiver, url, body, attempts, created, next FROM callbacks", 7},
@@ -44,44 +46,42 @@ constexpr std::array kAsTheyAre = {
           "SELECT route, study, series, instance, blob, bytes, at FROM received", 7},
     Table{"audit(id, at, record)", "SELECT id, at, record FROM audit ORDER BY id", 3}};
 
-Parameter text_of(const Query& row, int column) {
-  return row.is_null(column) ? std::nullopt : Parameter(row.text(column));
-}
+// A row's values, as the columns take them.
+class Values {
+ public:
+  Values(const Rows& row, int count) {
+    texts_.reserve(static_cast<std::size_t>(count) + 2);
+    for (int column = 0; column < count; ++column) {
+      add(row.is_null(column) ? std::nullopt : std::optional(row.text(column)));
+    }
+  }
+
+  void add(std::optional<std::string> value) { texts_.push_back(std::move(value)); }
+
+  std::vector<Parameter> parameters() const {
+    std::vector<Parameter> all;
+    for (const auto& text : texts_) {
+      all.emplace_back(std::string_view(text ? *text : ""), Parameter::Type::kOfColumn);
+      all.back().is_null = !text;
+    }
+    return all;
+  }
+
+ private:
+  std::vector<std::optional<std::string>> texts_;
+};
 
 std::string insertion(const Table& table) {
   std::string sql = std::string("INSERT INTO ") + table.columns + " VALUES(";
-  for (int n = 1; n <= table.count; ++n) sql += (n > 1 ? ", $" : "$") + std::to_string(n);
+  for (int n = 1; n <= table.count; ++n) sql += (n > 1 ? ", ?" : "?") + std::to_string(n);
   return sql + ')';
 }
 
 std::uint64_t copy(Source& from, Connection& to, const Table& table) {
   const std::string sql = insertion(table);
   std::uint64_t count = 0;
-  Query rows = from.query(table.rows);
-  for (; rows.next(); ++count) {
-    std::vector<Parameter> values;
-    for (int column = 0; column < table.count; ++column) values.push_back(text_of(rows, column));
-    to.execute(sql, values);
-  }
-  return count;
-}
-
-std::uint64_t copy_volumes(Source& from, Connection& to) {
-  constexpr Table kTable = {"volumes(owner, id, created, used, bytes, record, labelled)",
-                            "SELECT owner, id, created, used, bytes, record FROM volumes", 7};
-  const std::string sql = insertion(kTable);
-  std::uint64_t count = 0;
-  Query rows = from.query(kTable.rows);
-  for (; rows.next(); ++count) {
-    Volume listed = volume_from_record(rows.text(5));
-    const bool has_labels = !listed.labels.empty();
-    listed.labels.clear();
-    std::vector<Parameter> values;
-    for (int column = 0; column < 5; ++column) values.push_back(text_of(rows, column));
-    values.emplace_back(to_record(listed));
-    values.push_back(has_labels ? Parameter(rows.text(5)) : std::nullopt);
-    to.execute(sql, values);
-  }
+  Rows rows = from.query(table.rows);
+  for (; rows.next(); ++count) to.tell(sql, Values(rows, table.count).parameters());
   return count;
 }
 
@@ -96,21 +96,20 @@ std::uint64_t copy_jobs(Source& from, Connection& to) {
       17};
   const std::string sql = insertion(kTable);
   std::uint64_t count = 0;
-  Query rows = from.query(kTable.rows);
+  Rows rows = from.query(kTable.rows);
   for (; rows.next(); ++count) {
-    std::vector<Parameter> values;
-    for (int column = 0; column < 15; ++column) values.push_back(text_of(rows, column));
+    Values values(rows, 15);
     const auto callback = job_from_record(rows.text(14)).parameters.callback;
-    values.push_back(callback ? Parameter(receiver_of(callback->url)) : std::nullopt);
-    values.push_back(callback ? Parameter(callback->url) : std::nullopt);
-    to.execute(sql, values);
+    values.add(callback ? std::optional(receiver_of(callback->url)) : std::nullopt);
+    values.add(callback ? std::optional(callback->url) : std::nullopt);
+    to.tell(sql, values.parameters());
   }
   return count;
 }
 
 // What the folder's blobs are called, which the database is called from now on.
 std::string name_of_blobs(Source& from) {
-  Query row = from.query("SELECT id FROM identity");
+  Rows row = from.query("SELECT id FROM identity");
   return row.next() ? row.text(0) : random_hex(16);
 }
 
@@ -127,9 +126,9 @@ Moved move_records(const DataFolder& folder, const std::string& url) {
   Database target({.url = url, .node = "move " + random_hex(8), .connections = 1});
   return target.ask([&](Connection& to, bool) {
     Transaction transaction(to);
-    transaction->run("LOCK TABLE volumes, jobs, orders, audit, identity IN EXCLUSIVE MODE");
+    transaction->query("LOCK TABLE volumes, jobs, orders, audit, identity IN EXCLUSIVE MODE");
     const bool is_used = transaction
-                             ->run(
+                             ->query(
                                  "SELECT 1 FROM volumes UNION ALL SELECT 1 FROM jobs UNION ALL "
                                  "SELECT 1 FROM orders UNION ALL SELECT 1 FROM audit LIMIT 1")
                              .next();
@@ -138,20 +137,21 @@ Moved move_records(const DataFolder& folder, const std::string& url) {
                   "the database already has records: name an empty one");
     }
     Moved moved;
-    moved.volumes = copy_volumes(reading.connection(), to);
     moved.jobs = copy_jobs(reading.connection(), to);
     for (const Table& table : kAsTheyAre) {
       const std::uint64_t count = copy(reading.connection(), to, table);
-      if (std::string_view(table.columns).starts_with("orders(")) moved.orders = count;
+      const std::string_view name = table.columns;
+      if (name.starts_with("volumes(")) moved.volumes = count;
+      if (name.starts_with("orders(")) moved.orders = count;
     }
     {
-      Query row = reading->query("SELECT id FROM audit_sent");
+      Rows row = reading->query("SELECT id FROM audit_sent");
       row.next();
-      transaction->run("UPDATE audit_sent SET id = $1::bigint", row.integer(0));
+      transaction->query("UPDATE audit_sent SET id = ?1", row.integer(0));
     }
-    transaction->run("DELETE FROM identity");
-    transaction->run("INSERT INTO identity VALUES($1::text, isomesh_now())",
-                     name_of_blobs(reading.connection()));
+    transaction->query("DELETE FROM identity");
+    transaction->query("INSERT INTO identity VALUES(?1, isomesh_now())",
+                       name_of_blobs(reading.connection()));
     transaction.commit();
     return moved;
   });

@@ -195,29 +195,31 @@ CREATE TABLE identity(                 -- one row: what the blobs that belong to
   id text NOT NULL,
   seen bigint NOT NULL
 );
+)sql",
+                                R"sql(
+-- Of the stages that have ended, by name: JSON as of the last renewal. `timing` is of daemons of the first version, which
+-- may still run beside newer ones.
+ALTER TABLE runs ADD COLUMN timings text;
 )sql"};
 
 // As the newest version has them, each a verb in one round trip. Whoever changes one adds a
 // version, so that no older daemon that starts puts its own in place.
 constexpr const char* kFunctions = R"sql(
-CREATE OR REPLACE FUNCTION is_named(p_blob text) RETURNS boolean LANGUAGE sql STABLE AS $$
-  SELECT EXISTS(SELECT 1 FROM volumes WHERE id = p_blob) OR EXISTS(SELECT 1 FROM meshes WHERE blob = p_blob)
-    OR EXISTS(SELECT 1 FROM order_blobs WHERE blob = p_blob) OR EXISTS(SELECT 1 FROM received WHERE blob = p_blob) $$;
-
 -- Of those that make the same mesh: who submits one looks whether there is a mesh while nobody stores it.
 CREATE OR REPLACE FUNCTION alike_lock(p_owner text, p_key text) RETURNS bigint LANGUAGE sql IMMUTABLE AS
   $$ SELECT hashtextextended(p_owner || chr(10) || p_key, 18) $$;
 
--- A job that the caller has locked, or made, is over.
+-- A job that the caller has locked, or made, is over. p_blobs are those of its mesh: objects of `blob` and `bytes`.
 CREATE OR REPLACE FUNCTION end_job(p_job text, p_state int, p_record text, p_stage int, p_ended_by bigint, p_node uuid,
-                                   p_blobs text[], p_bytes bigint[]) RETURNS void LANGUAGE plpgsql AS $$
+                                   p_blobs jsonb) RETURNS void LANGUAGE plpgsql AS $$
 DECLARE j record; now_us bigint := isomesh_now();
 BEGIN
   UPDATE jobs SET state = p_state, finished = now_us, record = p_record, waiting_for = NULL,
                   ended_by = coalesce(p_ended_by, ended_by)
     WHERE id = p_job RETURNING owner, volume, receiver, url INTO j;
   UPDATE volumes SET used = greatest(used, now_us) WHERE owner = j.owner AND id = j.volume;
-  INSERT INTO meshes SELECT p_job, b, n FROM unnest(p_blobs, p_bytes) AS t(b, n) ON CONFLICT DO NOTHING;
+  INSERT INTO meshes SELECT p_job, t.blob, t.bytes FROM jsonb_to_recordset(p_blobs) AS t(blob text, bytes bigint)
+    ON CONFLICT DO NOTHING;
   IF j.url IS NOT NULL THEN
     INSERT INTO callbacks(job, receiver, url, body, attempts, created, next)
       VALUES(p_job, j.receiver, j.url, p_record, 0, now_us, now_us);
@@ -226,63 +228,68 @@ BEGIN
     VALUES(p_node, j.owner, p_job, 2, p_state, p_stage, CASE WHEN p_state = 2 THEN 1 ELSE 0 END);
 END $$;
 
--- kind: 0 new, 1 known, 2 another request, 3 the queue is full, 4 no such volume, 5 look at `p_latest` again,
--- 6 the owner has its share. `p_state` 2: with the mesh of the job p_latest.
-CREATE OR REPLACE FUNCTION submit_job(p_id text, p_owner text, p_priority int, p_volume text, p_key text,
-                                      p_idempotency text, p_digest text, p_record text, p_node uuid, p_max int,
-                                      p_has_share boolean, p_latest text, p_state int, p_blobs text[],
-                                      p_bytes bigint[], p_receiver text, p_url text, p_accepted bigint)
-RETURNS TABLE(kind int, job text) LANGUAGE plpgsql AS $$
-DECLARE old record; n int; latest text;
+-- p has what a row of jobs has, and
+--   latest     the job that made the like of it last, as the caller has seen it; null where there was none
+--   reuses     whether it ends at once with the mesh of that job, which is in `blobs`
+--   most       how many jobs may be queued
+--   has_share  whether the queue has room for one more of its owner
+-- The outcome is 'new', 'known' or 'conflict' (its key made that job before, with the same request or another one),
+-- 'full', 'no share', 'no volume', or 'look again' where `latest` is another one by now.
+CREATE OR REPLACE FUNCTION submit_job(p jsonb) RETURNS TABLE(outcome text, job text) LANGUAGE plpgsql AS $$
+DECLARE s record; old record; n bigint; latest text;
 BEGIN
-  IF EXISTS (SELECT 1 FROM jobs j WHERE j.id = p_id) THEN  -- asked again after a lost connection
-    RETURN QUERY SELECT 0, p_id;
+  SELECT * INTO s FROM jsonb_to_record(p) AS t(
+    id text, owner text, priority int, volume text, result_key text, accepted bigint, receiver text, url text,
+    idempotency_key text, request_digest text, record text, node uuid, latest text, reuses boolean, blobs jsonb,
+    most bigint, has_share boolean);
+  IF EXISTS (SELECT 1 FROM jobs j WHERE j.id = s.id) THEN  -- asked again after a lost connection
+    RETURN QUERY SELECT 'new', s.id;
     RETURN;
   END IF;
-  IF p_idempotency IS NOT NULL THEN
+  IF s.idempotency_key IS NOT NULL THEN
     SELECT j.id, j.request_digest AS digest INTO old FROM jobs j
-      WHERE j.owner = p_owner AND j.idempotency_key = p_idempotency;
+      WHERE j.owner = s.owner AND j.idempotency_key = s.idempotency_key;
     IF FOUND THEN
-      RETURN QUERY SELECT CASE WHEN old.digest = p_digest THEN 1 ELSE 2 END, old.id;
+      RETURN QUERY SELECT CASE WHEN old.digest = s.request_digest THEN 'known' ELSE 'conflict' END, old.id;
       RETURN;
     END IF;
   END IF;
-  PERFORM 1 FROM volumes v WHERE v.owner = p_owner AND v.id = p_volume FOR KEY SHARE;
-  IF NOT FOUND THEN RETURN QUERY SELECT 4, NULL::text; RETURN; END IF;
-  PERFORM pg_advisory_xact_lock_shared(alike_lock(p_owner, p_key));
-  IF p_state = 2 THEN
+  PERFORM 1 FROM volumes v WHERE v.owner = s.owner AND v.id = s.volume FOR KEY SHARE;
+  IF NOT FOUND THEN RETURN QUERY SELECT 'no volume', NULL::text; RETURN; END IF;
+  PERFORM pg_advisory_xact_lock_shared(alike_lock(s.owner, s.result_key));
+  IF s.reuses THEN
     -- Not to expire before this one names its blobs, too.
-    PERFORM 1 FROM jobs j WHERE j.id = p_latest AND j.state = 2 FOR KEY SHARE;
-    IF NOT FOUND THEN RETURN QUERY SELECT 5, NULL::text; RETURN; END IF;
+    PERFORM 1 FROM jobs j WHERE j.id = s.latest AND j.state = 2 FOR KEY SHARE;
+    IF NOT FOUND THEN RETURN QUERY SELECT 'look again', NULL::text; RETURN; END IF;
   ELSE
-    SELECT j.id INTO latest FROM jobs j WHERE j.owner = p_owner AND j.result_key = p_key AND j.state = 2
+    SELECT j.id INTO latest FROM jobs j WHERE j.owner = s.owner AND j.result_key = s.result_key AND j.state = 2
       ORDER BY j.id DESC LIMIT 1;
-    IF latest IS DISTINCT FROM p_latest THEN RETURN QUERY SELECT 5, NULL::text; RETURN; END IF;
-    SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = 0 LIMIT p_max) AS q;
-    IF n > p_max - 256 THEN            -- near the limit: one at a time, counted again
+    IF latest IS DISTINCT FROM s.latest THEN RETURN QUERY SELECT 'look again', NULL::text; RETURN; END IF;
+    SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = 0 LIMIT s.most) AS q;
+    IF n > s.most - 256 THEN           -- near the limit: one at a time, counted again
       PERFORM pg_advisory_xact_lock(hashtext('isomesh queue'), hashtext(current_schema()));
-      SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = 0 LIMIT p_max) AS q;
-      IF n >= p_max THEN RETURN QUERY SELECT 3, NULL::text; RETURN; END IF;
+      SELECT count(*) INTO n FROM (SELECT 1 FROM jobs j WHERE j.state = 0 LIMIT s.most) AS q;
+      IF n >= s.most THEN RETURN QUERY SELECT 'full', NULL::text; RETURN; END IF;
     END IF;
-    IF NOT p_has_share THEN RETURN QUERY SELECT 6, NULL::text; RETURN; END IF;
+    IF NOT s.has_share THEN RETURN QUERY SELECT 'no share', NULL::text; RETURN; END IF;
   END IF;
   INSERT INTO jobs(id, owner, state, priority, volume, result_key, accepted, receiver, url, idempotency_key,
                    request_digest, record)
-    VALUES(p_id, p_owner, 0, p_priority, p_volume, p_key, p_accepted, p_receiver, p_url, p_idempotency, p_digest,
-           p_record)
+    VALUES(s.id, s.owner, 0, s.priority, s.volume, s.result_key, s.accepted, s.receiver, s.url, s.idempotency_key,
+           s.request_digest, s.record)
     ON CONFLICT DO NOTHING;
   IF NOT FOUND THEN                    -- two with one key
     SELECT j.id, j.request_digest AS digest INTO old FROM jobs j
-      WHERE j.owner = p_owner AND j.idempotency_key = p_idempotency;
-    RETURN QUERY SELECT CASE WHEN old.digest = p_digest THEN 1 ELSE 2 END, old.id;
+      WHERE j.owner = s.owner AND j.idempotency_key = s.idempotency_key;
+    RETURN QUERY SELECT CASE WHEN old.digest = s.request_digest THEN 'known' ELSE 'conflict' END, old.id;
     RETURN;
   END IF;
-  IF p_state = 2 THEN
-    PERFORM end_job(p_id, 2, p_record, 7, NULL, p_node, p_blobs, p_bytes);
+  IF s.reuses THEN
+    PERFORM end_job(s.id, 2, s.record, 7, NULL, s.node, s.blobs);
   ELSE
-    INSERT INTO events(node, owner, job, kind, state, stage, progress) VALUES(p_node, p_owner, p_id, 0, 0, 0, 0);
+    INSERT INTO events(node, owner, job, kind, state, stage, progress) VALUES(s.node, s.owner, s.id, 0, 0, 0, 0);
   END IF;
-  RETURN QUERY SELECT 0, p_id;
+  RETURN QUERY SELECT 'new', s.id;
 END $$;
 
 -- A claim that is lost with the database's power is made again, so it does not wait for the disk. The fence is
@@ -313,61 +320,69 @@ END $$;
 
 -- Null when the lease is lost, otherwise whether the run is to stop.
 CREATE OR REPLACE FUNCTION renew_run(p_job text, p_fence bigint, p_lease bigint, p_stage int, p_progress float8,
-                                     p_timing float8[]) RETURNS boolean LANGUAGE plpgsql AS $$
+                                     p_timings text) RETURNS boolean LANGUAGE plpgsql AS $$
 DECLARE stops boolean; now_us bigint := isomesh_now();
 BEGIN
   PERFORM set_config('synchronous_commit', 'off', true);
-  UPDATE runs SET lease_until = now_us + p_lease, stage = p_stage, progress = p_progress, timing = p_timing
+  UPDATE runs SET lease_until = now_us + p_lease, stage = p_stage, progress = p_progress, timings = p_timings
     WHERE job = p_job AND fence = p_fence AND lease_until >= now_us RETURNING cancelling INTO stops;
   RETURN stops;
 END $$;
 
--- verdict: 0 the lease is lost, 1 done, 2 these are jobs like it, which have to be told how they end, too.
--- p_state 0: queued again. p_ends_others: it is somebody else's lease, which is over.
-CREATE OR REPLACE FUNCTION finish_run(p_job text, p_fence bigint, p_node uuid, p_again boolean, p_ends_others boolean,
-                                      p_state int, p_record text, p_cancelled text, p_blobs text[], p_bytes bigint[],
-                                      p_delay bigint, p_waiting_for int, p_counts boolean, p_alike text[],
-                                      p_alike_records text[])
-RETURNS TABLE(verdict int, id text, record text, accepted bigint) LANGUAGE plpgsql AS $$
-DECLARE j record; r record;
+-- p has
+--   id, fence, node  whose run ends
+--   is_again         whether the same was asked for before
+--   ends_others      it is somebody else's lease, which is over
+--   state, record    of the job from now on; queued: without a record, and with
+--   delay, waiting_for, counts: when it may run again, what it waits for, whether this was an attempt
+--   cancelled        the record, should it have been asked to stop
+--   blobs            of the mesh of one that succeeded
+--   alike            those like it that end with it, as far as the caller knows: objects of `id` and `record`
+-- The outcome is 'lost' (the lease), 'done', or 'alike': these jobs are to be told of, too.
+CREATE OR REPLACE FUNCTION finish_run(p jsonb) RETURNS TABLE(outcome text, id text, record text, accepted bigint)
+LANGUAGE plpgsql AS $$
+DECLARE s record; j record; r record; other record;
 BEGIN
-  SELECT t.owner, t.result_key, t.ended_by INTO j FROM jobs t WHERE t.id = p_job FOR UPDATE;
-  SELECT t.cancelling, t.lease_until INTO r FROM runs t WHERE t.job = p_job AND t.fence = p_fence FOR UPDATE;
-  IF NOT FOUND OR (NOT p_ends_others AND r.lease_until < isomesh_now()) THEN
-    RETURN QUERY SELECT CASE WHEN p_again AND j.ended_by = p_fence THEN 1 ELSE 0 END, NULL::text, NULL::text, 0::bigint;
+  SELECT * INTO s FROM jsonb_to_record(p) AS t(
+    id text, fence bigint, node uuid, is_again boolean, ends_others boolean, state int, record text, delay bigint,
+    waiting_for int, counts boolean, cancelled text, blobs jsonb, alike jsonb);
+  SELECT t.owner, t.result_key, t.ended_by INTO j FROM jobs t WHERE t.id = s.id FOR UPDATE;
+  SELECT t.cancelling, t.lease_until INTO r FROM runs t WHERE t.job = s.id AND t.fence = s.fence FOR UPDATE;
+  IF NOT FOUND OR (NOT s.ends_others AND r.lease_until < isomesh_now()) THEN
+    RETURN QUERY SELECT CASE WHEN s.is_again AND j.ended_by = s.fence THEN 'done' ELSE 'lost' END, NULL::text, NULL::text,
+                        0::bigint;
     RETURN;
   END IF;
   IF r.cancelling THEN
-    p_state := 4;
-    p_record := p_cancelled;
+    s.state := 4;
+    s.record := s.cancelled;
   END IF;
-  IF p_state = 2 THEN
+  IF s.state = 2 THEN
     PERFORM pg_advisory_xact_lock(alike_lock(j.owner, j.result_key));
     IF EXISTS (SELECT 1 FROM jobs a WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = 0
-                 AND a.id <> ALL(p_alike)) THEN
-      RETURN QUERY SELECT 2, a.id, a.record, a.accepted FROM jobs a
+                 AND a.id NOT IN (SELECT t.id FROM jsonb_to_recordset(s.alike) AS t(id text))) THEN
+      RETURN QUERY SELECT 'alike', a.id, a.record, a.accepted FROM jobs a
         WHERE a.owner = j.owner AND a.result_key = j.result_key AND a.state = 0 ORDER BY a.id;
       RETURN;
     END IF;
   END IF;
-  DELETE FROM runs t WHERE t.job = p_job;
-  IF p_state = 0 THEN
-    UPDATE jobs t SET state = 0, attempts = t.attempts - CASE WHEN p_counts THEN 0 ELSE 1 END,
-                      not_before = isomesh_now() + p_delay, waiting_for = p_waiting_for, ended_by = p_fence
-      WHERE t.id = p_job;
-    INSERT INTO events(node, owner, job, kind, state, stage, progress) VALUES(p_node, j.owner, p_job, 0, 0, 0, 0);
-  ELSE
-    PERFORM end_job(p_job, p_state, p_record, CASE WHEN p_state = 2 THEN 7 ELSE 1 END, p_fence, p_node,
-                    CASE WHEN p_state = 2 THEN p_blobs ELSE '{}' END, CASE WHEN p_state = 2 THEN p_bytes ELSE '{}' END);
-  END IF;
-  IF p_state = 2 THEN
-    FOR n IN 1 .. coalesce(array_length(p_alike, 1), 0) LOOP
-      PERFORM 1 FROM jobs a WHERE a.id = p_alike[n] AND a.state = 0 FOR UPDATE;
+  DELETE FROM runs t WHERE t.job = s.id;
+  IF s.state = 0 THEN
+    UPDATE jobs t SET state = 0, attempts = t.attempts - CASE WHEN s.counts THEN 0 ELSE 1 END,
+                      not_before = isomesh_now() + s.delay, waiting_for = s.waiting_for, ended_by = s.fence
+      WHERE t.id = s.id;
+    INSERT INTO events(node, owner, job, kind, state, stage, progress) VALUES(s.node, j.owner, s.id, 0, 0, 0, 0);
+  ELSIF s.state = 2 THEN
+    PERFORM end_job(s.id, 2, s.record, 7, s.fence, s.node, s.blobs);
+    FOR other IN SELECT t.id, t.record FROM jsonb_to_recordset(s.alike) AS t(id text, record text) LOOP
+      PERFORM 1 FROM jobs a WHERE a.id = other.id AND a.state = 0 FOR UPDATE;
       CONTINUE WHEN NOT FOUND;         -- cancelled meanwhile
-      PERFORM end_job(p_alike[n], 2, p_alike_records[n], 7, NULL, p_node, p_blobs, p_bytes);
+      PERFORM end_job(other.id, 2, other.record, 7, NULL, s.node, s.blobs);
     END LOOP;
+  ELSE
+    PERFORM end_job(s.id, s.state, s.record, 1, s.fence, s.node, '[]');
   END IF;
-  RETURN QUERY SELECT 1, NULL::text, NULL::text, 0::bigint;
+  RETURN QUERY SELECT 'done', NULL::text, NULL::text, 0::bigint;
 END $$;
 
 -- The state that the job is in afterwards.
@@ -376,40 +391,11 @@ DECLARE s int;
 BEGIN
   SELECT state INTO s FROM jobs WHERE id = p_job FOR UPDATE;
   IF s = 0 THEN
-    PERFORM end_job(p_job, 4, p_record, 0, NULL, p_node, '{}', '{}');
+    PERFORM end_job(p_job, 4, p_record, 0, NULL, p_node, '[]');
     RETURN 4;
   END IF;
   IF s = 1 THEN UPDATE runs SET cancelling = true WHERE job = p_job; END IF;
   RETURN s;
-END $$;
-
--- The blobs that no record names any more; a row without one where nothing has expired.
-CREATE OR REPLACE FUNCTION expire_job(p_job text, p_owner text) RETURNS TABLE(is_gone boolean, blob text, bytes bigint)
-LANGUAGE plpgsql AS $$
-DECLARE b text[]; n bigint[];
-BEGIN
-  PERFORM 1 FROM jobs WHERE jobs.id = p_job AND finished IS NOT NULL FOR UPDATE;
-  IF NOT FOUND THEN RETURN; END IF;
-  SELECT array_agg(m.blob), array_agg(m.bytes) INTO b, n FROM meshes m WHERE m.job = p_job;
-  DELETE FROM jobs WHERE jobs.id = p_job;
-  DELETE FROM events WHERE job = p_job;
-  INSERT INTO expired VALUES(p_job, p_owner, isomesh_now()) ON CONFLICT(id, owner) DO UPDATE SET at = excluded.at;
-  RETURN QUERY SELECT true, NULL::text, 0::bigint;
-  RETURN QUERY SELECT true, t.k, t.v FROM unnest(b, n) AS t(k, v) WHERE NOT is_named(t.k);
-END $$;
-
-CREATE OR REPLACE FUNCTION expire_volume(p_owner text, p_volume text, p_used bigint)
-RETURNS TABLE(is_gone boolean, blob text, bytes bigint) LANGUAGE plpgsql AS $$
-DECLARE n bigint;
-BEGIN
-  SELECT v.bytes INTO n FROM volumes v WHERE v.owner = p_owner AND v.id = p_volume AND v.used = p_used FOR UPDATE;
-  IF NOT FOUND OR EXISTS (SELECT 1 FROM jobs j WHERE j.volume = p_volume AND j.owner = p_owner AND j.state < 2) THEN
-    RETURN;
-  END IF;
-  DELETE FROM volumes v WHERE v.owner = p_owner AND v.id = p_volume;
-  INSERT INTO expired VALUES(p_volume, p_owner, isomesh_now()) ON CONFLICT(id, owner) DO UPDATE SET at = excluded.at;
-  RETURN QUERY SELECT true, NULL::text, 0::bigint;
-  IF NOT is_named(p_volume) THEN RETURN QUERY SELECT true, p_volume, n; END IF;
 END $$;
 
 -- Takes deliveries for one node: no receiver is told more at once than `p_most`, over all nodes.
@@ -437,9 +423,9 @@ constexpr auto kNewest = static_cast<std::int64_t>(kTables.size());
 
 void migrate(Connection& connection) {
   Transaction transaction(connection);
-  transaction->run("SELECT pg_advisory_xact_lock($1::bigint)", kMigrationLock);
+  transaction->query("SELECT pg_advisory_xact_lock(?1)", kMigrationLock);
   transaction->script("CREATE TABLE IF NOT EXISTS isomesh_version(version int NOT NULL)");
-  Rows row = transaction->run("SELECT version FROM isomesh_version");
+  Rows row = transaction->query("SELECT version FROM isomesh_version");
   const std::int64_t version = row.next() ? row.integer(0) : 0;
   if (version > kNewest) {
     throw Error(ErrorCode::kUnavailable,
@@ -447,13 +433,13 @@ void migrate(Connection& connection) {
                     std::to_string(version) + ", this isomeshd reads versions 1 to " +
                     std::to_string(kNewest));
   }
-  if (version == 0) transaction->run("INSERT INTO isomesh_version VALUES(0)");
+  if (version == 0) transaction->query("INSERT INTO isomesh_version VALUES(0)");
   for (std::int64_t next = version; next < kNewest; ++next) {
     transaction->script(kTables[static_cast<std::size_t>(next)]);
   }
   if (version < kNewest) {
     transaction->script(kFunctions);
-    transaction->run("UPDATE isomesh_version SET version = $1::int", kNewest);
+    transaction->query("UPDATE isomesh_version SET version = ?1", kNewest);
   }
   transaction.commit();
 }

@@ -12,8 +12,8 @@ class Turn {
  public:
   // `what` names it. Throws Error kUnavailable when nobody answers.
   Turn(const std::string& url, const std::string& what) : connection_(url) {
-    Rows row = connection_.run(
-        "SELECT pg_try_advisory_lock(hashtext('isomesh ' || $1::text), hashtext(current_schema()))",
+    Rows row = connection_.query(
+        "SELECT pg_try_advisory_lock(hashtext('isomesh ' || ?1), hashtext(current_schema()))",
         what);
     row.next();
     is_taken_ = row.boolean(0);

@@ -171,6 +171,12 @@ CREATE TABLE audit_sent(      -- one row: up to which entry a collector has had 
   id INTEGER NOT NULL
 );
 INSERT INTO audit_sent VALUES(0);
+)sql",
+                               R"sql(
+ALTER TABLE volumes ADD COLUMN labelled TEXT;  -- the record with its labels, if it has any: `record` is without
+UPDATE volumes SET labelled = record, record = json_remove(record, '$.labels')
+  WHERE instr(record, '"labels":[');
+CREATE INDEX volumes_by_time ON volumes(created, id);
 )sql"};
 
 // Versions 1 and 2 were never released.
@@ -178,7 +184,7 @@ constexpr std::int64_t kFirst = 3;
 constexpr auto kNewest = kFirst + static_cast<std::int64_t>(kSteps.size()) - 1;
 
 std::int64_t version_of(Connection& connection) {
-  Query query = connection.query("PRAGMA user_version");
+  Rows query = connection.query("PRAGMA user_version");
   query.next();
   return query.integer(0);
 }
@@ -245,6 +251,39 @@ Connection& Database::reader() {
     if (!reader->is_busy()) return *reader;
   }
   return *readers_[next_++ % kReaders];
+}
+
+void Database::in_transaction(Change kind, const std::function<void(SqlTransaction&)>& act) {
+  const auto run = [&] {
+    Transaction transaction(writer_,
+                            kind == Change::kRepeatable ? Durability::kProcess : Durability::kFull);
+    const std::function<void()> commit = [&] { transaction.commit(); };
+    SqlTransaction shown(writer_, false, commit);
+    act(shown);
+  };
+  if (kind == Change::kNew) return run();
+  freeing(run);
+}
+
+std::size_t Database::tell(Change kind, std::string_view sql,
+                           std::span<const Parameter> parameters) {
+  std::size_t changed = 0;
+  in_transaction(kind, [&](SqlTransaction& transaction) {
+    changed = transaction->tell(sql, parameters);
+    transaction.commit();
+  });
+  return changed;
+}
+
+void Database::while_reading(const std::function<void(SqlConnection&)>& act) {
+  const Reading reading(reader());
+  act(reading.connection());
+}
+
+// All rows are read, so that nobody waits for what is done with them.
+Rows Database::ask(std::string_view sql, std::span<const Parameter> parameters) {
+  const Reading reading(reader());
+  return reading->take(sql, parameters);
 }
 
 std::int64_t now_us() { return to_us(std::chrono::system_clock::now()); }

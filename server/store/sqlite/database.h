@@ -4,7 +4,11 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <limits>
 #include <memory>
+#include <span>
+#include <string_view>
 
 #include "base/error.h"
 #include "server/store/expiry.h"
@@ -17,7 +21,7 @@ namespace isomesh::store {
 // The records of a data folder: one SQLite file (WAL, synchronous=FULL), with a connection that
 // writes and some that read side by side, so that readers wait neither for the disk nor for whoever
 // reads much. Thread safe; `folder` must outlive it.
-class Database {
+class Database : public SqlDatabase {
  public:
   // Creates what is missing and brings the tables of an older version up to date. Throws Error
   // kUnavailable when another version made it that this one does not know, kOutOfSpace or
@@ -30,6 +34,10 @@ class Database {
 
   // How many rows were changed since it was opened.
   std::int64_t changes();
+
+  std::int64_t to_us(Time time) const override { return store::to_us(time); }
+  Time from_us(std::int64_t us) const override { return store::from_us(us); }
+  std::size_t most_at_once() const override { return std::numeric_limits<std::size_t>::max(); }
 
   // Does what frees room, or has to be kept in mind whatever the disk is like: where there is no
   // room for that, the reserve is let go first. `run` is one transaction. Throws what it throws.
@@ -44,6 +52,11 @@ class Database {
   }
 
  private:
+  void in_transaction(Change kind, const std::function<void(SqlTransaction&)>& act) override;
+  void while_reading(const std::function<void(SqlConnection&)>& act) override;
+  std::size_t tell(Change kind, std::string_view sql,
+                   std::span<const Parameter> parameters) override;
+  Rows ask(std::string_view sql, std::span<const Parameter> parameters) override;
   bool make_way();
 
   const DataFolder& folder_;

@@ -17,7 +17,7 @@ constexpr std::chrono::minutes kBetweenIdleMarks{10};
 
 // Whether anything is recorded.
 bool has_records(Connection& connection) {
-  Query query = connection.query(
+  Rows query = connection.query(
       "SELECT EXISTS(SELECT 1 FROM volumes) OR EXISTS(SELECT 1 FROM jobs) OR EXISTS(SELECT 1 FROM "
       "expired)");
   query.next();
@@ -26,7 +26,7 @@ bool has_records(Connection& connection) {
 
 // When the youngest record was made or used; the beginning of time without any.
 std::int64_t newest_record(Connection& connection) {
-  Query query = connection.query(
+  Rows query = connection.query(
       "SELECT max(coalesce((SELECT max(used) FROM volumes), 0), coalesce((SELECT max(finished) "
       "FROM jobs), 0), coalesce((SELECT max(accepted) FROM jobs), 0))");
   query.next();
@@ -83,7 +83,7 @@ Time Identity::last_seen(Database& database, const OperatorsWord& word) {
   const Time wall = std::chrono::system_clock::now();
   if (word.trust_clock) return wall;
   const Reading reading(database.reader());
-  Query seen = reading->query("SELECT seen FROM identity");
+  Rows seen = reading->query("SELECT seen FROM identity");
   const std::int64_t marked = seen.next() ? seen.integer(0) : 0;
   const std::int64_t newest = marked > 0 ? marked : newest_record(reading.connection());
   return newest > 0 ? from_us(newest) : wall;
@@ -91,7 +91,7 @@ Time Identity::last_seen(Database& database, const OperatorsWord& word) {
 
 Identity::Mark Identity::mark_of_database() const {
   const Reading reading(database_.reader());
-  Query query = reading->query("SELECT id, number, seen FROM identity");
+  Rows query = reading->query("SELECT id, number, seen FROM identity");
   if (!query.next()) return {};
   return {query.text(0), query.integer(1), query.integer(2)};
 }

@@ -1,33 +1,38 @@
-// What changes jobs, one transaction a function; job_store.cpp has what can be asked, job_reuse.cpp
-// which meshes serve more than one.
+// What changes jobs, one transaction a function; job_store.cpp has what is asked.
 #include <algorithm>
 
 #include "base/clock.h"
 #include "base/ids.h"
 #include "proto/json.h"
+#include "server/store/sql/outbox.h"
 #include "server/store/sqlite/job_rows.h"
 #include "server/store/sqlite/job_store.h"
-#include "server/store/sqlite/outbox.h"
 
 namespace isomesh::store {
 namespace {
 
-std::int64_t microseconds(std::chrono::milliseconds time) {
-  return std::chrono::microseconds(time).count();
-}
-
 double milliseconds_since(std::int64_t begin_us) {
-  return static_cast<double>(std::max<std::int64_t>(now_us() - begin_us, 1)) / 1000;
-}
-
-// Whether the job's volume has expired.
-bool has_expired(Connection& connection, const JobSpec& spec) {
-  return connection
-      .query("SELECT 1 FROM expired WHERE owner = ? AND id = ?", spec.owner, spec.parameters.volume)
-      .next();
+  return milliseconds_between(begin_us, now_us());
 }
 
 }  // namespace
+
+std::optional<Submission> SqliteJobStore::known(Connection& connection, const JobSpec& spec) const {
+  if (spec.idempotency_key.empty()) return std::nullopt;
+  std::string id;
+  {
+    Rows earlier = connection.query(
+        "SELECT id, request_digest FROM jobs WHERE owner = ?1 AND idempotency_key = ?2", spec.owner,
+        spec.idempotency_key);
+    if (!earlier.next()) return std::nullopt;
+    if (earlier.text(1) != spec.request_digest) {
+      return Submission{Submission::Kind::kConflict, {}, {}};
+    }
+    id = earlier.text(0);
+  }
+  return Submission{
+      Submission::Kind::kExisting, with_progress(found(connection, std::nullopt, id)), {}};
+}
 
 Submission SqliteJobStore::submit(const JobSpec& spec) {
   Row row;
@@ -36,31 +41,19 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
   const auto spoilt = spoilt_mesh_for(spec);
   {
     Change change(*this);
-    if (!spec.idempotency_key.empty()) {
-      Query earlier = change->query(std::string("SELECT ") + kRowColumns +
-                                        ", request_digest FROM jobs WHERE owner = ? AND "
-                                        "idempotency_key = ?",
-                                    spec.owner, spec.idempotency_key);
-      if (earlier.next()) {
-        constexpr int kAfterTheRow = 7;
-        if (earlier.text(kAfterTheRow) != spec.request_digest)
-          return {Submission::Kind::kConflict, {}, {}};
-        return {Submission::Kind::kExisting, with_progress(row_of(earlier)), {}};
-      }
-    }
+    if (auto before = known(change.connection(), spec)) return *std::move(before);
     const auto result_key = result_key_of(change.connection(), spec);
-    if (!result_key) throw_no_volume(has_expired(change.connection(), spec));
+    if (!result_key) throw_no_volume_of(change.connection(), spec);
     row.result_key = *result_key;
     row.accepted = now_us();
     row.job.id = time_ordered_id();
     row.job.parameters = spec.parameters;
     row.job.created = timestamp();
-    const auto mesh = mesh_like(change.connection(), row, spoilt);
-    if (refusing_ || (!mesh && count_queued(change.connection()) >= options_.max_queued)) {
+    const auto mesh = mesh_like(change.connection(), row.owner, row.result_key, spoilt);
+    if (refusing_ || (!mesh && is_full(change.connection()))) {
       return {Submission::Kind::kBusy, {}, kRetryAfter};
     }
-    if (!mesh && !spec.owner.empty() &&
-        !has_share_of_queue(spec, share_of_queue(change.connection(), spec), options_.max_queued)) {
+    if (!mesh && !has_share(change.connection(), spec)) {
       return {Submission::Kind::kOwnersShare, {}, kRetryAfter};
     }
     if (!mesh && !blobs_.has_room()) {
@@ -93,12 +86,11 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   const std::int64_t now = now_us();
   std::optional<Row> next;
   {
-    Query query = change->query(
-        std::string("SELECT ") + kRowColumns +
-            " FROM jobs q WHERE state = 0 AND not_before NOT BETWEEN ?1 + 1 AND ?1 + ?2 AND NOT "
-            "EXISTS (SELECT 1 FROM jobs r "
-            "WHERE r.owner = q.owner AND r.result_key = q.result_key AND r.state = 1) "
-            "ORDER BY priority, id LIMIT 1",
+    Rows query = change->query(
+        select_ +
+            "WHERE j.state = 0 AND j.not_before NOT BETWEEN ?1 + 1 AND ?1 + ?2 AND NOT EXISTS "
+            "(SELECT 1 FROM jobs r WHERE r.owner = j.owner AND r.result_key = j.result_key AND "
+            "r.state = 1) ORDER BY j.priority, j.id LIMIT 1",
         now, kLongestWaitUs);
     if (!query.next()) return std::nullopt;
     next = row_of(query);
@@ -134,9 +126,9 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
 Standing SqliteJobStore::renew(const Lease& lease, const Progress& progress,
                                std::chrono::milliseconds length) {
   if (!is_held(lease.id, lease.fence)) return Standing::kLost;
-  tell(lease, progress);
+  note(lease, progress);
   const Lock lock(live_mutex_);
-  Live* const renewed = live(lease);
+  Live* const renewed = live(lease.id, lease.fence);
   if (renewed == nullptr) return Standing::kLost;
   renewed->lease_until = Steady::clock::now() + length;
   return renewed->cancelling ? Standing::kCancel : Standing::kOk;
@@ -173,7 +165,7 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
     for (const auto& [format, file] : outcome.mesh->files) blobs_.settle(file.sha256);
   }
   // Without a mesh it may be due again, or one like it now. With one, nothing has become ready.
-  if (!has_mesh) wake_workers();
+  if (!has_mesh) wake_all_workers();
   return true;
 }
 
@@ -190,7 +182,7 @@ bool SqliteJobStore::put_back(const Lease& lease, std::chrono::milliseconds dela
   });
   if (!is_held) return false;
   forget_run(lease.id, lease.fence);
-  wake_workers();
+  wake_all_workers();
   return true;
 }
 
@@ -199,8 +191,7 @@ std::size_t SqliteJobStore::reap() {
     Change change(*this);
     std::vector<Row> rows;
     {
-      Query query =
-          change->query(std::string("SELECT ") + kRowColumns + " FROM jobs WHERE state = 1");
+      Rows query = change->query(select_ + "WHERE j.state = 1");
       while (query.next()) rows.push_back(row_of(query));
     }
     std::erase_if(rows, [this](const Row& row) { return is_held(row.job.id, row.fence); });
@@ -211,7 +202,7 @@ std::size_t SqliteJobStore::reap() {
     change.commit();
     return rows.size();
   });
-  if (reaped > 0) wake_workers();
+  if (reaped > 0) wake_all_workers();
   return reaped;
 }
 
@@ -258,7 +249,9 @@ void SqliteJobStore::end(Change& change, Row& row, JobState state) const {
               to_json(row.job), row.job.id);
   change->run("UPDATE volumes SET used = ? WHERE owner = ? AND id = ?", now, row.owner,
               row.job.parameters.volume);
-  SqliteOutbox::add(change.connection(), row.job);
+  if (const auto& callback = row.job.parameters.callback) {
+    add_callback(change.connection(), row.job.id, callback->url, to_json(row.job));
+  }
   change.announce(row, EventKind::kDone);
 }
 
@@ -274,9 +267,8 @@ void SqliteJobStore::succeed(Change& change, Row& row, const MeshSummary& mesh) 
 void SqliteJobStore::succeed_alike(Change& change, const Row& row, const MeshSummary& mesh) const {
   std::vector<Row> alike;
   {
-    Query query = change->query(std::string("SELECT ") + kRowColumns +
-                                    " FROM jobs WHERE owner = ? AND result_key = ? AND state = 0",
-                                row.owner, row.result_key);
+    Rows query = change->query(select_ + "WHERE j.owner = ?1 AND j.result_key = ?2 AND j.state = 0",
+                               row.owner, row.result_key);
     while (query.next()) alike.push_back(row_of(query));
   }
   for (Row& other : alike) {
@@ -306,41 +298,6 @@ void SqliteJobStore::queue_again(Change& change, Row& row, std::chrono::millisec
       row.attempts, now_us() + microseconds(delay), row.job.waiting_for, to_json(row.job),
       row.job.id);
   change.announce(row, EventKind::kStage);
-}
-
-SqliteJobStore::Live* SqliteJobStore::live(const Lease& lease) {
-  const auto run = live_.find(lease.id);
-  return run != live_.end() && run->second.fence == lease.fence ? &run->second : nullptr;
-}
-
-void SqliteJobStore::tell(const Lease& lease, const Progress& progress) {
-  const auto now = EventLog::Clock::now();
-  bool is_other_stage = false;
-  {
-    const Lock lock(live_mutex_);
-    Live* const run = live(lease);
-    if (run == nullptr) return;
-    const Progress before = run->progress.value_or(Progress{});
-    is_other_stage = before.stage != progress.stage;
-    const bool is_further = before.share != progress.share;
-    run->progress = progress;
-    if (!is_other_stage && (!is_further || now < run->told + kBetweenProgressEvents)) return;
-    run->told = now;
-  }
-  log_.tell({.id = 0,
-             .owner = lease.owner,
-             .job = lease.id,
-             .kind = is_other_stage ? EventKind::kStage : EventKind::kProgress,
-             .state = JobState::kRunning,
-             .stage = progress.stage,
-             .progress = progress.share});
-}
-
-// A later run of the job stays known.
-void SqliteJobStore::forget_run(const std::string& id, std::uint64_t fence) {
-  const Lock lock(live_mutex_);
-  const auto run = live_.find(id);
-  if (run != live_.end() && run->second.fence == fence) live_.erase(run);
 }
 
 }  // namespace isomesh::store

@@ -1,5 +1,5 @@
-// What the two halves of SqliteJobStore share: a job's row, and a transaction that tells what it
-// changed. Private to this folder.
+// What the two halves of SqliteJobStore share: a transaction that tells what it changed. Private to
+// this folder.
 #pragma once
 
 #include <string>
@@ -8,16 +8,6 @@
 #include "server/store/sqlite/job_store.h"
 
 namespace isomesh::store {
-
-struct SqliteJobStore::Row {
-  Job job;
-  std::string owner;
-  std::string result_key;
-  std::int64_t accepted = 0;
-  int attempts = 0;
-  std::uint64_t fence = 0;
-  bool cancelling = false;
-};
 
 // One transaction of the writer and its events, which are seen when it is over.
 class SqliteJobStore::Change {
@@ -50,17 +40,7 @@ class SqliteJobStore::Change {
   Transaction transaction_;  // last: its lock is held until the events are withdrawn
 };
 
-// The columns that row_of() reads.
-inline constexpr const char* kRowColumns =
-    "record, owner, result_key, accepted, attempts, fence, cancelling";
-
 // A job is not kept waiting for longer: if one seems to be, the clock was set back.
 inline constexpr std::int64_t kLongestWaitUs = std::int64_t{3600} * 1'000'000;
-
-// How many jobs wait.
-std::size_t count_queued(Connection& connection);
-
-// What has_share_of_queue() looks at.
-QueueShare share_of_queue(Connection& connection, const JobSpec& spec);
 
 }  // namespace isomesh::store

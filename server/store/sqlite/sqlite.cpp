@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <iterator>
 #include <utility>
 
 #include <sqlite3.h>
 
 #include "proto/error.h"
+#include "server/store/microseconds.h"
 
 namespace isomesh::store {
 namespace {
@@ -36,47 +38,112 @@ Mutex& counted(Mutex& mutex, std::atomic<std::size_t>& coming) {
   return mutex;
 }
 
+// A prepared statement in use; its parameters are cleared when it goes.
+class Statement : public Rows::Source {
+ public:
+  Statement(sqlite3_stmt* statement, std::span<const Parameter> parameters)
+      : statement_(statement) {
+    int number = 0;
+    for (const Parameter& parameter : parameters) bind(++number, parameter);
+  }
+  ~Statement() override {
+    sqlite3_reset(statement_);
+    sqlite3_clear_bindings(statement_);
+  }
+  Statement(const Statement&) = delete;
+  Statement& operator=(const Statement&) = delete;
+
+  bool next() override {
+    const int code = sqlite3_step(statement_);
+    if (code == SQLITE_ROW) return true;
+    if (code == SQLITE_DONE) return false;
+    sqlite3* handle = sqlite3_db_handle(statement_);
+    fail(handle, sqlite3_extended_errcode(handle));
+  }
+
+  int type(int column) const { return sqlite3_column_type(statement_, column); }
+  bool is_null(int column) const override { return type(column) == SQLITE_NULL; }
+  std::int64_t integer(int column) const override {
+    return sqlite3_column_int64(statement_, column);
+  }
+  double real(int column) const override { return sqlite3_column_double(statement_, column); }
+  std::string text(int column) const override {
+    const unsigned char* text = sqlite3_column_text(statement_, column);
+    const int bytes = sqlite3_column_bytes(statement_, column);
+    return {reinterpret_cast<const char*>(text), static_cast<std::size_t>(bytes)};
+  }
+
+ private:
+  void bind(int number, const Parameter& parameter) {
+    if (parameter.is_null) {
+      sqlite3_bind_null(statement_, number);
+    } else if (parameter.type == Parameter::Type::kInteger) {
+      sqlite3_bind_int64(statement_, number, parameter.integer);
+    } else if (parameter.type == Parameter::Type::kReal) {
+      sqlite3_bind_double(statement_, number, parameter.real);
+    } else {
+      sqlite3_bind_text64(statement_, number, parameter.text.data(), parameter.text.size(),
+                          SQLITE_TRANSIENT, SQLITE_UTF8);
+    }
+  }
+
+  sqlite3_stmt* statement_;
+};
+
+// Rows that were read.
+class Taken : public Rows::Source {
+ public:
+  explicit Taken(sqlite3_stmt* statement) : columns_(sqlite3_column_count(statement)) {}
+
+  // As what they are: to make texts of numbers takes time.
+  void add(const Statement& row) {
+    for (int column = 0; column < columns_; ++column) {
+      Cell& cell = cells_.emplace_back();
+      switch (row.type(column)) {
+        case SQLITE_NULL:
+          cell.is_null = true;
+          break;
+        case SQLITE_INTEGER:
+          cell.integer = row.integer(column);
+          cell.real = static_cast<double>(cell.integer);
+          break;
+        case SQLITE_FLOAT:
+          cell.real = row.real(column);
+          break;
+        default:
+          cell.text = row.text(column);
+      }
+    }
+  }
+
+  bool next() override { return static_cast<std::size_t>(++row_ * columns_) < cells_.size(); }
+  bool is_null(int column) const override { return at(column).is_null; }
+  std::int64_t integer(int column) const override { return at(column).integer; }
+  double real(int column) const override { return at(column).real; }
+  std::string text(int column) const override { return at(column).text; }
+
+ private:
+  struct Cell {
+    bool is_null = false;
+    std::int64_t integer = 0;
+    double real = 0;
+    std::string text;
+  };
+
+  const Cell& at(int column) const {
+    return cells_[static_cast<std::size_t>(row_ * columns_ + column)];
+  }
+
+  const int columns_;
+  int row_ = -1;
+  std::vector<Cell> cells_;
+};
+
+void give_now(sqlite3_context* context, int, sqlite3_value**) {
+  sqlite3_result_int64(context, to_us(std::chrono::system_clock::now()));
+}
+
 }  // namespace
-
-Query::~Query() {
-  sqlite3_reset(statement_);
-  sqlite3_clear_bindings(statement_);
-}
-
-bool Query::next() {
-  const int code = sqlite3_step(statement_);
-  if (code == SQLITE_ROW) return true;
-  if (code == SQLITE_DONE) return false;
-  sqlite3* handle = sqlite3_db_handle(statement_);
-  fail(handle, sqlite3_extended_errcode(handle));
-}
-
-bool Query::is_null(int column) const {
-  return sqlite3_column_type(statement_, column) == SQLITE_NULL;
-}
-
-std::int64_t Query::integer(int column) const { return sqlite3_column_int64(statement_, column); }
-
-double Query::real(int column) const { return sqlite3_column_double(statement_, column); }
-
-std::string Query::text(int column) const {
-  const unsigned char* text = sqlite3_column_text(statement_, column);
-  const int bytes = sqlite3_column_bytes(statement_, column);
-  return {reinterpret_cast<const char*>(text), static_cast<std::size_t>(bytes)};
-}
-
-void Query::bind(int parameter, std::string_view value) {
-  sqlite3_bind_text64(statement_, parameter, value.data(), value.size(), SQLITE_TRANSIENT,
-                      SQLITE_UTF8);
-}
-
-void Query::bind(int parameter, double value) { sqlite3_bind_double(statement_, parameter, value); }
-
-void Query::bind(int parameter, std::int64_t value) {
-  sqlite3_bind_int64(statement_, parameter, value);
-}
-
-void Query::bind(int parameter, std::nullptr_t) { sqlite3_bind_null(statement_, parameter); }
 
 Connection::Connection(const std::filesystem::path& path, Mode mode) {
   const int access =
@@ -86,6 +153,8 @@ Connection::Connection(const std::filesystem::path& path, Mode mode) {
   try {
     if (code != SQLITE_OK) fail(handle_, code);
     sqlite3_busy_timeout(handle_, kBusyTimeoutMs);
+    sqlite3_create_function_v2(handle_, "isomesh_now", 0, SQLITE_UTF8, nullptr, give_now, nullptr,
+                               nullptr, nullptr);
     if (mode == Mode::kRead) return;
     script("PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON;");
   } catch (...) {
@@ -111,7 +180,7 @@ void Connection::set_durability(Durability durability) {
 }
 
 void Connection::limit_log(std::uint64_t bytes) {
-  Query page = query("PRAGMA page_size");
+  Rows page = query("PRAGMA page_size");
   page.next();
   log_pages_ = static_cast<int>(bytes / static_cast<std::uint64_t>(page.integer(0)));
   script(("PRAGMA journal_size_limit=" + std::to_string(bytes)).c_str());
@@ -155,17 +224,34 @@ void Connection::end_batch(std::optional<Error> failure) noexcept {
   batch_ended_.notify_all();
 }
 
-sqlite3_stmt* Connection::prepared(std::string_view sql) {
-  sqlite3_stmt*& statement = statements_[std::string(sql)];
-  if (statement == nullptr) {
-    const int code = sqlite3_prepare_v3(handle_, sql.data(), static_cast<int>(sql.size()),
-                                        SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
-    if (code != SQLITE_OK) fail(handle_, code);
-  }
-  return statement;
+Rows Connection::ask(std::string_view sql, std::span<const Parameter> parameters) {
+  return Rows(std::make_unique<Statement>(prepared(sql), parameters));
 }
 
-int Connection::changes() const { return sqlite3_changes(handle_); }
+Rows Connection::take(std::string_view sql, std::span<const Parameter> parameters) {
+  sqlite3_stmt* const prepared_statement = prepared(sql);
+  Statement statement(prepared_statement, parameters);
+  auto taken = std::make_unique<Taken>(prepared_statement);
+  while (statement.next()) taken->add(statement);
+  return Rows(std::move(taken));
+}
+
+std::size_t Connection::tell(std::string_view sql, std::span<const Parameter> parameters) {
+  Statement statement(prepared(sql), parameters);
+  while (statement.next()) {
+  }
+  return static_cast<std::size_t>(sqlite3_changes(handle_));
+}
+
+sqlite3_stmt* Connection::prepared(std::string_view sql) {
+  const auto known = statements_.find(sql);
+  if (known != statements_.end()) return known->second;
+  sqlite3_stmt* statement = nullptr;
+  const int code = sqlite3_prepare_v3(handle_, sql.data(), static_cast<int>(sql.size()),
+                                      SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
+  if (code != SQLITE_OK) fail(handle_, code);
+  return statements_[std::string(sql)] = statement;
+}
 
 std::int64_t Connection::all_changes() const { return sqlite3_total_changes64(handle_); }
 

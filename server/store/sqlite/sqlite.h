@@ -1,4 +1,5 @@
-// SQLite as C++ values: a connection, its statements, transactions. Private to this folder.
+// SQLite behind the interface of SQL: a connection, its statements, transactions. Private to this
+// folder.
 #pragma once
 
 #include <atomic>
@@ -8,56 +9,20 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <unordered_map>
 #include <vector>
 
 #include "base/error.h"
 #include "base/mutex.h"
+#include "server/store/sql/sql.h"
 
 struct sqlite3;
 struct sqlite3_stmt;
 
 namespace isomesh::store {
-
-// A prepared statement in use; its parameters are cleared when it goes. Not thread safe.
-class Query {
- public:
-  template <class... Values>
-  explicit Query(sqlite3_stmt* statement, const Values&... values) : statement_(statement) {
-    int parameter = 0;
-    (bind(++parameter, values), ...);
-  }
-  ~Query();
-  Query(const Query&) = delete;
-  Query& operator=(const Query&) = delete;
-
-  // The next row; false after the last. Throws Error kOutOfSpace or kInternal.
-  bool next();
-
-  bool is_null(int column) const;
-  std::int64_t integer(int column) const;
-  double real(int column) const;
-  std::string text(int column) const;
-
-  void bind(int parameter, std::string_view value);
-  void bind(int parameter, double value);
-  void bind(int parameter, std::int64_t value);
-  void bind(int parameter, std::nullptr_t);
-  template <class T>
-  requires std::is_integral_v<T> || std::is_enum_v<T>
-  void bind(int parameter, T value) { bind(parameter, static_cast<std::int64_t>(value)); }
-  template <class T>
-  void bind(int parameter, const std::optional<T>& value) {
-    if (value) return bind(parameter, *value);
-    bind(parameter, nullptr);
-  }
-
- private:
-  sqlite3_stmt* statement_;
-};
 
 // What a commit outlives. All of them outlive the process, however it ends.
 enum class Durability {
@@ -76,30 +41,23 @@ struct Batch {
 };
 
 // One connection. What it does is done under the lock of a Transaction or a Reading.
-class Connection {
+class Connection : public SqlConnection {
  public:
   enum class Mode { kWrite, kRead };
 
   // Opens the file; creates it for writing. Throws Error kInternal when it is no database.
   Connection(const std::filesystem::path& path, Mode mode);
-  ~Connection();
+  ~Connection() override;
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
-  // Statements are prepared once and kept. At most one use of the same text at a time.
-  template <class... Values>
-  Query query(std::string_view sql, const Values&... values) {
-    return Query(prepared(sql), values...);
-  }
-
-  // Runs a statement to its end; returns how many rows it changed.
-  template <class... Values>
-  int run(std::string_view sql, const Values&... values) {
-    Query statement(prepared(sql), values...);
-    while (statement.next()) {
-    }
-    return changes();
-  }
+  Rows ask(std::string_view sql, std::span<const Parameter> parameters) override;
+  // The same with all rows read, so that these hold nothing any more.
+  Rows take(std::string_view sql, std::span<const Parameter> parameters);
+  std::size_t tell(std::string_view sql, std::span<const Parameter> parameters) override;
+  // A transaction has the connection, and no other one writes.
+  const char* for_update() const override { return ""; }
+  void lock_table(const std::string&) override {}
 
   // Several statements without parameters.
   void script(const char* sql);
@@ -139,14 +97,16 @@ class Connection {
 
   static int look_at_log(void* connection, sqlite3* handle, const char* name, int pages);
   sqlite3_stmt* prepared(std::string_view sql);
-  int changes() const;
 
   sqlite3* handle_ = nullptr;
   int log_pages_ = 0;
   Mutex mutex_;
   std::atomic<int> readings_ = 0;
   Durability durability_ = Durability::kFull;
-  std::unordered_map<std::string, sqlite3_stmt*> statements_;
+  struct Hash : std::hash<std::string_view> {
+    using is_transparent = void;  // NOLINT(readability-identifier-naming)
+  };
+  std::unordered_map<std::string, sqlite3_stmt*, Hash, std::equal_to<>> statements_;
   std::shared_ptr<Batch> batch_;         // of the transaction that is open
   std::atomic<std::size_t> coming_ = 0;  // threads that wait to begin a transaction
   Condition batch_ended_;

@@ -12,8 +12,8 @@
 #include "proto/json.h"
 #include "server/callbacks/signature.h"
 #include "server/store/files/data_folder.h"
+#include "server/store/sql/outbox.h"
 #include "server/store/sqlite/database.h"
-#include "server/store/sqlite/outbox.h"
 #include "tests/support/files.h"
 #include "tests/support/process.h"
 #include "tests/support/receiver.h"
@@ -37,7 +37,7 @@ class CallbacksTest : public testing::Test {
     job.state = JobState::kFailed;
     job.parameters.callback = Callback{url};
     store::Transaction transaction(database_.writer());
-    store::SqliteOutbox::add(transaction.connection(), job);
+    store::add_callback(transaction.connection(), id, url, to_json(job));
     transaction.commit();
     return job;
   }
@@ -71,7 +71,7 @@ class CallbacksTest : public testing::Test {
   test::TemporaryFolder folder_;
   store::DataFolder data_{folder_ / "data"};
   store::Database database_{data_};
-  store::SqliteOutbox outbox_{database_};
+  store::SqlOutbox outbox_{database_};
   std::mutex mutex_;  // guards what follows
   std::vector<CallbackOutcome> outcomes_;
   std::set<std::string> reasons_;

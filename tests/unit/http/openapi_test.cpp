@@ -9,10 +9,10 @@
 #include "server/http/routes/routes.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/retention.h"
+#include "server/store/sql/outbox.h"
+#include "server/store/sql/volume_store.h"
 #include "server/store/sqlite/database.h"
 #include "server/store/sqlite/job_store.h"
-#include "server/store/sqlite/outbox.h"
-#include "server/store/sqlite/volume_store.h"
 #include "tests/support/files.h"
 
 namespace isomesh::http {
@@ -54,7 +54,7 @@ class OpenApi : public testing::Test {
   store::DataFolder data_{folder_ / "data"};
   store::Database database_{data_};
   store::FileBlobStore blobs_{data_};
-  store::SqliteVolumeStore volumes_{database_};
+  store::SqlVolumeStore volumes_{database_};
   store::SqliteJobStore jobs_{database_, blobs_, store::JobStoreOptions{}};
   store::Retention retention_{jobs_, volumes_, blobs_, data_.scratch(), store::RetentionOptions{}};
   jobs::VolumeLibrary library_{
@@ -63,7 +63,7 @@ class OpenApi : public testing::Test {
   jobs::LabelLists labels_{blobs_};
   jobs::Estimator estimator_{volumes_, blobs_, jobs_, jobs::PipelineLimits{}, jobs::JobProgram{}};
   Metrics metrics_;
-  store::SqliteOutbox outbox_{database_};
+  store::SqlOutbox outbox_{database_};
   const callbacks::CallbackTargets targets_{{}};
   callbacks::Callbacks callbacks_{outbox_, targets_, {}, {}};
   App app_{Services{data_, blobs_, volumes_, jobs_, library_, histograms_, labels_, estimator_,

@@ -10,9 +10,9 @@
 #include "server/jobs/job_process.h"
 #include "server/jobs/volume_library.h"
 #include "server/store/files/blob_store.h"
+#include "server/store/sql/volume_store.h"
 #include "server/store/sqlite/database.h"
 #include "server/store/sqlite/job_store.h"
-#include "server/store/sqlite/volume_store.h"
 #include "server/volume/canonical.h"
 #include "tests/support/files.h"
 #include "tests/support/shapes.h"
@@ -60,7 +60,7 @@ class JobsFixture : public testing::Test {
   store::DataFolder data_{folder_ / "data"};
   store::Database database_{data_};
   store::FileBlobStore blobs_{data_};
-  store::SqliteVolumeStore volumes_{database_};
+  store::SqlVolumeStore volumes_{database_};
   store::SqliteJobStore jobs_{database_, blobs_, options()};
   store::Retention retention_{jobs_, volumes_, blobs_, data_.scratch(), store::RetentionOptions{}};
   jobs::VolumeLibrary library_{

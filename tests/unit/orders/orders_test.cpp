@@ -14,9 +14,9 @@
 #include "base/clock.h"
 #include "base/sha256.h"
 #include "server/orders/received.h"
-#include "server/store/sqlite/audit_trail.h"
-#include "server/store/sqlite/order_store.h"
-#include "server/store/sqlite/received_store.h"
+#include "server/store/sql/audit_trail.h"
+#include "server/store/sql/order_store.h"
+#include "server/store/sql/received_store.h"
 #include "tests/api/dicom_bytes.h"
 #include "tests/support/errors.h"
 #include "tests/support/process.h"
@@ -129,12 +129,12 @@ class FakePacs : public Pacs {
 };
 
 // Tells until when nothing was due.
-class WatchedOrders : public store::SqliteOrderStore {
+class WatchedOrders : public store::SqlOrderStore {
  public:
-  using SqliteOrderStore::SqliteOrderStore;
+  using SqlOrderStore::SqlOrderStore;
 
   std::vector<store::OrderRecord> due(store::Time now, std::size_t limit) const override {
-    std::vector<store::OrderRecord> found = SqliteOrderStore::due(now, limit);
+    std::vector<store::OrderRecord> found = SqlOrderStore::due(now, limit);
     if (found.empty()) idle_at_ = std::max(idle_at_.load(), now);
     return found;
   }
@@ -145,13 +145,13 @@ class WatchedOrders : public store::SqliteOrderStore {
 };
 
 // Counts how often somebody has begun to look at what is held.
-class WatchedReceived : public store::SqliteReceivedStore {
+class WatchedReceived : public store::SqlReceivedStore {
  public:
-  using SqliteReceivedStore::SqliteReceivedStore;
+  using SqlReceivedStore::SqlReceivedStore;
 
   std::vector<store::HeldSeries> held() const override {
     ++looks_;
-    return SqliteReceivedStore::held();
+    return SqlReceivedStore::held();
   }
   int looks() const { return looks_; }
 
@@ -245,7 +245,7 @@ class OrdersTest : public test::JobsFixture {
   FakePacs* other_ = nullptr;
   jobs::LabelLists labels_{blobs_};
   WatchedOrders store_{database_};
-  store::SqliteAuditTrail audit_{database_};
+  store::SqlAuditTrail audit_{database_};
   WatchedReceived received_{database_};
   JobParameters last_parameters_;  // of the job that was finished last
   std::unique_ptr<Orders> orders_;

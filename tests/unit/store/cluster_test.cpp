@@ -14,7 +14,9 @@
 #include "server/store/postgresql/identity.h"
 #include "server/store/postgresql/job_store.h"
 #include "server/store/postgresql/outbox.h"
-#include "server/store/postgresql/volume_store.h"
+#include "server/store/postgresql/turn.h"
+#include "server/store/sql/order_store.h"
+#include "server/store/sql/volume_store.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/postgres.h"
@@ -47,7 +49,7 @@ struct Node {
   bool can_claim() { return jobs.wait_for_work({}, milliseconds(0)); }
 
   Database database;
-  PostgresVolumeStore volumes;
+  SqlVolumeStore volumes;
   PostgresOutbox outbox;
   PostgresJobStore jobs;
 };
@@ -142,6 +144,20 @@ TEST_F(ClusterTest, ProgressReachesTheOtherNodeWithARenewal) {
   EXPECT_EQ(seen.started, two().jobs.get("", id).started);
 }
 
+// It was told by a newer node, which times more stages, or by one of the first version.
+TEST_F(ClusterTest, TimingsAreReadByTheirNames) {
+  const std::string id = submit();
+  two().jobs.renew(two().claimed(), {Stage::kSmooth, 0.5, {}}, kLongLease);
+  ask(R"(UPDATE runs SET timings = '{"load": 1, "thicken": 2, "smooth": 3}')");
+  Timing timing = one().jobs.get("", id).timing;
+  timing.queue = 0;
+  EXPECT_EQ(timing, (Timing{.load = 1, .smooth = 3}));
+  ask("UPDATE runs SET timings = NULL");
+  timing = one().jobs.get("", id).timing;
+  timing.queue = 0;
+  EXPECT_EQ(timing, Timing{});
+}
+
 TEST_F(ClusterTest, OfJobsAlikeOneRunsOverAllNodes) {
   const std::string first = submit();
   const std::string second = job_of(two().jobs.submit(spec())).id;
@@ -197,7 +213,7 @@ TEST_F(ClusterTest, AnEventThatIsWrittenLateIsNotMissed) {
   std::string quick;
   {
     Transaction transaction(connection);
-    transaction->run("SELECT cancel_job($1::text, '{}', $2::uuid)", slow, two().database.node());
+    transaction->query("SELECT cancel_job(?1, '{}', ?2::uuid)", slow, two().database.node());
     quick = submit(2);
     EXPECT_THAT(told(), IsEmpty());
     transaction.commit();
@@ -269,14 +285,15 @@ TEST_F(ClusterTest, AnEndThatIsAskedForAgainIsTheSameOne) {
   const std::string id = submit();
   const Lease lease = one().claimed();
   const auto end = [&](std::uint64_t fence, bool is_again) {
-    return ask("SELECT verdict FROM finish_run('" + id + "', " + std::to_string(fence) + ", '" +
-               one().database.node() + "', " + (is_again ? "true" : "false") +
-               ", false, 4, '{}', '{}', '{}', '{}', 0, NULL, false, '{}', '{}')");
+    return ask(R"(SELECT outcome FROM finish_run('{"id": ")" + id + R"(", "fence": )" +
+               std::to_string(fence) + R"(, "node": ")" + one().database.node() +
+               R"(", "is_again": )" + (is_again ? "true" : "false") +
+               R"(, "ends_others": false, "state": 4, "record": "{}", "cancelled": "{}"}'))");
   };
-  EXPECT_EQ(end(lease.fence, false), "1");
-  EXPECT_EQ(end(lease.fence, true), "1");
-  EXPECT_EQ(end(lease.fence, false), "0");
-  EXPECT_EQ(end(lease.fence + 1, true), "0");
+  EXPECT_EQ(end(lease.fence, false), "done");
+  EXPECT_EQ(end(lease.fence, true), "done");
+  EXPECT_EQ(end(lease.fence, false), "lost");
+  EXPECT_EQ(end(lease.fence + 1, true), "lost");
   EXPECT_EQ(ask("SELECT count(*) FROM events WHERE kind = 2"), "1");
 }
 
@@ -307,6 +324,18 @@ TEST_F(ClusterTest, TablesOfANewerVersionAreRefused) {
   EXPECT_EQ(code_thrown_by([&] { Database({.url = url_, .node = "x"}); }), ErrorCode::kUnavailable);
 }
 
+TEST_F(ClusterTest, TablesOfTheVersionBeforeAreBroughtUpToDate) {
+  const std::string id = submit();
+  ask("ALTER TABLE runs DROP COLUMN timings; DROP FUNCTION submit_job(jsonb); UPDATE "
+      "isomesh_version SET version = 1");
+  one_.emplace(url_, "one", blobs_);
+  const Lease lease = one().claimed();
+  EXPECT_EQ(lease.id, id);
+  one().jobs.renew(lease, {Stage::kSmooth, 0.5, {.load = 1}}, kLongLease);
+  EXPECT_EQ(two().jobs.get("", id).timing.load, 1);
+  submit(2);
+}
+
 TEST_F(ClusterTest, SeveralThatStartAtOnceMakeThemOnce) {
   const std::string place = Postgres::shared().new_place();
   std::vector<std::jthread> nodes;
@@ -333,6 +362,18 @@ TEST_F(ClusterTest, OneRemovesAtATime) {
   EXPECT_FALSE(two().jobs.turn_to_remove());
   turn.reset();
   EXPECT_TRUE(two().jobs.turn_to_remove());
+}
+
+// --- Orders
+
+// Who carries them out has the turn as long as it lives, and takes orders meanwhile.
+TEST_F(ClusterTest, OrdersAreTakenByWhoCarriesThemOut) {
+  const Turn turn(url_, "orders");
+  ASSERT_TRUE(turn.is_taken());
+  OrderSpec order;
+  order.record.order.id = "an order";
+  order.record.order.created = "2024-01-01T00:00:00.000Z";
+  EXPECT_EQ(SqlOrderStore(one().database).submit(order, 1).kind, OrderSubmission::Kind::kNew);
 }
 
 // --- Callbacks

@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "server/store/sqlite/audit_trail.h"
-#include "server/store/sqlite/volume_store.h"
+#include "server/store/sql/audit_trail.h"
+#include "server/store/sql/volume_store.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 
@@ -32,7 +32,7 @@ TEST_F(DatabaseTest, IsForItsOwnerOnly) {
 // Whoever reads much holds nobody up. With one connection the second reading would wait for ever.
 TEST_F(DatabaseTest, ReadersReadSideBySide) {
   Database database(data_);
-  SqliteVolumeStore volumes(database);
+  SqlVolumeStore volumes(database);
   const Reading much(database.reader());
   const Reading more(database.reader());
   EXPECT_TRUE(volumes.list(std::nullopt, "", 10, ListOrder::kOldestFirst).empty());
@@ -65,16 +65,43 @@ TEST_F(DatabaseTest, IsOpenedAgainAsItWas) {
   volume.created = "2024-01-02T03:04:05.678Z";
   {
     Database database(data_);
-    SqliteVolumeStore(database).add("", volume);
+    SqlVolumeStore(database).add("", volume);
   }
   Database again(data_);
-  EXPECT_EQ(SqliteVolumeStore(again).get("", "aa"), volume);
+  EXPECT_EQ(SqlVolumeStore(again).get("", "aa"), volume);
+}
+
+// Whose volumes have their labels in the record that is listed.
+TEST_F(DatabaseTest, OfTheVersionBeforeKeepsItsVolumesWithTheirLabels) {
+  Volume plain;
+  plain.id = "aa";
+  plain.created = "2024-01-02T03:04:05.678Z";
+  Volume labelled = plain;
+  labelled.id = "bb";
+  labelled.labels = {{3, "\"labels\":["}, {4, "four"}};
+  {
+    Database database(data_);
+    SqlVolumeStore volumes(database);
+    volumes.add("", plain);
+    volumes.add("", labelled);
+  }
+  Connection(data_.records(), Connection::Mode::kWrite)
+      .script(
+          "UPDATE volumes SET record = coalesce(labelled, record); DROP INDEX volumes_by_time; "
+          "ALTER TABLE volumes DROP COLUMN labelled; PRAGMA user_version=6");
+  Database database(data_);
+  const SqlVolumeStore volumes(database);
+  EXPECT_EQ(volumes.get("", "aa"), plain);
+  EXPECT_EQ(volumes.get("", "bb"), labelled);
+  labelled.labels.clear();
+  EXPECT_THAT(volumes.list("", "", 10, ListOrder::kOldestFirst),
+              testing::ElementsAre(plain, labelled));
 }
 
 // Not even by whoever has the file open.
 TEST_F(DatabaseTest, TheAuditTrailIsNeitherChangedNorRemoved) {
   Database database(data_);
-  SqliteAuditTrail(database).add({.event = AuditEvent::kStart});
+  SqlAuditTrail(database).add({.event = AuditEvent::kStart});
   for (const char* sql : {"UPDATE audit SET record = ''", "DELETE FROM audit"}) {
     EXPECT_EQ(test::code_thrown_by([&] {
                 Transaction transaction(database.writer());

@@ -4,20 +4,16 @@
 
 #include "server/store/files/blob_store.h"
 #include "server/store/files/files.h"
-#include "server/store/postgresql/audit_trail.h"
 #include "server/store/postgresql/database.h"
 #include "server/store/postgresql/job_store.h"
-#include "server/store/postgresql/order_store.h"
 #include "server/store/postgresql/outbox.h"
-#include "server/store/postgresql/received_store.h"
-#include "server/store/postgresql/volume_store.h"
-#include "server/store/sqlite/audit_trail.h"
+#include "server/store/sql/audit_trail.h"
+#include "server/store/sql/order_store.h"
+#include "server/store/sql/outbox.h"
+#include "server/store/sql/received_store.h"
+#include "server/store/sql/volume_store.h"
 #include "server/store/sqlite/database.h"
 #include "server/store/sqlite/job_store.h"
-#include "server/store/sqlite/order_store.h"
-#include "server/store/sqlite/outbox.h"
-#include "server/store/sqlite/received_store.h"
-#include "server/store/sqlite/volume_store.h"
 #include "tests/support/files.h"
 #include "tests/support/postgres.h"
 #include "tests/unit/store/power_cut.h"
@@ -102,11 +98,11 @@ class SqliteEngine : public Engine {
   std::optional<store::DataFolder> data_;
   std::optional<store::FileBlobStore> blobs_;
   std::optional<store::Database> database_;
-  std::optional<store::SqliteVolumeStore> volumes_;
-  std::optional<store::SqliteOutbox> outbox_;
-  std::optional<store::SqliteOrderStore> orders_;
-  std::optional<store::SqliteAuditTrail> audit_;
-  std::optional<store::SqliteReceivedStore> received_;
+  std::optional<store::SqlVolumeStore> volumes_;
+  std::optional<store::SqlOutbox> outbox_;
+  std::optional<store::SqlOrderStore> orders_;
+  std::optional<store::SqlAuditTrail> audit_;
+  std::optional<store::SqlReceivedStore> received_;
   std::optional<store::SqliteJobStore> jobs_;
 };
 
@@ -164,11 +160,11 @@ class PostgresEngine : public Engine {
   store::DataFolder data_;
   store::FileBlobStore blobs_;
   std::optional<store::postgresql::Database> database_;
-  std::optional<store::postgresql::PostgresVolumeStore> volumes_;
+  std::optional<store::SqlVolumeStore> volumes_;
   std::optional<store::postgresql::PostgresOutbox> outbox_;
-  std::optional<store::postgresql::PostgresOrderStore> orders_;
-  std::optional<store::postgresql::PostgresAuditTrail> audit_;
-  std::optional<store::postgresql::PostgresReceivedStore> received_;
+  std::optional<store::SqlOrderStore> orders_;
+  std::optional<store::SqlAuditTrail> audit_;
+  std::optional<store::SqlReceivedStore> received_;
   std::optional<store::postgresql::PostgresJobStore> jobs_;
 };
 

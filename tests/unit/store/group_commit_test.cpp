@@ -30,7 +30,7 @@ constexpr int kThreads = 12;
 std::set<int> numbers_in(Connection& connection) {
   std::set<int> numbers;
   const Reading reading(connection);
-  Query query = reading->query("SELECT n FROM numbers");
+  Rows query = reading->query("SELECT n FROM numbers");
   while (query.next()) numbers.insert(static_cast<int>(query.integer(0)));
   return numbers;
 }

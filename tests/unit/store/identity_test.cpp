@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "server/store/files/blob_store.h"
-#include "server/store/sqlite/volume_store.h"
+#include "server/store/sql/volume_store.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 
@@ -30,7 +30,7 @@ class IdentityTest : public testing::Test {
       Volume volume;
       volume.id = writer->commit().key;
       volume.created = "2024-01-02T03:04:05.678Z";
-      SqliteVolumeStore(database).add("", volume);
+      SqlVolumeStore(database).add("", volume);
     }
     identity.now();
   }

@@ -4,14 +4,14 @@
 #include <vector>
 
 #include "server/store/order_store.h"
-#include "server/store/sqlite/database.h"
+#include "server/store/sql/sql.h"
 
 namespace isomesh::store {
 
-// Orders in the database of a data folder, which must outlive it.
-class SqliteOrderStore : public OrderStore {
+// Orders in a database, which must outlive it. One of the processes that share it carries them out.
+class SqlOrderStore : public OrderStore {
  public:
-  explicit SqliteOrderStore(Database& database) : database_(database) {}
+  explicit SqlOrderStore(SqlDatabase& database) : database_(database) {}
 
   OrderSubmission submit(const OrderSpec& spec, std::size_t most_open) override;
   bool submit_watched(const OrderSpec& spec, const WatchedSeries& series,
@@ -32,10 +32,7 @@ class SqliteOrderStore : public OrderStore {
   std::size_t forget(Time before) override;
 
  private:
-  // Writes the record of an order that is there.
-  static void write(Connection& connection, const OrderRecord& record, std::int64_t next);
-
-  Database& database_;
+  SqlDatabase& database_;
 };
 
 }  // namespace isomesh::store

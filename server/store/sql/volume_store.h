@@ -5,15 +5,15 @@
 #include <utility>
 #include <vector>
 
-#include "server/store/sqlite/database.h"
+#include "server/store/sql/sql.h"
 #include "server/store/volume_store.h"
 
 namespace isomesh::store {
 
-// Volumes in the database of a data folder, which must outlive it.
-class SqliteVolumeStore : public VolumeStore {
+// Volumes in a database, which must outlive it.
+class SqlVolumeStore : public VolumeStore {
  public:
-  explicit SqliteVolumeStore(Database& database) : database_(database) {}
+  explicit SqlVolumeStore(SqlDatabase& database) : database_(database) {}
 
   std::pair<Volume, bool> add(const std::string& owner, const Volume& volume) override;
   Volume get(const Viewer& viewer, const std::string& id) const override;
@@ -30,10 +30,7 @@ class SqliteVolumeStore : public VolumeStore {
   OwnedBytes owned_bytes() const override;
 
  private:
-  std::vector<std::string> records(const Viewer& viewer, const std::string& after,
-                                   std::size_t limit, ListOrder order) const;
-
-  Database& database_;
+  SqlDatabase& database_;
 };
 
 }  // namespace isomesh::store

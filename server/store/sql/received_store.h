@@ -1,14 +1,14 @@
 #pragma once
 
 #include "server/store/received_store.h"
-#include "server/store/sqlite/database.h"
+#include "server/store/sql/sql.h"
 
 namespace isomesh::store {
 
-// Received instances in the database of a data folder, which must outlive it.
-class SqliteReceivedStore : public ReceivedStore {
+// Received instances in a database, which must outlive it.
+class SqlReceivedStore : public ReceivedStore {
  public:
-  explicit SqliteReceivedStore(Database& database) : database_(database) {}
+  explicit SqlReceivedStore(SqlDatabase& database) : database_(database) {}
 
   void add(const ReceivedSeries& series, const ReceivedInstance& instance) override;
   std::vector<HeldSeries> held() const override;
@@ -18,7 +18,7 @@ class SqliteReceivedStore : public ReceivedStore {
   std::size_t forget(Time before) override;
 
  private:
-  Database& database_;
+  SqlDatabase& database_;
 };
 
 }  // namespace isomesh::store

@@ -1,0 +1,28 @@
+#pragma once
+
+#include "server/store/audit_trail.h"
+#include "server/store/sql/sql.h"
+
+namespace isomesh::store {
+
+// The audit trail in a database, which must outlive it. Its table has triggers that let nobody
+// change or remove a row.
+class SqlAuditTrail : public AuditTrail {
+ public:
+  explicit SqlAuditTrail(SqlDatabase& database) : database_(database) {}
+
+  void add(const AuditEntry& entry) override;
+  void read(std::uint64_t after,
+            const std::function<void(std::string_view line)>& line) const override;
+  std::uint64_t sent() const override;
+  void note_sent(std::uint64_t number) override;
+
+ private:
+  SqlDatabase& database_;
+};
+
+// The same as read(), of a connection.
+void read_audit_trail(SqlConnection& connection, std::uint64_t after,
+                      const std::function<void(std::string_view line)>& line);
+
+}  // namespace isomesh::store

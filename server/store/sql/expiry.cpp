@@ -1,0 +1,85 @@
+#include "server/store/sql/expiry.h"
+
+#include <algorithm>
+
+namespace isomesh::store {
+namespace {
+
+// One that was removed: its id is known from now on as one that has expired.
+void note(SqlConnection& connection, const Expirable& record, const std::vector<Blob>& blobs,
+          Expired& expired) {
+  connection.run(
+      "INSERT INTO expired(id, owner, at) VALUES(?1, ?2, isomesh_now()) ON CONFLICT(id, owner) DO "
+      "UPDATE SET at = excluded.at",
+      record.id, record.owner);
+  ++expired.records;
+  for (const Blob& blob : blobs) {
+    if (is_named(connection, blob.key)) continue;
+    expired.bytes += blob.bytes;
+    expired.blobs.push_back(blob.key);
+  }
+}
+
+}  // namespace
+
+std::vector<Expirable> read_expirable(const SqlDatabase& database, RecordKind kind, Rows rows) {
+  std::vector<Expirable> items;
+  while (rows.next()) {
+    items.push_back({kind, rows.text(0), rows.text(1), database.from_us(rows.integer(2))});
+  }
+  return items;
+}
+
+std::vector<Blob> read_blobs(Rows rows) {
+  std::vector<Blob> blobs;
+  while (rows.next()) blobs.push_back({rows.text(0), rows.count(1)});
+  return blobs;
+}
+
+OwnedBytes read_owned_bytes(Rows rows) {
+  OwnedBytes bytes;
+  while (rows.next()) bytes[rows.text(0)] = rows.count(1);
+  return bytes;
+}
+
+bool is_named(SqlConnection& connection, const std::string& blob) {
+  return connection
+      .query(
+          "SELECT 1 FROM volumes WHERE id = ?1 UNION ALL SELECT 1 FROM meshes WHERE blob = ?1 "
+          "UNION ALL SELECT 1 FROM order_blobs WHERE blob = ?1 UNION ALL SELECT 1 FROM received "
+          "WHERE blob = ?1 LIMIT 1",
+          blob)
+      .next();
+}
+
+bool has_expired(SqlConnection& connection, const std::optional<std::string>& viewer,
+                 const std::string& id) {
+  return connection
+      .query("SELECT 1 FROM expired WHERE id = ?1 AND (?2 IS NULL OR owner = ?2)", id, viewer)
+      .next();
+}
+
+Expired expire_records(SqlDatabase& database, std::span<const Expirable> records,
+                       std::uint64_t enough, const Remove& remove) {
+  Expired all;
+  while (!records.empty() && all.bytes < enough) {
+    const auto some = records.first(std::min(records.size(), database.most_at_once()));
+    records = records.subspan(some.size());
+    const Expired expired = database.change(Change::kNeeded, [&](SqlTransaction& transaction) {
+      Expired now;
+      for (const Expirable& record : some) {
+        if (now.bytes >= enough) break;
+        const auto blobs = remove(transaction.connection(), record);
+        if (blobs) note(transaction.connection(), record, *blobs, now);
+      }
+      transaction.commit();
+      return now;
+    });
+    all.records += expired.records;
+    all.bytes += expired.bytes;
+    all.blobs.insert(all.blobs.end(), expired.blobs.begin(), expired.blobs.end());
+  }
+  return all;
+}
+
+}  // namespace isomesh::store

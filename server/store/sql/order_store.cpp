@@ -1,0 +1,299 @@
+#include "server/store/sql/order_store.h"
+
+#include <set>
+
+#include "proto/error.h"
+#include "server/store/microseconds.h"
+#include "server/store/order_rules.h"
+#include "server/store/sql/outbox.h"
+
+namespace isomesh::store {
+namespace {
+
+// Who makes an order looks first at those that are there, while nobody else makes one.
+constexpr const char* kOrders = "orders";
+
+OrderRecord record_of(const Rows& row) {
+  return {.owner = row.text(0),
+          .order = order_from_record(row.text(1)),
+          .work = order_work_from_record(row.text(2))};
+}
+
+// Empty when the viewer sees none.
+std::optional<OrderRecord> find(SqlConnection& connection, const Viewer& viewer,
+                                const std::string& id, const char* lock = "") {
+  Rows row = connection.query(
+      std::string(
+          "SELECT owner, record, work FROM orders WHERE id = ?1 AND (?2 IS NULL OR owner = ?2)") +
+          lock,
+      id, viewer);
+  if (!row.next()) return std::nullopt;
+  return record_of(row);
+}
+
+OrderRecord found(SqlConnection& connection, const Viewer& viewer, const std::string& id,
+                  const char* lock = "") {
+  if (auto record = find(connection, viewer, id, lock)) return *std::move(record);
+  throw Error(ErrorCode::kNotFound, "there is no order with this id");
+}
+
+std::size_t count_open(SqlConnection& connection) {
+  Rows row = connection.query("SELECT count(*) FROM orders WHERE state < 4");
+  row.next();
+  return row.count(0);
+}
+
+// Whether it was made when this was asked for before.
+bool is_made(const SqlTransaction& transaction, const OrderSpec& spec) {
+  return transaction.is_again() &&
+         transaction->query("SELECT 1 FROM orders WHERE id = ?1", spec.record.order.id).next();
+}
+
+void insert(SqlConnection& connection, const OrderSpec& spec) {
+  const auto& [owner, order, work] = spec.record;
+  const std::optional<std::string> key =
+      spec.idempotency_key.empty() ? std::nullopt : std::optional(spec.idempotency_key);
+  connection.run(
+      "INSERT INTO orders(id, owner, state, rule, created, next, idempotency_key, request_digest, "
+      "record, work) VALUES(?1, ?2, ?3, ?4, ?5, isomesh_now(), ?6, ?7, ?8, ?9)",
+      order.id, owner, order.state, order.rule, us_of_timestamp(order.created), key,
+      spec.request_digest, to_json(order), to_record(work));
+}
+
+// What the same key made before.
+std::optional<OrderSubmission> made_before(SqlConnection& connection, const OrderSpec& spec) {
+  using Kind = OrderSubmission::Kind;
+  if (spec.idempotency_key.empty()) return std::nullopt;
+  Rows known = connection.query(
+      "SELECT record, request_digest FROM orders WHERE owner = ?1 AND idempotency_key = ?2",
+      spec.record.owner, spec.idempotency_key);
+  if (!known.next()) return std::nullopt;
+  if (known.text(1) != spec.request_digest) {
+    return OrderSubmission{.kind = Kind::kConflict, .order = {}};
+  }
+  return OrderSubmission{.kind = Kind::kExisting, .order = order_from_record(known.text(0))};
+}
+
+std::optional<LastOrder> last_of(SqlConnection& connection, const WatchedSeries& series) {
+  Rows row = connection.query(
+      "SELECT w.instances, o.state, o.record FROM watched w LEFT JOIN orders o ON o.id = "
+      "w.\"order\" WHERE w.rule = ?1 AND w.study = ?2 AND w.series = ?3",
+      series.rule, series.study, series.series);
+  if (!row.next()) return std::nullopt;
+  LastOrder last = {.instances = static_cast<std::uint32_t>(row.integer(0))};
+  if (row.is_null(1)) return last;
+  last.state = static_cast<OrderState>(row.integer(1));
+  last.record = row.text(2);
+  return last;
+}
+
+void insert_watched(SqlConnection& connection, const OrderSpec& spec, const WatchedSeries& series) {
+  insert(connection, spec);
+  connection.run(
+      "INSERT INTO watched(rule, study, series, \"order\", instances, seen) VALUES(?1, ?2, ?3, ?4, "
+      "?5, isomesh_now()) ON CONFLICT(rule, study, series) DO UPDATE SET \"order\" = "
+      "excluded.\"order\", instances = excluded.instances, seen = excluded.seen",
+      series.rule, series.study, series.series, spec.record.order.id, series.instances);
+}
+
+void name_blobs(SqlConnection& connection, const OrderRecord& record) {
+  connection.run("DELETE FROM order_blobs WHERE \"order\" = ?1", record.order.id);
+  if (is_final(record.order.state)) return;
+  for (const std::string& blob :
+       std::set<std::string>(record.work.blobs.begin(), record.work.blobs.end())) {
+    connection.run("INSERT INTO order_blobs VALUES(?1, ?2)", record.order.id, blob);
+  }
+}
+
+// Writes the record of an order that is there, which is due at that time, or else now.
+void write(SqlConnection& connection, const OrderRecord& record,
+           std::optional<std::int64_t> next = {}) {
+  const Order& order = record.order;
+  const std::optional<std::int64_t> finished =
+      order.finished ? std::optional(us_of_timestamp(*order.finished)) : std::nullopt;
+  connection.run(
+      "UPDATE orders SET state = ?1, finished = ?2, next = coalesce(?3, isomesh_now()), record = "
+      "?4, work = ?5 WHERE id = ?6",
+      order.state, finished, next, to_json(order), to_record(record.work), order.id);
+  name_blobs(connection, record);
+}
+
+// Who has ended is told of, and the series is known by what it was in the end.
+void tell_of_end(SqlConnection& connection, const OrderRecord& record) {
+  const Order& order = record.order;
+  if (record.work.callback) {
+    add_callback(connection, order.id, *record.work.callback, to_callback_json(order));
+  }
+  if (order.source.instances) {
+    connection.run("UPDATE watched SET instances = ?1 WHERE \"order\" = ?2",
+                   *order.source.instances, order.id);
+  }
+}
+
+}  // namespace
+
+OrderSubmission SqlOrderStore::submit(const OrderSpec& spec, std::size_t most_open) {
+  using Kind = OrderSubmission::Kind;
+  return database_.change(Change::kNew, [&](SqlTransaction& transaction) -> OrderSubmission {
+    transaction->lock_table(kOrders);
+    if (is_made(transaction, spec)) return {.kind = Kind::kNew, .order = spec.record.order};
+    if (auto before = made_before(transaction.connection(), spec)) return *std::move(before);
+    if (count_open(transaction.connection()) >= most_open) {
+      return {.kind = Kind::kBusy, .order = {}};
+    }
+    insert(transaction.connection(), spec);
+    transaction.commit();
+    return {.kind = Kind::kNew, .order = spec.record.order};
+  });
+}
+
+bool SqlOrderStore::submit_watched(const OrderSpec& spec, const WatchedSeries& series,
+                                   std::size_t most_open) {
+  return database_.change(Change::kNew, [&](SqlTransaction& transaction) {
+    SqlConnection& connection = transaction.connection();
+    connection.lock_table(kOrders);
+    if (is_made(transaction, spec)) return true;
+    const auto before = last_of(connection, series);
+    if ((before && is_done(*before, series)) || count_open(connection) >= most_open) return false;
+    insert_watched(connection, spec, series);
+    transaction.commit();
+    return true;
+  });
+}
+
+ReceivedFate SqlOrderStore::submit_received(const OrderSpec& spec, const WatchedSeries& series,
+                                            Time last, std::size_t most_open) {
+  return database_.change(Change::kNew, [&](SqlTransaction& transaction) {
+    SqlConnection& connection = transaction.connection();
+    connection.lock_table(kOrders);
+    if (is_made(transaction, spec)) return ReceivedFate::kNew;
+    const auto before = last_of(connection, series);
+    const ReceivedFate fate = before ? fate_of(*before, series, last) : ReceivedFate::kNew;
+    if (fate != ReceivedFate::kNew) return fate;
+    if (count_open(connection) >= most_open) return ReceivedFate::kOpen;
+    insert_watched(connection, spec, series);
+    transaction.commit();
+    return fate;
+  });
+}
+
+Order SqlOrderStore::get(const Viewer& viewer, const std::string& id) const {
+  return database_.read(
+      [&](SqlConnection& connection) { return found(connection, viewer, id).order; });
+}
+
+std::vector<Order> SqlOrderStore::list(const Viewer& viewer, const OrderFilter& filter,
+                                       const std::string& after, std::size_t limit) const {
+  Rows rows = database_.query(
+      std::string("SELECT record FROM orders WHERE ") + (viewer ? "owner = ?1" : "?1 IS NULL") +
+          " AND (?2 IS NULL OR state = ?2) AND (?3 IS NULL OR rule = ?3)" +
+          (after.empty() ? " AND ?4 = ''" : " AND id < ?4") + " ORDER BY id DESC LIMIT ?5",
+      viewer, filter.state, filter.rule, after, limit);
+  std::vector<Order> orders;
+  while (rows.next()) orders.push_back(order_from_record(rows.text(0)));
+  return orders;
+}
+
+std::vector<OrderRecord> SqlOrderStore::due(Time now, std::size_t limit) const {
+  Rows rows = database_.query(
+      "SELECT owner, record, work FROM orders WHERE state < 4 AND next <= ?1 ORDER BY next LIMIT "
+      "?2",
+      database_.to_us(now), limit);
+  std::vector<OrderRecord> records;
+  while (rows.next()) records.push_back(record_of(rows));
+  return records;
+}
+
+std::optional<OrderRecord> SqlOrderStore::if_due(const std::string& id, Time now) const {
+  Rows rows = database_.query(
+      "SELECT owner, record, work FROM orders WHERE id = ?1 AND state < 4 AND next <= ?2", id,
+      database_.to_us(now));
+  if (!rows.next()) return std::nullopt;
+  return record_of(rows);
+}
+
+std::optional<Time> SqlOrderStore::next_after(Time now) const {
+  Rows row = database_.query("SELECT min(next) FROM orders WHERE state < 4 AND next > ?1",
+                             database_.to_us(now));
+  row.next();
+  if (row.is_null(0)) return std::nullopt;
+  return database_.from_us(row.integer(0));
+}
+
+bool SqlOrderStore::save(const OrderRecord& record, Time next) {
+  return database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
+    SqlConnection& connection = transaction.connection();
+    const auto known = find(connection, std::nullopt, record.order.id, connection.for_update());
+    if (!known) return false;
+    if (is_final(known->order.state)) {
+      return transaction.is_again() && known->order == record.order;
+    }
+    write(connection, record, database_.to_us(next));
+    if (is_final(record.order.state)) tell_of_end(connection, record);
+    transaction.commit();
+    return true;
+  });
+}
+
+void SqlOrderStore::hurry(const std::string& id) {
+  database_.run(
+      Change::kRepeatable,
+      "UPDATE orders SET next = isomesh_now() WHERE id = ?1 AND state < 4 AND next > isomesh_now()",
+      id);
+}
+
+Order SqlOrderStore::cancel(const Viewer& viewer, const std::string& id) {
+  return database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
+    SqlConnection& connection = transaction.connection();
+    OrderRecord record = found(connection, viewer, id, connection.for_update());
+    if (is_final(record.order.state)) return record.order;
+    cancel_order(record);
+    write(connection, record);
+    tell_of_end(connection, record);
+    transaction.commit();
+    return record.order;
+  });
+}
+
+Order SqlOrderStore::retry(const Viewer& viewer, const std::string& id) {
+  return database_.change(Change::kNew, [&](SqlTransaction& transaction) {
+    SqlConnection& connection = transaction.connection();
+    OrderRecord record = found(connection, viewer, id, connection.for_update());
+    if (transaction.is_again() && !is_final(record.order.state)) return record.order;
+    begin_anew(record);
+    write(connection, record);
+    transaction.commit();
+    return record.order;
+  });
+}
+
+OrderCounts SqlOrderStore::counts() const {
+  return database_.read([](SqlConnection& connection) {
+    OrderCounts counts;
+    Rows rows =
+        connection.query("SELECT state, coalesce(rule, ''), count(*) FROM orders GROUP BY 1, 2");
+    while (rows.next()) {
+      counts.by_state_and_rule[{static_cast<OrderState>(rows.integer(0)), rows.text(1)}] =
+          rows.count(2);
+    }
+    Rows oldest = connection.query("SELECT min(created) FROM orders WHERE state < 4");
+    oldest.next();
+    if (!oldest.is_null(0)) counts.oldest_open = from_us(oldest.integer(0));
+    return counts;
+  });
+}
+
+std::size_t SqlOrderStore::forget(Time before) {
+  return database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
+    // Orders tell when they ended by the clock of who carried them out.
+    const std::size_t removed =
+        transaction->run("DELETE FROM orders WHERE finished < ?1", to_us(before));
+    // A series that is not in the time that watches look at any more.
+    constexpr std::chrono::days kWatched{90};
+    transaction->run("DELETE FROM watched WHERE seen < ?1", database_.to_us(before - kWatched));
+    transaction.commit();
+    return removed;
+  });
+}
+
+}  // namespace isomesh::store

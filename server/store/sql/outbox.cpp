@@ -1,0 +1,58 @@
+#include "server/store/sql/outbox.h"
+
+namespace isomesh::store {
+
+void add_callback(SqlConnection& connection, const std::string& id, const std::string& url,
+                  const std::string& body) {
+  connection.run(
+      "INSERT INTO callbacks(job, receiver, url, body, attempts, created, next) VALUES(?1, ?2, ?3, "
+      "?4, 0, isomesh_now(), isomesh_now()) ON CONFLICT(job) DO UPDATE SET body = excluded.body, "
+      "attempts = 0, created = excluded.created, next = excluded.next",
+      id, receiver_of(url), url, body);
+}
+
+std::vector<Delivery> SqlOutbox::due(Time now, std::size_t per_receiver) const {
+  return deliveries_of(database_.query(
+      "SELECT job, url, body, attempts, created FROM (SELECT *, row_number() OVER "
+      "(PARTITION BY receiver ORDER BY next, job) AS place FROM callbacks WHERE next <= ?1) "
+      "WHERE place <= ?2 ORDER BY next, job",
+      database_.to_us(now), per_receiver));
+}
+
+std::vector<Delivery> SqlOutbox::deliveries_of(Rows rows) const {
+  std::vector<Delivery> result;
+  while (rows.next()) {
+    result.push_back({.job = rows.text(0),
+                      .url = rows.text(1),
+                      .body = rows.text(2),
+                      .attempts = static_cast<int>(rows.integer(3)),
+                      .created = database_.from_us(rows.integer(4))});
+  }
+  return result;
+}
+
+std::optional<Time> SqlOutbox::next_after(Time now) const {
+  Rows row =
+      database_.query("SELECT min(next) FROM callbacks WHERE next > ?1", database_.to_us(now));
+  row.next();
+  if (row.is_null(0)) return std::nullopt;
+  return database_.from_us(row.integer(0));
+}
+
+void SqlOutbox::remove(const std::string& job) {
+  database_.run(Change::kRepeatable, "DELETE FROM callbacks WHERE job = ?1", job);
+}
+
+void SqlOutbox::postpone(const std::string& job, Time next) {
+  database_.run(Change::kRepeatable,
+                "UPDATE callbacks SET attempts = attempts + 1, next = ?1 WHERE job = ?2",
+                database_.to_us(next), job);
+}
+
+std::size_t SqlOutbox::count() const {
+  Rows row = database_.query("SELECT count(*) FROM callbacks");
+  row.next();
+  return row.count(0);
+}
+
+}  // namespace isomesh::store

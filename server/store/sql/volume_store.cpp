@@ -1,0 +1,196 @@
+#include "server/store/sql/volume_store.h"
+
+#include <algorithm>
+
+#include "proto/json.h"
+#include "server/store/microseconds.h"
+#include "server/store/sql/expiry.h"
+
+namespace isomesh::store {
+namespace {
+
+// The record as it is listed, and whole where that is more.
+struct Records {
+  explicit Records(Volume volume)
+      : labelled(volume.labels.empty() ? std::nullopt : std::optional(to_record(volume))) {
+    volume.labels.clear();
+    listed = to_record(volume);
+  }
+
+  std::optional<std::string> labelled;
+  std::string listed;
+};
+
+// Empty when there is none.
+std::optional<Volume> find(SqlConnection& connection, const Viewer& viewer, const std::string& id,
+                           const char* lock = "") {
+  Rows row = connection.query(
+      std::string("SELECT coalesce(labelled, record) FROM volumes WHERE id = ?1 AND (?2 IS NULL OR "
+                  "owner = ?2)") +
+          lock,
+      id, viewer);
+  if (!row.next()) return std::nullopt;
+  return volume_from_record(row.text(0));
+}
+
+[[noreturn]] void throw_missing(SqlConnection& connection, const Viewer& viewer,
+                                const std::string& id) {
+  if (has_expired(connection, viewer, id)) {
+    throw Error(ErrorCode::kGone, "the volume has expired: upload it again");
+  }
+  throw Error(ErrorCode::kNotFound, "there is no volume with this id");
+}
+
+void throw_if_needed(SqlConnection& connection, const Viewer& viewer, const std::string& id) {
+  Rows needed = connection.query(
+      "SELECT 1 FROM jobs WHERE volume = ?1 AND (?2 IS NULL OR owner = ?2) AND state < 2 LIMIT 1",
+      id, viewer);
+  if (needed.next()) throw Error(ErrorCode::kNotReady, "unfinished jobs need this volume");
+}
+
+// The one that the owner has already, which is used now.
+std::optional<Volume> use(SqlConnection& connection, const std::string& owner,
+                          const std::string& id) {
+  Rows known = connection.query(
+      "UPDATE volumes SET used = isomesh_now() WHERE owner = ?1 AND id = ?2 RETURNING "
+      "coalesce(labelled, record)",
+      owner, id);
+  if (!known.next()) return std::nullopt;
+  return volume_from_record(known.text(0));
+}
+
+bool insert(SqlConnection& connection, const std::string& owner, const Volume& volume,
+            const Records& records) {
+  const std::size_t inserted = connection.run(
+      "INSERT INTO volumes(owner, id, created, used, bytes, record, labelled) VALUES(?1, ?2, ?3, "
+      "isomesh_now(), ?4, ?5, ?6) ON CONFLICT(owner, id) DO NOTHING",
+      owner, volume.id, us_of_timestamp(volume.created), volume.bytes, records.listed,
+      records.labelled);
+  if (inserted == 0) return false;
+  connection.run("DELETE FROM expired WHERE id = ?1 AND owner = ?2", volume.id, owner);
+  return true;
+}
+
+}  // namespace
+
+std::pair<Volume, bool> SqlVolumeStore::add(const std::string& owner, const Volume& volume) {
+  const Records records(volume);
+  return database_.change(Change::kNew, [&](SqlTransaction& transaction) {
+    // One that is there may be erased before it is used.
+    while (!insert(transaction.connection(), owner, volume, records)) {
+      const auto known = use(transaction.connection(), owner, volume.id);
+      if (!known) continue;
+      transaction.commit();
+      // Asked again, it may be there by the first time: what is stored is the same then.
+      return std::pair(*known, transaction.is_again() && *known == volume);
+    }
+    transaction.commit();
+    return std::pair(volume, true);
+  });
+}
+
+Volume SqlVolumeStore::get(const Viewer& viewer, const std::string& id) const {
+  return database_.read([&](SqlConnection& connection) {
+    if (auto volume = find(connection, viewer, id)) return *std::move(volume);
+    throw_missing(connection, viewer, id);
+  });
+}
+
+Volume SqlVolumeStore::rename(const std::string& owner, const std::string& id,
+                              const std::optional<std::string>& name) {
+  return database_.change(Change::kNew, [&](SqlTransaction& transaction) {
+    SqlConnection& connection = transaction.connection();
+    auto volume = find(connection, owner, id, connection.for_update());
+    if (!volume) throw_missing(connection, owner, id);
+    volume->name = name;
+    const Records records(*volume);
+    connection.run("UPDATE volumes SET record = ?1, labelled = ?2 WHERE owner = ?3 AND id = ?4",
+                   records.listed, records.labelled, owner, id);
+    transaction.commit();
+    return *volume;
+  });
+}
+
+bool SqlVolumeStore::contains(const Viewer& viewer, const std::string& id) const {
+  return database_
+      .query("SELECT 1 FROM volumes WHERE id = ?1 AND (?2 IS NULL OR owner = ?2)", id, viewer)
+      .next();
+}
+
+std::vector<Volume> SqlVolumeStore::list(const Viewer& viewer, const std::string& after,
+                                         std::size_t limit, ListOrder order) const {
+  const std::size_t space = after.find(' ');
+  const std::string id = space == std::string::npos ? "" : after.substr(space + 1);
+  const bool is_descending = order == ListOrder::kNewestFirst;
+  const std::int64_t beginning = is_descending ? std::numeric_limits<std::int64_t>::max() : -1;
+  Rows rows =
+      database_.query(std::string("SELECT record FROM volumes WHERE ") +
+                          (viewer ? "owner = ?1" : "?1 IS NULL") + " AND (created, id) " +
+                          (is_descending ? "< (?2, ?3) ORDER BY created DESC, id DESC LIMIT ?4"
+                                         : "> (?2, ?3) ORDER BY created, id LIMIT ?4"),
+                      viewer, after.empty() ? beginning : us_of_timestamp(after.substr(0, space)),
+                      id, std::min<std::size_t>(limit, 1 << 30));
+  std::vector<Volume> volumes;
+  while (rows.next()) volumes.push_back(volume_from_record(rows.text(0)));
+  return volumes;
+}
+
+// The rows are locked before their jobs are looked at, so that nobody submits one meanwhile.
+void SqlVolumeStore::erase(const Viewer& viewer, const std::string& id) {
+  database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
+    SqlConnection& connection = transaction.connection();
+    if (!find(connection, viewer, id, connection.for_update())) {
+      if (transaction.is_again()) return;
+      throw_missing(connection, viewer, id);
+    }
+    throw_if_needed(connection, viewer, id);
+    connection.run("DELETE FROM volumes WHERE id = ?1 AND (?2 IS NULL OR owner = ?2)", id, viewer);
+    transaction.commit();
+  });
+}
+
+bool SqlVolumeStore::names(const std::string& blob) const {
+  return database_.read([&](SqlConnection& connection) { return is_named(connection, blob); });
+}
+
+std::vector<Expirable> SqlVolumeStore::unused(const ExpiryFilter& filter, std::size_t limit) const {
+  return read_expirable(
+      database_, RecordKind::kVolume,
+      database_.query(
+          "SELECT owner, id, used FROM volumes v WHERE used < ?1 AND NOT EXISTS (SELECT 1 FROM "
+          "jobs j WHERE j.volume = v.id AND j.owner = v.owner AND j.state < 2) AND (?3 IS NULL OR "
+          "owner = ?3) ORDER BY used LIMIT ?2",
+          database_.to_us(filter.before), limit, filter.owner));
+}
+
+Expired SqlVolumeStore::expire(std::span<const Expirable> volumes, std::uint64_t enough) {
+  return expire_records(
+      database_, volumes, enough, [&](SqlConnection& connection, const Expirable& volume) {
+        std::vector<Blob> blobs = read_blobs(connection.query(
+            std::string("SELECT id, bytes FROM volumes WHERE owner = ?1 AND id = ?2 AND used = "
+                        "?3") +
+                connection.for_update(),
+            volume.owner, volume.id, database_.to_us(volume.last_used)));
+        const std::size_t removed = connection.run(
+            "DELETE FROM volumes WHERE owner = ?1 AND id = ?2 AND used = ?3 AND NOT EXISTS (SELECT "
+            "1 FROM jobs WHERE volume = ?2 AND owner = ?1 AND state < 2)",
+            volume.owner, volume.id, database_.to_us(volume.last_used));
+        return removed == 0 ? std::nullopt : std::optional(std::move(blobs));
+      });
+}
+
+std::uint64_t SqlVolumeStore::named_bytes() const {
+  Rows row = database_.query(
+      "SELECT coalesce(sum(bytes), 0) FROM (SELECT max(bytes) AS bytes FROM volumes GROUP BY id) "
+      "AS each");
+  row.next();
+  return row.count(0);
+}
+
+OwnedBytes SqlVolumeStore::owned_bytes() const {
+  return read_owned_bytes(database_.query("SELECT owner, sum(bytes) FROM volumes GROUP BY owner"));
+}
+
+std::string cursor_of(const Volume& volume) { return volume.created + ' ' + volume.id; }
+
+}  // namespace isomesh::store
