@@ -234,10 +234,26 @@ TEST_F(Cluster, WhatIsAskedOfOneNodeIsTrueOfAll) {
   EXPECT_TRUE(comes_to(0, running.id, JobState::kCancelled));
   for (const std::size_t each : {0U, 1U}) EXPECT_EQ(node(each).get("/readyz").status, 200);
   postgres_->stop_at_once();
-  EXPECT_EQ(node(0).get("/readyz").status, 503);
+  EXPECT_TRUE(eventually([&] { return node(0).get("/readyz").status == 503; }));
   EXPECT_EQ(node(0).get("/livez").status, 200);
   postgres_->start();
   EXPECT_TRUE(eventually([&] { return node(0).get("/readyz").status == 200; }));
+}
+
+// A server that takes connections and answers nothing, whatever the URL says of time.
+TEST_F(Cluster, ADatabaseThatStandsStillIsToldAfterFiveSeconds) {
+  store_ += (store_.find('?') == std::string::npos ? "?" : "&") + std::string("connect_timeout=60");
+  start(0, {"--workers", "0"});
+  const Volume volume = upload(node(0), sphere_upload());
+  postgres_->stand_still();
+  const auto began = std::chrono::steady_clock::now();
+  EXPECT_EQ(node(0).get("/v1/volumes/" + volume.id).status, 503);
+  EXPECT_EQ(node(0).get("/v1/jobs").status, 503);
+  EXPECT_EQ(node(0).get("/readyz").status, 503);
+  EXPECT_EQ(node(0).get("/livez").status, 200);
+  EXPECT_LT(std::chrono::steady_clock::now() - began, seconds(30));
+  postgres_->go_on();
+  EXPECT_TRUE(eventually([&] { return node(0).get("/v1/volumes/" + volume.id).status == 200; }));
 }
 
 TEST_F(Cluster, ANodeThatStandsStillCannotFinishAndADrainedOneGivesItsJobsBack) {

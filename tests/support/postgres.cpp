@@ -2,6 +2,7 @@
 
 #include <csignal>
 #include <cstdlib>
+#include <fstream>
 #include <stdexcept>
 
 #include <libpq-fe.h>
@@ -106,6 +107,17 @@ void Postgres::stop_at_once() {
   server_->send_signal(SIGQUIT);
   server_->wait();
   server_.reset();
+}
+
+void Postgres::stand_still() { signal_all(SIGSTOP); }
+
+void Postgres::go_on() { signal_all(SIGCONT); }
+
+void Postgres::signal_all(int number) {
+  const std::string pid = std::to_string(server_->pid());
+  server_->send_signal(number);
+  std::ifstream children("/proc/" + pid + "/task/" + pid + "/children");
+  for (pid_t child = 0; children >> child;) ::kill(child, number);
 }
 
 void Postgres::follow(const Postgres& primary) {

@@ -46,6 +46,9 @@ class Postgres {
   // As `pg_ctl -m immediate`: at once, and what was not on the disk is recovered from the log.
   void stop_at_once();
   void start();
+  // All of its processes stop, but their connections stay.
+  void stand_still();
+  void go_on();
 
   // One that was stopped starts anew as the standby of that one.
   void follow(const Postgres& primary);
@@ -53,6 +56,7 @@ class Postgres {
   void promote();
 
  private:
+  void signal_all(int number);
   std::vector<std::string> command(const std::string& program,
                                    const std::vector<std::string>& arguments) const;
   std::string url_of(const std::string& options) const;

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cstdint>
 #include <memory>
+#include <new>
 #include <utility>
 
 #include <libpq-fe.h>
+#include <poll.h>
 
 #include "base/text.h"
 #include "proto/error.h"
@@ -18,7 +21,7 @@ namespace {
 // What a statement may take: far more than any of ours does, so that one that hangs does not keep
 // its connection for ever. Locks are held for milliseconds.
 constexpr const char* kSession =
-    "SET statement_timeout = '60s'; SET lock_timeout = '10s'; "
+    "SET statement_timeout = '60s'; SET lock_timeout = '4s'; "
     "SET idle_in_transaction_session_timeout = '60s'; SET bytea_output = 'hex'";
 
 // Of what the other side has said, only its own words: they hold neither addresses nor passwords.
@@ -136,31 +139,61 @@ void check_url(const std::string& url) {
 
 namespace {
 
-// To be finished by the caller, also where it has failed.
-pg_conn* connected(const std::string& url) {
+// Waits until something can be read or written. False when it is too late.
+bool waits_for(int socket, short events, Connection::Clock::time_point deadline) {
+  while (true) {
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(deadline - Connection::Clock::now());
+    if (left.count() <= 0) return false;
+    pollfd watched = {socket, events, 0};
+    const int count =
+        ::poll(&watched, 1, static_cast<int>(std::min<std::int64_t>(left.count(), 60'000)));
+    if (count > 0) return true;
+    if (count < 0 && errno != EINTR) return false;
+  }
+}
+
+// To be finished by the caller, also where it has failed. libpq's own limit of time is for each
+// address, and a URL may have another, so this one counts here.
+pg_conn* connected(const std::string& url, Connection::Clock::time_point deadline) {
   // What the URL says comes later and wins.
-  const std::array<const char*, 9> names = {
-      "connect_timeout",      "tcp_user_timeout", "keepalives_idle", "fallback_application_name",
-      "target_session_attrs", "dbname",           "client_encoding", nullptr};
-  const std::array<const char*, 9> values = {"5",          "10000",     "10",   "isomeshd",
-                                             "read-write", url.c_str(), "UTF8", nullptr};
-  return PQconnectdbParams(names.data(), values.data(), 1);
+  const std::array<const char*, 7> names = {"tcp_user_timeout",
+                                            "keepalives_idle",
+                                            "fallback_application_name",
+                                            "target_session_attrs",
+                                            "dbname",
+                                            "client_encoding",
+                                            nullptr};
+  const std::array<const char*, 7> values = {"10000",     "10",   "isomeshd", "read-write",
+                                             url.c_str(), "UTF8", nullptr};
+  pg_conn* handle = PQconnectStartParams(names.data(), values.data(), 1);
+  if (handle == nullptr) throw std::bad_alloc();
+  if (PQstatus(handle) == CONNECTION_BAD) return handle;
+  for (PostgresPollingStatusType next = PGRES_POLLING_WRITING;
+       next != PGRES_POLLING_OK && next != PGRES_POLLING_FAILED; next = PQconnectPoll(handle)) {
+    const short events = next == PGRES_POLLING_READING ? POLLIN : POLLOUT;
+    if (!waits_for(PQsocket(handle), events, deadline)) break;
+  }
+  return handle;
 }
 
 }  // namespace
 
 std::string reason_of_no_connection(const std::string& url) {
-  const std::unique_ptr<pg_conn, decltype(&PQfinish)> handle(connected(url), &PQfinish);
+  constexpr std::chrono::seconds kPatience{5};
+  const std::unique_ptr<pg_conn, decltype(&PQfinish)> handle(
+      connected(url, Connection::Clock::now() + kPatience), &PQfinish);
   if (PQstatus(handle.get()) == CONNECTION_OK) return "";
   // A line for each address that was tried.
   std::string reason;
   for (const std::string_view line : split(PQerrorMessage(handle.get()), '\n')) {
     if (!line.empty()) reason += (reason.empty() ? "" : "; ") + std::string(trimmed(line));
   }
-  return reason;
+  return reason.empty() ? "no response" : reason;
 }
 
-Connection::Connection(const std::string& url) : handle_(connected(url)) {
+Connection::Connection(const std::string& url, Clock::time_point deadline)
+    : handle_(connected(url, deadline)), deadline_(deadline) {
   if (PQstatus(handle_) != CONNECTION_OK) {
     // libpq's own text may name hosts, users and files, and this one goes to clients.
     PQfinish(handle_);
@@ -168,6 +201,7 @@ Connection::Connection(const std::string& url) : handle_(connected(url)) {
   }
   PQsetNoticeReceiver(handle_, take_notice, this);
   try {
+    PQsetnonblocking(handle_, 1);
     script(kSession);
   } catch (...) {
     PQfinish(handle_);
@@ -187,11 +221,39 @@ void Connection::take_notice(void* connection, const pg_result* notice) {
 
 Connection::~Connection() { PQfinish(handle_); }
 
-bool Connection::is_open() const { return PQstatus(handle_) == CONNECTION_OK; }
+bool Connection::is_open() const { return !is_given_up_ && PQstatus(handle_) == CONNECTION_OK; }
 
 int Connection::socket() const { return PQsocket(handle_); }
 
-void Connection::script(const std::string& sql) { checked(PQexec(handle_, sql.c_str())); }
+void Connection::script(const std::string& sql) {
+  checked(answer_to(PQsendQuery(handle_, sql.c_str()) == 1));
+}
+
+void Connection::wait_for(short events) {
+  if (waits_for(PQsocket(handle_), events, deadline_)) return;
+  is_given_up_ = true;
+  throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
+}
+
+// The last result of what was asked; null when the connection is lost.
+pg_result* Connection::answer_to(bool is_asked) {
+  if (!is_asked) return nullptr;
+  for (int left = PQflush(handle_); left != 0; left = PQflush(handle_)) {
+    if (left < 0) return nullptr;
+    wait_for(POLLIN | POLLOUT);
+    if (PQconsumeInput(handle_) == 0) return nullptr;
+  }
+  Result last;
+  while (true) {
+    while (PQisBusy(handle_) == 1) {
+      wait_for(POLLIN);
+      if (PQconsumeInput(handle_) == 0) break;  // what has come is told by the next result
+    }
+    Result result(PQgetResult(handle_));
+    if (!result) return last.release();
+    last = std::move(result);
+  }
+}
 
 std::vector<std::string> Connection::take_messages() {
   if (PQconsumeInput(handle_) == 0) {
@@ -228,8 +290,9 @@ Connection::Result Connection::execute(std::string_view sql,
     texts.push_back(text_of(each));
     values.push_back(each.is_null ? nullptr : texts.back().c_str());
   }
-  return checked(PQexecPrepared(handle_, name.c_str(), static_cast<int>(values.size()),
-                                values.data(), nullptr, nullptr, 0));
+  return checked(
+      answer_to(PQsendQueryPrepared(handle_, name.c_str(), static_cast<int>(values.size()),
+                                    values.data(), nullptr, nullptr, 0) == 1));
 }
 
 const std::string& Connection::prepared(std::string_view sql,
@@ -240,8 +303,8 @@ const std::string& Connection::prepared(std::string_view sql,
   std::vector<Oid> types;
   for (const Parameter& each : parameters) types.push_back(type_of(each));
   const std::string name = "s" + std::to_string(names_.size());
-  checked(PQprepare(handle_, name.c_str(), with_dollars(sql).c_str(),
-                    static_cast<int>(types.size()), types.data()));
+  checked(answer_to(PQsendPrepare(handle_, name.c_str(), with_dollars(sql).c_str(),
+                                  static_cast<int>(types.size()), types.data()) == 1));
   return names_[text] = name;
 }
 

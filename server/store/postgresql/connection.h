@@ -2,6 +2,7 @@
 // this folder.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <memory>
 #include <span>
@@ -37,11 +38,17 @@ std::string reason_of_no_connection(const std::string& url);
 // texts may also have their parameters as PostgreSQL has them, $1, $2 and so on.
 class Connection : public SqlConnection {
  public:
-  // Throws Interrupted when nobody answers.
-  explicit Connection(const std::string& url);
+  using Clock = std::chrono::steady_clock;
+
+  // Throws Interrupted when nobody answers until then, whatever the URL says of time.
+  Connection(const std::string& url, Clock::time_point deadline);
   ~Connection() override;
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
+
+  // Until when answers are waited for, from now on. An answer that has not come by then makes the
+  // connection a lost one, and throws Interrupted.
+  void wait_until(Clock::time_point deadline) { deadline_ = deadline; }
 
   // Throw Interrupted, Error kOutOfSpace, kUnavailable or kInternal.
   Rows ask(std::string_view sql, std::span<const Parameter> parameters) override;
@@ -68,6 +75,8 @@ class Connection : public SqlConnection {
   class Answer;
 
   Result execute(std::string_view sql, std::span<const Parameter> parameters);
+  pg_result* answer_to(bool is_asked);
+  void wait_for(short events);
   Result checked(pg_result* result);
   const std::string& prepared(std::string_view sql, std::span<const Parameter> parameters);
 
@@ -75,7 +84,9 @@ class Connection : public SqlConnection {
   static void take_notice(void* connection, const pg_result* notice);
 
   pg_conn* handle_ = nullptr;
-  bool is_warned_ = false;  // by the last statement: it may be on this machine only
+  Clock::time_point deadline_;
+  bool is_given_up_ = false;  // an answer may still come, to nobody
+  bool is_warned_ = false;    // by the last statement: it may be on this machine only
   std::unordered_map<std::string, std::string> names_;  // of prepared statements
 };
 

@@ -22,6 +22,8 @@ std::string random_uuid() {
          hex.substr(17, 3) + '-' + hex.substr(20, 12);
 }
 
+constexpr std::chrono::minutes kLongestMigration{10};
+
 constexpr std::int64_t kToleranceUs = 1'000'000;
 
 std::int64_t to_steady_us(std::chrono::steady_clock::time_point time) {
@@ -37,7 +39,7 @@ thread_local int borrowed = 0;
 
 Database::Database(DatabaseOptions options) : options_(std::move(options)), node_(random_uuid()) {
   try {
-    ask([&](Connection& connection, bool) { migrate(connection); });
+    ask_for(kLongestMigration, [&](Connection& connection, bool) { migrate(connection); });
   } catch (const Interrupted&) {
     const std::string reason = reason_of_no_connection(options_.url);
     if (reason.empty()) throw;
@@ -56,7 +58,7 @@ Database::Database(DatabaseOptions options) : options_(std::move(options)), node
 
 bool Database::answers() {
   try {
-    const Borrowed borrowed(*this);
+    const Borrowed borrowed(*this, std::chrono::steady_clock::now() + options_.patience);
     borrowed.connection().query("SELECT 1");
     return true;
   } catch (const Error&) {
@@ -123,24 +125,26 @@ Rows Database::ask(std::string_view sql, std::span<const Parameter> parameters) 
   return ask([&](Connection& connection, bool) { return connection.ask(sql, parameters); });
 }
 
-std::unique_ptr<Connection> Database::take() {
+std::unique_ptr<Connection> Database::take(std::chrono::steady_clock::time_point deadline) {
   {
     // Who has one already does not wait for another, or all might wait for each other.
     const bool waits = borrowed == 0;
     Lock lock(mutex_);
-    given_.wait(lock, [&]() ISOMESH_REQUIRES(mutex_) {
+    const bool has_one = given_.wait_until(lock, deadline, [&]() ISOMESH_REQUIRES(mutex_) {
       return !waits || !idle_.empty() || open_ < options_.connections;
     });
+    if (!has_one) throw Interrupted(ErrorCode::kUnavailable, "the database does not respond");
     ++borrowed;
     if (!idle_.empty()) {
       auto connection = std::move(idle_.back());
       idle_.pop_back();
+      connection->wait_until(deadline);
       return connection;
     }
     ++open_;
   }
   try {
-    auto connection = std::make_unique<Connection>(options_.url);
+    auto connection = std::make_unique<Connection>(options_.url, deadline);
     look_at_clock(*connection);
     return connection;
   } catch (...) {

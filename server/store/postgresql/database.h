@@ -22,7 +22,8 @@ struct DatabaseOptions {
   std::string url;   // as libpq takes it; passwords may come from PGPASSFILE
   std::string node;  // the name of this process's data folder: it has one process at a time
   std::size_t connections = 16;
-  // For how long what was interrupted is asked again before that is an error.
+  // For how long an answer is waited for, and what was interrupted is asked again, before that is
+  // an error.
   std::chrono::milliseconds patience{5000};
 };
 
@@ -40,10 +41,19 @@ class Database : public SqlDatabase {
   // asked twice; is_again says that it is not the first time. Throws what it throws.
   template <class Act>
   auto ask(const Act& act) {
+    return ask_for(options_.patience, act);
+  }
+
+  // The same for what may take longer. What has to be repeated is begun anew for options.patience.
+  template <class Act>
+  auto ask_for(std::chrono::milliseconds longest, const Act& act) {
     const auto deadline = std::chrono::steady_clock::now() + options_.patience;
     for (bool is_again = false;; is_again = true) {
       try {
-        const Borrowed borrowed(*this);
+        const Borrowed borrowed(*this, deadline);
+        if (longest > options_.patience) {
+          borrowed.connection().wait_until(std::chrono::steady_clock::now() + longest);
+        }
         return act(borrowed.connection(), is_again);
       } catch (const Interrupted&) {
         if (std::chrono::steady_clock::now() >= deadline) throw;
@@ -74,7 +84,9 @@ class Database : public SqlDatabase {
   // One connection of the pool, for as long as it lives.
   class Borrowed {
    public:
-    explicit Borrowed(Database& database) : database_(database), connection_(database.take()) {}
+    // Waits for it, and it for its answers, until then.
+    Borrowed(Database& database, std::chrono::steady_clock::time_point deadline)
+        : database_(database), connection_(database.take(deadline)) {}
     ~Borrowed() { database_.give(std::move(connection_)); }
     Borrowed(const Borrowed&) = delete;
     Borrowed& operator=(const Borrowed&) = delete;
@@ -91,7 +103,7 @@ class Database : public SqlDatabase {
                    std::span<const Parameter> parameters) override;
   Rows ask(std::string_view sql, std::span<const Parameter> parameters) override;
 
-  std::unique_ptr<Connection> take();
+  std::unique_ptr<Connection> take(std::chrono::steady_clock::time_point deadline);
   void give(std::unique_ptr<Connection> connection);
   static void pause();
 

@@ -19,6 +19,8 @@ namespace {
 
 using Source = store::Connection;
 
+constexpr std::chrono::hours kLongestMove{24};
+
 // A table of SQLite's and the columns of PostgreSQL's that take its rows.
 struct Table {
   const char* columns;  // with the table's name
@@ -61,7 +63,8 @@ class Values {
   std::vector<Parameter> parameters() const {
     std::vector<Parameter> all;
     for (const auto& text : texts_) {
-      all.emplace_back(std::string_view(text ? *text : ""), Parameter::Type::kOfColumn);
+      all.emplace_back(text ? std::string_view(*text) : std::string_view(),
+                       Parameter::Type::kOfColumn);
       all.back().is_null = !text;
     }
     return all;
@@ -124,7 +127,7 @@ Moved move_records(const DataFolder& folder, const std::string& url) {
   SqliteJobStore(source, FileBlobStore(folder), {}).reap();
   const store::Reading reading(source.writer());
   Database target({.url = url, .node = "move " + random_hex(8), .connections = 1});
-  return target.ask([&](Connection& to, bool) {
+  return target.ask_for(kLongestMove, [&](Connection& to, bool) {
     Transaction transaction(to);
     transaction->query("LOCK TABLE volumes, jobs, orders, audit, identity IN EXCLUSIVE MODE");
     const bool is_used = transaction
