@@ -180,9 +180,8 @@ pg_conn* connected(const std::string& url, Connection::Clock::time_point deadlin
 }  // namespace
 
 std::string reason_of_no_connection(const std::string& url) {
-  constexpr std::chrono::seconds kPatience{5};
   const std::unique_ptr<pg_conn, decltype(&PQfinish)> handle(
-      connected(url, Connection::Clock::now() + kPatience), &PQfinish);
+      connected(url, Connection::Clock::now() + Connection::kPatience), &PQfinish);
   if (PQstatus(handle.get()) == CONNECTION_OK) return "";
   // A line for each address that was tried.
   std::string reason;

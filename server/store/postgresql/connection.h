@@ -39,9 +39,11 @@ std::string reason_of_no_connection(const std::string& url);
 class Connection : public SqlConnection {
  public:
   using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::seconds kPatience{5};
 
   // Throws Interrupted when nobody answers until then, whatever the URL says of time.
-  Connection(const std::string& url, Clock::time_point deadline);
+  explicit Connection(const std::string& url,
+                      Clock::time_point deadline = Clock::now() + kPatience);
   ~Connection() override;
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;

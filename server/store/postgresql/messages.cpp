@@ -99,8 +99,7 @@ void Messages::run(const std::stop_token& stop) {
 }
 
 void Messages::listen(const std::stop_token& stop) {
-  constexpr std::chrono::seconds kPatience{5};
-  Connection connection(database_.url(), std::chrono::steady_clock::now() + kPatience);
+  Connection connection(database_.url());
   connection.script("LISTEN isomesh; SET synchronous_commit = off");
   hear_({.has_work = true, .has_events = true, .cancelled = {}});
   auto next_poll = std::chrono::steady_clock::now() + kBetweenPolls;
@@ -111,7 +110,7 @@ void Messages::listen(const std::stop_token& stop) {
     std::uint64_t count = 0;
     // What this process tells is heard by it, too.
     News news;
-    connection.wait_until(std::chrono::steady_clock::now() + kPatience);
+    connection.wait_until(Connection::Clock::now() + Connection::kPatience);
     if (::read(wake_, &count, sizeof count) > 0) news = send(connection);
     add(news, read(connection.take_messages()));
     if (std::chrono::steady_clock::now() >= next_poll) {
