@@ -19,6 +19,7 @@
 #include "base/text.h"
 #include "proto/fields.h"
 #include "proto/json.h"
+#include "proto/json_tree.h"
 
 namespace isomesh {
 
