@@ -59,9 +59,10 @@ class LogValue {
   LogValue(std::string_view text) : text_(text) {}
   LogValue(const std::string& text) : text_(text) {}
   LogValue(const char* text) : text_(text) {}
-  LogValue(std::integral auto number)
-      : length_(std::to_chars(digits_.data(), digits_.data() + digits_.size(), number).ptr -
-                digits_.data()) {}
+  LogValue(std::integral auto number) {
+    length_ =
+        std::to_chars(digits_.data(), digits_.data() + digits_.size(), number).ptr - digits_.data();
+  }
   std::string_view text() const {
     return length_ == 0 ? text_
                         : std::string_view(digits_.data(), static_cast<std::size_t>(length_));

@@ -15,8 +15,8 @@ namespace isomesh {
 std::string_view trimmed(std::string_view text);
 std::string lower(std::string_view text);  // ASCII only
 
-// Whether a text that is UTF-8 has what nobody can see and XML cannot hold: control characters other
-// than tabs, or noncharacters (Unicode 15, 23.7).
+// Whether a text that is UTF-8 has what nobody can see and XML cannot hold: control characters
+// other than tabs, or noncharacters (Unicode 15, 23.7).
 bool has_control_characters(std::string_view text);
 
 // A text that is UTF-8, or should be, with U+FFFD for each of those, and for tabs.

@@ -6,8 +6,8 @@
 
 namespace isomesh::volume {
 
-// The text in Unicode's normalisation form C, so that names that look the same are the same. What is
-// not UTF-8 stays as it is.
+// The text in Unicode's normalisation form C, so that names that look the same are the same. What
+// is not UTF-8 stays as it is.
 std::string normalized(std::string_view text);
 
 }  // namespace isomesh::volume
