@@ -1,6 +1,7 @@
 // A daemon whose addresses are limited (ulimit -v), as some batch systems do it.
 #include <csignal>
 #include <cstdint>
+#include <initializer_list>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -38,8 +39,8 @@ void expect_service_or_message(std::uint64_t mebibytes) {
 
 // Which thread finds no room depends on what the others have done by then.
 TEST(MemoryLimit, TheDaemonListensOrSaysWhyNot) {
-  for (const std::uint64_t mebibytes :
-       {60, 100, 150, 200, 220, 240, 260, 280, 300, 320, 350, 400, 450, 500, 600, 800, 1200}) {
+  for (const std::uint64_t mebibytes : std::initializer_list<std::uint64_t>{
+           60, 100, 150, 200, 220, 240, 260, 280, 300, 320, 350, 400, 450, 500, 600, 800, 1200}) {
     SCOPED_TRACE(std::to_string(mebibytes) + " MiB");
     expect_service_or_message(mebibytes);
   }
