@@ -5,13 +5,15 @@
 #include <string>
 #include <thread>
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 
 #include "base/descriptor.h"
 #include "proto/json.h"
+#include "server/net/address.h"
+#include "server/net/listener.h"
 #include "tests/api/daemon.h"
 #include "tests/api/problems.h"
 
@@ -342,20 +344,15 @@ TEST(Drain, CtrlCCountsNoAttempt) {
   next.client().cancel(job.id);
 }
 
-// A start that waits, here for what nobody writes.
+// A start that waits, here for a database that says nothing.
 TEST(Start, SigtermEndsItBeforeItListens) {
   const TemporaryFolder folder;
-  const std::string pipe = folder / "tokens";
-  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  Process process(
-      {ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder / "data", "--tokens", pipe});
-  Descriptor writer;
-  ASSERT_TRUE(eventually([&] {
-    writer = Descriptor(::open(pipe.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC));
-    return writer.number() >= 0;
-  }));
+  const net::Listener silent(net::parse_address("127.0.0.1:0"));
+  Process process({ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder / "data", "--store",
+                   "postgresql://nobody@" + silent.authority() + "/isomesh"});
+  const Descriptor connection(::accept4(silent.descriptor(), nullptr, nullptr, SOCK_CLOEXEC));
   process.send_signal(SIGTERM);
-  EXPECT_EQ(process.wait(), 0);
+  EXPECT_EQ(process.wait(), 0) << process.errors();
   EXPECT_EQ(process.output(), "");
 }
 
