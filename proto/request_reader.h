@@ -266,6 +266,9 @@ class RequestReader {
       const std::size_t before = errors_.size();
       const std::string place = path + '.' + name;
       read_member(label ? Json(*label) : Json(), place, label_range(), key);
+      if (errors_.size() == before && value.contains(key)) {
+        add(place, "names a label that another member names, too");
+      }
       if (errors_.size() == before) read_of_label(element, place, parameter, value[key]);
       if (errors_.size() > before) return;
     }

@@ -1,7 +1,11 @@
 #include <algorithm>
+#include <charconv>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
+#include <string>
+#include <string_view>
 
 #include <nlohmann/json.hpp>
 
@@ -63,8 +67,40 @@ Json::json_pointer pointer_to(std::string path) {
   return Json::json_pointer('/' + path);
 }
 
-// Finds members that an object has twice.
-class Repetitions {
+// Stands for half of a surrogate pair. It is a noncharacter, which no text of a request may hold.
+constexpr std::string_view kHalfPair = "\uFFFF";
+
+// The code unit of the \u escape at that place (RFC 8259, 7); 0 if there is none.
+unsigned escaped_unit(std::string_view json, std::size_t place) {
+  constexpr std::size_t kLength = 6;
+  const std::string_view escape = json.substr(std::min(place, json.size()), kLength);
+  if (escape.size() < kLength || !escape.starts_with("\\u")) return 0;
+  unsigned unit = 0;
+  const char* const end = escape.data() + kLength;
+  return std::from_chars(escape.data() + 2, end, unit, 16).ptr == end ? unit : 0;
+}
+
+// JSON with kHalfPair for each escaped half of a surrogate pair without the other, about which the
+// parser says only that the text is not JSON.
+std::string without_half_pairs(std::string_view json) {
+  const auto is_high = [](unsigned unit) { return unit >= 0xD800 && unit < 0xDC00; };
+  const auto is_low = [](unsigned unit) { return unit >= 0xDC00 && unit < 0xE000; };
+  std::string result;
+  for (std::size_t next = 0; (next = json.find('\\')) != std::string_view::npos;) {
+    const unsigned unit = escaped_unit(json, next);
+    const bool is_pair = is_high(unit) && is_low(escaped_unit(json, next + 6));
+    const bool is_half = !is_pair && (is_high(unit) || is_low(unit));
+    const std::size_t length = is_pair ? 12 : is_half ? 6 : 2;
+    result += json.substr(0, next);
+    result += is_half ? kHalfPair : json.substr(next, length);
+    json.remove_prefix(std::min(next + length, json.size()));
+  }
+  return result += json;
+}
+
+// Finds what the parser accepts and a request must not have, while it parses: members that an
+// object has twice, and texts with kHalfPair.
+class Flaws {
  public:
   void see(Json::parse_event_t event, const Json& parsed) {
     if (event == Json::parse_event_t::object_start) {
@@ -72,16 +108,42 @@ class Repetitions {
     } else if (event == Json::parse_event_t::object_end) {
       open_.pop_back();
     } else if (event == Json::parse_event_t::key) {
-      const auto name = parsed.get<std::string>();
-      if (!open_.back().insert(name).second) names_.push_back(name);
+      see_name(parsed.get<std::string>());
+    } else if (event == Json::parse_event_t::value && parsed.is_string()) {
+      see_text(parsed.get_ref<const std::string&>());
     }
   }
 
-  const std::vector<std::string>& names() const { return names_; }
+  const std::vector<std::string>& repeated() const { return repeated_; }
+  const std::vector<std::string>& halves() const { return halves_; }
 
  private:
-  std::vector<std::set<std::string>> open_;
-  std::vector<std::string> names_;
+  struct Open {
+    std::set<std::string> names;
+    std::string name;  // whose value comes next
+  };
+
+  void see_text(const std::string& text) {
+    constexpr std::size_t kMost = 20;  // that are told of
+    if (text.find(kHalfPair) == std::string::npos || halves_.size() >= kMost) return;
+    halves_.push_back(path());
+  }
+
+  void see_name(const std::string& name) {
+    if (!open_.back().names.insert(name).second) repeated_.push_back(name);
+    open_.back().name = name;
+    see_text(name);
+  }
+
+  std::string path() const {
+    std::string path;
+    for (const Open& each : open_) path += (path.empty() ? "" : ".") + printable(each.name);
+    return path;
+  }
+
+  std::vector<Open> open_;
+  std::vector<std::string> repeated_;
+  std::vector<std::string> halves_;  // paths
 };
 
 // Converts a query's text to the JSON value that a body would have.
@@ -263,18 +325,24 @@ std::string text_of(const Json& value) {
 }  // namespace
 
 Json request_body(std::string_view body, RequestReader& reader) {
-  Repetitions repetitions;
+  Flaws flaws;
+  const std::string text = without_half_pairs(body);
   Json json = Json::parse(
-      body,
+      text,
       [&](int, Json::parse_event_t event, const Json& parsed) {
-        repetitions.see(event, parsed);
+        flaws.see(event, parsed);
         return true;
       },
       false);
   if (!json.is_object()) {
     throw Error(ErrorCode::kInvalidParameter, "the body must be one JSON object");
   }
-  for (const std::string& name : repetitions.names()) reader.add(name, "is given twice");
+  for (const std::string& name : flaws.repeated()) reader.add(name, "is given twice");
+  if (text == body) return json;
+  for (const std::string& path : flaws.halves()) {
+    reader.add(path, "has half of a surrogate pair (\\ud800 to \\udfff), which is not a character");
+  }
+  reader.throw_if_any();
   return json;
 }
 

@@ -10,6 +10,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -28,6 +29,7 @@
 #include "server/dicomweb/dicomweb.h"
 #include "server/dimse/c_store.h"
 #include "server/dimse/listener.h"
+#include "server/ending.h"
 #include "server/http/guards/auth.h"
 #include "server/http/observe/metrics.h"
 #include "server/http/observe/outcomes.h"
@@ -85,18 +87,6 @@ std::chrono::milliseconds housekeeping_interval(std::chrono::milliseconds keep) 
 std::chrono::milliseconds clock_tolerance(std::chrono::milliseconds keep) {
   return std::clamp<std::chrono::milliseconds>(keep / 4, std::chrono::hours(1),
                                                std::chrono::days(7));
-}
-
-sigset_t block_signals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGHUP);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
-  return signals;
 }
 
 // The files that are read again on SIGHUP; null for those that are not configured.
@@ -277,6 +267,7 @@ std::unique_ptr<audit::SyslogSender> send_trail(const orders::Hospital& hospital
 }
 
 int run(const Options& options, const sigset_t& signals) {
+  std::jthread starting = end_start_on_signal(signals);
   const net::Address address = net::parse_address(options.listen);
   const Files files = open_files(options, address, http::ReadBy::kService);
   check_reach(options, address, files);
@@ -352,6 +343,10 @@ int run(const Options& options, const sigset_t& signals) {
       folder,    blobs,   volumes, jobs,      library, histograms,         labels,      estimator,
       retention, metrics, outbox,  callbacks, targets, files.tokens.get(), orders.get()};
   http::Server server(services, server_options);
+  const std::string url = server.bind(address);
+  server.start();
+  starting.request_stop();
+  starting.join();
   // Declared after the server, so that the workers end before it and the end of their last job is
   // still logged and counted.
   const jobs::WorkerOptions worker_options = {
@@ -362,9 +357,7 @@ int run(const Options& options, const sigset_t& signals) {
       .longest_job = std::chrono::minutes(options.longest_job_minutes)};
   jobs::Workers workers(worker_options, jobs, volumes, blobs);
 
-  const std::string url = server.bind(address);
   std::cout << "listening on " << url << std::endl;
-  std::jthread serving([&] { server.serve(); });
 
   int signal = 0;
   while (::sigwait(&signals, &signal) == 0 && signal == SIGHUP) reload(options, files, callbacks);
@@ -402,6 +395,7 @@ int main(int argc, char** argv) {
   constexpr int kWrongUsage = 2;
   LogFormat log_format = LogFormat::kText;
   try {
+    end_clearly_without_memory();
     const sigset_t signals = block_signals();
     jobs::keep_freed_memory();
     be_prompt();
@@ -428,10 +422,12 @@ int main(int argc, char** argv) {
     }
     log_format = options.log_format;
     start_log(log_format, options.log_level);
+    for (const std::string& warning : unknown_variables(cli)) log_warning("{}", warning);
     if (options.check_only) return tell_configuration(options, cli);
     return run(options, signals);
   } catch (const std::exception& error) {
-    tell_failure(log_format, error.what());
+    const std::string_view reason = shortage(error);
+    tell_failure(log_format, reason.empty() ? error.what() : std::string(reason));
     return 1;
   }
 }

@@ -1,6 +1,7 @@
 #include "server/options.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -11,6 +12,9 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <unistd.h>
+
+#include "base/command_line/closest.h"
 
 namespace isomesh {
 namespace {
@@ -354,6 +358,27 @@ void add_options(CLI::App& cli, Options& options) {
   add_blob_options(cli, options);
   add_operators_word(cli, options);
   add_check(cli, options);
+}
+
+std::vector<std::string> unknown_variables(const CLI::App& cli) {
+  constexpr std::string_view kPrefix = "ISOMESH_";
+  constexpr std::array<std::string_view, 3> kOfClients = {"ISOMESH_SERVER", "ISOMESH_TOKEN",
+                                                          "ISOMESH_CA"};
+  std::vector<std::string> known = {"ISOMESH_CONFIG"};
+  for (const CLI::Option* option : cli.get_options()) known.push_back(option->get_envname());
+  std::vector<std::string> warnings;
+  for (char** variable = ::environ; *variable != nullptr; ++variable) {
+    const std::string_view entry = *variable;
+    const std::string name(entry.substr(0, entry.find('=')));
+    if (!name.starts_with(kPrefix) || std::ranges::find(known, name) != known.end() ||
+        std::ranges::find(kOfClients, name) != kOfClients.end()) {
+      continue;
+    }
+    const std::string close = command_line::closest_to(name, known);
+    warnings.push_back("there is no option " + name + " in the environment, so it is ignored" +
+                       (close.empty() ? "" : ". Did you mean " + close + '?'));
+  }
+  return warnings;
 }
 
 std::string as_config(const CLI::App& cli, Remarks remarks) {

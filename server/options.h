@@ -60,6 +60,10 @@ struct Options {
 // which may hold nothing else. `options` is filled in when `cli` parses.
 void add_options(CLI::App& cli, Options& options);
 
+// Warnings about variables of the environment that begin with ISOMESH_ and set nothing, here or in
+// the clients.
+std::vector<std::string> unknown_variables(const CLI::App& cli);
+
 enum class Remarks { kNo, kYes };
 
 // What `cli` has parsed as the lines of a file of --config that says all of it; those that nobody

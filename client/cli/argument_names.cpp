@@ -1,33 +1,17 @@
 #include "client/cli/argument_names.h"
 
-#include <algorithm>
 #include <cctype>
-#include <numeric>
 #include <string_view>
-#include <utility>
 
+#include "base/command_line/closest.h"
 #include "client/cli/options.h"
 
 namespace isomesh::cli {
 namespace {
 
-// Levenshtein's: letters to insert, delete or replace.
-std::size_t edits_between(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = std::exchange(row[j + 1], std::min({row[j] + 1, row[j + 1] + 1, replaced}));
-    }
-  }
-  return row.back();
-}
-
 [[noreturn]] void unknown(const std::string& what, const std::string& name,
                           const std::vector<std::string>& names, const std::string& help) {
-  const std::string close = closest_to(name, names);
+  const std::string close = command_line::closest_to(name, names);
   wrong_usage("there is no " + what + ' ' + name +
               (close.empty() ? "" : ". Did you mean " + close + '?') + "\n`" + help +
               " --help` lists the " + what + 's');
@@ -64,19 +48,6 @@ bool is_option(std::string_view word) {
 }
 
 }  // namespace
-
-std::string closest_to(const std::string& text, const std::vector<std::string>& names) {
-  constexpr std::size_t kMostEdits = 3;
-  std::string closest;
-  // Short names are close to each other, so at most half of the letters may differ.
-  std::size_t least = std::min(kMostEdits, text.size() / 2) + 1;
-  for (const std::string& name : names) {
-    const std::size_t edits = edits_between(text, name);
-    if (edits < least) closest = name;
-    least = std::min(least, edits);
-  }
-  return closest;
-}
 
 void check_names(const CLI::App& app, int argc, const char* const* argv) {
   const CLI::App* command = &app;

@@ -1,15 +1,9 @@
 // Checks the names of commands and options before the library parses them; private to this folder.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include <CLI/CLI.hpp>
 
 namespace isomesh::cli {
-
-// The name that `text` is most likely a misspelling of; empty if none is close.
-std::string closest_to(const std::string& text, const std::vector<std::string>& names);
 
 // Throws EarlyExit for a command or an option that `app` does not have. The library would report
 // "FILE: 30 does not exist" for "--isoo 30". Also rejects options that `local` has no use for.

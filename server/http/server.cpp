@@ -1,6 +1,7 @@
 #include "server/http/server.h"
 
 #include <chrono>
+#include <exception>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -81,7 +82,7 @@ void watch_jobs(App& app) {
         if (!event.is_elsewhere) report_ended(app, event.job);
       }
       if (is_heard) app.connections.wake_sources();
-    } catch (const Error& error) {
+    } catch (const std::exception& error) {
       log_error("job events cannot be read and are retried: {}", error.what());
       std::this_thread::sleep_for(kLongestWatch);
     }
@@ -118,7 +119,7 @@ struct Server::State {
 
   App app;
   std::optional<net::Listener> listener;
-  std::atomic<bool> is_over = false;
+  std::jthread watching;
 };
 
 Server::Server(const Services& services, const ServerOptions& options)
@@ -134,7 +135,9 @@ Server::Server(const Services& services, const ServerOptions& options)
   add_order_routes(state_->app);
 }
 
-Server::~Server() = default;
+Server::~Server() {
+  if (state_->watching.joinable()) stop();
+}
 
 std::string Server::bind(const net::Address& address) {
   OriginRules& rules = state_->app.rules;
@@ -147,7 +150,7 @@ std::string Server::bind(const net::Address& address) {
   return (state_->app.options.tls == nullptr ? "http://" : "https://") + authority;
 }
 
-void Server::serve() {
+void Server::start() {
   App& app = state_->app;
   app.connections.open(state_->listener->descriptor());
   if (app.services.orders != nullptr) {
@@ -156,11 +159,7 @@ void Server::serve() {
       app.services.callbacks.wake();
     });
   }
-  {
-    const std::jthread watching([&app] { watch_jobs(app); });
-    state_->is_over.wait(false);
-  }
-  app.connections.close(kLastAnswers);
+  state_->watching = std::jthread([&app] { watch_jobs(app); });
 }
 
 void Server::begin_drain() {
@@ -169,12 +168,13 @@ void Server::begin_drain() {
 }
 
 void Server::stop() {
-  state_->app.stopping = true;
-  state_->app.services.estimator.stop();
-  state_->app.services.library.stop_imports();
-  state_->app.services.jobs.close();
-  state_->is_over = true;
-  state_->is_over.notify_all();
+  App& app = state_->app;
+  app.stopping = true;
+  app.services.estimator.stop();
+  app.services.library.stop_imports();
+  app.services.jobs.close();
+  if (state_->watching.joinable()) state_->watching.join();
+  app.connections.close(kLastAnswers);
 }
 
 }  // namespace isomesh::http

@@ -67,6 +67,7 @@ struct Services {
 class Server {
  public:
   Server(const Services& services, const ServerOptions& options);
+  // As stop().
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -75,15 +76,16 @@ class Server {
   // Throws Error kUnavailable when the address cannot be bound.
   std::string bind(const net::Address& address);
 
-  // Serves until stop(); to be called once, after bind.
-  void serve();
+  // Serves until stop(); to be called once, after bind. Whatever serving needs is there when it
+  // returns. Throws std::system_error if a thread cannot be started.
+  void start();
 
   // /readyz answers 503 from now on, so that a load balancer looks elsewhere, and no job is
   // accepted. Thread safe.
   void begin_drain();
 
-  // Ends serve(), after the orders have ended: no connection is accepted any more, nobody waits for
-  // a job, uploads and imports are cut off. Thread safe.
+  // Returns when nothing is served any more: no connection is accepted, nobody waits for a job,
+  // uploads and imports are cut off. To be called after the orders have ended.
   void stop();
 
  private:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <limits>
 #include <string>
@@ -13,6 +14,28 @@ namespace {
 
 // A sample on a face of the box is in it, whatever its coordinates are rounded to.
 constexpr double kTolerance = 1e-6;  // of a spacing
+
+// "from (0, 0, 0) to (10, 20, 30) mm": the smallest box along the axes of space that holds all
+// samples.
+std::string extent_of(const mesh::LatticeToSpace& to_space,
+                      const std::array<std::uint32_t, 3>& dims) {
+  std::array<std::string, 2> ends = {"(", "("};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::array<double, 2> bounds = {to_space.origin[axis], to_space.origin[axis]};
+    const std::array<double, 3> steps = {to_space.step_x[axis], to_space.step_y[axis],
+                                         to_space.step_z[axis]};
+    for (std::size_t step = 0; step < 3; ++step) {
+      const double way = steps.at(step) * (dims.at(step) - 1.0);
+      bounds[way < 0 ? 0 : 1] += way;
+    }
+    for (std::size_t end = 0; end < 2; ++end) {
+      std::array<char, 32> text = {};
+      std::snprintf(text.data(), text.size(), "%.6g", bounds.at(end));
+      ends.at(end) += std::string(axis == 0 ? "" : ", ") + text.data();
+    }
+  }
+  return "from " + ends[0] + ") to " + ends[1] + ") mm";
+}
 
 }  // namespace
 
@@ -39,7 +62,9 @@ SampleRange samples_in(const Box& box, const Geometry& geometry,
     if (end - begin < 2) {
       throw invalid_parameter("crop",
                               "the box contains fewer than two samples along the volume's axis " +
-                                  std::string(1, "xyz"[axis]) + ", so there is no surface");
+                                  std::string(1, "xyz"[axis]) +
+                                  ", so there is no surface; the volume's samples are " +
+                                  extent_of(to_space, dims));
     }
     range.begin[axis] = static_cast<std::uint32_t>(begin);
     range.end[axis] = static_cast<std::uint32_t>(end);

@@ -42,7 +42,7 @@ struct JobProcess::Talk {
   std::optional<Clock::time_point> asked = {};  // to stop
 };
 
-JobProcess::JobProcess(const JobProgram& program) : program_(program), heard_(kHeardBytes) {}
+JobProcess::JobProcess(const JobProgram& program) : program_(program) {}
 
 MadeMesh JobProcess::make(const JobOrder& order, std::span<const codec::Sink> sinks,
                           const std::stop_token& stop, const Report& report) {
@@ -93,6 +93,7 @@ JobAnswer JobProcess::end_of(const JobOrder& order, std::span<const codec::Sink>
 void JobProcess::start() {
   if (child_ && child_->has_ended()) child_.reset();  // idle, so no job's doing
   if (child_) return;
+  heard_.resize(std::max(heard_.size(), kHeardBytes));
   child_ = process::start_program(program_.file);
   begin_ = end_ = 0;
   child_->say(to_line(program_.setup));

@@ -106,13 +106,20 @@ class Workers::Run {
 Workers::Workers(const WorkerOptions& options, store::JobStore& jobs,
                  const store::VolumeStore& volumes, const store::BlobStore& blobs)
     : options_(options), jobs_(jobs), volumes_(volumes), blobs_(blobs), alive_(options.threads) {
-  for (std::size_t i = 0; i < options.threads; ++i) {
-    threads_.emplace_back([this, i] { work(claims_.get_token(), worker_name(i)); });
+  try {
+    for (std::size_t i = 0; i < options.threads; ++i) {
+      threads_.emplace_back([this, i] { work(claims_.get_token(), worker_name(i)); });
+    }
+    leases_ = std::jthread([this](const std::stop_token& stop) { look_after_leases(stop); });
+  } catch (...) {
+    end_threads();  // or those that did start would work on
+    throw;
   }
-  leases_ = std::jthread([this](const std::stop_token& stop) { look_after_leases(stop); });
 }
 
-Workers::~Workers() {
+Workers::~Workers() { end_threads(); }
+
+void Workers::end_threads() {
   claims_.request_stop();
   running_.request_stop();
   threads_.clear();  // the leases are looked after until the last has ended

@@ -51,6 +51,7 @@ class Workers {
   void renew(Run& run);
   void look_after_leases(const std::stop_token& stop);
   void reap();
+  void end_threads();
 
   const WorkerOptions options_;
   store::JobStore& jobs_;

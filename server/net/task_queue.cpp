@@ -10,11 +10,16 @@ namespace isomesh::net {
 
 BoundedTaskQueue::BoundedTaskQueue(std::size_t threads, std::size_t capacity, int niceness)
     : capacity_(capacity), idle_(threads) {
-  for (std::size_t i = 0; i < threads; ++i) {
-    threads_.emplace_back([this, niceness] {
-      be_nicer(niceness);
-      work();
-    });
+  try {
+    for (std::size_t i = 0; i < threads; ++i) {
+      threads_.emplace_back([this, niceness] {
+        be_nicer(niceness);
+        work();
+      });
+    }
+  } catch (...) {
+    shutdown();  // or those that did start would wait for tasks for ever
+    throw;
   }
 }
 

@@ -61,12 +61,17 @@ Orders::Orders(const OrderServices& services, const Hospital& hospital, OrderOpt
        services_.orders.list(std::nullopt, {.state = OrderState::kMeshing}, "", kMostMeshing)) {
     services_.orders.hurry(order.id);
   }
-  for (std::size_t n = 0; n < options_.threads; ++n) {
-    threads_.emplace_back([this](const std::stop_token& stop) { work(stop); });
-  }
-  threads_.emplace_back([this](const std::stop_token& stop) { watch(stop); });
-  if (hospital_.dimse) {
-    threads_.emplace_back([this](const std::stop_token& stop) { receive(stop); });
+  try {
+    for (std::size_t n = 0; n < options_.threads; ++n) {
+      threads_.emplace_back([this](const std::stop_token& stop) { work(stop); });
+    }
+    threads_.emplace_back([this](const std::stop_token& stop) { watch(stop); });
+    if (hospital_.dimse) {
+      threads_.emplace_back([this](const std::stop_token& stop) { receive(stop); });
+    }
+  } catch (...) {
+    stop();  // or what those that did start wait for would not be cut off
+    throw;
   }
 }
 

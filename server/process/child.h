@@ -91,7 +91,8 @@ class Child {
 std::string how_it_ended(const std::optional<int>& status);
 
 // Starts a program that inherits nothing of this process but one end of a socket: its environment
-// is empty and its signals have their defaults. Safe with threads running. Throws Error kInternal.
+// is empty, its signals have their defaults, and it leads a process group of its own. Safe with
+// threads running. Throws Error kInternal.
 Child start_program(const std::filesystem::path& program);
 
 }  // namespace isomesh::process

@@ -52,6 +52,14 @@ TEST_F(JobsTest, AJobIsAcceptedAndRuns) {
   }
 }
 
+TEST_F(JobsTest, ACropBesideTheVolumeIsRefusedAtOnce) {
+  const Answer answer = post_with(R"("crop": [[100, 0, 0], [120, 10, 10]])");
+  EXPECT_TRUE(is_problem(answer, ErrorCode::kInvalidParameter)) << answer.body;
+  EXPECT_THAT(answer.body, testing::HasSubstr("from (0, 0, 0) to (20, 19, 18) mm"));
+  EXPECT_TRUE(daemon_.client().jobs().jobs.empty());
+  EXPECT_EQ(post_with(R"("crop": [[2, 2, 2], [12, 12, 12]])").status, 202);
+}
+
 TEST_F(JobsTest, TheSameJobAgainTakesTheMeshAtOnce) {
   const Job first = finished_job(daemon_);
   const Answer answer = post_with("\"priority\": \"stat\"");

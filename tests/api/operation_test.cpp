@@ -1,4 +1,5 @@
 // Starting, listening, ending.
+#include <algorithm>
 #include <csignal>
 #include <functional>
 #include <string>
@@ -6,9 +7,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 
+#include "base/descriptor.h"
 #include "proto/json.h"
+#include "server/net/address.h"
+#include "server/net/listener.h"
 #include "tests/api/daemon.h"
 #include "tests/api/problems.h"
 
@@ -114,6 +119,17 @@ TEST(Start, OptionsComeFromTheEnvironmentAndFromAFileToo) {
       answer_to(line.substr(13), request("POST", "/v1/volumes", std::string(2000, 'x')));
   EXPECT_TRUE(is_problem(answer, ErrorCode::kTooLarge));
   EXPECT_THAT(answer.body, HasSubstr("1234"));
+}
+
+TEST(Start, AnUnknownVariableIsToldWithTheNearestName) {
+  const TemporaryFolder folder;
+  const Finished told =
+      run({ISOMESHD, "--data", folder / "data", "check"},
+          {"ISOMESH_WORKRS=3", "ISOMESH_WORKERS=4", "ISOMESH_TOKEN=for-clients", "ISOMESHER=1"});
+  EXPECT_EQ(told.status, 0) << told.errors;
+  EXPECT_THAT(told.errors, HasSubstr("ISOMESH_WORKRS"));
+  EXPECT_THAT(told.errors, HasSubstr("Did you mean ISOMESH_WORKERS?"));
+  EXPECT_EQ(std::ranges::count(told.errors, '\n'), 1) << told.errors;
 }
 
 // A daemon that ignored it would listen without tokens.
@@ -309,6 +325,35 @@ TEST(Drain, AJobThatTakesTooLongIsPutBack) {
   const Daemon next(folder / "data", "127.0.0.1:0");
   EXPECT_TRUE(eventually([&] { return next.client().job(job.id).state == JobState::kRunning; }));
   next.client().cancel(job.id);
+}
+
+// Ctrl-C in a terminal is for the whole process group of the daemon.
+TEST(Drain, CtrlCCountsNoAttempt) {
+  const TemporaryFolder folder;
+  Job job;
+  {
+    Daemon daemon(folder / "data", "127.0.0.1:0", {"--drain-seconds", "1"}, {"setsid"});
+    job = long_job(daemon);
+    ASSERT_EQ(::kill(-daemon.pid(), SIGINT), 0);
+    EXPECT_EQ(daemon.wait(), 0);
+    EXPECT_THAT(daemon.errors(), HasSubstr("they are stopped and put back"));
+    EXPECT_THAT(daemon.errors(), testing::Not(HasSubstr("attempt 1 failed")));
+  }
+  const Daemon next(folder / "data", "127.0.0.1:0");
+  EXPECT_TRUE(eventually([&] { return next.client().job(job.id).state == JobState::kRunning; }));
+  next.client().cancel(job.id);
+}
+
+// A start that waits, here for a database that says nothing.
+TEST(Start, SigtermEndsItBeforeItListens) {
+  const TemporaryFolder folder;
+  const net::Listener silent(net::parse_address("127.0.0.1:0"));
+  Process process({ISOMESHD, "--listen", "127.0.0.1:0", "--data", folder / "data", "--store",
+                   "postgresql://nobody@" + silent.authority() + "/isomesh"});
+  const Descriptor connection(::accept4(silent.descriptor(), nullptr, nullptr, SOCK_CLOEXEC));
+  process.send_signal(SIGTERM);
+  EXPECT_EQ(process.wait(), 0) << process.errors();
+  EXPECT_EQ(process.output(), "");
 }
 
 TEST(Drain, IsNotReadyAndAcceptsNothing) {

@@ -101,6 +101,15 @@ TEST_F(ResumeTest, TheFirstPartMayComeWithTheBeginning) {
   EXPECT_EQ(daemon_->send("PATCH", first.header("location"), rest, part(500, true)).status, 201);
 }
 
+TEST_F(ResumeTest, AnUploadAtOnceMayTellItsLengthWhichMustBeRight) {
+  const std::string size = std::to_string(raw_.bytes.size());
+  EXPECT_TRUE(blames(begin({{"Upload-Complete", "?2"}}, raw_.bytes), "Upload-Complete"));
+  EXPECT_TRUE(blames(begin({{"Upload-Complete", "?1"}, {"Upload-Length", size + "0"}}, raw_.bytes),
+                     "Upload-Length"));
+  EXPECT_TRUE(daemon_->client().volumes().empty());
+  EXPECT_EQ(begin({{"Upload-Complete", "?1"}, {"Upload-Length", size}}, raw_.bytes).status, 201);
+}
+
 TEST_F(ResumeTest, WhatCameBeforeAConnectionBrokeStays) {
   raw_ = long_upload();  // a small body is handed over when all of it is there
   const std::string place = begun();

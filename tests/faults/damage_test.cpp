@@ -105,5 +105,24 @@ TEST_F(Damage, NothingIsToldOfASpoiltVolume) {
   EXPECT_EQ(daemon().get(path + "/slice.png").status, 200);
 }
 
+TEST_F(Damage, ABrokenRecordHidesNoOtherVolume) {
+  start();
+  const Volume broken = small_volume();
+  const Volume whole = upload(daemon(), long_upload());
+  run_sql("UPDATE volumes SET record = '{\"id\": 3' WHERE id = '" + broken.id + "'");
+  for (const std::string query : {"", "?limit=1", "?order=newest", "?order=newest&limit=1"}) {
+    const Answer listed = daemon().get("/v1/volumes" + query);
+    EXPECT_EQ(listed.status, 200) << query;
+    EXPECT_THAT(listed.body, HasSubstr(whole.id)) << query;
+    EXPECT_THAT(listed.body, testing::Not(HasSubstr(broken.id))) << query;
+  }
+  EXPECT_THAT(daemon().errors(), HasSubstr("the record of volume " + broken.id + " is damaged"));
+  const Answer alone = daemon().get("/v1/volumes/" + broken.id);
+  EXPECT_EQ(alone.status, 500);
+  EXPECT_THAT(alone.body, HasSubstr("the record of this volume is damaged"));
+  EXPECT_EQ(daemon().send("DELETE", "/v1/volumes/" + broken.id).status, 204);
+  EXPECT_EQ(daemon().get("/v1/volumes/" + broken.id).status, 404);
+}
+
 }  // namespace
 }  // namespace isomesh

@@ -32,9 +32,10 @@ std::optional<Continuation> submit(App& app, const Request& request, Response& r
   const auto& callback = spec.parameters.callback;
   if (callback) app.services.callback_targets.check(callback->url);
   if (!spec.idempotency_key.empty()) spec.request_digest = sha256_of(body);
-  if (spec.parameters.labels) {
+  {
     // The first time the volume's labels are counted, which takes as long as reading it.
-    const auto place = place_for_upload(app, request);
+    const auto place =
+        spec.parameters.labels ? place_for_upload(app, request) : net::FairPlaces::Place();
     spec.parameters = settled(app, request, spec.parameters);
   }
   const Job job = submitted(app, spec, response);

@@ -21,7 +21,9 @@ constexpr const char* kOffset = "Upload-Offset";
 constexpr const char* kLength = "Upload-Length";
 constexpr const char* kPartType = "application/partial-upload";
 
-// Structured fields (RFC 9651); whatever is none counts as absent, as the draft wants it.
+[[noreturn]] void throw_no_boolean() { throw invalid_parameter(kComplete, "must be ?0 or ?1"); }
+
+// Structured fields (RFC 9651); empty for anything else.
 std::optional<bool> boolean_in(const Request& request, std::string_view header) {
   const std::string_view text = trimmed(request.header(header));
   if (text == "?1") return true;
@@ -104,7 +106,7 @@ void append(App& app, const Request& request, Response& response) {
                 std::string("the body's Content-Type must be ") + kPartType);
   }
   const auto is_last = boolean_in(request, kComplete);
-  if (!is_last) throw invalid_parameter(kComplete, "must be ?0 or ?1");
+  if (!is_last) throw_no_boolean();
   const auto offset = number_in(request, kOffset);
   if (!offset) throw invalid_parameter(kOffset, "must be a number of bytes");
   check_length(app, number_in(request, kLength), response);
@@ -133,7 +135,18 @@ void cancel(App& app, const Request& request, Response& response) {
 
 }  // namespace
 
-bool begins_upload(const Request& request) { return boolean_in(request, kComplete) == false; }
+bool begins_upload(const Request& request) {
+  const std::optional<bool> is_whole = boolean_in(request, kComplete);
+  if (!is_whole && request.has_header(kComplete)) throw_no_boolean();
+  return is_whole == false;
+}
+
+void check_told_length(const Request& request, std::optional<std::uint64_t> bytes) {
+  const std::optional<std::uint64_t> told = number_in(request, kLength);
+  if (!bytes || !told || *told == *bytes || boolean_in(request, kComplete) != true) return;
+  throw invalid_parameter(kLength, "is " + std::to_string(*told) + ", but the body has " +
+                                       std::to_string(*bytes) + " bytes");
+}
 
 void begin_upload(App& app, const Request& request, Response& response) {
   if (request.has_parameter("upload")) {

@@ -1,3 +1,5 @@
+#include <filesystem>
+
 #include "proto/json.h"
 #include "server/http/import_query.h"
 #include "server/http/observe/outcomes.h"
@@ -32,9 +34,13 @@ KeptBody body_of(App& app, const Request& request) {
     std::string name(request.parameter("upload"));
     return {app.kept.find(owner_of(request), name), std::move(name)};
   }
+  check_told_length(request, request.content_length);
   make_room_for(app, request.content_length.value_or(0));
   const auto upload = std::make_shared<const Upload>(app.services.folder, app.options.upload,
                                                      app.stopping, request);
+  if (!request.content_length) {
+    check_told_length(request, std::filesystem::file_size(upload->body().path));
+  }
   return {{upload, &upload->body()}, {}};
 }
 

@@ -1,7 +1,10 @@
 #include "server/store/sql/volume_store.h"
 
 #include <algorithm>
+#include <limits>
+#include <utility>
 
+#include "base/log.h"
 #include "proto/json.h"
 #include "server/store/microseconds.h"
 #include "server/store/sql/expiry.h"
@@ -21,7 +24,24 @@ struct Records {
   std::string listed;
 };
 
-// Empty when there is none.
+// Empty if the record cannot be read, as after damage or a change by hand. One such record must not
+// hide all others.
+std::optional<Volume> readable(const std::string& record, const std::string& id) {
+  try {
+    return volume_from_record(record);
+  } catch (const Error& error) {
+    log_error("the record of volume {} is damaged: it {}", id, error.what());
+    return std::nullopt;
+  }
+}
+
+[[noreturn]] void throw_damaged() {
+  constexpr const char* kReason =
+      "the record of this volume is damaged: restore it from a backup, or delete the volume";
+  throw Error(ErrorCode::kInternal, kReason, {{"id", kReason}});
+}
+
+// Empty when there is none. Throws Error kInternal if its record is damaged.
 std::optional<Volume> find(SqlConnection& connection, const Viewer& viewer, const std::string& id,
                            const char* lock = "") {
   Rows row = connection.query(
@@ -30,7 +50,9 @@ std::optional<Volume> find(SqlConnection& connection, const Viewer& viewer, cons
           lock,
       id, viewer);
   if (!row.next()) return std::nullopt;
-  return volume_from_record(row.text(0));
+  auto volume = readable(row.text(0), id);
+  if (!volume) throw_damaged();
+  return volume;
 }
 
 [[noreturn]] void throw_missing(SqlConnection& connection, const Viewer& viewer,
@@ -56,7 +78,9 @@ std::optional<Volume> use(SqlConnection& connection, const std::string& owner,
       "coalesce(labelled, record)",
       owner, id);
   if (!known.next()) return std::nullopt;
-  return volume_from_record(known.text(0));
+  auto volume = readable(known.text(0), id);
+  if (!volume) throw_damaged();
+  return volume;
 }
 
 bool insert(SqlConnection& connection, const std::string& owner, const Volume& volume,
@@ -120,18 +144,26 @@ bool SqlVolumeStore::contains(const Viewer& viewer, const std::string& id) const
 std::vector<Volume> SqlVolumeStore::list(const Viewer& viewer, const std::string& after,
                                          std::size_t limit, ListOrder order) const {
   const std::size_t space = after.find(' ');
-  const std::string id = space == std::string::npos ? "" : after.substr(space + 1);
+  std::string id = space == std::string::npos ? "" : after.substr(space + 1);
   const bool is_descending = order == ListOrder::kNewestFirst;
   const std::int64_t beginning = is_descending ? std::numeric_limits<std::int64_t>::max() : -1;
-  Rows rows =
-      database_.query(std::string("SELECT record FROM volumes WHERE ") +
-                          (viewer ? "owner = ?1" : "?1 IS NULL") + " AND (created, id) " +
-                          (is_descending ? "< (?2, ?3) ORDER BY created DESC, id DESC LIMIT ?4"
-                                         : "> (?2, ?3) ORDER BY created, id LIMIT ?4"),
-                      viewer, after.empty() ? beginning : us_of_timestamp(after.substr(0, space)),
-                      id, std::min<std::size_t>(limit, 1 << 30));
+  std::int64_t created = after.empty() ? beginning : us_of_timestamp(after.substr(0, space));
+  const std::string select = std::string("SELECT record, created, id FROM volumes WHERE ") +
+                             (viewer ? "owner = ?1" : "?1 IS NULL") + " AND (created, id) " +
+                             (is_descending ? "< (?2, ?3) ORDER BY created DESC, id DESC LIMIT ?4"
+                                            : "> (?2, ?3) ORDER BY created, id LIMIT ?4");
   std::vector<Volume> volumes;
-  while (rows.next()) volumes.push_back(volume_from_record(rows.text(0)));
+  // Again only if records were passed over: fewer than `limit` would mean that no more follow.
+  for (bool is_over = false; !is_over && volumes.size() < limit;) {
+    std::size_t left = std::min<std::size_t>(limit - volumes.size(), 1 << 30);
+    Rows rows = database_.query(select, viewer, created, id, left);
+    for (; rows.next(); --left) {
+      created = rows.integer(1);
+      id = rows.text(2);
+      if (auto volume = readable(rows.text(0), id)) volumes.push_back(*std::move(volume));
+    }
+    is_over = left > 0;
+  }
   return volumes;
 }
 
@@ -139,7 +171,15 @@ std::vector<Volume> SqlVolumeStore::list(const Viewer& viewer, const std::string
 void SqlVolumeStore::erase(const Viewer& viewer, const std::string& id) {
   database_.change(Change::kNeeded, [&](SqlTransaction& transaction) {
     SqlConnection& connection = transaction.connection();
-    if (!find(connection, viewer, id, connection.for_update())) {
+    // A damaged record can be erased, too, so it is not read.
+    const bool is_there =
+        connection
+            .query(std::string("SELECT 1 FROM volumes WHERE id = ?1 AND (?2 IS NULL OR owner = "
+                               "?2)") +
+                       connection.for_update(),
+                   id, viewer)
+            .next();
+    if (!is_there) {
       if (transaction.is_again()) return;
       throw_missing(connection, viewer, id);
     }

@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/command_line/closest.h"
 #include "base/command_line/help.h"
-#include "client/cli/argument_names.h"
 #include "client/cli/ids.h"
 #include "client/cli/options.h"
 #include "proto/json.h"
@@ -170,8 +170,8 @@ TEST_F(CommandLine, SuggestsWhatWasMeant) {
     EXPECT_EQ(status, kWrongUsage);
     EXPECT_THAT(text, HasSubstr(told));
   }
-  EXPECT_EQ(closest_to("lst", {"list", "labels"}), "list");
-  EXPECT_EQ(closest_to("x", {"y"}), "");
+  EXPECT_EQ(command_line::closest_to("lst", {"list", "labels"}), "list");
+  EXPECT_EQ(command_line::closest_to("x", {"y"}), "");
 }
 
 TEST_F(CommandLine, AListOfOutputsIsRejectedWithAHint) {

@@ -65,6 +65,14 @@ void stay_on_one_processor() {
   ::sched_setaffinity(0, sizeof(one), &one);
 }
 
+// Ctrl-C in a terminal reaches the daemon alone, which ends them.
+TEST(PreparedProcesses, AreInAProcessGroupOfTheirOwn) {
+  PreparedProcesses prepared(COPIED_PROGRAM, 1);
+  const Child child = prepared.take(soon());
+  EXPECT_NE(::getpgid(child.pid()), ::getpgrp());
+  EXPECT_NE(::getpgid(child.pid()), -1);
+}
+
 TEST(PreparedProcesses, EachIsACopyThatWasNeverUsed) {
   PreparedProcesses prepared(COPIED_PROGRAM, 2);
   std::set<pid_t> seen;

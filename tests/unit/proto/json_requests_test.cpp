@@ -370,5 +370,53 @@ TEST(JobBody, MembersOfNonUtf8NamesAreRefusedWithoutThem) {
   EXPECT_EQ(error->code(), ErrorCode::kInvalidParameter);
 }
 
+// The parser says no more of it than that the body is not JSON.
+TEST(JobBody, RefusesHalfOfASurrogatePairByItsMember) {
+  const auto names = [](const std::string& name) {
+    return R"({"volume": "a", "labels": "all", "label_names": {"7": ")" + name + "\"}}";
+  };
+  for (const std::string half :
+       {R"(\ud800)", R"(\uDFFF)", R"(a\ud83d)", R"(\ud83d\ud83d\ude00)", R"(\\\udc00)"}) {
+    EXPECT_THAT(faults_in(names(half)), ElementsAre("label_names.7")) << half;
+  }
+  for (const std::string whole :
+       {R"(\ud83d\ude00)", R"(\uD83D\uDE00!)", R"(\\ud800)", R"(\u0041)"}) {
+    EXPECT_NO_THROW(parse_job_parameters(names(whole))) << whole;
+  }
+  const auto error = thrown_by([&] { parse_job_parameters(names(R"(\ud800)")); });
+  EXPECT_THAT(error->what(), HasSubstr("half of a surrogate pair"));
+  EXPECT_THAT(faults_in(R"({"volume": "\ud800", "iso": 1})"), ElementsAre("volume"));
+  EXPECT_THAT(faults_in(R"({"volume": "a", "iso": 1, "formats": ["\udc00"]})"),
+              ElementsAre("formats"));
+  EXPECT_THAT(faults_in(R"({"volume": "a", "iso": 1, "\udc00": 1})").size(), 1U);
+  const auto renamed = thrown_by([] { parse_volume_name(R"({"name": "\ud800"})"); });
+  ASSERT_TRUE(renamed);
+  EXPECT_THAT(fields_of(*renamed), ElementsAre("name"));
+}
+
+// What the parser cannot read stays unreadable.
+TEST(JobBody, RefusesBrokenEscapes) {
+  for (const std::string broken : {R"(\u)", R"(\ud8)", R"(\ud80)", R"(\ud80g)", R"(\)"}) {
+    const auto error = thrown_by([&] { parse_job_parameters(R"({"volume": ")" + broken + "\"}"); });
+    ASSERT_TRUE(error) << broken;
+    EXPECT_THAT(error->what(), HasSubstr("one JSON object")) << broken;
+  }
+}
+
+TEST(JobBody, RefusesALabelThatIsSpelledTwice) {
+  EXPECT_THAT(
+      faults_in(R"({"volume": "a", "labels": "all", "label_names": {"1": "b", "01": "c"}})"),
+      ElementsAre("label_names.01"));
+  EXPECT_THAT(faults_in(R"({"volume": "a", "labels": "all", "label_values": {"-0": [1], "0": [2]},
+                            "background": 9})"),
+              ElementsAre("label_values.0"));
+}
+
+TEST(VolumeNameBody, RefusesAMemberThatIsGivenTwice) {
+  const auto error = thrown_by([] { parse_volume_name(R"({"name": "a", "name": "b"})"); });
+  ASSERT_TRUE(error);
+  EXPECT_THAT(fields_of(*error), ElementsAre("name"));
+}
+
 }  // namespace
 }  // namespace isomesh
