@@ -245,6 +245,11 @@ void visit(Is<LabelSummary> auto& self, auto&& field) {
   field("files", self.files);
 }
 
+void visit(Is<LabelListFile> auto& self, auto&& field) {
+  field("bytes", self.bytes);
+  field("sha256", self.sha256);
+}
+
 void visit(Is<MeshSummary> auto& self, auto&& field) {
   if (is_told(self, self.iso.has_value())) {
     field("iso", self.iso);
@@ -268,6 +273,12 @@ void visit(Is<MeshSummary> auto& self, auto&& field) {
   field("files", self.files);
   if (is_told(self, !self.labels.empty())) {
     field("labels", self.labels);
+  }
+  if (is_told(self, self.labels_count.has_value())) {
+    field("labels_count", self.labels_count);
+  }
+  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(self)>>) {
+    field("label_list", self.label_list);  // written by to_record() alone
   }
   if (is_told(self, self.certificate.has_value())) {
     field("certificate", self.certificate);

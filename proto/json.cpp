@@ -3,6 +3,41 @@
 #include "proto/json_values.h"
 
 namespace isomesh {
+namespace {
+
+template <class Map>
+void bound(Map& by_label) {
+  if (by_label.size() > MeshSummary::kMostListedLabels) by_label.clear();
+}
+
+bool is_long(const Job& job) {
+  constexpr std::size_t kMost = MeshSummary::kMostListedLabels;
+  const JobParameters& asked = job.parameters;
+  return (job.mesh && job.mesh->labels.size() > kMost) || asked.label_names.size() > kMost ||
+         asked.label_colors.size() > kMost || asked.label_values.size() > kMost;
+}
+
+// Answers say little of very many labels; their pages have a route of their own.
+Job bounded(Job job) {
+  bound(job.parameters.label_names);
+  bound(job.parameters.label_colors);
+  bound(job.parameters.label_values);
+  if (job.mesh && job.mesh->labels.size() > MeshSummary::kMostListedLabels) {
+    job.mesh->labels_count = job.mesh->labels.size();
+    job.mesh->labels.clear();
+  }
+  return job;
+}
+
+template <class T>
+std::string record_of(const T& value) {
+  JsonTree record;
+  json_values::write_record(record.root(), value);
+  return dump(record.root());
+}
+
+}  // namespace
+
 using json_values::from_record;
 using json_values::from_text;
 using json_values::object;
@@ -10,7 +45,6 @@ using json_values::page;
 using json_values::to_text;
 
 std::string to_json(const Volume& volume) { return to_text(volume); }
-std::string to_json(const Job& job) { return to_text(job); }
 std::string to_json(const JobParameters& parameters) { return to_text(parameters); }
 std::string to_json(const MeshParameters& parameters) { return to_text(parameters); }
 std::string to_json(const Problem& problem) { return to_text(problem); }
@@ -36,11 +70,14 @@ std::string volume_name_to_json(const std::optional<std::string>& name) {
   return object("name", name);
 }
 
-std::string to_record(const Volume& volume) {
-  JsonTree record;
-  json_values::write_record(record.root(), volume);
-  return dump(record.root());
+std::string to_json(const Job& job) { return is_long(job) ? to_text(bounded(job)) : to_text(job); }
+
+std::string to_json(const std::vector<LabelSummary>& labels, const std::string& next) {
+  return page("labels", labels, next);
 }
+
+std::string to_record(const Volume& volume) { return record_of(volume); }
+std::string to_record(const Job& job) { return record_of(job); }
 
 Volume volume_from_record(std::string_view text) { return from_record<Volume>(text); }
 Job job_from_record(std::string_view text) { return from_record<Job>(text); }
@@ -64,6 +101,10 @@ JobEvent job_event_from_json(std::string_view text) { return from_text<JobEvent>
 
 std::vector<Volume> volumes_from_json(std::string_view text) {
   return from_text<std::vector<Volume>>(text, "volumes");
+}
+
+std::vector<LabelSummary> labels_from_json(std::string_view text) {
+  return from_text<std::vector<LabelSummary>>(text, "labels");
 }
 
 std::vector<Job> jobs_from_json(std::string_view text) {

@@ -17,6 +17,8 @@ namespace isomesh {
 
 // Without what only its owner's record has, its labels.
 std::string to_json(const Volume& volume);
+// Without lists of more than MeshSummary::kMostListedLabels labels: `labels_count` replaces
+// `labels`, and a longer map of the parameters is empty.
 std::string to_json(const Job& job);
 std::string to_json(const JobParameters& parameters);
 std::string to_json(const MeshParameters& parameters);
@@ -33,6 +35,9 @@ std::string to_json(const std::vector<UploadedVolume>& volumes);
 // As a page of volumes, with "jobs".
 std::string to_json(const std::vector<Job>& jobs, const std::string& next = "");
 
+// As a page of volumes, with "labels".
+std::string to_json(const std::vector<LabelSummary>& labels, const std::string& next);
+
 // The body of PATCH /v1/volumes/{id}.
 std::string volume_name_to_json(const std::optional<std::string>& name);
 
@@ -48,11 +53,14 @@ Estimate estimate_from_json(std::string_view text);
 JobEvent job_event_from_json(std::string_view text);
 std::vector<Volume> volumes_from_json(std::string_view text);
 std::vector<Job> jobs_from_json(std::string_view text);
+std::vector<LabelSummary> labels_from_json(std::string_view text);
 
 // A volume as a store keeps it and as an import tells it: to_json() with its labels.
 std::string to_record(const Volume& volume);
+// A job as a store keeps it: whole, with the file of its labels.
+std::string to_record(const Job& job);
 
-// Reads what to_record(), or to_json() of a job or its timing, made in this version or an older
+// Reads what to_record(), or to_json() of a timing, made in this version or an older
 // one: members that it did not know yet have their defaults. Throws Error kInternal.
 Volume volume_from_record(std::string_view text);
 Job job_from_record(std::string_view text);

@@ -132,6 +132,14 @@ inline void write_record(Json& place, const Volume& volume) {
   if (!volume.labels.empty()) write_field(place, "labels", volume.labels);
 }
 
+// A job with the file of its labels.
+inline void write_record(Json& place, const Job& job) {
+  write(place, job);
+  if (job.mesh && job.mesh->label_list) {
+    write_field(member(place, "mesh"), "label_list", job.mesh->label_list);
+  }
+}
+
 // --- Reading -------------------------------------------------------------------------------------
 
 template <class T>

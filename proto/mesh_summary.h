@@ -54,6 +54,15 @@ struct LabelSummary {
   bool operator==(const LabelSummary&) const = default;
 };
 
+// The file that holds a job's labels when they are too many for its record
+// (server/jobs/label_pages.h).
+struct LabelListFile {
+  std::uint64_t bytes = 0;
+  std::string sha256;  // hex
+
+  bool operator==(const LabelListFile&) const = default;
+};
+
 // How a quantity is spread over the triangles of a mesh. All zero when there are none.
 struct Distribution {
   static constexpr std::size_t kBins = 20;
@@ -189,7 +198,12 @@ struct MeshSummary {
   Displacement displacement_mm;
   std::array<std::array<double, 3>, 2> bounds = {};  // smallest and largest corner; 0 when empty
   std::map<MeshFormat, MeshFile> files;
-  std::vector<LabelSummary> labels = {};  // ascending; of a job by labels
+  // Of a job by labels, ascending. Jobs with more than kMostListedLabels have their number and a
+  // file of them instead. Only records name that file.
+  std::vector<LabelSummary> labels = {};
+  std::optional<std::uint64_t> labels_count = {};
+  std::optional<LabelListFile> label_list = {};
+  static constexpr std::size_t kMostListedLabels = 256;
   std::optional<MeshCertificate> certificate = {};
 
   bool operator==(const MeshSummary&) const = default;

@@ -69,14 +69,14 @@ int submit(const Options& options, const std::stop_token& stop) {
   return kDone;
 }
 
-void show(const Job& job, bool json) {
-  std::cout << (json ? to_json(job) + '\n' : job_report(job));
+void show(Client& client, const Job& job, bool json) {
+  std::cout << (json ? to_json(job) + '\n' : job_report(with_labels(client, job)));
 }
 
 // Returns 0 for every state of the job.
 int status(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
-  show(client.job(job_id(client, options.id)), options.json);
+  show(client, client.job(job_id(client, options.id)), options.json);
   return kDone;
 }
 
@@ -84,7 +84,7 @@ int wait(const Options& options, const std::stop_token& stop) {
   Client client = client_of(options, stop);
   ProgressBar bar(!options.quiet);
   const Job job = wait(client, job_id(client, options.id), bar);
-  if (!options.quiet || options.json) show(job, options.json);
+  if (!options.quiet || options.json) show(client, job, options.json);
   std::optional<SampleRange> range;
   if (job.mesh && job.mesh->empty) {
     try {

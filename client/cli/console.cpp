@@ -135,6 +135,11 @@ Job wait(Client& client, const std::string& id, ProgressBar& bar) {
   return job;
 }
 
+Job with_labels(Client& client, Job job) {
+  if (job.mesh && job.mesh->labels_count) job.mesh->labels = client.job_labels(job.id);
+  return job;
+}
+
 void fetch(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
            std::optional<std::int64_t> label) {
   if (output.is_stdout()) return fetch_to_stdout(client, id, output, bar, label);

@@ -45,6 +45,9 @@ void tell_notes(const Volume& volume, const std::string& subject);
 // Without a terminal no progress is shown, so the client uses the longest polls.
 Job wait(Client& client, const std::string& id, ProgressBar& bar);
 
+// The job with all of its labels. A job with many labels is told without them.
+Job with_labels(Client& client, Job job);
+
 void fetch(Client& client, const std::string& id, const Output& output, ProgressBar& bar,
            std::optional<std::int64_t> label = std::nullopt);
 

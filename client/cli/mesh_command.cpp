@@ -221,7 +221,8 @@ class Run {
     std::string text = outputs_report(job, outputs);
     if (!is_one_of_many_) {
       if (job.reused) text += "\nthe mesh was reused from an identical earlier job\n";
-      text += '\n' + timing_report(job.timing, seen_) + '\n' + mesh_report(*job.mesh);
+      text += '\n' + timing_report(job.timing, seen_) + '\n' +
+              mesh_report(*with_labels(client_, job).mesh);
     }
     print(text);
   }

@@ -249,9 +249,27 @@ Job Client::follow(const std::string& id, const JobListener& listener) {
   return events.job() ? *events.job() : wait(id);
 }
 
+std::vector<LabelSummary> Client::job_labels(const std::string& id) {
+  std::vector<LabelSummary> labels;
+  std::string cursor;
+  do {
+    Query query;
+    if (!cursor.empty()) query.emplace_back("cursor", cursor);
+    const std::string body =
+        impl_->repeat({.target = job_path(id) + "/labels" + query_string(query)});
+    const std::vector<LabelSummary> page = labels_from_json(body);
+    labels.insert(labels.end(), page.begin(), page.end());
+    cursor = page.empty() ? "" : next_of(body);
+  } while (!cursor.empty());
+  return labels;
+}
+
 void Client::fetch(const std::string& id, MeshFormat format, const std::filesystem::path& target,
                    const TransferProgress& progress, std::optional<std::int64_t> label) {
-  const Job done = job(id);
+  Job done = job(id);
+  if (done.mesh && done.mesh->labels_count && (label || !done.mesh->files.contains(format))) {
+    done.mesh->labels = job_labels(id);
+  }
   Download download(file_of(done, format, label), target, progress);
   HttpRequest request{.target = mesh_path(path_segment(id), format, label)};
   request.sink = [&](std::string_view piece) { download.take(piece); };

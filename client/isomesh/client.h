@@ -162,6 +162,10 @@ class Client {
   // time and again. A stream that breaks is taken up where it broke.
   Job follow(const std::string& id, const JobListener& listener);
 
+  // The labels of a finished job, in ascending order: also if they are so many that the job tells
+  // only `labels_count`. Throws kNotReady, the job's own error or kCancelled as fetch() does.
+  std::vector<LabelSummary> job_labels(const std::string& id);
+
   // Writes the mesh of a finished job to `target`, which appears only when all of its bytes have
   // come and have the SHA-256 that the job states; a connection that breaks is taken up where it
   // broke. Throws kNotReady when the job is not done, the

@@ -129,6 +129,7 @@ void CostModel::learn(const Job& job, std::uint64_t samples, double spacing_mm) 
     add(share_, as_double(surface.triangles),
         as_double(extracted.triangles) * share_within(*job.parameters.max_error_mm, spacing_mm));
   }
+  if (job.mesh->labels_count) return;  // how many triangles their files have is not in the record
   const SurfaceSize in_files = surface_in_files(*job.mesh);
   for (const auto& [format, file] : job.mesh->files) {
     add(files_.try_emplace(format, kFewBytes).first->second, as_double(file.bytes),

@@ -50,12 +50,12 @@ struct JobProgress {
 
 // Tells that so many bytes follow the line, which are the next ones of a file.
 struct JobPiece {
-  std::size_t file = 0;  // of files_of(parameters)
+  std::size_t file = 0;  // of files_of(parameters); behind the last: the file of the labels
   std::size_t bytes = 0;
 };
 
 struct MadeMesh {
-  MeshSummary summary;  // without files
+  MeshSummary summary;  // without files; many labels are counted only
   Timing timing;
 };
 

@@ -24,8 +24,8 @@ constexpr milliseconds kGone{2000};
 constexpr milliseconds kPatience{300};
 // More than most lines, and enough at once for what is of a file.
 constexpr std::size_t kHeardBytes = std::size_t{256} << 10;
-// What is told of 65 535 labels with a file of each in every format takes some 70 MB.
-constexpr std::size_t kLongestLine = std::size_t{128} << 20;
+// The triangles of 65 535 labels take some 3 MB.
+constexpr std::size_t kLongestLine = std::size_t{16} << 20;
 // More than one process that ends before it begins is no accident.
 constexpr int kMostEarlyEnds = 3;
 

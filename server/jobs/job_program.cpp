@@ -23,6 +23,7 @@
 #include "base/niceness.h"
 #include "server/jobs/crop.h"
 #include "server/jobs/job_message.h"
+#include "server/jobs/label_pages.h"
 #include "server/jobs/make_labels.h"
 #include "server/jobs/make_mesh.h"
 #include "server/jobs/memory.h"
@@ -161,6 +162,20 @@ SampleArray array_of(const volume::CanonicalVolume& canonical) {
   return {header.type, header.dims, header.geometry, canonical.samples().data()};
 }
 
+codec::Sink sink_of(Speaker& speaker, std::size_t file) {
+  return [&speaker, file](std::span<const std::byte> bytes) {
+    speaker.say(JobPiece{file, bytes.size()}, bytes);
+  };
+}
+
+// Sends many labels as a file, since a job's record is read often.
+void send_many_labels(Speaker& speaker, std::size_t file, MeshSummary& summary) {
+  if (summary.labels.size() <= MeshSummary::kMostListedLabels) return;
+  write_label_pages(summary.labels, sink_of(speaker, file));
+  summary.labels_count = summary.labels.size();
+  summary.labels.clear();
+}
+
 MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspace& workspace) {
   const JobOrder& order = task.order;
   Reporter reporter(speaker);
@@ -173,9 +188,7 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspac
   canonical.preload();
   std::vector<codec::Sink> sinks;
   for (std::size_t i = 0; i < files_of(order.parameters).size(); ++i) {
-    sinks.emplace_back([&speaker, i](std::span<const std::byte> bytes) {
-      speaker.say(JobPiece{i, bytes.size()}, bytes);
-    });
+    sinks.push_back(sink_of(speaker, i));
   }
   std::optional<mesh::OneThread> alone;
   if (canonical.header().sample_bytes() <= kFewSampleBytes) alone.emplace();
@@ -191,6 +204,7 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspac
   made.summary = order.parameters.labels
                      ? make_labels(samples, request, sinks, progress, workspace.walls)
                      : make_mesh(samples, request, sinks, progress, workspace.mesh);
+  send_many_labels(speaker, sinks.size(), made.summary);
   progress.end_stage();
   made.timing = progress.timing();
   return made;

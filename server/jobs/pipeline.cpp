@@ -37,7 +37,8 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
   std::vector<std::unique_ptr<store::BlobWriter>> writers;
   std::vector<codec::Sink> sinks;
   const std::vector<MeshFormat> files = files_of(parameters);
-  for (std::size_t i = 0; i < files.size(); ++i) {
+  // One more than files: for the labels, if they are many.
+  for (std::size_t i = 0; i <= files.size(); ++i) {
     store::BlobWriter& writer = *writers.emplace_back(blobs.begin());
     sinks.emplace_back([&writer](std::span<const std::byte> bytes) { writer.write(bytes); });
   }
@@ -59,9 +60,13 @@ PipelineResult run_pipeline(const Volume& volume, const JobParameters& parameter
                                  [&] { return process.make(order, sinks, stop, pass_on); });
   const auto stored = Clock::now();
   PipelineResult result = {std::move(made.summary), with_checking(made.timing)};
-  for (std::size_t i = 0; i < writers.size(); ++i) {
+  for (std::size_t i = 0; i < files.size(); ++i) {
     const store::Blob blob = writers[i]->commit();
     result.mesh.files[files[i]] = {blob.bytes, blob.key, ""};
+  }
+  if (result.mesh.labels_count) {
+    const store::Blob blob = writers.back()->commit();
+    result.mesh.label_list = {blob.bytes, blob.key};
   }
   result.timing.encode += milliseconds_since(stored);
   report(Stage::kEncode, 1, result.timing);

@@ -11,6 +11,7 @@
 #include "proto/parameters.h"
 #include "server/dicom/encapsulated_stl.h"
 #include "server/dicom/uid.h"
+#include "server/jobs/label_pages.h"
 
 namespace isomesh::orders {
 namespace {
@@ -25,7 +26,7 @@ struct Part {
   std::string sha256;
 };
 
-std::vector<Part> parts_of(const Job& job) {
+std::vector<Part> parts_of(const Job& job, const store::BlobStore& blobs) {
   std::vector<Part> parts;
   if (!job.mesh) return parts;
   const auto& files = job.mesh->files;
@@ -35,15 +36,19 @@ std::vector<Part> parts_of(const Job& job) {
   }
   const auto zip = files.find(MeshFormat::kZip);
   if (zip == files.end()) return parts;
-  for (const LabelSummary& label : job.mesh->labels) {
-    const auto stl = label.files.find(MeshFormat::kStl);
-    if (stl == label.files.end() || label.triangles == 0) continue;
-    parts.push_back({.label = label.label,
-                     .name = label.name.value_or("Label " + std::to_string(label.label)),
-                     .blob = zip->second.sha256,
-                     .offset = stl->second.offset,
-                     .bytes = stl->second.bytes,
-                     .sha256 = stl->second.sha256});
+  const jobs::JobLabels labels(job, blobs);
+  std::vector<LabelSummary> page = labels.after(std::nullopt);
+  for (; !page.empty(); page = labels.after(page.back().label)) {
+    for (const LabelSummary& label : page) {
+      const auto stl = label.files.find(MeshFormat::kStl);
+      if (stl == label.files.end() || label.triangles == 0) continue;
+      parts.push_back({.label = label.label,
+                       .name = label.name.value_or("Label " + std::to_string(label.label)),
+                       .blob = zip->second.sha256,
+                       .offset = stl->second.offset,
+                       .bytes = stl->second.bytes,
+                       .sha256 = stl->second.sha256});
+    }
   }
   return parts;
 }
@@ -136,8 +141,8 @@ void write(const std::string& text, store::BlobWriter& to) {
 }
 
 // Throws where there is none.
-std::vector<Part> parts_of_surface(const Job& job) {
-  std::vector<Part> parts = parts_of(job);
+std::vector<Part> parts_of_surface(const Job& job, const store::BlobStore& blobs) {
+  std::vector<Part> parts = parts_of(job, blobs);
   if (job.mesh && job.mesh->triangles > 0 && !parts.empty()) return parts;
   throw Error(ErrorCode::kUnusableVolume, "the surface is empty");
 }
@@ -205,7 +210,7 @@ std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job
                                      std::chrono::system_clock::time_point made,
                                      const store::BlobStore& blobs) {
   std::vector<MadeObject> objects;
-  for (const Part& part : parts_of_surface(job)) {
+  for (const Part& part : parts_of_surface(job, blobs)) {
     MadeObject object;
     const dicom::StlEnvelope envelope = envelope_of(record, job, part, station_name, made, object);
     const std::uint64_t bytes = bytes_of(envelope, part);
@@ -222,11 +227,12 @@ std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job
 
 std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record, const Job& job,
                                                 const std::string& station_name,
-                                                std::uint64_t most_bytes) {
+                                                std::uint64_t most_bytes,
+                                                const store::BlobStore& blobs) {
   // An STL file has so many for each triangle.
   constexpr std::uint64_t kTriangleBytes = 50;
   double share = 1;
-  for (const Part& part : parts_of_surface(job)) {
+  for (const Part& part : parts_of_surface(job, blobs)) {
     MadeObject object;
     const dicom::StlEnvelope envelope = envelope_of(record, job, part, station_name, {}, object);
     const std::uint64_t bytes = bytes_of(envelope, part);
@@ -245,7 +251,9 @@ std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record
 }
 
 bool can_make_objects(const Job& job, const store::BlobStore& blobs) {
-  const std::vector<Part> parts = parts_of(job);
+  const auto& list = job.mesh ? job.mesh->label_list : std::nullopt;
+  if (list && !store::is_there_and_intact(blobs, list->sha256, {})) return false;
+  const std::vector<Part> parts = parts_of(job, blobs);
   return std::ranges::all_of(
       parts, [&](const Part& part) { return store::is_there_and_intact(blobs, part.blob, {}); });
 }

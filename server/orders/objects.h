@@ -39,7 +39,8 @@ Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range)
 // when none has. Throws Error kTooLarge when not even one triangle fits.
 std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record, const Job& job,
                                                 const std::string& station_name,
-                                                std::uint64_t most_bytes);
+                                                std::uint64_t most_bytes,
+                                                const store::BlobStore& blobs);
 
 // Whether the files that objects are made of are there as they were written.
 bool can_make_objects(const Job& job, const store::BlobStore& blobs);

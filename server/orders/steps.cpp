@@ -242,7 +242,8 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
       if (pacs != nullptr) most_bytes = std::min(most_bytes, pacs->max_send_bytes);
     }
     if (record.work.max_error_mm && !record.work.triangles) {
-      const auto triangles = triangles_that_fit(record, job, hospital_.station_name, most_bytes);
+      const auto triangles =
+          triangles_that_fit(record, job, hospital_.station_name, most_bytes, services_.blobs);
       if (triangles) {
         record.work.triangles = *triangles;
         record.order.job.reset();

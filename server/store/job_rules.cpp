@@ -74,22 +74,25 @@ void give_mesh(Job& job, const MeshSummary& mesh) {
   }
 }
 
+std::vector<Blob> blobs_of(const MeshSummary& mesh) {
+  std::vector<Blob> blobs;
+  for (const auto& [format, file] : mesh.files) blobs.push_back({file.sha256, file.bytes});
+  if (mesh.label_list) blobs.push_back({mesh.label_list->sha256, mesh.label_list->bytes});
+  return blobs;
+}
+
 bool have_same_blobs(const MeshSummary& one, const MeshSummary& other) {
-  return std::ranges::equal(
-      one.files, other.files, {}, [](const auto& file) { return file.second.sha256; },
-      [](const auto& file) { return file.second.sha256; });
+  return std::ranges::equal(blobs_of(one), blobs_of(other), {}, &Blob::key, &Blob::key);
 }
 
 bool is_there(const MeshSummary& mesh, const BlobStore& blobs) {
-  return std::ranges::all_of(mesh.files, [&](const auto& named) {
-    return blobs.size(named.second.sha256) == named.second.bytes;
-  });
+  return std::ranges::all_of(blobs_of(mesh),
+                             [&](const Blob& blob) { return blobs.size(blob.key) == blob.bytes; });
 }
 
 bool is_intact(const MeshSummary& mesh, const BlobStore& blobs) {
-  return std::ranges::all_of(mesh.files, [&](const auto& named) {
-    return is_there_and_intact(blobs, named.second.sha256, {});
-  });
+  return std::ranges::all_of(
+      blobs_of(mesh), [&](const Blob& blob) { return is_there_and_intact(blobs, blob.key, {}); });
 }
 
 void throw_other_version() {

@@ -46,6 +46,9 @@ void give_progress(Job& job, const Progress& progress);
 // The job has that mesh.
 void give_mesh(Job& job, const MeshSummary& mesh);
 
+// The blobs that the mesh is in: its files, and the file of its labels.
+std::vector<Blob> blobs_of(const MeshSummary& mesh);
+
 // Whether two meshes are in the same blobs.
 bool have_same_blobs(const MeshSummary& one, const MeshSummary& other);
 

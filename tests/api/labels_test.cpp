@@ -158,6 +158,103 @@ TEST_F(LabelsTest, OneRequestMakesAFileOfAllLabels) {
   EXPECT_EQ(mesh_of("labels=all&format=stl").status, 400);
 }
 
+// Labels 1 to 1000, each of as many voxels as its number has digits.
+class ManyLabelsTest : public LabelsTest {
+ protected:
+  static constexpr std::int64_t kLabels = 1000;
+
+  static RawUpload thousand_labels() {
+    auto volume = constant<std::uint16_t>(0, {20, 20, 20});
+    std::size_t at = 0;
+    for (std::int64_t label = 1; label <= kLabels; ++label) {
+      for (std::size_t n = 0; n < std::to_string(label).size(); ++n) {
+        volume.samples[at++] = static_cast<std::uint16_t>(label);
+      }
+    }
+    return {bytes_of(volume.samples), "dims=20,20,20&type=uint16", {}};
+  }
+
+  Answer page(const std::string& query = {}) const {
+    return daemon_.get("/v1/jobs/" + job_.id + "/labels" + query);
+  }
+
+  Job made_of_many() const {
+    const Answer answer =
+        post(R"("labels": "all", "formats": ["stl"], "label_names": {"700": "x"})",
+             upload(daemon_, thousand_labels()).id);
+    EXPECT_EQ(answer.status, 202) << answer.body;
+    return daemon_.client().wait(job_from_json(answer.body).id);
+  }
+
+  const Job job_ = made_of_many();
+};
+
+TEST_F(ManyLabelsTest, AreListedInPages) {
+  ASSERT_EQ(job_.state, JobState::kSucceeded) << to_json(job_);
+  std::int64_t last = 0;
+  std::size_t pages = 0;
+  std::string query;
+  do {
+    const Answer answer = page(query);
+    ASSERT_EQ(answer.status, 200) << answer.body;
+    const auto labels = labels_from_json(answer.body);
+    EXPECT_EQ(labels.size(), ++pages < 4 ? 256U : 232U);
+    for (const LabelSummary& label : labels) {
+      EXPECT_EQ(label.label, ++last);
+      EXPECT_EQ(label.voxels, std::to_string(label.label).size());
+      EXPECT_EQ(label.name.has_value(), label.label == 700);
+      EXPECT_EQ(label.files.at(MeshFormat::kStl).href,
+                "/v1/jobs/" + job_.id + "/mesh.stl?label=" + std::to_string(label.label));
+    }
+    const json next = json::parse(answer.body)["next"];
+    query = next.is_null() ? "" : "?cursor=" + next.get<std::string>();
+  } while (!query.empty());
+  EXPECT_EQ(last, kLabels);
+  EXPECT_EQ(pages, 4U);
+  for (const char* wrong : {"?cursor=", "?cursor=1", "?cursor=6c6162656c733a78", "?x=1"}) {
+    EXPECT_EQ(page(wrong).status, 400) << wrong;
+  }
+}
+
+TEST_F(ManyLabelsTest, MakeNoAnswerLong) {
+  for (const std::string path : {"", "?wait=1", "/events"}) {
+    const Answer answer = daemon_.get("/v1/jobs/" + job_.id + path);
+    EXPECT_THAT(answer.body, HasSubstr("\"labels_count\":1000")) << path;
+    EXPECT_LT(answer.body.size(), std::size_t{64} << 10) << path;
+    EXPECT_EQ(answer.body.find("label_list"), std::string::npos) << path;
+  }
+  const json mesh = json::parse(daemon_.get("/v1/jobs/" + job_.id).body)["mesh"];
+  EXPECT_FALSE(mesh.contains("labels"));
+}
+
+TEST_F(ManyLabelsTest, HaveFilesOfTheirOwn) {
+  const Answer file = mesh(job_, "stl?label=700");
+  EXPECT_EQ(file.status, 200);
+  const Answer etag = page("?cursor=" + json::parse(page().body)["next"].get<std::string>());
+  EXPECT_EQ(labels_from_json(etag.body).front().label, 257);
+  EXPECT_EQ(mesh(job_, "stl?label=1001").status, 400);
+  EXPECT_THAT(mesh(job_, "stl").body, HasSubstr("50 and 950 more"));
+  EXPECT_EQ(mesh(job_, "ply").status, 404);
+  const TemporaryFolder folder;
+  daemon_.client().fetch(job_.id, MeshFormat::kStl, folder / "700.stl", {}, 700);
+  EXPECT_EQ(read_file(folder / "700.stl"), file.body);
+  const Finished report = daemon_.command({"status", job_.id});
+  EXPECT_EQ(report.status, 0) << report.errors;
+  EXPECT_THAT(report.output, HasSubstr(" 700  x "));
+  EXPECT_THAT(report.output, HasSubstr(" 1000  "));
+}
+
+TEST_F(LabelsTest, FewAreAPageToo) {
+  const Job job = made(R"("labels": "all", "formats": ["stl"])");
+  const Answer answer = daemon_.get("/v1/jobs/" + job.id + "/labels");
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(labels_from_json(answer.body), job.mesh->labels);
+  EXPECT_TRUE(json::parse(answer.body)["next"].is_null());
+  const Answer none = daemon_.get("/v1/jobs/" + finished_job(daemon_).id + "/labels");
+  EXPECT_EQ(none.status, 200);
+  EXPECT_TRUE(labels_from_json(none.body).empty());
+}
+
 TEST_F(LabelsTest, TheCommandWritesThem) {
   const TemporaryFolder folder;
   write_file(folder / "balls.raw", balls_.bytes);

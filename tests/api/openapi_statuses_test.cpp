@@ -179,6 +179,17 @@ void probe_jobs(Statuses& statuses, const Job& job) {
   statuses.listen("GET /v1/events", "/v1/events?x=1");
 }
 
+void probe_job_labels(Statuses& statuses, const Job& job, const Job& running) {
+  const std::string get = "GET /v1/jobs/{id}/labels";
+  const std::string list = "/v1/jobs/" + job.id + "/labels";
+  statuses.probe(get, list);
+  statuses.probe(get, list + "?cursor=x");
+  statuses.probe(get, "/v1/jobs/0123/labels");
+  statuses.probe(get, "/v1/jobs/" + running.id + "/labels");
+  statuses.probe(get, list, {}, {{"If-None-Match", "*"}});
+  statuses.probe(get, list, {}, {{"If-Match", "\"x\""}});
+}
+
 void probe_meshes(Statuses& statuses, const Job& job, const Job& running) {
   const std::string get = "GET /v1/jobs/{id}/mesh.{format}";
   const std::string mesh = "/v1/jobs/" + job.id + "/mesh.drc";
@@ -261,6 +272,7 @@ TEST_F(OpenApiTest, TheStatusesAreThoseOfTheServer) {
   const Job running = long_job(daemon_);
   Statuses statuses(daemon_);
   probe_jobs(statuses, job_);
+  probe_job_labels(statuses, job_, running);
   probe_meshes(statuses, job_, running);
   probe_volumes(statuses, running, job_.parameters.volume);
   probe_uploads(statuses, daemon_);

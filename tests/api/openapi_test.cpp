@@ -185,6 +185,9 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
   by_labels.mesh->labels = {{.label = 3, .voxels = 1}};
   const std::string digest(64, 'a');
   by_labels.mesh->labels[0].files[MeshFormat::kStl] = {.bytes = 1, .sha256 = digest, .href = "/x"};
+  Job many_labels = by_labels;
+  many_labels.mesh->labels.clear();
+  many_labels.mesh->labels_count = 257;
   Estimate of_labels = estimate;
   of_labels.labels = {{3, 12}};
   Volume volume = daemon_.client().volume(job_.parameters.volume);
@@ -208,6 +211,8 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
       {"VolumeLabels", to_json(VolumeLabels{"", 0, {{.label = 1, .voxels = 1}}})},
       {"Estimate", to_json(estimate)},
       {"Job", to_json(by_labels)},
+      {"Job", to_json(many_labels)},
+      {"LabelSummaryList", to_json(by_labels.mesh->labels, "next")},
       {"JobParameters", to_json(by_labels.parameters)},
       {"JobList", to_json(std::vector{by_labels})},
       {"Estimate", to_json(of_labels)},

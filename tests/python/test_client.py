@@ -142,6 +142,18 @@ class Jobs(DaemonTest):
         with self.assertRaisesRegex(ValueError, "of the label 9"):
             self.client.download(job, self.folder / "9.stl", label=9)
 
+    def test_many_labels_are_listed_in_pages(self):
+        samples = numpy.arange(343, dtype="uint16").reshape(7, 7, 7)
+        job = self.client.wait(self.client.submit(self.client.upload(samples), labels="all", formats=["stl"]))
+        self.assertNotIn("labels", job["mesh"])
+        self.assertEqual(job["mesh"]["labels_count"], 342)
+        labels = list(self.client.job_labels(job))
+        self.assertEqual([each["label"] for each in labels], list(range(1, 343)))
+        size = self.client.download(job, self.folder / "300.stl", label=300).stat().st_size
+        self.assertEqual(size, 84 + 50 * labels[299]["triangles"])
+        with self.assertRaisesRegex(ValueError, "of the label 999"):
+            self.client.download(job, self.folder / "999.stl", label=999)
+
     def test_parameters_that_are_wrong_are_named(self):
         volume = self.client.upload(ball())
         for parameters, text in (

@@ -8,6 +8,7 @@
 
 #include "base/log.h"
 #include "base/sha256.h"
+#include "base/text.h"
 #include "proto/fields.h"
 #include "proto/json.h"
 #include "server/codec/encode.h"
@@ -16,6 +17,7 @@
 #include "server/http/observe/outcomes.h"
 #include "server/http/request_values.h"
 #include "server/http/routes/routes.h"
+#include "server/jobs/label_pages.h"
 
 namespace isomesh::http {
 namespace {
@@ -111,37 +113,57 @@ struct Stored {
   std::string name;  // for those who save it
 };
 
-std::string listed_labels(const std::vector<LabelSummary>& labels) {
+// Has a damaged blob made again, and says what becomes of that.
+void check_intact(const App& app, const Job& job, const std::string& blob) {
+  if (store::is_there_and_intact(app.services.blobs, blob, {})) return;
+  log_error("the stored mesh of job {} is damaged", job.id);
+  const Job again = app.services.jobs.remake(job.id);
+  if (again.error) throw to_error(*again.error);
+  throw Error(ErrorCode::kUnavailable, "the stored mesh was damaged and is being made again");
+}
+
+jobs::JobLabels labels_of(const App& app, const Job& job) {
+  if (job.mesh->label_list) check_intact(app, job, job.mesh->label_list->sha256);
+  return {job, app.services.blobs};
+}
+
+std::string listed_labels(const jobs::JobLabels& labels) {
   constexpr std::size_t kMostNamed = 50;
+  const std::vector<LabelSummary> first = labels.after(std::nullopt);
+  const std::size_t named = std::min(first.size(), kMostNamed);
   std::string text;
-  for (std::size_t n = 0; n < std::min(labels.size(), kMostNamed); ++n) {
-    text += (n == 0 ? "" : ", ") + std::to_string(labels[n].label);
-    if (labels[n].name) text += " (" + *labels[n].name + ')';
+  for (std::size_t n = 0; n < named; ++n) {
+    text += (n == 0 ? "" : ", ") + std::to_string(first[n].label);
+    if (first[n].name) text += " (" + *first[n].name + ')';
   }
-  const std::size_t more = labels.size() - std::min(labels.size(), kMostNamed);
+  const std::uint64_t more = labels.count() - named;
   return more == 0 ? text : text + " and " + std::to_string(more) + " more";
 }
 
-const LabelSummary& label_of(const MeshSummary& mesh, const WhichMesh& which) {
-  if (mesh.labels.empty()) throw invalid_parameter("label", "applies only to jobs with `labels`");
-  if (!which.label && mesh.labels.size() == 1) return mesh.labels.front();
-  const auto found = std::ranges::find(mesh.labels, which.label.value_or(0), &LabelSummary::label);
-  if (!which.label || found == mesh.labels.end()) {
-    throw invalid_parameter("label", "must be one of " + listed_labels(mesh.labels));
-  }
+LabelSummary label_of(const jobs::JobLabels& labels, const WhichMesh& which) {
+  if (labels.count() == 0) throw invalid_parameter("label", "applies only to jobs with `labels`");
+  if (!which.label && labels.count() == 1) return labels.after(std::nullopt).front();
+  const auto found = which.label ? labels.find(*which.label) : std::nullopt;
+  if (!found) throw invalid_parameter("label", "must be one of " + listed_labels(labels));
   return *found;
 }
 
-Stored stored_mesh(const MeshSummary& mesh, const WhichMesh& which) {
+// Whether each label has a file of that format.
+bool is_zipped(const jobs::JobLabels& labels, MeshFormat format) {
+  return labels.count() > 0 && labels.after(std::nullopt).front().files.contains(format);
+}
+
+Stored stored_mesh(const App& app, const Job& job, const WhichMesh& which) {
+  const MeshSummary& mesh = *job.mesh;
   const std::string suffix(to_string(which.format));
   const auto whole = mesh.files.find(which.format);
   if (!which.label && whole != mesh.files.end()) {
     const MeshFile& file = whole->second;
     return {file.sha256, 0, file.bytes, file.sha256, "mesh." + suffix};
   }
-  const auto zipped = [&](const LabelSummary& label) { return label.files.contains(which.format); };
-  if (which.label || std::ranges::any_of(mesh.labels, zipped)) {
-    const LabelSummary& label = label_of(mesh, which);
+  const jobs::JobLabels labels = labels_of(app, job);
+  if (which.label || is_zipped(labels, which.format)) {
+    const LabelSummary label = label_of(labels, which);
     if (const auto found = label.files.find(which.format); found != label.files.end()) {
       const LabelFile& file = found->second;
       return {mesh.files.at(MeshFormat::kZip).sha256, file.offset, file.bytes, file.sha256,
@@ -150,15 +172,6 @@ Stored stored_mesh(const MeshSummary& mesh, const WhichMesh& which) {
   }
   throw Error(ErrorCode::kNotFound, "the job was submitted without the format \"" + suffix + '"' +
                                         (which.label ? " for each label" : ""));
-}
-
-// Has a damaged file made again, and says what becomes of that.
-void check_intact(const App& app, const Job& job, const Stored& file) {
-  if (store::is_there_and_intact(app.services.blobs, file.blob, {})) return;
-  log_error("the stored mesh of job {} is damaged", job.id);
-  const Job again = app.services.jobs.remake(job.id);
-  if (again.error) throw to_error(*again.error);
-  throw Error(ErrorCode::kUnavailable, "the stored mesh was damaged and is being made again");
 }
 
 // Where the whole of a blob can be had without this daemon, for a client that asks for that.
@@ -174,10 +187,7 @@ std::optional<std::string> link_to(const App& app, const Request& request, const
       {.name = file.name, .media_type = std::string(codec::describe(format).media_type)});
 }
 
-}  // namespace
-
-void answer_mesh(const App& app, const Request& request, Response& response, const Job& job,
-                 const WhichMesh& which) {
+void check_has_mesh(const Job& job) {
   if (job.error) throw to_error(*job.error);
   if (job.state == JobState::kCancelled) {
     throw Error(ErrorCode::kCancelled, "the job was cancelled and has no mesh");
@@ -186,7 +196,30 @@ void answer_mesh(const App& app, const Request& request, Response& response, con
     throw Error(ErrorCode::kNotReady,
                 "the job is " + std::string(to_string(job.state)) + ": its mesh is not ready");
   }
-  const Stored file = stored_mesh(*job.mesh, which);
+}
+
+// A page of a job's labels. The labels of a mesh do not change.
+void list_labels(const App& app, const Request& request, Response& response) {
+  constexpr const char* kCursor = "labels";
+  check_known(request, {"cursor"});
+  const std::string after = id_after(request, kCursor);
+  const auto last = parse_int64(after);
+  if (!after.empty() && !last) throw wrong_cursor();
+  const Job job = app.services.jobs.get(viewer_of(request), request.path_parameter("id"));
+  check_has_mesh(job);
+  const jobs::JobLabels labels = labels_of(app, job);
+  const std::vector<LabelSummary> page = labels.after(last);
+  const bool has_more = !page.empty() && !labels.after(page.back().label).empty();
+  const std::string next = has_more ? cursor_after(kCursor, std::to_string(page.back().label)) : "";
+  answer_tagged_json(request, response, to_json(page, next));
+}
+
+}  // namespace
+
+void answer_mesh(const App& app, const Request& request, Response& response, const Job& job,
+                 const WhichMesh& which) {
+  check_has_mesh(job);
+  const Stored file = stored_mesh(app, job, which);
   const std::string etag = '"' + file.sha256 + '"';
   const bool is_read = request.method != "POST";
   if (is_read) check_if_match(request, etag);
@@ -208,7 +241,7 @@ void answer_mesh(const App& app, const Request& request, Response& response, con
     response.set_header("Preference-Applied", "redirect");
     return;
   }
-  check_intact(app, job, file);
+  check_intact(app, job, file.blob);
   const ByteRange range = part.value_or(ByteRange{0, file.bytes});
   response.status = part ? 206 : 200;
   if (part) {
@@ -235,6 +268,9 @@ void add_mesh_routes(App& app) {
     if (request.has_parameter("label")) which.label = whole_number_of(request, "label", 0);
     answer_mesh(app, request, response,
                 app.services.jobs.get(viewer_of(request), request.path_parameter("id")), which);
+  });
+  add_computed_get(app, "/v1/jobs/{id}/labels", [&app](const auto& request, auto& response) {
+    list_labels(app, request, response);
   });
   add_post(app, "/v1/mesh", [&app](const auto& request, auto& response) {
     return mesh_in_one(app, request, response);

@@ -37,11 +37,11 @@ std::string text_of(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-Json blobs_of(const MeshSummary* mesh) {
+Json blobs_told(const MeshSummary* mesh) {
   Json blobs = Json::array();
   if (mesh == nullptr) return blobs;
-  for (const auto& [format, file] : mesh->files) {
-    blobs.push_back({{"blob", file.sha256}, {"bytes", file.bytes}});
+  for (const Blob& blob : blobs_of(*mesh)) {
+    blobs.push_back({{"blob", blob.key}, {"bytes", blob.bytes}});
   }
   return blobs;
 }
@@ -94,11 +94,11 @@ std::optional<Submission> PostgresJobStore::try_to_submit(const JobSpec& spec, J
       {"url", callback ? Json(callback->url) : Json()},
       {"idempotency_key", spec.idempotency_key.empty() ? Json() : Json(spec.idempotency_key)},
       {"request_digest", spec.request_digest},
-      {"record", to_json(job)},
+      {"record", to_record(job)},
       {"node", database_.node()},
       {"latest", made ? Json(made->job) : Json()},
       {"reuses", mesh != nullptr},
-      {"blobs", blobs_of(mesh)},
+      {"blobs", blobs_told(mesh)},
       {"most", refusing_ || !has_room ? 0 : options_.max_queued},
       {"has_share",
        database_.read([&](SqlConnection& connection) { return has_share(connection, spec); })}};
@@ -211,7 +211,7 @@ bool PostgresJobStore::finish(const Lease& lease, const Outcome& outcome) {
   job.timing = outcome.timing;
   job.timing.queue = run->job.timing.queue;
   Ending ending;
-  ending.cancelled = to_json(cancelled(job, run->accepted));
+  ending.cancelled = to_record(cancelled(job, run->accepted));
   if (!outcome.mesh && !outcome.error) {
     ending.state = JobState::kCancelled;
     ending.record = ending.cancelled;
@@ -228,11 +228,11 @@ bool PostgresJobStore::finish(const Lease& lease, const Outcome& outcome) {
   }
   if (ending.state == JobState::kSucceeded || ending.state == JobState::kFailed) {
     end(job, ending.state, run->accepted, now);
-    ending.record = to_json(job);
+    ending.record = to_record(job);
   }
   if (!end_run(lease.id, lease.fence, ending)) return false;
   if (outcome.mesh) {
-    for (const auto& [format, file] : outcome.mesh->files) blobs_.settle(file.sha256);
+    for (const Blob& blob : blobs_of(*outcome.mesh)) blobs_.settle(blob.key);
   }
   return true;
 }
@@ -242,7 +242,7 @@ bool PostgresJobStore::put_back(const Lease& lease, std::chrono::milliseconds de
   const auto run = live_run(lease);
   if (!run) return false;
   Ending ending;
-  ending.cancelled = to_json(cancelled(run->job, run->accepted));
+  ending.cancelled = to_record(cancelled(run->job, run->accepted));
   ending.delay = delay;
   ending.waiting_for = waiting_for;
   return end_run(lease.id, lease.fence, ending);
@@ -259,7 +259,7 @@ std::size_t PostgresJobStore::reap() {
     const Row row = row_of(rows);
     Ending ending;
     ending.ends_others = true;
-    ending.cancelled = to_json(cancelled(row.job, row.accepted));
+    ending.cancelled = to_record(cancelled(row.job, row.accepted));
     if (end_run(row.job.id, row.fence, ending)) ++reaped;
   }
   return reaped;
@@ -279,7 +279,7 @@ bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const
       {"waiting_for", ending.waiting_for ? Json(static_cast<int>(*ending.waiting_for)) : Json()},
       {"counts", ending.counts},
       {"cancelled", ending.cancelled},
-      {"blobs", blobs_of(ending.mesh)},
+      {"blobs", blobs_told(ending.mesh)},
       {"alike", Json::array()}};
   while (true) {
     Rows rows = database_.ask([&](Connection& connection, bool was_interrupted) {
@@ -301,7 +301,7 @@ bool PostgresJobStore::end_run(const std::string& id, std::uint64_t fence, const
       other.timing.queue = milliseconds_between(accepted, now);
       give_mesh(other, *ending.mesh);
       end(other, JobState::kSucceeded, accepted, now);
-      asked["alike"].push_back({{"id", rows.text(1)}, {"record", to_json(other)}});
+      asked["alike"].push_back({{"id", rows.text(1)}, {"record", to_record(other)}});
     } while (rows.next());
   }
   forget_run(id, fence);
@@ -319,8 +319,8 @@ Job PostgresJobStore::cancel(const Viewer& viewer, const std::string& id) {
       database_.read([&](SqlConnection& connection) { return found(connection, viewer, id); });
   if (is_final(row.job.state)) return row.job;
   const Job ended = cancelled(row.job, row.accepted);
-  Rows answer =
-      database_.query("SELECT cancel_job(?1, ?2, ?3::uuid)", id, to_json(ended), database_.node());
+  Rows answer = database_.query("SELECT cancel_job(?1, ?2, ?3::uuid)", id, to_record(ended),
+                                database_.node());
   answer.next();
   if (answer.is_null(0)) return get(viewer, id);  // gone meanwhile
   const auto state = static_cast<JobState>(answer.integer(0));

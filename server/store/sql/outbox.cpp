@@ -12,23 +12,22 @@ void add_callback(SqlConnection& connection, const std::string& id, const std::s
 }
 
 std::vector<Delivery> SqlOutbox::due(Time now, std::size_t per_receiver) const {
-  return deliveries_of(database_.query(
+  Rows rows = database_.query(
       "SELECT job, url, body, attempts, created FROM (SELECT *, row_number() OVER "
       "(PARTITION BY receiver ORDER BY next, job) AS place FROM callbacks WHERE next <= ?1) "
       "WHERE place <= ?2 ORDER BY next, job",
-      database_.to_us(now), per_receiver));
+      database_.to_us(now), per_receiver);
+  std::vector<Delivery> deliveries;
+  while (rows.next()) deliveries.push_back(delivery_of(rows));
+  return deliveries;
 }
 
-std::vector<Delivery> SqlOutbox::deliveries_of(Rows rows) const {
-  std::vector<Delivery> result;
-  while (rows.next()) {
-    result.push_back({.job = rows.text(0),
-                      .url = rows.text(1),
-                      .body = rows.text(2),
-                      .attempts = static_cast<int>(rows.integer(3)),
-                      .created = database_.from_us(rows.integer(4))});
-  }
-  return result;
+Delivery SqlOutbox::delivery_of(const Rows& row) const {
+  return {.job = row.text(0),
+          .url = row.text(1),
+          .body = row.text(2),
+          .attempts = static_cast<int>(row.integer(3)),
+          .created = database_.from_us(row.integer(4))};
 }
 
 std::optional<Time> SqlOutbox::next_after(Time now) const {

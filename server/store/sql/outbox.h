@@ -20,8 +20,8 @@ class SqlOutbox : public Outbox {
   std::size_t count() const override;
 
  protected:
-  // Of rows that are job, url, body, attempts and created.
-  std::vector<Delivery> deliveries_of(Rows rows) const;
+  // Of a row whose first columns are job, url, body, attempts and created.
+  Delivery delivery_of(const Rows& row) const;
 
  private:
   SqlDatabase& database_;

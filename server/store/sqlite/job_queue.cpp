@@ -66,7 +66,7 @@ Submission SqliteJobStore::submit(const JobSpec& spec) {
         "attempts, fence, cancelling, idempotency_key, request_digest, record) "
         "VALUES(?, ?, 0, ?, ?, ?, ?, 0, 0, 0, 0, ?, ?, ?)",
         row.job.id, row.owner, spec.parameters.priority, spec.parameters.volume, row.result_key,
-        row.accepted, key, spec.request_digest, to_json(row.job));
+        row.accepted, key, spec.request_digest, to_record(row.job));
     if (mesh) {
       row.job.reused = true;
       succeed(change, row, *mesh);
@@ -106,7 +106,7 @@ std::optional<Lease> SqliteJobStore::claim(const std::string& worker,
   change->run(
       "UPDATE jobs SET state = 1, attempts = ?, fence = ?, claimed = ?, worker = ?, "
       "waiting_for = NULL, record = ? WHERE id = ?",
-      row.attempts, row.fence, now, worker, to_json(row.job), row.job.id);
+      row.attempts, row.fence, now, worker, to_record(row.job), row.job.id);
   change.announce(row, EventKind::kStage);
   {
     // Before anybody else's transaction, which may ask the run to stop or end its lease.
@@ -162,7 +162,7 @@ bool SqliteJobStore::finish(const Lease& lease, const Outcome& outcome) {
   if (!is_held) return false;
   forget_run(lease.id, lease.fence);
   if (has_mesh) {
-    for (const auto& [format, file] : outcome.mesh->files) blobs_.settle(file.sha256);
+    for (const Blob& blob : blobs_of(*outcome.mesh)) blobs_.settle(blob.key);
   }
   // Without a mesh it may be due again, or one like it now. With one, nothing has become ready.
   if (!has_mesh) wake_all_workers();
@@ -246,7 +246,7 @@ void SqliteJobStore::end(Change& change, Row& row, JobState state) const {
   row.job.timing.total = milliseconds_since(row.accepted);
   const std::int64_t now = now_us();
   change->run("UPDATE jobs SET state = ?, finished = ?, record = ? WHERE id = ?", state, now,
-              to_json(row.job), row.job.id);
+              to_record(row.job), row.job.id);
   change->run("UPDATE volumes SET used = ? WHERE owner = ? AND id = ?", now, row.owner,
               row.job.parameters.volume);
   if (const auto& callback = row.job.parameters.callback) {
@@ -257,9 +257,8 @@ void SqliteJobStore::end(Change& change, Row& row, JobState state) const {
 
 void SqliteJobStore::succeed(Change& change, Row& row, const MeshSummary& mesh) const {
   give_mesh(row.job, mesh);
-  for (const auto& [format, file] : mesh.files) {
-    change->run("INSERT OR IGNORE INTO meshes VALUES(?, ?, ?)", row.job.id, file.sha256,
-                file.bytes);
+  for (const Blob& blob : blobs_of(mesh)) {
+    change->run("INSERT OR IGNORE INTO meshes VALUES(?, ?, ?)", row.job.id, blob.key, blob.bytes);
   }
   end(change, row, JobState::kSucceeded);
 }
@@ -295,7 +294,7 @@ void SqliteJobStore::queue_again(Change& change, Row& row, std::chrono::millisec
       "UPDATE jobs SET state = 0, attempts = ?, not_before = ?, waiting_for = ?, record = ? WHERE "
       "id "
       "= ?",
-      row.attempts, now_us() + microseconds(delay), row.job.waiting_for, to_json(row.job),
+      row.attempts, now_us() + microseconds(delay), row.job.waiting_for, to_record(row.job),
       row.job.id);
   change.announce(row, EventKind::kStage);
 }

@@ -8,8 +8,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/sha256.h"
+#include "proto/json.h"
 #include "server/jobs/estimate.h"
 #include "server/jobs/label_lists.h"
+#include "server/jobs/label_pages.h"
 #include "server/jobs/pipeline.h"
 #include "server/jobs/settle_labels.h"
 #include "tests/support/errors.h"
@@ -182,7 +185,6 @@ TEST_F(LabelJobsTest, AreRefusedWithTheReason) {
   EXPECT_EQ(error->code(), ErrorCode::kUnusableVolume);
 }
 
-// Their summary is longer than anything else that a process tells.
 TEST_F(LabelJobsTest, MayBeThousands) {
   auto samples = test::constant<std::uint16_t>(0, {14, 14, 14});
   for (std::size_t n = 0; n < samples.samples.size(); ++n) {
@@ -191,9 +193,21 @@ TEST_F(LabelJobsTest, MayBeThousands) {
   const Volume volume = add(samples, SampleType::kUint16);
   JobParameters parameters = label_parameters({});
   parameters.formats = {MeshFormat::kStl, MeshFormat::kPly};
-  const MeshSummary mesh = run(volume, settled(volume, parameters)).mesh;
-  EXPECT_EQ(mesh.labels.size(), 2499U);
-  EXPECT_EQ(mesh.labels.back().files.size(), 2U);
+  Job job;
+  job.id = "many";
+  job.mesh = run(volume, settled(volume, parameters)).mesh;
+  EXPECT_EQ(job.mesh->labels_count, 2499U);
+  EXPECT_TRUE(job.mesh->labels.empty());
+  EXPECT_LT(to_record(job).size(), std::size_t{64} << 10);
+  const JobLabels labels(job, blobs_);
+  EXPECT_EQ(labels.after(2498).size(), 1U);
+  const auto label = labels.find(2000);
+  ASSERT_TRUE(label);
+  EXPECT_EQ(label->voxels, 1U);  // of 2744 samples
+  EXPECT_EQ(label->files.size(), 2U);
+  const LabelFile& file = label->files.at(MeshFormat::kStl);
+  const std::string zip = blob(job.mesh->files.at(MeshFormat::kZip).sha256);
+  EXPECT_EQ(sha256_of(zip.substr(file.offset, file.bytes)), file.sha256);
   EXPECT_GT(run(add_sphere(), parameters_of(add_sphere(), 0)).mesh.triangles, 0U);  // as ever
 }
 

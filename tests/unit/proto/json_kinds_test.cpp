@@ -47,6 +47,31 @@ TEST(JobJson, TellsOfLabelsOnlyWhereThereAreSome) {
   EXPECT_EQ(read, job);
 }
 
+TEST(JobJson, TellsTheNumberOfManyLabelsOnly) {
+  Job job = succeeded_job();
+  static_cast<MeshParameters&>(job.parameters) = label_parameters({});
+  for (std::int64_t label = 1; label <= 257; ++label) {
+    job.mesh->labels.push_back({.label = label});
+    job.parameters.label_names[label] = "x";
+    if (label <= 256) job.parameters.label_colors[label] = "#112233";
+  }
+  EXPECT_EQ(job_from_record(to_record(job)).mesh->labels.size(), 257U);
+  EXPECT_EQ(job_from_record(to_record(job)).parameters.label_names, job.parameters.label_names);
+  Job told = job_from_json(to_json(job));
+  EXPECT_TRUE(told.mesh->labels.empty());
+  EXPECT_EQ(told.mesh->labels_count, 257U);
+  EXPECT_TRUE(told.parameters.label_names.empty());
+  EXPECT_EQ(told.parameters.label_colors, job.parameters.label_colors);
+
+  job.mesh->labels.clear();
+  job.mesh->labels_count = 257;
+  job.mesh->label_list = {9, "aa"};
+  EXPECT_EQ(job_from_record(to_record(job)).mesh, job.mesh);
+  told = job_from_json(to_json(job));
+  EXPECT_EQ(told.mesh->labels_count, 257U);
+  EXPECT_FALSE(told.mesh->label_list);
+}
+
 // --- The error -----------------------------------------------------------------------------------
 
 Job certified_job() {

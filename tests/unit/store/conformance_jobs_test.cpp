@@ -129,6 +129,21 @@ TEST_P(JobConformance, AMeshEndsItSucceeded) {
   EXPECT_GT(job.timing.total, 0);
 }
 
+TEST_P(JobConformance, TheFileOfManyLabelsBelongsToItsMesh) {
+  Outcome outcome = some_mesh();
+  outcome.mesh->labels_count = 300;
+  outcome.mesh->label_list = {9, put_blob("the pages")};
+  const std::string key = outcome.mesh->label_list->sha256;
+  const JobParameters parameters = unlike();
+  const std::string id = submit(parameters).id;
+  EXPECT_TRUE(jobs().finish(claimed(), outcome));
+  EXPECT_EQ(jobs().get("", id).mesh->label_list, outcome.mesh->label_list);
+  EXPECT_TRUE(volumes().names(key));
+  EXPECT_TRUE(submit(parameters).reused);
+  blobs().erase(key);
+  EXPECT_FALSE(submit(parameters).reused);
+}
+
 TEST_P(JobConformance, AnErrorEndsItFailed) {
   const std::string id = submit().id;
   EXPECT_TRUE(jobs().finish(claimed(), failure()));

@@ -44,6 +44,13 @@ describe('two clients in one process', () => {
   });
 });
 
+describe('the labels of a job', () => {
+  it('come from all pages', async () => {
+    expect((await client.labelsOfJob(id)).map(({ label }) => label)).toEqual([1, 2, 3]);
+    expect(first.asked.length).toBe(2);
+  });
+});
+
 describe('follow', () => {
   it('rejects with a TimeoutError at the time limit, and closes its stream', async () => {
     const began = performance.now();

@@ -57,6 +57,9 @@ export class Daemon {
       response.end(JSON.stringify({ id, state: this.state, progress: 0.5, volume: this.name, mesh }));
     } else if (path === `/v1/jobs/${id}/mesh.glb`) {
       response.end('glTF');
+    } else if (path === `/v1/jobs/${id}/labels`) {
+      const isLast = request.url?.endsWith('?cursor=the%20rest') === true;
+      response.end(JSON.stringify(isLast ? { labels: [{ label: 3 }], next: null } : { labels: [{ label: 1 }, { label: 2 }], next: 'the rest' }));
     } else if (path === '/v1/jobs' && request.method === 'POST') {
       response.writeHead(202).end(JSON.stringify({ id, key: request.headers['idempotency-key'] }));
     } else if (path === '/v1/volumes' && request.method === 'POST') {

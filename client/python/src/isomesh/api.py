@@ -448,7 +448,8 @@ CompleteJobParameters = Union['JobParameters']
 
 
 class Job(TypedDict):
-    """A job and, if it succeeded, its mesh."""
+    """A job and, if it succeeded, its mesh. label_names, label_colors and label_values are
+    empty here if they have more than 256 entries."""
 
     #: A UUID. Newer jobs have greater ids.
     id: str
@@ -604,8 +605,11 @@ class MeshSummary(TypedDict):
     #: One entry for each requested format. For a job by labels: the formats that hold all labels,
     #: and a zip of the others.
     files: Mapping[str, MeshFile]
-    #: For a job by labels, in ascending order. Lists of jobs leave it out.
+    #: For a job by labels, in ascending order. Lists of jobs leave it out. A job with more than
+    #: 256 labels has labels_count instead.
     labels: NotRequired[Sequence[LabelSummary]]
+    #: The number of labels, only if there are more than 256. /v1/jobs/{id}/labels lists them.
+    labels_count: NotRequired[int]
     #: The distance between the files and the extracted surface, before smoothing. Only for a job
     #: with certify. The bytes of drc and glb, which round coordinates, are decoded by an
     #: independent reader. All other formats hold the mesh exactly, so the mesh is measured once
@@ -656,6 +660,12 @@ class DistanceSummary(TypedDict):
     p99_mm: float
     #: The number of points in equal bins from 0 to max_mm.
     histogram: Sequence[int]
+
+
+class LabelSummaryList(TypedDict):
+    labels: Sequence[LabelSummary]
+    #: The cursor of the next page. Null on the last page.
+    next: Optional[str]
 
 
 class LabelSummary(TypedDict):

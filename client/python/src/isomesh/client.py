@@ -8,7 +8,7 @@ import re
 import time
 import uuid
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Iterator, List, Mapping, Optional, Sequence, Union, cast
+from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, List, Mapping, Optional, Sequence, Union, cast
 from urllib.parse import quote, urlencode
 
 from . import ply, uploads
@@ -273,6 +273,11 @@ class Client:
             # A server that responds at once does not make this a busy loop.
             time.sleep(max(0.0, min(longest, _SHORTEST_LOOK) - (time.monotonic() - asked)))
 
+    def job_labels(self, job: Union[str, AnyJob]) -> Iterator[api.LabelSummary]:
+        """The labels of a succeeded job, in ascending order. A job with more than 256 labels has only their
+        number, `job["mesh"]["labels_count"]`."""
+        return cast("Iterator[api.LabelSummary]", self._exchange.pages(f"{_job_path(job)}/labels", "labels", {}))
+
     def cancel(self, job: Union[str, AnyJob]) -> api.Job:
         """Cancels a job. A job that has ended stays as it is."""
         return cast("api.Job", self._exchange.delete(_job_path(job)))
@@ -322,7 +327,11 @@ class Client:
         the job's SHA-256."""
         target = Path(path)
         done = self.job(job) if isinstance(job, str) else job
-        announced = file_of(done, format_of(target), label)
+        form = format_of(target)
+        labels: Iterable[api.LabelSummary] = ()
+        if label is not None and done["mesh"] is not None:
+            labels = done["mesh"].get("labels") or self.job_labels(done)
+        announced = file_of(done, form, label, labels)
         with written(target) as file:
 
             def write(at: int, piece: bytes) -> None:

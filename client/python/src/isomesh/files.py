@@ -6,7 +6,7 @@ import contextlib
 import os
 import tempfile
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Iterator, Optional, Union, cast, get_args
+from typing import IO, TYPE_CHECKING, Any, Iterable, Iterator, Optional, Union, cast, get_args
 
 from . import api
 from .errors import JobFailed
@@ -26,8 +26,10 @@ def format_of(path: Path) -> str:
     return form
 
 
-def file_of(job: AnyJob, form: str, label: Optional[int] = None) -> api.MeshFile:
-    """The job's file of that format. Raises JobFailed for a job that failed or was cancelled, and
+def file_of(
+    job: AnyJob, form: str, label: Optional[int] = None, labels: Iterable[api.LabelSummary] = ()
+) -> api.MeshFile:
+    """The job's file of that format, or that of one of its `labels`. Raises JobFailed for a job that failed or was cancelled, and
     ValueError if the job is not done or was not asked for the format."""
     mesh = job["mesh"]
     if mesh is None:
@@ -36,7 +38,7 @@ def file_of(job: AnyJob, form: str, label: Optional[int] = None) -> api.MeshFile
         raise ValueError(f"job {job['id']} is {job['state']}; call wait(job) first")
     files: Any = mesh["files"]
     if label is not None:
-        files = next((each["files"] for each in mesh.get("labels", []) if each["label"] == label), {})
+        files = next((each["files"] for each in labels if each["label"] == label), {})
     if form in files:
         return cast(api.MeshFile, files[form])
     of_label = "" if label is None else f" of the label {label}"

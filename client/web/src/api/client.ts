@@ -14,6 +14,8 @@ import type {
   Job,
   JobList,
   JobRequest,
+  LabelSummary,
+  LabelSummaryList,
   MeshFormat,
   Order,
   OrderList,
@@ -163,6 +165,18 @@ export class Client {
   /** Returns at once, or with `waitSeconds` when the job has finished or the time is over. */
   getJob(id: string, waitSeconds = 0, signal?: GlobalAbortSignal): Promise<Job> {
     return this.connection.json(`${jobPath(id)}${waitSeconds > 0 ? `?wait=${waitSeconds}` : ''}`, { signal });
+  }
+
+  /** Lists the labels of a finished job in ascending order, also if the job itself has only `labels_count`. */
+  async labelsOfJob(id: string, signal?: GlobalAbortSignal): Promise<LabelSummary[]> {
+    const labels: LabelSummary[] = [];
+    for (let cursor: string | null = ''; cursor !== null; ) {
+      const query: string = cursor === '' ? '' : `?cursor=${encodeURIComponent(cursor)}`;
+      const page: LabelSummaryList = await this.connection.json(`${jobPath(id)}/labels${query}`, { signal });
+      labels.push(...page.labels);
+      cursor = page.next;
+    }
+    return labels;
   }
 
   cancelJob(id: string): Promise<Job> {

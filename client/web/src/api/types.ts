@@ -45,6 +45,7 @@ export type PacsList = Schemas['PacsList'];
 
 export type MeshSummary = Schemas['MeshSummary'];
 export type LabelSummary = Schemas['LabelSummary'];
+export type LabelSummaryList = Schemas['LabelSummaryList'];
 export type VolumeLabels = Schemas['VolumeLabels'];
 export type VolumeLabel = Schemas['VolumeLabel'];
 export type DistanceSummary = Schemas['DistanceSummary'];

@@ -1,4 +1,5 @@
 // The labels of a job's mesh as a person looks at them: which are shown, and in which colours.
+import { client } from '../client';
 import type { Estimate, Job, LabelSummary } from '../api/types';
 import { Signal } from '../ui/signal';
 
@@ -21,8 +22,13 @@ export function matching<T extends Named>(labels: readonly T[], text: string): T
   });
 }
 
-export function labelsOfMesh({ mesh }: Job): readonly LabelSummary[] {
-  return mesh?.labels ?? [];
+// The job itself lists its labels only if they are few.
+export async function labelsOfMesh({ id, mesh }: Job): Promise<readonly LabelSummary[]> {
+  return mesh?.labels_count === undefined ? (mesh?.labels ?? []) : client.labelsOfJob(id);
+}
+
+export function labelCount({ mesh }: Job): number {
+  return mesh?.labels_count ?? mesh?.labels?.length ?? 0;
 }
 
 // The triangles of each label's surface.

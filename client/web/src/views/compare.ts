@@ -1,7 +1,7 @@
 // Two to four surfaces side by side that turn together: #/compare?jobs=A,B
 import { client } from '../client';
 import { ApiError, asApiError, errorOfProblem } from '../api/problem';
-import { isFinal, type Job, type Volume } from '../api/types';
+import { isFinal, type Job, type LabelSummary, type Volume } from '../api/types';
 import { differences } from '../job/differences';
 import { LabelState, labelsOfMesh } from '../job/labels';
 import type { SurfaceStyle } from '../scene/parts';
@@ -166,15 +166,15 @@ class Comparison {
       cell.show(refusal(reason));
       return;
     }
-    await graphicsStarted();
+    const [labels] = await Promise.all([labelsOfMesh(job), graphicsStarted()]);
     if (this.scope.isOver) return;
-    const pane = this.addPane(job);
+    const pane = this.addPane(job, labels);
     cell.show(pane.element);
     await pane.load();
   }
 
   // A surface whose camera moves those of the others.
-  private addPane(job: Job): SurfacePane {
+  private addPane(job: Job, labels: readonly LabelSummary[]): SurfacePane {
     const camera = this.panes[0]?.camera ?? this.camera;
     const pane = new SurfacePane(this.scope, job, {
       hasKeys: false,
@@ -182,7 +182,7 @@ class Comparison {
       look: new URLSearchParams(),
       camera,
       volume: this.volume,
-      labels: new LabelState(labelsOfMesh(job)),
+      labels: new LabelState(labels),
     });
     this.panes.push(pane);
     pane.onCamera = (place) => {

@@ -121,14 +121,15 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
   };
   nameTab(first);
 
-  const showEnd = (job: Job): void => {
+  const showEnd = async (job: Job): Promise<void> => {
     element.dataset.state = job.state;
     nameTab(job);
-    if (job.state === 'succeeded' && job.mesh) showSurface(scope, route, job, volume, stageArea, panel);
-    else showFailure(job, volume, stageArea, panel);
+    if (job.state !== 'succeeded' || !job.mesh) return showFailure(job, volume, stageArea, panel);
+    const labels = await labelsOfMesh(job);
+    if (!scope.isOver) showSurface(scope, route, job, new LabelState(labels), volume, stageArea, panel);
   };
   if (isFinal(first.state)) {
-    showEnd(first);
+    await showEnd(first);
     return element;
   }
 
@@ -140,14 +141,13 @@ export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> 
     element.dataset.state = job.state;
     nameTab(job);
     progress.show(job);
-  }).then(
-    (job) => {
-      if (!scope.isOver) showEnd(job);
-    },
-    (error: unknown) => {
+  })
+    .then(async (job) => {
+      if (!scope.isOver) await showEnd(job);
+    })
+    .catch((error: unknown) => {
       if (!scope.isOver) panel.replaceChildren(head(first, volume), refusal(asApiError(error)));
-    },
-  );
+    });
   return element;
 }
 
@@ -164,6 +164,7 @@ function showSurface(
   scope: Scope,
   route: Route,
   job: Job,
+  labels: LabelState,
   volume: Volume | null,
   stageArea: HTMLElement,
   panel: HTMLElement,
@@ -171,7 +172,6 @@ function showSurface(
   const { mesh } = job;
   if (!mesh) return;
   const camera = placeOfText(route.query.get('cam') ?? '');
-  const labels = new LabelState(labelsOfMesh(job));
   const slices = volume && new SlicesBeside(scope, job, volume, stageArea, route.query);
   const onSlices = slices && ((): void => slices.toggle());
   const pane = new SurfacePane(scope, job, { hasKeys: true, camera, volume, labels, onSlices, look: route.query });

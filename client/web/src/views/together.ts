@@ -3,6 +3,7 @@ import { client } from '../client';
 import { ApiError } from '../api/problem';
 import type { Job, Vec3 } from '../api/types';
 import { differences } from '../job/differences';
+import { labelCount } from '../job/labels';
 import { surfaceInWords } from '../job/parameters';
 import type { Part } from '../mesh/glb';
 import { loadMesh, viewableFile } from '../mesh/load';
@@ -193,8 +194,8 @@ class Together {
   }
 }
 
-function hasLabels({ mesh }: Job): boolean {
-  return (mesh?.labels ?? []).length > 1;
+function hasLabels(job: Job): boolean {
+  return labelCount(job) > 1;
 }
 
 function around(jobs: readonly Job[]): [Vec3, Vec3] {
