@@ -55,6 +55,8 @@ TEST_F(Folder, TheOldestGoesWhenAllIsTooMuch) {
       sample<std::uint8_t>(scaled(sphere({10.2, 9.7, 9.1}, 5.4), 12, 100), {21, 20, 19}));
   const Volume second = upload(daemon(), other);
   EXPECT_EQ(daemon().get("/v1/volumes/" + first.id).status, 410);
+  EXPECT_THAT(daemon().errors(), HasSubstr("limit=--max-disk"));
+  EXPECT_THAT(daemon().errors(), HasSubstr(first.id + " unused since "));
   EXPECT_EQ(daemon().get("/v1/volumes/" + second.id).status, 200);
 }
 
@@ -128,7 +130,8 @@ TEST_F(Folder, NothingExpiresByAClockThatIsFarAhead) {
   const Job job = finished_job(daemon());
   EXPECT_EQ(daemon().stop(), 0);
   const std::string days_ago = " - 40 * 86400000000";
-  run_sql("UPDATE jobs SET finished = finished" + days_ago + ", accepted = accepted" + days_ago);
+  // It was 20 days old then: not yet too old, and not just used.
+  run_sql("UPDATE jobs SET finished = finished - 60 * 86400000000, accepted = accepted" + days_ago);
   run_sql("UPDATE volumes SET used = used" + days_ago);
   run_sql("CREATE TABLE IF NOT EXISTS identity(seen INTEGER)");
   run_sql("UPDATE identity SET seen = seen" + days_ago);
@@ -145,6 +148,9 @@ TEST_F(Folder, NothingExpiresByAClockThatIsFarAhead) {
   EXPECT_EQ(daemon().stop(), 0);
   start({"--trust-clock"});
   EXPECT_TRUE(eventually([&] { return daemon().get("/v1/jobs/" + job.id).status == 410; }));
+  EXPECT_THAT(daemon().errors(), HasSubstr("limit=--keep-days"));
+  EXPECT_THAT(daemon().errors(), HasSubstr(job.id + " unused since "));
+  EXPECT_EQ(daemon().get("/v1/volumes/" + job.parameters.volume).status, 200) << "just used";
 }
 
 }  // namespace

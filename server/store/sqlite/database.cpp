@@ -231,6 +231,7 @@ Database::Database(const DataFolder& folder)
     const Reading reading(*reader);
     reading->query("SELECT count(*) FROM sqlite_schema").next();
   }
+  writer_.know_newest(newest_us_);
   writer_.limit_log(log_bytes(folder.reserve().capacity()));
 }
 

@@ -364,6 +364,35 @@ TEST_F(ClusterTest, OneRemovesAtATime) {
   EXPECT_TRUE(two().jobs.turn_to_remove());
 }
 
+// The newest time that is known is 40 days later than the database's clock.
+TEST_F(ClusterTest, WhatIsUsedIsNeverOlderThanTheNewestTimeThatIsKnown) {
+  Identity(one().database, blobs_, {.adopt = true}, seconds(1)).now();
+  ask("UPDATE identity SET seen = isomesh_now() + 40 * 86400000000");
+  Volume volume;
+  volume.id = "another";
+  volume.created = "2024-01-01T00:00:00.000Z";
+  one().volumes.add("", volume);
+  two().jobs.cancel("", submit());
+  EXPECT_EQ(ask("SELECT count(*) FROM volumes, identity WHERE used < seen"), "0");
+  EXPECT_EQ(ask("SELECT count(*) FROM jobs, identity WHERE finished < seen"), "0");
+  Identity behind(two().database, blobs_, {}, seconds(1));
+  EXPECT_GT(behind.now(), std::chrono::system_clock::now() + std::chrono::days(39));
+}
+
+// The one was used right before the time until which the clock was behind, the other long before.
+TEST_F(ClusterTest, AClockThatIsTrustedLetsExpireWhatWasOldBefore) {
+  Identity(one().database, blobs_, {.adopt = true}, seconds(1)).now();
+  const std::string id = submit();
+  one().jobs.cancel("", id);
+  ask("UPDATE identity SET seen = isomesh_now() - 40 * 86400000000; UPDATE volumes SET used = "
+      "isomesh_now() - 40 * 86400000000; UPDATE jobs SET finished = isomesh_now() - 60 * "
+      "86400000000");
+  Identity trusting(two().database, blobs_, {.trust_clock = true}, std::chrono::days(7));
+  const Time month_ago = trusting.now() - std::chrono::days(30);
+  EXPECT_THAT(two().jobs.ended({month_ago}, Ended::kAll, 9), SizeIs(1));
+  EXPECT_THAT(two().volumes.unused({month_ago}, 9), IsEmpty());
+}
+
 // --- Orders
 
 // Who carries them out has the turn as long as it lives, and takes orders meanwhile.
