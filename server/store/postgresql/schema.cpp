@@ -205,6 +205,9 @@ ALTER TABLE runs ADD COLUMN timings text;
 -- A time that decides how long something is kept is never older than the newest that is known for certain.
 CREATE OR REPLACE FUNCTION isomesh_kept(us bigint) RETURNS bigint LANGUAGE sql VOLATILE AS
   $$ SELECT greatest(us, (SELECT max(seen) FROM identity)) $$;
+)sql",
+                                R"sql(
+ALTER TABLE audit ADD COLUMN IF NOT EXISTS chain text;  -- see AuditChain; none in entries of versions before
 )sql"};
 
 // As the newest version has them, each a verb in one round trip. Whoever changes one adds a

@@ -15,6 +15,7 @@
 #include "server/store/postgresql/job_store.h"
 #include "server/store/postgresql/outbox.h"
 #include "server/store/postgresql/turn.h"
+#include "server/store/sql/audit_trail.h"
 #include "server/store/sql/order_store.h"
 #include "server/store/sql/volume_store.h"
 #include "tests/support/errors.h"
@@ -352,6 +353,13 @@ TEST_F(ClusterTest, TheAuditTrailIsNotChanged) {
        {"UPDATE audit SET record = ''", "DELETE FROM audit", "TRUNCATE audit"}) {
     EXPECT_THROW(ask(sql), std::runtime_error) << sql;
   }
+}
+
+TEST_F(ClusterTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
+  for (int n = 0; n < 5; ++n) SqlAuditTrail((n % 2 ? one() : two()).database).add({});
+  EXPECT_EQ(SqlAuditTrail(one().database).verify().entries, 5U);
+  ask("ALTER TABLE audit DISABLE TRIGGER audit_is_kept; UPDATE audit SET at = '' WHERE id = 3");
+  EXPECT_EQ(SqlAuditTrail(one().database).verify().misfit, 3U);
 }
 
 // --- What is not kept
