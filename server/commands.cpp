@@ -57,6 +57,7 @@ struct Commands::State {
   std::filesystem::path folder = {};
   std::string target = {};  // of move
   std::uint64_t after = 0;  // of the audit trail
+  bool verify = false;      // it
   std::function<void()> chosen = {};
   int status = 0;
 
@@ -150,6 +151,7 @@ struct Commands::State {
         cli, "audit",
         "Print the audit trail of the folder of --data, or of --store, as one JSON object per line",
         [this] {
+          if (verify) return verify_trail();
           read_audit_trail(options, after,
                            [](std::string_view line) { std::cout << line << '\n'; });
           std::cout.flush();
@@ -158,8 +160,27 @@ struct Commands::State {
                         "the audit trail cannot be written to standard output");
           }
         });
-    audit.add_option("--after", after, "Print only entries with a greater id")
-        ->capture_default_str();
+    CLI::Option& from = *audit.add_option("--after", after, "Print only entries with a greater id")
+                             ->capture_default_str();
+    audit
+        .add_flag("--verify", verify,
+                  "Check the digests of all entries instead, and print the last; status 1 if an "
+                  "entry was changed, removed or inserted")
+        ->excludes(&from);
+  }
+
+  void verify_trail() {
+    const store::AuditCheck check = verify_audit_trail(options);
+    if (check.misfit) {
+      std::cerr << "isomeshd: entry " << *check.misfit
+                << " of the audit trail does not fit: it or one before it was changed, removed or "
+                   "inserted\n";
+      status = 1;
+      return;
+    }
+    std::cout << check.entries << " entries fit";
+    if (check.entries > 0) std::cout << "; the digest of " << check.last << " is " << check.digest;
+    std::cout << std::endl;
   }
 
   // Half a copy is none.

@@ -328,10 +328,12 @@ int run(const Options& options, const sigset_t& signals) {
                               received, peers},
         hospital->settings,
         orders::OrderOptions{.keep = std::chrono::duration_cast<std::chrono::hours>(keep),
-                             .cut_off = [&] {
-                               hospital->stop();
-                               library.stop_imports();
-                             }});
+                             .believed_now = [&records] { return records->now(); },
+                             .cut_off =
+                                 [&] {
+                                   hospital->stop();
+                                   library.stop_imports();
+                                 }});
     if (hospital->settings.dimse) {
       dimse_listener = std::make_unique<dimse::DimseListener>(
           dimse::ListenerServices{folder, blobs, received, audit, *hospital->dimse},

@@ -129,20 +129,39 @@ std::unique_ptr<Records> open_records(const Options& options, const store::DataF
   return std::make_unique<SharedRecords>(options, std::move(database), blobs, tolerance);
 }
 
-void read_audit_trail(const Options& options, std::uint64_t after,
-                      const std::function<void(std::string_view line)>& line) {
+namespace {
+
+// Calls `of_folder` with a connection, or `of_store` with a database.
+template <class OfFolder, class OfStore>
+auto with_audit_trail(const Options& options, const OfFolder& of_folder, const OfStore& of_store) {
   if (options.store.empty()) {
     const std::filesystem::path file = options.data / "isomesh.sqlite";
     if (!std::filesystem::exists(file)) {
       throw Error(ErrorCode::kNotFound, "the data folder has no data of isomeshd");
     }
     store::Connection connection(file, store::Connection::Mode::kRead);
-    return store::read_audit_trail(connection, after, line);
+    return of_folder(connection);
   }
   store::postgresql::check_url(options.store);
   store::postgresql::Database database(
       {.url = options.store, .node = "audit " + random_hex(8), .connections = 1});
-  store::SqlAuditTrail(database).read(after, line);
+  return of_store(store::SqlAuditTrail(database));
+}
+
+}  // namespace
+
+void read_audit_trail(const Options& options, std::uint64_t after,
+                      const std::function<void(std::string_view line)>& line) {
+  with_audit_trail(
+      options,
+      [&](store::Connection& connection) { store::read_audit_trail(connection, after, line); },
+      [&](const store::SqlAuditTrail& trail) { trail.read(after, line); });
+}
+
+store::AuditCheck verify_audit_trail(const Options& options) {
+  return with_audit_trail(
+      options, [](store::Connection& connection) { return store::verify_audit_trail(connection); },
+      [](const store::SqlAuditTrail& trail) { return trail.verify(); });
 }
 
 }  // namespace isomesh

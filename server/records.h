@@ -44,4 +44,7 @@ std::unique_ptr<Records> open_records(const Options& options, const store::DataF
 void read_audit_trail(const Options& options, std::uint64_t after,
                       const std::function<void(std::string_view line)>& line);
 
+// The same, and checks the digests of all entries.
+store::AuditCheck verify_audit_trail(const Options& options);
+
 }  // namespace isomesh

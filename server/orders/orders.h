@@ -27,6 +27,8 @@ struct Attempts {
 struct OrderOptions {
   std::chrono::hours keep{30 * 24};  // orders that have ended
   std::function<store::Time()> now = [] { return std::chrono::system_clock::now(); };
+  // The same as far as it can be believed, for what is not kept any longer; empty: the same.
+  std::function<store::Time()> believed_now = {};
   // Ends what steps may wait for long, such as imports; called when this stops.
   std::function<void()> cut_off = {};
   std::size_t threads = 6;
@@ -89,6 +91,7 @@ class Orders {
 
   void work(const std::stop_token& stop);
   void watch(const std::stop_token& stop);
+  void forget();
   void receive(const std::stop_token& stop);
   store::ReceivedFate look_at_received(const store::HeldSeries& series);
   void look_at_rule(const Rule& rule, const std::stop_token& stop);

@@ -3,6 +3,7 @@
 #include <ctime>
 #include <utility>
 
+#include "base/clock.h"
 #include "base/log.h"
 #include "server/orders/orders.h"
 
@@ -82,8 +83,7 @@ void Orders::watch(const std::stop_token& stop) {
       const store::Time now = options_.now();
       if (now >= next_forgetting) {
         next_forgetting = now + kForgetPause;
-        services_.orders.forget(now - options_.keep);
-        services_.received.forget(now - options_.keep);
+        forget();
       }
     } catch (const std::exception& error) {
       log_error("ended orders could not be removed and are retried: {}", error.what());
@@ -91,6 +91,16 @@ void Orders::watch(const std::stop_token& stop) {
     Lock lock(mutex_);
     changed_.wait_for(lock, stop, hospital_.poll, [] { return false; });
   }
+}
+
+void Orders::forget() {
+  const store::Time before =
+      (options_.believed_now ? options_.believed_now() : options_.now()) - options_.keep;
+  const std::size_t orders = services_.orders.forget(before);
+  const std::size_t instances = services_.received.forget(before);
+  if (orders + instances == 0) return;
+  log_info("removed {} orders that ended before {} (--keep-days) and the notes of {} instances",
+           orders, timestamp_of(before), instances);
 }
 
 }  // namespace isomesh::orders

@@ -4,6 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/sha256.h"
+
 namespace isomesh::store {
 namespace {
 
@@ -31,6 +33,11 @@ Code code_of(AuditEvent event) {
 }
 
 }  // namespace
+
+void AuditChain::add(std::string_view line) {
+  digest_ += '\n';
+  digest_ = sha256_of(digest_.append(line));
+}
 
 std::string audit_record(const AuditEntry& entry) {
   const Code code = code_of(entry.event);

@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace isomesh::store {
 
@@ -45,6 +47,30 @@ class AuditTrail {
   // The number of the last entry that a collector has had; 0 for none.
   virtual std::uint64_t sent() const = 0;
   virtual void note_sent(std::uint64_t number) = 0;
+};
+
+// What --verify finds.
+struct AuditCheck {
+  std::uint64_t entries = 0;                 // that fit, up to the first that does not
+  std::uint64_t last = 0;                    // the number of the last of those
+  std::string digest = {};                   // its own
+  std::optional<std::uint64_t> misfit = {};  // the first that does not
+};
+
+// Each entry has the digest of what it says and of the digest before it: SHA-256, in hex, of that
+// digest (of the first entry: nothing), a line break and the entry's line. So who changes, removes
+// or adds one in between has to change all digests after it, too. Those that an earlier version has
+// written have none of their own; the first that has one vouches for them.
+class AuditChain {
+ public:
+  AuditChain() = default;
+  explicit AuditChain(std::string digest) : digest_(std::move(digest)) {}
+
+  void add(std::string_view line);
+  const std::string& digest() const { return digest_; }
+
+ private:
+  std::string digest_;
 };
 
 // For engines: what is kept of an entry, and how that is told.

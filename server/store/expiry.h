@@ -36,7 +36,7 @@ using OwnedBytes = std::map<std::string, std::uint64_t>;
 
 // What a call of expire() removed.
 struct Expired {
-  std::size_t records = 0;
+  std::vector<Expirable> records = {};
   std::uint64_t bytes = 0;              // of the blobs that no record names any more
   std::vector<std::string> blobs = {};  // those
 };

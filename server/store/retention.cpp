@@ -4,9 +4,12 @@
 #include <functional>
 #include <iterator>
 #include <span>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
+#include "base/clock.h"
+#include "base/log.h"
 #include "proto/error.h"
 
 namespace isomesh::store {
@@ -21,10 +24,57 @@ constexpr std::chrono::days kEventsKept{2};
 
 }  // namespace
 
+// What expires in one round, by one limit; logged when it goes, so that nothing that is gone stays
+// untold after an error.
+class Retention::Report {
+ public:
+  explicit Report(std::string_view limit) : limit_(limit) {}
+  ~Report() {
+    tell("volumes", volumes_);
+    tell("jobs", jobs_);
+  }
+  Report(const Report&) = delete;
+  Report& operator=(const Report&) = delete;
+
+  void add(const Expired& expired) {
+    for (const Expirable& record : expired.records) {
+      (record.kind == RecordKind::kJob ? jobs_ : volumes_).add(record);
+    }
+  }
+
+ private:
+  struct Kind {
+    std::size_t count = 0;
+    std::string named;  // the first of them
+
+    void add(const Expirable& record) {
+      constexpr std::size_t kMostNamed = 10;
+      if (++count > kMostNamed) return;
+      if (!named.empty()) named += ", ";
+      named += record.id + " unused since " + timestamp_of(record.last_used);
+    }
+  };
+
+  void tell(std::string_view kind, const Kind& gone) const {
+    if (gone.count == 0) return;
+    LogLine("expired")
+        .add("kind", kind)
+        .add("count", gone.count)
+        .add("limit", limit_)
+        .add("first", gone.named);
+  }
+
+  const std::string_view limit_;
+  Kind volumes_;
+  Kind jobs_;
+};
+
 Retention::Gone Retention::enforce() {
   const Time now = options_.now();
+  // Files have the times of the system's clock, whether that is right or not.
+  const Time of_files = std::min(now, std::chrono::system_clock::now());
   Gone gone;
-  sweep_scratch(now);
+  sweep_scratch(of_files);
   const auto turn = jobs_.turn_to_remove();
   if (!turn) return gone;
   {
@@ -34,7 +84,7 @@ Retention::Gone Retention::enforce() {
     gone.blobs += erase_garbage();
   }
   sweep_blobs(gone);
-  gone.blobs += blobs_.empty_quarantine(now - options_.quarantine, names());
+  gone.blobs += blobs_.empty_quarantine(of_files - options_.quarantine, names());
   forget(now);
   return gone;
 }
@@ -57,14 +107,16 @@ Names Retention::names() const {
 
 void Retention::expire_old(Time now, Gone& gone) {
   const Time cutoff = now - options_.keep;
+  Report report("--keep-days");
   while (true) {
     const std::vector<Expirable> items = oldest({cutoff}, Ended::kAll);
-    expire(items, kAllBytes, gone);
+    expire(items, kAllBytes, gone, report);
     if (items.size() < kMostAtOnce) return;
   }
 }
 
 bool Retention::shrink_to(std::uint64_t max_bytes, Gone& gone) {
+  Report report("--max-disk");
   while (true) {
     const std::uint64_t used = blobs_.bytes();
     if (used <= max_bytes) return true;
@@ -78,7 +130,7 @@ bool Retention::shrink_to(std::uint64_t max_bytes, Gone& gone) {
     if (used <= max_bytes + going) return false;
     const Superfluous superfluous = this->superfluous();
     if (superfluous.items.empty()) return false;
-    expire(superfluous.items, std::min(used - max_bytes - going, superfluous.enough), gone);
+    expire(superfluous.items, std::min(used - max_bytes - going, superfluous.enough), gone, report);
   }
 }
 
@@ -115,7 +167,8 @@ std::vector<Expirable> Retention::oldest(const ExpiryFilter& filter, Ended which
   return items;
 }
 
-void Retention::expire(std::span<const Expirable> items, std::uint64_t enough, Gone& gone) {
+void Retention::expire(std::span<const Expirable> items, std::uint64_t enough, Gone& gone,
+                       Report& report) {
   std::uint64_t freed = 0;
   while (!items.empty() && freed < enough) {
     const RecordKind kind = items.front().kind;
@@ -125,7 +178,8 @@ void Retention::expire(std::span<const Expirable> items, std::uint64_t enough, G
     const bool is_job = kind == RecordKind::kJob;
     const Expired expired =
         is_job ? jobs_.expire(alike, enough - freed) : volumes_.expire(alike, enough - freed);
-    (is_job ? gone.jobs : gone.volumes) += expired.records;
+    report.add(expired);
+    (is_job ? gone.jobs : gone.volumes) += expired.records.size();
     freed += expired.bytes;
     garbage_.insert(garbage_.end(), expired.blobs.begin(), expired.blobs.end());
     items = items.subspan(alike.size());

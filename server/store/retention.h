@@ -35,7 +35,8 @@ struct RetentionOptions {
 };
 
 // Keeps the stores from growing for ever, and a node's folder of unfinished files. Never touches
-// what a job that is queued or runs needs. Thread safe; what it is made of must outlive it.
+// what a job that is queued or runs needs. Logs what expires, and why. Thread safe; what it is made
+// of must outlive it.
 class Retention {
  public:
   struct Gone {
@@ -76,7 +77,8 @@ class Retention {
     std::uint64_t enough = 0;  // bytes of them; after these it may be another owner's turn
   };
   Superfluous superfluous() const;
-  void expire(std::span<const Expirable> items, std::uint64_t enough, Gone& gone)
+  class Report;
+  void expire(std::span<const Expirable> items, std::uint64_t enough, Gone& gone, Report& report)
       ISOMESH_REQUIRES(mutex_);
   Steady unsettled_since() const;
   std::size_t erase_garbage() ISOMESH_REQUIRES(mutex_);

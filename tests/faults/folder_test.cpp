@@ -2,6 +2,7 @@
 #include <string>
 #include <thread>
 
+#include "base/sha256.h"
 #include "tests/api/problems.h"
 #include "tests/faults/fixture.h"
 
@@ -55,6 +56,8 @@ TEST_F(Folder, TheOldestGoesWhenAllIsTooMuch) {
       sample<std::uint8_t>(scaled(sphere({10.2, 9.7, 9.1}, 5.4), 12, 100), {21, 20, 19}));
   const Volume second = upload(daemon(), other);
   EXPECT_EQ(daemon().get("/v1/volumes/" + first.id).status, 410);
+  EXPECT_THAT(daemon().errors(), HasSubstr("limit=--max-disk"));
+  EXPECT_THAT(daemon().errors(), HasSubstr(first.id + " unused since "));
   EXPECT_EQ(daemon().get("/v1/volumes/" + second.id).status, 200);
 }
 
@@ -128,7 +131,8 @@ TEST_F(Folder, NothingExpiresByAClockThatIsFarAhead) {
   const Job job = finished_job(daemon());
   EXPECT_EQ(daemon().stop(), 0);
   const std::string days_ago = " - 40 * 86400000000";
-  run_sql("UPDATE jobs SET finished = finished" + days_ago + ", accepted = accepted" + days_ago);
+  // It was 20 days old then: not yet too old, and not just used.
+  run_sql("UPDATE jobs SET finished = finished - 60 * 86400000000, accepted = accepted" + days_ago);
   run_sql("UPDATE volumes SET used = used" + days_ago);
   run_sql("CREATE TABLE IF NOT EXISTS identity(seen INTEGER)");
   run_sql("UPDATE identity SET seen = seen" + days_ago);
@@ -145,6 +149,32 @@ TEST_F(Folder, NothingExpiresByAClockThatIsFarAhead) {
   EXPECT_EQ(daemon().stop(), 0);
   start({"--trust-clock"});
   EXPECT_TRUE(eventually([&] { return daemon().get("/v1/jobs/" + job.id).status == 410; }));
+  EXPECT_THAT(daemon().errors(), HasSubstr("limit=--keep-days"));
+  EXPECT_THAT(daemon().errors(), HasSubstr(job.id + " unused since "));
+  EXPECT_EQ(daemon().get("/v1/volumes/" + job.parameters.volume).status, 200) << "just used";
+}
+
+// Entries as they are kept: each has the digest of the one before it, a line break and its line.
+TEST_F(Folder, AnAuditTrailIsVerified) {
+  start();
+  EXPECT_EQ(daemon().stop(), 0);
+  std::string digest;
+  for (const std::string id : {"1", "2"}) {
+    const std::string at = "2026-01-02T03:04:05.678Z";
+    digest = sha256_of(digest + "\n{\"id\":" + id + ",\"at\":\"" + at + "\",\"event\":\"110120\"}");
+    run_sql("INSERT INTO audit(id, at, record, chain) VALUES(" + id + ", '" + at +
+            "', '{\"event\":\"110120\"}', '" + digest + "')");
+  }
+  const std::vector<std::string> command = {ISOMESHD, "audit", "--verify", "--data",
+                                            folder_ / "data"};
+  const Finished intact = run(command);
+  EXPECT_EQ(intact.status, 0) << intact.errors;
+  EXPECT_EQ(intact.output, "2 entries fit; the digest of 2 is " + digest + "\n");
+  run_sql("DROP TRIGGER audit_is_not_changed");
+  run_sql("UPDATE audit SET record = '{\"event\":\"110121\"}' WHERE id = 2");
+  const Finished tampered = run(command);
+  EXPECT_EQ(tampered.status, 1);
+  EXPECT_THAT(tampered.errors, HasSubstr("entry 2 of the audit trail does not fit"));
 }
 
 }  // namespace

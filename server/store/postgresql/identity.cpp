@@ -4,6 +4,7 @@
 #include "base/log.h"
 #include "proto/error.h"
 #include "server/store/microseconds.h"
+#include "server/store/sql/trusted_clock.h"
 
 namespace isomesh::store::postgresql {
 namespace {
@@ -69,20 +70,21 @@ void check(Database& database, const BlobStore& blobs, bool may_adopt) {
 
 Identity::Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
                    std::chrono::milliseconds tolerance)
-    : database_(database),
-      clock_(last_seen(database, word), {.tolerance = tolerance, .wall = [&database] {
-                                           return store::from_us(database.now_us());
-                                         }}) {
+    : Identity(
+          database, blobs, word,
+          BelievedClock::Options{.tolerance = tolerance,
+                                 .wall = [&database] { return store::from_us(database.now_us()); },
+                                 .name = "the clock of the database"}) {}
+
+Identity::Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
+                   const BelievedClock::Options& clock)
+    : database_(database), clock_(time_to_start_with(last_seen(database), word, clock), clock) {
   check(database, blobs, word.adopt);
+  if (word.trust_clock) trust(database, last_seen(database), clock_.now(), clock.tolerance);
 }
 
 Time Identity::now() {
-  const bool was_doubted = clock_.is_doubted();
-  const Time believed = clock_.now();
-  if (clock_.is_doubted() && !was_doubted) {
-    log_warning("the database's clock is far ahead; until it is right, nothing expires");
-  }
-  const std::int64_t us = store::to_us(believed);
+  const std::int64_t us = store::to_us(clock_.now());
   try {
     database_.query("UPDATE identity SET seen = ?1 WHERE seen < ?1", us);
   } catch (const Error& error) {
@@ -91,10 +93,9 @@ Time Identity::now() {
   return database_.from_us(us);
 }
 
-Time Identity::last_seen(Database& database, const OperatorsWord& word) {
+Time Identity::last_seen(Database& database) {
   Rows row = database.query("SELECT seen FROM identity");
-  if (word.trust_clock || !row.next()) return store::from_us(database.now_us());
-  return store::from_us(row.integer(0));
+  return store::from_us(row.next() ? row.integer(0) : database.now_us());
 }
 
 }  // namespace isomesh::store::postgresql

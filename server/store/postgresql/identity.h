@@ -20,13 +20,16 @@ class Identity {
   // where neither has a name.
   Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
            std::chrono::milliseconds tolerance);
+  // The same with another clock, which tells the database's time.
+  Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
+           const BelievedClock::Options& clock);
 
   // By this machine's clock, as all times of the stores' interfaces are. Leaves a mark of it.
   Time now();
 
  private:
   // Of the database, in its own time.
-  static Time last_seen(Database& database, const OperatorsWord& word);
+  static Time last_seen(Database& database);
 
   Database& database_;
   BelievedClock clock_;

@@ -46,7 +46,8 @@ constexpr std::array kAsTheyAre = {
           "SELECT rule, study, series, \"order\", instances, seen FROM watched", 6},
     Table{"received(route, study, series, instance, blob, bytes, at)",
           "SELECT route, study, series, instance, blob, bytes, at FROM received", 7},
-    Table{"audit(id, at, record)", "SELECT id, at, record FROM audit ORDER BY id", 3}};
+    Table{"audit(id, at, record, chain)", "SELECT id, at, record, chain FROM audit ORDER BY id",
+          4}};
 
 // A row's values, as the columns take them.
 class Values {

@@ -200,6 +200,14 @@ CREATE TABLE identity(                 -- one row: what the blobs that belong to
 -- Of the stages that have ended, by name: JSON as of the last renewal. `timing` is of daemons of the first version, which
 -- may still run beside newer ones.
 ALTER TABLE runs ADD COLUMN timings text;
+)sql",
+                                R"sql(
+-- A time that decides how long something is kept is never older than the newest that is known for certain.
+CREATE OR REPLACE FUNCTION isomesh_kept(us bigint) RETURNS bigint LANGUAGE sql VOLATILE AS
+  $$ SELECT greatest(us, (SELECT max(seen) FROM identity)) $$;
+)sql",
+                                R"sql(
+ALTER TABLE audit ADD COLUMN IF NOT EXISTS chain text;  -- see AuditChain; none in entries of versions before
 )sql"};
 
 // As the newest version has them, each a verb in one round trip. Whoever changes one adds a
@@ -214,10 +222,10 @@ CREATE OR REPLACE FUNCTION end_job(p_job text, p_state int, p_record text, p_sta
                                    p_blobs jsonb) RETURNS void LANGUAGE plpgsql AS $$
 DECLARE j record; now_us bigint := isomesh_now();
 BEGIN
-  UPDATE jobs SET state = p_state, finished = now_us, record = p_record, waiting_for = NULL,
+  UPDATE jobs SET state = p_state, finished = isomesh_kept(now_us), record = p_record, waiting_for = NULL,
                   ended_by = coalesce(p_ended_by, ended_by)
     WHERE id = p_job RETURNING owner, volume, receiver, url INTO j;
-  UPDATE volumes SET used = greatest(used, now_us) WHERE owner = j.owner AND id = j.volume;
+  UPDATE volumes SET used = greatest(used, isomesh_kept(now_us)) WHERE owner = j.owner AND id = j.volume;
   INSERT INTO meshes SELECT p_job, t.blob, t.bytes FROM jsonb_to_recordset(p_blobs) AS t(blob text, bytes bigint)
     ON CONFLICT DO NOTHING;
   IF j.url IS NOT NULL THEN

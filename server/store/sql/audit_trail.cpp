@@ -1,26 +1,76 @@
 #include "server/store/sql/audit_trail.h"
 
-#include <vector>
+#include <optional>
+#include <string>
 
 #include "server/store/microseconds.h"
 
 namespace isomesh::store {
 namespace {
 
-// A piece at a time, so that who reads slowly holds nobody up.
-template <class Ask>
-void read_pieces(const Ask& ask, std::uint64_t after,
-                 const std::function<void(std::string_view line)>& line) {
+struct Entry {
+  std::uint64_t number = 0;
+  std::string line;
+  std::optional<std::string> chain;
+};
+
+// Those after a number, oldest first, as long as `take` returns true. A piece at a time, so that
+// who reads slowly holds nobody up.
+template <class Ask, class Take>
+void read_pieces(const Ask& ask, std::uint64_t after, const Take& take) {
   constexpr int kPiece = 500;
   while (true) {
-    Rows rows =
-        ask("SELECT id, at, record FROM audit WHERE id > ?1 ORDER BY id LIMIT ?2", after, kPiece);
+    Rows rows = ask("SELECT id, at, record, chain FROM audit WHERE id > ?1 ORDER BY id LIMIT ?2",
+                    after, kPiece);
     if (!rows.next()) return;
     do {
       after = rows.count(0);
-      line(audit_line(after, rows.text(1), rows.text(2)));
+      const auto chain = rows.is_null(3) ? std::nullopt : std::optional(rows.text(3));
+      if (!take(Entry{after, audit_line(after, rows.text(1), rows.text(2)), chain})) return;
     } while (rows.next());
   }
+}
+
+template <class Ask>
+AuditCheck check(const Ask& ask) {
+  AuditCheck result;
+  AuditChain chain;
+  bool has_begun = false;
+  read_pieces(ask, 0, [&](const Entry& entry) {
+    chain.add(entry.line);
+    has_begun = has_begun || entry.chain;
+    if (has_begun && entry.chain != chain.digest()) {
+      result.misfit = entry.number;
+      return false;
+    }
+    ++result.entries;
+    result.last = entry.number;
+    result.digest = chain.digest();
+    return true;
+  });
+  return result;
+}
+
+// Of all entries so far: the last that has a digest, and what follows it.
+AuditChain chain_of(SqlConnection& connection) {
+  std::uint64_t after = 0;
+  AuditChain chain;
+  {
+    Rows last = connection.query(
+        "SELECT id, chain FROM audit WHERE chain IS NOT NULL ORDER BY id DESC LIMIT 1");
+    if (last.next()) {
+      after = last.count(0);
+      chain = AuditChain(last.text(1));
+    }
+  }
+  const auto ask = [&](const char* sql, std::uint64_t from, int most) {
+    return connection.query(sql, from, most);
+  };
+  read_pieces(ask, after, [&](const Entry& entry) {
+    chain.add(entry.line);
+    return true;
+  });
+  return chain;
 }
 
 }  // namespace
@@ -39,7 +89,10 @@ void SqlAuditTrail::add(const AuditEntry& entry) {
       number = row.integer(0);
       at = timestamp_of(from_us(row.integer(1)));
     }
-    transaction->run("INSERT INTO audit(id, at, record) VALUES(?1, ?2, ?3)", number, at, record);
+    AuditChain chain = chain_of(transaction.connection());
+    chain.add(audit_line(static_cast<std::uint64_t>(number), at, record));
+    transaction->run("INSERT INTO audit(id, at, record, chain) VALUES(?1, ?2, ?3, ?4)", number, at,
+                     record, chain.digest());
     transaction.commit();
   });
 }
@@ -48,7 +101,17 @@ void SqlAuditTrail::read(std::uint64_t after,
                          const std::function<void(std::string_view line)>& line) const {
   read_pieces([this](const char* sql, std::uint64_t from,
                      int most) { return database_.query(sql, from, most); },
-              after, line);
+              after,
+              [&](const Entry& entry) {
+                line(entry.line);
+                return true;
+              });
+}
+
+AuditCheck SqlAuditTrail::verify() const {
+  return check([this](const char* sql, std::uint64_t from, int most) {
+    return database_.query(sql, from, most);
+  });
 }
 
 std::uint64_t SqlAuditTrail::sent() const {
@@ -65,7 +128,17 @@ void read_audit_trail(SqlConnection& connection, std::uint64_t after,
                       const std::function<void(std::string_view line)>& line) {
   read_pieces([&](const char* sql, std::uint64_t from,
                   int most) { return connection.query(sql, from, most); },
-              after, line);
+              after,
+              [&](const Entry& entry) {
+                line(entry.line);
+                return true;
+              });
+}
+
+AuditCheck verify_audit_trail(SqlConnection& connection) {
+  return check([&](const char* sql, std::uint64_t from, int most) {
+    return connection.query(sql, from, most);
+  });
 }
 
 }  // namespace isomesh::store

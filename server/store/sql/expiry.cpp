@@ -9,10 +9,11 @@ namespace {
 void note(SqlConnection& connection, const Expirable& record, const std::vector<Blob>& blobs,
           Expired& expired) {
   connection.run(
-      "INSERT INTO expired(id, owner, at) VALUES(?1, ?2, isomesh_now()) ON CONFLICT(id, owner) DO "
-      "UPDATE SET at = excluded.at",
+      "INSERT INTO expired(id, owner, at) VALUES(?1, ?2, isomesh_kept(isomesh_now())) ON "
+      "CONFLICT(id, "
+      "owner) DO UPDATE SET at = excluded.at",
       record.id, record.owner);
-  ++expired.records;
+  expired.records.push_back(record);
   for (const Blob& blob : blobs) {
     if (is_named(connection, blob.key)) continue;
     expired.bytes += blob.bytes;
@@ -75,7 +76,7 @@ Expired expire_records(SqlDatabase& database, std::span<const Expirable> records
       transaction.commit();
       return now;
     });
-    all.records += expired.records;
+    all.records.insert(all.records.end(), expired.records.begin(), expired.records.end());
     all.bytes += expired.bytes;
     all.blobs.insert(all.blobs.end(), expired.blobs.begin(), expired.blobs.end());
   }

@@ -91,7 +91,7 @@ void insert_watched(SqlConnection& connection, const OrderSpec& spec, const Watc
   insert(connection, spec);
   connection.run(
       "INSERT INTO watched(rule, study, series, \"order\", instances, seen) VALUES(?1, ?2, ?3, ?4, "
-      "?5, isomesh_now()) ON CONFLICT(rule, study, series) DO UPDATE SET \"order\" = "
+      "?5, isomesh_kept(isomesh_now())) ON CONFLICT(rule, study, series) DO UPDATE SET \"order\" = "
       "excluded.\"order\", instances = excluded.instances, seen = excluded.seen",
       series.rule, series.study, series.series, spec.record.order.id, series.instances);
 }
@@ -112,8 +112,9 @@ void write(SqlConnection& connection, const OrderRecord& record,
   const std::optional<std::int64_t> finished =
       order.finished ? std::optional(us_of_timestamp(*order.finished)) : std::nullopt;
   connection.run(
-      "UPDATE orders SET state = ?1, finished = ?2, next = coalesce(?3, isomesh_now()), record = "
-      "?4, work = ?5 WHERE id = ?6",
+      "UPDATE orders SET state = ?1, finished = CASE WHEN ?2 IS NULL THEN NULL ELSE "
+      "isomesh_kept(?2) END, next = coalesce(?3, isomesh_now()), record = ?4, work = ?5 WHERE id = "
+      "?6",
       order.state, finished, next, to_json(order), to_record(record.work), order.id);
   name_blobs(connection, record);
 }

@@ -62,8 +62,8 @@ std::vector<std::string> SqlReceivedStore::release(const HeldSeries& series) {
     }
     // One that comes meanwhile is newer.
     transaction->run(
-        "UPDATE received SET blob = NULL WHERE route = ?1 AND study = ?2 AND series = ?3 AND at <= "
-        "?4",
+        "UPDATE received SET blob = NULL, at = isomesh_kept(at) WHERE route = ?1 AND study = ?2 "
+        "AND series = ?3 AND at <= ?4",
         of.route, of.study, of.series, last);
     transaction.commit();
     return blobs;

@@ -2,7 +2,9 @@
 // stores only.
 //
 // A text has its parameters as ?1, ?2 and so on, and may have `isomesh_now()`, which is the time
-// as the tables keep it: microseconds since 1970.
+// as the tables keep it: microseconds since 1970. What decides how long something is kept is
+// written as `isomesh_kept(time)`: that time, or the newest that is known for certain where the
+// clock has gone back behind that.
 #pragma once
 
 #include <array>

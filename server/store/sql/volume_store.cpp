@@ -74,8 +74,9 @@ void throw_if_needed(SqlConnection& connection, const Viewer& viewer, const std:
 std::optional<Volume> use(SqlConnection& connection, const std::string& owner,
                           const std::string& id) {
   Rows known = connection.query(
-      "UPDATE volumes SET used = isomesh_now() WHERE owner = ?1 AND id = ?2 RETURNING "
-      "coalesce(labelled, record)",
+      "UPDATE volumes SET used = CASE WHEN used > isomesh_kept(isomesh_now()) THEN used ELSE "
+      "isomesh_kept(isomesh_now()) END WHERE owner = ?1 AND id = ?2 RETURNING coalesce(labelled, "
+      "record)",
       owner, id);
   if (!known.next()) return std::nullopt;
   auto volume = readable(known.text(0), id);
@@ -87,7 +88,7 @@ bool insert(SqlConnection& connection, const std::string& owner, const Volume& v
             const Records& records) {
   const std::size_t inserted = connection.run(
       "INSERT INTO volumes(owner, id, created, used, bytes, record, labelled) VALUES(?1, ?2, ?3, "
-      "isomesh_now(), ?4, ?5, ?6) ON CONFLICT(owner, id) DO NOTHING",
+      "isomesh_kept(isomesh_now()), ?4, ?5, ?6) ON CONFLICT(owner, id) DO NOTHING",
       owner, volume.id, us_of_timestamp(volume.created), volume.bytes, records.listed,
       records.labelled);
   if (inserted == 0) return false;

@@ -177,6 +177,12 @@ ALTER TABLE volumes ADD COLUMN labelled TEXT;  -- the record with its labels, if
 UPDATE volumes SET labelled = record, record = json_remove(record, '$.labels')
   WHERE instr(record, '"labels":[');
 CREATE INDEX volumes_by_time ON volumes(created, id);
+)sql",
+                               R"sql(
+ALTER TABLE audit ADD COLUMN chain TEXT;  -- see AuditChain; none in entries of versions before
+CREATE TRIGGER audit_is_not_replaced BEFORE INSERT ON audit
+  WHEN EXISTS(SELECT 1 FROM audit WHERE id = new.id)
+  BEGIN SELECT raise(ABORT, 'the audit trail is not changed'); END;
 )sql"};
 
 // Versions 1 and 2 were never released.
@@ -231,6 +237,7 @@ Database::Database(const DataFolder& folder)
     const Reading reading(*reader);
     reading->query("SELECT count(*) FROM sqlite_schema").next();
   }
+  writer_.know_newest(newest_us_);
   writer_.limit_log(log_bytes(folder.reserve().capacity()));
 }
 

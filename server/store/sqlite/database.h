@@ -32,6 +32,9 @@ class Database : public SqlDatabase {
   // One that nobody uses, where there is one.
   Connection& reader();
 
+  // Tells which time it is for certain: what is kept from now on is never older.
+  void know_newest(Time time) { newest_us_ = store::to_us(time); }
+
   // How many rows were changed since it was opened.
   std::int64_t changes();
 
@@ -60,6 +63,7 @@ class Database : public SqlDatabase {
   bool make_way();
 
   const DataFolder& folder_;
+  std::atomic<std::int64_t> newest_us_ = 0;
   Connection writer_;
   static constexpr std::size_t kReaders = 6;
   std::array<std::unique_ptr<Connection>, kReaders> readers_;

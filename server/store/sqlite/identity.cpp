@@ -8,6 +8,7 @@
 #include "base/ids.h"
 #include "base/log.h"
 #include "proto/error.h"
+#include "server/store/sql/trusted_clock.h"
 
 namespace isomesh::store {
 namespace {
@@ -45,28 +46,25 @@ std::int64_t newest_record(Connection& connection) {
 
 Identity::Identity(Database& database, const BlobStore& blobs, const OperatorsWord& word,
                    const BelievedClock::Options& clock)
-    : database_(database), blobs_(blobs), clock_(last_seen(database, word), clock) {
+    : database_(database),
+      blobs_(blobs),
+      clock_(time_to_start_with(last_seen(database, clock), word, clock), clock) {
   const Mark records = mark_of_database();
   const Mark theirs = mark_of_blobs();
   if (!word.adopt) check(records, theirs);
+  const Time now = clock_.now();
+  database_.know_newest(now);
+  if (word.trust_clock) trust(database_, last_seen(database, clock), now, clock.tolerance);
   const Lock lock(mutex_);
   const bool belong_together = !records.id.empty() && records.id == theirs.id;
   mark_ = belong_together ? records : Mark{random_hex(16), 0, records.seen};
   mark_.number = std::max(mark_.number, theirs.id == mark_.id ? theirs.number : 0);
-  write_mark(clock_.now());
-  if (clock_.is_doubted()) {
-    log_warning(
-        "the clock is far ahead of the newest record: until it is right, nothing expires. If the "
-        "service was off for that long, start once with --trust-clock");
-  }
+  write_mark(now);
 }
 
 Time Identity::now() {
-  const bool was_doubted = clock_.is_doubted();
   const Time time = clock_.now();
-  if (clock_.is_doubted() && !was_doubted) {
-    log_warning("the clock was set far ahead: until it is right, nothing expires");
-  }
+  database_.know_newest(time);
   const Lock lock(mutex_);
   try {
     if (!is_told_) write_blobs_mark();
@@ -79,14 +77,12 @@ Time Identity::now() {
   return time;
 }
 
-Time Identity::last_seen(Database& database, const OperatorsWord& word) {
-  const Time wall = std::chrono::system_clock::now();
-  if (word.trust_clock) return wall;
+Time Identity::last_seen(Database& database, const BelievedClock::Options& clock) {
   const Reading reading(database.reader());
   Rows seen = reading->query("SELECT seen FROM identity");
   const std::int64_t marked = seen.next() ? seen.integer(0) : 0;
   const std::int64_t newest = marked > 0 ? marked : newest_record(reading.connection());
-  return newest > 0 ? from_us(newest) : wall;
+  return newest > 0 ? from_us(newest) : clock.wall();
 }
 
 Identity::Mark Identity::mark_of_database() const {

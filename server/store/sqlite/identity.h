@@ -26,8 +26,8 @@ class Identity {
   // or so.
   Time now();
 
-  // Whether the clock says another time than that.
-  bool doubts_clock() const { return clock_.is_doubted(); }
+  // Whether the clock says quite another time than that.
+  bool doubts_clock() const { return clock_.doubt() != BelievedClock::Doubt::kNone; }
 
  private:
   struct Mark {
@@ -36,7 +36,7 @@ class Identity {
     std::int64_t seen = 0;  // of the database's: the believed time when it was made
   };
 
-  static Time last_seen(Database& database, const OperatorsWord& word);
+  static Time last_seen(Database& database, const BelievedClock::Options& clock);
   Mark mark_of_database() const;
   Mark mark_of_blobs() const;
   void check(const Mark& records, const Mark& blobs) const;

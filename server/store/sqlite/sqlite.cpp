@@ -143,6 +143,12 @@ void give_now(sqlite3_context* context, int, sqlite3_value**) {
   sqlite3_result_int64(context, to_us(std::chrono::system_clock::now()));
 }
 
+void give_kept(sqlite3_context* context, int, sqlite3_value** values) {
+  const auto* newest = static_cast<const std::atomic<std::int64_t>*>(sqlite3_user_data(context));
+  sqlite3_result_int64(context,
+                       std::max<std::int64_t>(sqlite3_value_int64(values[0]), newest->load()));
+}
+
 }  // namespace
 
 Connection::Connection(const std::filesystem::path& path, Mode mode) {
@@ -166,6 +172,14 @@ Connection::Connection(const std::filesystem::path& path, Mode mode) {
 Connection::~Connection() {
   for (const auto& [sql, statement] : statements_) sqlite3_finalize(statement);
   sqlite3_close(handle_);
+}
+
+void Connection::know_newest(const std::atomic<std::int64_t>& newest_us) {
+  // SQLite gives it back as it was given.
+  auto* given = const_cast<std::atomic<std::int64_t>*>(&newest_us);
+  const int code = sqlite3_create_function_v2(handle_, "isomesh_kept", 1, SQLITE_UTF8, given,
+                                              give_kept, nullptr, nullptr, nullptr);
+  if (code != SQLITE_OK) fail(handle_, code);
 }
 
 void Connection::script(const char* sql) {

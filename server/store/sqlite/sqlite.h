@@ -59,6 +59,9 @@ class Connection : public SqlConnection {
   const char* for_update() const override { return ""; }
   void lock_table(const std::string&) override {}
 
+  // Gives texts `isomesh_kept`, by the newest time that is known, which must outlive this.
+  void know_newest(const std::atomic<std::int64_t>& newest_us);
+
   // Several statements without parameters.
   void script(const char* sql);
 

@@ -31,7 +31,7 @@ TEST_F(BelievedClockTest, FollowsAClockThatIsRight) {
   EXPECT_EQ(clock.now(), wall_);
   pass(days(400));
   EXPECT_EQ(clock.now(), wall_);
-  EXPECT_FALSE(clock.is_doubted());
+  EXPECT_EQ(clock.doubt(), BelievedClock::Doubt::kNone);
 }
 
 TEST_F(BelievedClockTest, GoesOnAtItsOwnPaceWhenTheClockIsSetAhead) {
@@ -39,29 +39,47 @@ TEST_F(BelievedClockTest, GoesOnAtItsOwnPaceWhenTheClockIsSetAhead) {
   const Time before = clock.now();
   wall_ += days(40);
   EXPECT_EQ(clock.now(), before);
-  EXPECT_TRUE(clock.is_doubted());
+  EXPECT_EQ(clock.doubt(), BelievedClock::Doubt::kAhead);
   pass(hours(3));
   EXPECT_EQ(clock.now(), before + hours(3));
   wall_ -= days(40);
   EXPECT_EQ(clock.now(), wall_);
-  EXPECT_FALSE(clock.is_doubted());
+  EXPECT_EQ(clock.doubt(), BelievedClock::Doubt::kNone);
 }
 
 TEST_F(BelievedClockTest, DoubtsAStartFarAhead) {
   BelievedClock clock = clock_from(wall_ - days(40));
   EXPECT_EQ(clock.now(), wall_ - days(40));
-  EXPECT_TRUE(clock.is_doubted());
+  EXPECT_EQ(clock.doubt(), BelievedClock::Doubt::kAhead);
 }
 
-// And does not let what is stored then make it believe.
-TEST_F(BelievedClockTest, FollowsAClockThatIsBehindAndDoubtsTheWayBack) {
+// What is used then would be the oldest of all once the clock is right.
+TEST_F(BelievedClockTest, NeverGoesBack) {
   BelievedClock clock = clock_from(wall_);
-  clock.now();
+  const Time before = clock.now();
   wall_ -= days(40);
-  EXPECT_EQ(clock.now(), wall_);
+  EXPECT_EQ(clock.now(), before);
+  EXPECT_EQ(clock.doubt(), BelievedClock::Doubt::kBehind);
+  pass(days(3));
+  EXPECT_EQ(clock.now(), before + days(3));
   wall_ += days(40);
-  EXPECT_EQ(clock.now(), wall_ - days(40));
-  EXPECT_TRUE(clock.is_doubted());
+  EXPECT_EQ(clock.now(), wall_);
+  EXPECT_EQ(clock.doubt(), BelievedClock::Doubt::kNone);
+}
+
+TEST_F(BelievedClockTest, AStartFarBehindGoesOnFromWhatWasSeen) {
+  const Time seen = wall_ + days(40);
+  BelievedClock clock = clock_from(seen);
+  EXPECT_EQ(clock.now(), seen);
+  EXPECT_EQ(clock.doubt(), BelievedClock::Doubt::kBehind);
+}
+
+TEST_F(BelievedClockTest, AClockThatIsALittleBehindIsNoMatter) {
+  BelievedClock clock = clock_from(wall_);
+  const Time before = clock.now();
+  wall_ -= hours(3);
+  EXPECT_EQ(clock.now(), before);
+  EXPECT_EQ(clock.doubt(), BelievedClock::Doubt::kNone);
 }
 
 }  // namespace

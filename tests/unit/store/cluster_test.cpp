@@ -15,6 +15,7 @@
 #include "server/store/postgresql/job_store.h"
 #include "server/store/postgresql/outbox.h"
 #include "server/store/postgresql/turn.h"
+#include "server/store/sql/audit_trail.h"
 #include "server/store/sql/order_store.h"
 #include "server/store/sql/volume_store.h"
 #include "tests/support/errors.h"
@@ -354,6 +355,13 @@ TEST_F(ClusterTest, TheAuditTrailIsNotChanged) {
   }
 }
 
+TEST_F(ClusterTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
+  for (int n = 0; n < 5; ++n) SqlAuditTrail((n % 2 ? one() : two()).database).add({});
+  EXPECT_EQ(SqlAuditTrail(one().database).verify().entries, 5U);
+  ask("ALTER TABLE audit DISABLE TRIGGER audit_is_kept; UPDATE audit SET at = '' WHERE id = 3");
+  EXPECT_EQ(SqlAuditTrail(one().database).verify().misfit, 3U);
+}
+
 // --- What is not kept
 
 TEST_F(ClusterTest, OneRemovesAtATime) {
@@ -362,6 +370,35 @@ TEST_F(ClusterTest, OneRemovesAtATime) {
   EXPECT_FALSE(two().jobs.turn_to_remove());
   turn.reset();
   EXPECT_TRUE(two().jobs.turn_to_remove());
+}
+
+// The newest time that is known is 40 days later than the database's clock.
+TEST_F(ClusterTest, WhatIsUsedIsNeverOlderThanTheNewestTimeThatIsKnown) {
+  Identity(one().database, blobs_, {.adopt = true}, seconds(1)).now();
+  ask("UPDATE identity SET seen = isomesh_now() + 40 * 86400000000");
+  Volume volume;
+  volume.id = "another";
+  volume.created = "2024-01-01T00:00:00.000Z";
+  one().volumes.add("", volume);
+  two().jobs.cancel("", submit());
+  EXPECT_EQ(ask("SELECT count(*) FROM volumes, identity WHERE used < seen"), "0");
+  EXPECT_EQ(ask("SELECT count(*) FROM jobs, identity WHERE finished < seen"), "0");
+  Identity behind(two().database, blobs_, {}, seconds(1));
+  EXPECT_GT(behind.now(), std::chrono::system_clock::now() + std::chrono::days(39));
+}
+
+// The one was used right before the time until which the clock was behind, the other long before.
+TEST_F(ClusterTest, AClockThatIsTrustedLetsExpireWhatWasOldBefore) {
+  Identity(one().database, blobs_, {.adopt = true}, seconds(1)).now();
+  const std::string id = submit();
+  one().jobs.cancel("", id);
+  ask("UPDATE identity SET seen = isomesh_now() - 40 * 86400000000; UPDATE volumes SET used = "
+      "isomesh_now() - 40 * 86400000000; UPDATE jobs SET finished = isomesh_now() - 60 * "
+      "86400000000");
+  Identity trusting(two().database, blobs_, {.trust_clock = true}, std::chrono::days(7));
+  const Time month_ago = trusting.now() - std::chrono::days(30);
+  EXPECT_THAT(two().jobs.ended({month_ago}, Ended::kAll, 9), SizeIs(1));
+  EXPECT_THAT(two().volumes.unused({month_ago}, 9), IsEmpty());
 }
 
 // --- Orders

@@ -88,7 +88,9 @@ TEST_F(DatabaseTest, OfTheVersionBeforeKeepsItsVolumesWithTheirLabels) {
   Connection(data_.records(), Connection::Mode::kWrite)
       .script(
           "UPDATE volumes SET record = coalesce(labelled, record); DROP INDEX volumes_by_time; "
-          "ALTER TABLE volumes DROP COLUMN labelled; PRAGMA user_version=6");
+          "ALTER TABLE volumes DROP COLUMN labelled; DROP TRIGGER audit_is_not_replaced; ALTER "
+          "TABLE "
+          "audit DROP COLUMN chain; PRAGMA user_version=6");
   Database database(data_);
   const SqlVolumeStore volumes(database);
   EXPECT_EQ(volumes.get("", "aa"), plain);
@@ -102,7 +104,10 @@ TEST_F(DatabaseTest, OfTheVersionBeforeKeepsItsVolumesWithTheirLabels) {
 TEST_F(DatabaseTest, TheAuditTrailIsNeitherChangedNorRemoved) {
   Database database(data_);
   SqlAuditTrail(database).add({.event = AuditEvent::kStart});
-  for (const char* sql : {"UPDATE audit SET record = ''", "DELETE FROM audit"}) {
+  for (const char* sql :
+       {"UPDATE audit SET record = ''", "DELETE FROM audit",
+        "INSERT OR REPLACE INTO audit(id, at, record) VALUES(1, '', '{}')",
+        "REPLACE INTO audit SELECT * FROM audit", "UPDATE OR REPLACE audit SET id = 1"}) {
     EXPECT_EQ(test::code_thrown_by([&] {
                 Transaction transaction(database.writer());
                 transaction->run(sql);
@@ -111,6 +116,53 @@ TEST_F(DatabaseTest, TheAuditTrailIsNeitherChangedNorRemoved) {
               ErrorCode::kInternal)
         << sql;
   }
+}
+
+// By who removes the triggers first.
+TEST_F(DatabaseTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
+  const auto add = [this](int count) {
+    Database database(data_);
+    for (int n = 0; n < count; ++n) {
+      SqlAuditTrail(database).add({.event = AuditEvent::kQuery, .study = std::to_string(n)});
+    }
+  };
+  const auto tamper = [this](const std::string& sql) {
+    Connection connection(data_.records(), Connection::Mode::kWrite);
+    connection.script(
+        "DROP TRIGGER IF EXISTS audit_is_not_changed; DROP TRIGGER IF EXISTS audit_is_not_removed; "
+        "DROP TRIGGER IF EXISTS audit_is_not_replaced;");
+    connection.script(sql.c_str());
+  };
+  const auto check = [this] {
+    Database database(data_);
+    return SqlAuditTrail(database).verify();
+  };
+  EXPECT_EQ(check().entries, 0U);
+  // Of the version before, which had no digests.
+  add(3);
+  tamper("UPDATE audit SET chain = NULL");
+  EXPECT_EQ(check().entries, 3U);
+  add(1200);  // more than are read at once
+  const AuditCheck intact = check();
+  EXPECT_EQ(intact.misfit, std::nullopt);
+  EXPECT_EQ(intact.entries, 1203U);
+  EXPECT_EQ(intact.last, 1203U);
+  tamper("UPDATE audit SET chain = chain");
+  EXPECT_EQ(check().digest, intact.digest);
+  const auto kept = test::read_file(data_.records());
+  using Case = std::pair<const char*, std::uint64_t>;
+  for (const auto& [sql, misfit] :
+       {Case{"UPDATE audit SET record = replace(record, '\"7\"', '\"8\"') WHERE id = 11", 11},
+        Case{"UPDATE audit SET at = '2024-01-01T00:00:00.000Z' WHERE id = 700", 700},
+        Case{"DELETE FROM audit WHERE id = 600", 601}, Case{"DELETE FROM audit WHERE id < 50", 50},
+        Case{"UPDATE audit SET record = '{}' WHERE id = 2", 4},  // by the first that has a digest
+        Case{"UPDATE audit SET chain = NULL WHERE id = 1203", 1203},
+        Case{"INSERT INTO audit(id, at, record) VALUES(9999, '', '{}')", 9999}}) {
+    tamper(sql);
+    EXPECT_EQ(check().misfit, misfit) << sql;
+    test::write_file(data_.records(), kept);
+  }
+  EXPECT_EQ(check().digest, intact.digest);
 }
 
 TEST_F(DatabaseTest, ThatIsNoneIsRefusedWithoutItsPath) {
