@@ -70,6 +70,7 @@ void visit(Is<OrderWork> auto& self, auto&& field) {
   field("max_error_mm", self.max_error_mm);
   field("triangles", self.triangles);
   field("queried", self.queried);
+  field("failed_in", self.failed_in);
 }
 
 void visit(Is<PacsStatus> auto& self, auto&& field) {

@@ -96,6 +96,8 @@ struct OrderWork {
   std::optional<double> max_error_mm = {};
   std::optional<std::uint32_t> triangles = {};  // that fit, once it is known that all do not
   std::optional<std::string> queried = {};      // when the query of the audit trail was made
+  // The step that has to succeed before the failures are forgotten. Empty: there were none.
+  std::optional<OrderState> failed_in = {};
 
   bool operator==(const OrderWork&) const = default;
 };

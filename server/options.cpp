@@ -404,7 +404,15 @@ std::string as_config(const CLI::App& cli, Remarks remarks) {
 std::string describe_config_error(const std::string& library_text) {
   constexpr std::string_view kUnknown = "INI was not able to parse ";
   if (!library_text.starts_with(kUnknown)) return "the file of --config: " + library_text;
-  return "the file of --config: there is no option \"" + library_text.substr(kUnknown.size()) +
+  std::string name = library_text.substr(kUnknown.size());
+  // What the library calls the beginning of a section.
+  constexpr std::string_view kSection = ".++";
+  if (name.ends_with(kSection)) {
+    name.resize(name.size() - kSection.size());
+    return "the file of --config: there is no section [" + name +
+           "]; it has none, and those of a hospital belong in the file of --hospital";
+  }
+  return "the file of --config: there is no option \"" + name +
          "\"; `isomeshd --help` lists all options";
 }
 

@@ -1,10 +1,12 @@
 #include "server/dimse/listener.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <string_view>
 
-#include <fcntl.h>
+#include <linux/tcp.h>
+#include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -76,40 +78,115 @@ net::Address listen_address(const orders::DimseSettings& settings) {
 
 DimseListener::DimseListener(const ListenerServices& services,
                              const orders::DimseSettings& settings)
-    : services_(services), settings_(settings), listener_(listen_address(settings)) {
-  // Several threads wait for each connection, which one of them gets.
-  ::fcntl(listener_.descriptor(), F_SETFL, O_NONBLOCK);
+    : services_(services),
+      settings_(settings),
+      listener_(listen_address(settings)),
+      places_(settings.associations, "associations"),
+      acceptor_(listener_.descriptor(), {.wait_time = settings.idle},
+                [this](AssociationRequest& request) { return begin(request); }) {
   for (std::size_t n = 0; n < settings_.associations; ++n) {
     threads_.emplace_back([this](const std::stop_token& stop) { serve(stop); });
   }
 }
 
 void DimseListener::stop() {
+  acceptor_.stop();
   for (std::jthread& thread : threads_) thread.request_stop();
+  {
+    const Lock lock(mutex_);
+    for (const auto& association : open_) association->end.request_stop();
+  }
   threads_.clear();
 }
 
-Descriptor DimseListener::next_connection() const {
-  pollfd waiting = {listener_.descriptor(), POLLIN, 0};
-  if (::poll(&waiting, 1, static_cast<int>(process::kLook.count())) <= 0) return Descriptor();
-  return Descriptor(::accept4(listener_.descriptor(), nullptr, nullptr, SOCK_CLOEXEC));
+bool DimseListener::begin(AssociationRequest& request) {
+  try {
+    auto association = std::make_shared<Association>();
+    association->place = places_.take(request.party);
+    association->peer = std::move(request.peer);
+    association->party = request.party;
+    const Lock lock(mutex_);
+    open_.push_back(association);
+    ready_.push_back(std::move(association));
+    changed_.notify_one();
+    return true;
+  } catch (const Error& error) {
+    make_room(error.code() == ErrorCode::kTooManyRequests ? request.party : "");
+    return false;
+  }
+}
+
+// Among those of that party, or of all for "". One at a time: it takes a moment to end.
+void DimseListener::make_room(const std::string& party) {
+  const Lock lock(mutex_);
+  Association* idlest = nullptr;
+  std::chrono::milliseconds longest{0};
+  for (const auto& each : open_) {
+    if (each->end.stop_requested()) return;
+    std::chrono::milliseconds idle{0};
+    if ((!party.empty() && each->party != party) || !is_idle(*each, idle) || idle < longest) {
+      continue;
+    }
+    idlest = each.get();
+    longest = idle;
+  }
+  if (idlest != nullptr) idlest->end.request_stop();
+}
+
+// Sets for how long neither side has sent anything.
+bool DimseListener::is_idle(const Association& association, std::chrono::milliseconds& idle) {
+  // A sender has what it sends first when it begins, and may need longer to read the next object.
+  constexpr std::chrono::seconds kBeforeTheFirst{1};
+  constexpr std::chrono::seconds kBetween{10};
+  // From when it has begun until the peer hears of that: our time, not the peer's.
+  constexpr std::chrono::seconds kUnanswered{5};
+  const Clock::time_point told = association.told;
+  if (told == Clock::time_point() || association.is_storing) return false;
+  tcp_info info = {};
+  socklen_t size = sizeof info;
+  if (::getsockopt(association.peer.number(), IPPROTO_TCP, TCP_INFO, &info, &size) != 0) {
+    return false;
+  }
+  idle = std::chrono::floor<std::chrono::milliseconds>(Clock::now() - told);
+  if (info.tcpi_data_segs_out == 0) return idle >= kUnanswered;
+  const auto moved = std::min(info.tcpi_last_data_recv, info.tcpi_last_data_sent);
+  idle = std::min(idle, std::chrono::milliseconds(moved));
+  return idle >= (association.has_sent ? kBetween : kBeforeTheFirst);
+}
+
+std::shared_ptr<DimseListener::Association> DimseListener::next_association(
+    const std::stop_token& stop) {
+  Lock lock(mutex_);
+  changed_.wait(lock, stop, [&]() ISOMESH_REQUIRES(mutex_) { return !ready_.empty(); });
+  if (stop.stop_requested() || ready_.empty()) return nullptr;
+  auto next = std::move(ready_.front());
+  ready_.pop_front();
+  return next;
 }
 
 void DimseListener::serve(const std::stop_token& stop) {
   constexpr std::chrono::seconds kPause{1};
-  while (!stop.stop_requested()) {
+  while (auto association = next_association(stop)) {
+    bool has_failed = false;
     try {
-      const Descriptor peer = next_connection();
-      if (peer.number() >= 0) serve_association(peer, stop);
+      serve_association(*association);
     } catch (const std::exception& error) {
       if (stop.stop_requested()) return;
       log_error("an association was ended by an error: {}", error.what());
-      std::this_thread::sleep_for(kPause);
+      has_failed = true;
     }
+    {
+      const Lock lock(mutex_);
+      std::erase(open_, association);
+    }
+    association.reset();
+    acceptor_.wake();
+    if (has_failed) std::this_thread::sleep_for(kPause);
   }
 }
 
-void DimseListener::serve_association(const Descriptor& peer, const std::stop_token& stop) {
+void DimseListener::serve_association(Association& association) {
+  const std::stop_token stop = association.end.get_token();
   const store::ScratchFolder scratch(services_.folder.scratch());
   process::Child child = services_.processes.take(Clock::now() + settings_.idle);
   child.say(process::to_line(process::DimseReceiving{.called = titles_of(settings_),
@@ -117,7 +194,8 @@ void DimseListener::serve_association(const Descriptor& peer, const std::stop_to
                                                      .folder = scratch.path(),
                                                      .max_object_bytes = settings_.max_object_bytes,
                                                      .idle = settings_.idle}),
-            peer.number());
+            association.peer.number());
+  association.told = Clock::now();
   Lines lines(child);
   while (true) {
     const std::string line = lines.next(stop);
@@ -126,8 +204,12 @@ void DimseListener::serve_association(const Descriptor& peer, const std::stop_to
     if (const auto* ended = std::get_if<DimseEnded>(&report)) return note_end(*ended);
     const auto* object = std::get_if<DimseObject>(&report);
     if (object == nullptr) break;
+    association.is_storing = true;
     const char verdict = static_cast<char>(keep(*object, scratch.path()));
     child.say(std::string_view(&verdict, 1));
+    association.told = Clock::now();
+    association.has_sent = true;
+    association.is_storing = false;
   }
   if (stop.stop_requested()) return;
   // It neither ended well nor did it say why: what it has read may be the reason.

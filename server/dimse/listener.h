@@ -1,14 +1,19 @@
 // Takes series that peers send by C-STORE.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "base/mutex.h"
+#include "server/dimse/acceptor.h"
+#include "server/net/fair_places.h"
 #include "server/net/listener.h"
 #include "server/orders/hospital.h"
 #include "server/process/dimse_message.h"
@@ -35,6 +40,9 @@ struct ListenerServices {
 // Listens from its making on. Each association has a thread here, which does not look at what the
 // peer sends, and a confined process, which does. An object is acknowledged when it is a blob on
 // the disk that a record names.
+//
+// Addresses share the associations (FairPlaces). Where there is no place for one more, the one that
+// has been idle for the longest time ends, if that is long enough.
 class DimseListener {
  public:
   // Throws Error kInvalidParameter or kUnavailable when it cannot listen there.
@@ -50,10 +58,23 @@ class DimseListener {
   void stop();
 
  private:
+  struct Association {
+    Descriptor peer;
+    std::string party;
+    net::FairPlaces::Place place;
+    std::stop_source end = {};
+    std::atomic<bool> has_sent = false;    // an object
+    std::atomic<bool> is_storing = false;  // which the peer waits for
+    // When its process began, or an object was stored last; then it is the peer's turn.
+    std::atomic<std::chrono::steady_clock::time_point> told = {};
+  };
+
+  bool begin(AssociationRequest& request);
+  void make_room(const std::string& party);
+  static bool is_idle(const Association& association, std::chrono::milliseconds& idle);
   void serve(const std::stop_token& stop);
-  // None when there is none within a moment.
-  Descriptor next_connection() const;
-  void serve_association(const Descriptor& peer, const std::stop_token& stop);
+  std::shared_ptr<Association> next_association(const std::stop_token& stop);
+  void serve_association(Association& association);
   process::DimseVerdict keep(const process::DimseObject& object,
                              const std::filesystem::path& folder);
   bool has_room(std::uint64_t more_bytes) const;
@@ -62,9 +83,16 @@ class DimseListener {
   const ListenerServices services_;
   const orders::DimseSettings settings_;
   const net::Listener listener_;
+  net::FairPlaces places_;
   Mutex mutex_;
+  Condition changed_;
+  // All that have begun, and those of them that no thread has taken yet.
+  std::vector<std::shared_ptr<Association>> open_ ISOMESH_GUARDED_BY(mutex_);
+  std::deque<std::shared_ptr<Association>> ready_ ISOMESH_GUARDED_BY(mutex_);
   std::chrono::steady_clock::time_point next_note_ ISOMESH_GUARDED_BY(mutex_);
-  std::vector<std::jthread> threads_;  // last: run on all of the above
+  // Last: they run on all of the above.
+  AssociationAcceptor acceptor_;
+  std::vector<std::jthread> threads_;
 };
 
 }  // namespace isomesh::dimse

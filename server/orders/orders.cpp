@@ -252,13 +252,13 @@ void Orders::advance(store::OrderRecord record, const std::stop_token& stop) {
   } catch (const PacsFailure& failure) {
     if (stop.stop_requested()) return;
     note_failure(pacs, failure, record.order.id);
-    fail_step(record, failure, failure.may_pass(), failure.retry_after());
+    fail_step(record, before, failure, failure.may_pass(), failure.retry_after());
   } catch (const Error& error) {
     // It was cancelled, or goes on in the next process.
     if (stop.stop_requested()) return;
-    fail_step(record, error, may_pass(error.code()), {});
+    fail_step(record, before, error, may_pass(error.code()), {});
   } catch (const std::exception& error) {
-    fail_step(record, Error(ErrorCode::kInternal, error.what()), true, {});
+    fail_step(record, before, Error(ErrorCode::kInternal, error.what()), true, {});
   }
 }
 
@@ -285,8 +285,8 @@ void Orders::on_end(std::function<void(const std::string& order)> listener) {
   on_end_ = std::move(listener);
 }
 
-void Orders::fail_step(store::OrderRecord& record, const Error& error, bool may_pass,
-                       seconds retry_after) {
+void Orders::fail_step(store::OrderRecord& record, OrderState failed, const Error& error,
+                       bool may_pass, seconds retry_after) {
   const Time now = options_.now();
   const bool is_over = now - time_of(record.work.begun) >= hospital_.give_up;
   if (!may_pass || is_over) return end(record, error);
@@ -294,6 +294,7 @@ void Orders::fail_step(store::OrderRecord& record, const Error& error, bool may_
   const milliseconds delay =
       std::max<milliseconds>(delay_after(record.work.failures, hospital_), retry_after);
   ++record.work.failures;
+  record.work.failed_in = std::max(record.work.failed_in, std::optional(failed));
   ++order.attempts;
   order.error = to_problem(error, "/v1/orders/" + order.id);
   const Time next = now + std::min<milliseconds>(delay, hospital_.give_up);

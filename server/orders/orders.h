@@ -99,7 +99,8 @@ class Orders {
   std::optional<std::string> take(std::stop_token& cancelled);
   void give_back(const std::string& id);
   void advance(store::OrderRecord record, const std::stop_token& stop);
-  void fail_step(store::OrderRecord& record, const Error& error, bool may_pass,
+  // The record may be at an earlier step by now than the one that failed.
+  void fail_step(store::OrderRecord& record, OrderState failed, const Error& error, bool may_pass,
                  std::chrono::seconds retry_after);
   void end(store::OrderRecord& record, const Error& error);
   void note_success(const std::string& pacs);

@@ -9,13 +9,13 @@ ErrorCode code_of(PacsFault fault) {
     case PacsFault::kRefused:
       return ErrorCode::kPacsRefused;
     case PacsFault::kIncomplete:
+    case PacsFault::kChanged:
       return ErrorCode::kSeriesIncomplete;
     case PacsFault::kUnreachable:
     case PacsFault::kTimeout:
     case PacsFault::kBusy:
     case PacsFault::kUnreadable:
     case PacsFault::kNotStored:
-    case PacsFault::kChanged:
       break;
   }
   return ErrorCode::kPacsUnreachable;

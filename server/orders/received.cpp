@@ -137,9 +137,9 @@ void Orders::receive(const std::stop_token& stop) {
       for (const store::HeldSeries& held : services_.received.held()) {
         if (std::max(held.last, begun) + hospital_.settle > now || waiting.contains(held.series))
           continue;
-        if (look_at_received(held) != store::ReceivedFate::kDone) {
-          waiting[held.series] = now + hospital_.poll;
-        }
+        // First, so that one that fails waits, too, and holds up no other.
+        waiting[held.series] = now + hospital_.poll;
+        if (look_at_received(held) == store::ReceivedFate::kDone) waiting.erase(held.series);
       }
     } catch (const std::exception& error) {
       log_error("received series could not be processed and are retried: {}", error.what());

@@ -41,7 +41,7 @@ void simplify(const OrderWork& work, JobParameters& parameters) {
   parameters.certify = true;
 }
 
-// What has been said of the series is forgotten, and the images with it.
+// Forgets the list of instances, the images, and all that was made of them.
 void forget_images(store::OrderRecord& record) {
   record.order.state = OrderState::kWaiting;
   record.order.volume.reset();
@@ -94,16 +94,19 @@ Pacs& OrderSteps::pacs(const std::string& name) const {
 }
 
 Time OrderSteps::save(store::OrderRecord& record, Time next) const {
-  record.order.error.reset();
   record.order.next_attempt.reset();
-  record.work.failures = 0;
   if (!services_.orders.save(record, next)) throw OrderIsOver();
   return next;
 }
 
-Time OrderSteps::start_over(store::OrderRecord& record) const {
-  forget_images(record);
-  return save(record, now_());
+// A series that can be listed and not fetched would otherwise be fetched again without a pause.
+Time OrderSteps::save_after(OrderState step, store::OrderRecord& record, Time next) const {
+  if (record.work.failed_in <= step) {
+    record.order.error.reset();
+    record.work.failures = 0;
+    record.work.failed_in.reset();
+  }
+  return save(record, next);
 }
 
 // Later queries of an order ask for the same again, so that only its first one is kept.
@@ -138,7 +141,8 @@ Time OrderSteps::wait_for_series(store::OrderRecord& record, const std::stop_tok
     if (++work.looks >= kMostLooks) {
       throw PacsFailure(PacsFault::kRefused, "the PACS does not know the series");
     }
-    return save(record, now + hospital_.first_delay * (1 << work.looks));
+    return save_after(OrderState::kWaiting, record,
+                      now + hospital_.first_delay * (1 << work.looks));
   }
   work.looks = 0;
   if (listed != work.listed || !work.listed_since) {
@@ -147,11 +151,13 @@ Time OrderSteps::wait_for_series(store::OrderRecord& record, const std::stop_tok
   }
   const Time settled = time_of(*work.listed_since) + hospital_.settle;
   const bool is_whole = !series->instances || *series->instances == listed.size();
-  if (now < settled) return save(record, std::min(settled, now + hospital_.poll));
-  if (!is_whole) return save(record, now + hospital_.poll);
+  if (now < settled || !is_whole) {
+    const Time poll = now + hospital_.poll;
+    return save_after(OrderState::kWaiting, record, now < settled ? std::min(settled, poll) : poll);
+  }
   source.instances = static_cast<std::uint32_t>(listed.size());
   record.order.state = OrderState::kFetching;
-  return save(record, now);
+  return save_after(OrderState::kWaiting, record, now);
 }
 
 Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) const {
@@ -183,7 +189,7 @@ Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) 
     throw PacsFailure(PacsFault::kIncomplete, error.what());
   }
   record.order.state = OrderState::kMeshing;
-  return save(record, now_());
+  return save_after(OrderState::kFetching, record, now_());
 }
 
 Time OrderSteps::submit_job(store::OrderRecord& record) const {
@@ -203,14 +209,16 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
                              .idempotency_key = job_key(record),
                              .request_digest = sha256_of(to_json(parameters))});
   record.order.job = store::job_of(submission).id;
-  return save(record, now_() + kJobLook);
+  return save_after(OrderState::kMeshing, record, now_() + kJobLook);
 }
 
 Time OrderSteps::mesh(store::OrderRecord& record) const {
   try {
     if (!record.order.job) return submit_job(record);
     const Job job = services_.jobs.get(std::nullopt, *record.order.job);
-    if (!is_final(job.state)) return save(record, now_() + kJobLook);
+    if (!is_final(job.state)) {
+      return save_after(OrderState::kMeshing, record, now_() + kJobLook);
+    }
     if (job.state == JobState::kFailed && job.error) throw to_error(*job.error);
     if (job.state != JobState::kSucceeded) {
       throw Error(ErrorCode::kUnusableVolume, "the order's job was cancelled");
@@ -219,7 +227,10 @@ Time OrderSteps::mesh(store::OrderRecord& record) const {
   } catch (const Error& error) {
     // The volume or the job has expired, or was removed.
     if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
-    return start_over(record);
+    forget_images(record);
+    record.work.failed_in = OrderState::kSending;
+    throw Error(ErrorCode::kUnavailable,
+                "the volume or the job of the order is gone; the images are fetched again");
   }
 }
 
@@ -234,7 +245,9 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
     }
     if (!can_make_objects(job, services_.blobs)) {
       record.order.job = services_.jobs.remake(job.id).id;
-      return save(record, now_() + kJobLook);
+      record.work.failed_in = OrderState::kSending;
+      throw Error(ErrorCode::kUnavailable,
+                  "the mesh is damaged or missing in the store; its job is repeated");
     }
     std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();
     for (const SendTarget& target : record.order.send) {
@@ -247,7 +260,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
       if (triangles) {
         record.work.triangles = *triangles;
         record.order.job.reset();
-        return save(record, now_());
+        return save_after(OrderState::kMeshing, record, now_());
       }
     }
     const Time made = job.finished ? time_of(*job.finished) : now_();
@@ -265,7 +278,7 @@ Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
     }
   }
   record.order.state = OrderState::kSending;
-  const Time next = save(record, now_());
+  const Time next = save_after(OrderState::kMeshing, record, now_());
   for (const MadeObject& object : objects) services_.blobs.settle(object.blob.key);
   return next;
 }
@@ -278,6 +291,23 @@ bool OrderSteps::is_same_patient(const store::OrderRecord& record, const OrderRe
   // A PACS that the images did not come from need not know the study.
   if (result.pacs != record.order.source.pacs) return true;
   throw PacsFailure(PacsFault::kChanged, "the study is no longer in the PACS");
+}
+
+void OrderSteps::check_before_sending(store::OrderRecord& record, std::size_t index,
+                                      const std::stop_token& stop) const {
+  if (!is_same_patient(record, record.order.results[index], stop)) {
+    forget_images(record);
+    // Until the order succeeds: other objects of it may be stored each time.
+    record.work.failed_in = OrderState::kSucceeded;
+    throw PacsFailure(PacsFault::kChanged,
+                      "the study has another Patient ID than the images; they are fetched again");
+  }
+  if (!store::is_there_and_intact(services_.blobs, record.work.blobs[index], stop)) {
+    record.order.state = OrderState::kMeshing;
+    record.work.failed_in = OrderState::kSucceeded;
+    throw Error(ErrorCode::kUnavailable,
+                "the object is damaged or missing in the store; it is made again");
+  }
 }
 
 void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
@@ -326,19 +356,15 @@ Time OrderSteps::send(store::OrderRecord& record, const std::stop_token& stop) c
                                  .series = result.series_uid,
                                  .instance = result.sop_instance_uid};
     if (pacs(result.pacs).has_instance(place, stop) != true) {
-      if (!is_same_patient(record, result, stop)) return start_over(record);
-      if (!store::is_there_and_intact(services_.blobs, record.work.blobs[index], stop)) {
-        record.order.state = OrderState::kMeshing;
-        return save(record, now_());
-      }
+      check_before_sending(record, index, stop);
       send_one(record, index, stop);
     }
     result.stored = true;
-    save(record, now_());
+    save_after(OrderState::kSending, record, now_());
   }
   record.order.state = OrderState::kSucceeded;
   record.order.finished = timestamp_of(now_());
-  return save(record, now_());
+  return save_after(OrderState::kSucceeded, record, now_());
 }
 
 }  // namespace isomesh::orders

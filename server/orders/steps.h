@@ -54,6 +54,7 @@ class OrderSteps {
 
   // Makes the next step of an open order and saves it. Returns when the next one is due. Throws
   // PacsFailure and Error when the step failed; the record is then what is to be saved of that.
+  // Every return to an earlier step is such a failure, so that none repeats without a pause.
   // Throws OrderIsOver.
   store::Time advance(store::OrderRecord& record, const std::stop_token& stop) const;
 
@@ -72,9 +73,15 @@ class OrderSteps {
   // False when the study is another patient's now.
   bool is_same_patient(const store::OrderRecord& record, const OrderResult& result,
                        const std::stop_token& stop) const;
+  // Throws PacsFailure kChanged when the study is another patient's now, and Error kUnavailable
+  // when the object is damaged or missing. The record is then at the step that repairs that.
+  void check_before_sending(store::OrderRecord& record, std::size_t index,
+                            const std::stop_token& stop) const;
   void send_one(store::OrderRecord& record, std::size_t index, const std::stop_token& stop) const;
-  store::Time start_over(store::OrderRecord& record) const;
-  // Returns `next`. Throws OrderIsOver.
+  // Saves the order after `step` has succeeded, which forgets failures of that and of earlier
+  // steps. Returns `next`. Throws OrderIsOver.
+  store::Time save_after(OrderState step, store::OrderRecord& record, store::Time next) const;
+  // The same, forgetting no failures.
   store::Time save(store::OrderRecord& record, store::Time next) const;
   Pacs& pacs(const std::string& name) const;
 

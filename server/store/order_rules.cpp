@@ -47,6 +47,7 @@ void begin_anew(OrderRecord& record) {
   work.listed.clear();
   work.listed_since.reset();
   work.failures = 0;
+  work.failed_in.reset();
   work.looks = 0;
   work.begun = timestamp();
   work.identity.reset();

@@ -145,7 +145,7 @@ TEST(Configuration, AnUnknownKeyIsRefusedByName) {
                                      "--config", folder / "config.toml"});
       const Finished refused = run(command);
       EXPECT_EQ(refused.status, 2) << text;
-      EXPECT_THAT(refused.errors, testing::AnyOf(HasSubstr("\"tokns\""), HasSubstr("\"server.")));
+      EXPECT_THAT(refused.errors, testing::AnyOf(HasSubstr("\"tokns\""), HasSubstr("[server];")));
       EXPECT_EQ(refused.output, "");
     }
   }

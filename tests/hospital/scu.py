@@ -16,20 +16,27 @@ def element(group, number, value):
     return struct.pack("<HHI", group, number, len(value)) + value
 
 
+def pdu(kind, body):
+    return struct.pack(">BxI", kind, len(body)) + body
+
+
+def associate_request(called="BONE", calling="CT1"):
+    context = b"\1\0\0\0" + item(0x30, dicom.CT_IMAGE_STORAGE.encode())
+    context += item(0x40, dicom.EXPLICIT_LITTLE_ENDIAN.encode())
+    user = item(0x51, struct.pack(">I", 16384)) + item(0x52, b"1.2.3.4")
+    body = struct.pack(">HH16s16s32x", 1, 0, called.ljust(16).encode(), calling.ljust(16).encode())
+    body += item(0x10, b"1.2.840.10008.3.1.1.1") + item(0x20, context) + item(0x50, user)
+    return pdu(1, body)
+
+
 class Scu:
     def __init__(self, port, called="BONE", calling="CT1"):
         self.connection = socket.create_connection(("127.0.0.1", port), timeout=10)
-        context = b"\1\0\0\0" + item(0x30, dicom.CT_IMAGE_STORAGE.encode())
-        context += item(0x40, dicom.EXPLICIT_LITTLE_ENDIAN.encode())
-        user = item(0x51, struct.pack(">I", 16384)) + item(0x52, b"1.2.3.4")
-        body = struct.pack(">HH16s16s32x", 1, 0, called.ljust(16).encode(),
-                           calling.ljust(16).encode())
-        body += item(0x10, b"1.2.840.10008.3.1.1.1") + item(0x20, context) + item(0x50, user)
-        self.send(1, body)
+        self.connection.sendall(associate_request(called, calling))
         self.accepted = self.receive()[0] == 2
 
     def send(self, kind, body):
-        self.connection.sendall(struct.pack(">BxI", kind, len(body)) + body)
+        self.connection.sendall(pdu(kind, body))
 
     def receive(self):
         """The kind of the next PDU, and its content; (None, b"") when the connection has ended."""

@@ -239,6 +239,45 @@ class Receiving(Loop):
         for each in silent:
             each.close()
 
+    def sent_beside(self, count, greeting, address="127.0.0.1"):
+        """The seconds that a series takes beside so many connections that send that and no more."""
+        _, folder = self.made()
+        daemon = self.receiver(1, 60, 8)
+        silent = []
+        for _ in range(count):
+            silent.append(socket.create_connection(("127.0.0.1", daemon.dimse_port),
+                                                   source_address=(address, 0)))
+            silent[-1].sendall(greeting)
+        begun = time.monotonic()
+        self.send(daemon, self.in_folder(folder))
+        took = time.monotonic() - begun
+        for each in silent:
+            each.close()
+        return took
+
+    def test_many_begun_requests(self):
+        self.assertLess(self.sent_beside(300, scu.associate_request()[:20]), 10)
+
+    def test_many_silent_associations(self):
+        """Those that have sent nothing make room, one after the other."""
+        self.assertLess(self.sent_beside(40, scu.associate_request()), 30)
+
+    def test_silent_associations_of_another_address(self):
+        """They have their share of the places, and wait for more behind nobody else."""
+        self.assertLess(self.sent_beside(100, scu.associate_request(), "127.0.0.2"), 10)
+
+    def test_slow_request(self):
+        """A request has five seconds to come, however long an association may be idle."""
+        daemon = self.receiver(idle=60)
+        with socket.create_connection(("127.0.0.1", daemon.dimse_port), timeout=20) as connection:
+            connection.sendall(scu.associate_request()[:-1])
+            begun = time.monotonic()
+            try:
+                self.assertEqual(connection.recv(1), b"")
+            except ConnectionResetError:
+                pass  # what it has sent was not read
+        self.assertGreater(time.monotonic() - begun, 4)
+
     def test_aborted_association(self):
         """What was acknowledged stays, what was not does not count: aborted, cut, left alone."""
         series, folder = self.made()

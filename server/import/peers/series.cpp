@@ -1,13 +1,16 @@
 #include "server/import/peers/series.h"
 
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "base/text.h"
 #include "proto/error.h"
 #include "server/import/dicom/dataset.h"
 #include "server/import/dicom/import.h"
 #include "server/import/dicom/tags.h"
+#include "server/import/dicom/text.h"
 #include "server/import/peers/multipart.h"
 #include "server/import/reader.h"
 #include "server/import/scratch_folder.h"
@@ -17,13 +20,33 @@ namespace {
 
 constexpr std::size_t kMostInstances = 20000;
 
+// Compares the patients of a series' instances. Their texts stay here: no error names a patient.
+class PatientCheck {
+ public:
+  // Throws Error kUnusableVolume.
+  void add(const dicom::DataSet& data) {
+    const std::string id(trimmed(dicom::utf8(data, dicom::kPatientId)));
+    const std::string issuer(trimmed(dicom::utf8(data, dicom::kIssuerOfPatientId)));
+    if (!id_) id_ = id;
+    if (issuer_.empty()) issuer_ = issuer;
+    if (id == *id_ && (issuer.empty() || issuer == issuer_)) return;
+    throw Error(ErrorCode::kUnusableVolume,
+                "the images of the series have different patients (Patient ID)");
+  }
+
+ private:
+  std::optional<std::string> id_;
+  std::string issuer_;  // Not every image needs to have it.
+};
+
 // The files of the series' instances, each once. Nothing that is missing may pass: half a head is a
-// volume, too.
+// volume, too. Nor may two patients in one volume.
 std::vector<std::filesystem::path> checked(const std::vector<std::filesystem::path>& parts,
                                            const process::PeersSeries& asked,
                                            const ImportTask& task) {
   std::vector<std::filesystem::path> files;
   std::set<std::string> instances;
+  PatientCheck patients;
   for (const std::filesystem::path& part : parts) {
     const dicom::DicomFile file(part, task.scratch, task.limits.max_sample_bytes);
     const dicom::DataSet& data = file.data();
@@ -32,6 +55,7 @@ std::vector<std::filesystem::path> checked(const std::vector<std::filesystem::pa
       throw Error(ErrorCode::kSeriesIncomplete,
                   "the PACS sent an object of another series than the requested one");
     }
+    patients.add(data);
     if (instances.emplace(data.text(dicom::kSopInstanceUid)).second) files.push_back(part);
   }
   const std::set<std::string> listed(asked.instances.begin(), asked.instances.end());

@@ -1,0 +1,135 @@
+// What orders do when a step fails: how long they wait, what they say, and when they give up.
+#include "tests/unit/orders/fixture.h"
+
+namespace isomesh::orders {
+namespace {
+
+TEST_F(OrdersTest, OfAStudyOfAnotherPatientWaitLongerEachTime) {
+  main_->is_merged = true;
+  const std::string id = submit();
+  ASSERT_TRUE(finish_job());
+  fails_with_growing_pauses(id, 6);
+  ASSERT_TRUE(until([&] { return get(id).attempts == 7; }));
+  EXPECT_EQ(main_->fetches, 7);
+  EXPECT_EQ(get(id).error->type, "urn:isomesh:problem:series-incomplete");
+  EXPECT_THAT(get(id).error->detail, testing::HasSubstr("another Patient ID"));
+  EXPECT_EQ(main_->stores, 0);
+  main_->is_merged = false;
+  pass(hours(1));
+  ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+  EXPECT_EQ(get(id).attempts, 7U);
+  EXPECT_FALSE(get(id).error);
+}
+
+TEST_F(OrdersTest, OfASeriesOfTwoPatientsFailAtOnce) {
+  main_->foreign_slice = kSlices - 1;
+  const std::string id = submit();
+  ASSERT_TRUE(until([&] { return is_final(get(id).state) || get(id).job; }));
+  const Order order = get(id);
+  ASSERT_EQ(order.state, OrderState::kFailed);
+  EXPECT_EQ(order.error->type, "urn:isomesh:problem:unusable-volume");
+  EXPECT_THAT(order.error->detail, testing::HasSubstr("different patients"));
+  EXPECT_EQ(main_->fetches, 1);
+}
+
+TEST_F(OrdersTest, OfASeriesWithoutAListedInstanceWaitLongerEachTime) {
+  main_->sent_slices = kSlices - 1;
+  const std::string id = submit();
+  fails_with_growing_pauses(id, 6);
+  ASSERT_TRUE(until([&] { return get(id).attempts == 7; }));
+  EXPECT_EQ(main_->fetches, 7);
+  EXPECT_EQ(get(id).error->type, "urn:isomesh:problem:series-incomplete");
+  main_->sent_slices = kSlices;
+  pass(hours(1));
+  ASSERT_TRUE(finish_job());
+  EXPECT_TRUE(reaches(id, OrderState::kSucceeded));
+}
+
+TEST_F(OrdersTest, WhoseJobIsGoneFetchAgainAfterAPause) {
+  const std::string id = submit();
+  ASSERT_TRUE(finish_job(1, [&](const std::string& job) {
+    const store::Expirable ended = {
+        .kind = store::RecordKind::kJob, .owner = "", .id = job, .last_used = {}};
+    jobs_.expire(std::span(&ended, 1), store::kAllBytes);
+  }));
+  ASSERT_TRUE(until([&] { return get(id).attempts == 1; }));
+  EXPECT_EQ(get(id).state, OrderState::kWaiting);
+  EXPECT_THAT(get(id).error->detail, testing::HasSubstr("is gone"));
+  EXPECT_EQ(main_->fetches, 1);
+  pass(minutes(1));
+  ASSERT_TRUE(finish_job());
+  EXPECT_TRUE(reaches(id, OrderState::kSucceeded));
+}
+
+TEST_F(OrdersTest, WhoseObjectIsMissingMakeItAgainAfterAPause) {
+  const std::string id = submit();
+  ASSERT_TRUE(until([&] { return get(id).job.has_value(); }));
+  main_->is_down = true;
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(until([&] { return get(id).attempts == 1; }));
+  for (const auto& file : test::files_below(data_.blobs())) {
+    if (test::read_file(data_.blobs() / file).find("PAT-1") != std::string::npos)
+      std::filesystem::remove(data_.blobs() / file);
+  }
+  main_->is_down = false;
+  pass(minutes(1));
+  ASSERT_TRUE(until([&] { return get(id).attempts == 2; }));
+  EXPECT_EQ(get(id).state, OrderState::kMeshing);
+  EXPECT_THAT(get(id).error->detail, testing::HasSubstr("made again"));
+  pass(minutes(1));
+  EXPECT_TRUE(reaches(id, OrderState::kSucceeded));
+}
+
+// Sixty hours, of which nothing is waited for.
+TEST_F(OrdersTest, OutliveAWeekendsOutage) {
+  main_->is_down = true;
+  const std::string id = submit();
+  for (int hour = 0; hour < 60; ++hour) {
+    const std::uint32_t before = get(id).attempts;
+    pass(hours(1));
+    ASSERT_TRUE(until([&] { return get(id).attempts > before; })) << hour;
+  }
+  const Order waiting = get(id);
+  EXPECT_EQ(waiting.state, OrderState::kWaiting);
+  EXPECT_EQ(waiting.error->type, "urn:isomesh:problem:pacs-unreachable");
+  ASSERT_TRUE(waiting.next_attempt);
+  // Pauses grow up to an hour, and are not shorter than half of that.
+  EXPECT_LE(waiting.attempts, 135U);
+  main_->is_down = false;
+  pass(hours(1));
+  ASSERT_TRUE(finish_job());
+  EXPECT_TRUE(reaches(id, OrderState::kSucceeded));
+  EXPECT_FALSE(get(id).error);
+  EXPECT_EQ(orders_->attempts().front().fault, PacsFault::kUnreachable);
+}
+
+TEST_F(OrdersTest, GiveUpAndAreTriedAnew) {
+  main_->is_down = true;
+  const std::string id = submit();
+  ASSERT_TRUE(until([&] { return get(id).attempts > 0; }));
+  pass(hours(73));
+  ASSERT_TRUE(reaches(id, OrderState::kFailed));
+  EXPECT_EQ(get(id).error->type, "urn:isomesh:problem:pacs-unreachable");
+  EXPECT_FALSE(get(id).next_attempt);
+  EXPECT_EQ(test::code_thrown_by([&] { orders_->retry("somebody", id); }), ErrorCode::kNotFound);
+  main_->is_down = false;
+  orders_->retry(std::nullopt, id);
+  ASSERT_TRUE(finish_job());
+  EXPECT_TRUE(reaches(id, OrderState::kSucceeded));
+  EXPECT_EQ(test::code_thrown_by([&] { orders_->retry(std::nullopt, id); }), ErrorCode::kNotReady);
+}
+
+TEST_F(OrdersTest, WaitAsLongAsThePacsSays) {
+  main_->is_down = true;
+  main_->retry_after = 1000;
+  const std::string id = submit();
+  ASSERT_TRUE(until([&] { return get(id).attempts == 1; }));
+  pass(seconds(900));
+  ASSERT_TRUE(until([&, passed = now()] { return store_.idle_at() >= passed; }));
+  EXPECT_EQ(get(id).attempts, 1U);
+  pass(seconds(101));
+  EXPECT_TRUE(until([&] { return get(id).attempts == 2; }));
+}
+
+}  // namespace
+}  // namespace isomesh::orders

@@ -1,0 +1,291 @@
+// Orders against a PACS that does as the test says, by a clock that the test sets.
+#pragma once
+
+#include <atomic>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "base/clock.h"
+#include "base/sha256.h"
+#include "server/orders/orders.h"
+#include "server/orders/received.h"
+#include "server/store/sql/audit_trail.h"
+#include "server/store/sql/order_store.h"
+#include "server/store/sql/received_store.h"
+#include "tests/api/dicom_bytes.h"
+#include "tests/support/errors.h"
+#include "tests/support/process.h"
+#include "tests/unit/jobs/fixture.h"
+
+namespace isomesh::orders {
+
+using std::chrono::hours;
+using std::chrono::milliseconds;
+using std::chrono::minutes;
+using std::chrono::seconds;
+using test::element;
+using testing::ElementsAre;
+
+inline constexpr const char* kStudy = "1.2.1";
+inline constexpr const char* kSeries = "1.2.2";
+inline constexpr int kSlices = 4;
+
+inline std::string instance_of(int slice) {
+  return std::string(kSeries) + '.' + std::to_string(slice);
+}
+
+inline std::string slice_file(int slice, const std::string& patient = "PAT-1") {
+  const std::string pixels(std::size_t{4} * 4 * 2, slice % 2 == 0 ? '\1' : '\0');
+  return test::dicom(element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") +
+                     element(8, 0x18, "UI", instance_of(slice)) + element(8, 0x60, "CS", "CT") +
+                     element(0x10, 0x20, "LO", patient) + element(0x20, 0xD, "UI", kStudy) +
+                     element(0x20, 0xE, "UI", kSeries) +
+                     element(0x20, 0x32, "DS", "0\\0\\" + std::to_string(slice)) +
+                     element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") +
+                     element(0x20, 0x52, "UI", "1.9") + test::number(0x28, 2, 1) +
+                     element(0x28, 4, "CS", "MONOCHROME2") + test::number(0x28, 0x10, 4) +
+                     test::number(0x28, 0x11, 4) + element(0x28, 0x30, "DS", "1\\1") +
+                     test::number(0x28, 0x100, 16) + test::number(0x28, 0x101, 16) +
+                     test::number(0x28, 0x102, 15) + test::number(0x28, 0x103, 0) +
+                     element(0x7FE0, 0x10, "OW", pixels));
+}
+
+// One series, and what was stored.
+class FakePacs : public Pacs {
+ public:
+  std::atomic<bool> is_down = false;
+  std::atomic<bool> hangs = false;
+  std::atomic<int> retry_after = 0;
+  std::atomic<int> calls = 0;
+  std::atomic<int> stores = 0;
+  std::atomic<int> fetches = 0;
+  std::atomic<int> sent_slices = kSlices;  // of those that it lists
+  std::atomic<int> foreign_slice = -1;     // of another patient
+  std::atomic<bool> is_merged = false;     // the study has another Patient ID than its images
+
+  std::vector<FoundSeries> find_recent(const std::string&, const std::string&,
+                                       const std::stop_token&) override {
+    return {};
+  }
+  std::optional<FoundSeries> find_series(const std::string&, const std::string& series,
+                                         const std::stop_token& stop) override {
+    answer(stop);
+    if (series != kSeries) return std::nullopt;
+    return FoundSeries{.study = kStudy,
+                       .series = kSeries,
+                       .modality = "CT",
+                       .description = "",
+                       .instances = kSlices};
+  }
+  std::vector<std::string> list_instances(const std::string&, const std::string&,
+                                          const std::stop_token& stop) override {
+    answer(stop);
+    std::vector<std::string> all;
+    for (int slice = 0; slice < kSlices; ++slice) all.push_back(instance_of(slice));
+    return all;
+  }
+  std::string fetch_series(const std::string&, const std::string&,
+                           const std::filesystem::path& target,
+                           const std::stop_token& stop) override {
+    answer(stop);
+    ++fetches;
+    std::ofstream file(target, std::ios::binary);
+    for (int slice = 0; slice < sent_slices; ++slice) {
+      file << "\r\n--b\r\nContent-Type: application/dicom\r\n\r\n"
+           << slice_file(slice, slice == foreign_slice ? "PAT-2" : "PAT-1");
+    }
+    file << "\r\n--b--\r\n";
+    return "multipart/related; boundary=b";
+  }
+  std::optional<std::string> patient_of(const std::string&, const std::stop_token& stop) override {
+    answer(stop);
+    return is_merged ? "PAT-2" : "PAT-1";
+  }
+  std::optional<bool> has_instance(const InstancePlace& place,
+                                   const std::stop_token& stop) override {
+    answer(stop);
+    const Lock lock(mutex_);
+    return stored_.contains(place.instance);
+  }
+  void store(const OutgoingObject& object, const std::stop_token& stop) override {
+    answer(stop);
+    ++stores;
+    const Lock lock(mutex_);
+    stored_.insert(object.place.instance);
+  }
+
+ private:
+  void answer(const std::stop_token& stop) {
+    ++calls;
+    while (hangs) {
+      if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "stopped");
+      std::this_thread::sleep_for(milliseconds(2));
+    }
+    if (is_down) {
+      throw PacsFailure(PacsFault::kUnreachable, "it is down", seconds(retry_after.load()));
+    }
+  }
+
+  Mutex mutex_;
+  std::set<std::string> stored_ ISOMESH_GUARDED_BY(mutex_);
+};
+
+// Tells until when nothing was due.
+class WatchedOrders : public store::SqlOrderStore {
+ public:
+  using SqlOrderStore::SqlOrderStore;
+
+  std::vector<store::OrderRecord> due(store::Time now, std::size_t limit) const override {
+    std::vector<store::OrderRecord> found = SqlOrderStore::due(now, limit);
+    if (found.empty()) idle_at_ = std::max(idle_at_.load(), now);
+    return found;
+  }
+  store::Time idle_at() const { return idle_at_; }
+
+ private:
+  mutable std::atomic<store::Time> idle_at_ = store::Time();
+};
+
+// Counts how often somebody has begun to look at what is held.
+class WatchedReceived : public store::SqlReceivedStore {
+ public:
+  using SqlReceivedStore::SqlReceivedStore;
+
+  std::vector<store::HeldSeries> held() const override {
+    ++looks_;
+    return SqlReceivedStore::held();
+  }
+  int looks() const { return looks_; }
+
+  std::vector<store::ReceivedInstance> instances(
+      const store::ReceivedSeries& series) const override {
+    if (series.route == "BROKEN") {
+      ++failures_;
+      throw Error(ErrorCode::kInternal, "it cannot be read");
+    }
+    return SqlReceivedStore::instances(series);
+  }
+  int failures() const { return failures_; }
+
+ private:
+  mutable std::atomic<int> looks_ = 0;
+  mutable std::atomic<int> failures_ = 0;
+};
+
+class OrdersTest : public test::JobsFixture {
+ protected:
+  OrdersTest() {
+    for (const char* name : {"main", "other"}) {
+      PacsSettings settings;
+      settings.name = name;
+      settings.dicomweb = "http://pacs.example.org";
+      hospital_.pacs.push_back(settings);
+      auto pacs = std::make_unique<FakePacs>();
+      (name == std::string("main") ? main_ : other_) = pacs.get();
+      pacs_[name] = std::move(pacs);
+    }
+    hospital_.settle = seconds(0);
+    begin();
+  }
+
+  // As a process that goes on after the last one.
+  void begin() {
+    orders_.reset();
+    orders_ = std::make_unique<Orders>(OrderServices{data_, blobs_, volumes_, jobs_, library_,
+                                                     labels_, store_, audit_, received_, pacs_},
+                                       hospital_,
+                                       OrderOptions{.now = [this] { return now(); }, .threads = 3});
+    orders_->on_end([](const std::string&) {});
+  }
+
+  std::string submit(const std::string& pacs = "main", const std::string& series = kSeries) {
+    OrderRequest request;
+    request.source = {.pacs = pacs, .study = kStudy, .series = series};
+    request.parameters = R"({"iso": 100})";
+    request.send = {{.pacs = pacs}};
+    return orders_->submit({.name = "", .is_administrator = true}, request, "", "").first.id;
+  }
+
+  Order get(const std::string& id) const { return orders_->get(std::nullopt, id); }
+
+  store::Time now() const { return std::chrono::system_clock::now() + ahead_.load(); }
+
+  void pass(milliseconds time) {
+    ahead_ = ahead_.load() + time;
+    orders_->wake();
+  }
+
+  // Waits for what threads of the orders bring about, not for the clock.
+  static bool until(const std::function<bool()>& is_so) { return test::eventually(is_so); }
+  bool reaches(const std::string& id, OrderState state) {
+    return until([&] { return get(id).state == state; });
+  }
+
+  // Whether the order fails that often, each time after a pause that doubles.
+  void fails_with_growing_pauses(const std::string& id, std::uint32_t times) {
+    for (std::uint32_t attempts = 1; attempts <= times; ++attempts) {
+      ASSERT_TRUE(until([&] { return get(id).attempts >= attempts; })) << attempts;
+      const Order order = get(id);
+      ASSERT_EQ(order.attempts, attempts);
+      ASSERT_TRUE(order.next_attempt && order.error);
+      const auto pause = time_of(*order.next_attempt) - now();
+      // A pause is at least half of its full length; some of it has passed by now.
+      EXPECT_GT(pause, hospital_.first_delay * (1 << (attempts - 1)) / 2 - seconds(2));
+      pass(std::chrono::ceil<milliseconds>(pause));
+    }
+  }
+
+  std::vector<std::string> outcomes_of_queries(const std::string& order) const {
+    std::vector<std::string> outcomes;
+    audit_.read(0, [&](std::string_view line) {
+      const auto entry = nlohmann::json::parse(line);
+      if (entry.at("event") == "110112" && entry.value("order", "") == order) {
+        outcomes.push_back(entry.at("outcome"));
+      }
+    });
+    return outcomes;
+  }
+
+  // Does what a worker does with the next job: a mesh of so many triangles. The orders are told of
+  // its end after `before_told`.
+  bool finish_job(
+      std::uint32_t triangles = 1,
+      const std::function<void(const std::string& job)>& before_told = [](const auto&) {}) {
+    std::optional<store::Lease> lease;
+    if (!until([&] { return (lease = jobs_.claim("test", minutes(1))).has_value(); })) return false;
+    last_parameters_ = lease->parameters;
+    std::string stl(84 + std::size_t{50} * triangles, '\0');
+    stl[80] = 1;
+    const auto writer = blobs_.begin();
+    writer->write(std::as_bytes(std::span(stl)));
+    const store::Blob blob = writer->commit();
+    store::Outcome outcome;
+    outcome.mesh.emplace().triangles = triangles;
+    if (triangles == 0) outcome.mesh->iso = 1000;
+    outcome.mesh->files[MeshFormat::kStl] = {.bytes = blob.bytes, .sha256 = blob.key, .href = "/x"};
+    const bool is_done = jobs_.finish(*lease, outcome);
+    before_told(lease->id);
+    orders_->job_ended(lease->id);
+    return is_done;
+  }
+
+  std::atomic<milliseconds> ahead_ = milliseconds(0);
+  Hospital hospital_;
+  PacsByName pacs_;
+  FakePacs* main_ = nullptr;
+  FakePacs* other_ = nullptr;
+  jobs::LabelLists labels_{blobs_};
+  WatchedOrders store_{database_};
+  store::SqlAuditTrail audit_{database_};
+  WatchedReceived received_{database_};
+  JobParameters last_parameters_;  // of the job that was finished last
+  std::unique_ptr<Orders> orders_;
+};
+
+}  // namespace isomesh::orders
