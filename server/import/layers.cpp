@@ -14,7 +14,7 @@ namespace {
 using State = Combinations::State;
 using Labels = std::map<std::pair<std::uint64_t, std::int64_t>, std::uint32_t>;
 
-constexpr std::size_t kPieceBytes = std::size_t{1} << 20;  // of all layers
+constexpr std::size_t kLayerPieceBytes = std::size_t{1} << 20;  // of all layers
 
 std::uint32_t highest_label(const Labels& labels) {
   std::uint32_t highest = 0;
@@ -30,7 +30,8 @@ class LayerReader {
       : samples_(samples),
         source_(source),
         labels_(source.layers->labels),
-        at_once_(std::max<std::size_t>(kPieceBytes / sizeof(Sample) / source.chosen.count, 1)) {}
+        at_once_(
+            std::max<std::size_t>(kLayerPieceBytes / sizeof(Sample) / source.chosen.count, 1)) {}
 
   // The states of at most `most` samples from `first` on.
   void read(std::uint64_t first, std::vector<State>& states, Combinations& combinations) {

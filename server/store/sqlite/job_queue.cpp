@@ -245,17 +245,10 @@ void SqliteJobStore::end(Change& change, Row& row, JobState state) const {
   row.job.finished = timestamp();
   row.job.timing.total = milliseconds_since(row.accepted);
   const std::int64_t now = now_us();
-<<<<<<< HEAD
-  change->run("UPDATE jobs SET state = ?, finished = ?, record = ? WHERE id = ?", state, now,
-              to_record(row.job), row.job.id);
-  change->run("UPDATE volumes SET used = ? WHERE owner = ? AND id = ?", now, row.owner,
-              row.job.parameters.volume);
-=======
   change->run("UPDATE jobs SET state = ?, finished = isomesh_kept(?), record = ? WHERE id = ?",
-              state, now, to_json(row.job), row.job.id);
+              state, now, to_record(row.job), row.job.id);
   change->run("UPDATE volumes SET used = max(used, isomesh_kept(?)) WHERE owner = ? AND id = ?",
               now, row.owner, row.job.parameters.volume);
->>>>>>> wt-clock
   if (const auto& callback = row.job.parameters.callback) {
     add_callback(change.connection(), row.job.id, callback->url, to_json(row.job));
   }
