@@ -214,7 +214,7 @@ TEST_F(OpenApiTest, TheMembersAreThoseOfTheTypes) {
       {"Job", to_json(many_labels)},
       {"LabelSummaryList", to_json(by_labels.mesh->labels, "next")},
       {"JobParameters", to_json(by_labels.parameters)},
-      {"JobList", to_json(std::vector{by_labels})},
+      {"JobList", to_json(std::vector{by_labels, many_labels})},
       {"Estimate", to_json(of_labels)},
       {"Order", to_json(order)},
       {"OrderList", to_json(std::vector{order})},
