@@ -43,7 +43,7 @@ std::string text_member(std::string_view name, std::string_view value) {
   return member(name, bare ? std::string(value) : quoted(value));
 }
 
-// What an event's members follow.
+// The name of an event stands before its members.
 std::string event_member(std::string_view name) {
   return chosen_format == LogFormat::kJson ? ",\"event\":" + quoted(name) : ' ' + std::string(name);
 }
@@ -72,7 +72,7 @@ LogLine::~LogLine() {
     std::fwrite(line.data(), 1, line.size(),
                 stderr);  // stderr has no buffer: one call writes it whole
   } catch (const std::bad_alloc&) {
-    // Whoever waits for an answer is served nevertheless.
+    // The line is lost, but the request that it tells of is served.
   }
 }
 

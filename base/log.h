@@ -52,7 +52,7 @@ class LogLine {
   std::string text_;  // empty when the level is not logged
 };
 
-// What takes the place of a {} in a message. It allocates nothing, and refers to a text that
+// A value takes the place of a {} in a message. It allocates nothing, and refers to a text that
 // outlives it.
 class LogValue {
  public:

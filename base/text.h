@@ -15,7 +15,7 @@ namespace isomesh {
 std::string_view trimmed(std::string_view text);
 std::string lower(std::string_view text);  // ASCII only
 
-// Whether a text that is UTF-8 has what nobody can see and XML cannot hold: control characters
+// True if a text that is UTF-8 has what nobody can see and XML cannot hold: control characters
 // other than tabs, or noncharacters (Unicode 15, 23.7).
 bool has_control_characters(std::string_view text);
 

@@ -143,6 +143,10 @@ std::vector<LabelSummary> JobLabels::after(std::optional<std::int64_t> label) co
   return labels;
 }
 
+bool JobLabels::has_after(std::int64_t last) const {
+  return file_ ? page_of(last) + 1 < pages_.size() : job_.mesh->labels.back().label > last;
+}
+
 std::optional<LabelSummary> JobLabels::find(std::int64_t label) const {
   const auto found_in = [&](const std::vector<LabelSummary>& labels) {
     const auto found = std::ranges::lower_bound(labels, label, {}, &LabelSummary::label);

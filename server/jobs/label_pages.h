@@ -35,6 +35,9 @@ class JobLabels {
   // MeshSummary::kMostListedLabels, or none at the end of the list. Their files have addresses.
   std::vector<LabelSummary> after(std::optional<std::int64_t> label) const;
 
+  // True if more labels follow the last one that after() returned. It reads nothing.
+  bool has_after(std::int64_t last) const;
+
   // Empty if the job has no such label. Its files may have no addresses.
   std::optional<LabelSummary> find(std::int64_t label) const;
 

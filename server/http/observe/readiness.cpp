@@ -3,7 +3,14 @@
 #include <exception>
 #include <utility>
 
+#include "base/log.h"
+
 namespace isomesh::http {
+namespace {
+
+constexpr const char* kNothingResponds = "the records or the storage do not respond";
+
+}  // namespace
 
 Readiness::Readiness(std::function<std::string()> check, const Limits& limits)
     : check_(std::move(check)), limits_(limits) {
@@ -23,7 +30,7 @@ std::string Readiness::reason() {
                         [&]() ISOMESH_REQUIRES(mutex_) { return ended_ >= wanted; });
   }
   const bool is_believed = ended_ > 0 && Clock::now() - ended_at_ <= limits_.believed_for;
-  return ended_ >= wanted || is_believed ? reason_ : "the records or the storage do not respond";
+  return ended_ >= wanted || is_believed ? reason_ : kNothingResponds;
 }
 
 void Readiness::work(const std::stop_token& stop) {
@@ -37,7 +44,8 @@ void Readiness::work(const std::stop_token& stop) {
     try {
       reason = check_();
     } catch (const std::exception& error) {
-      reason = error.what();
+      log_error("whether the service is ready could not be found out: {}", error.what());
+      reason = kNothingResponds;
     }
     lock.lock();
     reason_ = std::move(reason);

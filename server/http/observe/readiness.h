@@ -21,7 +21,7 @@ class Readiness {
   };
 
   // `check` returns why the service takes no work, empty when it does. It may block, and is called
-  // by one thread. What it throws is a reason, too.
+  // by one thread. What it throws is logged, and the reason is that nothing responds.
   explicit Readiness(std::function<std::string()> check) : Readiness(std::move(check), Limits()) {}
   Readiness(std::function<std::string()> check, const Limits& limits);
   // Waits for a check that is under way.

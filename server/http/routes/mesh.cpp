@@ -209,7 +209,7 @@ void list_labels(const App& app, const Request& request, Response& response) {
   check_has_mesh(job);
   const jobs::JobLabels labels = labels_of(app, job);
   const std::vector<LabelSummary> page = labels.after(last);
-  const bool has_more = !page.empty() && !labels.after(page.back().label).empty();
+  const bool has_more = !page.empty() && labels.has_after(page.back().label);
   const std::string next = has_more ? cursor_after(kCursor, std::to_string(page.back().label)) : "";
   answer_tagged_json(request, response, to_json(page, next));
 }

@@ -64,9 +64,8 @@ std::string unready_reason(const Services& services) {
   if (services.jobs.is_full()) return "the queue is full";
   if (!services.blobs.answers()) return "the storage of volumes and meshes does not respond";
   if (!services.blobs.has_room()) return "the disk is full: nothing new is accepted";
-  if (services.jobs.depth(std::nullopt).waiting_for_disk > 0)
-    return "jobs are waiting for disk space";
-  return "";
+  const bool has_waiting = services.jobs.depth(std::nullopt).waiting_for_disk > 0;
+  return has_waiting ? "jobs are waiting for disk space" : "";
 }
 
 // Browsers let pages of other origins send plain text without asking the server first, but not what
