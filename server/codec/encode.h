@@ -13,10 +13,10 @@
 
 #include "proto/types.h"
 #include "server/mesh/context.h"
-#include "server/mesh/extract.h"
+#include "server/mesh/extract/extract.h"
+#include "server/mesh/measure/triangle_grid.h"
 #include "server/mesh/mesh.h"
-#include "server/mesh/topology.h"
-#include "server/mesh/triangle_grid.h"
+#include "server/mesh/topology/topology.h"
 
 namespace isomesh::codec {
 

@@ -9,9 +9,9 @@
 #include "proto/types.h"
 #include "server/codec/encode.h"
 #include "server/mesh/context.h"
-#include "server/mesh/label_surface.h"
-#include "server/mesh/separate.h"
-#include "server/mesh/triangle_grid.h"
+#include "server/mesh/labels/label_surface.h"
+#include "server/mesh/labels/separate.h"
+#include "server/mesh/measure/triangle_grid.h"
 
 namespace isomesh::codec {
 

@@ -13,8 +13,8 @@
 #include "server/codec/encoders.h"
 #include "server/codec/glb_document.h"
 #include "server/codec/levels.h"
-#include "server/mesh/distance.h"
-#include "server/mesh/normals.h"
+#include "server/mesh/measure/distance.h"
+#include "server/mesh/measure/normals.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::codec {

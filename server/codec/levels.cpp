@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "server/mesh/simplify.h"
+#include "server/mesh/simplify/simplify.h"
 
 namespace isomesh::codec {
 namespace {

@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "server/mesh/context.h"
+#include "server/mesh/labels/separate.h"
 #include "server/mesh/mesh.h"
-#include "server/mesh/separate.h"
 
 namespace isomesh::codec {
 
@@ -13,8 +13,8 @@ mesh::Mesh copy_of(const mesh::Mesh& mesh);
 mesh::SeparatingSurface copy_of(const mesh::SeparatingSurface& walls);
 
 // Simplifies the mesh in place to about so many triangles, without a bound of the error
-// (server/mesh/simplify.h); to more where its boundary, or the lines between walls, leave no
-// choice. Takes what simplification takes. Throws Error kCancelled.
+// (server/mesh/simplify/simplify.h); to more where its boundary, or the lines between walls, leave
+// no choice. Takes what simplification takes. Throws Error kCancelled.
 void coarsen(std::uint64_t triangles, const mesh::Context& context, mesh::Mesh& mesh);
 
 // As above for walls between labels: labels next to each other still have theirs in common.

@@ -7,9 +7,9 @@
 #include "proto/parameters.h"
 #include "server/codec/decode/decode.h"
 #include "server/jobs/error_budget.h"
-#include "server/mesh/distance.h"
+#include "server/mesh/measure/distance.h"
+#include "server/mesh/measure/self_intersections.h"
 #include "server/mesh/parallel.h"
-#include "server/mesh/self_intersections.h"
 
 namespace isomesh::jobs {
 namespace {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-#include "server/mesh/lattice.h"
+#include "server/mesh/lattice/lattice.h"
 
 namespace isomesh::jobs {
 namespace {

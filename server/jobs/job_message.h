@@ -15,7 +15,7 @@
 #include "proto/error.h"
 #include "proto/types.h"
 #include "server/jobs/make_mesh.h"
-#include "server/mesh/extract.h"
+#include "server/mesh/extract/extract.h"
 
 namespace isomesh::jobs {
 

@@ -9,7 +9,7 @@
 #include "proto/json.h"
 #include "proto/samples.h"
 #include "server/jobs/stored_samples.h"
-#include "server/mesh/lattice.h"
+#include "server/mesh/lattice/lattice.h"
 #include "server/mesh/parallel.h"
 #include "server/volume/canonical.h"
 #include "server/volume/unusable.h"

@@ -10,7 +10,7 @@
 
 #include "proto/types.h"
 #include "server/jobs/memo.h"
-#include "server/mesh/labels.h"
+#include "server/mesh/labels/labels.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
 

@@ -13,7 +13,7 @@
 #include "server/jobs/mesh_cost.h"
 #include "server/jobs/mesh_stages.h"
 #include "server/jobs/settle_labels.h"
-#include "server/mesh/label_surface.h"
+#include "server/mesh/labels/label_surface.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::jobs {

@@ -7,8 +7,8 @@
 
 #include "proto/types.h"
 #include "server/jobs/make_mesh.h"
-#include "server/mesh/labels.h"
-#include "server/mesh/separate.h"
+#include "server/mesh/labels/labels.h"
+#include "server/mesh/labels/separate.h"
 
 namespace isomesh::jobs {
 

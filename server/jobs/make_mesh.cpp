@@ -10,10 +10,10 @@
 #include "server/jobs/error_budget.h"
 #include "server/jobs/mesh_cost.h"
 #include "server/jobs/mesh_stages.h"
-#include "server/mesh/cavities.h"
-#include "server/mesh/components.h"
+#include "server/mesh/measure/cavities.h"
 #include "server/mesh/parallel.h"
-#include "server/mesh/topology.h"
+#include "server/mesh/topology/components.h"
+#include "server/mesh/topology/topology.h"
 
 namespace isomesh::jobs {
 namespace {

@@ -14,9 +14,9 @@
 
 #include "proto/types.h"
 #include "server/codec/encode.h"
-#include "server/mesh/extract.h"
+#include "server/mesh/extract/extract.h"
+#include "server/mesh/labels/separate.h"
 #include "server/mesh/mesh.h"
-#include "server/mesh/separate.h"
 
 namespace isomesh::jobs {
 

@@ -6,8 +6,8 @@
 
 #include "server/codec/encode.h"
 #include "server/jobs/error_budget.h"
-#include "server/mesh/label_parts.h"
-#include "server/mesh/separate.h"
+#include "server/mesh/labels/label_parts.h"
+#include "server/mesh/labels/separate.h"
 
 namespace isomesh::jobs {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "proto/types.h"
 #include "server/jobs/make_mesh.h"
-#include "server/mesh/extract.h"
-#include "server/mesh/smooth.h"
+#include "server/mesh/extract/extract.h"
+#include "server/mesh/smooth/smooth.h"
 
 namespace isomesh::jobs {
 

@@ -6,10 +6,10 @@
 
 #include "server/jobs/error_budget.h"
 #include "server/jobs/mesh_cost.h"
-#include "server/mesh/measure.h"
-#include "server/mesh/shapes.h"
-#include "server/mesh/simplify.h"
-#include "server/mesh/smooth.h"
+#include "server/mesh/measure/measure.h"
+#include "server/mesh/measure/shapes.h"
+#include "server/mesh/simplify/simplify.h"
+#include "server/mesh/smooth/smooth.h"
 
 namespace isomesh::jobs {
 namespace {

@@ -12,11 +12,11 @@
 #include "server/jobs/make_mesh.h"
 #include "server/mesh/buffer.h"
 #include "server/mesh/context.h"
-#include "server/mesh/lattice.h"
+#include "server/mesh/labels/separate.h"
+#include "server/mesh/lattice/lattice.h"
+#include "server/mesh/measure/surface_view.h"
+#include "server/mesh/measure/triangle_grid.h"
 #include "server/mesh/mesh.h"
-#include "server/mesh/separate.h"
-#include "server/mesh/surface_view.h"
-#include "server/mesh/triangle_grid.h"
 
 namespace isomesh::jobs {
 

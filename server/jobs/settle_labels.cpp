@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "server/mesh/labels.h"
+#include "server/mesh/labels/labels.h"
 #include "server/volume/names.h"
 
 namespace isomesh::jobs {

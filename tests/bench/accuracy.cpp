@@ -5,7 +5,7 @@
 
 #include <meshoptimizer.h>
 
-#include "server/mesh/distance.h"
+#include "server/mesh/measure/distance.h"
 #include "tests/bench/numbers.h"
 #include "tests/bench/peers.h"
 #include "tests/bench/stages.h"

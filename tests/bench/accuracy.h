@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "proto/mesh_summary.h"
-#include "server/mesh/distance.h"
+#include "server/mesh/measure/distance.h"
 #include "tests/bench/rows.h"
 #include "tests/bench/samples.h"
 

@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <zlib.h>
 
-#include "server/mesh/labels.h"
+#include "server/mesh/labels/labels.h"
 #include "tests/bench/ct_head.h"
 #include "tests/bench/label_body.h"
 #include "tests/bench/paper.h"

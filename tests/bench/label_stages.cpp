@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "server/mesh/label_surface.h"
+#include "server/mesh/labels/label_surface.h"
 
 namespace isomesh::bench {
 namespace {

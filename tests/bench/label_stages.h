@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "server/mesh/labels.h"
-#include "server/mesh/separate.h"
-#include "server/mesh/smooth.h"
+#include "server/mesh/labels/labels.h"
+#include "server/mesh/labels/separate.h"
+#include "server/mesh/smooth/smooth.h"
 #include "tests/bench/label_walls.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/stages.h"

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "server/mesh/labels/separate.h"
 #include "server/mesh/mesh.h"
-#include "server/mesh/separate.h"
 #include "tests/bench/samples.h"
 
 namespace isomesh::bench {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/mesh/surface_view.h"
+#include "server/mesh/measure/surface_view.h"
 #include "tests/bench/label_walls.h"
 #include "tests/bench/samples.h"
 #include "tests/bench/stages.h"

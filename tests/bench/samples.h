@@ -10,7 +10,7 @@
 
 #include "proto/samples.h"
 #include "proto/types.h"
-#include "server/mesh/lattice.h"
+#include "server/mesh/lattice/lattice.h"
 
 namespace isomesh::bench {
 

@@ -6,11 +6,11 @@
 
 #include "server/codec/encode.h"
 #include "server/jobs/make_mesh.h"
-#include "server/mesh/extract.h"
-#include "server/mesh/measure.h"
+#include "server/mesh/extract/extract.h"
+#include "server/mesh/measure/measure.h"
 #include "server/mesh/parallel.h"
-#include "server/mesh/smooth.h"
-#include "server/mesh/topology.h"
+#include "server/mesh/smooth/smooth.h"
+#include "server/mesh/topology/topology.h"
 
 namespace isomesh::bench {
 namespace {

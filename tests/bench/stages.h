@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "proto/types.h"
+#include "server/mesh/measure/shapes.h"
 #include "server/mesh/mesh.h"
-#include "server/mesh/shapes.h"
 #include "tests/bench/samples.h"
 
 namespace isomesh::bench {

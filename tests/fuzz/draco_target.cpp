@@ -5,7 +5,7 @@
 #include "proto/error.h"
 #include "server/codec/draco/encoder.h"
 #include "server/codec/encode.h"
-#include "server/mesh/topology_parts.h"
+#include "server/mesh/topology/topology_parts.h"
 #include "tests/unit/codec/made_up_meshes.h"
 #include "tests/unit/codec/stream_check.h"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "server/mesh/extract.h"
+#include "server/mesh/extract/extract.h"
 #include "server/mesh/mesh.h"
 #include "server/mesh/parallel.h"
 #include "tests/support/shapes.h"

@@ -9,8 +9,8 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/lattice.h"
-#include "server/mesh/separate.h"
+#include "server/mesh/labels/separate.h"
+#include "server/mesh/lattice/lattice.h"
 #include "tests/support/shapes.h"
 #include "tests/support/tetrahedra.h"
 

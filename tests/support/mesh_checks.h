@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/lattice.h"
+#include "server/mesh/lattice/lattice.h"
 #include "server/mesh/mesh.h"
 #include "tests/support/shapes.h"
 

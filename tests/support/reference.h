@@ -9,8 +9,8 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/extract.h"
-#include "server/mesh/lattice.h"
+#include "server/mesh/extract/extract.h"
+#include "server/mesh/lattice/lattice.h"
 #include "server/mesh/mesh.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/shapes.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "proto/types.h"
-#include "server/mesh/lattice.h"
+#include "server/mesh/lattice/lattice.h"
 
 namespace isomesh::test {
 

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "proto/types.h"
-#include "server/mesh/lattice.h"
+#include "server/mesh/lattice/lattice.h"
 
 namespace isomesh::test {
 

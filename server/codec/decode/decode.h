@@ -11,8 +11,8 @@
 #include "proto/types.h"
 #include "server/mesh/buffer.h"
 #include "server/mesh/context.h"
+#include "server/mesh/measure/surface_view.h"
 #include "server/mesh/mesh.h"
-#include "server/mesh/surface_view.h"
 
 namespace isomesh::codec {
 

@@ -15,7 +15,7 @@
 #include "server/codec/draco/grid.h"
 #include "server/mesh/context.h"
 #include "server/mesh/mesh.h"
-#include "server/mesh/topology_parts.h"
+#include "server/mesh/topology/topology_parts.h"
 
 namespace isomesh::codec::edgebreaker {
 

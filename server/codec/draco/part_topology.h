@@ -6,7 +6,7 @@
 #include "server/codec/draco/corners.h"
 #include "server/codec/draco/fans.h"
 #include "server/codec/draco/traversal.h"
-#include "server/mesh/topology_parts.h"
+#include "server/mesh/topology/topology_parts.h"
 
 namespace isomesh::codec::edgebreaker {
 

@@ -12,7 +12,7 @@
 #include "server/codec/draco/grid.h"
 #include "server/codec/space.h"
 #include "server/codec/zip/zip_writer.h"
-#include "server/mesh/label_surface.h"
+#include "server/mesh/labels/label_surface.h"
 #include "server/mesh/parallel.h"
 
 namespace isomesh::codec {

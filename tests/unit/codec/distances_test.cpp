@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 
 #include "server/codec/encode.h"
-#include "server/mesh/distance.h"
-#include "server/mesh/smooth.h"
+#include "server/mesh/measure/distance.h"
+#include "server/mesh/smooth/smooth.h"
 #include "tests/support/errors.h"
 #include "tests/unit/codec/foreign.h"
 #include "tests/unit/codec/glb_container.h"

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "server/codec/encode.h"
-#include "server/mesh/label_surface.h"
+#include "server/mesh/labels/label_surface.h"
 #include "tests/unit/codec/foreign.h"
 #include "tests/unit/codec/foreign_cgal.h"
 #include "tests/unit/codec/label_files.h"

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "server/codec/encode.h"
-#include "server/mesh/normals.h"
+#include "server/mesh/measure/normals.h"
 #include "tests/unit/codec/meshes.h"
 #include "tests/unit/codec/same_mesh.h"
 

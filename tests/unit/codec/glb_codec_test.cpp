@@ -10,7 +10,7 @@
 
 #include "server/codec/decode/decode.h"
 #include "server/codec/encode.h"
-#include "server/mesh/normals.h"
+#include "server/mesh/measure/normals.h"
 #include "tests/support/kernels.h"
 #include "tests/unit/codec/foreign.h"
 #include "tests/unit/codec/glb_container.h"

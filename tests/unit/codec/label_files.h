@@ -11,7 +11,7 @@
 
 #include "server/codec/encode_labels.h"
 #include "server/codec/zip/label_zip.h"
-#include "server/mesh/smooth.h"
+#include "server/mesh/smooth/smooth.h"
 #include "tests/unit/mesh/separated.h"
 
 namespace isomesh::test {

@@ -5,8 +5,8 @@
 #include <limits>
 #include <utility>
 
-#include "server/mesh/extract.h"
-#include "server/mesh/smooth.h"
+#include "server/mesh/extract/extract.h"
+#include "server/mesh/smooth/smooth.h"
 
 namespace isomesh::test {
 namespace {

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/codec/encode.h"
-#include "server/mesh/topology.h"
+#include "server/mesh/topology/topology.h"
 #include "tests/unit/codec/foreign_3mf.h"
 #include "tests/unit/codec/meshes.h"
 

@@ -1,5 +1,5 @@
 // What encoders say of a mesh's topology, held against what is measured on the mesh itself.
-#include "server/mesh/topology.h"
+#include "server/mesh/topology/topology.h"
 
 #include <optional>
 #include <vector>

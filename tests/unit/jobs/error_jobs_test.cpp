@@ -10,7 +10,7 @@
 #include "server/codec/decode/decode.h"
 #include "server/jobs/estimate.h"
 #include "server/jobs/pipeline.h"
-#include "server/mesh/distance.h"
+#include "server/mesh/measure/distance.h"
 #include "tests/support/errors.h"
 #include "tests/unit/jobs/fixture.h"
 

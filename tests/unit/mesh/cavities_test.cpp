@@ -1,4 +1,4 @@
-#include "server/mesh/cavities.h"
+#include "server/mesh/measure/cavities.h"
 
 #include <array>
 #include <cstdint>
@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/measure.h"
-#include "server/mesh/topology.h"
+#include "server/mesh/measure/measure.h"
+#include "server/mesh/topology/topology.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"

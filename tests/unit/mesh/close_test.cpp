@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/extract.h"
-#include "server/mesh/smooth.h"
+#include "server/mesh/extract/extract.h"
+#include "server/mesh/smooth/smooth.h"
 #include "tests/support/points.h"
 #include "tests/support/shapes.h"
 #include "tests/unit/mesh/reference_surface.h"

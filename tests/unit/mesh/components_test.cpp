@@ -1,4 +1,4 @@
-#include "server/mesh/components.h"
+#include "server/mesh/topology/components.h"
 
 #include <algorithm>
 #include <map>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/extract.h"
+#include "server/mesh/extract/extract.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"

@@ -1,4 +1,4 @@
-#include "server/mesh/distance.h"
+#include "server/mesh/measure/distance.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/extract.h"
+#include "server/mesh/extract/extract.h"
 #include "tests/support/nifti.h"
 #include "tests/unit/mesh/reference_surface.h"
 

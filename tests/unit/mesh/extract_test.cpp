@@ -1,4 +1,4 @@
-#include "server/mesh/extract.h"
+#include "server/mesh/extract/extract.h"
 
 #include <algorithm>
 #include <mutex>

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/extract.h"
+#include "server/mesh/extract/extract.h"
 #include "tests/unit/mesh/reference_surface.h"
 
 namespace isomesh::mesh {

@@ -1,5 +1,5 @@
 // Labels that are made of several values, and labels that overlap.
-#include "server/mesh/label_parts.h"
+#include "server/mesh/labels/label_parts.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "server/mesh/label_surface.h"
+#include "server/mesh/labels/label_surface.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/smooth.h"
+#include "server/mesh/smooth/smooth.h"
 #include "tests/support/errors.h"
 #include "tests/support/nifti.h"
 #include "tests/unit/mesh/separated.h"

@@ -1,4 +1,4 @@
-#include "server/mesh/labels.h"
+#include "server/mesh/labels/labels.h"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "server/mesh/lattice.h"
+#include "server/mesh/lattice/lattice.h"
 
 #include <cmath>
 #include <numbers>

@@ -1,4 +1,4 @@
-#include "server/mesh/measure.h"
+#include "server/mesh/measure/measure.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/topology.h"
+#include "server/mesh/topology/topology.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/nifti.h"

@@ -1,4 +1,4 @@
-#include "server/mesh/normals.h"
+#include "server/mesh/measure/normals.h"
 
 #include <cmath>
 

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/extract.h"
+#include "server/mesh/extract/extract.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/reference.h"

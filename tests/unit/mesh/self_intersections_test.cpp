@@ -1,4 +1,4 @@
-#include "server/mesh/self_intersections.h"
+#include "server/mesh/measure/self_intersections.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/smooth.h"
+#include "server/mesh/smooth/smooth.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/shapes.h"

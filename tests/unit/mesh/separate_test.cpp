@@ -1,4 +1,4 @@
-#include "server/mesh/separate.h"
+#include "server/mesh/labels/separate.h"
 
 #include <algorithm>
 #include <thread>

@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/label_surface.h"
-#include "server/mesh/labels.h"
-#include "server/mesh/separate.h"
+#include "server/mesh/labels/label_surface.h"
+#include "server/mesh/labels/labels.h"
+#include "server/mesh/labels/separate.h"
 #include "tests/support/kernels.h"
 #include "tests/support/label_reference.h"
 #include "tests/support/mesh_checks.h"

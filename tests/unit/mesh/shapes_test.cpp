@@ -1,4 +1,4 @@
-#include "server/mesh/shapes.h"
+#include "server/mesh/measure/shapes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/extract.h"
+#include "server/mesh/extract/extract.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"

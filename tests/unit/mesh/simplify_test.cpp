@@ -1,4 +1,4 @@
-#include "server/mesh/simplify.h"
+#include "server/mesh/simplify/simplify.h"
 
 #include <algorithm>
 #include <array>
@@ -7,11 +7,11 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/distance.h"
-#include "server/mesh/measure.h"
-#include "server/mesh/separate.h"
-#include "server/mesh/smooth.h"
-#include "server/mesh/topology.h"
+#include "server/mesh/labels/separate.h"
+#include "server/mesh/measure/distance.h"
+#include "server/mesh/measure/measure.h"
+#include "server/mesh/smooth/smooth.h"
+#include "server/mesh/topology/topology.h"
 #include "tests/support/errors.h"
 #include "tests/support/kernels.h"
 #include "tests/support/mesh_checks.h"

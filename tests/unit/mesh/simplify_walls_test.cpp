@@ -6,10 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/distance.h"
-#include "server/mesh/label_surface.h"
-#include "server/mesh/simplify.h"
-#include "server/mesh/smooth.h"
+#include "server/mesh/labels/label_surface.h"
+#include "server/mesh/measure/distance.h"
+#include "server/mesh/simplify/simplify.h"
+#include "server/mesh/smooth/smooth.h"
 #include "tests/unit/mesh/separated.h"
 
 namespace isomesh::mesh {

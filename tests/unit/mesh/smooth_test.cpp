@@ -1,4 +1,4 @@
-#include "server/mesh/smooth.h"
+#include "server/mesh/smooth/smooth.h"
 
 #include <algorithm>
 #include <cmath>

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/mesh/smooth.h"
+#include "server/mesh/smooth/smooth.h"
 #include "tests/support/points.h"
 #include "tests/unit/mesh/separated.h"
 

@@ -1,4 +1,4 @@
-#include "server/mesh/topology.h"
+#include "server/mesh/topology/topology.h"
 
 #include <utility>
 #include <vector>

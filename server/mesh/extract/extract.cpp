@@ -1,0 +1,120 @@
+#include "server/mesh/extract/extract.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "proto/samples.h"
+#include "server/mesh/extract/slab_passes.h"
+
+namespace isomesh::mesh {
+namespace {
+
+// The smallest value of T that is inside, so that classifying compares T with T. Empty when no
+// value of T is inside.
+template <class T>
+std::optional<T> smallest_inside(double iso) {
+  constexpr auto kLowest = static_cast<double>(std::numeric_limits<T>::lowest());
+  if (iso > static_cast<double>(std::numeric_limits<T>::max())) return std::nullopt;
+  if constexpr (std::is_integral_v<T>) {
+    return static_cast<T>(std::ceil(std::max(iso, kLowest)));
+  } else {
+    const auto nearest = static_cast<T>(std::max(iso, kLowest));
+    return static_cast<double>(nearest) >= iso
+               ? nearest
+               : std::nextafter(nearest, std::numeric_limits<T>::infinity());
+  }
+}
+
+}  // namespace
+
+// A left-handed lattice turns the tables' triangles inside out.
+std::array<CellSplit, 2> splits_of(Scheme scheme, bool left_handed) {
+  std::array splits = {cell_split(scheme, false), cell_split(scheme, true)};
+  if (left_handed) {
+    for (CellSplit& split : splits) {
+      for (CellCase& cell : split.cases) {
+        for (auto& [a, b, c] : cell.edges) std::swap(b, c);
+      }
+    }
+  }
+  return splits;
+}
+
+void make_room(const SurfaceCount& count, const LatticeToSpace& to_space, bool close, Mesh& mesh) {
+  constexpr std::uint64_t kMostVertices = std::numeric_limits<std::uint32_t>::max();
+  if (count.vertices() > kMostVertices) {
+    throw Error(ErrorCode::kTooLarge, "the surface has " + std::to_string(count.vertices()) +
+                                          " vertices; more than " + std::to_string(kMostVertices) +
+                                          " cannot be indexed with 32 bits");
+  }
+  mesh.origin = to_space.origin;
+  mesh.layer_vertices = count.layer_vertices;
+  mesh.layer_triangles = count.layer_triangles;
+  mesh.positions.resize_for_overwrite(count.vertices());
+  mesh.triangles.resize_for_overwrite(count.triangles());
+  mesh.on_border.assign(close ? (count.vertices() + kFlagBits - 1) / kFlagBits : 0, 0);
+  mesh.on_line.clear();
+}
+
+SurfaceSize size_of(const SurfaceCount& count) {
+  SurfaceSize size = {.triangles = count.triangles(),
+                      .vertices = count.vertices(),
+                      .layers = count.layer_vertices.size() - 1};
+  for (std::size_t k = 0; k < size.layers; ++k) {
+    size.largest_layer =
+        std::max(size.largest_layer, count.layer_vertices[k + 1] - count.layer_vertices[k]);
+  }
+  return size;
+}
+
+template <class T>
+Extraction<T>::Extraction(const Lattice<T>& the_lattice, const ExtractOptions& options,
+                          T the_smallest)
+    : Marching(the_lattice.dims, the_lattice.to_space, options.scheme, options.close),
+      lattice(the_lattice),
+      smallest(the_smallest),
+      placement(options, the_lattice.dims, the_lattice.to_space) {
+  if (options.close) border.emplace(the_lattice, options, the_smallest, placement);
+}
+
+template <class T>
+SurfaceCount count_surface(const Lattice<T>& lattice, const ExtractOptions& options,
+                           const Context& context) {
+  SurfaceCount count = empty_count(marched_dims(lattice.dims, options.close).z);
+  const auto smallest = smallest_inside<T>(options.iso);
+  if (!lattice.dims.has_cells() || !smallest) {
+    context.throw_if_stopped();
+    return count;
+  }
+
+  const Extraction<T> extraction(lattice, options, *smallest);
+  count_pass(extraction, context, count);
+  prefix_pass(count);
+  return count;
+}
+
+template <class T>
+void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
+                     const SurfaceCount& count, const Context& context, Mesh& mesh) {
+  make_room(count, lattice.to_space, options.close, mesh);
+  const auto smallest = smallest_inside<T>(options.iso);
+  if (!lattice.dims.has_cells() || !smallest || count.vertices() == 0) {
+    return context.throw_if_stopped();
+  }
+
+  write_pass(Extraction<T>(lattice, options, *smallest), kEdgePlaces, context, mesh, mesh);
+}
+
+#define ISOMESH_INSTANTIATE(T, name, kType)                                                      \
+  template SurfaceCount count_surface(const Lattice<T>&, const ExtractOptions&, const Context&); \
+  template void extract_surface(const Lattice<T>&, const ExtractOptions&, const SurfaceCount&,   \
+                                const Context&, Mesh&);
+ISOMESH_FOR_EACH_SAMPLE_TYPE(ISOMESH_INSTANTIATE)
+#undef ISOMESH_INSTANTIATE
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,70 @@
+// Iso-surface extraction by marching tetrahedra.
+//
+// A cell of eight samples is split into five or six tetrahedra; in each the surface is the plane
+// patch that linear interpolation puts there (B. A. Payne, A. W. Toga, "Surface mapping brain
+// function on 3D models", IEEE Computer Graphics and Applications 10(5), 1990; A. Doi, A. Koide,
+// "An efficient method of triangulating equi-valued surfaces by using tetrahedral cells", IEICE
+// Transactions E74(1), 1991, whose Table 1 has both splits). The six-way split is Kuhn's (H. W.
+// Kuhn, "Some combinatorial lemmas in topology", IBM Journal of Research and Development 4(5),
+// 1960), which tiles by translation; of the five-way split every cell with odd i+j+k is mirrored,
+// or the diagonals of shared faces would cross. Vertices near a sample could be snapped to it, for
+// better triangles (G. M. Treece, R. W. Prager, A. H. Gee, "Regularised marching tetrahedra",
+// Computers & Graphics 23(4), 1999); here they stay where interpolation puts them, and smoothing
+// betters the triangles.
+//
+// Three passes: count_surface (1) counts the vertices and triangles of each layer and (2) sums the
+// counts up, so that every layer knows its place; extract_surface (3) writes every vertex and
+// triangle there. Nothing is searched, hashed or merged: a vertex is named by the sample that owns
+// its edge and the edge's direction, and its index is a running count.
+//
+// A surface that is to be closed is marched on around the volume, as if one more layer of samples
+// beyond each face were outside; those samples are nowhere in memory. Its caps lie on the border of
+// the volume (border.h). The rest is what it is when it stays open, but for vertices in the faces
+// of the volume's box that are next to a sample of about the iso-value.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "server/mesh/context.h"
+#include "server/mesh/lattice/lattice.h"
+#include "server/mesh/lattice/placement.h"
+#include "server/mesh/mesh.h"
+
+namespace isomesh::mesh {
+
+// How large the surface is, layer by layer; layers + 1 running sums each, as in Mesh. There are as
+// many layers as the lattice has planes, and two more when the surface is closed.
+struct SurfaceCount {
+  std::vector<std::uint64_t> layer_vertices = {0};
+  std::vector<std::uint64_t> layer_triangles = {0};
+
+  std::uint64_t vertices() const { return layer_vertices.back(); }
+  std::uint64_t triangles() const { return layer_triangles.back(); }
+};
+
+// What memory follows from.
+struct SurfaceSize {
+  std::uint64_t triangles = 0;
+  std::uint64_t vertices = 0;
+  std::uint64_t layers = 0;
+  std::uint64_t largest_layer = 0;  // in vertices
+};
+
+SurfaceSize size_of(const SurfaceCount& count);
+
+// Counts without writing; exact. A lattice without cells, or an iso-value outside the samples'
+// range, has an empty surface. Thread safe. Throws Error kCancelled.
+template <class T>
+SurfaceCount count_surface(const Lattice<T>& lattice, const ExtractOptions& options,
+                           const Context& context);
+
+// Extracts the surface into `mesh`, whose memory is reused. `count` must come from count_surface
+// with the same lattice and options. The result does not depend on the number of threads.
+// Thread safe for different meshes. Throws Error kTooLarge when the mesh has more vertices than
+// 32-bit indices can name, before memory is taken, and kCancelled.
+template <class T>
+void extract_surface(const Lattice<T>& lattice, const ExtractOptions& options,
+                     const SurfaceCount& count, const Context& context, Mesh& mesh);
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,320 @@
+// Which samples are inside, one bit each, and the logic on 64 samples at a time that extraction at
+// an iso-value counts and walks with. Compiled once for each instruction set, see slabs.cpp.
+#if defined(ISOMESH_SIGNS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef ISOMESH_SIGNS_INL_H_
+#undef ISOMESH_SIGNS_INL_H_
+#else
+#define ISOMESH_SIGNS_INL_H_
+#endif
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <hwy/highway.h>
+
+#include "server/mesh/extract/slabs.h"
+#include "server/mesh/lattice/rows-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace isomesh::mesh::HWY_NAMESPACE {
+
+// The signs of one plane of samples. Each row ends in one word of zeros, so that the word after a
+// row's last one can be read.
+class SignPlane {
+ public:
+  explicit SignPlane(const Dims& dims) : words_(words_of(dims.x)), bits_((words_ + 1) * dims.y) {}
+
+  std::size_t words() const { return words_; }
+  Word* row(std::size_t y) { return bits_.data() + y * (words_ + 1); }
+  const Word* row(std::size_t y) const { return bits_.data() + y * (words_ + 1); }
+
+ private:
+  std::size_t words_;
+  std::vector<Word> bits_;
+};
+
+// The signs of up to 64 samples; bits beyond `count` are zero.
+template <class T>
+HWY_INLINE Word classify_word(const T* samples, std::size_t count, T smallest) {
+  std::array<std::uint8_t, kWordBits> flags = {};
+  if (count == kWordBits) {  // a constant count, which the compiler turns into wide compares
+    for (std::size_t x = 0; x < kWordBits; ++x) flags[x] = samples[x] >= smallest ? 1 : 0;
+  } else {
+    for (std::size_t x = 0; x < count; ++x) flags[x] = samples[x] >= smallest ? 1 : 0;
+  }
+  return pack_word(flags);
+}
+
+// Fills `plane` with the signs of the samples of plane z.
+template <class T>
+void classify(const Lattice<T>& lattice, std::uint32_t z, T smallest, SignPlane& plane) {
+  const std::size_t width = lattice.dims.x;
+  const T* samples = lattice.samples + std::size_t{z} * lattice.dims.y * width;
+  for (std::uint32_t y = 0; y < lattice.dims.y; ++y, samples += width) {
+    Word* row = plane.row(y);
+    for (std::size_t w = 0; w < plane.words(); ++w) {
+      const std::size_t begin = w * kWordBits;
+      row[w] =
+          classify_word(samples + begin, std::min<std::size_t>(kWordBits, width - begin), smallest);
+    }
+  }
+}
+
+// The same for the plane that is z when phantoms are numbered too: a phantom, which is outside, is
+// on each of its sides, so that rows begin one bit later.
+template <class T>
+void classify_with_margin(const Lattice<T>& lattice, std::uint32_t z, T smallest,
+                          SignPlane& plane) {
+  const std::size_t width = lattice.dims.x;
+  const std::size_t words = plane.words();
+  std::fill_n(plane.row(0), words, 0);
+  std::fill_n(plane.row(lattice.dims.y + 1), words, 0);
+  const bool is_phantom = z == 0 || z == lattice.dims.z + 1;
+  for (std::uint32_t y = 0; y < lattice.dims.y; ++y) {
+    Word* row = plane.row(y + 1);
+    if (is_phantom) {
+      std::fill_n(row, words, 0);
+      continue;
+    }
+    const T* samples = lattice.samples + (std::size_t{z - 1} * lattice.dims.y + y) * width;
+    Word carry = 0;
+    for (std::size_t w = 0; w < words; ++w) {
+      const std::size_t begin = std::min(w * kWordBits, width);
+      const Word signs =
+          classify_word(samples + begin, std::min<std::size_t>(kWordBits, width - begin), smallest);
+      row[w] = signs << 1 | carry;
+      carry = signs >> (kWordBits - 1);
+    }
+  }
+}
+
+inline unsigned count_in_tetrahedron(const CornerWords& corners,
+                                     const std::array<std::uint8_t, 4>& tetrahedron, Word cells) {
+  const Word a = corners[tetrahedron[0]];
+  const Word b = corners[tetrahedron[1]];
+  const Word c = corners[tetrahedron[2]];
+  const Word d = corners[tetrahedron[3]];
+  const Word odd = (a ^ b ^ c ^ d) & cells;                         // one or three inside
+  const Word mixed = ((a | b | c | d) & ~(a & b & c & d)) & cells;  // one, two or three
+  return static_cast<unsigned>(std::popcount(odd) + 2 * std::popcount(mixed & ~odd));
+}
+
+// What numbering a row leaves for the triangles of the layer: its crossed cells with their cases.
+struct SignCells {
+  Word crossed = 0;
+  std::array<std::uint8_t, kWordBits> cases;
+};
+
+// One row of cells: the four rows of signs around it.
+class SignRow : public RowShape {
+ public:
+  SignRow(const RowShape& shape, const std::array<CellSplit, 2>& splits, const SignPlane& low,
+          const SignPlane& high, std::uint32_t y)
+      : RowShape(shape),
+        splits_(splits),
+        rows_{low.row(y), low.row(next_row(y)), high.row(y), high.row(next_row(y))} {}
+
+  // Quick test on the signs alone: false when no sample of word w has a crossed edge.
+  bool may_cross(std::size_t w) const {
+    Word any = 0;
+    Word all = ~Word{0};
+    for (const Word* row : rows_) {
+      any |= row[w] | row[w + 1] << 63;
+      all &= row[w] & (row[w + 1] << 63 | ~Word{0} >> 1);
+    }
+    return any != 0 && all != ~Word{0};
+  }
+
+  // The samples of word w that own a crossed edge; what is known of its cells goes to `cells`.
+  Word describe(std::size_t w, SignCells& cells) const {
+    const CornerWords signs = corners(w);
+    const std::array<Word, 8> crossed = crossed_edges(w, signs);
+    cells.crossed = crossed_cells(w, signs);
+    cells.cases = transpose(signs);
+    Word owners = 0;
+    for (const Word edges : crossed) owners |= edges;
+    return owners;
+  }
+
+  // Lists the places of the vertices that the sample at x owns, which is `bit` of the word that
+  // `cells` are of. At least eight places of the list are written, and only those before what is
+  // returned are valid.
+  HWY_INLINE std::uint32_t* list(std::size_t x, unsigned bit, const SignCells& cells,
+                                 std::uint32_t* next) const {
+    const unsigned directions = splits_[parity_at(x)].crossed[cells.cases[bit]] & existing_at(x);
+    const auto& members = kMembers[directions];
+    for (std::size_t i = 0; i < kEdgePlaces; ++i) {
+      next[i] = static_cast<std::uint32_t>(x * kEdgePlaces) + members[i];
+    }
+    return next + std::popcount(directions);
+  }
+
+  WordCount count(std::size_t w) const {
+    const CornerWords signs = corners(w);
+    WordCount count;
+    for (const Word edges : crossed_edges(w, signs)) {
+      count.vertices += static_cast<unsigned>(std::popcount(edges));
+    }
+    count.triangles = count_triangles(w, signs);
+    return count;
+  }
+
+ private:
+  CornerWords corners(std::size_t w) const {
+    CornerWords corners;
+    for (unsigned r = 0; r < 4; ++r) {
+      corners[std::size_t{2} * r] = rows_[r][w];
+      corners[std::size_t{2} * r + 1] = rows_[r][w] >> 1 | rows_[r][w + 1] << 63;
+    }
+    return corners;
+  }
+
+  std::array<Word, 8> crossed_edges(std::size_t w, const CornerWords& corners) const {
+    return edges_where(w, [&](unsigned a, unsigned b) { return corners[a] ^ corners[b]; });
+  }
+
+  // The cells that exist and have corners on both sides.
+  Word crossed_cells(std::size_t w, const CornerWords& corners) const {
+    Word any = 0;
+    Word all = ~Word{0};
+    for (const Word corner : corners) {
+      any |= corner;
+      all &= corner;
+    }
+    return any & ~all & cells(w);
+  }
+
+  unsigned count_triangles(std::size_t w, const CornerWords& corners) const {
+    const Word cells = crossed_cells(w, corners);
+    if (cells == 0) return 0;
+    unsigned count = 0;
+    for (std::size_t t = 0; t < splits_[0].tetrahedra; ++t) {
+      count +=
+          count_in_tetrahedron(corners, splits_[0].corners[t], is_five() ? cells & even() : cells);
+      if (is_five()) {
+        count += count_in_tetrahedron(corners, splits_[1].corners[t], cells & ~even());
+      }
+    }
+    return count;
+  }
+
+  const std::array<CellSplit, 2>& splits_;
+  std::array<const Word*, 4> rows_;  // at (y, z), (y + 1, z), (y, z + 1), (y + 1, z + 1)
+};
+
+// Writes the triangles of the cells of one row.
+class SignCellWriter {
+ public:
+  SignCellWriter(const std::array<CellSplit, 2>& splits, const SignRow& row,
+                 const EdgeOffsets& offsets)
+      : splits_(splits), row_(row), offsets_(offsets) {}
+
+  // Of the cell at x, which is `bit` of the word that `cells` are of.
+  HWY_INLINE Triangle* write(std::size_t x, unsigned bit, const SignCells& cells,
+                             const std::uint32_t* places, Triangle* out) const {
+    return write_case(splits_[row_.parity_at(x)].cases[cells.cases[bit]], places, offsets_, out);
+  }
+
+ private:
+  const std::array<CellSplit, 2>& splits_;
+  const SignRow row_;
+  const EdgeOffsets& offsets_;
+};
+
+// What the walk is told of an iso-value's signs: those of the planes around the one that is worked
+// on, each classified once as z rises.
+template <class T>
+class SignField {
+ public:
+  using Marched = Extraction<T>;
+  using Output = Mesh;
+  using Cells = SignCells;
+  using Row = SignRow;
+  static constexpr std::size_t kPlaces = kEdgePlaces;
+  static constexpr bool kHasLines = false;
+
+  SignField(const Extraction<T>& extraction, std::uint32_t first)
+      : extraction_(extraction),
+        dims_(extraction.dims),
+        planes_{SignPlane(dims_), SignPlane(dims_), SignPlane(dims_)},
+        next_(first) {}
+
+  // Classifies up to the plane above z. Afterwards rows of z - 1 and z can be asked for.
+  void reach(std::uint32_t z) {
+    for (; next_ <= z + 1 && next_ < dims_.z; ++next_) {
+      SignPlane& plane = planes_[next_ % kPlanes];
+      if (extraction_.margin == 0) {
+        classify(extraction_.lattice, next_, extraction_.smallest, plane);
+      } else {
+        classify_with_margin(extraction_.lattice, next_, extraction_.smallest, plane);
+      }
+    }
+  }
+
+  SignRow row(std::uint32_t y, std::uint32_t z) const {
+    const std::uint32_t above = std::min(z + 1, dims_.z - 1);
+    const Word even = extraction_.parity(0, y, z) == 0 ? kEvenX : ~kEvenX;
+    return {RowShape(dims_, extraction_.scheme, even, y, z), extraction_.splits,
+            planes_[z % kPlanes], planes_[above % kPlanes], y};
+  }
+
+  static Mesh& mesh_of(Mesh& mesh) { return mesh; }
+
+  EdgeFrame frame(unsigned parity, std::size_t direction) const {
+    const LatticeToSpace& map = extraction_.lattice.to_space;
+    const EdgeEnds ends = extraction_.splits[parity].ends[direction];
+    EdgeFrame frame;
+    frame.from = sample_offset(ends.from);
+    frame.to = sample_offset(ends.to);
+    frame.start = space_offset(map, ends.from);
+    frame.run = space_offset(map, ends.to) - frame.start;
+    return frame;
+  }
+
+  // The share of the way along its edge of each vertex in a row between the lattice's own samples.
+  template <std::uint32_t kMargin>
+  auto shares(std::uint32_t y, std::uint32_t z) const {
+    const Lattice<T>& lattice = extraction_.lattice;
+    const T* samples = lattice.samples - kMargin +
+                       (std::size_t{z - kMargin} * lattice.dims.y + (y - kMargin)) * lattice.dims.x;
+    return [samples, this](std::size_t x, const EdgeFrame& edge) {
+      return extraction_.placement.share(samples[x + edge.from], samples[x + edge.to]);
+    };
+  }
+
+  BorderVertex place_at_border(std::uint32_t x, std::uint32_t y, std::uint32_t z,
+                               std::size_t direction, const EdgeFrame& /*frame*/) const {
+    const CellSplit& split = extraction_.splits[extraction_.parity(x, y, z)];
+    const auto placed = extraction_.border->place(
+        {std::int64_t{x} - 1, std::int64_t{y} - 1, std::int64_t{z} - 1}, split.ends[direction]);
+    return {placed.position, placed.on_border};
+  }
+
+  SignCellWriter cell_writer(std::uint32_t y, std::uint32_t z, const EdgeOffsets& offsets,
+                             Mesh& /*output*/) const {
+    return {extraction_.splits, row(y, z), offsets};
+  }
+
+ private:
+  static constexpr std::uint32_t kPlanes = 3;
+
+  std::ptrdiff_t sample_offset(unsigned corner) const {
+    const std::ptrdiff_t row = extraction_.lattice.dims.x;
+    const std::ptrdiff_t plane = row * extraction_.lattice.dims.y;
+    return (corner & 1) + (corner >> 1 & 1) * row + (corner >> 2) * plane;
+  }
+
+  const Extraction<T>& extraction_;
+  const Dims dims_;
+  std::array<SignPlane, kPlanes> planes_;
+  std::uint32_t next_;
+};
+
+}  // namespace isomesh::mesh::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,118 @@
+// The first and the third pass of extraction on one slab of layers, compiled for several
+// instruction sets of which the best is chosen when the program runs; private to this folder.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "base/mutex.h"
+#include "server/mesh/extract/extract.h"
+#include "server/mesh/lattice/border.h"
+#include "server/mesh/lattice/placement.h"
+#include "server/mesh/lattice/tetrahedra.h"
+
+namespace isomesh::mesh {
+
+// A run of layers that one task works on.
+struct Slab {
+  std::uint32_t begin = 0;
+  std::uint32_t end = 0;
+};
+
+// How many layers of phantoms are around the volume.
+inline std::uint32_t margin_of(bool close) { return close ? 1 : 0; }
+
+// The samples that are marched over: the lattice's, and the phantoms around them.
+inline Dims marched_dims(const Dims& dims, bool close) {
+  const std::uint32_t more = 2 * margin_of(close);
+  return {dims.x + more, dims.y + more, dims.z + more};
+}
+
+// The ways to split cells of even and odd parity, wound for the lattice.
+std::array<CellSplit, 2> splits_of(Scheme scheme, bool left_handed);
+
+// What is marched over. Samples are numbered with the phantoms, so the lattice's begin at `margin`.
+// Immutable while slabs are worked on.
+struct Marching {
+  Marching(const Dims& samples, const LatticeToSpace& map, Scheme the_scheme, bool close)
+      : to_space(map),
+        margin(margin_of(close)),
+        dims(marched_dims(samples, close)),
+        scheme(the_scheme),
+        splits(splits_of(the_scheme, map.determinant() < 0)) {}
+
+  // 0 or 1: whether i+j+k is even or odd, in the lattice's own numbers, of the cell or sample that
+  // is (x, y, z) when phantoms are numbered too.
+  unsigned parity(std::size_t x, std::size_t y, std::size_t z) const {
+    return (x + y + z + margin) & 1;
+  }
+
+  LatticeToSpace to_space;
+  std::uint32_t margin;
+  Dims dims;  // of what is marched over
+  Scheme scheme;
+  std::array<CellSplit, 2> splits;
+};
+
+// What all slabs of an extraction at an iso-value share.
+template <class T>
+struct Extraction : Marching {
+  Extraction(const Lattice<T>& the_lattice, const ExtractOptions& options, T the_smallest);
+
+  const Lattice<T>& lattice;
+  T smallest;  // the smallest value that is inside
+  Placement placement;
+  std::optional<BorderPlacement<T>> border;  // of a surface that is closed
+};
+
+// The memory that a slab numbers its vertices in. A slab that has ended gives its block back and
+// the next one takes it, so that pages are mapped once for each thread, not for each slab. Thread
+// safe.
+class IndexMemory {
+ public:
+  explicit IndexMemory(std::size_t count) : count_(count) {}
+
+  using Block = std::unique_ptr<std::uint32_t[]>;
+
+  Block take() {
+    const Lock lock(mutex_);
+    if (free_.empty()) return std::make_unique_for_overwrite<std::uint32_t[]>(count_);
+    Block block = std::move(free_.back());
+    free_.pop_back();
+    return block;
+  }
+
+  void give_back(Block block) {
+    const Lock lock(mutex_);
+    free_.push_back(std::move(block));
+  }
+
+ private:
+  const std::size_t count_;
+  Mutex mutex_;
+  std::vector<Block> free_ ISOMESH_GUARDED_BY(mutex_);
+};
+
+// Places a sample, by direction, for the indices of the vertices on the edges that it owns.
+inline constexpr std::size_t kEdgePlaces = 8;
+
+// How many indices a slab works with that marches over such samples: those of one plane and two
+// rows, of so many places a sample.
+inline std::size_t index_memory_size(const Dims& dims, std::size_t places) {
+  return (std::size_t{dims.y} + 2) * dims.x * places;
+}
+
+// Pass 1, count: how many vertices and triangles layer k has goes to layer_vertices[k + 1] and
+// layer_triangles[k + 1].
+template <class T>
+void count_slab(const Extraction<T>& extraction, const Slab& slab, SurfaceCount& count);
+
+// Pass 3, write: the slab's vertices and triangles go to their places, which mesh.layer_vertices
+// and mesh.layer_triangles tell.
+template <class T>
+void write_slab(const Extraction<T>& extraction, const Slab& slab, IndexMemory& memory, Mesh& mesh);
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,54 @@
+// As slabs.cpp, for labels.
+#include "server/mesh/labels/label_slabs.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "server/mesh/labels/label_slabs.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "server/mesh/extract/slab_walk-inl.h"
+#include "server/mesh/labels/labels-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace isomesh::mesh::HWY_NAMESPACE {
+
+void count_labels(const Separation& separation, const Slab& slab, SurfaceCount& count) {
+  count_slab_of<LabelField>(separation, slab, count);
+}
+
+void tally_labels(const Separation& separation, const Slab& slab,
+                  std::span<std::uint64_t> triangles) {
+  tally_slab_of(separation, slab, triangles);
+}
+
+void write_labels(const Separation& separation, const Slab& slab, IndexMemory& memory,
+                  SeparatingSurface& surface) {
+  write_slab_of<LabelField>(separation, slab, memory, surface);
+}
+
+}  // namespace isomesh::mesh::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace isomesh::mesh {
+
+HWY_EXPORT(count_labels);
+HWY_EXPORT(tally_labels);
+HWY_EXPORT(write_labels);
+
+void count_slab(const Separation& separation, const Slab& slab, SurfaceCount& count) {
+  HWY_DYNAMIC_DISPATCH(count_labels)(separation, slab, count);
+}
+
+void tally_slab(const Separation& separation, const Slab& slab,
+                std::span<std::uint64_t> triangles) {
+  HWY_DYNAMIC_DISPATCH(tally_labels)(separation, slab, triangles);
+}
+
+void write_slab(const Separation& separation, const Slab& slab, IndexMemory& memory,
+                SeparatingSurface& surface) {
+  HWY_DYNAMIC_DISPATCH(write_labels)(separation, slab, memory, surface);
+}
+
+}  // namespace isomesh::mesh
+#endif

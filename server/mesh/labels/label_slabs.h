@@ -1,0 +1,39 @@
+// The passes over one slab of labels, as slabs.h has them for an iso-value; private to this folder.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "server/mesh/extract/slabs.h"
+#include "server/mesh/labels/label_index.h"
+#include "server/mesh/labels/separate.h"
+#include "server/mesh/labels/wall_cases.h"
+
+namespace isomesh::mesh {
+
+// What all slabs share whose labels are separated. Phantoms are background.
+struct Separation : Marching {
+  template <class T>
+  Separation(const Lattice<T>& lattice, const SeparateOptions& options)
+      : Marching(lattice.dims, lattice.to_space, options.scheme, options.close),
+        parts(options.labels, options.values),
+        samples(std::make_unique<PartsOf<T>>(lattice, parts)),
+        walls({make_wall_cases(options.scheme, false, to_space.determinant() < 0),
+               make_wall_cases(options.scheme, true, to_space.determinant() < 0)}) {}
+
+  LabelParts parts;
+  std::unique_ptr<const SampleParts> samples;
+  std::array<WallCases, 2> walls;  // by parity, wound for the lattice
+};
+
+void count_slab(const Separation& separation, const Slab& slab, SurfaceCount& count);
+
+// Adds to the place of each label's number how many of the slab's triangles have it on either side.
+void tally_slab(const Separation& separation, const Slab& slab, std::span<std::uint64_t> triangles);
+
+void write_slab(const Separation& separation, const Slab& slab, IndexMemory& memory,
+                SeparatingSurface& surface);
+
+}  // namespace isomesh::mesh

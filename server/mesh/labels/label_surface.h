@@ -1,0 +1,64 @@
+// One label's own surface, taken out of the walls between all.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/mesh/buffer.h"
+#include "server/mesh/context.h"
+#include "server/mesh/labels/separate.h"
+#include "server/mesh/measure/measure.h"
+#include "server/mesh/topology/topology.h"
+
+namespace isomesh::mesh {
+
+// Which triangles have each label on either side: 8 bytes a triangle and a label. Keeps nothing of
+// the surface. Immutable, so safe to read from several threads.
+class LabelTriangles {
+ public:
+  // Throws Error kTooLarge when 32 bits cannot number all triangles.
+  explicit LabelTriangles(const SeparatingSurface& surface);
+
+  // Of the label of that number, from 1 on (see WallSides); in the order of the surface.
+  std::span<const std::uint32_t> of(std::size_t number) const {
+    return triangles_.span().subspan(ends_[number - 1], ends_[number] - ends_[number - 1]);
+  }
+
+ private:
+  std::vector<std::uint64_t> ends_;  // ends_[n] of label n
+  Buffer<std::uint32_t> triangles_;
+};
+
+// The surface of the label of that number, from 1 on, into `mesh`, whose memory is reused: the
+// triangles that have it on either side, turned outward, in their order and their layers. It is an
+// oriented manifold, and closed when the surface is. What two labels share has the same positions
+// in both, to the bit. Thread safe for different meshes.
+void extract_label(const SeparatingSurface& surface, const LabelTriangles& triangles,
+                   std::size_t number, Mesh& mesh);
+
+// Which of the walls' vertices extract_label takes for that label, in the order of its surface.
+std::vector<std::uint32_t> vertices_of_label(const SeparatingSurface& surface,
+                                             const LabelTriangles& triangles, std::size_t number);
+
+// What one label's own surface is.
+struct LabelMeasure {
+  std::int64_t label = 0;
+  std::uint64_t vertices = 0;
+  std::uint64_t triangles = 0;
+  Topology topology;
+  Extent extent;  // its volume is signed: negative only of a surface that is not closed
+
+  bool is_closed() const { return topology.boundary_edges == 0; }
+};
+
+// Of each label, in their order. Takes one label's surface for each thread. The same for any number
+// of threads. Throws Error kCancelled.
+std::vector<LabelMeasure> measure_labels(const SeparatingSurface& surface,
+                                         const LabelTriangles& triangles, const Context& context);
+
+// What all labels enclose together, in cubic millimetres: of a surface that is not closed as
+// Extent::volume_mm3 is. The same for any number of threads. Throws Error kCancelled.
+double enclosed_by_all(const SeparatingSurface& surface, const Context& context);
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,223 @@
+#include "server/mesh/labels/labels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+#include <type_traits>
+#include <unordered_map>
+#include <utility>
+
+#include "server/mesh/labels/label_slabs.h"
+#include "server/mesh/parallel.h"
+
+namespace isomesh::mesh {
+namespace {
+
+constexpr std::uint32_t kPlanesPerTask = 16;
+constexpr std::size_t kMostValues = kMostLabels + 1;  // with the background
+
+void add_run(LabelVoxels& label, std::uint32_t begin, std::uint32_t end, std::uint32_t y,
+             std::uint32_t z) {
+  const std::array<std::uint32_t, 3> first = {begin, y, z};
+  const std::array<std::uint32_t, 3> last = {end - 1, y, z};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    label.low[axis] = label.voxels == 0 ? first[axis] : std::min(label.low[axis], first[axis]);
+    label.high[axis] = std::max(label.high[axis], last[axis]);
+  }
+  label.voxels += end - begin;
+}
+
+// The labels that have been met, by value.
+template <class T, bool kIsSmall = sizeof(T) <= 2>
+class LabelTable {
+ public:
+  LabelTable() : labels_(std::size_t{1} << std::numeric_limits<Bits>::digits) {}
+
+  LabelVoxels& at(T value) { return labels_[static_cast<Bits>(value)]; }
+
+  template <class Visit>
+  void visit(Visit visit) const {
+    for (std::size_t bits = 0; bits < labels_.size(); ++bits) {
+      if (labels_[bits].voxels > 0) visit(static_cast<T>(static_cast<Bits>(bits)), labels_[bits]);
+    }
+  }
+
+ private:
+  using Bits = std::make_unsigned_t<T>;
+  std::vector<LabelVoxels> labels_;
+};
+
+// Where there are too many values for one row each.
+template <class T>
+class LabelTable<T, false> {
+ public:
+  LabelVoxels& at(T value) {
+    LabelVoxels& label = labels_[value];
+    if (labels_.size() > kMostValues) throw_too_many_labels();
+    return label;
+  }
+
+  template <class Visit>
+  void visit(Visit visit) const {
+    for (const auto& [value, label] : labels_) visit(value, label);
+  }
+
+ private:
+  std::unordered_map<T, LabelVoxels> labels_;
+};
+
+template <class T>
+std::vector<LabelVoxels> count_planes(const Lattice<T>& lattice, std::uint32_t begin,
+                                      std::uint32_t end) {
+  LabelTable<T> table;
+  const std::uint32_t width = lattice.dims.x;
+  for (std::uint32_t z = begin; z < end; ++z) {
+    for (std::uint32_t y = 0; y < lattice.dims.y; ++y) {
+      const T* row = lattice.samples + (std::size_t{z} * lattice.dims.y + y) * width;
+      for (std::uint32_t x = 0; x < width;) {
+        const std::uint32_t first = x;
+        while (++x < width && row[x] == row[first]) {
+        }
+        add_run(table.at(row[first]), first, x, y, z);
+      }
+    }
+  }
+  std::vector<LabelVoxels> labels;
+  table.visit([&](T value, LabelVoxels label) {
+    label.label = value;
+    labels.push_back(label);
+  });
+  return labels;
+}
+
+// Those that are not in `present`, as text; empty when all are.
+std::string missing_labels(std::span<const std::int64_t> labels,
+                           std::span<const LabelVoxels> present) {
+  constexpr std::size_t kMostNamed = 20;
+  std::string names;
+  std::size_t missing = 0;
+  for (const std::int64_t label : labels) {
+    if (std::ranges::binary_search(present, label, {}, &LabelVoxels::label)) continue;
+    if (++missing <= kMostNamed) names += (names.empty() ? "" : ", ") + std::to_string(label);
+  }
+  if (missing > kMostNamed) names += " and " + std::to_string(missing - kMostNamed) + " more";
+  return names;
+}
+
+}  // namespace
+
+void add_voxels(const LabelVoxels& part, LabelVoxels& whole) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    whole.low[axis] =
+        whole.voxels == 0 ? part.low[axis] : std::min(whole.low[axis], part.low[axis]);
+    whole.high[axis] = std::max(whole.high[axis], part.high[axis]);
+  }
+  whole.voxels += part.voxels;
+  whole.volume_mm3 += part.volume_mm3;
+}
+
+void throw_too_many_labels() {
+  throw Error(ErrorCode::kUnusableVolume,
+              "the volume has more than " + std::to_string(kMostLabels) +
+                  " different values besides its background, so they are not labels");
+}
+
+template <class T>
+std::vector<LabelVoxels> count_labels(const Lattice<T>& lattice, const Context& context) {
+  const std::uint32_t planes = lattice.dims.samples() == 0 ? 0 : lattice.dims.z;
+  std::vector<std::vector<LabelVoxels>> parts((planes + kPlanesPerTask - 1) / kPlanesPerTask);
+  parallel_for(context, parts.size(), [&](std::size_t task) {
+    const auto begin = static_cast<std::uint32_t>(task) * kPlanesPerTask;
+    parts[task] = count_planes(lattice, begin, std::min(planes, begin + kPlanesPerTask));
+  });
+  std::unordered_map<std::int64_t, LabelVoxels> joined;
+  for (std::vector<LabelVoxels>& part : parts) {
+    for (const LabelVoxels& label : std::exchange(part, {})) add_voxels(label, joined[label.label]);
+    if (joined.size() > kMostValues) throw_too_many_labels();
+  }
+  const double voxel_mm3 = std::abs(lattice.to_space.determinant());
+  std::vector<LabelVoxels> labels;
+  for (auto& [value, label] : joined) {
+    label.label = value;
+    label.volume_mm3 = static_cast<double>(label.voxels) * voxel_mm3;
+    labels.push_back(label);
+  }
+  std::ranges::sort(labels, {}, &LabelVoxels::label);
+  return labels;
+}
+
+std::vector<LabelVoxels> labels_of(std::span<const LabelVoxels> present, std::int64_t background,
+                                   const LabelValues& values) {
+  std::set<std::int64_t> taken = {background};
+  std::vector<LabelVoxels> labels;
+  for (const auto& [label, own] : values) {
+    LabelVoxels whole = {.label = label};
+    for (const std::int64_t value : own) {
+      if (value == background) continue;
+      taken.insert(value);
+      const auto found = std::ranges::lower_bound(present, value, {}, &LabelVoxels::label);
+      if (found == present.end() || found->label != value) continue;
+      add_voxels(*found, whole);
+    }
+    taken.insert(label);
+    if (whole.voxels > 0 && label != background) labels.push_back(whole);
+  }
+  for (const LabelVoxels& value : present) {
+    if (!taken.contains(value.label)) labels.push_back(value);
+  }
+  if (labels.size() > kMostLabels) throw_too_many_labels();
+  std::ranges::sort(labels, {}, &LabelVoxels::label);
+  return labels;
+}
+
+std::vector<std::int64_t> select_labels(std::span<const LabelVoxels> present,
+                                        std::int64_t background,
+                                        const std::optional<std::vector<std::int64_t>>& wanted) {
+  std::vector<std::int64_t> labels;
+  if (!wanted) {
+    for (const LabelVoxels& label : present) {
+      if (label.label != background) labels.push_back(label.label);
+    }
+  } else {
+    labels = *wanted;
+    std::ranges::sort(labels);
+    labels.erase(std::unique(labels.begin(), labels.end()), labels.end());
+    if (labels.empty()) throw invalid_parameter("labels", "must name at least one label");
+    if (std::ranges::binary_search(labels, background)) {
+      throw invalid_parameter("labels",
+                              "must not name the background, " + std::to_string(background));
+    }
+    if (const std::string missing = missing_labels(labels, present); !missing.empty()) {
+      throw Error(ErrorCode::kUnusableVolume, "the volume has no voxels of the labels " + missing);
+    }
+  }
+  if (labels.size() > kMostLabels) throw_too_many_labels();
+  return labels;
+}
+
+std::vector<LabelVoxels> chosen_labels(std::span<const LabelVoxels> counted,
+                                       const MeshParameters& parameters) {
+  const auto there = labels_of(counted, parameters.background, parameters.label_values);
+  std::optional<std::vector<std::int64_t>> wanted;
+  if (!parameters.labels->is_all()) wanted = parameters.labels->values;
+  const auto chosen = select_labels(there, parameters.background, wanted);
+  if (chosen.empty()) {
+    throw Error(ErrorCode::kUnusableVolume,
+                "the volume has no labels: all samples are background, " +
+                    std::to_string(parameters.background));
+  }
+  std::vector<LabelVoxels> labels;
+  std::ranges::copy_if(there, std::back_inserter(labels), [&](const LabelVoxels& label) {
+    return std::ranges::binary_search(chosen, label.label);
+  });
+  return labels;
+}
+
+#define ISOMESH_INSTANTIATE(T) \
+  template std::vector<LabelVoxels> count_labels(const Lattice<T>&, const Context&);
+ISOMESH_FOR_EACH_LABEL_TYPE(ISOMESH_INSTANTIATE)
+#undef ISOMESH_INSTANTIATE
+
+}  // namespace isomesh::mesh

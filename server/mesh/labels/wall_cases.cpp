@@ -1,0 +1,244 @@
+#include "server/mesh/labels/wall_cases.h"
+
+#include <bit>
+#include <set>
+#include <span>
+#include <utility>
+
+namespace isomesh::mesh {
+namespace {
+
+using Tetrahedron = std::array<std::uint8_t, 4>;
+using Corners = unsigned;  // a set: bit c is corner c
+using Point = std::array<int, 3>;
+
+Corners set_of(std::span<const std::uint8_t> corners) {
+  Corners set = 0;
+  for (const std::uint8_t corner : corners) set |= 1U << corner;
+  return set;
+}
+
+// The corner that is the smallest of the set along every axis.
+unsigned owner_of(Corners set) {
+  unsigned owner = 7;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    if ((set >> corner & 1) != 0) owner &= corner;
+  }
+  return owner;
+}
+
+Slot slot_of(Corners set) {
+  Slot slot;
+  for (std::uint8_t corner = 0; corner < 8; ++corner) {
+    if ((set >> corner & 1) != 0) slot.corners[slot.size++] = corner;
+  }
+  return slot;
+}
+
+Corners corners_of(const Slot& slot) { return set_of(std::span(slot.corners).first(slot.size)); }
+
+using Slots = std::array<Slot, kSlots>;
+
+// What corner 0 owns is an edge, a face or a tetrahedron of one of its cell's tetrahedra.
+Slots slots_of(const CellSplit& split) {
+  Slots slots = {};
+  for (unsigned direction = 1; direction < 8; ++direction) {
+    const EdgeEnds ends = split.ends[direction];
+    if (ends.from != ends.to) slots[direction] = {2, {ends.from, ends.to}};
+  }
+  std::set<Corners> faces;
+  std::set<Corners> tetrahedra;
+  for (std::size_t t = 0; t < split.tetrahedra; ++t) {
+    const Corners all = set_of(split.corners[t]);
+    tetrahedra.insert(all);
+    for (const std::uint8_t corner : split.corners[t]) {
+      const Corners face = all & ~(1U << corner);
+      if (owner_of(face) == 0) faces.insert(face);
+    }
+  }
+  std::size_t next = kFaceSlot;
+  for (const Corners face : faces) slots[next++] = slot_of(face);
+  next = kTetrahedronSlot;
+  for (const Corners tetrahedron : tetrahedra) slots[next++] = slot_of(tetrahedron);
+  return slots;
+}
+
+// The cases of one tetrahedron are made in its own corners.
+class TetrahedronBuilder {
+ public:
+  // `slots`: of samples of even and odd parity.
+  TetrahedronBuilder(const Tetrahedron& corners, bool odd, const std::array<Slots, 2>& slots)
+      : corners_(corners), odd_(odd), slots_(slots) {}
+
+  TetrahedronWalls build(unsigned pattern) {
+    walls_ = {};
+    // Each corner's class is the first corner of its label.
+    std::array<unsigned, 4> classes = {0, 1, 2, 3};
+    std::array<unsigned, 4> sizes = {};
+    for (unsigned j = 0; j < 4; ++j) {
+      for (unsigned i = j; i-- > 0;) {
+        if ((pattern >> kPairs[i][j] & 1) == 0) classes[j] = i;
+      }
+      ++sizes[classes[j]];
+    }
+    if (pattern_of(classes) != pattern) return {};  // "the same" does not carry over: no such case
+    unsigned labels = 0;
+    for (const unsigned size : sizes) labels += size > 0 ? 1 : 0;
+    if (labels == 2) add_two(classes);
+    if (labels == 3) add_three(classes, sizes);
+    if (labels == 4) add_four();
+    return walls_;
+  }
+
+ private:
+  static constexpr std::array<std::array<unsigned, 4>, 4> kPairs = {
+      {{0, 0, 1, 2}, {0, 0, 3, 4}, {1, 3, 0, 5}, {2, 4, 5, 0}}};
+
+  // A vertex on what some of the tetrahedron's corners span.
+  struct Spot {
+    VertexName name;
+    Point at;  // times 12
+  };
+
+  template <class... Corner>
+  Spot spot(Corner... members) const {
+    const Corners set = ((1U << corners_[members]) | ...);
+    const unsigned owner = owner_of(set);
+    const Slots& slots = slots_[(odd_ ? 1 : 0) ^ (std::popcount(owner) & 1)];
+    Corners relative = 0;
+    Point at = {0, 0, 0};
+    for (const unsigned corner : {unsigned{corners_[members]}...}) {
+      relative |= 1U << (corner ^ owner);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        at[axis] +=
+            static_cast<int>(corner >> axis & 1) * 12 / static_cast<int>(sizeof...(members));
+      }
+    }
+    std::size_t slot = 1;
+    while (corners_of(slots[slot]) != relative) ++slot;
+    return {static_cast<VertexName>(owner * kSlotPlaces + slot), at};
+  }
+
+  // From one corner to another.
+  Point way(unsigned from, unsigned to) const {
+    Point way;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      way[axis] = (corners_[to] >> axis & 1) - (corners_[from] >> axis & 1);
+    }
+    return way;
+  }
+
+  // The side of a plane along `a` and `b` that `outward` points to.
+  static bool faces(const Point& a, const Point& b, const Point& outward) {
+    const Point normal = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                          a[0] * b[1] - a[1] * b[0]};
+    return normal[0] * outward[0] + normal[1] * outward[1] + normal[2] * outward[2] > 0;
+  }
+
+  void add(unsigned back, unsigned front, const Point& outward, const Spot& a, Spot b, Spot c) {
+    Point ab;
+    Point ac;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      ab[axis] = b.at[axis] - a.at[axis];
+      ac[axis] = c.at[axis] - a.at[axis];
+    }
+    if (!faces(ab, ac, outward)) std::swap(b, c);
+    walls_.walls[walls_.triangles++] = {{a.name, b.name, c.name}, corners_[back], corners_[front]};
+  }
+
+  // As the tables for an iso-value have it, with the label of the first corner in front.
+  void add_two(const std::array<unsigned, 4>& classes) {
+    Corners inside = 0;
+    unsigned back = 0;
+    for (unsigned i = 0; i < 4; ++i) {
+      if (classes[i] == 0) continue;
+      inside |= 1U << corners_[i];
+      back = i;
+    }
+    const CellCase cell = tetrahedron_case(corners_, inside);
+    for (std::size_t t = 0; t < cell.triangles; ++t) {
+      WallTriangle& wall = walls_.walls[walls_.triangles++];
+      for (std::size_t v = 0; v < 3; ++v) {
+        const EdgeName edge = cell.edges[t][v];
+        wall.vertices[v] = static_cast<VertexName>(edge / 8 * kSlotPlaces + edge % 8);
+      }
+      wall.back = corners_[back];
+      wall.front = corners_[0];
+    }
+  }
+
+  void add_three(const std::array<unsigned, 4>& classes, const std::array<unsigned, 4>& sizes) {
+    std::array<unsigned, 2> twins = {};
+    std::array<unsigned, 2> singles = {};
+    std::size_t twins_found = 0;
+    std::size_t singles_found = 0;
+    for (unsigned i = 0; i < 4; ++i) {
+      if (sizes[classes[i]] == 2) {
+        twins[twins_found++] = i;
+      } else {
+        singles[singles_found++] = i;
+      }
+    }
+    const auto [a, a2] = twins;
+    const auto [b, c] = singles;
+    const Spot face = spot(a, b, c);
+    const Spot face2 = spot(a2, b, c);
+    add(b, c, way(b, c), spot(b, c), face, face2);
+    for (const unsigned single : singles) {
+      Point outward = way(a, single);
+      const Point more = way(a2, single);
+      for (std::size_t axis = 0; axis < 3; ++axis) outward[axis] += more[axis];
+      add(a, single, outward, spot(a, single), spot(a2, single), face2);
+      add(a, single, outward, spot(a, single), face2, face);
+    }
+  }
+
+  // Cut from the edge to the centre, so that points of faces and centres are joined along the lines
+  // where walls meet and nowhere else: smoothing relies on that.
+  void add_four() {
+    const Spot centre = spot(0U, 1U, 2U, 3U);
+    for (unsigned i = 0; i < 4; ++i) {
+      for (unsigned j = i + 1; j < 4; ++j) {
+        const unsigned k = i != 0 ? 0 : j != 1 ? 1 : 2;
+        const unsigned l = 6 - i - j - k;
+        const Spot edge = spot(i, j);
+        add(i, j, way(i, j), edge, spot(i, j, k), centre);
+        add(i, j, way(i, j), edge, centre, spot(i, j, l));
+      }
+    }
+  }
+
+  const Tetrahedron& corners_;
+  const bool odd_;
+  const std::array<Slots, 2>& slots_;
+  TetrahedronWalls walls_;
+};
+
+}  // namespace
+
+WallCases make_wall_cases(Scheme scheme, bool odd, bool left_handed) {
+  const std::array<Slots, 2> slots = {slots_of(cell_split(scheme, false)),
+                                      slots_of(cell_split(scheme, true))};
+  const CellSplit& split = cell_split(scheme, odd);
+  WallCases cases;
+  cases.slots = slots[odd ? 1 : 0];
+  for (std::size_t s = 0; s < kSlots; ++s) {
+    const Slot& slot = cases.slots[s];
+    unsigned span = 0;
+    for (std::size_t i = 0; i < slot.size; ++i) span |= slot.corners[i];
+    for (unsigned axes = 0; axes < 8; ++axes) {
+      if (slot.size > 0 && (span & ~axes) == 0) cases.existing[axes] |= 1U << s;
+    }
+  }
+  for (std::size_t t = 0; t < split.tetrahedra; ++t) {
+    TetrahedronBuilder builder(split.corners[t], odd, slots);
+    for (unsigned pattern = 0; pattern < kPatterns; ++pattern) {
+      TetrahedronWalls& walls = cases.tetrahedra[t][pattern] = builder.build(pattern);
+      if (!left_handed) continue;
+      for (WallTriangle& wall : walls.walls) std::swap(wall.vertices[1], wall.vertices[2]);
+    }
+  }
+  return cases;
+}
+
+}  // namespace isomesh::mesh

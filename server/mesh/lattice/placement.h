@@ -1,0 +1,61 @@
+// Where a vertex on a lattice edge lies; private to this folder.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+#include "server/mesh/lattice/lattice.h"
+
+namespace isomesh::mesh {
+
+struct ExtractOptions {
+  double iso = 0;  // a sample is inside when its value is >= iso
+  Scheme scheme = Scheme::kSix;
+  Interpolation interpolation = Interpolation::kLinear;
+  bool close = false;  // cap the surface where it meets the lattice's border
+};
+
+// Immutable, so safe to read from several threads.
+class Placement {
+ public:
+  Placement(const ExtractOptions& options, const Dims& dims, const LatticeToSpace& to_space)
+      : iso_(options.iso),
+        midpoint_(options.interpolation == Interpolation::kMidpoint),
+        nearest_(nearest_share(dims, to_space)) {}
+
+  // One that keeps another distance from the samples; see nearest_share.
+  Placement(const ExtractOptions& options, double nearest)
+      : iso_(options.iso),
+        midpoint_(options.interpolation == Interpolation::kMidpoint),
+        nearest_(nearest) {}
+
+  // The share of the way from a sample of value `from` to one of value `to`, between which the
+  // iso-value lies.
+  template <class T>
+  double share(T from_sample, T to_sample) const {
+    if (midpoint_) return 0.5;
+    const auto from = static_cast<double>(from_sample);
+    const auto to = static_cast<double>(to_sample);
+    double f = (iso_ - from) / (to - from);
+    if constexpr (std::is_same_v<T, double>) {
+      // The difference of two doubles can overflow; that of their halves cannot.
+      if (std::isinf(to - from)) f = (iso_ / 2 - from / 2) / (to / 2 - from / 2);
+    }
+    return std::min(std::max(f, nearest_), 1 - nearest_);
+  }
+
+  double nearest() const { return nearest_; }
+
+  // A vertex on a sample that equals the iso-value would coincide with those on the sample's other
+  // edges, and their triangles would have no area. So every vertex keeps a distance from the
+  // samples that single precision still resolves. This is that distance as a share of an edge.
+  static double nearest_share(const Dims& dims, const LatticeToSpace& to_space);
+
+ private:
+  double iso_;
+  bool midpoint_;
+  double nearest_;
+};
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,223 @@
+// Rows of samples and of cells, 64 at a time: what the walk over an iso-value's signs and the one
+// over labels have in common. Compiled once for each instruction set, see slabs.cpp.
+#if defined(ISOMESH_ROWS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef ISOMESH_ROWS_INL_H_
+#undef ISOMESH_ROWS_INL_H_
+#else
+#define ISOMESH_ROWS_INL_H_
+#endif
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include <hwy/highway.h>
+
+#include "server/mesh/lattice/lattice.h"
+#include "server/mesh/lattice/tetrahedra.h"
+#include "server/mesh/mesh.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace isomesh::mesh::HWY_NAMESPACE {
+
+using Word = std::uint64_t;  // 64 samples of a row, the lowest bit the smallest x
+inline constexpr unsigned kWordBits = 64;
+inline constexpr Word kEvenX = 0x5555555555555555;
+
+// How many words a row of so many samples has.
+inline std::size_t words_of(std::uint32_t samples) {
+  return (std::size_t{samples} + kWordBits - 1) / kWordBits;
+}
+
+// Eight bytes of 0 or 1 to the eight bits of a byte, the first byte the lowest bit.
+inline std::uint8_t pack_byte(const std::uint8_t* flags) {
+  std::uint64_t bytes = 0;
+  std::memcpy(&bytes, flags, sizeof bytes);
+  return static_cast<std::uint8_t>(bytes * 0x0102040810204080 >> 56);
+}
+
+// 64 bytes of 0 or 1 to the bits of a word.
+HWY_INLINE Word pack_word(const std::array<std::uint8_t, kWordBits>& flags) {
+  Word word = 0;
+  for (unsigned byte = 0; byte < 8; ++byte) {
+    word |= Word{pack_byte(flags.data() + byte * std::size_t{8})} << (byte * 8);
+  }
+  return word;
+}
+
+// One bit for each of the eight corners of 64 cells of a row: word c holds corner c of each.
+using CornerWords = std::array<Word, 8>;
+
+// Bit i of byte j of the result is bit j of word i, for the 64 bits of eight words.
+inline std::array<std::uint8_t, kWordBits> transpose(const std::array<Word, 8>& words) {
+  std::array<std::uint8_t, kWordBits> bytes;
+  for (unsigned group = 0; group < 8; ++group) {
+    Word square = 0;  // row r: byte `group` of word r
+    for (unsigned r = 0; r < 8; ++r) square |= (words[r] >> (group * 8) & 0xFF) << (r * 8);
+    // Swaps ever larger squares across the diagonal (H. S. Warren, Hacker's Delight, 7-3).
+    Word swap = (square ^ square >> 7) & 0x00AA00AA00AA00AA;
+    square ^= swap ^ swap << 7;
+    swap = (square ^ square >> 14) & 0x0000CCCC0000CCCC;
+    square ^= swap ^ swap << 14;
+    swap = (square ^ square >> 28) & 0x00000000F0F0F0F0;
+    square ^= swap ^ swap << 28;
+    std::memcpy(bytes.data() + group * std::size_t{8}, &square, sizeof square);
+  }
+  return bytes;
+}
+
+// For each set of directions its members in order.
+inline constexpr auto kMembers = [] {
+  std::array<std::array<std::uint8_t, 8>, 256> members = {};
+  for (unsigned set = 0; set < 256; ++set) {
+    std::size_t found = 0;
+    for (unsigned direction = 0; direction < 8; ++direction) {
+      if ((set >> direction & 1) != 0) {
+        members[set][found++] = static_cast<std::uint8_t>(direction);
+      }
+    }
+  }
+  return members;
+}();
+
+// How many vertices a word's samples own, and how many triangles its cells have.
+struct WordCount {
+  unsigned vertices = 0;
+  unsigned triangles = 0;
+};
+
+// Which edges the samples of a row own, and which of its cells there are. Beyond the lattice's
+// upper borders there are no rows; the last ones stand for them, and what depends on them is left
+// out.
+class RowShape {
+ public:
+  // `even` are the samples of even parity in a word of the row.
+  RowShape(const Dims& dims, Scheme scheme, Word even, std::uint32_t y, std::uint32_t z)
+      : last_x_(dims.x - 1),
+        has_y_(y + 1 < dims.y),
+        has_z_(z + 1 < dims.z),
+        five_(scheme == Scheme::kFive),
+        even_(even),
+        odd_((even & 1) != 0 ? 0 : 1) {}
+
+  // The set (bit d: direction d) of edges that the row's samples own, but for the sample of the
+  // largest x, which owns no edge with a part along x.
+  unsigned existing() const {
+    constexpr unsigned kAll = 0b11111110;
+    constexpr unsigned kWithY = 0b11001100;
+    constexpr unsigned kWithZ = 0b11110000;
+    constexpr unsigned kFiveHasNone = 0b10000000;
+    return kAll & ~(has_y_ ? 0 : kWithY) & ~(has_z_ ? 0 : kWithZ) & ~(five_ ? kFiveHasNone : 0);
+  }
+
+  // The same for the sample at x.
+  unsigned existing_at(std::size_t x) const {
+    constexpr unsigned kWithX = 0b10101010;
+    return x == last_x_ ? existing() & ~kWithX : existing();
+  }
+
+  // The axes (bit 0: x) along which the sample at x has a next one.
+  unsigned axes_at(std::size_t x) const {
+    return (x == last_x_ ? 0U : 1U) | (has_y_ ? 2U : 0U) | (has_z_ ? 4U : 0U);
+  }
+
+  // 0 or 1: the parity of the sample or cell at x.
+  unsigned parity_at(std::size_t x) const { return (x + odd_) & 1; }
+
+ protected:
+  std::uint32_t next_row(std::uint32_t y) const { return has_y_ ? y + 1 : y; }
+
+  // The samples whose next neighbour along x exists.
+  Word has_next(std::size_t w) const {
+    const std::size_t begin = w * kWordBits;
+    if (begin + kWordBits <= last_x_) return ~Word{0};
+    return begin >= last_x_ ? 0 : (Word{1} << (last_x_ - begin)) - 1;
+  }
+
+  // The samples that exist, given has_next(w): beyond the last x there are none at all.
+  Word samples(std::size_t w, Word next_x) const {
+    return next_x << 1 | (w == 0 ? 1 : has_next(w - 1) >> 63);
+  }
+
+  Word cells(std::size_t w) const { return has_y_ && has_z_ ? has_next(w) : 0; }
+
+  // Word d: the samples whose edge of direction d exists and is crossed; word 0 is zero.
+  // `differ(a, b)`: the cells whose corners a and b are on two sides.
+  template <class Differ>
+  HWY_INLINE std::array<Word, 8> edges_where(std::size_t w, Differ differ) const {
+    const Word next_x = has_next(w);
+    const Word here = samples(w, next_x);
+    std::array<Word, 8> crossed = {};
+    for (unsigned direction = 1; direction < 8; ++direction) {
+      if ((existing() >> direction & 1) == 0) continue;
+      Word edges = differ(0U, direction);
+      if (five_ && std::popcount(direction) == 2) {
+        // The diagonal of a face joins its two other corners when its sample is odd.
+        const unsigned low = direction & (~direction + 1);
+        edges = (edges & even_) | (differ(low, direction ^ low) & ~even_);
+      }
+      crossed[direction] = edges & ((direction & 1) != 0 ? next_x : here);
+    }
+    return crossed;
+  }
+
+  bool is_five() const { return five_; }
+  Word even() const { return even_; }
+
+ private:
+  std::size_t last_x_;
+  bool has_y_;
+  bool has_z_;
+  bool five_;
+  Word even_;
+  unsigned odd_;  // the parity of the first sample
+};
+
+// Four lanes, of which the last is idle: positions in double precision until they are stored.
+using Double4 = double __attribute__((vector_size(32)));
+using Float4 = float __attribute__((vector_size(16)));
+
+HWY_INLINE Double4 lanes(const std::array<double, 3>& offset) {
+  return Double4{offset[0], offset[1], offset[2], 0};
+}
+
+// A corner of a cell as seen from corner 0, in millimetres.
+HWY_INLINE Double4 space_offset(const LatticeToSpace& map, unsigned corner) {
+  return lanes(map.step_x) * (corner & 1) + lanes(map.step_y) * (corner >> 1 & 1) +
+         lanes(map.step_z) * (corner >> 2);
+}
+
+// What placing a vertex needs to know of the edge that it lies on, relative to the sample that owns
+// it. A vertex that lies on none has a line of its own, half-way on which it is.
+struct EdgeFrame {
+  std::ptrdiff_t from = 0;  // the samples at its ends
+  std::ptrdiff_t to = 0;
+  Double4 start = {};  // where it begins and how it runs, in millimetres
+  Double4 run = {};
+};
+
+// A vertex near the border of the volume.
+struct BorderVertex {
+  Vec3 position = {0, 0, 0};
+  bool on_border = false;
+};
+
+// For each edge of a cell, where its vertex's index lies from corner 0's first place on.
+using EdgeOffsets = std::array<std::ptrdiff_t, 64>;
+
+// Writes the triangles of one case of the tables. Returns where the next one goes.
+HWY_INLINE Triangle* write_case(const CellCase& cell, const std::uint32_t* places,
+                                const EdgeOffsets& offsets, Triangle* out) {
+  for (std::size_t t = 0; t < cell.triangles; ++t) {
+    const auto& [a, b, c] = cell.edges[t];
+    *out++ = {places[offsets[a]], places[offsets[b]], places[offsets[c]]};
+  }
+  return out;
+}
+
+}  // namespace isomesh::mesh::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,137 @@
+#include "server/mesh/lattice/tetrahedra.h"
+
+#include <utility>
+
+namespace isomesh::mesh {
+namespace {
+
+using Corner = std::uint8_t;
+using Tetrahedron = std::array<Corner, 4>;
+
+// Table 1 of Doi and Koide (see extract.h), whose corners 0..7 are 000 100 110 010 001 101 111 011.
+constexpr std::array<Corner, 8> kPaperCorner = {0, 1, 3, 2, 4, 5, 7, 6};
+constexpr std::array<Tetrahedron, 6> kPaperSix = {
+    {{0, 2, 3, 6}, {0, 1, 2, 6}, {0, 1, 5, 6}, {0, 3, 6, 7}, {0, 4, 6, 7}, {0, 4, 5, 6}}};
+constexpr std::array<Tetrahedron, 5> kPaperFive = {
+    {{0, 2, 3, 7}, {0, 1, 2, 5}, {0, 4, 5, 7}, {2, 5, 6, 7}, {0, 2, 5, 7}}};
+
+using Point = std::array<int, 3>;
+
+constexpr Point position(Corner corner) { return {corner & 1, corner >> 1 & 1, corner >> 2 & 1}; }
+
+constexpr Point operator-(const Point& a, const Point& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
+constexpr Point operator+(const Point& a, const Point& b) {
+  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+
+constexpr int dot(const Point& a, const Point& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+constexpr Point cross(const Point& a, const Point& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+struct Edge {
+  Corner inside = 0;
+  Corner outside = 0;
+
+  constexpr EdgeName name() const { return edge_name(inside & outside, inside ^ outside); }
+  constexpr Point middle() const { return position(inside) + position(outside); }  // times two
+};
+
+// Adds the triangle with its normal turned to `outward`; the midpoints of the edges tell its side.
+constexpr void add_triangle(CellCase& out, Edge a, Edge b, Edge c, const Point& outward) {
+  const Point normal = cross(b.middle() - a.middle(), c.middle() - a.middle());
+  if (dot(normal, outward) < 0) std::swap(b, c);
+  out.edges[out.triangles++] = {a.name(), b.name(), c.name()};
+}
+
+constexpr void add_tetrahedron(CellCase& out, const Tetrahedron& corners, unsigned inside_corners) {
+  std::array<Corner, 4> inside = {};
+  std::array<Corner, 4> outside = {};
+  std::size_t insides = 0;
+  std::size_t outsides = 0;
+  Point outward = {0, 0, 0};  // from the inside corners to the outside ones, each pair once
+  for (const Corner corner : corners) {
+    if ((inside_corners >> corner & 1) != 0) {
+      inside[insides++] = corner;
+    } else {
+      outside[outsides++] = corner;
+    }
+  }
+  for (std::size_t i = 0; i < insides; ++i) {
+    for (std::size_t o = 0; o < outsides; ++o) {
+      outward = outward + (position(outside[o]) - position(inside[i]));
+    }
+  }
+  if (insides == 1) {
+    add_triangle(out, {inside[0], outside[0]}, {inside[0], outside[1]}, {inside[0], outside[2]},
+                 outward);
+  } else if (insides == 3) {
+    add_triangle(out, {inside[0], outside[0]}, {inside[1], outside[0]}, {inside[2], outside[0]},
+                 outward);
+  } else if (insides == 2) {
+    const Edge first = {inside[0], outside[0]};
+    const Edge second = {inside[0], outside[1]};
+    const Edge third = {inside[1], outside[1]};
+    const Edge fourth = {inside[1], outside[0]};
+    add_triangle(out, first, second, third, outward);
+    add_triangle(out, first, third, fourth, outward);
+  }
+}
+
+template <std::size_t N>
+constexpr CellSplit make_split(const std::array<Tetrahedron, N>& paper, Corner mirror) {
+  CellSplit split;
+  split.tetrahedra = N;
+  for (std::size_t t = 0; t < N; ++t) {
+    for (std::size_t c = 0; c < 4; ++c) {
+      split.corners[t][c] = kPaperCorner[paper[t][c]] ^ mirror;
+    }
+  }
+  for (unsigned inside = 0; inside < 256; ++inside) {
+    for (std::size_t t = 0; t < N; ++t) {
+      add_tetrahedron(split.cases[inside], split.corners[t], inside);
+    }
+  }
+  // Every edge that corner 0 owns is an edge of one of its cell's tetrahedra.
+  for (std::size_t t = 0; t < N; ++t) {
+    for (const Corner a : split.corners[t]) {
+      for (const Corner b : split.corners[t]) {
+        if (a < b && (a & b) == 0) split.ends[a ^ b] = {a, b};
+      }
+    }
+  }
+  for (unsigned inside = 0; inside < 256; ++inside) {
+    for (unsigned direction = 1; direction < 8; ++direction) {
+      const EdgeEnds ends = split.ends[direction];
+      const bool crossed = ((inside >> ends.from ^ inside >> ends.to) & 1) != 0;
+      split.crossed[inside] |= static_cast<std::uint8_t>(crossed ? 1U << direction : 0);
+    }
+  }
+  return split;
+}
+
+constexpr Corner kMirrorX = 1;
+
+}  // namespace
+
+CellCase tetrahedron_case(const std::array<std::uint8_t, 4>& corners, unsigned inside) {
+  CellCase result;
+  add_tetrahedron(result, corners, inside);
+  return result;
+}
+
+const CellSplit& cell_split(Scheme scheme, bool odd) {
+  static const CellSplit six = make_split(kPaperSix, 0);
+  static const CellSplit five_even = make_split(kPaperFive, 0);
+  static const CellSplit five_odd = make_split(kPaperFive, kMirrorX);
+  if (scheme == Scheme::kSix) return six;
+  return odd ? five_odd : five_even;
+}
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,132 @@
+#include "server/mesh/measure/cavities.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "server/mesh/measure/triangle_grid.h"
+#include "server/mesh/parallel.h"
+#include "server/mesh/points.h"
+
+namespace isomesh::mesh {
+namespace {
+
+// A number for an edge from one vertex to another; the other way it is the negative one, modulo
+// 2^64. So over all edges of a component's triangles the sum is zero where each edge is run through
+// as often one way as the other, and else but for a chance of 2^-64 it is not.
+std::uint64_t edge_number(std::uint32_t from, std::uint32_t to) {
+  std::uint64_t mixed = (std::uint64_t{std::min(from, to)} << 32 | std::max(from, to)) + 1;
+  // The finaliser of splitmix64 (G. L. Steele et al., OOPSLA 2014).
+  mixed = (mixed ^ (mixed >> 30)) * 0xBF58476D1CE4E5B9U;
+  mixed = (mixed ^ (mixed >> 27)) * 0x94D049BB133111EBU;
+  mixed ^= mixed >> 31;
+  return from < to ? mixed : 0 - mixed;
+}
+
+struct Shell {
+  std::uint64_t open_edges = 0;  // see edge_number
+  double volume_mm3 = 0;         // of a closed one; the sum of tetrahedra to `apex`
+  Point apex = {0, 0, 0};
+  std::uint32_t first_triangle = TriangleGrid::kNone;
+};
+
+std::vector<Shell> shells_of(const Components& components, const Mesh& mesh) {
+  std::vector<Shell> shells(components.count);
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    Shell& shell = shells[components.of_vertex[a]];
+    if (shell.first_triangle == TriangleGrid::kNone) {
+      shell.first_triangle = t;
+      shell.apex = to_point(mesh.positions[a]);
+    }
+    shell.open_edges += edge_number(a, b) + edge_number(b, c) + edge_number(c, a);
+    const Point from = minus(to_point(mesh.positions[a]), shell.apex);
+    shell.volume_mm3 += dot(from, cross(minus(to_point(mesh.positions[b]), shell.apex),
+                                        minus(to_point(mesh.positions[c]), shell.apex))) /
+                        6;
+  }
+  return shells;
+}
+
+// A point of the triangle that lies on no plane of the lattice's vertices, but for a chance.
+Point point_in(const Mesh& mesh, const Triangle& triangle) {
+  constexpr std::array<double, 3> kWeights = {0.2718281828, 0.3141592654, 0.4140125518};
+  Point point = {0, 0, 0};
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      point[axis] += kWeights[corner] * mesh.positions[triangle[corner]][axis];
+    }
+  }
+  return point;
+}
+
+// Twice the area of the triangle (a, b, point) in the plane of y and z.
+double area_at(const Point& a, const Point& b, const Point& point) {
+  return (b[1] - a[1]) * (point[2] - a[2]) - (b[2] - a[2]) * (point[1] - a[1]);
+}
+
+// How often the ray from the point towards larger x runs out of the walls, less how often it runs
+// into them: 0 where the point is in no cavity.
+int crossings(const Point& point, const TriangleGrid& walls, double end_x,
+              std::vector<std::uint32_t>& near) {
+  near.clear();
+  walls.visit_near(point, {end_x, point[1], point[2]},
+                   [&](std::uint32_t triangle) { near.push_back(triangle); });
+  std::ranges::sort(near);
+  near.erase(std::unique(near.begin(), near.end()), near.end());
+  int sum = 0;
+  for (const std::uint32_t t : near) {
+    const Triangle& triangle = walls.surface().triangles[t];
+    const Point a = to_point(walls.surface().positions[triangle[0]]);
+    const Point b = to_point(walls.surface().positions[triangle[1]]);
+    const Point c = to_point(walls.surface().positions[triangle[2]]);
+    const double at_a = area_at(b, c, point);
+    const double at_b = area_at(c, a, point);
+    const double at_c = area_at(a, b, point);
+    const bool is_hit = (at_a > 0 && at_b > 0 && at_c > 0) || (at_a < 0 && at_b < 0 && at_c < 0);
+    const double all = at_a + at_b + at_c;
+    if (is_hit && (at_a * a[0] + at_b * b[0] + at_c * c[0]) / all > point[0])
+      sum += all > 0 ? 1 : -1;
+  }
+  return sum;
+}
+
+}  // namespace
+
+Dropped fill_cavities(const Context& context, Mesh& mesh) {
+  const Context quiet = {context.stop, nullptr};
+  Components components;
+  find_components(mesh, quiet, components);
+  const std::vector<Shell> shells = shells_of(components, mesh);
+  const auto is_wall = [&](std::uint32_t n) {
+    return shells[n].open_edges == 0 && shells[n].volume_mm3 < 0;
+  };
+  std::vector<Triangle> triangles;
+  for (const Triangle& triangle : mesh.triangles) {
+    if (is_wall(components.of_vertex[triangle[0]])) triangles.push_back(triangle);
+  }
+  if (triangles.empty()) return {};
+  const TriangleGrid walls({mesh.positions.span(), triangles}, quiet);
+  float end_x = -std::numeric_limits<float>::infinity();
+  for (const Triangle& triangle : triangles) {
+    for (const std::uint32_t vertex : triangle) end_x = std::max(end_x, mesh.positions[vertex][0]);
+  }
+
+  std::vector<std::uint8_t> stays(shells.size(), 0);
+  constexpr std::size_t kPerTask = 256;
+  parallel_for(context, (shells.size() + kPerTask - 1) / kPerTask, [&](std::size_t task) {
+    std::vector<std::uint32_t> near;
+    const std::size_t end = std::min(shells.size(), (task + 1) * kPerTask);
+    for (std::size_t n = task * kPerTask; n < end; ++n) {
+      const Shell& shell = shells[n];
+      if (is_wall(static_cast<std::uint32_t>(n))) continue;
+      if (shell.first_triangle == TriangleGrid::kNone) continue;  // a vertex of no triangle
+      const Point point = point_in(mesh, mesh.triangles[shell.first_triangle]);
+      stays[n] = point[0] > end_x || crossings(point, walls, end_x, near) == 0 ? 1 : 0;
+    }
+  });
+  context.throw_if_stopped();
+  return leave_out({stays.begin(), stays.end()}, triangles_of(components, mesh), components, mesh);
+}
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,135 @@
+#include "server/mesh/measure/distance.h"
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "server/mesh/parallel.h"
+
+namespace isomesh::mesh {
+namespace {
+
+// Points that follow each other are near each other, so each is a guess for the next; a block
+// begins without one. Its size is fixed, for sums that are the same on any number of threads.
+constexpr std::size_t kBlock = 2048;
+
+constexpr double kPercentile = 0.99;
+
+struct Sums {
+  double sum = 0;
+  double squares = 0;
+  float max = 0;
+};
+
+// The points of a surface by number: its vertices, then the centres of its triangles.
+class Points {
+ public:
+  explicit Points(const SurfaceView& surface) : surface_(surface) {}
+
+  std::size_t vertices() const { return surface_.positions.size(); }
+  std::size_t size() const { return vertices() + surface_.triangles.size(); }
+
+  Point operator[](std::size_t number) const {
+    if (number < vertices()) return to_point(surface_.positions[number]);
+    Point centre = {0, 0, 0};
+    for (const std::uint32_t vertex : surface_.triangles[number - vertices()]) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        centre[axis] += surface_.positions[vertex][axis] / 3.0;
+      }
+    }
+    return centre;
+  }
+
+ private:
+  const SurfaceView surface_;
+};
+
+float distance_of(const Point& point, const TriangleGrid& to, std::uint32_t& guess) {
+  if (!std::isfinite(point[0]) || !std::isfinite(point[1]) || !std::isfinite(point[2])) {
+    throw Error(ErrorCode::kUnusableVolume, "a position of the mesh is not a finite number");
+  }
+  const TriangleGrid::Nearest nearest = to.nearest(point, guess);
+  guess = nearest.triangle;
+  return static_cast<float>(std::sqrt(nearest.squared_mm));
+}
+
+// The distances of the first `count` points, and the sums of each block.
+std::vector<Sums> measure(const Points& points, std::size_t count, const TriangleGrid& to,
+                          const Context& context, Buffer<float>& distances) {
+  distances.resize_for_overwrite(count);
+  std::vector<Sums> blocks((count + kBlock - 1) / kBlock);
+  parallel_for(context, blocks.size(), [&](std::size_t block) {
+    Sums& sums = blocks[block];
+    std::uint32_t guess = TriangleGrid::kNone;
+    const std::size_t end = std::min(count, (block + 1) * kBlock);
+    for (std::size_t n = block * kBlock; n < end; ++n) {
+      const float distance = distance_of(points[n], to, guess);
+      distances[n] = distance;
+      sums.sum += distance;
+      sums.squares += double{distance} * distance;
+      sums.max = std::max(sums.max, distance);
+    }
+  });
+  return blocks;
+}
+
+using Histogram = std::array<std::uint64_t, DistanceSummary::kBins>;
+
+Histogram histogram_of(std::span<const float> distances, double max) {
+  Histogram histogram = {};
+  if (!std::isfinite(max)) return histogram;
+  const double bins_per_mm = max > 0 ? DistanceSummary::kBins / max : 0;
+  for (const float distance : distances) {
+    const auto bin = static_cast<std::size_t>(distance * bins_per_mm);
+    ++histogram[std::min(bin, DistanceSummary::kBins - 1)];
+  }
+  return histogram;
+}
+
+}  // namespace
+
+void measure_vertex_distances(const SurfaceView& from, const TriangleGrid& to,
+                              const Context& context, Buffer<float>& distances) {
+  measure(Points(from), from.positions.size(), to, context, distances);
+}
+
+DistanceSummary measure_distance(const SurfaceView& from, const TriangleGrid& to,
+                                 const Context& context) {
+  const Points points(from);
+  DistanceSummary summary;
+  summary.points = points.size();
+  if (summary.points == 0) return summary;
+  Buffer<float> distances;
+  Sums whole;
+  for (const Sums& sums : measure(points, points.size(), to, context, distances)) {
+    whole.sum += sums.sum;
+    whole.squares += sums.squares;
+    whole.max = std::max(whole.max, sums.max);
+  }
+  const auto count = static_cast<double>(summary.points);
+  summary.max_mm = whole.max;
+  summary.mean_mm = whole.sum / count;
+  summary.rms_mm = std::sqrt(whole.squares / count);
+  summary.histogram = histogram_of(distances.span(), summary.max_mm);
+  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(kPercentile * count)) - 1;
+  std::nth_element(distances.begin(), distances.begin() + rank, distances.end());
+  summary.p99_mm = distances[static_cast<std::size_t>(rank)];
+  return summary;
+}
+
+Certificate certify(const SurfaceView& mesh, const SurfaceView& reference, const Context& context) {
+  // Each direction is half of the work, whatever it takes.
+  const auto half = [&](double begin) {
+    Context part = {context.stop, nullptr};
+    if (context.progress) {
+      part.progress = [&, begin](double share) { context.progress(begin + share / 2); };
+    }
+    return part;
+  };
+  Certificate certificate;
+  certificate.from_mesh = measure_distance(mesh, TriangleGrid(reference, context), half(0));
+  certificate.from_reference = measure_distance(reference, TriangleGrid(mesh, context), half(0.5));
+  return certificate;
+}
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,109 @@
+// Area, enclosed volume and bounds of a layer, summed up as its triangles and vertices are met;
+// private to this folder. Everything that measures does it through here and layer by layer, so that
+// the same mesh always has the same figures.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <span>
+
+#include "server/mesh/measure/measure.h"
+#include "server/mesh/mesh.h"
+
+namespace isomesh::mesh {
+
+// A position and one idle lane.
+using Float4 = float __attribute__((vector_size(16)));
+
+// Reads four bytes past the position: the next one's, or what Buffer keeps behind the last.
+inline Float4 load(const Vec3& position) {
+  Float4 lanes;
+  std::memcpy(&lanes, &position, sizeof lanes);
+  return lanes;
+}
+
+// One coordinate of two points.
+using Double2 = double __attribute__((vector_size(16)));
+
+struct TwoPoints {
+  static TwoPoints of(Float4 first, Float4 second) {
+    return {__builtin_convertvector(__builtin_shufflevector(first, second, 0, 4), Double2),
+            __builtin_convertvector(__builtin_shufflevector(first, second, 1, 5), Double2),
+            __builtin_convertvector(__builtin_shufflevector(first, second, 2, 6), Double2)};
+  }
+
+  TwoPoints operator-(const TwoPoints& other) const {
+    return {x - other.x, y - other.y, z - other.z};
+  }
+  Double2 dot(const TwoPoints& other) const { return x * other.x + y * other.y + z * other.z; }
+  TwoPoints cross(const TwoPoints& other) const {
+    return {y * other.z - z * other.y, z * other.x - x * other.z, x * other.y - y * other.x};
+  }
+
+  Double2 x;
+  Double2 y;
+  Double2 z;
+};
+
+class LayerExtent {
+ public:
+  // `corner` gives the position of a vertex as a Float4.
+  template <class Corner>
+  void add_triangles(std::span<const Triangle> triangles, const std::array<double, 3>& origin,
+                     Corner corner) {
+    const TwoPoints apex = {{origin[0], origin[0]}, {origin[1], origin[1]}, {origin[2], origin[2]}};
+    Double2 areas = {};
+    Double2 volumes = {};
+    const auto add_two = [&](const Triangle& first, const Triangle& second) {
+      const auto at = TwoPoints::of(corner(first[0]), corner(second[0]));
+      const TwoPoints normal = (TwoPoints::of(corner(first[1]), corner(second[1])) - at)
+                                   .cross(TwoPoints::of(corner(first[2]), corner(second[2])) - at);
+      const Double2 squares = normal.dot(normal);
+      areas += Double2{std::sqrt(squares[0]), std::sqrt(squares[1])};
+      volumes += (at - apex).dot(normal);
+    };
+    std::size_t t = 0;
+    for (; t + 1 < triangles.size(); t += 2) add_two(triangles[t], triangles[t + 1]);
+    if (t < triangles.size()) {
+      const std::uint32_t any = triangles[t][0];
+      add_two(triangles[t], {any, any, any});  // which has no area
+    }
+    area_ += (areas[0] + areas[1]) / 2;
+    volume_ += (volumes[0] + volumes[1]) / 6;
+  }
+
+  void add_vertex(Float4 position) {
+    low_ = position < low_ ? position : low_;
+    high_ = position > high_ ? position : high_;
+  }
+
+  // Adds another layer's sums; to be called in the order of the layers.
+  void add(const LayerExtent& other) {
+    area_ += other.area_;
+    volume_ += other.volume_;
+    low_ = other.low_ < low_ ? other.low_ : low_;
+    high_ = other.high_ > high_ ? other.high_ : high_;
+  }
+
+  Extent extent() const {
+    if (low_[0] > high_[0]) return {};
+    return {area_, volume_, {low_[0], low_[1], low_[2]}, {high_[0], high_[1], high_[2]}};
+  }
+
+ private:
+  static constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  double area_ = 0;
+  double volume_ = 0;
+  Float4 low_ = {kInfinity, kInfinity, kInfinity, kInfinity};
+  Float4 high_ = {-kInfinity, -kInfinity, -kInfinity, -kInfinity};
+};
+
+inline void add_triangles(const Mesh& mesh, std::size_t layer, LayerExtent& extent) {
+  extent.add_triangles(mesh.triangles_of(layer, layer + 1), mesh.origin,
+                       [&](std::uint32_t vertex) { return load(mesh.positions[vertex]); });
+}
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,124 @@
+#include "server/mesh/measure/self_intersections.h"
+
+#include <algorithm>
+
+#include "server/mesh/measure/exact_triangles.h"
+#include "server/mesh/measure/triangle_grid.h"
+#include "server/mesh/parallel.h"
+
+namespace isomesh::mesh {
+namespace {
+
+constexpr std::size_t kBlock = 4096;
+
+struct Box {
+  Point low;
+  Point high;
+
+  Box(const SurfaceView& surface, const Triangle& triangle)
+      : low(to_point(surface.positions[triangle[0]])), high(low) {
+    for (const std::uint32_t vertex : triangle) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        low[axis] = std::min(low[axis], double{surface.positions[vertex][axis]});
+        high[axis] = std::max(high[axis], double{surface.positions[vertex][axis]});
+      }
+    }
+  }
+
+  bool meets(const Box& other) const {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (other.low[axis] > high[axis] || other.high[axis] < low[axis]) return false;
+    }
+    return true;
+  }
+
+  Point middle_with(const Box& other) const {
+    Point middle;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      middle[axis] =
+          (std::max(low[axis], other.low[axis]) + std::min(high[axis], other.high[axis])) / 2;
+    }
+    return middle;
+  }
+};
+
+// By far most triangles near each other are neighbours that lie to different sides of their edge,
+// or have a corner in common and are on one side of each other's planes.
+bool are_apart(const SurfaceView& surface, const Triangle& a, const Triangle& b) {
+  const auto& [u, v, w] = a;
+  const Point from = to_point(surface.positions[u]);
+  const Point normal =
+      normal_of(from, to_point(surface.positions[v]), to_point(surface.positions[w]));
+  const double reach = std::abs(normal[0]) + std::abs(normal[1]) + std::abs(normal[2]);
+  int above = 0;
+  int below = 0;
+  int shared = 0;
+  for (const std::uint32_t vertex : b) {
+    if (vertex == u || vertex == v || vertex == w) {
+      ++shared;
+      continue;
+    }
+    const Point to = minus(to_point(surface.positions[vertex]), from);
+    const double height = dot(normal, to);
+    // More than rounding leaves of it.
+    const double margin = 1e-12 * reach * (std::abs(to[0]) + std::abs(to[1]) + std::abs(to[2]));
+    above += height > margin ? 1 : 0;
+    below += height < -margin ? 1 : 0;
+  }
+  return std::max(above, below) == 3 - shared && shared < 3;
+}
+
+// Of the triangles from `begin` to `end`, with those of higher numbers.
+std::vector<IntersectingPair> pairs_in(const SurfaceView& surface, const TriangleGrid& grid,
+                                       std::size_t begin, std::size_t end) {
+  std::vector<IntersectingPair> pairs;
+  std::vector<std::uint32_t> near;
+  for (std::size_t t = begin; t < end; ++t) {
+    const Triangle& triangle = surface.triangles[t];
+    if (is_flat(surface.positions, triangle)) continue;
+    const Box box(surface, triangle);
+    near.clear();
+    grid.visit_near(box.low, box.high, [&](std::uint32_t other) {
+      if (other > t) near.push_back(other);
+    });
+    std::ranges::sort(near);
+    near.erase(std::unique(near.begin(), near.end()), near.end());
+    for (const std::uint32_t n : near) {
+      const Triangle& other = surface.triangles[n];
+      const Box other_box(surface, other);
+      if (!box.meets(other_box) || are_apart(surface, triangle, other) ||
+          are_apart(surface, other, triangle) || is_flat(surface.positions, other) ||
+          !do_intersect(surface.positions, triangle, other)) {
+        continue;
+      }
+      pairs.push_back({static_cast<std::uint32_t>(t), n, box.middle_with(other_box)});
+    }
+  }
+  return pairs;
+}
+
+}  // namespace
+
+SelfIntersections find_self_intersections(const SurfaceView& surface, const Context& context) {
+  const TriangleGrid grid(surface, context);
+  const std::size_t triangles = surface.triangles.size();
+  std::vector<std::vector<IntersectingPair>> blocks((triangles + kBlock - 1) / kBlock);
+  parallel_for(context, blocks.size(), [&](std::size_t b) {
+    blocks[b] = pairs_in(surface, grid, b * kBlock, std::min(triangles, (b + 1) * kBlock));
+  });
+  SelfIntersections result;
+  std::vector<std::uint32_t> named;
+  for (const std::vector<IntersectingPair>& pairs : blocks) {
+    result.pairs += pairs.size();
+    for (const IntersectingPair& pair : pairs) {
+      named.insert(named.end(), {pair.first, pair.second});
+      if (result.places.size() < SelfIntersections::kMostPlaces) result.places.push_back(pair);
+    }
+  }
+  std::ranges::sort(named);
+  result.triangles =
+      static_cast<std::uint64_t>(std::unique(named.begin(), named.end()) - named.begin());
+  return result;
+}
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,55 @@
+// Triangles whose edges collapse one by one; private to this folder.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "server/mesh/simplify/simplify_block.h"
+
+namespace isomesh::mesh {
+
+using Numbers = std::vector<std::uint32_t>;
+
+inline bool has(std::span<const std::uint32_t> numbers, std::uint32_t number) {
+  return std::ranges::find(numbers, number) != numbers.end();
+}
+
+// Some triangles of a mesh with vertices of their own, and those around each vertex. A collapse
+// draws a vertex into a neighbour. Not thread safe.
+class EdgeCollapses {
+ public:
+  EdgeCollapses(const Mesh& mesh, std::span<const Triangle> triangles);
+
+  // The triangles around a vertex that a collapse takes away, and those that it leaves.
+  std::pair<Numbers, Numbers> split_star(std::uint32_t v, std::uint32_t into) const;
+
+  // The third corner.
+  std::uint32_t third(std::uint32_t triangle, std::uint32_t a, std::uint32_t b) const;
+
+  // Ascending.
+  Numbers neighbours(std::uint32_t v) const;
+
+  // Whether the vertices next to both ends of an edge are those of its own triangles, `gone`, each
+  // of one, and no edge is beyond both: then the surface stays of its kind.
+  bool links_meet_at_edge(std::uint32_t v, std::uint32_t into, const Numbers& gone) const;
+
+  // The triangle as it is after a collapse.
+  Triangle moved(std::uint32_t triangle, std::uint32_t v, std::uint32_t into) const;
+
+  // Whether no triangle that stays is turned far.
+  bool stays_upright(std::uint32_t v, std::uint32_t into, const Numbers& kept) const;
+
+  void collapse_edge(std::uint32_t v, std::uint32_t into, const Numbers& gone, const Numbers& kept);
+
+ protected:
+  bool are_neighbours(std::uint32_t a, std::uint32_t b) const;
+
+  LocalMesh mesh_;
+  std::vector<bool> is_gone_;    // of triangles
+  std::vector<Numbers> around_;  // triangles of each vertex
+};
+
+}  // namespace isomesh::mesh

@@ -1,0 +1,229 @@
+#include "server/mesh/smooth/smooth.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <vector>
+
+#include "server/mesh/parallel.h"
+#include "server/mesh/points.h"
+#include "server/mesh/smooth/sweep.h"
+
+namespace isomesh::mesh {
+namespace {
+
+// More steps at once save little: what each walk costs anew is about one step.
+constexpr std::size_t kUsualSteps = 6;
+
+std::size_t steps_of(const SmoothOptions& options) {
+  return static_cast<std::size_t>(options.passes) * (options.mu == 0 ? 1 : 2);
+}
+
+// How the work is cut up: a number of rounds of almost equally many steps, in each of which every
+// slab is one task.
+struct Plan {
+  std::size_t slabs = 1;
+  std::size_t rounds = 1;
+  std::uint64_t bytes = 0;
+
+  // Steps before the round begins.
+  std::size_t first_step(std::size_t round, std::size_t steps) const {
+    return steps * round / rounds;
+  }
+};
+
+// Slabs cost the steps around their cuts twice: as few as keep the threads busy, and on a deep
+// volume twice that, so that they end together.
+std::size_t count_slabs(std::size_t layers) {
+  constexpr std::size_t kFewestLayers = 16;
+  constexpr std::size_t kManyLayers = 64;
+  const auto threads = static_cast<std::size_t>(thread_count());
+  return std::max({std::size_t{1}, std::min(threads, layers / kFewestLayers),
+                   std::min(2 * threads, layers / kManyLayers)});
+}
+
+// Many steps in one round need many layers at a time, more rounds a copy of all positions, to know
+// at the end how far they moved: whichever is less.
+Plan plan_for(const SmoothOptions& options, const SurfaceSize& size) {
+  const std::size_t steps = steps_of(options);
+  Plan plan = {.slabs = count_slabs(size.layers)};
+  const auto bytes_with = [&](std::size_t steps_at_once) {
+    const auto at_once = std::min(plan.slabs, static_cast<std::size_t>(thread_count()));
+    const std::uint64_t copied = plan.slabs * 2 * steps_at_once * sizeof(Vec3);
+    return size.largest_layer * (at_once * sweep_bytes_per_vertex(steps_at_once) + copied);
+  };
+  const std::size_t rounds = (steps + kUsualSteps - 1) / kUsualSteps;
+  const std::uint64_t several =
+      bytes_with((steps + rounds - 1) / rounds) + size.vertices * sizeof(Vec3);
+  const bool slabs_are_deep = plan.slabs == 1 || 4 * steps <= size.layers / plan.slabs;
+  const bool once = rounds == 1 || (slabs_are_deep && bytes_with(steps) <= several);
+  plan.rounds = once ? 1 : rounds;
+  plan.bytes = once ? bytes_with(steps) : several;
+  return plan;
+}
+
+// Cuts the layers into runs of about as many vertices.
+std::vector<LayerRange> cut_slabs(const Mesh& mesh, std::size_t slabs) {
+  std::vector<LayerRange> result;
+  LayerRange slab;
+  const auto layers = static_cast<std::ptrdiff_t>(mesh.layers());
+  for (slab.end = 1; slab.end <= layers; ++slab.end) {
+    const std::uint64_t goal = mesh.layer_vertices.back() * (result.size() + 1) / slabs;
+    if (slab.end < layers && mesh.layer_vertices[slab.end] < goal) continue;
+    result.push_back(slab);
+    slab.begin = slab.end;
+  }
+  return result;
+}
+
+LayerCopy copy_of(const Mesh& mesh, const LayerRange& layers) {
+  if (layers.begin >= layers.end) return {layers, {}};
+  const auto vertices = mesh.positions.span().subspan(
+      mesh.layer_vertices[layers.begin],
+      mesh.layer_vertices[layers.end] - mesh.layer_vertices[layers.begin]);
+  return {layers, {vertices.begin(), vertices.end()}};
+}
+
+Extent sum_of(const std::vector<LayerExtent>& layers) {
+  LayerExtent whole;
+  for (const LayerExtent& layer : layers) whole.add(layer);
+  return whole.extent();
+}
+
+class Smoother {
+ public:
+  Smoother(const SmoothOptions& options, const Context& context, Mesh& mesh)
+      : options_(options),
+        context_(context),
+        quiet_{context.stop, nullptr},
+        mesh_(mesh),
+        plan_(plan_for(options, size_of({mesh.layer_vertices, mesh.layer_triangles}))),
+        slabs_(cut_slabs(mesh, plan_.slabs)),
+        before_(mesh.layers()),
+        after_(mesh.layers()),
+        displacements_(mesh.layers()) {
+    for (std::size_t step = 0; step < steps_of(options); ++step) {
+      const bool is_second = options.mu != 0 && step % 2 == 1;
+      shares_.push_back(static_cast<float>(is_second ? options.mu : options.lambda));
+    }
+  }
+
+  SmoothingEffect run() {
+    if (plan_.rounds > 1) {
+      extracted_.resize_for_overwrite(mesh_.positions.size());
+      parallel_for(quiet_, slabs_.size(), [&](std::size_t i) { keep_extracted(slabs_[i]); });
+    }
+    for (std::size_t round = 0; round < plan_.rounds; ++round) run_round(round);
+    return summary();
+  }
+
+ private:
+  void keep_extracted(const LayerRange& slab) {
+    const Vec3* from = mesh_.positions.data();
+    std::copy(from + mesh_.layer_vertices[slab.begin], from + mesh_.layer_vertices[slab.end],
+              extracted_.data() + mesh_.layer_vertices[slab.begin]);
+  }
+
+  void run_round(std::size_t number) {
+    const std::size_t first = plan_.first_step(number, shares_.size());
+    const std::size_t last = plan_.first_step(number + 1, shares_.size());
+    const bool is_last = number + 1 == plan_.rounds;
+    const Round round = {.mesh = mesh_,
+                         .shares = std::span(shares_).subspan(first, last - first),
+                         .max_displacement_mm = options_.max_displacement_mm,
+                         .within = options_.within,
+                         .extracted = plan_.rounds > 1 ? extracted_.data() : nullptr,
+                         .before = number == 0 ? before_.data() : nullptr,
+                         .after = is_last ? after_.data() : nullptr,
+                         .displacements = displacements_.data()};
+
+    std::vector<LayerCopy> below(slabs_.size());
+    std::vector<LayerCopy> above(slabs_.size());
+    parallel_for(quiet_, slabs_.size(), [&](std::size_t i) {
+      const LayerRange all = with_halo(round, slabs_[i], round.steps());
+      below[i] = copy_of(mesh_, {all.begin, slabs_[i].begin});
+      above[i] = copy_of(mesh_, {slabs_[i].end, all.end});
+      if (number == 0) measure_seam(i, before_);
+    });
+    parallel_for(quiet_, slabs_.size(), [&](std::size_t i) {
+      sweep(round, slabs_[i], below[i], above[i], [&] { report_layer(); });
+    });
+    if (is_last)
+      parallel_for(quiet_, slabs_.size(), [&](std::size_t i) { measure_seam(i, after_); });
+  }
+
+  // Of the triangles that name vertices of this slab and of the next.
+  void measure_seam(std::size_t slab, std::vector<LayerExtent>& extents) {
+    const auto layer = static_cast<std::size_t>(slabs_[slab].end) - 1;
+    if (layer + 1 < mesh_.layers()) add_triangles(mesh_, layer, extents[layer]);
+  }
+
+  void report_layer() {
+    context_.throw_if_stopped();
+    if (!context_.progress) return;
+    const std::size_t done = layers_done_.fetch_add(1, std::memory_order_relaxed) + 1;
+    context_.progress(static_cast<double>(done) /
+                      static_cast<double>(plan_.rounds * mesh_.layers()));
+  }
+
+  SmoothingEffect summary() const {
+    SmoothingEffect result = {.before = sum_of(before_), .after = sum_of(after_)};
+    for (const LayerDisplacement& layer : displacements_) {
+      result.mean_displacement_mm += layer.sum;
+      result.max_displacement_mm = std::max(result.max_displacement_mm, layer.largest);
+    }
+    if (mesh_.positions.size() > 0) {
+      result.mean_displacement_mm /= static_cast<double>(mesh_.positions.size());
+    }
+    return result;
+  }
+
+  const SmoothOptions& options_;
+  const Context& context_;
+  const Context quiet_;
+  Mesh& mesh_;
+  const Plan plan_;
+  const std::vector<LayerRange> slabs_;
+  std::vector<float> shares_;
+  Buffer<Vec3> extracted_;  // of several rounds
+  std::vector<LayerExtent> before_;
+  std::vector<LayerExtent> after_;
+  std::vector<LayerDisplacement> displacements_;
+  std::atomic<std::size_t> layers_done_ = 0;
+};
+
+}  // namespace
+
+double taubin_mu(double lambda, double pass_band) { return 1 / (pass_band - 1 / lambda); }
+
+std::vector<HalfSpace> box_around(const LatticeToSpace& to_space, const Dims& dims, double wider) {
+  const std::array<Point, 3> steps = {to_space.step_x, to_space.step_y, to_space.step_z};
+  const std::array<std::uint32_t, 3> counts = {dims.x, dims.y, dims.z};
+  std::vector<HalfSpace> box;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Point normal = cross(steps[(axis + 1) % 3], steps[(axis + 2) % 3]);
+    const double length = std::sqrt(dot(normal, normal));
+    for (double& coordinate : normal) coordinate /= length;
+    const double step = dot(normal, steps[axis]);  // negative of a left-handed lattice
+    const double first = dot(normal, to_space.origin) - wider * step;
+    const double last = first + (counts[axis] - 1 + 2 * wider) * step;
+    box.push_back({normal, std::max(first, last)});
+    for (double& coordinate : normal) coordinate = -coordinate;
+    box.push_back({normal, -std::min(first, last)});
+  }
+  return box;
+}
+
+SmoothingEffect smooth(const SmoothOptions& options, const Context& context, Mesh& mesh) {
+  if (steps_of(options) == 0 || mesh.positions.size() == 0) {
+    const Extent extent = measure_extent(mesh, context);
+    return {.before = extent, .after = extent};
+  }
+  return Smoother(options, context, mesh).run();
+}
+
+std::uint64_t smoothing_memory(const SmoothOptions& options, const SurfaceSize& size) {
+  return steps_of(options) == 0 || size.vertices == 0 ? 0 : plan_for(options, size).bytes;
+}
+
+}  // namespace isomesh::mesh
