@@ -13,10 +13,10 @@
 #include "base/log.h"
 #include "server/options.h"
 #include "server/records.h"
-#include "server/store/backup.h"
 #include "server/store/files/data_folder.h"
 #include "server/store/postgresql/connection.h"
 #include "server/store/postgresql/move.h"
+#include "server/store/sqlite/backup.h"
 #include "server/token_command.h"
 
 namespace isomesh {

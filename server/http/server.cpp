@@ -7,63 +7,16 @@
 #include <utility>
 
 #include "base/log.h"
-#include "server/http/observe/outcomes.h"
+#include "server/http/app/outcomes.h"
 #include "server/http/routes/routes.h"
 #include "server/net/listener.h"
 
 namespace isomesh::http {
 namespace {
 
-constexpr std::size_t kLongestPath = 256;
-constexpr std::size_t kLongestTarget = 4096;
 constexpr std::chrono::seconds kLongestWatch{1};
 // How long answers may still be sent when the service ends.
 constexpr std::chrono::seconds kLastAnswers{5};
-
-// Refuses requests that are malformed for every route. The HTTP library would wait for a body whose
-// length is not given.
-void check_request(const Request& request) {
-  if (request.path.size() > kLongestPath || request.target.size() > kLongestTarget) {
-    throw Error(ErrorCode::kUriTooLong, "the request's path or query is too long");
-  }
-  const bool needs_body =
-      request.method == "POST" || request.method == "PUT" || request.method == "PATCH";
-  const bool has_length =
-      request.has_header("Content-Length") || request.has_header("Transfer-Encoding");
-  if (needs_body && !has_length) {
-    throw Error(ErrorCode::kLengthRequired, "the request needs a Content-Length");
-  }
-}
-
-// The route at the request's path, whose parameters the request gets. Throws Error kNotFound.
-const Route& route_of(const Router& router, Request& request) {
-  auto [route, parameters] = router.find(request.path);
-  if (route == nullptr) throw Error(ErrorCode::kNotFound, "there is nothing at this path");
-  request.context.route = route->pattern();
-  request.path_parameters = std::move(parameters);
-  return *route;
-}
-
-// Throws Error kMethodNotAllowed, and then says in the response which methods are.
-const Handler& handler_of_method(const Route& route, const Request& request, Response& response) {
-  const auto found = route.handlers().find(request.method);
-  if (found != route.handlers().end()) return found->second;
-  response.set_header("Allow", route.methods());
-  throw Error(ErrorCode::kMethodNotAllowed, "this resource supports " + route.methods());
-}
-
-std::optional<Continuation> checked_answer(App& app, Request& request, Response& response) {
-  allow_reading(app.rules, request, response);
-  check_origin(app.rules, request);
-  begin_request(app.tokens, request, response);
-  check_request(request);
-  const Route& route = route_of(app.router, request);
-  if (is_preflight(app.rules, request)) {
-    answer_preflight(route.methods(), response);
-    return std::nullopt;
-  }
-  return handler_of_method(route, request, response)(request, response);
-}
 
 // Hands events of jobs on to requests that wait for them, streams, the log and the metrics, until
 // the service stops.
@@ -90,29 +43,6 @@ void watch_jobs(App& app) {
 }
 
 }  // namespace
-
-std::optional<Continuation> answer(App& app, Request& request, Response& response) {
-  auto continuation =
-      guarded(request, response, [&] { return checked_answer(app, request, response); });
-  if (!continuation) return std::nullopt;
-  if (continuation->abandoned) {
-    continuation->abandoned = [run = std::move(continuation->abandoned)](const Request& asked) {
-      Response nobodys;
-      guarded(asked, nobodys, [&] {
-        run(asked);
-        return std::optional<Continuation>();
-      });
-    };
-  }
-  continuation->resume = [resume = std::move(continuation->resume)](const Request& asked,
-                                                                    Response& out) {
-    guarded(asked, out, [&] {
-      resume(asked, out);
-      return std::optional<Continuation>();
-    });
-  };
-  return continuation;
-}
 
 struct Server::State {
   State(const Services& services, const ServerOptions& options) : app(services, options) {}

@@ -2,16 +2,11 @@
 // program isomesh-import is linked with it, which confines itself before it reads.
 #pragma once
 
-#include <functional>
-#include <string_view>
-
 #include "proto/types.h"
-#include "server/import/names.h"
+#include "server/import/source/names.h"
+#include "server/import/source/reader.h"
 
 namespace isomesh::import {
-
-// Called with the name of each format before a file of it is read: "archive", then "nifti", ...
-using FormatListener = std::function<void(std::string_view format)>;
 
 // Writes the task's target, a canonical file, and returns what else is known of the volume; id and
 // created stay empty. Thread safe.

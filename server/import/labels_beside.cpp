@@ -10,10 +10,10 @@
 #include "base/error.h"
 #include "base/files.h"
 #include "base/text.h"
-#include "server/import/formats/label_text.h"
-#include "server/import/label_table.h"
-#include "server/import/reader.h"
+#include "server/import/labels/label_table.h"
+#include "server/import/labels/label_text.h"
 #include "server/import/readers.h"
+#include "server/import/source/reader.h"
 
 namespace isomesh::import {
 namespace {

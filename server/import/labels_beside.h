@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "proto/types.h"
-#include "server/import/source.h"
+#include "server/import/source/source.h"
 
 namespace isomesh::import {
 

@@ -14,7 +14,7 @@
 
 #include "base/error.h"
 #include "proto/error.h"
-#include "server/import/dicom/text.h"
+#include "server/import/dicom/elements/text.h"
 #include "server/import/import.h"
 #include "server/import/peers/answer.h"
 #include "server/process/fork_server.h"

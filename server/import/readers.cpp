@@ -3,8 +3,6 @@
 #include <algorithm>
 
 #include "proto/error.h"
-#include "server/import/archives/gzip.h"
-#include "server/import/archives/import.h"
 #include "server/import/dicom/import.h"
 #include "server/import/formats/metaimage.h"
 #include "server/import/formats/nifti.h"
@@ -12,7 +10,9 @@
 #include "server/import/formats/raw.h"
 #include "server/import/formats/vti.h"
 #include "server/import/labels_beside.h"
-#include "server/import/transfer.h"
+#include "server/import/members.h"
+#include "server/import/samples/transfer.h"
+#include "server/import/source/gzip.h"
 
 namespace isomesh::import {
 namespace {

@@ -1,6 +1,6 @@
 #include "tests/fuzz/dicom_corpus.h"
 
-#include "server/import/dicom/tags.h"
+#include "server/import/dicom/elements/tags.h"
 #include "tests/unit/import/dicom/mosaics.h"
 #include "tests/unit/import/dicom/segments.h"
 

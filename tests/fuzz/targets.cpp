@@ -12,10 +12,10 @@
 
 #include "proto/error.h"
 #include "proto/json.h"
-#include "server/import/dicom/csa_header.h"
-#include "server/import/formats/label_text.h"
+#include "server/import/dicom/elements/csa_header.h"
 #include "server/import/import.h"
-#include "server/import/label_table.h"
+#include "server/import/labels/label_table.h"
+#include "server/import/labels/label_text.h"
 #include "server/import/readers.h"
 #include "server/process/import_message.h"
 #include "server/volume/canonical.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "proto/json.h"
-#include "server/http/request_values.h"
+#include "server/http/requests/request_values.h"
 
 namespace isomesh::http {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "server/http/request_values.h"
+#include "server/http/requests/request_values.h"
 #include "server/net/sender.h"
 #include "server/store/blob_store.h"
 

@@ -4,11 +4,11 @@
 
 #include <string>
 
-#include "server/http/connections.h"
+#include "server/http/connections/connections.h"
 #include "server/http/guards/auth.h"
 #include "server/http/observe/metrics.h"
-#include "server/http/request.h"
-#include "server/http/response.h"
+#include "server/http/requests/request.h"
+#include "server/http/requests/response.h"
 #include "server/store/job_store.h"
 
 namespace isomesh::http {

@@ -13,25 +13,12 @@
 
 #include "base/mutex.h"
 #include "proto/error.h"
+#include "server/http/requests/caller.h"
 
 namespace isomesh::http {
 
-enum class Role {
-  kUser,     // its own volumes and jobs
-  kAdmin,    // everybody's, and the metrics
-  kMonitor,  // the metrics and nothing else
-};
-
 std::string_view to_string(Role role);
 std::optional<Role> role_from(std::string_view name);
-
-// Who sent a request. Where no tokens are configured everybody is an administrator without a name.
-struct Caller {
-  std::string name;
-  Role role = Role::kAdmin;
-
-  bool operator==(const Caller&) const = default;
-};
 
 // Who reads a file of tokens: the service, or somebody who looks after it and may be root, while
 // the service runs as another user, to whom the file may belong.

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "server/http/request.h"
-#include "server/http/response.h"
+#include "server/http/requests/request.h"
+#include "server/http/requests/response.h"
 
 namespace isomesh::http {
 

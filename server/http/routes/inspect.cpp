@@ -4,7 +4,7 @@
 
 #include "base/text.h"
 #include "proto/json.h"
-#include "server/http/request_values.h"
+#include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
 #include "server/jobs/stored_samples.h"
 #include "server/volume/preview.h"

@@ -8,9 +8,9 @@
 #include "base/sha256.h"
 #include "base/text.h"
 #include "proto/json.h"
-#include "server/http/request_values.h"
+#include "server/http/requests/request_values.h"
+#include "server/http/requests/upload.h"
 #include "server/http/routes/routes.h"
-#include "server/http/upload.h"
 
 namespace isomesh::http {
 namespace {

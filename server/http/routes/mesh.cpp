@@ -13,9 +13,9 @@
 #include "proto/json.h"
 #include "server/codec/encode.h"
 #include "server/http/answers/sources.h"
-#include "server/http/import_query.h"
-#include "server/http/observe/outcomes.h"
-#include "server/http/request_values.h"
+#include "server/http/app/outcomes.h"
+#include "server/http/requests/import_query.h"
+#include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
 #include "server/jobs/label_pages.h"
 

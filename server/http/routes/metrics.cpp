@@ -1,7 +1,7 @@
 #include <chrono>
 #include <filesystem>
 
-#include "server/http/request_values.h"
+#include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
 
 namespace isomesh::http {

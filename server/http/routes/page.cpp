@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "server/http/answers/sources.h"
-#include "server/http/request_values.h"
+#include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
 
 namespace isomesh::http {

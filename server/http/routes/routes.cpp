@@ -8,65 +8,12 @@
 #include "base/sha256.h"
 #include "base/text.h"
 #include "proto/json.h"
-#include "server/http/upload.h"
+#include "server/http/requests/upload.h"
 #include "server/jobs/crop.h"
 #include "server/jobs/settle_labels.h"
 
 namespace isomesh::http {
 namespace {
-
-ConnectionOptions connection_options(const ServerOptions& options) {
-  ConnectionOptions connections;
-  connections.connections = options.connections;
-  connections.threads = options.threads;
-  connections.backlog = options.backlog;
-  connections.probes = {"/livez", "/readyz"};
-  connections.acceptor.head_time = options.request_time;
-  if (const net::TlsFiles* tls = options.tls) {
-    connections.stream_of = [tls](int socket) { return tls->accept(socket); };
-  }
-  return connections;
-}
-
-KeptLimits kept_limits(const Services& services, const ServerOptions& options) {
-  KeptLimits limits;
-  limits.part_bytes =
-      options.part_bytes > 0 ? options.part_bytes : services.folder.reserve().capacity() / 4;
-  return limits;
-}
-
-void report_refused(Metrics& metrics, const std::string& address, const Error& error) {
-  const int status = describe(error.code()).status;
-  metrics.count({.method = "", .route = kNoRoute, .status = status});
-  LogLine("request")
-      .add("status", status)
-      .add("reason", error.what())
-      .add("remote", address.empty() ? "unix" : address);
-}
-
-// Requests wait for jobs and for orders.
-bool has_ended(const Services& services, const std::string& id) {
-  try {
-    if (services.orders != nullptr) return is_final(services.orders->get(std::nullopt, id).state);
-  } catch (const Error&) {
-    // it is no order
-  }
-  try {
-    return is_final(services.jobs.get(std::nullopt, id).state);
-  } catch (const Error&) {
-    return true;  // it is not there any more
-  }
-}
-
-// Why the service takes no work at the moment.
-std::string unready_reason(const Services& services) {
-  if (!services.jobs.answers()) return "the database does not respond";
-  if (services.jobs.is_full()) return "the queue is full";
-  if (!services.blobs.answers()) return "the storage of volumes and meshes does not respond";
-  if (!services.blobs.has_room()) return "the disk is full: nothing new is accepted";
-  const bool has_waiting = services.jobs.depth(std::nullopt).waiting_for_disk > 0;
-  return has_waiting ? "jobs are waiting for disk space" : "";
-}
 
 // Browsers let pages of other origins send plain text without asking the server first, but not what
 // is declared as JSON.
@@ -77,49 +24,6 @@ void check_is_json(const Request& request) {
 }
 
 }  // namespace
-
-App::App(const Services& the_services, const ServerOptions& the_options)
-    : services(the_services),
-      options(the_options),
-      uploads(the_options.upload_places, "uploads"),
-      kept(kept_limits(the_services, the_options), the_services.folder.uploads()),
-      streams(the_options.event_streams, "event streams"),
-      rules{.cors_origins = the_options.cors_origins,
-            .check_host = false,
-            .hosts = the_options.hosts},
-      readiness([&used = services] { return unready_reason(used); }),
-      connections(
-          connection_options(the_options),
-          {.answer = [this](Request& request,
-                            Response& response) { return answer(*this, request, response); },
-           .has_ended = [this](const std::string& job) { return has_ended(services, job); },
-           .on_answered =
-               [this](const Request& request, const Response& response, const BodySizes& sizes) {
-                 end_request(metrics, request, response, sizes);
-               },
-           .on_refused = [this](const std::string& address,
-                                const Error& error) { report_refused(metrics, address, error); }}) {
-}
-
-std::optional<Continuation> guarded(const Request& request, Response& response,
-                                    const std::function<std::optional<Continuation>()>& run) {
-  try {
-    return run();
-  } catch (const Error& error) {
-    if (error.code() == ErrorCode::kInternal) {
-      log_error("{} {} failed: {}", request.method, request.path, error.what());
-    }
-    answer_problem(request, response, error);
-  } catch (const std::bad_alloc&) {
-    log_error("{} {} failed: out of memory", request.method, request.path);
-    answer_problem(request, response,
-                   Error(ErrorCode::kUnavailable, "the service is out of memory at the moment"));
-  } catch (const std::exception& error) {
-    log_error("{} {} failed: {}", request.method, request.path, error.what());
-    answer_problem(request, response, Error(ErrorCode::kInternal, error.what()));
-  }
-  return std::nullopt;
-}
 
 std::optional<Continuation> answer_at_end(App& app, const Request& request, Response& response,
                                           const Job& job, std::chrono::milliseconds wait,

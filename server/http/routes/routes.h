@@ -1,7 +1,6 @@
 // How routes are written and answered; private to server/http.
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -11,50 +10,12 @@
 
 #include "proto/error.h"
 #include "proto/types.h"
-#include "server/http/answers/event_stream.h"
 #include "server/http/answers/list_page.h"
 #include "server/http/answers/sources.h"
-#include "server/http/connections.h"
-#include "server/http/guards/access.h"
-#include "server/http/guards/origin.h"
-#include "server/http/kept_uploads.h"
-#include "server/http/observe/readiness.h"
-#include "server/http/request_values.h"
-#include "server/http/response.h"
-#include "server/http/router.h"
-#include "server/http/server.h"
-#include "server/net/fair_places.h"
+#include "server/http/app/app.h"
+#include "server/http/requests/request_values.h"
 
 namespace isomesh::http {
-
-// What all routes share. Thread safe once the routes are added.
-struct App {
-  App(const Services& the_services, const ServerOptions& the_options);
-
-  Services services;
-  ServerOptions options;
-  const Tokens* tokens = services.tokens;  // null: everybody may do everything
-  Metrics& metrics = services.metrics;
-  net::FairPlaces uploads;
-  KeptUploads kept;
-  net::FairPlaces streams;  // of events
-  Broadcaster events;
-  OriginRules rules;  // constant once the server is bound
-  // What came before was told by another life.
-  const std::uint64_t first_event = services.jobs.last_event();
-  std::atomic<bool> draining = false;  // running jobs are finished, others are not accepted
-  std::atomic<bool> stopping = false;  // nobody is waited for any more
-  Router router;
-  Readiness readiness;
-  Connections connections;
-};
-
-// One request from its guards to its route. Does not throw.
-std::optional<Continuation> answer(App& app, Request& request, Response& response);
-
-// Makes a problem of what `run` throws. Only an Error's own words reach a client.
-std::optional<Continuation> guarded(const Request& request, Response& response,
-                                    const std::function<std::optional<Continuation>()>& run);
 
 // `run` is a Handler, or a function of the same arguments that returns nothing.
 template <class Run>

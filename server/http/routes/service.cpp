@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
-#include "server/http/openapi.h"
-#include "server/http/request_values.h"
+#include "server/http/requests/request_values.h"
+#include "server/http/routes/openapi.h"
 #include "server/http/routes/routes.h"
 #include "server/jobs/pipeline.h"
 

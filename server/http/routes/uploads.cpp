@@ -8,8 +8,8 @@
 
 #include "base/text.h"
 #include "proto/json.h"
-#include "server/http/import_query.h"
-#include "server/http/request_values.h"
+#include "server/http/requests/import_query.h"
+#include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
 
 namespace isomesh::http {

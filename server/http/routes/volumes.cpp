@@ -1,9 +1,9 @@
 #include <filesystem>
 
 #include "proto/json.h"
-#include "server/http/import_query.h"
-#include "server/http/observe/outcomes.h"
-#include "server/http/request_values.h"
+#include "server/http/app/outcomes.h"
+#include "server/http/requests/import_query.h"
+#include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
 #include "server/http/routes/uploads.h"
 #include "server/volume/names.h"

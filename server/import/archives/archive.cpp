@@ -16,7 +16,7 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "proto/error.h"
-#include "server/import/source.h"
+#include "server/import/source/source.h"
 
 namespace isomesh::import {
 namespace {

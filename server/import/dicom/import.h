@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "proto/types.h"
-#include "server/import/reader.h"
+#include "server/import/source/reader.h"
 
 namespace isomesh::import {
 

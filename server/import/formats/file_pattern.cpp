@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "base/text.h"
-#include "server/import/source.h"
+#include "server/import/source/source.h"
 
 namespace isomesh::import {
 namespace {

@@ -11,8 +11,8 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "server/import/formats/file_pattern.h"
-#include "server/import/reader.h"
-#include "server/import/units.h"
+#include "server/import/source/reader.h"
+#include "server/import/source/units.h"
 
 namespace isomesh::import {
 namespace {

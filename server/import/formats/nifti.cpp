@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "base/text.h"
-#include "server/import/archives/gzip.h"
 #include "server/import/formats/nifti_extensions.h"
 #include "server/import/formats/nifti_header.h"
+#include "server/import/source/gzip.h"
 
 namespace isomesh::import {
 namespace {

@@ -5,8 +5,8 @@
 #include <string_view>
 #include <utility>
 
-#include "server/import/formats/label_xml.h"
-#include "server/import/label_table.h"
+#include "server/import/labels/label_table.h"
+#include "server/import/labels/label_xml.h"
 
 namespace isomesh::import {
 namespace {

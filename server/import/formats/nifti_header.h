@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "server/import/names.h"
+#include "server/import/source/names.h"
 
 namespace isomesh::import {
 

@@ -14,7 +14,7 @@
 #include "server/import/formats/nifti.h"
 #include "server/import/formats/nrrd_segments.h"
 #include "server/import/formats/nrrd_space.h"
-#include "server/import/reader.h"
+#include "server/import/source/reader.h"
 
 namespace isomesh::import {
 namespace {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/files.h"
-#include "server/import/reader.h"
-#include "server/import/source.h"
+#include "server/import/source/reader.h"
+#include "server/import/source/source.h"
 
 namespace isomesh::import {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "base/text.h"
-#include "server/import/names.h"
+#include "server/import/source/names.h"
 
 namespace isomesh::import {
 namespace {

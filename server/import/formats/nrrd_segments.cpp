@@ -7,7 +7,7 @@
 
 #include "base/text.h"
 #include "proto/samples.h"
-#include "server/import/label_table.h"
+#include "server/import/labels/label_table.h"
 
 namespace isomesh::import {
 namespace {

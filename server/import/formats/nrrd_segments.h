@@ -3,7 +3,7 @@
 #pragma once
 
 #include "server/import/formats/nrrd_space.h"
-#include "server/import/source.h"
+#include "server/import/source/source.h"
 
 namespace isomesh::import {
 

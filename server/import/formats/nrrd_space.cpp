@@ -9,8 +9,8 @@
 
 #include "base/text.h"
 #include "server/import/formats/nrrd_numbers.h"
-#include "server/import/names.h"
-#include "server/import/units.h"
+#include "server/import/source/names.h"
+#include "server/import/source/units.h"
 
 namespace isomesh::import {
 namespace {

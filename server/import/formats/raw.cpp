@@ -4,7 +4,7 @@
 
 #include "base/files.h"
 #include "proto/error.h"
-#include "server/import/transfer.h"
+#include "server/import/samples/transfer.h"
 
 namespace isomesh::import {
 namespace {

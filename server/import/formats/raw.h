@@ -1,7 +1,7 @@
 // Raw samples, which a request describes.
 #pragma once
 
-#include "server/import/reader.h"
+#include "server/import/source/reader.h"
 
 namespace isomesh::import {
 

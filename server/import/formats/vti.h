@@ -4,8 +4,8 @@
 #include <string_view>
 
 #include "base/files.h"
-#include "server/import/reader.h"
-#include "server/import/source.h"
+#include "server/import/source/reader.h"
+#include "server/import/source/source.h"
 
 namespace isomesh::import {
 

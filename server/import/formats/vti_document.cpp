@@ -5,7 +5,7 @@
 #include "base/text.h"
 #include "base/xml_reader.h"
 #include "proto/error.h"
-#include "server/import/names.h"
+#include "server/import/source/names.h"
 
 namespace isomesh::import {
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/files.h"
-#include "server/import/archives/gzip.h"
+#include "server/import/source/gzip.h"
 
 namespace isomesh::import {
 

@@ -7,13 +7,13 @@
 
 #include "base/text.h"
 #include "proto/error.h"
-#include "server/import/dicom/dataset.h"
+#include "server/import/dicom/elements/dataset.h"
+#include "server/import/dicom/elements/tags.h"
+#include "server/import/dicom/elements/text.h"
 #include "server/import/dicom/import.h"
-#include "server/import/dicom/tags.h"
-#include "server/import/dicom/text.h"
 #include "server/import/peers/multipart.h"
-#include "server/import/reader.h"
-#include "server/import/scratch_folder.h"
+#include "server/import/source/reader.h"
+#include "server/import/source/scratch_folder.h"
 
 namespace isomesh::import {
 namespace {

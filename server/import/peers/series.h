@@ -2,7 +2,7 @@
 #pragma once
 
 #include "proto/types.h"
-#include "server/import/import.h"
+#include "server/import/source/reader.h"
 
 namespace isomesh::import {
 

@@ -14,8 +14,8 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include "server/http/connections.h"
-#include "server/http/router.h"
+#include "server/http/connections/connections.h"
+#include "server/http/requests/router.h"
 #include "server/net/address.h"
 #include "server/net/listener.h"
 #include "tests/api/http.h"

@@ -1,4 +1,4 @@
-#include "server/http/import_query.h"
+#include "server/http/requests/import_query.h"
 
 #include <string>
 #include <utility>

@@ -1,4 +1,4 @@
-#include "server/http/kept_uploads.h"
+#include "server/http/requests/kept_uploads.h"
 
 #include <atomic>
 #include <functional>

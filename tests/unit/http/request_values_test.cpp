@@ -1,4 +1,4 @@
-#include "server/http/request_values.h"
+#include "server/http/requests/request_values.h"
 
 #include <cmath>
 #include <string>

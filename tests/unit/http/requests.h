@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/http/request.h"
+#include "server/http/requests/request.h"
 
 namespace isomesh::test {
 

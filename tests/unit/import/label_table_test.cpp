@@ -1,10 +1,10 @@
-#include "server/import/label_table.h"
+#include "server/import/labels/label_table.h"
 
 #include <limits>
 
 #include <gmock/gmock.h>
 
-#include "server/import/combinations.h"
+#include "server/import/labels/combinations.h"
 #include "server/volume/labels.h"
 #include "tests/support/errors.h"
 

@@ -1,5 +1,5 @@
 // Names of labels in a file of their own, beside the volume.
-#include "server/import/formats/label_text.h"
+#include "server/import/labels/label_text.h"
 
 #include <filesystem>
 

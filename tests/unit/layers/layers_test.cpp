@@ -28,8 +28,26 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/volume", {"proto"}},
     {"server/codec", {"server/mesh"}},
     {"server/store", {"proto"}},
+    {"server/store/files", {"server/store"}},
+    {"server/store/sql", {"server/store"}},
+    {"server/store/sqlite", {"server/store/sql", "server/store/files"}},
+    {"server/store/postgresql", {"server/store/sqlite"}},
+    {"server/store/s3", {"server/store/files"}},
     {"server/process", {"server/volume"}},
-    {"server/import", {"server/volume", "server/process", "server/dicom"}},
+    {"server/import/source", {"server/volume", "server/process"}},
+    {"server/import/archives", {"server/import/source"}},
+    {"server/import/labels", {"server/import/source"}},
+    {"server/import/samples", {"server/import/labels"}},
+    {"server/import/formats", {"server/import/samples"}},
+    {"server/import/dicom/elements", {"server/import/source"}},
+    {"server/import/dicom/geometry", {"server/import/dicom/elements"}},
+    {"server/import/dicom/pixels", {"server/import/dicom/geometry"}},
+    {"server/import/dicom/kinds",
+     {"server/import/dicom/pixels", "server/import/labels", "server/dicom"}},
+    {"server/import/dicom/choosing", {"server/import/dicom/kinds"}},
+    {"server/import/dicom", {"server/import/dicom/choosing", "server/import/samples"}},
+    {"server/import/peers", {"server/import/dicom"}},
+    {"server/import", {"server/import/peers", "server/import/archives", "server/import/formats"}},
     {"server/association", {"server/process", "server/dicom"}},
     {"server/jobs",
      {"server/store", "server/codec", "server/volume", "server/mesh", "server/process"}},
@@ -40,7 +58,15 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/callbacks", {"server/store"}},
     {"server/net", {"proto"}},
     {"server/audit", {"server/store", "server/net"}},
-    {"server/http", {"server/net", "server/callbacks", "server/orders"}},
+    {"server/http/requests", {"server/net", "server/store", "server/process"}},
+    {"server/http/connections", {"server/http/requests"}},
+    {"server/http/observe", {"server/callbacks", "server/orders"}},
+    {"server/http/guards", {"server/http/connections", "server/http/observe"}},
+    {"server/http/answers", {"server/http/requests"}},
+    {"server/http/app",
+     {"server/http/guards", "server/http/answers", "server/callbacks", "server/orders"}},
+    {"server/http/routes", {"server/http/app"}},
+    {"server/http", {"server/http/routes"}},
     {"server", {"server/http", "server/audit", "server/dicomweb", "server/dimse"}},
     {"client/isomesh", {"proto"}},
     {"client/cli", {"client/isomesh"}},
@@ -120,7 +146,7 @@ TEST(Layers, OneFileOfTheServerKnowsTheHttpLibrary) {
       }
     }
   }
-  EXPECT_EQ(users, std::vector<std::string>{"server/http/library.cpp"});
+  EXPECT_EQ(users, std::vector<std::string>{"server/http/connections/library.cpp"});
 }
 
 TEST(Layers, KernelsKnowNoFilesNoJsonNoHttp) {

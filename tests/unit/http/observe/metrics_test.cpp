@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/http/request.h"
+#include "server/http/requests/request.h"
 
 namespace isomesh::http {
 namespace {

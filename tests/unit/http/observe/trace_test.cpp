@@ -1,4 +1,4 @@
-#include "server/http/observe/trace.h"
+#include "server/http/requests/trace.h"
 
 #include <string>
 

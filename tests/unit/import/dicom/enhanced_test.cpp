@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/import.h"
-#include "server/import/dicom/tags.h"
 #include "tests/unit/import/dicom/objects.h"
 
 namespace isomesh::import::test {

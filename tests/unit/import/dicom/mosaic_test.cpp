@@ -2,9 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/import/dicom/csa_header.h"
-#include "server/import/dicom/private_elements.h"
-#include "server/import/dicom/tags.h"
+#include "server/import/dicom/elements/csa_header.h"
+#include "server/import/dicom/elements/private_elements.h"
+#include "server/import/dicom/elements/tags.h"
 #include "tests/unit/import/dicom/csa_writer.h"
 #include "tests/unit/import/dicom/mosaics.h"
 

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "server/import/dicom/private_elements.h"
-#include "server/import/dicom/tags.h"
+#include "server/import/dicom/elements/private_elements.h"
+#include "server/import/dicom/elements/tags.h"
 
 namespace isomesh::import::test {
 

@@ -8,8 +8,8 @@
 #include <gdcmSequenceOfFragments.h>
 
 #include "base/text.h"
+#include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/import.h"
-#include "server/import/dicom/tags.h"
 #include "tests/support/deflate.h"
 
 namespace isomesh::import::test {

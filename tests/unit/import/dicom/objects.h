@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/import/dicom/image.h"
+#include "server/import/dicom/geometry/image.h"
 #include "tests/unit/import/files.h"
 
 namespace isomesh::import::test {

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
-#include "server/import/dicom/tags.h"
+#include "server/import/dicom/elements/tags.h"
 #include "tests/unit/import/dicom/objects.h"
 
 namespace isomesh::import::test {

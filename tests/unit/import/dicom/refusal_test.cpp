@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/import/dicom/elements/tags.h"
 #include "server/import/dicom/import.h"
-#include "server/import/dicom/tags.h"
 #include "tests/unit/import/archives.h"
 #include "tests/unit/import/dicom/objects.h"
 #include "tests/unit/import/writers.h"

@@ -1,6 +1,6 @@
 #include "tests/unit/import/dicom/segments.h"
 
-#include "server/import/dicom/tags.h"
+#include "server/import/dicom/elements/tags.h"
 
 namespace isomesh::import::test {
 

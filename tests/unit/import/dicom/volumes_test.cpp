@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/import/dicom/tags.h"
+#include "server/import/dicom/elements/tags.h"
 #include "tests/unit/import/dicom/objects.h"
 
 namespace isomesh::import::test {

@@ -1,0 +1,184 @@
+#include "server/http/app/app.h"
+
+#include <exception>
+#include <new>
+#include <string_view>
+#include <utility>
+
+#include "base/log.h"
+#include "proto/error.h"
+#include "server/http/observe/metrics.h"
+
+namespace isomesh::http {
+namespace {
+
+constexpr std::size_t kLongestPath = 256;
+constexpr std::size_t kLongestTarget = 4096;
+
+ConnectionOptions connection_options(const ServerOptions& options) {
+  ConnectionOptions connections;
+  connections.connections = options.connections;
+  connections.threads = options.threads;
+  connections.backlog = options.backlog;
+  connections.probes = {"/livez", "/readyz"};
+  connections.acceptor.head_time = options.request_time;
+  if (const net::TlsFiles* tls = options.tls) {
+    connections.stream_of = [tls](int socket) { return tls->accept(socket); };
+  }
+  return connections;
+}
+
+KeptLimits kept_limits(const Services& services, const ServerOptions& options) {
+  KeptLimits limits;
+  limits.part_bytes =
+      options.part_bytes > 0 ? options.part_bytes : services.folder.reserve().capacity() / 4;
+  return limits;
+}
+
+void report_refused(Metrics& metrics, const std::string& address, const Error& error) {
+  const int status = describe(error.code()).status;
+  metrics.count({.method = "", .route = kNoRoute, .status = status});
+  LogLine("request")
+      .add("status", status)
+      .add("reason", error.what())
+      .add("remote", address.empty() ? "unix" : address);
+}
+
+// Requests wait for jobs and for orders.
+bool has_ended(const Services& services, const std::string& id) {
+  try {
+    if (services.orders != nullptr) return is_final(services.orders->get(std::nullopt, id).state);
+  } catch (const Error&) {
+    // it is no order
+  }
+  try {
+    return is_final(services.jobs.get(std::nullopt, id).state);
+  } catch (const Error&) {
+    return true;  // it is not there any more
+  }
+}
+
+// Why the service takes no work at the moment.
+std::string unready_reason(const Services& services) {
+  if (!services.jobs.answers()) return "the database does not respond";
+  if (services.jobs.is_full()) return "the queue is full";
+  if (!services.blobs.answers()) return "the storage of volumes and meshes does not respond";
+  if (!services.blobs.has_room()) return "the disk is full: nothing new is accepted";
+  const bool has_waiting = services.jobs.depth(std::nullopt).waiting_for_disk > 0;
+  return has_waiting ? "jobs are waiting for disk space" : "";
+}
+
+// Refuses requests that are malformed for every route. The HTTP library would wait for a body whose
+// length is not given.
+void check_request(const Request& request) {
+  if (request.path.size() > kLongestPath || request.target.size() > kLongestTarget) {
+    throw Error(ErrorCode::kUriTooLong, "the request's path or query is too long");
+  }
+  const bool needs_body =
+      request.method == "POST" || request.method == "PUT" || request.method == "PATCH";
+  const bool has_length =
+      request.has_header("Content-Length") || request.has_header("Transfer-Encoding");
+  if (needs_body && !has_length) {
+    throw Error(ErrorCode::kLengthRequired, "the request needs a Content-Length");
+  }
+}
+
+// The route at the request's path, whose parameters the request gets. Throws Error kNotFound.
+const Route& route_of(const Router& router, Request& request) {
+  auto [route, parameters] = router.find(request.path);
+  if (route == nullptr) throw Error(ErrorCode::kNotFound, "there is nothing at this path");
+  request.context.route = route->pattern();
+  request.path_parameters = std::move(parameters);
+  return *route;
+}
+
+// Throws Error kMethodNotAllowed, and then says in the response which methods are.
+const Handler& handler_of_method(const Route& route, const Request& request, Response& response) {
+  const auto found = route.handlers().find(request.method);
+  if (found != route.handlers().end()) return found->second;
+  response.set_header("Allow", route.methods());
+  throw Error(ErrorCode::kMethodNotAllowed, "this resource supports " + route.methods());
+}
+
+std::optional<Continuation> checked_answer(App& app, Request& request, Response& response) {
+  allow_reading(app.rules, request, response);
+  check_origin(app.rules, request);
+  begin_request(app.tokens, request, response);
+  check_request(request);
+  const Route& route = route_of(app.router, request);
+  if (is_preflight(app.rules, request)) {
+    answer_preflight(route.methods(), response);
+    return std::nullopt;
+  }
+  return handler_of_method(route, request, response)(request, response);
+}
+
+}  // namespace
+
+App::App(const Services& the_services, const ServerOptions& the_options)
+    : services(the_services),
+      options(the_options),
+      uploads(the_options.upload_places, "uploads"),
+      kept(kept_limits(the_services, the_options), the_services.folder.uploads()),
+      streams(the_options.event_streams, "event streams"),
+      rules{.cors_origins = the_options.cors_origins,
+            .check_host = false,
+            .hosts = the_options.hosts},
+      readiness([&used = services] { return unready_reason(used); }),
+      connections(
+          connection_options(the_options),
+          {.answer = [this](Request& request,
+                            Response& response) { return answer(*this, request, response); },
+           .has_ended = [this](const std::string& job) { return has_ended(services, job); },
+           .on_answered =
+               [this](const Request& request, const Response& response, const BodySizes& sizes) {
+                 end_request(metrics, request, response, sizes);
+               },
+           .on_refused = [this](const std::string& address,
+                                const Error& error) { report_refused(metrics, address, error); }}) {
+}
+
+std::optional<Continuation> guarded(const Request& request, Response& response,
+                                    const std::function<std::optional<Continuation>()>& run) {
+  try {
+    return run();
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kInternal) {
+      log_error("{} {} failed: {}", request.method, request.path, error.what());
+    }
+    answer_problem(request, response, error);
+  } catch (const std::bad_alloc&) {
+    log_error("{} {} failed: out of memory", request.method, request.path);
+    answer_problem(request, response,
+                   Error(ErrorCode::kUnavailable, "the service is out of memory at the moment"));
+  } catch (const std::exception& error) {
+    log_error("{} {} failed: {}", request.method, request.path, error.what());
+    answer_problem(request, response, Error(ErrorCode::kInternal, error.what()));
+  }
+  return std::nullopt;
+}
+
+std::optional<Continuation> answer(App& app, Request& request, Response& response) {
+  auto continuation =
+      guarded(request, response, [&] { return checked_answer(app, request, response); });
+  if (!continuation) return std::nullopt;
+  if (continuation->abandoned) {
+    continuation->abandoned = [run = std::move(continuation->abandoned)](const Request& asked) {
+      Response nobodys;
+      guarded(asked, nobodys, [&] {
+        run(asked);
+        return std::optional<Continuation>();
+      });
+    };
+  }
+  continuation->resume = [resume = std::move(continuation->resume)](const Request& asked,
+                                                                    Response& out) {
+    guarded(asked, out, [&] {
+      resume(asked, out);
+      return std::optional<Continuation>();
+    });
+  };
+  return continuation;
+}
+
+}  // namespace isomesh::http

@@ -1,0 +1,61 @@
+#include "server/http/app/outcomes.h"
+
+#include "base/log.h"
+
+namespace isomesh::http {
+namespace {
+
+void log_ended(const store::JobAccount& account) {
+  const Job& job = account.job;
+  LogLine line("job");
+  line.add("id", job.id)
+      .add("state", to_string(job.state))
+      .add("priority", to_string(job.parameters.priority))
+      .add("attempts", account.attempts)
+      .add("queue_ms", job.timing.queue)
+      .add("load_ms", job.timing.load)
+      .add("extract_ms", job.timing.extract)
+      .add("smooth_ms", job.timing.smooth)
+      .add("encode_ms", job.timing.encode)
+      .add("total_ms", job.timing.total);
+  if (job.mesh) line.add("triangles", job.mesh->triangles);
+  // The code alone: a detail may quote what stands in a volume's header.
+  if (job.error) line.add("reason", describe(to_error(*job.error).code()).name);
+}
+
+}  // namespace
+
+void report_ended(App& app, const std::string& id) {
+  store::JobAccount account;
+  try {
+    account = app.services.jobs.account(id);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kGone && error.code() != ErrorCode::kNotFound) throw;
+    return app.services.callbacks.wake();  // it may have had one
+  }
+  if (account.job.parameters.callback) app.services.callbacks.wake();
+  app.metrics.count_ended(account.job);
+  log_ended(account);
+}
+
+callbacks::CallbackObserver callback_reporter(Metrics& metrics) {
+  return [&metrics](const store::Delivery& delivery, callbacks::CallbackOutcome outcome,
+                    const std::string& reason) {
+    metrics.count(outcome);
+    const bool is_lost = outcome == callbacks::CallbackOutcome::kGivenUp;
+    LogLine line("callback", is_lost ? LogLevel::kError : LogLevel::kInfo);
+    line.add("job", delivery.job)
+        .add("result", name_of(outcome))
+        .add("attempt", delivery.attempts + 1);
+    if (!reason.empty()) line.add("reason", reason);
+  };
+}
+
+void report_import_refused(App& app, const Request& request, const Error& error) {
+  app.metrics.count_refused(error.code());
+  LogLine("import_refused")
+      .add("id", request.context.trace.request_id())
+      .add("reason", describe(error.code()).name);
+}
+
+}  // namespace isomesh::http

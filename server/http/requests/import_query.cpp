@@ -1,0 +1,221 @@
+#include "server/http/requests/import_query.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <limits>
+
+#include "base/text.h"
+#include "server/http/requests/request_values.h"
+
+namespace isomesh::http {
+namespace {
+
+const std::set<std::string>& raw_parameters() {
+  static const std::set<std::string> names = {"dims",   "type",      "spacing",
+                                              "origin", "direction", "byte_order"};
+  return names;
+}
+
+// Those that choose within a file, of which raw samples have nothing to choose.
+const std::set<std::string>& file_parameters() {
+  static const std::set<std::string> names = {"series", "member", "volume", "accept", "nifti_form"};
+  return names;
+}
+
+template <std::size_t N>
+std::array<double, N> array_of(const std::string& name, std::string_view text) {
+  std::array<double, N> numbers = {};
+  std::ranges::copy(numbers_of(name, text, N), numbers.begin());
+  return numbers;
+}
+
+std::array<std::uint32_t, 3> dims_of(std::string_view text) {
+  const std::vector<std::string_view> parts = split(text, ',');
+  std::array<std::uint32_t, 3> dims = {};
+  const Error wrong = invalid_parameter(
+      "dims", "must be 3 whole numbers from 1 to 4294967295, separated by commas");
+  if (parts.size() != dims.size()) throw wrong;
+  for (std::size_t i = 0; i < dims.size(); ++i) {
+    const auto number = whole_number(parts[i]);
+    if (!number || *number > std::numeric_limits<std::uint32_t>::max()) throw wrong;
+    dims[i] = static_cast<std::uint32_t>(*number);
+  }
+  return dims;
+}
+
+std::string series_of(std::string_view text) {
+  constexpr std::size_t kLongestUid = 64;
+  if (text.empty() || text.size() > kLongestUid ||
+      text.find_first_not_of("0123456789.") != std::string_view::npos) {
+    throw invalid_parameter("series",
+                            "must be a UID: numbers separated by dots, at most 64 characters");
+  }
+  return std::string(text);
+}
+
+std::string member_of(std::string_view text) {
+  constexpr std::size_t kLongest = 1024;
+  if (text.empty() || text.size() > kLongest || has_control_characters(text)) {
+    throw invalid_parameter("member", "must be the name of a file in the archive");
+  }
+  return std::string(text);
+}
+
+std::uint32_t volume_of(std::string_view text) {
+  const auto number = whole_number(text);
+  if (!number || *number > std::numeric_limits<std::uint32_t>::max()) {
+    throw invalid_parameter("volume", "must be a whole number; 0 is the file's first volume");
+  }
+  return static_cast<std::uint32_t>(*number);
+}
+
+std::vector<std::string> accepted_of(std::string_view text) {
+  std::vector<std::string> codes;
+  for (const std::string_view name : split(text, ',')) {
+    const NoteDescription* note = find_note(name);
+    if (note == nullptr || !note->is_acceptable) {
+      throw invalid_parameter("accept", in_quotes(name) + " cannot be accepted; these notes can: " +
+                                            acceptable_notes());
+    }
+    if (std::ranges::find(codes, name) == codes.end()) codes.emplace_back(name);
+  }
+  return codes;
+}
+
+NiftiForm nifti_form_of(std::string_view text) {
+  const auto form = from_string<NiftiForm>(text);
+  if (!form) throw invalid_parameter("nifti_form", "must be " + names_of<NiftiForm>());
+  return *form;
+}
+
+void refuse_choice_in_raw(const Request& request) {
+  for (const std::string& name : file_parameters()) {
+    if (request.has_parameter(name)) {
+      throw invalid_parameter(name, "does not apply to raw samples");
+    }
+  }
+}
+
+// The value of a parameter such as `filename="a b.nii"`, of which `text` is what follows the name
+// and the equals sign.
+std::string unquoted(std::string_view text) {
+  text = trimmed(text);
+  if (!text.starts_with('"')) return std::string(text.substr(0, text.find(';')));
+  std::string value;
+  for (std::size_t at = 1; at < text.size() && text[at] != '"'; ++at) {
+    if (text[at] == '\\' && at + 1 < text.size()) ++at;
+    value += text[at];
+  }
+  return value;
+}
+
+std::string percent_decoded(std::string_view text) {
+  std::string value;
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    unsigned byte = 0;
+    const char* digits = text.data() + at + 1;
+    const bool is_encoded = text[at] == '%' && at + 2 < text.size() &&
+                            std::from_chars(digits, digits + 2, byte, 16).ptr == digits + 2;
+    value += is_encoded ? static_cast<char>(byte) : text[at];
+    if (is_encoded) at += 2;
+  }
+  return value;
+}
+
+// What follows `name=` in the header; empty without it.
+std::string_view disposition_parameter(std::string_view header, std::string_view name) {
+  const std::string folded = lower(header);
+  for (std::size_t at = folded.find(';'); at != std::string::npos; at = folded.find(';', at + 1)) {
+    const std::size_t begin = folded.find_first_not_of(" \t", at + 1);
+    if (begin == std::string::npos) break;
+    if (std::string_view(folded).substr(begin).starts_with(name)) {
+      return header.substr(begin + name.size());
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+const std::set<std::string>& import_parameters() {
+  static const std::set<std::string> names = [] {
+    std::set<std::string> all = raw_parameters();
+    all.insert(file_parameters().begin(), file_parameters().end());
+    return all;
+  }();
+  return names;
+}
+
+process::ImportOptions import_options_of(const Request& request) {
+  process::ImportOptions options{.raw = raw_description_of(request)};
+  if (options.raw) {
+    refuse_choice_in_raw(request);
+    return options;
+  }
+  const auto take = [&](const char* name, auto read, auto& option) {
+    if (request.has_parameter(name)) option = read(request.parameter(name));
+  };
+  take("series", series_of, options.series);
+  take("member", member_of, options.member);
+  take("volume", volume_of, options.volume);
+  take("accept", accepted_of, options.accept);
+  take("nifti_form", nifti_form_of, options.nifti_form);
+  return options;
+}
+
+std::optional<RawDescription> raw_description_of(const Request& request) {
+  const auto text = [&](const char* name) { return request.parameter(name); };
+  if (!request.has_parameter("dims")) {
+    for (const std::string& name : raw_parameters()) {
+      if (request.has_parameter(name)) {
+        throw invalid_parameter("dims", "is required, because " + name + " describes raw samples");
+      }
+    }
+    return std::nullopt;
+  }
+  RawDescription raw;
+  raw.dims = dims_of(text("dims"));
+  const auto type = from_string<SampleType>(text("type"));
+  if (!type) throw invalid_parameter("type", "must be " + names_of<SampleType>());
+  raw.type = *type;
+  if (request.has_parameter("spacing")) {
+    raw.geometry.spacing = array_of<3>("spacing", text("spacing"));
+  }
+  if (request.has_parameter("origin")) {
+    raw.geometry.origin = array_of<3>("origin", text("origin"));
+  }
+  if (request.has_parameter("direction")) {
+    raw.geometry.direction = array_of<9>("direction", text("direction"));
+  }
+  if (request.has_parameter("byte_order")) {
+    const std::string_view order = text("byte_order");
+    if (order != "little" && order != "big") {
+      throw invalid_parameter("byte_order", "must be \"little\" or \"big\"");
+    }
+    raw.big_endian = order == "big";
+  }
+  return raw;
+}
+
+std::string plain_file_name(std::string_view name) {
+  constexpr std::size_t kLongest = 255;
+  const std::size_t folder = name.find_last_of("/\\");
+  std::string plain(trimmed(folder == std::string_view::npos ? name : name.substr(folder + 1)));
+  std::erase_if(plain, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
+  if (plain.size() <= kLongest) return plain;
+  std::size_t end = kLongest;
+  while (end > 0 && (static_cast<unsigned char>(plain[end]) & 0xC0) == 0x80) --end;
+  return plain.substr(0, end);
+}
+
+std::string file_name_of(std::string_view content_disposition) {
+  constexpr std::string_view kUtf8 = "utf-8''";
+  const std::string extended = unquoted(disposition_parameter(content_disposition, "filename*="));
+  if (lower(extended).starts_with(kUtf8)) {
+    return plain_file_name(percent_decoded(std::string_view(extended).substr(kUtf8.size())));
+  }
+  return plain_file_name(unquoted(disposition_parameter(content_disposition, "filename=")));
+}
+
+}  // namespace isomesh::http

@@ -1,0 +1,232 @@
+#include "server/http/requests/partial_upload.h"
+
+#include <cerrno>
+#include <fstream>
+#include <utility>
+
+#include <fcntl.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "base/error.h"
+#include "base/files.h"
+#include "server/store/files/files.h"
+
+namespace isomesh::http {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kNoteSuffix = ".json";
+
+// Names the time since the machine was started; empty where the system does not tell.
+const std::string& this_boot() {
+  static const std::string boot = [] {
+    std::string text;
+    std::getline(std::ifstream("/proc/sys/kernel/random/boot_id"), text);
+    return text;
+  }();
+  return boot;
+}
+
+std::string text_of(const PartialNote& note) {
+  json text = {{"boot", this_boot()},   {"owner", note.owner},
+               {"query", note.query},   {"file_name", note.file_name},
+               {"sha256", note.sha256}, {"complete", note.is_complete},
+               {"volume", note.volume}, {"length", nullptr}};
+  if (note.length) text["length"] = *note.length;
+  return text.dump();
+}
+
+PartialNote note_from(const std::filesystem::path& path) {
+  try {
+    const json text = json::parse(read_whole(path));
+    // Bytes that had not reached the disk are gone, whatever the file's length says.
+    if (this_boot().empty() || text.at("boot") != this_boot()) {
+      throw Error(ErrorCode::kGone, "the machine was restarted since");
+    }
+    PartialNote note = {.owner = text.at("owner"),
+                        .query = text.at("query").get<Parameters>(),
+                        .file_name = text.at("file_name"),
+                        .sha256 = text.at("sha256"),
+                        .is_complete = text.at("complete"),
+                        .volume = text.at("volume")};
+    if (!text.at("length").is_null()) note.length = text.at("length").get<std::uint64_t>();
+    return note;
+  } catch (const json::exception&) {
+    throw Error(ErrorCode::kGone, "its record is damaged");
+  }
+}
+
+Descriptor opened(const std::filesystem::path& path, int flags) {
+  Descriptor file(::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC | flags, 0600));
+  if (file.number() < 0) throw_system_error("opening an upload", errno);
+  return file;
+}
+
+}  // namespace
+
+PartialUpload::File::~File() {
+  std::error_code ignored;  // what stays is found when the daemon starts next, and expires then
+  if (goes) std::filesystem::remove(body.path, ignored);
+}
+
+PartialUpload::PartialUpload(const std::filesystem::path& folder, std::string name,
+                             PartialNote note)
+    : name_(std::move(name)),
+      path_(folder / name_),
+      note_path_(path_.string() + kNoteSuffix),
+      note_(std::move(note)) {
+  const Lock lock(mutex_);
+  write_note();
+  bytes_file_->body.name = note_.file_name;
+  file_ = opened(path_, O_CREAT | O_EXCL);
+}
+
+PartialUpload::PartialUpload(const std::filesystem::path& folder, std::string name)
+    : name_(std::move(name)), path_(folder / name_), note_path_(path_.string() + kNoteSuffix) {
+  const Lock lock(mutex_);
+  note_ = note_from(note_path_);
+  bytes_file_->body.name = note_.file_name;
+  if (!note_.volume.empty()) {
+    bytes_file_->goes = true;  // a kill may have left it
+    bytes_file_.reset();
+    return;
+  }
+  file_ = opened(path_, 0);
+  bytes_ = std::filesystem::file_size(path_);
+}
+
+PartialUpload::~PartialUpload() {
+  const Lock lock(mutex_);
+  std::error_code ignored;
+  if (is_let_go_) std::filesystem::remove(note_path_, ignored);
+}
+
+std::shared_ptr<const ReceivedBody> PartialUpload::body() const {
+  const Lock lock(mutex_);
+  if (!bytes_file_) return nullptr;
+  return {bytes_file_, &bytes_file_->body};
+}
+
+PartialNote PartialUpload::note() const {
+  const Lock lock(mutex_);
+  return note_;
+}
+
+std::uint64_t PartialUpload::bytes() const {
+  const Lock lock(mutex_);
+  return bytes_;
+}
+
+std::filesystem::file_time_type PartialUpload::written_at() const {
+  std::error_code absent;
+  const auto time = std::filesystem::last_write_time(path_, absent);
+  return absent ? std::filesystem::last_write_time(note_path_) : time;
+}
+
+std::uint64_t PartialUpload::end_turns() {
+  const Lock lock(mutex_);
+  ++turn_;
+  return offset();
+}
+
+std::optional<PartialTurn> PartialUpload::begin_turn(std::uint64_t offset) {
+  const Lock lock(mutex_);
+  ++turn_;
+  if (this->offset() != offset) return std::nullopt;
+  return PartialTurn{turn_, offset};
+}
+
+void PartialUpload::tell_length(const Turn& turn, std::uint64_t length) {
+  const Lock lock(mutex_);
+  check(turn);
+  if (note_.length == length) return;
+  if (note_.length || length < bytes_) {
+    throw invalid_parameter("Upload-Length", "differs from the length of this upload");
+  }
+  note_.length = length;
+  write_note();
+}
+
+void PartialUpload::write(const Turn& turn, std::span<const std::byte> bytes) {
+  const Lock lock(mutex_);
+  check(turn);
+  if (note_.length && bytes.size() > *note_.length - bytes_) {
+    throw invalid_parameter("Upload-Length", "the body exceeds the upload's length");
+  }
+  try {
+    write_all(file_, bytes);
+  } catch (const Error&) {
+    // A full disk takes some of them, which are not counted.
+    cut(bytes_);
+    throw;
+  }
+  bytes_ += bytes.size();
+}
+
+void PartialUpload::take_back(const Turn& turn) {
+  const Lock lock(mutex_);
+  check(turn);
+  cut(turn.offset);
+}
+
+void PartialUpload::complete(const Turn& turn) {
+  const Lock lock(mutex_);
+  check(turn);
+  if (bytes_ == 0) throw Error(ErrorCode::kInvalidParameter, "the body is empty");
+  if (note_.length.value_or(bytes_) != bytes_) {
+    throw invalid_parameter("Upload-Complete", "the upload has fewer bytes than its length");
+  }
+  note_.length = bytes_;
+  note_.is_complete = true;
+  write_note();
+}
+
+void PartialUpload::become(const std::string& volume) {
+  const Lock lock(mutex_);
+  note_.volume = volume;
+  write_note();
+  bytes_ = 0;
+  file_ = Descriptor();
+  if (bytes_file_) bytes_file_->goes = true;
+  bytes_file_.reset();
+}
+
+void PartialUpload::let_go() {
+  const Lock lock(mutex_);
+  is_let_go_ = true;
+  if (bytes_file_) bytes_file_->goes = true;
+  ++turn_;
+}
+
+std::uint64_t PartialUpload::offset() const {
+  return note_.is_complete ? note_.length.value_or(bytes_) : bytes_;
+}
+
+void PartialUpload::cut(std::uint64_t bytes) {
+  if (::ftruncate(file_.number(), static_cast<off_t>(bytes)) != 0) {
+    throw_system_error("cutting an upload", errno);
+  }
+  bytes_ = bytes;
+}
+
+void PartialUpload::check(const Turn& turn) const {
+  if (turn.number != turn_) {
+    throw Error(ErrorCode::kUnavailable, "another request continues this upload");
+  }
+  if (note_.is_complete) {
+    throw invalid_parameter("Upload-Complete", "this upload is already complete");
+  }
+}
+
+void PartialUpload::write_note() const {
+  const std::filesystem::path part = note_path_.string() + ".part";
+  std::error_code absent;
+  std::filesystem::remove(part, absent);
+  const std::string text = text_of(note_);
+  store::File::create(part).write(std::as_bytes(std::span(text)));
+  store::move_to(part, note_path_);
+}
+
+}  // namespace isomesh::http

@@ -1,0 +1,60 @@
+// Bodies of requests, bounded: in a file or in memory.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "base/files.h"
+#include "server/http/requests/request.h"
+#include "server/store/files/data_folder.h"
+
+namespace isomesh::http {
+
+struct UploadLimits {
+  std::uint64_t max_bytes = std::uint64_t{8} << 30;
+  std::chrono::seconds max_time = std::chrono::hours(1);  // in all; each read has its own limit
+};
+
+// A body that has come whole.
+struct ReceivedBody {
+  std::filesystem::path path;
+  // What the client calls the file, without folders: the name in the form, or in the header
+  // Content-Disposition. May be empty, and may name a patient.
+  std::string name;
+};
+
+// A request's body in a file: written as it comes, counted, checked against its Content-Digest. The
+// destructor removes the file. Not thread safe.
+class Upload {
+ public:
+  // Receives the body, or the one field `file` of a form. Throws Error kTooLarge, kDigestMismatch,
+  // kUnsupportedMedia for an encoded body, kInvalidParameter for a broken or empty one,
+  // kRequestTimeout, kOutOfSpace, and kUnavailable once `stopping` is true.
+  Upload(const store::DataFolder& folder, const UploadLimits& limits,
+         const std::atomic<bool>& stopping, const Request& request);
+
+  const ReceivedBody& body() const { return body_; }
+
+ private:
+  ScratchFile file_;
+  ReceivedBody body_;
+};
+
+class PartialUpload;
+struct PartialTurn;
+
+// Appends the request's body. What came stays, also where the rest does not, unless it is not what
+// Content-Digest says. Throws as Upload does but for an empty body, and as PartialUpload's
+// functions do.
+void receive_part(PartialUpload& upload, const PartialTurn& turn, const store::DataFolder& folder,
+                  const UploadLimits& limits, const std::atomic<bool>& stopping,
+                  const Request& request);
+
+// A small body, whole in memory. Throws Error kTooLarge beyond `max_bytes`, kUnsupportedMedia,
+// kInvalidParameter, kRequestTimeout.
+std::string read_text(const Request& request, std::size_t max_bytes);
+
+}  // namespace isomesh::http

@@ -1,0 +1,154 @@
+#include "server/import/dicom/choosing/choice.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "base/text.h"
+#include "server/import/dicom/choosing/volumes.h"
+#include "server/import/dicom/geometry/frame_of_reference.h"
+#include "server/import/dicom/geometry/placement.h"
+#include "server/import/dicom/kinds/segmentation.h"
+#include "server/import/source/source.h"
+
+namespace isomesh::import::dicom {
+namespace {
+
+// "0 (EchoTime 4.92, 20 slices); 1 (...); ..."
+std::string listed(const std::vector<Choice>& choices) {
+  constexpr std::size_t kMostNamed = 5;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(choices.size(), kMostNamed); ++i) {
+    text += (i == 0 ? "" : "; ") + choices[i].value + " (" + choices[i].title + ')';
+  }
+  return text + (choices.size() > kMostNamed ? "; ..." : "");
+}
+
+std::vector<Choice> choices_of(const SeriesVolumes& all) {
+  std::vector<Choice> choices;
+  for (const SeriesVolume& volume : all.volumes) {
+    choices.push_back({"volume", std::to_string(choices.size()), volume.title});
+  }
+  return choices;
+}
+
+// The volume that the options choose; the only one needs no choice.
+std::vector<Slice> chosen_of(SeriesVolumes all, const ImportOptions& options,
+                             std::vector<Note>& notes) {
+  const std::size_t count = all.volumes.size();
+  if (count == 1 && options.volume.value_or(0) == 0) return std::move(all.volumes.front().slices);
+  const std::string difference = all.difference.empty() ? "" : " that differ in " + all.difference;
+  const std::string found = "The series holds " + count_of(count, "volume") + difference + '.';
+  std::vector<Choice> choices = choices_of(all);
+  const std::string choose = " Choose one with volume=N: " + listed(choices) + '.';
+  if (!options.volume) {
+    throw_choice(found + choose, choices);
+  }
+  if (*options.volume >= count) {
+    throw_choice(found + " It has no volume " + std::to_string(*options.volume) + '.' + choose,
+                 choices);
+  }
+  SeriesVolume& chosen = all.volumes[*options.volume];
+  if (chosen.whole_count > 0) {
+    throw_choice("Volume " + std::to_string(*options.volume) +
+                     " of the series is incomplete: it has " +
+                     std::to_string(chosen.slices.size()) + " of " +
+                     count_of(chosen.whole_count, "slice") + '.',
+                 choices);
+  }
+  notes.push_back(note_of(NoteCode::kVolumeChosen, "Volume " + std::to_string(*options.volume) +
+                                                       " of " + count_of(count, "volume") +
+                                                       difference +
+                                                       " was read. The first is volume 0."));
+  return std::move(chosen.slices);
+}
+
+bool is_label_slice(const Slice& slice) { return slice.image->segmentation.has_value(); }
+
+// A volume for each object.
+SeriesVolumes one_an_object(const std::vector<Slice>& slices) {
+  SeriesVolumes all = {"their objects", {}};
+  std::size_t last = 0;
+  for (const Slice& slice : slices) {
+    if (all.volumes.empty() || slice.file != last) all.volumes.push_back({});
+    last = slice.file;
+    all.volumes.back().slices.push_back(slice);
+  }
+  for (SeriesVolume& volume : all.volumes) {
+    const Image& image = *volume.slices.front().image;
+    volume.title = image.file_name.empty() ? "" : in_quotes(image.file_name) + ", ";
+    volume.title += count_of(image.segmentation->segments.size(), "segment");
+  }
+  return all;
+}
+
+// A volume for each segment, of which some frames are there.
+SeriesVolumes one_a_segment(const std::vector<Slice>& slices) {
+  SeriesVolumes all = {"their segments", {}};
+  const Image& image = *slices.front().image;
+  for (const Segment& segment : image.segmentation->segments) {
+    SeriesVolume volume = {segment_name(image, segment.number), {}, 0};
+    std::ranges::copy_if(slices, std::back_inserter(volume.slices), [&](const Slice& slice) {
+      return slice.frame->segment == segment.number;
+    });
+    all.volumes.push_back(std::move(volume));
+  }
+  return all;
+}
+
+// Planes without a frame are planes without a label.
+void note_empty_planes(const Stack& stack, std::vector<Note>& notes) {
+  std::uint32_t filled = 0;
+  for (std::size_t i = 0; i < stack.planes.size(); ++i) {
+    if (i == 0 || stack.planes[i] != stack.planes[i - 1]) ++filled;
+  }
+  if (filled == stack.plane_count) return;
+  notes.push_back(
+      note_of(NoteCode::kEmptyPlanes, std::to_string(stack.plane_count - filled) + " of the " +
+                                          std::to_string(stack.plane_count) +
+                                          " planes have no frame. Their samples are 0."));
+}
+
+std::vector<Slice> choose_label_slices(std::vector<Slice> slices, const ImportOptions& options,
+                                       std::vector<Note>& notes) {
+  SeriesVolumes objects = one_an_object(slices);
+  if (objects.volumes.size() > 1) return chosen_of(std::move(objects), options, notes);
+  if (!options.volume || slices.front().image->segmentation->kind == SegmentKind::kLabelMap) {
+    return chosen_of({"", {{"", std::move(slices), 0}}}, options, notes);
+  }
+  std::vector<Slice> chosen = chosen_of(one_a_segment(slices), options, notes);
+  if (chosen.empty()) throw_unusable("The segmentation has no frames of the chosen segment.");
+  return chosen;
+}
+
+Stack choose_labels(std::vector<Slice> slices, const ImportOptions& options,
+                    std::vector<Note>& notes) {
+  Stack stack = make_label_stack(choose_label_slices(std::move(slices), options, notes));
+  note_empty_planes(stack, notes);
+  return stack;
+}
+
+}  // namespace
+
+Stack choose_stack(std::vector<Slice> slices, const ImportOptions& options,
+                   std::vector<Note>& notes) {
+  if (std::ranges::all_of(slices, is_label_slice)) {
+    return choose_labels(std::move(slices), options, notes);
+  }
+  if (std::ranges::any_of(slices, is_label_slice)) {
+    throw_unusable("The series is not a single volume: it mixes images and segmentations.");
+  }
+  Stack stack = make_stack(chosen_of(split_volumes(std::move(slices)), options, notes));
+  if (stack.slices.front().image->is_distance_assumed) {
+    notes.push_back(
+        note_of(NoteCode::kDistanceAssumed,
+                "The distance between the slices of the mosaic is unknown. The slice thickness, " +
+                    in_mm(stack.geometry.spacing[2]) + ", was used."));
+  }
+  if (auto note = note_on_frames_of_reference(stack.slices, options)) {
+    notes.push_back(std::move(*note));
+  }
+  return stack;
+}
+
+}  // namespace isomesh::import::dicom

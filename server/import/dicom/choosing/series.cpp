@@ -1,0 +1,245 @@
+#include "server/import/dicom/choosing/series.h"
+
+#include <algorithm>
+#include <map>
+
+#include "base/files.h"
+#include "base/text.h"
+#include "server/import/dicom/elements/beginning.h"
+#include "server/import/dicom/elements/tags.h"
+#include "server/import/dicom/elements/text.h"
+#include "server/import/dicom/kinds/describe.h"
+#include "server/import/dicom/kinds/object_kinds.h"
+#include "server/import/source/reader.h"
+#include "server/import/source/source.h"
+
+namespace isomesh::import::dicom {
+namespace {
+
+constexpr std::size_t kMostNamedObjects = 100;
+
+std::string name_of(const std::filesystem::path& path) {
+  return printable(path.filename().string());
+}
+
+[[noreturn]] void rethrow_for(const std::filesystem::path& path, const Error& error) {
+  throw Error(error.code(), "File " + in_quotes(name_of(path)) + ": " + error.what());
+}
+
+void ignore(Upload& upload, const std::filesystem::path& path, const std::string& reason) {
+  if (upload.ignored.size() < kMostNamedObjects) {
+    upload.ignored.push_back({name_of(path), reason});
+  }
+}
+
+// Some anonymisers keep identifiers only in the meta information, so those are taken where the data
+// set has none.
+DicomInstance instance_of(const DicomFile& file) {
+  DicomInstance instance = {utf8(file.data(), kSopClassUid), utf8(file.data(), kSopInstanceUid)};
+  if (instance.sop_class_uid.empty()) instance.sop_class_uid = file.meta().sop_class_uid;
+  if (instance.sop_instance_uid.empty()) instance.sop_instance_uid = file.meta().sop_instance_uid;
+  return instance;
+}
+
+// Some programs write no UIDs. What is then the series' name is none that a UID can be: those do
+// not end with a part 0 behind a single number.
+std::string series_name(const DataSet& data) {
+  std::string uid = utf8(data, kSeriesInstanceUid);
+  if (!uid.empty()) return uid;
+  return std::to_string(data.integer(kSeriesNumber).value_or(0)) + ".0";
+}
+
+Source describe_source(const std::filesystem::path& path, const DicomFile& file) {
+  const DataSet& data = file.data();
+  Source source;
+  source.path = path;
+  source.series_uid = series_name(data);
+  source.series_description = utf8(data, kSeriesDescription);
+  source.frame_count = std::max<std::int64_t>(data.integer(kNumberOfFrames).value_or(1), 1);
+  source.instance = instance_of(file);
+  try {
+    source.image = describe_image(file);
+  } catch (const Error& error) {
+    source.fault = error;
+  }
+  return source;
+}
+
+bool begins_as_dicom(const std::filesystem::path& path) {
+  const std::string head = InputFile(path).text(0, kSniffBytes);
+  return find_beginning(std::as_bytes(std::span(head))).has_value();
+}
+
+// Reads the files of one upload.
+class HeaderReader {
+ public:
+  HeaderReader(std::filesystem::path scratch, std::uint64_t most_sample_bytes)
+      : scratch_(std::move(scratch)), most_sample_bytes_(most_sample_bytes) {}
+
+  void read(const std::filesystem::path& path) {
+    if (!begins_as_dicom(path)) return ignore(upload_, path, "it is not a DICOM file");
+    const DicomFile file(path, scratch_, most_sample_bytes_);
+    if (const auto reason = reason_to_ignore(file)) return ignore(upload_, path, *reason);
+    Source source = describe_source(path, file);
+    const std::string& uid = source.instance.sop_instance_uid;
+    const auto [known, is_new] = first_with_uid_.try_emplace(uid, path);
+    if (!is_new && same_bytes(known->second, path)) {
+      ++doubles_;
+      return ignore(upload_, path, reason_of_double(name_of(known->second)));
+    }
+    upload_.sources.push_back(std::move(source));
+  }
+
+  Upload finish() {
+    if (doubles_ > 0) upload_.notes.push_back(duplicate_note(doubles_));
+    return std::move(upload_);
+  }
+
+ private:
+  std::filesystem::path scratch_;
+  std::uint64_t most_sample_bytes_;
+  Upload upload_;
+  std::map<std::string, std::filesystem::path> first_with_uid_;
+  std::size_t doubles_ = 0;
+};
+
+std::string count_of(std::int64_t count) {
+  return std::to_string(count) + (count == 1 ? " slice" : " slices");
+}
+
+// One entry for each series: "head, 93 slices".
+std::vector<Choice> list_series(std::span<const Source> sources) {
+  struct Series {
+    std::string description;
+    std::string modality;
+    std::int64_t slices = 0;
+  };
+  std::map<std::string, Series> all;
+  for (const Source& source : sources) {
+    Series& series = all[source.series_uid];
+    series.description = source.series_description;
+    series.modality = source.image.modality;
+    series.slices += source.frame_count;
+  }
+  std::vector<Choice> choices;
+  for (const auto& [uid, series] : all) {
+    std::string title;
+    for (const std::string& part : {series.description, series.modality}) {
+      if (!part.empty()) title += part + ", ";
+    }
+    choices.push_back({"series", uid, title + count_of(series.slices)});
+  }
+  return choices;
+}
+
+std::string joined_titles(const std::vector<Choice>& choices) {
+  constexpr std::size_t kMostNamed = 5;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(choices.size(), kMostNamed); ++i) {
+    text += (i == 0 ? "" : "; ") + choices[i].title + " (" + choices[i].value + ')';
+  }
+  return text + (choices.size() > kMostNamed ? "; ..." : "");
+}
+
+DicomCode code_of(const DataSet& data, Tag sequence) {
+  const DataSet* code = data.item(sequence);
+  if (code == nullptr) return {};
+  return {.value = utf8(*code, kCodeValue),
+          .scheme = utf8(*code, kCodingSchemeDesignator),
+          .meaning = utf8(*code, kCodeMeaning)};
+}
+
+std::vector<DicomSegment> segments_of(const DataSet& data) {
+  std::vector<DicomSegment> segments;
+  const Element* sequence = data.find(kSegmentSequence);
+  if (sequence == nullptr) return segments;
+  for (const DataSet& item : sequence->items) {
+    const auto number = item.unsigned_number(kSegmentNumber);
+    if (!number) continue;
+    segments.push_back({.label = *number,
+                        .category = code_of(item, kSegmentedPropertyCategoryCodeSequence),
+                        .type = code_of(item, kSegmentedPropertyTypeCodeSequence),
+                        .region = code_of(item, kAnatomicRegionSequence)});
+  }
+  std::ranges::sort(segments, {}, &DicomSegment::label);
+  return segments;
+}
+
+}  // namespace
+
+Upload read_headers(std::span<const std::filesystem::path> files,
+                    const std::filesystem::path& scratch, std::uint64_t most_sample_bytes) {
+  HeaderReader reader(scratch, most_sample_bytes);
+  for (const std::filesystem::path& path : files) {
+    try {
+      reader.read(path);
+    } catch (const Error& error) {
+      if (files.size() == 1) throw;
+      rethrow_for(path, error);
+    }
+  }
+  Upload upload = reader.finish();
+  if (files.size() > 1) {
+    for (Source& source : upload.sources) source.image.file_name = name_of(source.path);
+  }
+  if (!upload.sources.empty()) return upload;
+  if (upload.ignored.size() == 1) {
+    throw_unusable("The upload has no DICOM image: " + upload.ignored.front().reason + ".");
+  }
+  throw_unusable("None of the upload's " + std::to_string(files.size()) +
+                 " files is a DICOM image that can be part of a volume.");
+}
+
+std::vector<Source> choose_series(std::vector<Source> sources, const std::string& uid) {
+  const std::vector<Choice> all = list_series(sources);
+  if (!uid.empty()) {
+    std::erase_if(sources, [&](const Source& source) { return source.series_uid != uid; });
+    if (sources.empty()) {
+      throw_choice("The upload has no series " + in_quotes(uid) +
+                       ". Choose one with series=UID: " + joined_titles(all) + '.',
+                   all);
+    }
+  } else if (all.size() > 1) {
+    throw_choice("The upload holds " + std::to_string(all.size()) +
+                     " series. Choose one with series=UID: " + joined_titles(all) + '.',
+                 all);
+  }
+  for (const Source& source : sources) {
+    if (!source.fault) continue;
+    if (sources.size() == 1) throw *source.fault;
+    rethrow_for(source.path, *source.fault);
+  }
+  return sources;
+}
+
+DicomIdentity identity_of(const DataSet& data) {
+  return {.patient_name = utf8(data, kPatientName),
+          .patient_id = utf8(data, kPatientId),
+          .patient_birth_date = utf8(data, kPatientBirthDate),
+          .patient_sex = utf8(data, kPatientSex),
+          .study_uid = utf8(data, kStudyInstanceUid),
+          .study_date = utf8(data, kStudyDate),
+          .study_time = utf8(data, kStudyTime),
+          .study_id = utf8(data, kStudyId),
+          .study_description = utf8(data, kStudyDescription),
+          .accession_number = utf8(data, kAccessionNumber),
+          .referring_physician = utf8(data, kReferringPhysician),
+          .series_uid = utf8(data, kSeriesInstanceUid),
+          .series_description = utf8(data, kSeriesDescription),
+          .modality = utf8(data, kModality),
+          .frame_of_reference_uid = utf8(data, kFrameOfReferenceUid),
+          .instances = {},
+          .issuer_of_patient_id = utf8(data, kIssuerOfPatientId),
+          .patient_identity_removed = utf8(data, kPatientIdentityRemoved),
+          .deidentification_method = utf8(data, kDeidentificationMethod),
+          .acquisition_datetime = utf8(data, kAcquisitionDateTime),
+          .position_reference_indicator = utf8(data, kPositionReferenceIndicator),
+          .equipment = {.manufacturer = utf8(data, kManufacturer),
+                        .model_name = utf8(data, kManufacturerModelName),
+                        .station_name = utf8(data, kStationName),
+                        .device_serial_number = utf8(data, kDeviceSerialNumber),
+                        .software_versions = utf8(data, kSoftwareVersions)},
+          .segments = segments_of(data)};
+}
+
+}  // namespace isomesh::import::dicom

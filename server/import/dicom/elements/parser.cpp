@@ -1,0 +1,370 @@
+#include "server/import/dicom/elements/parser.h"
+
+#include <algorithm>
+#include <array>
+
+#include "base/files.h"
+#include "base/text.h"
+#include "server/import/dicom/elements/private_elements.h"
+#include "server/import/dicom/elements/tags.h"
+#include "server/import/dicom/elements/text.h"
+#include "server/import/source/source.h"
+
+namespace isomesh::import::dicom {
+namespace {
+
+constexpr std::uint32_t kUndefinedLength = 0xFFFFFFFF;
+constexpr unsigned kDeepestSequence = 32;
+// Bounds on elements, items and fragments together, and on the bytes of elements that are kept.
+constexpr std::size_t kMostParts = std::size_t{1} << 21;
+constexpr std::size_t kMostKeptBytes = std::size_t{1} << 28;
+constexpr std::size_t kWindowBytes = std::size_t{1} << 16;
+
+// The two ways in which data sets are written.
+struct Encoding {
+  bool is_explicit = true;
+  bool big_endian = false;
+};
+
+// The head of an element, which comes before its value.
+struct Head {
+  Tag tag = 0;
+  std::string vr;  // empty when it is implicit
+  std::uint32_t length = 0;
+
+  bool has_undefined_length() const { return length == kUndefinedLength; }
+};
+
+// The sequences that a volume needs; implicit ones do not say that they are sequences.
+bool is_needed_sequence(Tag tag) {
+  switch (tag) {
+    case kFrameContentSequence:
+    case kSegmentSequence:
+    case kSegmentIdentificationSequence:
+    case kMrEchoSequence:
+    case kMrDiffusionSequence:
+    case kDiffusionGradientSequence:
+    case kCardiacSequence:
+    case kMrImageFrameTypeSequence:
+    case kPlanePositionSequence:
+    case kPlaneOrientationSequence:
+    case kModalityLutSequence:
+    case kPixelMeasuresSequence:
+    case kPixelValueTransformationSequence:
+    case kSharedFunctionalGroups:
+    case kPerFrameFunctionalGroups:
+      return true;
+    default:
+      return false;
+  }
+}
+
+// Some programs leave representations blank that they do not know, before lengths of 16 bits.
+bool is_blank(std::string_view vr) {
+  return vr == "  " || vr == "??" || vr == std::string_view("\0\0", 2);
+}
+
+bool is_pixel_data(Tag tag) {
+  return tag == kPixelData || tag == kFloatPixelData || tag == kDoubleFloatPixelData;
+}
+
+class Parser {
+ public:
+  Parser(const InputFile& file, std::uint64_t offset) : file_(file), at_(offset) {}
+
+  std::uint64_t position() const { return at_; }
+  std::uint64_t end() const { return file_.size(); }
+
+  MetaInformation meta_information() {
+    MetaInformation meta;
+    const Encoding encoding;
+    while (end() - at_ >= 8 && number(at_, 2, false) == 2) {
+      const Head head = read_head(encoding, end());
+      const std::string stored = read_value(head, end());
+      const std::string value = printable(without_padding(stored));
+      if (head.tag == kTransferSyntaxUid) meta.transfer_syntax = value;
+      if (head.tag == kMediaStorageSopClassUid) meta.sop_class_uid = value;
+      if (head.tag == kMediaStorageSopInstanceUid) meta.sop_instance_uid = value;
+    }
+    meta.end = at_;
+    return meta;
+  }
+
+  // True when the element at the position names its value representation.
+  bool looks_explicit() {
+    if (end() - at_ < 8) return true;
+    return is_representation(window(at_ + 4, 2));
+  }
+
+  void read_file(const Encoding& encoding, ParsedFile& result) {
+    result.data.big_endian = encoding.big_endian;
+    while (at_ < end()) {
+      // Media that are read in blocks leave zeros and other bytes after the last element.
+      if (end() - at_ < 8 || number(at_, 4, encoding.big_endian) == 0) break;
+      const Head head = read_head(encoding, end());
+      if (is_pixel_data(head.tag)) {
+        result.pixels = read_pixels(head, encoding);
+        break;
+      }
+      read_outer_element(head, encoding, result.data);
+    }
+  }
+
+ private:
+  // Reads bytes that are known to be in the file.
+  std::string_view window(std::uint64_t offset, std::size_t count) {
+    if (offset < window_begin_ || offset + count > window_begin_ + window_.size()) {
+      window_ = file_.text(offset, std::max(kWindowBytes, count));
+      window_begin_ = offset;
+    }
+    return std::string_view(window_).substr(offset - window_begin_, count);
+  }
+
+  std::uint32_t number(std::uint64_t offset, std::size_t bytes, bool big_endian) {
+    const std::string_view text = window(offset, bytes);
+    std::uint32_t result = 0;
+    for (std::size_t i = 0; i < bytes; ++i) {
+      result = result << 8 | static_cast<unsigned char>(text[big_endian ? i : bytes - 1 - i]);
+    }
+    return result;
+  }
+
+  Tag read_tag(bool big_endian) {
+    const Tag tag = number(at_, 2, big_endian) << 16 | number(at_ + 2, 2, big_endian);
+    at_ += 4;
+    return tag;
+  }
+
+  // Throws unless `bytes` more lie before `limit`.
+  void require(std::uint64_t bytes, std::uint64_t limit, Tag tag) const {
+    if (limit >= at_ && bytes <= limit - at_) return;
+    const std::string name = is_pixel_data(tag) ? "pixel data"
+                             : tag == 0         ? "data set"
+                                                : "element " + tag_name(tag);
+    const std::string there = std::to_string(limit > at_ ? limit - at_ : 0);
+    throw_unusable("The DICOM file is truncated or corrupt: its " + name + " takes " +
+                   std::to_string(bytes) + " bytes, but only " + there + " are left.");
+  }
+
+  Head read_head(const Encoding& encoding, std::uint64_t limit) {
+    require(8, limit, 0);
+    Head head;
+    head.tag = read_tag(encoding.big_endian);
+    if (!encoding.is_explicit || head.tag >> 16 == kItem >> 16) {
+      head.length = number(at_, 4, encoding.big_endian);
+      at_ += 4;
+      return head;
+    }
+    head.vr = window(at_, 2);
+    if (!is_representation(head.vr) && !is_blank(head.vr)) {
+      throw_unusable("The DICOM file is corrupt: its element " + tag_name(head.tag) +
+                     " has no value representation.");
+    }
+    if (has_short_length(head.vr) || is_blank(head.vr)) {
+      head.length = number(at_ + 2, 2, encoding.big_endian);
+      at_ += 4;
+      return head;
+    }
+    require(8, limit, head.tag);
+    head.length = number(at_ + 4, 4, encoding.big_endian);
+    at_ += 8;
+    return head;
+  }
+
+  std::string read_value(const Head& head, std::uint64_t limit,
+                         std::uint64_t longest = kLongestValue) {
+    require(head.length, limit, head.tag);
+    std::string value;
+    if (head.length <= longest) value = window(at_, head.length);
+    at_ += head.length;
+    return value;
+  }
+
+  // Throws when there are more parts than any scanner writes, which would fill the memory.
+  void count_part() {
+    if (++parts_ <= kMostParts) return;
+    throw_unusable("The DICOM file has more than the " + std::to_string(kMostParts) +
+                   " elements that are accepted.");
+  }
+
+  void keep(DataSet& set, Element element) {
+    count_part();
+    kept_bytes_ += element.value.size();
+    if (kept_bytes_ > kMostKeptBytes) {
+      throw_unusable("The DICOM file's elements take more than the " +
+                     std::to_string(kMostKeptBytes) + " bytes that are accepted.");
+    }
+    set.elements.push_back(std::move(element));
+  }
+
+  // Reads an element of a file's data set, of which some private ones are needed, too.
+  void read_outer_element(const Head& head, const Encoding& encoding, DataSet& set) {
+    if (!is_private(head.tag)) return read_element(head, encoding, end(), 0, set);
+    const auto needed = blocks_.needed(head.tag);
+    Head known = head;
+    if (needed) known.tag = *needed;
+    Element element =
+        read_content(known, encoding, end(), 0, needed ? Meaning::kKnownPrivate : Meaning::kPublic);
+    if (needed) return keep(set, std::move(element));
+    blocks_.reserve(head.tag, without_padding(element.value));
+  }
+
+  void read_element(const Head& head, const Encoding& encoding, std::uint64_t limit, unsigned depth,
+                    DataSet& set) {
+    if (is_pixel_data(head.tag) && head.has_undefined_length()) {
+      read_fragments(encoding, limit);  // an icon's, which are passed over
+      return;
+    }
+    Element element = read_content(head, encoding, limit, depth);
+    if (!is_private(head.tag)) keep(set, std::move(element));
+  }
+
+  // Whose dictionary a tag is looked up in.
+  enum class Meaning { kPublic, kKnownPrivate };
+
+  Element read_content(const Head& head, const Encoding& encoding, std::uint64_t limit,
+                       unsigned depth, Meaning meaning = Meaning::kPublic) {
+    Element element;
+    element.tag = head.tag;
+    const bool is_known = meaning == Meaning::kKnownPrivate;
+    const bool is_sequence = head.vr == "SQ" || head.has_undefined_length() ||
+                             (is_known ? head.tag == kGridFrames : is_needed_sequence(head.tag));
+    if (!is_sequence) {
+      element.value = read_value(head, limit, is_known ? kLongestPrivateValue : kLongestValue);
+      return element;
+    }
+    // Systems that do not know an element pass it on as UN, with its items in implicit encoding.
+    const Encoding inside = head.vr == "UN" ? Encoding{false, false} : encoding;
+    read_items(head, inside, limit, depth + 1, element);
+    return element;
+  }
+
+  void read_items(const Head& head, const Encoding& encoding, std::uint64_t limit, unsigned depth,
+                  Element& sequence) {
+    if (depth > kDeepestSequence) {
+      throw_unusable("The DICOM file is corrupt: its sequences are nested more than " +
+                     std::to_string(kDeepestSequence) + " levels deep.");
+    }
+    const bool has_end = !head.has_undefined_length();
+    if (has_end) require(head.length, limit, head.tag);
+    const std::uint64_t end = has_end ? at_ + head.length : limit;
+    while (!has_end || at_ < end) {
+      const Head item = read_head(encoding, end);
+      if (item.tag == kSequenceEnd) return;
+      if (item.tag != kItem) {
+        throw_unusable("The DICOM file is corrupt: its sequence " + tag_name(sequence.tag) +
+                       " contains something that is not an item.");
+      }
+      count_part();
+      DataSet set = read_item(item, encoding, end, depth);
+      if (!is_private(sequence.tag) || sequence.tag == kGridFrames) {
+        sequence.items.push_back(std::move(set));
+      }
+    }
+  }
+
+  DataSet read_item(const Head& item, const Encoding& encoding, std::uint64_t limit,
+                    unsigned depth) {
+    const bool has_end = !item.has_undefined_length();
+    if (has_end) require(item.length, limit, kItem);
+    const std::uint64_t end = has_end ? at_ + item.length : limit;
+    DataSet set;
+    set.big_endian = encoding.big_endian;
+    while (!has_end || at_ < end) {
+      const Head head = read_head(encoding, end);
+      if (head.tag == kItemEnd) break;
+      read_element(head, encoding, end, depth, set);
+    }
+    return set;
+  }
+
+  PixelElement read_pixels(const Head& head, const Encoding& encoding) {
+    PixelElement pixels;
+    pixels.tag = head.tag;
+    pixels.is_words = head.vr == "OW";
+    pixels.is_encapsulated = head.has_undefined_length();
+    if (!pixels.is_encapsulated) {
+      require(head.length, end(), head.tag);
+      pixels.native = {at_, head.length};
+      return pixels;
+    }
+    pixels.fragments = read_fragments(encoding, end());
+    if (pixels.fragments.empty()) return pixels;
+    const Extent table = pixels.fragments.front();
+    pixels.fragments.erase(pixels.fragments.begin());
+    for (std::uint64_t at = 0; at + 4 <= table.bytes && at / 4 < kMostParts; at += 4) {
+      pixels.frame_offsets.push_back(number(table.offset + at, 4, false));
+    }
+    return pixels;
+  }
+
+  // Reads the items of compressed pixels. The first is a table of offsets.
+  std::vector<Extent> read_fragments(const Encoding& encoding, std::uint64_t limit) {
+    std::vector<Extent> fragments;
+    for (;;) {
+      const Head item = read_head(encoding, limit);
+      if (item.tag == kSequenceEnd) return fragments;
+      if (item.tag != kItem || item.has_undefined_length()) {
+        throw_unusable("The DICOM file is corrupt: its compressed pixel data is not in items.");
+      }
+      require(item.length, limit, kPixelData);
+      count_part();
+      fragments.push_back({at_, item.length});
+      at_ += item.length;
+    }
+  }
+
+  const InputFile& file_;
+  std::uint64_t at_;
+  std::string window_;
+  std::uint64_t window_begin_ = 0;
+  PrivateBlocks blocks_;
+  std::size_t parts_ = 0;
+  std::size_t kept_bytes_ = 0;
+};
+
+Encoding encoding_of(Parser& parser, std::string_view transfer_syntax) {
+  const bool big_endian = transfer_syntax == kExplicitBigEndian;
+  return {big_endian || parser.looks_explicit(), big_endian};
+}
+
+}  // namespace
+
+bool is_representation(std::string_view text) {
+  const auto is_letter = [](char each) { return each >= 'A' && each <= 'Z'; };
+  return text.size() == 2 && is_letter(text[0]) && is_letter(text[1]);
+}
+
+bool has_short_length(std::string_view vr) {
+  static constexpr std::array<std::string_view, 21> kShort = {
+      "AE", "AS", "AT", "CS", "DA", "DS", "DT", "FD", "FL", "IS", "LO",
+      "LT", "PN", "SH", "SL", "SS", "ST", "TM", "UI", "UL", "US"};
+  return std::find(kShort.begin(), kShort.end(), vr) != kShort.end();
+}
+
+MetaInformation parse_meta_information(const InputFile& file, std::uint64_t offset) {
+  return Parser(file, offset).meta_information();
+}
+
+ParsedFile parse_data_set(const InputFile& file, std::uint64_t offset,
+                          std::string_view transfer_syntax) {
+  ParsedFile result;
+  Parser parser(file, offset);
+  parser.read_file(encoding_of(parser, transfer_syntax), result);
+  return result;
+}
+
+DataSet parse_beginning(const InputFile& file, std::uint64_t offset,
+                        std::string_view transfer_syntax) {
+  ParsedFile result;
+  Parser parser(file, offset);
+  try {
+    parser.read_file(encoding_of(parser, transfer_syntax), result);
+  } catch (const Error& error) {
+    // The file's end, which may lie anywhere. What else is wrong is found when all of it is read.
+    if (error.code() != ErrorCode::kUnusableVolume) throw;
+  }
+  return std::move(result.data);
+}
+
+}  // namespace isomesh::import::dicom

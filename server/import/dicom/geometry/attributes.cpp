@@ -1,0 +1,215 @@
+#include "server/import/dicom/geometry/attributes.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "base/text.h"
+#include "server/import/dicom/elements/private_elements.h"
+#include "server/import/dicom/elements/tags.h"
+#include "server/import/dicom/elements/text.h"
+#include "server/import/dicom/geometry/vectors.h"
+#include "server/import/source/source.h"
+
+namespace isomesh::import::dicom {
+namespace {
+
+// For direction cosines, which are often written with only four decimals.
+constexpr double kCosineTolerance = 1e-3;
+
+enum class Kind { kText, kReal, kWord };
+
+struct PhaseRow {
+  std::string_view name;
+  Tag group;  // 0: of the object itself
+  Tag tag;
+  Kind kind;
+};
+
+constexpr std::array kPhaseRows = {
+    PhaseRow{"TemporalPositionIdentifier", 0, kTemporalPositionIdentifier, Kind::kText},
+    PhaseRow{"TemporalPositionIndex", kFrameContentSequence, kTemporalPositionIndex, Kind::kWord},
+    PhaseRow{"EchoTime", 0, kEchoTime, Kind::kText},
+    PhaseRow{"EffectiveEchoTime", kMrEchoSequence, kEffectiveEchoTime, Kind::kReal},
+    PhaseRow{"EchoNumbers", 0, kEchoNumbers, Kind::kText},
+    PhaseRow{"DiffusionBValue", kMrDiffusionSequence, kDiffusionBValue, Kind::kReal},
+    PhaseRow{"DiffusionBValue", 0, kDiffusionBValue, Kind::kReal},
+    PhaseRow{"B_value", 0, kSiemensBValue, Kind::kText},
+    PhaseRow{"BActualValue", 0, kGridBValue, Kind::kReal},
+    PhaseRow{"DiffusionGradientOrientation", kDiffusionGradientSequence, kDiffusionGradient,
+             Kind::kReal},
+    PhaseRow{"InversionTime", 0, kInversionTime, Kind::kText},
+    PhaseRow{"FlipAngle", 0, kFlipAngle, Kind::kText},
+    PhaseRow{"ComplexImageComponent", kMrImageFrameTypeSequence, kComplexImageComponent,
+             Kind::kText},
+    PhaseRow{"FrameType", kMrImageFrameTypeSequence, kFrameType, Kind::kText},
+    PhaseRow{"ImageType", 0, kImageType, Kind::kText},
+    PhaseRow{"TriggerTime", 0, kTriggerTime, Kind::kText},
+    PhaseRow{"NominalCardiacTriggerDelayTime", kCardiacSequence, kNominalTriggerDelay, Kind::kReal},
+    PhaseRow{"StackID", kFrameContentSequence, kStackId, Kind::kText},
+    PhaseRow{"AcquisitionNumber", 0, kAcquisitionNumber, Kind::kText},
+    PhaseRow{"AcquisitionDateTime", 0, kAcquisitionDateTime, Kind::kText},
+    PhaseRow{"AcquisitionTime", 0, kAcquisitionTime, Kind::kText},
+    PhaseRow{"ContentTime", 0, kContentTime, Kind::kText},
+};
+
+// Texts come from a file and go into messages.
+constexpr std::size_t kLongestPhase = 64;
+
+// Cut before a letter, which may have several bytes.
+std::string shortened(std::string text) {
+  if (text.size() <= kLongestPhase) return text;
+  std::size_t end = kLongestPhase;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
+  text.resize(end);
+  return text;
+}
+
+std::string value_of(const DataSet& data, const PhaseRow& row) {
+  std::string value;
+  switch (row.kind) {
+    case Kind::kText:
+      value = utf8(data, row.tag);
+      break;
+    case Kind::kReal:
+      for (const double number : data.binary_reals(row.tag)) {
+        value += (value.empty() ? "" : "\\") + to_text(number);
+      }
+      break;
+    case Kind::kWord:
+      if (const auto number = data.unsigned_number(row.tag)) value = std::to_string(*number);
+      break;
+  }
+  return shortened(std::move(value));
+}
+
+constexpr auto kPhaseNames = [] {
+  std::array<std::string_view, kPhaseRows.size()> names;
+  std::ranges::transform(kPhaseRows, names.begin(), &PhaseRow::name);
+  return names;
+}();
+
+// The group of a row among functional groups; null when it is not there.
+const DataSet* group_of(const PhaseRow& row, const DataSet& groups) {
+  if (row.group != kDiffusionGradientSequence) return groups.item(row.group);
+  // The gradient's direction lies in a sequence within its group.
+  const DataSet* diffusion = groups.item(kMrDiffusionSequence);
+  return diffusion == nullptr ? nullptr : diffusion->item(row.group);
+}
+
+// What the rows of groups find in `groups`, which may be null, and with `object` those of none find
+// in it.
+std::vector<Phase> phases_in(const DataSet* groups, const DataSet* object) {
+  std::vector<Phase> phases;
+  for (std::size_t at = 0; at < kPhaseRows.size(); ++at) {
+    const PhaseRow& row = kPhaseRows[at];
+    const DataSet* place = row.group == 0      ? object
+                           : groups == nullptr ? nullptr
+                                               : group_of(row, *groups);
+    std::string value = place == nullptr ? std::string() : value_of(*place, row);
+    if (!value.empty()) phases.push_back({at, std::move(value)});
+  }
+  return phases;
+}
+
+// Empty where it is not told.
+std::optional<double> factor(const DataSet& data, Tag tag) {
+  const std::string_view text = data.text(tag);
+  if (text.empty()) return std::nullopt;
+  const auto numbers = data.numbers(tag);
+  if (numbers.size() == 1 && !(tag == kRescaleSlope && numbers[0] == 0)) return numbers[0];
+  throw_unusable("The DICOM image's rescale slope " + in_quotes(data.text(kRescaleSlope)) +
+                 " and intercept " + in_quotes(data.text(kRescaleIntercept)) +
+                 " do not define the values of its samples.");
+}
+
+}  // namespace
+
+Attributes::Attributes(const DataSet& data, std::uint32_t frame)
+    : data_(data), shared_(data.item(kSharedFunctionalGroups)) {
+  const Element* frames = data.find(kPerFrameFunctionalGroups);
+  if (frames != nullptr && frame < frames->items.size()) own_ = &frames->items[frame];
+}
+
+const DataSet* Attributes::group(Tag sequence) const {
+  if (own_ != nullptr) {
+    if (const DataSet* item = own_->item(sequence)) return item;
+  }
+  return shared_ == nullptr ? nullptr : shared_->item(sequence);
+}
+
+const DataSet& Attributes::place(Tag sequence) const {
+  const DataSet* found = group(sequence);
+  return found == nullptr ? data_ : *found;
+}
+
+bool has_functional_groups(const DataSet& data) {
+  return data.find(kSharedFunctionalGroups) != nullptr ||
+         data.find(kPerFrameFunctionalGroups) != nullptr;
+}
+
+std::vector<double> required_numbers(const DataSet& data, Tag tag, std::size_t count,
+                                     std::string_view name) {
+  std::vector<double> numbers = data.numbers(tag);
+  if (numbers.size() == count) return numbers;
+  const std::string_view text = data.text(tag);
+  if (text.empty()) {
+    throw_unusable("The DICOM image has no " + std::string(name) + ' ' + tag_name(tag) +
+                   ", so its place in the patient is unknown.");
+  }
+  throw_unusable("The DICOM image's " + std::string(name) + ' ' + tag_name(tag) + " is " +
+                 in_quotes(text) + ", not " + std::to_string(count) + " numbers.");
+}
+
+Vector3 unit_vector(const double* parts) {
+  Vector3 vector = {parts[0], parts[1], parts[2]};
+  const double size = std::sqrt(dot(vector, vector));
+  if (!(std::abs(size - 1) <= kCosineTolerance)) {
+    throw_unusable("The DICOM image's orientation does not consist of unit vectors.");
+  }
+  for (double& part : vector) part /= size;
+  return vector;
+}
+
+Plane plane_of(const Attributes& attributes) {
+  const auto position =
+      required_numbers(attributes.place(kPlanePositionSequence), kImagePosition, 3, "position");
+  const auto cosines = required_numbers(attributes.place(kPlaneOrientationSequence),
+                                        kImageOrientation, 6, "orientation");
+  const auto spacing =
+      required_numbers(attributes.place(kPixelMeasuresSequence), kPixelSpacing, 2, "pixel spacing");
+  Plane plane;
+  std::copy(position.begin(), position.end(), plane.position.begin());
+  plane.along_row = unit_vector(cosines.data());
+  plane.along_column = unit_vector(cosines.data() + 3);
+  if (std::abs(dot(plane.along_row, plane.along_column)) > kCosineTolerance) {
+    throw_unusable("The DICOM image's rows and columns are not perpendicular.");
+  }
+  // The file tells the distance between rows first, then that between columns.
+  plane.spacing = {spacing[1], spacing[0]};
+  if (!(spacing[0] > 0 && spacing[1] > 0)) {
+    throw_unusable("The DICOM image's pixel spacing is not positive.");
+  }
+  return plane;
+}
+
+Rescale rescale_of(const DataSet& data) {
+  return {factor(data, kRescaleSlope).value_or(1), factor(data, kRescaleIntercept).value_or(0)};
+}
+
+std::span<const std::string_view> phase_names() { return kPhaseNames; }
+
+std::vector<Phase> phases_of_object(const DataSet& data) {
+  return phases_in(data.item(kSharedFunctionalGroups), &data);
+}
+
+std::vector<Phase> phases_of_frame(const DataSet& data, std::uint32_t frame) {
+  const Element* frames = data.find(kPerFrameFunctionalGroups);
+  if (frames == nullptr || frame >= frames->items.size()) return {};
+  return phases_in(&frames->items[frame], nullptr);
+}
+
+}  // namespace isomesh::import::dicom

@@ -1,0 +1,128 @@
+#include "server/import/dicom/kinds/describe.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "base/text.h"
+#include "server/import/dicom/elements/tags.h"
+#include "server/import/dicom/elements/text.h"
+#include "server/import/dicom/geometry/attributes.h"
+#include "server/import/dicom/kinds/dose.h"
+#include "server/import/dicom/kinds/mosaic.h"
+#include "server/import/dicom/kinds/segmentation.h"
+#include "server/import/dicom/pixels/pixel_layout.h"
+#include "server/import/source/source.h"
+
+namespace isomesh::import::dicom {
+namespace {
+
+constexpr std::uint32_t kMostFrames = 1U << 20;
+
+std::uint32_t frame_count(const DataSet& data) {
+  if (data.text(kNumberOfFrames).empty()) return 1;
+  const auto count = data.integer(kNumberOfFrames);
+  if (count && *count > 0 && *count <= kMostFrames) return static_cast<std::uint32_t>(*count);
+  throw_unusable("The DICOM image's number of frames is " + in_quotes(data.text(kNumberOfFrames)) +
+                 ", not a number from 1 to " + std::to_string(kMostFrames) + ".");
+}
+
+void refuse_unplaced_frames(const DataSet& data, std::uint32_t frames) {
+  const Element* groups = data.find(kPerFrameFunctionalGroups);
+  if (frames == 1) return;
+  if (!has_functional_groups(data)) {
+    throw_unusable("The DICOM image has " + std::to_string(frames) +
+                   " frames, but no position for each of them.");
+  }
+  const std::size_t placed = groups == nullptr ? 0 : groups->items.size();
+  if (placed != frames) {
+    throw_unusable("The DICOM image has " + std::to_string(frames) + " frames, but describes " +
+                   std::to_string(placed) + '.');
+  }
+}
+
+void check_label_layout(const Segmentation& segmentation, const PixelLayout& layout) {
+  const bool is_binary = segmentation.kind == SegmentKind::kBinary;
+  const bool is_label_map = segmentation.kind == SegmentKind::kLabelMap;
+  const bool fits = layout.bits_allocated == (is_binary ? 1U : 8U) ||
+                    (is_label_map && layout.bits_allocated == 16);
+  if (fits && !layout.is_signed && !layout.is_float) return;
+  throw_unusable("The DICOM segmentation's samples cannot be labels: they have " +
+                 std::to_string(layout.bits_allocated) + " bits" +
+                 (layout.is_signed ? " and a sign." : "."));
+}
+
+// The commonest reason why a file makes no volume: a picture that some program has made.
+void refuse_placeless(const DataSet& data, std::uint32_t frames) {
+  if (frames > 1 || has_functional_groups(data)) return;
+  for (const auto& [tag, name] :
+       {std::pair{kImagePosition, "position"}, std::pair{kImageOrientation, "orientation"},
+        std::pair{kPixelSpacing, "pixel spacing"}}) {
+    if (!data.text(tag).empty()) continue;
+    throw_unusable("The DICOM image is a single slice and has no " + std::string(name) + ' ' +
+                   tag_name(tag) + ", so it cannot be part of a volume.");
+  }
+}
+
+// A single bit becomes a sample of eight.
+PixelLayout unpacked(PixelLayout layout) {
+  if (layout.bits_allocated != 1) return layout;
+  layout.bits_allocated = 8;
+  layout.bits_stored = 8;
+  layout.high_bit = 7;
+  layout.is_signed = false;
+  return layout;
+}
+
+Frame describe_frame(const DataSet& data, std::uint32_t number, const Image& image) {
+  const Attributes attributes(data, number);
+  Frame frame;
+  frame.number = number;
+  frame.plane = plane_of(attributes);
+  frame.rescale = rescale_of(attributes.place(kPixelValueTransformationSequence));
+  if (image.segmentation && image.segmentation->kind != SegmentKind::kLabelMap) {
+    frame.segment = segment_of(data, number);
+  }
+  frame.phases = phases_of_frame(data, number);
+  return frame;
+}
+
+Image describe_object(const DataSet& data) {
+  Image image;
+  image.frame_of_reference_uid = data.text(kFrameOfReferenceUid);
+  image.modality = utf8(data, kModality);
+  image.photometric = data.text(kPhotometricInterpretation);
+  image.instance_number = data.integer(kInstanceNumber);
+  image.rescale_type =
+      Attributes(data, 0).place(kPixelValueTransformationSequence).text(kRescaleType);
+  image.phases = phases_of_object(data);
+  if (is_segmentation(data)) image.segmentation = describe_segmentation(data);
+  return image;
+}
+
+}  // namespace
+
+Image describe_image(const DicomFile& file) {
+  const DataSet& data = file.data();
+  Image image = describe_object(data);
+  const std::uint32_t frames = frame_count(data);
+  image.stored = pixel_layout(file);
+  image.layout = unpacked(image.stored);
+  if (image.segmentation) check_label_layout(*image.segmentation, image.stored);
+  require_pixels(file, image.stored, frames);
+  if (data.item(kModalityLutSequence) != nullptr) {
+    throw_unusable(
+        "The DICOM image defines the values of its samples by a lookup table, which is not "
+        "supported.");
+  }
+  if (!is_dose(data)) refuse_unplaced_frames(data, frames);
+  refuse_placeless(data, frames);
+  for (std::uint32_t number = 0; number < frames; ++number) {
+    image.frames.push_back(describe_frame(data, number, image));
+  }
+  if (is_dose(data)) place_dose(data, image.frames);
+  if (frames == 1 && is_mosaic(data)) unfold_mosaic(data, image);
+  return image;
+}
+
+}  // namespace isomesh::import::dicom

@@ -1,0 +1,160 @@
+#include "server/import/dicom/kinds/mosaic.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/text.h"
+#include "server/import/dicom/elements/csa_header.h"
+#include "server/import/dicom/elements/private_elements.h"
+#include "server/import/dicom/elements/tags.h"
+#include "server/import/dicom/geometry/attributes.h"
+#include "server/import/dicom/geometry/vectors.h"
+#include "server/import/source/source.h"
+
+namespace isomesh::import::dicom {
+namespace {
+
+constexpr std::uint32_t kMostTiles = 4096;
+// How far the two normals may be apart: the image's own, and that of the CSA header.
+constexpr double kParallel = 1e-2;
+
+bool has_image_type(const DataSet& data, std::string_view type) {
+  const auto types = data.texts(kImageType);
+  return std::ranges::find(types, type) != types.end();
+}
+
+bool is_grid(const DataSet& data) { return data.find(kGridImages) != nullptr; }
+
+struct Tiling {
+  std::uint32_t slices = 0;
+  std::uint32_t columns = 0;
+  std::uint32_t rows = 0;
+};
+
+std::uint32_t checked_count(double count) {
+  if (count >= 1 && count <= kMostTiles && std::floor(count) == count) {
+    return static_cast<std::uint32_t>(count);
+  }
+  throw_unusable("The DICOM image is a mosaic of " + to_text(count) +
+                 " slices, which is not a valid number of slices.");
+}
+
+Tiling tiling_of(double count, bool is_square) {
+  Tiling tiling;
+  tiling.slices = checked_count(count);
+  tiling.columns = static_cast<std::uint32_t>(std::ceil(std::sqrt(tiling.slices)));
+  tiling.rows = is_square ? tiling.columns : (tiling.slices + tiling.columns - 1) / tiling.columns;
+  return tiling;
+}
+
+void cut(const Tiling& tiling, Image& image) {
+  const PixelLayout& whole = image.stored;
+  if (whole.bits_allocated < 8) throw_unusable("The DICOM image is a mosaic of single bits.");
+  if (whole.columns % tiling.columns != 0 || whole.rows % tiling.rows != 0) {
+    throw_unusable("The DICOM image is a mosaic of " + std::to_string(tiling.slices) +
+                   " slices, but its " + std::to_string(whole.columns) + " x " +
+                   std::to_string(whole.rows) + " samples cannot be divided into " +
+                   std::to_string(tiling.columns) + " x " + std::to_string(tiling.rows) +
+                   " tiles.");
+  }
+  image.layout.columns = whole.columns / tiling.columns;
+  image.layout.rows = whole.rows / tiling.rows;
+  image.tiles_per_row = tiling.columns;
+  const Frame first = image.frames.front();
+  image.frames.assign(tiling.slices, first);
+  for (std::uint32_t tile = 0; tile < tiling.slices; ++tile) image.frames[tile].number = tile;
+}
+
+double slice_count(const DataSet& data, const CsaHeader& header) {
+  if (const auto told = csa_numbers(header, "NumberOfImagesInMosaic"); !told.empty()) {
+    return told.front();
+  }
+  if (const auto told = data.unsigned_number(kMosaicImages)) return *told;
+  throw_unusable(
+      "The DICOM image is a mosaic, but its number of slices is unknown: it has no Siemens header "
+      "(0029,1010).");
+}
+
+// The way in which the slices follow one another.
+Vector3 slice_normal(const Plane& plane, const CsaHeader& header) {
+  const auto told = csa_numbers(header, "SliceNormalVector");
+  if (told.size() != 3) {
+    throw_unusable(
+        "The DICOM image is a mosaic, but the order of its slices is unknown: its Siemens header "
+        "(0029,1010) has no SliceNormalVector.");
+  }
+  const Vector3 own = cross(plane.along_row, plane.along_column);
+  const double along = dot(own, unit_vector(told.data()));
+  if (std::abs(std::abs(along) - 1) > kParallel) {
+    throw_unusable(
+        "The DICOM image is a mosaic, but its slices are not stacked along their normal.");
+  }
+  return moved({}, own, std::copysign(1, along));
+}
+
+double slice_distance(const DataSet& data, const CsaHeader& header, Image& image) {
+  for (const auto& told :
+       {data.numbers(kSpacingBetweenSlices), csa_numbers(header, "SpacingBetweenSlices")}) {
+    if (!told.empty() && told.front() > 0) return told.front();
+  }
+  image.is_distance_assumed = true;
+  const auto thickness = data.numbers(kSliceThickness);
+  if (!thickness.empty() && thickness.front() > 0) return thickness.front();
+  throw_unusable("The DICOM image is a mosaic, but the distance between its slices " +
+                 tag_name(kSpacingBetweenSlices) + " is unknown.");
+}
+
+void unfold_siemens(const DataSet& data, Image& image) {
+  const Element* element = data.find(kCsaImageHeader);
+  const CsaHeader header =
+      parse_csa_header(element == nullptr ? std::string_view() : std::string_view(element->value));
+  const Tiling tiling = tiling_of(slice_count(data, header), true);
+  const Plane plane = image.frames.front().plane;
+  const Vector3 normal = slice_normal(plane, header);
+  const double distance = slice_distance(data, header, image);
+  cut(tiling, image);
+  const auto half_less = [](std::uint32_t whole, std::uint32_t tile) {
+    return (static_cast<double>(whole) - static_cast<double>(tile)) / 2;
+  };
+  const double across = half_less(image.stored.columns, image.layout.columns) * plane.spacing[0];
+  const double down = half_less(image.stored.rows, image.layout.rows) * plane.spacing[1];
+  const Vector3 corner =
+      moved(moved(plane.position, plane.along_row, across), plane.along_column, down);
+  for (Frame& frame : image.frames) {
+    frame.plane.position = moved(corner, normal, distance * frame.number);
+  }
+}
+
+void unfold_united_imaging(const DataSet& data, Image& image) {
+  const auto count = data.numbers(kGridImages);
+  const Tiling tiling = tiling_of(count.empty() ? 0 : count.front(), false);
+  const Element* places = data.find(kGridFrames);
+  const std::size_t told = places == nullptr ? 0 : places->items.size();
+  if (told != tiling.slices) {
+    throw_unusable("The DICOM image is a grid of " + std::to_string(tiling.slices) +
+                   " slices, but it describes " + std::to_string(told) + ' ' +
+                   tag_name(kGridFrames) + ".");
+  }
+  cut(tiling, image);
+  for (Frame& frame : image.frames) {
+    const auto position = required_numbers(places->items[frame.number], kImagePosition, 3,
+                                           "position of every slice in its grid");
+    std::ranges::copy(position, frame.plane.position.begin());
+  }
+}
+
+}  // namespace
+
+bool is_mosaic(const DataSet& data) {
+  if (has_functional_groups(data)) return false;
+  if (is_grid(data)) return has_image_type(data, "VFRAME") || data.find(kGridFrames) != nullptr;
+  return has_image_type(data, "MOSAIC");
+}
+
+void unfold_mosaic(const DataSet& data, Image& image) {
+  if (is_grid(data)) return unfold_united_imaging(data, image);
+  unfold_siemens(data, image);
+}
+
+}  // namespace isomesh::import::dicom

@@ -1,0 +1,316 @@
+#include "server/import/dicom/kinds/segmentation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "base/text.h"
+#include "proto/samples.h"
+#include "server/import/dicom/elements/tags.h"
+#include "server/import/dicom/elements/text.h"
+#include "server/import/dicom/geometry/attributes.h"
+#include "server/import/dicom/geometry/placement.h"
+#include "server/import/dicom/geometry/vectors.h"
+#include "server/import/dicom/kinds/display_color.h"
+#include "server/import/dicom/pixels/values.h"
+#include "server/import/labels/combinations.h"
+#include "server/import/labels/label_table.h"
+#include "server/import/source/source.h"
+
+namespace isomesh::import::dicom {
+namespace {
+
+constexpr double kMostPlanes = 65535;
+
+std::vector<Segment> segments_of(const DataSet& data) {
+  std::vector<Segment> segments;
+  const Element* sequence = data.find(kSegmentSequence);
+  if (sequence == nullptr) return segments;
+  for (const DataSet& item : sequence->items) {
+    const auto number = item.unsigned_number(kSegmentNumber);
+    if (number) segments.push_back({*number, utf8(item, kSegmentLabel), display_color(item)});
+  }
+  std::ranges::sort(segments, {}, &Segment::number);
+  return segments;
+}
+
+// Empty where the object does not tell it.
+std::optional<double> slice_distance(const DataSet& data) {
+  const auto told =
+      Attributes(data, 0).place(kPixelMeasuresSequence).numbers(kSpacingBetweenSlices);
+  if (told.size() == 1 && told[0] != 0) return std::abs(told[0]);
+  return std::nullopt;
+}
+
+bool is_whole_step(double gap, double distance) {
+  const double steps = gap / distance;
+  return std::round(steps) >= 1 && std::abs(steps - std::round(steps)) <= kPlaceTolerance;
+}
+
+// The distances from each position to the next.
+std::vector<double> gaps_of(std::span<const Placed> placed, std::span<const std::size_t> starts) {
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < starts.size(); ++i) {
+    gaps.push_back(placed[starts[i]].along - placed[starts[i - 1]].along);
+  }
+  return gaps;
+}
+
+// The distance of planes of which all positions are some.
+double plane_distance(const std::vector<double>& gaps, const std::optional<double>& told) {
+  const auto fits = [&](double distance) {
+    return std::ranges::all_of(gaps, [&](double gap) { return is_whole_step(gap, distance); });
+  };
+  if (told && fits(*told)) return *told;
+  const double smallest = std::ranges::min(gaps);
+  if (fits(smallest)) return smallest;
+  throw_unusable("The segmentation's frames are unevenly spaced: some are " + in_mm(smallest) +
+                 " apart, others " + in_mm(std::ranges::max(gaps)) + '.');
+}
+
+// The number of each slice's plane.
+std::vector<std::uint32_t> planes_of(std::span<const Placed> placed,
+                                     const std::optional<double>& told) {
+  const std::vector<std::size_t> starts = position_starts(placed);
+  if (starts.size() < 2) {
+    throw_unusable("The segmentation is a single slice. A volume needs at least two.");
+  }
+  const std::vector<double> gaps = gaps_of(placed, starts);
+  const double distance = plane_distance(gaps, told);
+  std::vector<std::uint32_t> planes;
+  double plane = 0;
+  for (std::size_t position = 0; position < starts.size(); ++position) {
+    if (position > 0) plane += std::round(gaps[position - 1] / distance);
+    if (plane > kMostPlanes) {
+      throw_unusable("The segmentation's frames lie more than " + to_text(kMostPlanes) +
+                     " planes apart.");
+    }
+    const std::size_t end = position + 1 < starts.size() ? starts[position + 1] : placed.size();
+    planes.resize(end, static_cast<std::uint32_t>(plane));
+  }
+  return planes;
+}
+
+void refuse_crooked(std::span<const Placed> placed, const Stack& stack, const Vector3& step) {
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    const Vector3 place = moved(placed.front().position(), step, stack.planes[i]);
+    const double off = length(difference(placed[i].position(), place));
+    if (off <= kPlaceTolerance * length(step)) continue;
+    throw_unusable("Frame " + std::to_string(placed[i].slice.frame->number + 1) +
+                   " of the segmentation lies " + in_mm(off) +
+                   " away from its place in a line of evenly spaced frames.");
+  }
+}
+
+// Two frames of one segment at one place contradict each other.
+void refuse_doubled(const Stack& stack) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> seen;
+  for (std::size_t i = 0; i < stack.slices.size(); ++i) {
+    seen.emplace_back(stack.planes[i], stack.slices[i].frame->segment);
+  }
+  std::ranges::sort(seen);
+  const auto twice = std::ranges::adjacent_find(seen);
+  if (twice == seen.end()) return;
+  throw_unusable("The segmentation has two frames of " +
+                 (twice->second == 0 ? std::string("its labels")
+                                     : "segment " + std::to_string(twice->second)) +
+                 " at one position.");
+}
+
+SegmentKind kind_of(const DataSet& data) {
+  const std::string_view type = data.text(kSegmentationType);
+  if (type == "BINARY") return SegmentKind::kBinary;
+  if (type == "FRACTIONAL") return SegmentKind::kFractional;
+  if (type == "LABELMAP") return SegmentKind::kLabelMap;
+  throw_unusable("The DICOM segmentation is " + in_quotes(type) +
+                 ", which is unknown. BINARY, FRACTIONAL and LABELMAP are supported.");
+}
+
+std::uint32_t maximum_of(const DataSet& data) {
+  const auto maximum = data.unsigned_number(kMaximumFractionalValue);
+  if (maximum && *maximum > 0 && *maximum <= 0xFF) return *maximum;
+  throw_unusable(
+      "The fractional DICOM segmentation does not declare the largest value of its samples " +
+      tag_name(kMaximumFractionalValue) + ".");
+}
+
+const Segmentation& segmentation_of(const Stack& stack) {
+  return *stack.slices.front().image->segmentation;
+}
+
+bool is_label_map(const Stack& stack) {
+  return segmentation_of(stack).kind == SegmentKind::kLabelMap;
+}
+
+std::uint32_t highest_segment(const Stack& stack) {
+  const auto segment = [](const Slice& slice) { return slice.frame->segment; };
+  return segment(std::ranges::max(stack.slices, {}, segment));
+}
+
+// Samples as they are stored.
+void copy_frames(const Stack& stack, SampleType type, const ReadSlice& read,
+                 std::span<std::byte> target) {
+  std::vector<std::byte> stored;
+  for (std::size_t i = 0; i < stack.slices.size(); ++i) {
+    const PixelLayout& layout = stack.slices[i].image->layout;
+    stored.resize(layout.frame_bytes());
+    read(i, stored);
+    const std::size_t bytes = layout.samples() * bytes_per_sample(type);
+    convert_frame(stored, layout, {}, type, target.subspan(stack.planes[i] * bytes, bytes));
+  }
+}
+
+// The slices, those of a plane by their segments, as combinations want them.
+std::vector<std::size_t> by_plane_and_segment(const Stack& stack) {
+  std::vector<std::size_t> order(stack.slices.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, [&](std::size_t i) {
+    return std::pair(stack.planes[i], stack.slices[i].frame->segment);
+  });
+  return order;
+}
+
+// Of samples that are half of the maximum or more, which a set bit is.
+void add_segment(std::span<const std::byte> samples, const Slice& slice,
+                 std::span<Combinations::State> states, Combinations& combinations) {
+  const std::uint32_t maximum = slice.image->segmentation->maximum;
+  for (std::size_t at = 0; at < samples.size(); ++at) {
+    if (std::to_integer<std::uint32_t>(samples[at]) * 2 < maximum) continue;
+    states[at] = combinations.with(states[at], slice.frame->segment);
+  }
+}
+
+// False when a value does not fit into the type.
+bool write_combinations(const Stack& stack, SampleType type, const ReadSlice& read,
+                        std::span<std::byte> target, Combinations& combinations) {
+  const std::vector<std::size_t> order = by_plane_and_segment(stack);
+  std::vector<std::byte> stored;
+  std::vector<Combinations::State> states;
+  for (std::size_t at = 0; at < order.size(); ++at) {
+    const std::size_t i = order[at];
+    const PixelLayout& layout = stack.slices[i].image->layout;
+    const std::uint32_t plane = stack.planes[i];
+    if (at == 0 || plane != stack.planes[order[at - 1]]) {
+      states.assign(layout.samples(), Combinations::kNone);
+    }
+    stored.resize(layout.frame_bytes());
+    read(i, stored);
+    add_segment(stored, stack.slices[i], states, combinations);
+    if (at + 1 < order.size() && stack.planes[order[at + 1]] == plane) continue;
+    const std::size_t bytes = layout.samples() * bytes_per_sample(type);
+    if (!combinations.write(states, type, target.subspan(plane * bytes, bytes))) return false;
+  }
+  return true;
+}
+
+std::vector<LabelEntry> entries_of(const std::vector<Segment>& segments) {
+  std::vector<LabelEntry> entries;
+  for (const Segment& segment : segments) {
+    entries.push_back(
+        {.label = segment.number, .name = label_name(segment.label), .color = segment.color});
+  }
+  return label_table(std::move(entries));
+}
+
+// Those that have a frame.
+std::vector<Segment> segments_in(const Stack& stack) {
+  std::set<std::uint32_t> numbers;
+  for (const Slice& slice : stack.slices) numbers.insert(slice.frame->segment);
+  std::vector<Segment> segments = segmentation_of(stack).segments;
+  std::erase_if(segments, [&](const Segment& each) { return !numbers.contains(each.number); });
+  return segments;
+}
+
+}  // namespace
+
+bool is_segmentation(const DataSet& data) { return !data.text(kSegmentationType).empty(); }
+
+Segmentation describe_segmentation(const DataSet& data) {
+  const SegmentKind kind = kind_of(data);
+  return {.segments = segments_of(data),
+          .kind = kind,
+          .maximum = kind == SegmentKind::kFractional ? maximum_of(data) : 1,
+          .slice_distance = slice_distance(data)};
+}
+
+std::uint32_t segment_of(const DataSet& data, std::uint32_t frame) {
+  const auto number = Attributes(data, frame)
+                          .place(kSegmentIdentificationSequence)
+                          .unsigned_number(kReferencedSegmentNumber);
+  if (number && *number > 0 && *number <= 0xFFFF) return *number;
+  throw_unusable("The DICOM segmentation does not declare the segment of its frame " +
+                 std::to_string(frame + 1) + ' ' + tag_name(kReferencedSegmentNumber) + ".");
+}
+
+std::string segment_name(const Image& image, std::uint64_t number) {
+  const auto& segments = image.segmentation->segments;
+  const auto found = std::ranges::find(segments, number, &Segment::number);
+  const std::string text = std::to_string(number);
+  return found == segments.end() || found->label.empty()
+             ? text
+             : text + " (" + in_quotes(found->label) + ')';
+}
+
+Stack make_label_stack(std::vector<Slice> slices) {
+  refuse_mixtures(slices);
+  const std::vector<Placed> placed = placed_along_normal(slices);
+  Stack stack;
+  stack.planes = planes_of(placed, slices.front().image->segmentation->slice_distance);
+  stack.plane_count = stack.planes.back() + 1;
+  Vector3 step = difference(placed.back().position(), placed.front().position());
+  for (double& part : step) part /= stack.planes.back();
+  refuse_crooked(placed, stack, step);
+  stack.geometry = lattice(placed.front().slice.frame->plane, step);
+  for (const Placed& each : placed) stack.slices.push_back(each.slice);
+  refuse_doubled(stack);
+  return stack;
+}
+
+bool are_shares(const Stack& stack) {
+  const std::uint32_t segment = stack.slices.front().frame->segment;
+  return segmentation_of(stack).kind == SegmentKind::kFractional &&
+         std::ranges::all_of(stack.slices,
+                             [&](const Slice& slice) { return slice.frame->segment == segment; });
+}
+
+std::vector<SampleType> label_types(const Stack& stack) {
+  if (are_shares(stack)) return {SampleType::kUint8};
+  if (is_label_map(stack)) {
+    const unsigned bits = stack.slices.front().image->layout.bits_allocated;
+    return {bits == 8 ? SampleType::kUint8 : SampleType::kUint16};
+  }
+  if (highest_segment(stack) > 0xFF) return {SampleType::kUint16};
+  return {SampleType::kUint8, SampleType::kUint16};
+}
+
+bool write_labels(const Stack& stack, SampleType type, const ReadSlice& read,
+                  std::span<std::byte> target, Volume& volume) {
+  std::ranges::fill(target, std::byte{0});
+  if (are_shares(stack) || is_label_map(stack)) {
+    copy_frames(stack, type, read, target);
+    if (is_label_map(stack)) volume.labels = entries_of(segmentation_of(stack).segments);
+    return true;
+  }
+  Combinations combinations(highest_segment(stack));
+  if (!write_combinations(stack, type, read, target, combinations)) return false;
+  volume.labels = combinations.entries(entries_of(segments_in(stack)));
+  if (auto note = combinations.note()) volume.notes.push_back(std::move(*note));
+  return true;
+}
+
+std::optional<Note> note_on_shares(const Stack& stack) {
+  const Segmentation& segmentation = segmentation_of(stack);
+  if (segmentation.kind != SegmentKind::kFractional) return std::nullopt;
+  return note_of(NoteCode::kFractionalSegments,
+                 "A sample belongs to a segment if its value is " + to_text(half_of(stack)) +
+                     " or more, half of the maximum." +
+                     (are_shares(stack) ? " The values are kept unchanged." : ""));
+}
+
+double half_of(const Stack& stack) { return segmentation_of(stack).maximum / 2.0; }
+
+}  // namespace isomesh::import::dicom

@@ -1,0 +1,264 @@
+#include "server/import/dicom/pixels/decode.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include <gdcmDataElement.h>
+#include <gdcmFragment.h>
+#include <gdcmJPEG2000Codec.h>
+#include <gdcmJPEGCodec.h>
+#include <gdcmJPEGLSCodec.h>
+#include <gdcmSequenceOfFragments.h>
+#include <gdcmTrace.h>
+
+#include "base/text.h"
+#include "server/import/dicom/elements/tags.h"
+#include "server/import/source/source.h"
+
+namespace isomesh::import::dicom {
+namespace {
+
+enum class Family { kRle, kJpeg, kJpegLs, kJpeg2000 };
+
+struct Syntax {
+  std::string_view uid;
+  Family family;
+  std::string_view name;
+};
+
+constexpr std::array kSyntaxes = {
+    Syntax{kRle, Family::kRle, "RLE"},
+    Syntax{"1.2.840.10008.1.2.4.50", Family::kJpeg, "JPEG baseline"},
+    Syntax{"1.2.840.10008.1.2.4.51", Family::kJpeg, "JPEG extended"},
+    Syntax{"1.2.840.10008.1.2.4.57", Family::kJpeg, "JPEG lossless"},
+    Syntax{"1.2.840.10008.1.2.4.70", Family::kJpeg, "JPEG lossless"},
+    Syntax{"1.2.840.10008.1.2.4.80", Family::kJpegLs, "JPEG-LS lossless"},
+    Syntax{"1.2.840.10008.1.2.4.81", Family::kJpegLs, "JPEG-LS"},
+    Syntax{"1.2.840.10008.1.2.4.90", Family::kJpeg2000, "JPEG 2000 lossless"},
+    Syntax{"1.2.840.10008.1.2.4.91", Family::kJpeg2000, "JPEG 2000"}};
+
+const Syntax* find_syntax(std::string_view uid) {
+  const auto* found =
+      std::ranges::find(kSyntaxes, uid, [](const Syntax& syntax) { return syntax.uid; });
+  return found == kSyntaxes.end() ? nullptr : found;
+}
+
+// What a code stream's header tells.
+struct StreamSize {
+  std::uint32_t columns = 0;
+  std::uint32_t rows = 0;
+  unsigned components = 0;
+  unsigned bits = 0;
+};
+
+std::uint32_t big_endian(std::span<const std::byte> bytes, std::size_t at, std::size_t count) {
+  std::uint32_t number = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    number = number << 8 | std::to_integer<std::uint32_t>(bytes[at + i]);
+  }
+  return number;
+}
+
+// Frame headers have the markers C0 to CF, but for C4, C8 and CC, which are tables or reserved, and
+// JPEG-LS's F7.
+bool is_frame_header(std::uint32_t marker) {
+  if (marker == 0xFFF7) return true;
+  return marker >= 0xFFC0 && marker <= 0xFFCF && marker != 0xFFC4 && marker != 0xFFC8 &&
+         marker != 0xFFCC;
+}
+
+std::optional<StreamSize> jpeg_size(std::span<const std::byte> stream) {
+  if (stream.size() < 4 || big_endian(stream, 0, 2) != 0xFFD8) return std::nullopt;
+  for (std::size_t at = 2; at + 10 <= stream.size();) {
+    const std::uint32_t marker = big_endian(stream, at, 2);
+    if (marker == 0xFFFF) {  // fill bytes may stand before a marker
+      ++at;
+      continue;
+    }
+    if (marker < 0xFF01) return std::nullopt;
+    if (is_frame_header(marker)) {
+      return StreamSize{.columns = big_endian(stream, at + 7, 2),
+                        .rows = big_endian(stream, at + 5, 2),
+                        .components = big_endian(stream, at + 9, 1),
+                        .bits = big_endian(stream, at + 4, 1)};
+    }
+    at += 2 + std::size_t{big_endian(stream, at + 2, 2)};
+  }
+  return std::nullopt;
+}
+
+// ISO/IEC 15444-1, A.5.1: the SIZ segment is the first behind the start of the code stream.
+std::optional<StreamSize> jpeg_2000_size(std::span<const std::byte> stream) {
+  constexpr std::size_t kNeeded = 43;
+  if (stream.size() < kNeeded || big_endian(stream, 0, 4) != 0xFF4FFF51) return std::nullopt;
+  const std::uint32_t right = big_endian(stream, 8, 4);
+  const std::uint32_t bottom = big_endian(stream, 12, 4);
+  const std::uint32_t left = big_endian(stream, 16, 4);
+  const std::uint32_t top = big_endian(stream, 20, 4);
+  if (right < left || bottom < top) return std::nullopt;
+  return StreamSize{.columns = right - left,
+                    .rows = bottom - top,
+                    .components = big_endian(stream, 40, 2),
+                    .bits = (big_endian(stream, 42, 1) & 0x7FU) + 1};
+}
+
+// GDCM fills a cut stream up without an error, so the stream must have its end, FFD9, and nothing
+// but padding after it.
+bool is_whole(std::span<const std::byte> stream) {
+  while (!stream.empty() && stream.back() == std::byte{0}) stream = stream.first(stream.size() - 1);
+  return stream.size() >= 2 && big_endian(stream, stream.size() - 2, 2) == 0xFFD9;
+}
+
+void check_stream(std::span<const std::byte> stream, const Syntax& syntax,
+                  const PixelLayout& layout) {
+  const auto size = syntax.family == Family::kJpeg2000 ? jpeg_2000_size(stream) : jpeg_size(stream);
+  if (!size) {
+    throw_unusable("its compressed samples are not a " + std::string(syntax.name) + " stream");
+  }
+  if (!is_whole(stream)) throw_unusable("its compressed samples are truncated");
+  if (size->columns != layout.columns || size->rows != layout.rows || size->components != 1) {
+    throw_unusable("its compressed samples are " + std::to_string(size->columns) + " x " +
+                   std::to_string(size->rows) + " with " + std::to_string(size->components) +
+                   " components, but its header declares " + std::to_string(layout.columns) +
+                   " x " + std::to_string(layout.rows) + " with 1");
+  }
+  if ((size->bits + 7) / 8 != layout.bits_allocated / 8) {
+    throw_unusable("its compressed samples have " + std::to_string(size->bits) +
+                   " bits, but its header declares " + std::to_string(layout.bits_allocated));
+  }
+}
+
+void decode_rle_segment(std::span<const std::byte> segment, std::size_t first, std::size_t stride,
+                        std::span<std::byte> target) {
+  std::size_t at = first;
+  for (std::size_t next = 0; at < target.size();) {
+    if (next + 1 >= segment.size()) throw_unusable("its RLE segment ends before its samples do");
+    const int control = static_cast<signed char>(segment[next++]);
+    if (control == -128) continue;
+    const bool is_run = control < 0;
+    const auto count = static_cast<std::size_t>(is_run ? 1 - control : control + 1);
+    if (!is_run && count > segment.size() - next) {
+      throw_unusable("its RLE segment ends before its samples do");
+    }
+    for (std::size_t i = 0; i < count && at < target.size(); ++i, at += stride) {
+      target[at] = segment[is_run ? next : next + i];
+    }
+    next += is_run ? 1 : count;
+  }
+}
+
+// PS3.5, annex G: one segment of packed bytes for every byte of a sample, the highest first. It is
+// decoded here, because GDCM's decoder reports success on streams that end early.
+void decode_rle(std::span<const std::byte> stream, const PixelLayout& layout,
+                std::span<std::byte> target) {
+  constexpr std::size_t kHeaderBytes = 64;
+  if (stream.size() < kHeaderBytes) throw_unusable("its RLE header is truncated");
+  const auto header = [&](std::size_t index) {
+    std::array<std::byte, 4> word;
+    std::copy_n(stream.begin() + static_cast<std::ptrdiff_t>(index) * 4, 4, word.begin());
+    std::reverse(word.begin(), word.end());
+    return std::size_t{big_endian(word, 0, 4)};
+  };
+  const std::size_t segments = layout.bits_allocated / 8;
+  if (header(0) != segments) {
+    throw_unusable("its RLE header declares " + std::to_string(header(0)) + " segments, but " +
+                   std::to_string(segments) + " are needed");
+  }
+  for (std::size_t i = 0; i < segments; ++i) {
+    const std::size_t begin = header(i + 1);
+    const std::size_t end = i + 1 < segments ? header(i + 2) : stream.size();
+    if (begin < kHeaderBytes || begin > end || end > stream.size()) {
+      throw_unusable("its RLE segments lie outside its compressed data");
+    }
+    decode_rle_segment(stream.subspan(begin, end - begin), segments - 1 - i, segments, target);
+  }
+}
+
+// GDCM writes warnings about files to the standard error output, which nobody should read there.
+void silence_gdcm() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    gdcm::Trace::DebugOff();
+    gdcm::Trace::WarningOff();
+    gdcm::Trace::ErrorOff();
+  });
+}
+
+template <class Codec>
+bool decode_by(const gdcm::DataElement& input, const PixelLayout& layout,
+               gdcm::DataElement& output) {
+  Codec codec;
+  const std::array<unsigned, 3> dimensions = {layout.columns, layout.rows, 1};
+  const auto bits = [](unsigned count) { return static_cast<unsigned short>(count); };
+  codec.SetNumberOfDimensions(2);
+  codec.SetDimensions(dimensions.data());
+  codec.SetPixelFormat(gdcm::PixelFormat(1, bits(layout.bits_allocated), bits(layout.bits_stored),
+                                         bits(layout.bits_stored - 1), layout.is_signed ? 1 : 0));
+  codec.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
+  if constexpr (requires { codec.SetBufferLength(0); }) {
+    codec.SetBufferLength(layout.frame_bytes());
+  }
+  return codec.Decode(input, output);
+}
+
+bool decode_by_gdcm(Family family, const gdcm::DataElement& input, const PixelLayout& layout,
+                    gdcm::DataElement& output) {
+  switch (family) {
+    case Family::kRle:
+      return false;
+    case Family::kJpeg:
+      return decode_by<gdcm::JPEGCodec>(input, layout, output);
+    case Family::kJpegLs:
+      return decode_by<gdcm::JPEGLSCodec>(input, layout, output);
+    case Family::kJpeg2000:
+      return decode_by<gdcm::JPEG2000Codec>(input, layout, output);
+  }
+  return false;
+}
+
+void decode_jpeg(std::span<const std::byte> stream, const Syntax& syntax, const PixelLayout& layout,
+                 std::span<std::byte> target) {
+  check_stream(stream, syntax, layout);
+  silence_gdcm();
+  gdcm::Fragment fragment;
+  fragment.SetByteValue(reinterpret_cast<const char*>(stream.data()),
+                        static_cast<std::uint32_t>(stream.size()));
+  const gdcm::SmartPointer<gdcm::SequenceOfFragments> fragments = new gdcm::SequenceOfFragments;
+  fragments->AddFragment(fragment);
+  gdcm::DataElement input(gdcm::Tag(0x7fe0, 0x0010));
+  input.SetValue(*fragments);
+  gdcm::DataElement output;
+  bool decoded = false;
+  try {
+    decoded = decode_by_gdcm(syntax.family, input, layout, output);
+  } catch (const std::exception&) {
+    // GDCM's texts are not passed on, because they name its source files.
+  }
+  const gdcm::ByteValue* bytes = decoded ? output.GetByteValue() : nullptr;
+  if (bytes == nullptr || std::size_t{bytes->GetLength()} < target.size()) {
+    throw_unusable("its " + std::string(syntax.name) + " stream is corrupt");
+  }
+  std::memcpy(target.data(), bytes->GetPointer(), target.size());
+}
+
+}  // namespace
+
+bool can_decode(std::string_view transfer_syntax) {
+  return find_syntax(transfer_syntax) != nullptr;
+}
+
+void decode_frame(std::string_view transfer_syntax, std::span<const std::byte> compressed,
+                  const PixelLayout& layout, std::span<std::byte> target) {
+  const Syntax* syntax = find_syntax(transfer_syntax);
+  if (syntax == nullptr) {
+    throw_unusable("its transfer syntax " + in_quotes(transfer_syntax) + " is not supported");
+  }
+  if (syntax->family == Family::kRle) return decode_rle(compressed, layout, target);
+  decode_jpeg(compressed, *syntax, layout, target);
+}
+
+}  // namespace isomesh::import::dicom

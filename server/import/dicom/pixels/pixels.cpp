@@ -1,0 +1,144 @@
+#include "server/import/dicom/pixels/pixels.h"
+
+#include <algorithm>
+#include <string>
+
+#include "server/import/dicom/elements/tags.h"
+#include "server/import/dicom/pixels/decode.h"
+#include "server/import/source/source.h"
+
+namespace isomesh::import::dicom {
+namespace {
+
+// Compressed samples may be larger than plain ones, but not by much.
+std::uint64_t most_compressed_bytes(const PixelLayout& layout) {
+  return layout.frame_bytes() * 2 + (std::uint64_t{1} << 20);
+}
+
+void swap_pairs(std::span<std::byte> bytes) {
+  for (std::size_t at = 0; at + 1 < bytes.size(); at += 2) std::swap(bytes[at], bytes[at + 1]);
+}
+
+// Every compressed frame begins like this, whatever the syntax.
+bool begins_frame(const DicomFile& file, const Extent& fragment) {
+  const std::string head = file.bytes().text(fragment.offset, 4);
+  return head.starts_with("\xFF\xD8\xFF") || head.starts_with("\xFF\x4F\xFF\x51");
+}
+
+bool is_one_of(const std::vector<std::uint64_t>& sorted, std::uint64_t value) {
+  return std::binary_search(sorted.begin(), sorted.end(), value);
+}
+
+std::vector<std::size_t> first_fragments(const DicomFile& file, std::size_t frames) {
+  const PixelElement& pixels = *file.pixels();
+  const std::size_t fragments = pixels.fragments.size();
+  const bool has_table = pixels.frame_offsets.size() == frames;
+  std::vector<std::size_t> firsts;
+  std::uint64_t offset = 0;  // of a fragment's item from the first one's
+  for (std::size_t i = 0; i < fragments; ++i) {
+    const bool is_first = fragments == frames || i == 0 ||
+                          (frames > 1 && (has_table ? is_one_of(pixels.frame_offsets, offset)
+                                                    : begins_frame(file, pixels.fragments[i])));
+    if (is_first) firsts.push_back(i);
+    offset += pixels.fragments[i].bytes + 8;
+  }
+  if (firsts.size() != frames) {
+    throw_unusable("its compressed frames cannot be separated: " + std::to_string(fragments) +
+                   " fragments hold " + std::to_string(frames) + " frames");
+  }
+  firsts.push_back(fragments);
+  return firsts;
+}
+
+}  // namespace
+
+FrameReader::FrameReader(const DicomFile& file, const Image& image)
+    : file_(file), image_(image), stored_(image.stored) {
+  if (!file.pixels()->is_encapsulated) return;
+  first_fragments_ = first_fragments(file, image.tiles_per_row > 0 ? 1 : image.frames.size());
+}
+
+void FrameReader::read(std::uint32_t frame, std::span<std::byte> target) {
+  if (image_.tiles_per_row > 0) return read_tile(frame, target);
+  if (stored_.bits_allocated == 1) return read_bits(frame, target);
+  read_stored(frame, target);
+}
+
+void FrameReader::read_stored(std::uint32_t frame, std::span<std::byte> target) const {
+  if (!file_.pixels()->is_encapsulated) return read_native(frame, target);
+  decode_frame(file_.transfer_syntax(), compressed(frame), stored_, target);
+}
+
+void FrameReader::read_tile(std::uint32_t tile, std::span<std::byte> target) {
+  if (mosaic_.empty()) {
+    mosaic_.resize(stored_.frame_bytes());
+    read_stored(0, mosaic_);
+  }
+  const PixelLayout& layout = image_.layout;
+  const std::size_t sample = stored_.bits_allocated / 8;
+  const std::size_t row_bytes = layout.columns * sample;
+  const std::size_t left = tile % image_.tiles_per_row * row_bytes;
+  const std::size_t top = std::size_t{tile / image_.tiles_per_row} * layout.rows;
+  for (std::size_t row = 0; row < layout.rows; ++row) {
+    const std::size_t from = (top + row) * stored_.columns * sample + left;
+    std::ranges::copy(std::span(mosaic_).subspan(from, row_bytes),
+                      target.subspan(row * row_bytes, row_bytes).begin());
+  }
+}
+
+// Bits fill bytes from the lowest on, and frames follow one another within bytes.
+void FrameReader::read_bits(std::uint32_t frame, std::span<std::byte> target) const {
+  const PixelElement& pixels = *file_.pixels();
+  const std::uint64_t first = std::uint64_t{frame} * target.size();
+  const bool is_swapped = file_.transfer_syntax() == kExplicitBigEndian && pixels.is_words;
+  // Whole words, because a big-endian one has its bytes turned around.
+  const std::uint64_t begin = first / 16 * 2;
+  const std::uint64_t end = std::min((first + target.size() + 15) / 16 * 2, pixels.native.bytes);
+  std::vector<std::byte> packed(end - begin);
+  if (file_.bytes().read(pixels.native.offset + begin, packed) != packed.size()) {
+    throw_unusable("the file ends before its samples do");
+  }
+  if (is_swapped) {
+    if (packed.size() % 2 != 0) throw_unusable("its bytes are swapped across its end");
+    swap_pairs(packed);
+  }
+  for (std::size_t at = 0; at < target.size(); ++at) {
+    const std::uint64_t bit = first + at - begin * 8;
+    target[at] = packed[bit / 8] >> (bit % 8) & std::byte{1};
+  }
+}
+
+void FrameReader::read_native(std::uint32_t frame, std::span<std::byte> target) const {
+  const PixelElement& pixels = *file_.pixels();
+  const std::uint64_t offset = pixels.native.offset + frame * stored_.frame_bytes();
+  if (file_.bytes().read(offset, target) != target.size()) {
+    throw_unusable("the file ends before its samples do");
+  }
+  if (file_.transfer_syntax() != kExplicitBigEndian) return;
+  if (stored_.bits_allocated > 8) {
+    swap_bytes(target, stored_.bits_allocated / 8);
+  } else if (pixels.is_words) {
+    if (target.size() % 2 != 0) throw_unusable("its bytes are swapped across its end");
+    swap_pairs(target);
+  }
+}
+
+std::vector<std::byte> FrameReader::compressed(std::uint32_t frame) const {
+  const std::vector<Extent>& fragments = file_.pixels()->fragments;
+  const std::size_t first = first_fragments_[frame];
+  const std::size_t end = first_fragments_[frame + 1];
+  std::uint64_t bytes = 0;
+  for (std::size_t i = first; i < end; ++i) bytes += fragments[i].bytes;
+  if (bytes > most_compressed_bytes(stored_)) {
+    throw_unusable("its compressed samples take far more bytes than its size explains");
+  }
+  std::vector<std::byte> result(bytes);
+  std::span<std::byte> rest = result;
+  for (std::size_t i = first; i < end; ++i) {
+    file_.bytes().read(fragments[i].offset, rest.first(fragments[i].bytes));
+    rest = rest.subspan(fragments[i].bytes);
+  }
+  return result;
+}
+
+}  // namespace isomesh::import::dicom

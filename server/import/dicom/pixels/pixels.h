@@ -1,0 +1,39 @@
+// The samples of one frame, as they are stored or compressed.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "server/import/dicom/geometry/image.h"
+
+namespace isomesh::import::dicom {
+
+// Reads the frames of one file. The file and its description must outlive the reader. Not thread
+// safe.
+class FrameReader {
+ public:
+  // Throws Error kUnusableVolume when the frames cannot be told apart among compressed fragments.
+  FrameReader(const DicomFile& file, const Image& image);
+
+  // Reads one frame of the image into `target`, which has layout.frame_bytes() bytes:
+  // little-endian, bits as they are stored, single ones as a byte each. Throws Error
+  // kUnusableVolume when the frame cannot be decoded or is of another size than its object tells.
+  void read(std::uint32_t frame, std::span<std::byte> target);
+
+ private:
+  void read_stored(std::uint32_t frame, std::span<std::byte> target) const;
+  void read_bits(std::uint32_t frame, std::span<std::byte> target) const;
+  void read_tile(std::uint32_t tile, std::span<std::byte> target);
+  void read_native(std::uint32_t frame, std::span<std::byte> target) const;
+  std::vector<std::byte> compressed(std::uint32_t frame) const;
+
+  const DicomFile& file_;
+  const Image& image_;
+  const PixelLayout& stored_;
+  std::vector<std::byte> mosaic_;  // the one frame of tiles, once it was read
+  // Where each compressed frame begins among the fragments, and one beyond the last.
+  std::vector<std::size_t> first_fragments_;
+};
+
+}  // namespace isomesh::import::dicom

@@ -1,0 +1,161 @@
+#include "server/import/dicom/pixels/values.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+#include <utility>
+
+#include "proto/samples.h"
+
+namespace isomesh::import::dicom {
+namespace {
+
+// Products of these and samples of 32 bits are exact in 64 bits.
+constexpr double kLargestFactor = 0x1p30;
+
+bool is_integral(double value) {
+  return std::abs(value) <= kLargestFactor && std::floor(value) == value;
+}
+
+bool is_integral(const Rescale& rescale) {
+  return is_integral(rescale.slope) && is_integral(rescale.intercept);
+}
+
+struct Range {
+  std::int64_t low = 0;
+  std::int64_t high = 0;
+};
+
+Range stored_range(const PixelLayout& layout) {
+  const std::int64_t count = std::int64_t{1} << layout.bits_stored;
+  return layout.is_signed ? Range{-count / 2, count / 2 - 1} : Range{0, count - 1};
+}
+
+Range value_range(const PixelLayout& layout, const Rescale& rescale) {
+  const auto slope = static_cast<std::int64_t>(rescale.slope);
+  const auto intercept = static_cast<std::int64_t>(rescale.intercept);
+  const Range stored = stored_range(layout);
+  const std::int64_t one = stored.low * slope + intercept;
+  const std::int64_t other = stored.high * slope + intercept;
+  return {std::min(one, other), std::max(one, other)};
+}
+
+struct IntegerType {
+  SampleType type;
+  Range range;
+};
+
+template <class Integer>
+constexpr IntegerType integer_type() {
+  return {sample_type<Integer>(),
+          {std::numeric_limits<Integer>::min(), std::numeric_limits<Integer>::max()}};
+}
+
+constexpr IntegerType kIntegerTypes[] = {
+    integer_type<std::uint8_t>(), integer_type<std::int8_t>(),  integer_type<std::uint16_t>(),
+    integer_type<std::int16_t>(), integer_type<std::int32_t>(), integer_type<std::uint32_t>(),
+};
+
+std::vector<SampleType> integer_candidates(const Range& values, unsigned bits_allocated) {
+  std::vector<SampleType> candidates;
+  for (const IntegerType& each : kIntegerTypes) {
+    if (bytes_per_sample(each.type) < bits_allocated / 8) continue;
+    if (each.range.low <= values.low && values.high <= each.range.high) {
+      candidates.push_back(each.type);
+      return candidates;
+    }
+    if (each.type == SampleType::kInt16 && bits_allocated == 16) candidates.push_back(each.type);
+  }
+  candidates.push_back(SampleType::kFloat64);
+  return candidates;
+}
+
+template <class Stored, class Value>
+bool convert(std::span<const std::byte> stored, const PixelLayout& layout, const Rescale& rescale,
+             std::byte* target) {
+  const unsigned shift = layout.high_bit + 1 - layout.bits_stored;
+  const std::uint64_t mask = (std::uint64_t{1} << layout.bits_stored) - 1;
+  const std::uint64_t sign = layout.is_signed ? std::uint64_t{1} << (layout.bits_stored - 1) : 0;
+  const bool integral = is_integral(rescale);
+  const auto slope = integral ? static_cast<std::int64_t>(rescale.slope) : 0;
+  const auto intercept = integral ? static_cast<std::int64_t>(rescale.intercept) : 0;
+  for (std::size_t at = 0; at < stored.size(); at += sizeof(Stored), target += sizeof(Value)) {
+    Stored word;
+    std::memcpy(&word, stored.data() + at, sizeof(Stored));
+    const std::uint64_t bits = std::uint64_t{word} >> shift & mask;
+    const auto sample = static_cast<std::int64_t>(bits ^ sign) - static_cast<std::int64_t>(sign);
+    Value value{};
+    if constexpr (std::is_integral_v<Value>) {
+      const std::int64_t exact = sample * slope + intercept;
+      if (!std::in_range<Value>(exact)) return false;
+      value = static_cast<Value>(exact);
+    } else {
+      // A value beyond the largest float becomes infinite, and the volume is refused for it later.
+      value = static_cast<Value>(static_cast<double>(sample) * rescale.slope + rescale.intercept);
+    }
+    std::memcpy(target, &value, sizeof(Value));
+  }
+  return true;
+}
+
+template <class Stored, class Value>
+bool convert_reals(std::span<const std::byte> stored, const Rescale& rescale, std::byte* target) {
+  for (std::size_t at = 0; at < stored.size(); at += sizeof(Stored), target += sizeof(Value)) {
+    Stored sample;
+    std::memcpy(&sample, stored.data() + at, sizeof(Stored));
+    const auto value = static_cast<Value>(sample * rescale.slope + rescale.intercept);
+    std::memcpy(target, &value, sizeof(Value));
+  }
+  return true;
+}
+
+template <class Value>
+bool convert_to(std::span<const std::byte> stored, const PixelLayout& layout,
+                const Rescale& rescale, std::byte* target) {
+  if constexpr (std::is_floating_point_v<Value>) {
+    if (layout.is_float && layout.bits_allocated == 32) {
+      return convert_reals<float, Value>(stored, rescale, target);
+    }
+    if (layout.is_float) return convert_reals<double, Value>(stored, rescale, target);
+  }
+  switch (layout.bits_allocated) {
+    case 8:
+      return convert<std::uint8_t, Value>(stored, layout, rescale, target);
+    case 16:
+      return convert<std::uint16_t, Value>(stored, layout, rescale, target);
+    default:
+      return convert<std::uint32_t, Value>(stored, layout, rescale, target);
+  }
+}
+
+}  // namespace
+
+std::vector<SampleType> candidate_types(std::span<const Slice> slices) {
+  unsigned bits_allocated = 0;
+  bool integral = true;
+  bool fits_float = true;
+  for (const Slice& slice : slices) {
+    const PixelLayout& layout = slice.image->layout;
+    bits_allocated = std::max(bits_allocated, layout.bits_allocated);
+    integral = integral && !layout.is_float && is_integral(slice.frame->rescale);
+    fits_float = fits_float && layout.bits_allocated <= (layout.is_float ? 32 : 16);
+  }
+  if (!integral) return {fits_float ? SampleType::kFloat32 : SampleType::kFloat64};
+  Range all = value_range(slices.front().image->layout, slices.front().frame->rescale);
+  for (const Slice& slice : slices) {
+    const Range values = value_range(slice.image->layout, slice.frame->rescale);
+    all = {std::min(all.low, values.low), std::max(all.high, values.high)};
+  }
+  return integer_candidates(all, bits_allocated);
+}
+
+bool convert_frame(std::span<const std::byte> stored, const PixelLayout& layout,
+                   const Rescale& rescale, SampleType type, std::span<std::byte> target) {
+  return with_sample(type, [&](auto sample) {
+    return convert_to<decltype(sample)>(stored, layout, rescale, target.data());
+  });
+}
+
+}  // namespace isomesh::import::dicom

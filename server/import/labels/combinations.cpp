@@ -1,0 +1,118 @@
+#include "server/import/labels/combinations.h"
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <string>
+
+#include "server/import/labels/label_table.h"
+#include "server/import/source/names.h"
+
+namespace isomesh::import {
+namespace {
+
+// Of which some may be no sample's in the end.
+constexpr std::size_t kMostStates = std::size_t{1} << 20;
+
+template <class Value>
+bool write_as(std::span<const std::uint32_t> values, std::span<std::byte> target) {
+  for (std::size_t at = 0; at < values.size(); ++at) {
+    const auto value = static_cast<Value>(values[at]);
+    if (value != values[at]) return false;
+    std::memcpy(target.data() + at * sizeof(Value), &value, sizeof(Value));
+  }
+  return true;
+}
+
+}  // namespace
+
+Combinations::Combinations(std::uint32_t highest_label) : next_value_(highest_label + 1) {}
+
+Combinations::State Combinations::with(State state, std::uint32_t label) {
+  if (nodes_[state].label == label) return state;
+  const std::uint64_t key = std::uint64_t{state} << 32 | label;
+  if (key == last_key_ && last_state_ != kNone) return last_state_;
+  const auto [child, is_new] = children_.emplace(key, static_cast<State>(nodes_.size()));
+  if (is_new) {
+    if (nodes_.size() == kMostStates) {
+      throw_unusable("The segments overlap in more than " + std::to_string(kMostStates) +
+                     " combinations. Choose one segment with volume=N.");
+    }
+    nodes_.push_back({.parent = state, .label = label, .size = nodes_[state].size + 1});
+  }
+  last_key_ = key;
+  last_state_ = child->second;
+  return last_state_;
+}
+
+std::uint32_t Combinations::new_label() { return next_value(); }
+
+std::uint32_t Combinations::next_value() {
+  constexpr std::uint32_t kMostValues = 0xFFFF;
+  if (next_value_ > kMostValues) {
+    throw_unusable("The segments and their overlaps need more than the " +
+                   std::to_string(kMostValues) +
+                   " values that are available. Choose one segment with volume=N.");
+  }
+  return next_value_++;
+}
+
+std::uint32_t Combinations::value(State state) {
+  Node& node = nodes_[state];
+  if (node.value == 0 && node.size == 1) node.value = node.label;
+  if (node.value == 0 && node.size > 1) {
+    node.value = next_value();
+    ++overlaps_;
+  }
+  return node.value;
+}
+
+std::vector<LabelEntry> Combinations::entries(std::vector<LabelEntry> named) const {
+  std::map<std::uint32_t, std::vector<std::int64_t>> values;
+  std::size_t count = 0;
+  for (const Node& node : nodes_) {
+    if (node.value == 0) continue;
+    count += node.size;
+    // Each takes some bytes of an answer, and one combination may be of thousands.
+    if (count > Volume::kMostLabels * 16) {
+      throw_unusable(
+          "The segments overlap in too many combinations to list. Choose one segment with "
+          "volume=N.");
+    }
+    for (const Node* part = &node; part->size > 0; part = &nodes_[part->parent]) {
+      values[part->label].push_back(node.value);
+    }
+  }
+  for (const auto& [label, unused] : values) named.push_back({.label = label});
+  named = label_table(std::move(named));
+  for (LabelEntry& entry : named) {
+    const auto found = values.find(static_cast<std::uint32_t>(entry.label));
+    if (found == values.end()) continue;
+    std::ranges::sort(found->second);
+    if (found->second != std::vector{entry.label}) entry.values = std::move(found->second);
+  }
+  return label_table(std::move(named));
+}
+
+bool Combinations::write(std::span<const State> states, SampleType type,
+                         std::span<std::byte> target) {
+  std::vector<std::uint32_t> values(states.size());
+  for (std::size_t at = 0; at < states.size(); ++at) {
+    values[at] = value(states[at]);
+    if (nodes_[states[at]].size > 1) ++overlapping_samples_;
+  }
+  return type == SampleType::kUint8 ? write_as<std::uint8_t>(values, target)
+                                    : write_as<std::uint16_t>(values, target);
+}
+
+std::optional<Note> Combinations::note() const {
+  if (overlapping_samples_ == 0) return std::nullopt;
+  return note_of(NoteCode::kOverlappingSegments,
+                 std::to_string(overlapping_samples_) +
+                     (overlapping_samples_ == 1 ? " sample belongs" : " samples belong") +
+                     " to several segments. " + std::to_string(overlaps_) +
+                     (overlaps_ == 1 ? " value stands" : " values stand") +
+                     " for their combinations.");
+}
+
+}  // namespace isomesh::import

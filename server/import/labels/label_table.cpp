@@ -1,0 +1,66 @@
+#include "server/import/labels/label_table.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include "base/hex.h"
+#include "base/text.h"
+#include "server/import/source/names.h"
+#include "server/volume/names.h"
+
+namespace isomesh::import {
+namespace {
+
+// Of names, and of values by some ten bytes each: what an import's answer has room for.
+constexpr std::size_t kMostBytes = std::size_t{4} << 20;
+
+std::string valid_utf8(std::string_view text) {
+  using Json = nlohmann::json;
+  const std::string quoted = Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
+  return Json::parse(quoted).get<std::string>();
+}
+
+void check_size(const std::vector<LabelEntry>& entries) {
+  if (entries.size() > Volume::kMostLabels) {
+    throw_unusable("The file has " + std::to_string(entries.size()) + " labels. At most " +
+                   std::to_string(Volume::kMostLabels) + " are supported.");
+  }
+  constexpr std::size_t kBytesOfValue = 8;
+  std::size_t bytes = 0;
+  for (const LabelEntry& entry : entries) {
+    bytes += entry.name.size() + entry.values.size() * kBytesOfValue;
+  }
+  if (bytes <= kMostBytes) return;
+  throw_unusable("The names and overlaps of the file's labels take more than the " +
+                 std::to_string(kMostBytes) + " bytes that can be stored.");
+}
+
+}  // namespace
+
+std::string label_name(std::string_view text) {
+  // More than the bytes that can remain, before others are replaced by longer ones.
+  const std::string_view first = beginning(trimmed(text), LabelEntry::kMostNameBytes);
+  const std::string name = volume::normalized(printable(valid_utf8(first)));
+  return std::string(beginning(name, LabelEntry::kMostNameBytes));
+}
+
+std::optional<std::string> label_color(const std::array<double, 3>& parts) {
+  std::array<std::uint8_t, 3> bytes = {};
+  for (std::size_t at = 0; at < parts.size(); ++at) {
+    if (!std::isfinite(parts[at])) return std::nullopt;
+    bytes[at] = static_cast<std::uint8_t>(std::lround(std::clamp(parts[at], 0.0, 1.0) * 255));
+  }
+  return '#' + to_hex(bytes);
+}
+
+std::vector<LabelEntry> label_table(std::vector<LabelEntry> entries) {
+  std::ranges::stable_sort(entries, {}, &LabelEntry::label);
+  const auto is_same = [](const LabelEntry& a, const LabelEntry& b) { return a.label == b.label; };
+  entries.erase(std::unique(entries.begin(), entries.end(), is_same), entries.end());
+  check_size(entries);
+  return entries;
+}
+
+}  // namespace isomesh::import

@@ -1,0 +1,155 @@
+#include "server/import/labels/label_text.h"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "base/text.h"
+#include "server/import/labels/label_table.h"
+
+namespace isomesh::import {
+namespace {
+
+using Words = std::span<const std::string_view>;
+using Color = std::array<double, 3>;
+
+constexpr double kMostColor = 255;
+
+struct TextEntry {
+  std::int64_t label = 0;
+  std::string_view name;
+  // The name's only word, where a single number follows it, as in MRIcron's tables.
+  std::string_view name_ahead_of_number;
+  std::optional<Color> color;
+};
+
+bool is_comment(std::string_view line) {
+  return line.starts_with('#') || line.starts_with('%') || line.starts_with("//");
+}
+
+bool is_number(std::string_view word) { return parse_double(word).has_value(); }
+
+std::optional<Color> color_of(Words words) {
+  Color color = {};
+  for (std::size_t at = 0; at < color.size(); ++at) {
+    const auto part = parse_double(words[at]);
+    if (!part || !(*part >= 0 && *part <= kMostColor)) return std::nullopt;
+    color[at] = *part;
+  }
+  return color;
+}
+
+// From the beginning of the first to the end of the last: words are views of one line.
+std::string_view joined(Words words) {
+  const char* const begin = words.front().data();
+  const char* const end = words.back().data() + words.back().size();
+  return {begin, static_cast<std::size_t>(end - begin)};
+}
+
+std::string_view without_quotes(std::string_view name) {
+  if (name.size() < 2 || name.front() != '"' || name.back() != '"') return name;
+  return trimmed(name.substr(1, name.size() - 2));
+}
+
+// Numbers come first: a colour, with an opacity or with all that ITK-SNAP tells.
+std::optional<TextEntry> after_color(std::int64_t label, Words rest, std::size_t numbers) {
+  if (numbers != 3 && numbers != 4 && numbers != 6) return std::nullopt;
+  const auto color = color_of(rest);
+  if (!color || numbers == rest.size()) return std::nullopt;
+  const std::string_view name = without_quotes(joined(rest.subspan(numbers)));
+  return TextEntry{.label = label, .name = name, .name_ahead_of_number = {}, .color = color};
+}
+
+// A name comes first. Three or four numbers at the end are its colour, with an opacity or without.
+std::optional<TextEntry> ahead_of_color(std::int64_t label, Words rest) {
+  constexpr std::size_t kMostNumbers = 4;
+  std::size_t numbers = 0;
+  while (numbers < kMostNumbers && numbers + 1 < rest.size() &&
+         is_number(rest[rest.size() - numbers - 1])) {
+    ++numbers;
+  }
+  TextEntry entry = {.label = label, .name = {}, .name_ahead_of_number = {}, .color = {}};
+  if (numbers >= 3) entry.color = color_of(rest.last(numbers));
+  if (numbers == 1 && rest.size() == 2) entry.name_ahead_of_number = rest.front();
+  entry.name = without_quotes(joined(entry.color ? rest.first(rest.size() - numbers) : rest));
+  return entry;
+}
+
+std::optional<TextEntry> entry_of(std::string_view line) {
+  const std::vector<std::string_view> all = words(line);
+  if (all.size() < 2 || has_control_characters(line)) return std::nullopt;
+  const auto label = parse_int64(all.front());
+  if (!label) return std::nullopt;
+  const Words rest = Words(all).subspan(1);
+  const auto numbers =
+      static_cast<std::size_t>(std::ranges::find_if_not(rest, is_number) - rest.begin());
+  return numbers > 0 ? after_color(*label, rest, numbers) : ahead_of_color(*label, rest);
+}
+
+// MRIcron's tables have a number behind each name. A name may end with a number, too: then names
+// without it would be alike.
+bool have_numbers_behind(std::span<const TextEntry> entries) {
+  std::set<std::string_view> names;
+  return std::ranges::all_of(entries, [&](const TextEntry& entry) {
+    return !entry.name_ahead_of_number.empty() && names.insert(entry.name_ahead_of_number).second;
+  });
+}
+
+// Parts of colours are 0 to 1 in some tables, and 0 to 255 in others.
+double largest_color(std::span<const TextEntry> entries) {
+  double largest = 0;
+  for (const TextEntry& entry : entries) {
+    if (entry.color) largest = std::max(largest, std::ranges::max(*entry.color));
+  }
+  return largest > 1 ? kMostColor : 1;
+}
+
+// 3D Slicer writes a space as "_".
+std::string with_spaces(std::string_view name) {
+  std::string spaced(name);
+  std::ranges::replace(spaced, '_', ' ');
+  return spaced;
+}
+
+std::vector<LabelEntry> named(std::span<const TextEntry> entries, bool is_of_slicer) {
+  const bool numbered = have_numbers_behind(entries);
+  const double scale = 1 / largest_color(entries);
+  std::vector<LabelEntry> labels;
+  for (const TextEntry& entry : entries) {
+    if (entry.name == "(none)") continue;  // Slicer's, for a number without a label
+    const std::string_view name = numbered ? entry.name_ahead_of_number : entry.name;
+    LabelEntry label = {.label = entry.label,
+                        .name = label_name(is_of_slicer ? with_spaces(name) : std::string(name))};
+    if (entry.color) {
+      const Color& color = *entry.color;
+      label.color = label_color({color[0] * scale, color[1] * scale, color[2] * scale});
+    }
+    labels.push_back(std::move(label));
+  }
+  return labels;
+}
+
+}  // namespace
+
+std::vector<LabelEntry> labels_of_text(std::string_view text) {
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  std::vector<TextEntry> entries;
+  bool is_of_slicer = false;
+  for (const std::string_view line : lines(text)) {
+    if (is_comment(line)) {
+      is_of_slicer = is_of_slicer || line.starts_with("# Color table file");
+      continue;
+    }
+    const auto entry = entry_of(line);
+    if (!entry || entries.size() == Volume::kMostLabels) return {};
+    entries.push_back(*entry);
+  }
+  return named(entries, is_of_slicer);
+}
+
+}  // namespace isomesh::import

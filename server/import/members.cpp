@@ -1,0 +1,319 @@
+#include "server/import/members.h"
+
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "proto/error.h"
+#include "server/import/archives/archive.h"
+#include "server/import/dicom/import.h"
+#include "server/import/formats/vti.h"
+#include "server/import/labels_beside.h"
+#include "server/import/readers.h"
+#include "server/import/source/scratch_folder.h"
+
+namespace isomesh::import {
+namespace {
+
+// So many ignored files are named.
+constexpr std::size_t kMostNamed = 100;
+
+// A member that is of a format that is read.
+struct FoundVolume {
+  ArchiveMember member;
+  const Reader* reader = nullptr;
+  std::vector<std::string> doubles = {};  // names of members that are the same
+};
+
+ArchiveLimits limits_of(const SizeLimits& limits) {
+  return {.max_bytes = limits.max_sample_bytes + kHeadroomBytes};
+}
+
+// Slices are needed in any case. Of others it is not known yet whether, and for data files not how
+// many bytes they may have.
+std::optional<std::uint64_t> most_of_slice(const std::filesystem::path& beginning,
+                                           const ImportTask& task) {
+  const InputFile file(beginning);
+  const Reader* reader = sniff(file);
+  if (reader == nullptr || reader->content != Content::kSlices) return std::nullopt;
+  return most_bytes_of(*reader, file, task).file;
+}
+
+// The members of an archive, of which large ones are unpacked when they are needed.
+class Members {
+ public:
+  explicit Members(const Input& input)
+      : input_(input),
+        folder_(input.task.scratch, "members-"),
+        all_(unpack(input.path, folder_.path(), limits_of(input.task.limits),
+                    [&](const auto& beginning) { return most_of_slice(beginning, input.task); })) {}
+
+  const std::vector<ArchiveMember>& all() const { return all_; }
+
+  // The files that hold the samples of a header. Throws Error kUnusableVolume when they are
+  // missing.
+  std::vector<std::filesystem::path> data_of(const FoundVolume& found) const;
+
+  // Unpacks a volume and its data files whole, up to what its header tells.
+  void complete(const FoundVolume& found);
+
+ private:
+  const Input& input_;
+  TemporaryFolder folder_;
+  std::vector<ArchiveMember> all_;
+};
+
+Companions companions_of(const ArchiveMember& header, const std::vector<ArchiveMember>& members) {
+  const std::string_view folder = folder_of(header.name);
+  Companions companions{.name = std::string(base_of(header.name)), .files = {}};
+  for (const ArchiveMember& member : members) {
+    if (member.name == header.name || !member.name.starts_with(folder)) continue;
+    const std::filesystem::path below = member.name.substr(folder.size());
+    companions.files.emplace(below.lexically_normal().generic_string(), member.path);
+  }
+  return companions;
+}
+
+std::vector<std::filesystem::path> Members::data_of(const FoundVolume& found) const {
+  std::vector<std::filesystem::path> data;
+  const auto& [member, reader, doubles] = found;
+  const Companions companions = companions_of(member, all_);
+  for (const std::string& name :
+       data_names_of(*reader, InputFile(member.path), companions, input_.task)) {
+    data.push_back(companion(name, companions));
+  }
+  return data;
+}
+
+void Members::complete(const FoundVolume& found) {
+  std::set<std::filesystem::path> cut;
+  for (const ArchiveMember& member : all_) {
+    if (!member.is_whole) cut.insert(member.path);
+  }
+  if (cut.empty()) return;
+  const MostBytes most = most_bytes_of(*found.reader, InputFile(found.member.path), input_.task);
+  std::map<std::filesystem::path, std::uint64_t> wanted;
+  if (cut.contains(found.member.path)) wanted.emplace(found.member.path, most.file);
+  for (const std::filesystem::path& data : data_of(found)) {
+    if (cut.contains(data)) wanted.emplace(data, most.data);
+  }
+  if (wanted.empty()) return;
+  unpack_whole(input_.path, all_, wanted, limits_of(input_.task.limits));
+  for (ArchiveMember& member : all_) {
+    if (wanted.contains(member.path)) member.is_whole = true;
+  }
+}
+
+// Whether a file of a format of volumes lies beside them for another reason: documents of office
+// programs are ZIPs, and VTK's XML holds surfaces too.
+bool is_beside(const Reader& reader, const InputFile& file) {
+  return reader.content == Content::kFiles ||
+         (reader.sniff == is_vti && !may_hold_image(file.text(0, kSniffBytes)));
+}
+
+std::vector<FoundVolume> files_of_formats(const std::vector<ArchiveMember>& members) {
+  std::vector<FoundVolume> found;
+  for (const ArchiveMember& member : members) {
+    const InputFile file(member.path);
+    const Reader* reader = sniff(file);
+    if (reader != nullptr && !is_beside(*reader, file)) found.push_back({member, reader});
+  }
+  return found;
+}
+
+[[noreturn]] void throw_no_volume(const std::vector<ArchiveMember>& members) {
+  for (const ArchiveMember& member : members) {
+    const Reader* reader = sniff(InputFile(member.path));
+    if (reader == nullptr || reader->content != Content::kFiles) continue;
+    throw_unusable("The archive contains another archive, " + in_quotes(member.name) +
+                   ". Send that one by itself.");
+  }
+  throw Error(ErrorCode::kUnsupportedMedia,
+              "None of the " + std::to_string(members.size()) +
+                  " files in the archive is a volume in a supported format.");
+}
+
+// Files that hold the samples of a header among them. A header that is damaged names none here;
+// when its volume is read it is refused with its reason.
+std::set<std::filesystem::path> data_of(const std::vector<FoundVolume>& found,
+                                        const Members& members) {
+  std::set<std::filesystem::path> all;
+  for (const FoundVolume& volume : found) {
+    try {
+      for (const std::filesystem::path& data : members.data_of(volume)) all.insert(data);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kUnusableVolume) throw;
+    }
+  }
+  return all;
+}
+
+// Whether two volumes have the same bytes, those of their data files too.
+bool are_same(const FoundVolume& one, const FoundVolume& other, Members& members) {
+  try {
+    for (const FoundVolume* volume : {&one, &other}) members.complete(*volume);
+    std::vector<std::filesystem::path> files = members.data_of(one);
+    std::vector<std::filesystem::path> others = members.data_of(other);
+    files.push_back(one.member.path);
+    others.push_back(other.member.path);
+    return std::ranges::equal(files, others, same_bytes);
+  } catch (const Error& error) {
+    // What cannot be read is refused with its reason, under either name.
+    if (describe(error.code()).status >= 500) throw;
+    return false;
+  }
+}
+
+// Takes each file once. Files of one size that begin alike are compared with the first of them
+// only, which bounds the work and finds copies where there are some.
+std::vector<FoundVolume> without_doubles(std::vector<FoundVolume> volumes, Members& members) {
+  using Likeness = std::pair<std::uint64_t, std::size_t>;  // the size, and a hash of the beginning
+  std::vector<FoundVolume> kept;
+  std::map<Likeness, std::size_t> first_like_it;
+  for (FoundVolume& volume : volumes) {
+    const std::string beginning = InputFile(volume.member.path).text(0, kBeginningBytes);
+    const Likeness likeness = {volume.member.bytes, std::hash<std::string>{}(beginning)};
+    const auto [first, is_new] = first_like_it.try_emplace(likeness, kept.size());
+    if (!is_new && are_same(kept[first->second], volume, members)) {
+      kept[first->second].doubles.push_back(volume.member.name);
+    } else {
+      kept.push_back(std::move(volume));
+    }
+  }
+  return kept;
+}
+
+// What an archive holds: volumes of a file each, with their data files, and one of all slices.
+struct Contents {
+  std::vector<FoundVolume> volumes;
+  std::vector<ArchiveMember> slices;
+  const Reader* slice_reader = nullptr;
+  // Files that are no volume. They are listed as ignored.
+  std::vector<ArchiveMember> others;
+};
+
+Contents contents_of(Members& members) {
+  const std::vector<FoundVolume> found = files_of_formats(members.all());
+  const std::set<std::filesystem::path> data = data_of(found, members);
+  Contents contents;
+  std::set<std::filesystem::path> taken = data;
+  for (const FoundVolume& volume : found) {
+    if (data.contains(volume.member.path)) continue;
+    taken.insert(volume.member.path);
+    if (volume.reader->content == Content::kSlices) {
+      contents.slice_reader = volume.reader;
+      contents.slices.push_back(volume.member);
+    } else {
+      contents.volumes.push_back(volume);
+    }
+  }
+  for (const ArchiveMember& member : members.all()) {
+    if (!taken.contains(member.path)) contents.others.push_back(member);
+  }
+  contents.volumes = without_doubles(std::move(contents.volumes), members);
+  return contents;
+}
+
+Volume read_slices(const Contents& contents, const Input& input) {
+  if (input.listener) input.listener(contents.slice_reader->name);
+  std::vector<std::filesystem::path> files;
+  for (const auto* members : {&contents.slices, &contents.others}) {
+    for (const ArchiveMember& member : *members) files.push_back(member.path);
+  }
+  Volume volume = import_dicom(files, input.task);
+  volume.format = contents.slice_reader->name;
+  return volume;
+}
+
+// Lists files beside a volume, without tables of the names of its labels.
+void ignore(const std::vector<ArchiveMember>& others, Volume& volume) {
+  for (const ArchiveMember& other : others) {
+    if (volume.ignored.size() >= kMostNamed) return;
+    if (is_label_table(other.path)) continue;
+    volume.ignored.push_back(
+        {printable(base_of(other.name)), "it is not a volume in a supported format"});
+  }
+}
+
+Volume read_file(const FoundVolume& found, const Contents& contents, Members& members,
+                 const Input& input) {
+  const auto& [member, reader, doubles] = found;
+  members.complete(found);
+  Volume volume = read_input(*reader, {.path = member.path,
+                                       .companions = companions_of(member, members.all()),
+                                       .task = input.task,
+                                       .listener = input.listener});
+  volume.name = std::string(base_of(member.name));
+  if (!doubles.empty()) volume.notes.push_back(duplicate_note(doubles.size()));
+  for (std::size_t at = 0; at < std::min(kMostNamed, doubles.size()); ++at) {
+    volume.ignored.push_back({std::string(base_of(doubles[at])), reason_of_double(member.name)});
+  }
+  ignore(contents.others, volume);
+  return volume;
+}
+
+// Leaves it to the client which of several is to be read.
+[[noreturn]] void offer_members(const Contents& contents, const std::string& asked) {
+  std::vector<Choice> choices;
+  if (!contents.slices.empty()) {
+    choices.push_back({"member", std::string(process::kDicomMember),
+                       std::to_string(contents.slices.size()) + " DICOM files"});
+  }
+  for (const auto& [member, reader, doubles] : contents.volumes) {
+    choices.push_back({"member", member.name, std::string(reader->title)});
+  }
+  std::string names;
+  constexpr std::size_t kMost = 10;
+  for (std::size_t at = 0; at < std::min(kMost, choices.size()); ++at) {
+    names += (at > 0 ? ", " : "") + in_quotes(choices[at].value);
+  }
+  if (choices.size() > kMost) names += " and " + std::to_string(choices.size() - kMost) + " more";
+  const std::string reason = asked.empty()
+                                 ? "The archive holds " + std::to_string(choices.size()) +
+                                       " volumes. Choose one with member=NAME: " + names + "."
+                                 : "The upload has no volume " + in_quotes(asked) +
+                                       ". Choose one with member=NAME: " + names + ".";
+  throw_choice(reason, std::move(choices));
+}
+
+Volume read_members(Members& members, const Input& input) {
+  const Contents contents = contents_of(members);
+  const std::string& asked = input.task.options.member;
+  const std::size_t count = contents.volumes.size() + (contents.slices.empty() ? 0 : 1);
+  if (count == 0) throw_no_volume(members.all());
+  if (!contents.slices.empty() &&
+      (asked == process::kDicomMember || (asked.empty() && count == 1))) {
+    return read_slices(contents, input);
+  }
+  if (asked.empty() && count == 1) {
+    return read_file(contents.volumes.front(), contents, members, input);
+  }
+  const auto found = std::ranges::find_if(contents.volumes, [&](const FoundVolume& volume) {
+    return volume.member.name == asked || std::ranges::count(volume.doubles, asked) > 0;
+  });
+  if (found == contents.volumes.end()) offer_members(contents, asked);
+  return read_file(*found, contents, members, input);
+}
+
+}  // namespace
+
+bool is_archive(std::string_view head) { return is_zip(head) || is_tar(head); }
+
+Volume parse_archive(const Input& input) {
+  Members members(input);
+  return read_members(members, input);
+}
+
+std::uint64_t most_archive_bytes(std::uint64_t compressed_bytes, const SizeLimits& limits) {
+  return std::min(limits_of(limits).max_bytes + kHeadroomBytes,
+                  most_unpacked_bytes(compressed_bytes));
+}
+
+}  // namespace isomesh::import

@@ -1,0 +1,269 @@
+#include "server/import/samples/payload.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "base/files.h"
+#include "base/text.h"
+#include "server/import/samples/vtk_data.h"
+#include "server/import/source/bzip2.h"
+
+namespace isomesh::import {
+namespace {
+
+constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
+
+[[noreturn]] void throw_short(std::uint64_t expected, std::uint64_t found) {
+  throw_unusable("The file is truncated: its header declares " + std::to_string(expected) +
+                 " bytes of samples, but the file has " + std::to_string(found) + ".");
+}
+
+// All samples, or the share of them that one data file holds.
+struct Part {
+  const InputFile& file;
+  CompressedRange range;
+  std::uint64_t bytes = 0;  // once decoded
+  Skip skip = 0;            // of what is decoded
+  StoredType type = StoredType::kUint8;
+};
+
+[[noreturn]] void throw_long(std::uint64_t expected) {
+  throw_unusable("The file has more than the " + std::to_string(expected) +
+                 " bytes of samples that its header declares.");
+}
+
+// As inflate_range, of any kind of stream.
+using StreamDecoder = std::function<std::uint64_t(const InputFile&, const CompressedRange&,
+                                                  std::uint64_t limit, const ByteSink&)>;
+
+// How many bytes a header within encoded data may have.
+constexpr std::uint64_t kMostSkipped = std::uint64_t{1} << 20;
+
+// Writes the decoded bytes, those that are to be skipped among them.
+void decode_stream(const Part& part, ScratchFile& scratch, const StreamDecoder& decode) {
+  const std::uint64_t known = part.skip.value_or(0);
+  const std::uint64_t most = part.bytes + (part.skip ? known : kMostSkipped);
+  const std::uint64_t found = decode(
+      part.file, part.range, most, [&](std::span<const std::byte> piece) { scratch.write(piece); });
+  if (found > most) throw_long(part.bytes);
+  const std::uint64_t needed = part.bytes + known;
+  if (found < needed) throw_short(part.bytes, found - std::min(found, known));
+}
+
+void copy_part(const Part& part, ScratchFile& scratch) {
+  std::vector<std::byte> piece(kPieceBytes);
+  for (std::uint64_t done = 0; done < part.bytes;) {
+    const std::size_t wanted = std::min<std::uint64_t>(piece.size(), part.bytes - done);
+    const std::size_t count =
+        part.file.read(part.range.offset + done, std::span(piece).first(wanted));
+    if (count == 0) throw_short(part.bytes, done);
+    scratch.write(std::span(piece).first(count));
+    done += count;
+  }
+}
+
+// Collects decoded bytes, so that each system call writes many of them.
+class Decoded {
+ public:
+  Decoded(std::uint64_t expected, ScratchFile& scratch) : scratch_(scratch), expected_(expected) {}
+
+  void add(std::span<const std::byte> bytes) {
+    if (bytes.size() > expected_ - count_) throw_long(expected_);
+    count_ += bytes.size();
+    pending_.insert(pending_.end(), bytes.begin(), bytes.end());
+    if (pending_.size() >= kPieceBytes) flush();
+  }
+
+  void finish() {
+    flush();
+    if (count_ < expected_) throw_short(expected_, count_);
+  }
+
+ private:
+  void flush() {
+    scratch_.write(pending_);
+    pending_.clear();
+  }
+
+  ScratchFile& scratch_;
+  std::uint64_t expected_;
+  std::uint64_t count_ = 0;
+  std::vector<std::byte> pending_;
+};
+
+template <class Sample>
+std::optional<Sample> parse_sample(std::string_view word) {
+  if constexpr (std::is_floating_point_v<Sample>) {
+    if (const auto value = parse_double(word)) return static_cast<Sample>(*value);
+  } else if constexpr (std::is_unsigned_v<Sample>) {
+    const auto value = parse_uint64(word);
+    if (value && *value <= std::numeric_limits<Sample>::max()) return static_cast<Sample>(*value);
+  } else {
+    const auto value = parse_int64(word);
+    if (value && *value >= std::numeric_limits<Sample>::min() &&
+        *value <= std::numeric_limits<Sample>::max()) {
+      return static_cast<Sample>(*value);
+    }
+  }
+  return std::nullopt;
+}
+
+void decode_word(std::string_view word, StoredType type, Decoded& decoded) {
+  // Some writers separate the numbers by commas as well.
+  if (word.ends_with(',')) word.remove_suffix(1);
+  with_stored_sample(type, [&](auto sample) {
+    const auto value = parse_sample<decltype(sample)>(word);
+    if (!value)
+      throw_unusable("The sample " + in_quotes(word) +
+                     " is not a number of the type that the header declares.");
+    sample = *value;
+    decoded.add(std::as_bytes(std::span(&sample, 1)));
+  });
+}
+
+void decode_text(const Part& part, ScratchFile& scratch) {
+  constexpr std::size_t kLongestWord = 512;
+  const InputFile& file = part.file;
+  Decoded decoded(part.bytes, scratch);
+  std::string rest;
+  const std::uint64_t last = part.range.offset + part.range.bytes;
+  for (std::uint64_t next = part.range.offset; next < last;) {
+    std::string piece = rest + file.text(next, std::min<std::uint64_t>(kPieceBytes, last - next));
+    next += piece.size() - rest.size();
+    const std::size_t end = next < last ? piece.find_last_of(" \t\r\n") : piece.size();
+    if (end == std::string::npos || piece.size() - end > kLongestWord) {
+      throw_unusable("The samples are not numbers separated by white space.");
+    }
+    for (const std::string_view word : words(std::string_view(piece).substr(0, end))) {
+      if (word != ",") decode_word(word, part.type, decoded);
+    }
+    rest = piece.substr(end);
+  }
+  decoded.finish();
+}
+
+std::optional<unsigned> hex_digit(char letter) {
+  if (letter >= '0' && letter <= '9') return static_cast<unsigned>(letter - '0');
+  if (letter >= 'a' && letter <= 'f') return static_cast<unsigned>(letter - 'a') + 10;
+  if (letter >= 'A' && letter <= 'F') return static_cast<unsigned>(letter - 'A') + 10;
+  return std::nullopt;
+}
+
+void decode_hex(const Part& part, ScratchFile& scratch) {
+  Decoded decoded(part.bytes, scratch);
+  unsigned value = 0;
+  bool is_low_digit = false;
+  for (std::uint64_t next = part.range.offset; next < part.file.size();) {
+    const std::string piece = part.file.text(next, kPieceBytes);
+    next += piece.size();
+    for (const char letter : piece) {
+      if (trimmed({&letter, 1}).empty()) continue;
+      const auto digit = hex_digit(letter);
+      if (!digit) throw_unusable("The samples are not hexadecimal digits.");
+      value = (value * 16 + *digit) % 256;
+      const auto byte = static_cast<std::byte>(value);
+      if (is_low_digit) decoded.add({&byte, 1});
+      is_low_digit = !is_low_digit;
+    }
+  }
+  decoded.finish();
+}
+
+void decode_part(const SourceVolume& volume, const Part& part, const std::filesystem::path& folder,
+                 ScratchFile& scratch) {
+  switch (volume.encoding) {
+    case Encoding::kRaw:
+      return copy_part(part, scratch);
+    case Encoding::kDeflate:
+      return decode_stream(part, scratch,
+                           [](const auto&... arguments) { return inflate_range(arguments...); });
+    case Encoding::kBzip2:
+      return decode_stream(part, scratch, unzip2_range);
+    case Encoding::kText:
+      return decode_text(part, scratch);
+    case Encoding::kHex:
+      return decode_hex(part, scratch);
+    case Encoding::kVtk:
+      return decode_vtk(part.file, part.range, part.bytes, volume.vtk, folder, scratch);
+  }
+}
+
+// How many bytes follow the samples.
+std::uint64_t trailing_bytes(const InputFile& file, const SourceVolume& volume) {
+  const std::uint64_t expected = volume.stored_bytes();
+  const std::uint64_t found = file.size() - std::min(volume.payload.offset, file.size());
+  if (found < expected) throw_short(expected, found);
+  if (!may_trail(found - expected, volume)) throw_long(expected);
+  return found - expected;
+}
+
+}  // namespace
+
+Payload::Payload(const InputFile& file, const SourceVolume& volume,
+                 const std::filesystem::path& scratch)
+    : file_(file), layout_(volume.layout) {
+  const bool is_raw = volume.encoding == Encoding::kRaw;
+  if (is_raw && volume.data_files.empty()) {
+    if (const auto bytes = trailing_bytes(file, volume)) notes_.push_back(trailing_note(bytes));
+    offset_ = volume.payload.offset;
+  } else if (is_raw && volume.data_files.size() == 1) {
+    decoded_.emplace(volume.data_files[0].path);
+    offset_ = volume.data_files[0].range.offset;
+  } else {
+    decode(volume, scratch);
+  }
+  if (volume.chosen.is_interleaved) {
+    pick_interleaved(volume, scratch);
+  } else {
+    offset_ += volume.chosen.index * volume.volume_bytes();
+  }
+}
+
+void Payload::decode(const SourceVolume& volume, const std::filesystem::path& scratch) {
+  scratch_.emplace(scratch, ".samples");
+  const StoredType type = layout_.type;
+  if (volume.encoding == Encoding::kText) layout_.big_endian = false;
+  if (volume.data_files.empty()) {
+    decode_part(volume, {file_, volume.payload, volume.stored_bytes(), volume.decoded_skip, type},
+                scratch, *scratch_);
+  }
+  for (const DataFile& data : volume.data_files) {
+    const InputFile part(data.path);
+    const std::uint64_t share = volume.stored_bytes() / volume.data_files.size();
+    decode_part(volume, {part, data.range, share, volume.decoded_skip, type}, scratch, *scratch_);
+  }
+  decoded_.emplace(scratch_->path());
+  offset_ = volume.decoded_skip.value_or(decoded_->size() - volume.stored_bytes());
+}
+
+// Copies every count-th sample of the file into one that holds nothing else.
+void Payload::pick_interleaved(const SourceVolume& volume, const std::filesystem::path& scratch) {
+  const std::size_t size = bytes_per_sample(layout_.type);
+  const std::size_t step = size * volume.chosen.count;
+  const std::size_t at_once = std::max<std::size_t>(kPieceBytes / step, 1);
+  ScratchFile& picked = picked_.emplace(scratch, ".volume");
+  std::vector<std::byte> piece(at_once * step);
+  std::vector<std::byte> samples;
+  for (std::uint64_t left = volume.sample_count(); left > 0;) {
+    const std::size_t count = std::min<std::uint64_t>(left, at_once);
+    const std::span<std::byte> whole = std::span(piece).first(count * step);
+    if (this->file().read(offset_, whole) != whole.size()) throw_short(volume.stored_bytes(), 0);
+    samples.clear();
+    for (std::size_t at = volume.chosen.index * size; at < whole.size(); at += step) {
+      samples.insert(samples.end(), whole.begin() + static_cast<std::ptrdiff_t>(at),
+                     whole.begin() + static_cast<std::ptrdiff_t>(at + size));
+    }
+    picked.write(samples);
+    offset_ += whole.size();
+    left -= count;
+  }
+  decoded_.emplace(picked.path());
+  offset_ = 0;
+}
+
+}  // namespace isomesh::import

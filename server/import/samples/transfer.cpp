@@ -1,0 +1,106 @@
+#include "server/import/samples/transfer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <span>
+#include <type_traits>
+#include <utility>
+
+#include "proto/error.h"
+#include "proto/samples.h"
+#include "server/import/samples/layers.h"
+#include "server/import/samples/payload.h"
+#include "server/volume/labels.h"
+#include "server/volume/statistics.h"
+
+namespace isomesh::import {
+namespace {
+
+Geometry usable_geometry(const SourceVolume& source) {
+  const Geometry geometry = normalised(source.geometry);
+  if (const auto fault = find_fault(source.dims, geometry)) {
+    throw_unusable("The file's geometry cannot be used: " + fault->message + ".");
+  }
+  return geometry;
+}
+
+// The smallest sample is outside for every iso-value above it, and keeps the surface beside it
+// where the other samples have it.
+void replace_non_finite(std::span<std::byte> samples, SampleType type, double smallest) {
+  with_sample(type, [&](auto sample) {
+    using Sample = decltype(sample);
+    if constexpr (std::is_floating_point_v<Sample>) {
+      auto* first = reinterpret_cast<Sample*>(samples.data());
+      std::replace_if(
+          first, first + samples.size() / sizeof(Sample),
+          [](Sample value) { return !std::isfinite(value); }, static_cast<Sample>(smallest));
+    }
+  });
+}
+
+// What the file says is known; otherwise samples may look as if.
+void note_labels(std::span<const std::byte> samples, Volume& volume) {
+  const std::size_t told = volume.labels.size();
+  const auto values = volume::label_count(samples, volume.type, volume.dims);
+  if (told == 0 && !values) return;
+  const std::string what =
+      told > 0 ? "The file describes " + std::to_string(told) + (told == 1 ? " label" : " labels")
+               : "The samples look like labels: they have " + std::to_string(*values) +
+                     " different whole values in flat regions";
+  volume.notes.push_back(
+      note_of(NoteCode::kLooksLikeLabels,
+              what + ". Use \"labels\": \"all\" to mesh each label. An iso-value makes one surface "
+                     "around all samples above it."));
+}
+
+}  // namespace
+
+Volume write_canonical(const PlainSamples& samples, Volume volume,
+                       const std::filesystem::path& target) {
+  volume.type = canonical_type(samples.layout);
+  CanonicalWriter writer(target, {volume.dims, volume.type, volume.geometry});
+  read_samples(samples.file, samples.offset, samples.layout, writer.samples());
+  return finish(writer, std::move(volume));
+}
+
+Volume write_canonical(const InputFile& file, const SourceVolume& source, const ImportTask& task) {
+  Volume volume;
+  volume.dims = source.dims;
+  volume.geometry = usable_geometry(source);
+  // Raw samples are first compared with the size of their file, so that a file that is too short is
+  // refused as truncated even where its header tells of more samples than are accepted.
+  if (source.encoding != Encoding::kRaw) check_limits(source, task.limits);
+  const Payload payload(file, source, task.scratch);
+  check_limits(source, task.limits);
+  volume.notes = source.notes;
+  std::ranges::copy(payload.notes(), std::back_inserter(volume.notes));
+  if (source.layers)
+    return write_layers({payload.file(), payload.offset(), payload.layout()}, source,
+                        std::move(volume), task.target);
+  // Labels are whole numbers.
+  if (is_integer(canonical_type(payload.layout()))) volume.labels = source.labels;
+  return write_canonical({payload.file(), payload.offset(), payload.layout()}, std::move(volume),
+                         task.target);
+}
+
+Volume finish(CanonicalWriter& writer, Volume volume) {
+  volume::Statistics statistics = volume::measure(writer.samples(), volume.type);
+  if (statistics.non_finite > 0) {
+    const std::string count = std::to_string(statistics.non_finite) + " of the " +
+                              std::to_string(volume.sample_count()) +
+                              " samples are not finite numbers";
+    if (statistics.non_finite == volume.sample_count()) throw_unusable(count + ".");
+    replace_non_finite(writer.samples(), volume.type, statistics.range[0]);
+    statistics = volume::measure(writer.samples(), volume.type);
+    volume.notes.push_back(
+        note_of(NoteCode::kNonFiniteSamples, count + ". They lie outside the surface."));
+  }
+  note_labels(writer.samples(), volume);
+  volume.range = statistics.range;
+  volume.suggested_iso = statistics.otsu;
+  volume.bytes = writer.samples().size();
+  return volume;
+}
+
+}  // namespace isomesh::import

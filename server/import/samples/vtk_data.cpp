@@ -1,0 +1,265 @@
+#include "server/import/samples/vtk_data.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/import/samples/vtk_blocks.h"
+
+namespace isomesh::import {
+namespace {
+
+constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
+
+[[noreturn]] void throw_short() {
+  throw_unusable("The file is truncated: the VTK array of the samples ends too early.");
+}
+
+[[noreturn]] void throw_contradiction(std::uint64_t expected, std::uint64_t found) {
+  throw_unusable("The VTK file contradicts itself: its extent needs " + std::to_string(expected) +
+                 " bytes of samples, but its array declares " + std::to_string(found) + ".");
+}
+
+std::optional<unsigned> base64_digit(char letter) {
+  if (letter >= 'A' && letter <= 'Z') return static_cast<unsigned>(letter - 'A');
+  if (letter >= 'a' && letter <= 'z') return static_cast<unsigned>(letter - 'a') + 26;
+  if (letter >= '0' && letter <= '9') return static_cast<unsigned>(letter - '0') + 52;
+  if (letter == '+') return 62;
+  if (letter == '/') return 63;
+  return std::nullopt;
+}
+
+bool is_space(char letter) {
+  return letter == ' ' || letter == '\t' || letter == '\r' || letter == '\n';
+}
+
+// Decodes base64 text of a file, in order.
+class Base64 {
+ public:
+  Base64(const InputFile& file, const CompressedRange& range)
+      : file_(file), next_(range.offset), end_(range.offset + range.bytes) {}
+
+  void read(std::span<std::byte> target) {
+    for (std::byte& byte : target) {
+      if (waiting_ == 0) decode_group();
+      if (waiting_ == 0) throw_short();
+      byte = group_[used_++];
+      --waiting_;
+    }
+  }
+
+  // The header and each block are encoded by themselves, so the rest of a group of digits is
+  // dropped between them.
+  void end_part() { waiting_ = 0; }
+
+ private:
+  void decode_group() {
+    std::array<unsigned, 4> digits = {};
+    std::size_t padding = 0;
+    for (std::size_t at = 0; at < digits.size(); ++at) {
+      const char letter = next_letter();
+      const auto digit = base64_digit(letter);
+      if (letter == '=' && at >= 2) {
+        ++padding;
+      } else if (digit && padding == 0) {
+        digits[at] = *digit;
+      } else {
+        throw_unusable("The VTK array of the samples is not base64.");
+      }
+    }
+    const unsigned bits = digits[0] << 18 | digits[1] << 12 | digits[2] << 6 | digits[3];
+    group_ = {static_cast<std::byte>(bits >> 16 & 0xff), static_cast<std::byte>(bits >> 8 & 0xff),
+              static_cast<std::byte>(bits & 0xff)};
+    waiting_ = group_.size() - padding;
+    used_ = 0;
+  }
+
+  char next_letter() {
+    for (;;) {
+      if (at_ == piece_.size()) refill();
+      const char letter = piece_[at_++];
+      if (!is_space(letter)) return letter;
+    }
+  }
+
+  void refill() {
+    piece_ = file_.text(next_, std::min<std::uint64_t>(kPieceBytes, end_ - next_));
+    if (piece_.empty()) throw_short();
+    next_ += piece_.size();
+    at_ = 0;
+  }
+
+  const InputFile& file_;
+  std::uint64_t next_;
+  std::uint64_t end_;
+  std::string piece_;
+  std::size_t at_ = 0;
+  std::array<std::byte, 3> group_ = {};
+  std::size_t used_ = 0;
+  std::size_t waiting_ = 0;
+};
+
+std::size_t count_bytes(const VtkEncoding& encoding) { return encoding.wide_header ? 8 : 4; }
+
+std::uint64_t count_at(std::span<const std::byte> header, std::size_t index,
+                       const VtkEncoding& encoding) {
+  const std::size_t size = count_bytes(encoding);
+  std::uint64_t value = 0;
+  for (std::size_t at = 0; at < size; ++at) {
+    const std::size_t byte = encoding.big_endian ? at : size - 1 - at;
+    value = value << 8 | std::to_integer<std::uint64_t>(header[index * size + byte]);
+  }
+  return value;
+}
+
+// The header of compressed blocks.
+struct Blocks {
+  std::uint64_t bytes = 0;  // of each block but the last, decoded
+  std::uint64_t last_bytes = 0;
+  std::vector<std::uint64_t> stored;  // bytes of each block in the file
+};
+
+constexpr std::size_t kCountsAheadOfSizes = 3;
+
+// The number of blocks. Throws where the three counts of the header cannot be right.
+std::size_t block_count(std::span<const std::byte> counts, std::uint64_t expected,
+                        const VtkEncoding& encoding) {
+  // VTK's blocks have at least 32 KiB. Smaller ones are accepted up to a number whose sizes fit
+  // into memory.
+  constexpr std::uint64_t kMostBlocks = std::uint64_t{1} << 24;
+  constexpr std::uint64_t kLargestBlock = std::uint64_t{1} << 40;
+  const std::uint64_t count = count_at(counts, 0, encoding);
+  const std::uint64_t bytes = count_at(counts, 1, encoding);
+  const std::uint64_t last = count_at(counts, 2, encoding);
+  if (count == 0 || count > kMostBlocks || bytes == 0 || bytes > kLargestBlock || last > bytes) {
+    throw_unusable("The VTK array's counts of compressed blocks are not plausible.");
+  }
+  if (count - 1 > expected / bytes) {
+    throw_unusable(
+        "The VTK file contradicts itself: its array declares more samples than its extent has.");
+  }
+  const std::uint64_t total = (count - 1) * bytes + (last == 0 ? bytes : last);
+  if (total != expected) throw_contradiction(expected, total);
+  return static_cast<std::size_t>(count);
+}
+
+Blocks blocks_of(std::span<const std::byte> counts, const VtkEncoding& encoding) {
+  Blocks blocks;
+  blocks.bytes = count_at(counts, 1, encoding);
+  blocks.last_bytes = count_at(counts, 2, encoding);
+  if (blocks.last_bytes == 0) blocks.last_bytes = blocks.bytes;
+  const std::size_t all = counts.size() / count_bytes(encoding);
+  for (std::size_t at = kCountsAheadOfSizes; at < all; ++at) {
+    blocks.stored.push_back(count_at(counts, at, encoding));
+    // Bytes that cannot be compressed grow by little. The bound also keeps the sum from
+    // overflowing.
+    if (blocks.stored.back() > blocks.bytes + blocks.bytes / 2 + kPieceBytes) {
+      throw_unusable("A compressed block of the VTK array is too large.");
+    }
+  }
+  return blocks;
+}
+
+// The bytes of a file, as they are or decoded from base64.
+class Source {
+ public:
+  Source(const InputFile& file, const CompressedRange& range, bool base64)
+      : file_(file), next_(range.offset), end_(range.offset + range.bytes) {
+    if (base64) base64_.emplace(file, range);
+  }
+
+  void read(std::span<std::byte> target) {
+    if (base64_) return base64_->read(target);
+    if (target.size() > end_ - next_ || file_.read(next_, target) != target.size()) throw_short();
+    next_ += target.size();
+  }
+
+  const InputFile& file() const { return file_; }
+  std::uint64_t next() const { return next_; }  // where the next byte lies, without base64
+
+  void end_part() {
+    if (base64_) base64_->end_part();
+  }
+
+  void copy(std::uint64_t bytes, ScratchFile& target) {
+    std::vector<std::byte> piece(kPieceBytes);
+    while (bytes > 0) {
+      const auto part = std::span(piece).first(std::min<std::uint64_t>(piece.size(), bytes));
+      read(part);
+      target.write(part);
+      bytes -= part.size();
+    }
+  }
+
+ private:
+  const InputFile& file_;
+  std::uint64_t next_;
+  std::uint64_t end_;
+  std::optional<Base64> base64_;
+};
+
+std::vector<std::byte> read_block(const InputFile& file, std::uint64_t offset,
+                                  std::uint64_t bytes) {
+  if (bytes > 2 * kLargestVtkBlock) {
+    throw_unusable("A compressed block of the VTK array is too large.");
+  }
+  std::vector<std::byte> block(bytes);
+  if (file.read(offset, block) != block.size()) throw_short();
+  return block;
+}
+
+void expand_blocks(const InputFile& file, std::uint64_t offset, const Blocks& blocks,
+                   VtkCompression compression, ScratchFile& target) {
+  const auto sink = [&](std::span<const std::byte> piece) { target.write(piece); };
+  for (std::size_t at = 0; at < blocks.stored.size(); ++at) {
+    const bool is_last = at + 1 == blocks.stored.size();
+    const std::uint64_t bytes = is_last ? blocks.last_bytes : blocks.bytes;
+    const std::uint64_t stored = blocks.stored[at];
+    if (stored > file.size() - std::min(offset, file.size())) throw_short();
+    if (compression != VtkCompression::kZlib) {
+      target.write(expanded_block(compression, read_block(file, offset, stored), bytes));
+    } else if (inflate_range(file, {offset, stored}, bytes, sink) != bytes) {
+      throw_unusable("A compressed block of the VTK array has the wrong size.");
+    }
+    offset += stored;
+  }
+}
+
+void decode_blocks(Source& source, std::uint64_t expected, const VtkEncoding& encoding,
+                   const std::filesystem::path& scratch, ScratchFile& target) {
+  const std::size_t size = count_bytes(encoding);
+  std::vector<std::byte> counts(kCountsAheadOfSizes * size);
+  source.read(counts);
+  std::vector<std::byte> sizes(block_count(counts, expected, encoding) * size);
+  source.read(sizes);
+  source.end_part();
+  counts.insert(counts.end(), sizes.begin(), sizes.end());
+  const Blocks blocks = blocks_of(counts, encoding);
+  if (!encoding.base64) {
+    return expand_blocks(source.file(), source.next(), blocks, encoding.compression, target);
+  }
+  ScratchFile stored(scratch, ".blocks");
+  source.copy(std::accumulate(blocks.stored.begin(), blocks.stored.end(), std::uint64_t{0}),
+              stored);
+  expand_blocks(InputFile(stored.path()), 0, blocks, encoding.compression, target);
+}
+
+}  // namespace
+
+void decode_vtk(const InputFile& file, const CompressedRange& range, std::uint64_t bytes,
+                const VtkEncoding& encoding, const std::filesystem::path& scratch,
+                ScratchFile& target) {
+  Source source(file, range, encoding.base64);
+  if (encoding.compression != VtkCompression::kNone)
+    return decode_blocks(source, bytes, encoding, scratch, target);
+  std::vector<std::byte> header(count_bytes(encoding));
+  source.read(header);
+  const std::uint64_t found = count_at(header, 0, encoding);
+  if (found != bytes) throw_contradiction(bytes, found);
+  source.copy(bytes, target);
+}
+
+}  // namespace isomesh::import

@@ -1,0 +1,154 @@
+#include "server/import/source/source.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "base/files.h"
+#include "base/text.h"
+#include "proto/error.h"
+
+namespace isomesh::import {
+namespace {
+
+// A file of another size than the header tells belongs to another volume.
+[[noreturn]] void throw_other_size(const std::string& name, std::uint64_t found,
+                                   std::uint64_t expected) {
+  throw_unusable("The data file " + in_quotes(name) + " has " + std::to_string(found) +
+                 " bytes, but the header declares " + std::to_string(expected) + ".");
+}
+
+}  // namespace
+
+std::uint64_t SourceVolume::most_encoded_bytes() const {
+  constexpr std::uint64_t kTextPerSample = 32;  // "-1.7976931348623157e+308", and white space
+  constexpr std::uint64_t kHexPerByte = 4;
+  switch (encoding) {
+    case Encoding::kText:
+      return sample_count() * chosen.count * kTextPerSample;
+    case Encoding::kHex:
+      return stored_bytes() * kHexPerByte;
+    case Encoding::kRaw:
+    case Encoding::kDeflate:
+    case Encoding::kBzip2:
+    case Encoding::kVtk:
+      break;
+  }
+  // Whatever deflate cannot compress it stores, with a few bytes for each block.
+  constexpr std::uint64_t kStoredShare = 100;
+  return stored_bytes() + stored_bytes() / kStoredShare;
+}
+
+void check_limits(const SourceVolume& volume, const SizeLimits& limits) {
+  check_limits(volume.sample_count(), canonical_type(volume.layout), limits);
+}
+
+const std::filesystem::path& companion(const std::string& name, const Companions& companions) {
+  const std::string reason = "The header names the data file " + in_quotes(name);
+  const std::string path = std::filesystem::path(name).lexically_normal().generic_string();
+  if (path.starts_with('/') || path.starts_with("..") || name.find('\\') != std::string::npos) {
+    throw_unusable(reason +
+                   ", which is outside the header's folder. Only files in that folder and its "
+                   "subfolders are read.");
+  }
+  const auto found = companions.files.find(path);
+  if (found != companions.files.end()) return found->second;
+  throw_unusable(reason + ", which is missing. Send both files in one ZIP or TAR.");
+}
+
+bool may_trail(std::uint64_t bytes, const SourceVolume& volume) {
+  constexpr std::uint64_t kBlockBytes = 4096;
+  return bytes <= kBlockBytes || bytes < volume.volume_bytes() / volume.dims[2];
+}
+
+Note trailing_note(std::uint64_t bytes) {
+  return note_of(NoteCode::kTrailingBytes,
+                 "The data is " + std::to_string(bytes) + (bytes == 1 ? " byte" : " bytes") +
+                     " longer than the header declares. The extra bytes were ignored.");
+}
+
+Note duplicate_note(std::size_t files) {
+  return note_of(NoteCode::kDuplicateFile,
+                 std::to_string(files) + (files == 1 ? " file is a copy" : " files are copies") +
+                     " of another file, byte for byte. Each file was read once.");
+}
+
+std::string reason_of_double(std::string_view first_name) {
+  return "it is the same as " + in_quotes(first_name);
+}
+
+std::vector<DataFile> data_files_of(const std::vector<std::string>& names,
+                                    const Companions& companions, const Skip& skip,
+                                    SourceVolume& volume) {
+  if (names.empty()) throw_unusable("The header names no data file.");
+  if (volume.sample_count() * volume.chosen.count % names.size() != 0) {
+    throw_unusable("The header names " + std::to_string(names.size()) +
+                   " data files. The samples cannot be divided equally among them.");
+  }
+  const bool is_raw = volume.encoding == Encoding::kRaw;
+  if (!is_raw && names.size() > 1 && skip != Skip(0)) {
+    throw_unusable("The header skips bytes in several encoded data files, which is not supported.");
+  }
+  if (!is_raw) volume.decoded_skip = skip;
+  const std::uint64_t part = volume.stored_bytes() / names.size();
+  std::vector<DataFile> files;
+  for (const std::string& name : names) {
+    const std::filesystem::path& path = companion(name, companions);
+    const std::uint64_t size = InputFile(path).size();
+    const std::uint64_t first = !is_raw ? 0 : skip ? *skip : size - std::min(size, part);
+    if (first > size)
+      throw_unusable("The data file " + in_quotes(name) + " ends before its samples begin.");
+    files.push_back({path, {first, size - first}});
+    if (!is_raw || size - first == part) continue;
+    const std::uint64_t more = size - first - std::min(size - first, part);
+    if (more == 0 || names.size() > 1 || !may_trail(more, volume)) {
+      throw_other_size(name, size, first + part);
+    }
+    volume.notes.push_back(trailing_note(more));
+  }
+  return files;
+}
+
+std::uint64_t volumes_beyond(std::span<const std::uint64_t> sizes) {
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 24;
+  std::uint64_t count = 1;
+  for (std::size_t axis = 3; axis < sizes.size(); ++axis) {
+    if (sizes[axis] == 0) throw_unusable("The size along " + axis_name(axis) + " is 0.");
+    if (sizes[axis] > kMost / count) {
+      throw_unusable("The size along " + axis_name(axis) +
+                     " is not plausible: " + std::to_string(sizes[axis]) + ".");
+    }
+    count *= sizes[axis];
+  }
+  return count;
+}
+
+void choose_volume(std::uint64_t count, const Difference& difference, const ImportOptions& options,
+                   SourceVolume& volume) {
+  const auto chosen = options.volume;
+  volume.chosen.count = count;
+  volume.chosen.index = chosen.value_or(0);
+  if (count == 1 && volume.chosen.index == 0) return;
+  if (chosen && *chosen < count) {
+    volume.notes.push_back(note_of(
+        NoteCode::kVolumeChosen, "Volume " + std::to_string(*chosen) + " (" +
+                                     difference.title(*chosen) + ") of " + std::to_string(count) +
+                                     " was read. The volumes differ in " + difference.what + "."));
+    return;
+  }
+  if (count == 1) {
+    throw_unusable("The file has only volume 0. It has no volume " + std::to_string(*chosen) + ".");
+  }
+  constexpr std::uint64_t kMost = 1000;
+  std::vector<Choice> choices;
+  for (std::uint64_t index = 0; index < std::min(count, kMost); ++index) {
+    choices.push_back({"volume", std::to_string(index), difference.title(index)});
+  }
+  const std::string reason = "The file holds " + std::to_string(count) +
+                             " volumes that differ in " + difference.what + ". ";
+  const std::string none = chosen ? "It has no volume " + std::to_string(*chosen) + ". " : "";
+  throw_choice(
+      reason + none + "Choose one with volume=0 to volume=" + std::to_string(count - 1) + ".",
+      std::move(choices));
+}
+
+}  // namespace isomesh::import
