@@ -23,11 +23,13 @@ constexpr std::uint32_t kMostLooks = 4;
 // The end of a job is told at once; this is for an end that was missed.
 constexpr seconds kJobLook{30};
 
-// An order that begins anew has another job, also where that is the same once more.
+// An order that begins anew, or fetches its images again, has another job, even if the volume is
+// the same.
 std::string job_key(const store::OrderRecord& record) {
   constexpr std::size_t kEnough = 12;
   const std::string what =
-      sha256_of(record.order.volume.value_or("") + ' ' + record.work.begun +
+      sha256_of(record.order.volume.value_or("") + ' ' + record.work.begun + ' ' +
+                std::to_string(record.order.attempts) +
                 (record.work.triangles ? ' ' + std::to_string(*record.work.triangles) : ""))
           .substr(0, kEnough);
   return "order-" + record.order.id + '-' + what;
@@ -212,6 +214,13 @@ Time OrderSteps::submit_job(store::OrderRecord& record) const {
   return save_after(OrderState::kMeshing, record, now_() + kJobLook);
 }
 
+// Whether the volume or the job has expired, was removed, or the volume is damaged.
+bool OrderSteps::is_lost(const Error& error, const store::OrderRecord& record) const {
+  if (error.code() == ErrorCode::kNotFound || error.code() == ErrorCode::kGone) return true;
+  return error.code() == ErrorCode::kUnusableVolume &&
+         !store::is_there_and_intact(services_.blobs, *record.order.volume, {});
+}
+
 Time OrderSteps::mesh(store::OrderRecord& record) const {
   try {
     if (!record.order.job) return submit_job(record);
@@ -225,12 +234,12 @@ Time OrderSteps::mesh(store::OrderRecord& record) const {
     }
     return make(record, job);
   } catch (const Error& error) {
-    // The volume or the job has expired, or was removed.
-    if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
+    if (!is_lost(error, record)) throw;
     forget_images(record);
     record.work.failed_in = OrderState::kSending;
-    throw Error(ErrorCode::kUnavailable,
-                "the volume or the job of the order is gone; the images are fetched again");
+    throw Error(
+        ErrorCode::kUnavailable,
+        "the volume or the job of the order is gone or damaged; the images are fetched again");
   }
 }
 

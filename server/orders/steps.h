@@ -67,6 +67,7 @@ class OrderSteps {
   store::Time wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const;
   store::Time fetch(store::OrderRecord& record, const std::stop_token& stop) const;
   store::Time mesh(store::OrderRecord& record) const;
+  bool is_lost(const Error& error, const store::OrderRecord& record) const;
   store::Time submit_job(store::OrderRecord& record) const;
   store::Time make(store::OrderRecord& record, const Job& job) const;
   store::Time send(store::OrderRecord& record, const std::stop_token& stop) const;

@@ -152,8 +152,9 @@ class JobStore {
 
   // Has the mesh of a job that succeeded made again, because its blobs are damaged: by a job like
   // it, which makes the same bytes. Returns that job: one that is under way already, or has failed,
-  // or a new one. Throws Error kNotFound or kGone, kGone also when the mesh cannot be made again,
-  // and kUnavailable when the queue is full.
+  // or a new one. If the earlier one failed because the volume was damaged, and the volume is
+  // intact now, a new one is submitted. Throws Error kNotFound or kGone, kGone also when the mesh
+  // cannot be made again, and kUnavailable when the queue is full.
   virtual Job remake(const std::string& id) = 0;
 
   // The next job by priority, then age, for `lease` from now. A job whose like is running for the

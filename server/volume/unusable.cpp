@@ -7,7 +7,9 @@ namespace isomesh::volume {
 
 void throw_unusable(const std::string& reason) { throw Error(ErrorCode::kUnusableVolume, reason); }
 
-void throw_damaged() { throw_unusable("The stored volume is damaged. Upload it again."); }
+void throw_damaged() {
+  throw_unusable("The stored volume is damaged. Upload it again, then repeat the request.");
+}
 
 void throw_overridable(NoteCode code, const std::string& reason) {
   throw Error(ErrorCode::kUnusableVolume, reason)

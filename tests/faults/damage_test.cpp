@@ -85,9 +85,56 @@ TEST_F(Damage, AMeshThatCannotBeMadeAgainSaysWhy) {
   ASSERT_TRUE(eventually([&] { return daemon().get(mesh(job).href).status == 422; }));
   EXPECT_THAT(daemon().get(mesh(job).href).body, HasSubstr("Upload it again"));
   EXPECT_EQ(daemon().client().jobs().jobs.size(), 2U);
-  // Which mends it, with the next job like it.
-  finished_job(daemon());
-  EXPECT_EQ(daemon().get(mesh(job).href).status, 200);
+  EXPECT_EQ(daemon().client().jobs().jobs.size(), 2U) << "it is not tried again";
+  small_volume();
+  EXPECT_TRUE(is_problem(daemon().get(mesh(job).href), ErrorCode::kUnavailable));
+  ASSERT_TRUE(eventually([&] { return daemon().get(mesh(job).href).status == 200; }));
+  EXPECT_EQ(daemon().client().jobs().jobs.size(), 3U);
+}
+
+// Labels 1 to 300, so that their list is a file of its own.
+RawUpload many_labels() {
+  auto volume = constant<std::uint16_t>(0, {9, 9, 9});
+  for (std::size_t label = 1; label <= 300; ++label) {
+    volume.samples[label] = static_cast<std::uint16_t>(label);
+  }
+  return {bytes_of(volume.samples), "dims=9,9,9&type=uint16", {}};
+}
+
+// Whichever of its files is damaged, and whatever is asked for first.
+TEST_F(Damage, AMeshByLabelsIsMadeAgainOnceItsVolumeIsBack) {
+  start();
+  const std::string volume = upload(daemon(), many_labels()).id;
+  const Answer accepted =
+      daemon().send("POST", "/v1/jobs",
+                    R"({"volume": ")" + volume +
+                        R"(", "labels": "all", "formats": ["stl", "glb"], "lods": [1, 0.5]})",
+                    {{"Content-Type", "application/json"}});
+  ASSERT_EQ(accepted.status, 202) << accepted.body;
+  const Job job = ended(job_from_json(accepted.body).id);
+  ASSERT_EQ(job.state, JobState::kSucceeded) << to_json(job);
+  const std::string list =
+      run_sql("SELECT json_extract(record, '$.mesh.label_list.sha256') FROM jobs WHERE id = '" +
+              job.id + "'");
+  const std::string zip = job.mesh->files.at(MeshFormat::kZip).sha256;
+  const std::string glb = job.mesh->files.at(MeshFormat::kGlb).sha256;
+  const std::string path = "/v1/jobs/" + job.id;
+  const auto status = [&](const std::string& request) {
+    return daemon().get(path + request).status;
+  };
+  for (const auto& [blob, request] : {std::pair(list, "/labels"),
+                                      {list, "/mesh.stl?label=7"},
+                                      {zip, "/mesh.stl?label=7"},
+                                      {zip, "/mesh.zip"},
+                                      {glb, "/mesh.glb"}}) {
+    const std::string whole = daemon().get(path + request).body;
+    spoil(blob);
+    std::filesystem::remove(file_of(volume));
+    ASSERT_TRUE(eventually([&] { return status(request) == 422; })) << request;
+    upload(daemon(), many_labels());
+    ASSERT_TRUE(eventually([&] { return status(request) == 200; })) << request;
+    EXPECT_EQ(daemon().get(path + request).body, whole) << request;
+  }
 }
 
 TEST_F(Damage, NothingIsToldOfASpoiltVolume) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "proto/error.h"
 #include "proto/json.h"
 #include "server/store/job_rules.h"
 #include "server/store/sql/expiry.h"
@@ -117,6 +118,11 @@ bool SqlJobStore::has_share(SqlConnection& connection, const JobSpec& spec) cons
   return has_share_of_queue(spec, {row.count(0), row.count(1)}, options_.max_queued);
 }
 
+bool SqlJobStore::is_repaired(const Job& job) const {
+  return job.error && to_error(*job.error).code() == ErrorCode::kUnusableVolume &&
+         is_there_and_intact(blobs_, job.parameters.volume, {});
+}
+
 Job SqlJobStore::remake(const std::string& id) {
   JobSpec spec;
   const auto like = records_.read([&](SqlConnection& connection) -> std::optional<Job> {
@@ -135,7 +141,8 @@ Job SqlJobStore::remake(const std::string& id) {
     if (is_final(youngest.job.state) && !youngest.job.error) return std::nullopt;
     return with_progress(youngest);
   });
-  if (like) return *like;
+  // Outside of the transaction, because it may read the whole volume.
+  if (like && !is_repaired(*like)) return *like;
   try {
     return job_of(submit(spec));
   } catch (const Error& error) {

@@ -109,6 +109,9 @@ class SqlJobStore : public JobStore {
   std::map<std::string, Live> live_ ISOMESH_GUARDED_BY(live_mutex_);  // of running jobs
 
  private:
+  // Whether the job failed because of a damaged volume that is intact now.
+  bool is_repaired(const Job& job) const;
+
   SqlDatabase& records_;
 
   Mutex work_mutex_;

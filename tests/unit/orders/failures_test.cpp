@@ -1,4 +1,5 @@
 // What orders do when a step fails: how long they wait, what they say, and when they give up.
+#include "proto/error.h"
 #include "tests/unit/orders/fixture.h"
 
 namespace isomesh::orders {
@@ -54,11 +55,32 @@ TEST_F(OrdersTest, WhoseJobIsGoneFetchAgainAfterAPause) {
   }));
   ASSERT_TRUE(until([&] { return get(id).attempts == 1; }));
   EXPECT_EQ(get(id).state, OrderState::kWaiting);
-  EXPECT_THAT(get(id).error->detail, testing::HasSubstr("is gone"));
+  EXPECT_THAT(get(id).error->detail, testing::HasSubstr("is gone or damaged"));
   EXPECT_EQ(main_->fetches, 1);
   pass(minutes(1));
   ASSERT_TRUE(finish_job());
   EXPECT_TRUE(reaches(id, OrderState::kSucceeded));
+}
+
+TEST_F(OrdersTest, WhoseVolumeIsDamagedFetchAgainAfterAPause) {
+  const std::string id = submit();
+  ASSERT_TRUE(until([&] { return get(id).job.has_value(); }));
+  const std::string volume = *get(id).volume;
+  test::write_file(blobs_.path_of(volume), "spoilt");
+  const auto lease = jobs_.claim("test", minutes(1));
+  ASSERT_TRUE(lease);
+  store::Outcome outcome;
+  outcome.error = to_problem(Error(ErrorCode::kUnusableVolume, "it is damaged"), "");
+  ASSERT_TRUE(jobs_.finish(*lease, outcome));
+  orders_->job_ended(lease->id);
+  ASSERT_TRUE(until([&] { return get(id).attempts == 1; }));
+  EXPECT_EQ(get(id).state, OrderState::kWaiting);
+  EXPECT_THAT(get(id).error->detail, testing::HasSubstr("gone or damaged"));
+  pass(minutes(1));
+  ASSERT_TRUE(finish_job());
+  ASSERT_TRUE(reaches(id, OrderState::kSucceeded));
+  EXPECT_EQ(get(id).volume, volume);
+  EXPECT_TRUE(blobs_.is_intact(volume, {}));
 }
 
 TEST_F(OrdersTest, WhoseObjectIsMissingMakeItAgainAfterAPause) {

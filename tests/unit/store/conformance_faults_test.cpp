@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 
+#include "proto/error.h"
 #include "tests/support/errors.h"
 #include "tests/support/process.h"
 #include "tests/unit/store/engine.h"
@@ -246,6 +247,42 @@ TEST_P(FaultConformance, AMeshWhoseBytesAreGoneIsMadeAgain) {
   blobs().erase(key);
   EXPECT_FALSE(submit(parameters()).reused);
   EXPECT_TRUE(can_claim());
+}
+
+TEST_P(FaultConformance, AMeshIsRemadeByOneJobUntilThatFails) {
+  const std::string id = submit(parameters()).id;
+  jobs().finish(claimed(), some_mesh());
+  // There is a mesh like it, which was damaged by now.
+  const Job mine = jobs().get("", id);
+  for (const auto& blob : mine.mesh->files) blobs().erase(blob.second.sha256);
+  const std::string again = jobs().remake(id).id;
+  EXPECT_NE(again, id);
+  EXPECT_EQ(jobs().remake(id).id, again);
+  jobs().finish(claimed(), failure());
+  EXPECT_EQ(jobs().remake(id).id, again);
+  EXPECT_FALSE(can_claim());
+}
+
+TEST_P(FaultConformance, AMeshIsRemadeOnceItsDamagedVolumeIsBack) {
+  const std::string volume = put_blob("samples");
+  add_volume("", volume);
+  JobParameters wanted = parameters();
+  wanted.volume = volume;
+  const std::string id = submit(wanted).id;
+  const std::string key = put_blob("mesh");
+  jobs().finish(claimed(), mesh_of({{key, 4}}));
+  blobs().erase(key);
+  blobs().erase(volume);
+  const std::string failed = jobs().remake(id).id;
+  Outcome damaged;
+  damaged.error = to_problem(Error(ErrorCode::kUnusableVolume, "it is damaged"), "");
+  jobs().finish(claimed(), damaged);
+  EXPECT_EQ(jobs().remake(id).id, failed);
+  put_blob("samples");
+  const std::string again = jobs().remake(id).id;
+  EXPECT_NE(again, failed);
+  EXPECT_EQ(jobs().remake(id).id, again);
+  EXPECT_EQ(claimed().id, again);
 }
 
 TEST_P(FaultConformance, JobsAlikeAreComputedOnce) {

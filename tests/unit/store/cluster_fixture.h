@@ -1,0 +1,109 @@
+// Processes that share the records of one PostgreSQL, for tests of what they do together.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <gmock/gmock.h>
+
+#include "server/store/files/blob_store.h"
+#include "server/store/job_rules.h"
+#include "server/store/postgresql/database.h"
+#include "server/store/postgresql/job_store.h"
+#include "server/store/postgresql/outbox.h"
+#include "server/store/sql/volume_store.h"
+#include "tests/support/files.h"
+#include "tests/support/postgres.h"
+
+namespace isomesh::store::postgresql {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using test::Postgres;
+
+inline constexpr milliseconds kLongLease{600'000};
+inline constexpr milliseconds kLong{60'000};
+inline constexpr const char* kVolume = "some-volume";
+
+// A process, but that it shares this one's memory.
+struct Node {
+  Node(const std::string& url, const std::string& name, const BlobStore& shared)
+      : database({.url = url, .node = name}),
+        volumes(database),
+        outbox(database),
+        jobs(database, shared, {.retry_delay = milliseconds(0), .mesher_version = "test"}) {}
+
+  Lease claimed(milliseconds lease = kLongLease) { return jobs.claim("worker", lease).value(); }
+  bool can_claim() { return jobs.wait_for_work({}, milliseconds(0)); }
+
+  Database database;
+  SqlVolumeStore volumes;
+  PostgresOutbox outbox;
+  PostgresJobStore jobs;
+};
+
+class ClusterTest : public testing::Test {
+ protected:
+  ClusterTest() : folder_(files_ / "data"), blobs_(shared_folder(), folder_.reserve()) {}
+
+  void SetUp() override {
+    if (!Postgres::is_here()) GTEST_SKIP() << "PostgreSQL is not installed";
+    url_ = Postgres::shared().new_place();
+    one_.emplace(url_, "one", blobs_);
+    two_.emplace(url_, "two", blobs_);
+    Volume volume;
+    volume.id = kVolume;
+    volume.created = "2024-01-01T00:00:00.000Z";
+    one_->volumes.add("", volume);
+  }
+
+  static JobSpec spec(double iso = 60, const std::string& key = "") {
+    JobSpec spec;
+    spec.parameters.volume = kVolume;
+    spec.parameters.iso = iso;
+    spec.idempotency_key = key;
+    return spec;
+  }
+  std::string submit(double iso = 60) { return job_of(one().jobs.submit(spec(iso))).id; }
+
+  Outcome mesh() {
+    Outcome outcome;
+    MeshFile& file = outcome.mesh.emplace().files[MeshFormat::kDrc];
+    const Blob blob = put("mesh");
+    file.sha256 = blob.key;
+    file.bytes = blob.bytes;
+    return outcome;
+  }
+  Blob put(const std::string& text) {
+    const auto writer = blobs_.begin();
+    writer->write(test::as_span(text));
+    return writer->commit();
+  }
+
+  // As when the network fails or the server restarts.
+  void cut_connections() {
+    Postgres::ask(url_,
+                  "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> "
+                  "pg_backend_pid() AND backend_type = 'client backend'");
+  }
+  std::string ask(const std::string& sql) { return Postgres::ask(url_, sql); }
+
+  BlobFolders shared_folder() const {
+    std::filesystem::create_directory(files_ / "shared");
+    return shared_blob_folders(files_ / "shared");
+  }
+
+  Node& one() { return *one_; }
+  Node& two() { return *two_; }
+
+  test::TemporaryFolder files_;
+  DataFolder folder_;
+  FileBlobStore blobs_;
+  std::string url_;
+  std::optional<Node> one_;
+  std::optional<Node> two_;
+};
+
+}  // namespace isomesh::store::postgresql

@@ -1,0 +1,174 @@
+// What several processes do that share the records of one database, besides jobs: tables, what is
+// not kept, orders, callbacks, and which blobs belong to a database.
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/store/postgresql/identity.h"
+#include "server/store/postgresql/turn.h"
+#include "server/store/sql/audit_trail.h"
+#include "server/store/sql/order_store.h"
+#include "tests/support/errors.h"
+#include "tests/unit/store/cluster_fixture.h"
+
+namespace isomesh::store::postgresql {
+namespace {
+
+using test::code_thrown_by;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+// --- Tables
+
+TEST_F(ClusterTest, TablesOfANewerVersionAreRefused) {
+  ask("UPDATE isomesh_version SET version = 1000");
+  EXPECT_EQ(code_thrown_by([&] { Database({.url = url_, .node = "x"}); }), ErrorCode::kUnavailable);
+}
+
+TEST_F(ClusterTest, TablesOfTheVersionBeforeAreBroughtUpToDate) {
+  const std::string id = submit();
+  ask("ALTER TABLE runs DROP COLUMN timings; DROP FUNCTION submit_job(jsonb); UPDATE "
+      "isomesh_version SET version = 1");
+  one_.emplace(url_, "one", blobs_);
+  const Lease lease = one().claimed();
+  EXPECT_EQ(lease.id, id);
+  one().jobs.renew(lease, {Stage::kSmooth, 0.5, {.load = 1}}, kLongLease);
+  EXPECT_EQ(two().jobs.get("", id).timing.load, 1);
+  submit(2);
+}
+
+TEST_F(ClusterTest, SeveralThatStartAtOnceMakeThemOnce) {
+  const std::string place = Postgres::shared().new_place();
+  std::vector<std::jthread> nodes;
+  for (int n = 0; n < 6; ++n) {
+    nodes.emplace_back([&, n] { Database({.url = place, .node = std::to_string(n)}); });
+  }
+  nodes.clear();
+  EXPECT_EQ(Postgres::ask(place, "SELECT count(*) FROM nodes"), "6");
+  EXPECT_EQ(Postgres::ask(place, "SELECT count(*) FROM isomesh_version"), "1");
+}
+
+TEST_F(ClusterTest, TheAuditTrailIsNotChanged) {
+  for (const std::string sql :
+       {"UPDATE audit SET record = ''", "DELETE FROM audit", "TRUNCATE audit"}) {
+    EXPECT_THROW(ask(sql), std::runtime_error) << sql;
+  }
+}
+
+TEST_F(ClusterTest, TheAuditTrailTellsWhichEntryWasTamperedWith) {
+  for (int n = 0; n < 5; ++n) SqlAuditTrail((n % 2 ? one() : two()).database).add({});
+  EXPECT_EQ(SqlAuditTrail(one().database).verify().entries, 5U);
+  ask("ALTER TABLE audit DISABLE TRIGGER audit_is_kept; UPDATE audit SET at = '' WHERE id = 3");
+  EXPECT_EQ(SqlAuditTrail(one().database).verify().misfit, 3U);
+}
+
+// --- What is not kept
+
+TEST_F(ClusterTest, OneRemovesAtATime) {
+  auto turn = one().jobs.turn_to_remove();
+  EXPECT_TRUE(turn);
+  EXPECT_FALSE(two().jobs.turn_to_remove());
+  turn.reset();
+  EXPECT_TRUE(two().jobs.turn_to_remove());
+}
+
+// The newest time that is known is 40 days later than the database's clock.
+TEST_F(ClusterTest, WhatIsUsedIsNeverOlderThanTheNewestTimeThatIsKnown) {
+  Identity(one().database, blobs_, {.adopt = true}, seconds(1)).now();
+  ask("UPDATE identity SET seen = isomesh_now() + 40 * 86400000000");
+  Volume volume;
+  volume.id = "another";
+  volume.created = "2024-01-01T00:00:00.000Z";
+  one().volumes.add("", volume);
+  two().jobs.cancel("", submit());
+  EXPECT_EQ(ask("SELECT count(*) FROM volumes, identity WHERE used < seen"), "0");
+  EXPECT_EQ(ask("SELECT count(*) FROM jobs, identity WHERE finished < seen"), "0");
+  Identity behind(two().database, blobs_, {}, seconds(1));
+  EXPECT_GT(behind.now(), std::chrono::system_clock::now() + std::chrono::days(39));
+}
+
+// The one was used right before the time until which the clock was behind, the other long before.
+TEST_F(ClusterTest, AClockThatIsTrustedLetsExpireWhatWasOldBefore) {
+  Identity(one().database, blobs_, {.adopt = true}, seconds(1)).now();
+  const std::string id = submit();
+  one().jobs.cancel("", id);
+  ask("UPDATE identity SET seen = isomesh_now() - 40 * 86400000000; UPDATE volumes SET used = "
+      "isomesh_now() - 40 * 86400000000; UPDATE jobs SET finished = isomesh_now() - 60 * "
+      "86400000000");
+  Identity trusting(two().database, blobs_, {.trust_clock = true}, std::chrono::days(7));
+  const Time month_ago = trusting.now() - std::chrono::days(30);
+  EXPECT_THAT(two().jobs.ended({month_ago}, Ended::kAll, 9), SizeIs(1));
+  EXPECT_THAT(two().volumes.unused({month_ago}, 9), IsEmpty());
+}
+
+// --- Orders
+
+// Who carries them out has the turn as long as it lives, and takes orders meanwhile.
+TEST_F(ClusterTest, OrdersAreTakenByWhoCarriesThemOut) {
+  const Turn turn(url_, "orders");
+  ASSERT_TRUE(turn.is_taken());
+  OrderSpec order;
+  order.record.order.id = "an order";
+  order.record.order.created = "2024-01-01T00:00:00.000Z";
+  EXPECT_EQ(SqlOrderStore(one().database).submit(order, 1).kind, OrderSubmission::Kind::kNew);
+}
+
+// --- Callbacks
+
+TEST_F(ClusterTest, OneReceiverIsToldNoMoreAtATimeByAllNodes) {
+  for (int n = 0; n < 6; ++n) {
+    JobSpec calling = spec(n);
+    calling.parameters.callback = Callback{"https://a.example.org/" + std::to_string(n)};
+    one().jobs.cancel("", job_of(one().jobs.submit(calling)).id);
+  }
+  const Time now = std::chrono::system_clock::now() + seconds(1);
+  const auto mine = one().outbox.due(now, 4);
+  EXPECT_THAT(mine, SizeIs(4));
+  EXPECT_THAT(two().outbox.due(now, 4), IsEmpty());
+  one().outbox.remove(mine[0].job);
+  const auto theirs = two().outbox.due(now, 4);
+  ASSERT_THAT(theirs, SizeIs(1));
+  for (const Delivery& each : mine) EXPECT_NE(each.job, theirs[0].job);
+  EXPECT_THAT(one().outbox.due(now, 4), SizeIs(3));
+}
+
+// --- Databases and blobs
+
+// Whether a daemon of that database starts with those blobs.
+bool belong(Database& database, const BlobStore& blobs, bool adopt = false) {
+  const auto code =
+      code_thrown_by([&] { Identity(database, blobs, {.adopt = adopt}, seconds(1)); });
+  EXPECT_EQ(code.value_or(ErrorCode::kUnavailable), ErrorCode::kUnavailable);
+  return !code;
+}
+
+TEST_F(ClusterTest, ADatabaseAndBlobsThatAreNotItsOwnAreRefused) {
+  const std::string url = Postgres::shared().new_place();
+  Database database({.url = url, .node = "x"});
+  Database again({.url = url, .node = "y"});
+  EXPECT_TRUE(belong(database, blobs_));
+  EXPECT_TRUE(belong(again, blobs_));
+  Database other({.url = Postgres::shared().new_place(), .node = "x"});
+  EXPECT_FALSE(belong(other, blobs_));
+  EXPECT_TRUE(belong(other, blobs_, true));
+  EXPECT_FALSE(belong(database, blobs_));
+}
+
+TEST_F(ClusterTest, BlobsOfOneDaemonAloneAreNotThoseOfASecond) {
+  Database database({.url = Postgres::shared().new_place(), .node = "x"});
+  const DataFolder mine(files_ / "mine");
+  const DataFolder others(files_ / "others");
+  EXPECT_TRUE(belong(database, FileBlobStore(mine)));
+  EXPECT_FALSE(belong(database, FileBlobStore(others)));
+  EXPECT_TRUE(belong(database, FileBlobStore(mine)));
+}
+
+// The store's URL is wrong, or nothing is mounted there.
+TEST_F(ClusterTest, BlobsThatAreMissingAreMissed) {
+  EXPECT_FALSE(belong(one().database, blobs_)) << "there are records, and no blobs";
+  EXPECT_TRUE(belong(one().database, blobs_, true));
+  EXPECT_TRUE(belong(two().database, blobs_));
+}
+
+}  // namespace
+}  // namespace isomesh::store::postgresql
