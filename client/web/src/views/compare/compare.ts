@@ -1,8 +1,8 @@
 // Two to four surfaces side by side that turn together: #/compare?jobs=A,B
 import { client } from '../../client';
 import { ApiError, asApiError, errorOfProblem } from '../../api/problem';
-import { isFinal, type Job, type LabelSummary, type Volume } from '../../api/types';
-import { differences } from '../../job/differences';
+import { isFinal, type Job, type LabelSummary } from '../../api/types';
+import { titlesOf } from '../../job/differences';
 import { LabelState, labelsOfMesh } from '../../job/labels';
 import type { SurfaceStyle } from '../../scene/parts';
 import { graphicsStarted } from '../../scene/graphics';
@@ -12,7 +12,7 @@ import { formatCount, formatMilliseconds, formatNumber, formatValue } from '../.
 import { refusal } from '../../ui/notices';
 import { hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
-import { volumeName } from '../../volume/names';
+import { KnownVolumes } from '../../volume/known';
 import { SurfacePane } from '../surface/surface_pane';
 
 const most = 4;
@@ -50,9 +50,9 @@ export async function compareView(scope: Scope, route: Route): Promise<HTMLEleme
     throw new ApiError(-1, 'Nothing to compare', 'Choose two to four jobs in the list of jobs.', [], {}, link);
   }
   const jobs = await Promise.all(ids.map((id) => client.getJob(id)));
-  const [first] = jobs;
-  const volume = first ? await client.getVolume(first.volume).catch(() => null) : null;
-  return new Comparison(scope, jobs, volume, placeOfText(route.query.get('cam') ?? '')).element;
+  const volumes = new KnownVolumes();
+  await volumes.find(jobs.map((job) => job.volume));
+  return new Comparison(scope, jobs, volumes, placeOfText(route.query.get('cam') ?? '')).element;
 }
 
 // One of the surfaces with its title and numbers.
@@ -94,16 +94,17 @@ class Comparison {
   constructor(
     private readonly scope: Scope,
     jobs: readonly Job[],
-    private readonly volume: Volume | null,
+    private readonly volumes: KnownVolumes,
     private readonly camera: CameraPlace | null,
   ) {
-    const titles = differences(jobs);
-    const isOneVolume = jobs.every((job) => job.volume === volume?.id);
+    const titles = titlesOf(jobs, (volume) => volumes.nameOf(volume));
+    const [only, ...others] = new Set(jobs.map(({ volume }) => volume));
+    const title = only !== undefined && others.length === 0 ? `Compare, ${volumes.nameOf(only)}` : 'Compare';
     const cells = jobs.map((job, place) => this.cellFor(job, titles[place] ?? ''));
     this.element = h(
       'div',
       { class: 'compare', 'data-count': cells.length, 'data-title': `Compare ${titles.join(', ')}` },
-      this.head(volume && isOneVolume ? `Compare, ${volumeName(volume)}` : 'Compare', jobs.map(({ id }) => id)),
+      this.head(title, jobs.map(({ id }) => id)),
       h('div', { class: 'grid' }, ...cells),
     );
     scope.onEnd(() => clearTimeout(this.noting));
@@ -116,7 +117,7 @@ class Comparison {
     return h(
       'div',
       { class: 'section-head' },
-      h('h1', { title: this.volume ? volumeName(this.volume) : '' }, title),
+      h('h1', {}, title),
       h(
         'div',
         { class: 'tool-group', role: 'toolbar', 'aria-label': 'View of all surfaces' },
@@ -181,7 +182,7 @@ class Comparison {
       onSlices: null,
       look: new URLSearchParams(),
       camera,
-      volume: this.volume,
+      volume: this.volumes.get(job.volume),
       labels: new LabelState(labels),
     });
     this.panes.push(pane);

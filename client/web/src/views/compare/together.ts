@@ -2,9 +2,8 @@
 import { client } from '../../client';
 import { ApiError } from '../../api/problem';
 import type { Job, Vec3 } from '../../api/types';
-import { differences } from '../../job/differences';
+import { titlesOf } from '../../job/differences';
 import { labelCount } from '../../job/labels';
-import { surfaceInWords } from '../../job/parameters';
 import type { Part } from '../../mesh/glb';
 import { loadMesh, viewableFile } from '../../mesh/load';
 import { graphicsStarted } from '../../scene/graphics';
@@ -15,7 +14,7 @@ import { formatCount } from '../../ui/format';
 import { tellError } from '../../ui/notices';
 import { hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
-import { volumeName } from '../../volume/names';
+import { KnownVolumes } from '../../volume/known';
 import { looksOfText, looksToText, usual, type SurfaceLook } from './together_look';
 
 const most = 8;
@@ -28,25 +27,9 @@ export async function togetherView(scope: Scope, route: Route): Promise<HTMLElem
     const link = { href: hashOf(['jobs']), text: 'Go to the list of jobs' };
     throw new ApiError(-1, 'No surfaces to show', 'Choose jobs that made a GLB or Draco file.', [], {}, link);
   }
-  const titles = await titlesOf(jobs);
-  return new Together(scope, jobs, titles, route.query).element;
-}
-
-// The differences between the jobs; with the volume's name if there are several volumes.
-async function titlesOf(jobs: readonly Job[]): Promise<string[]> {
-  const different = jobs.length > 1 ? differences(jobs) : [''];
-  const volumes = new Set(jobs.map(({ volume }) => volume));
-  const names = new Map(
-    await Promise.all(
-      [...volumes].map(async (id): Promise<[string, string]> => [id, await client.getVolume(id).then(volumeName, () => 'erased volume')]),
-    ),
-  );
-  const isNamed = volumes.size > 1 || jobs.length === 1;
-  return jobs.map((job, at) => {
-    // Named, a volume needs no number.
-    const words = (different[at] ?? '').split(', ').filter((word) => !isNamed || !/^volume [0-9a-f]{8}$/.test(word));
-    return [isNamed ? names.get(job.volume) : '', ...words, isNamed ? surfaceInWords(job.parameters) : ''].filter(Boolean).join(', ');
-  });
+  const volumes = new KnownVolumes();
+  await volumes.find(jobs.map(({ volume }) => volume));
+  return new Together(scope, jobs, titlesOf(jobs, (volume) => volumes.nameOf(volume)), route.query).element;
 }
 
 class Together {
@@ -172,8 +155,12 @@ class Together {
       clearTimeout(this.noting);
       this.noting = window.setTimeout(() => noteInAddress({ cam: placeToText(surface.place) }), noteDelay);
     };
-    const done = this.jobs.map(() => 0);
-    const total = this.jobs.reduce((sum, { mesh }) => sum + (mesh?.triangles ?? 0), 0);
+    const totals = this.jobs.map(({ mesh }) => mesh?.triangles ?? 0);
+    const show = (): void => {
+      const total = totals.reduce((sum, count) => sum + count, 0);
+      this.status.textContent = `${formatCount(surface.trianglesShown)} of ${formatCount(total)} triangles`;
+    };
+    surface.onShown = show;
     await Promise.all(
       this.jobs.map((job, at) =>
         loadMesh(job, this.scope.signal, {
@@ -181,14 +168,15 @@ class Together {
           onBlocks: (blocks, label, isCoarse) => {
             if (!isCoarse) surface.addBlocks(blocks, this.partOf(at, label));
           },
-          onProgress: ({ triangles }) => {
-            done[at] = triangles;
-            this.status.textContent = `${formatCount(done.reduce((sum, count) => sum + count, 0))} of ${formatCount(total)} triangles`;
+          onProgress: ({ totalTriangles }) => {
+            totals[at] = totalTriangles;
+            show();
           },
         }),
       ),
     );
     if (this.scope.isOver) return;
+    await surface.allShown();
     surface.finish();
     this.view.parentElement?.setAttribute('data-loaded', 'true');
   }

@@ -1,7 +1,7 @@
 // A surface with its tools: what a job made, loaded part by part.
 import { asApiError } from '../../api/problem';
 import type { Job, MeshSummary, Vec3, Volume } from '../../api/types';
-import { loadMesh, viewableFile, type LoadTiming } from '../../mesh/load';
+import { loadMesh, viewableFile, type LoadProgress, type LoadTiming } from '../../mesh/load';
 import { lengthOf } from '../../scene/rulers';
 import { defaultStyle, type SurfaceStyle } from '../../scene/parts';
 import type { Picked } from '../../scene/picked';
@@ -65,7 +65,7 @@ export class SurfacePane {
   });
   private wantsDistance = false;
   private isMeasuring = false;
-  // All of it is there.
+  // All of it is drawn.
   private isWhole = false;
   private cut: CutTool | null = null;
   private readonly toggles = new Map<string, HTMLButtonElement>();
@@ -93,19 +93,7 @@ export class SurfacePane {
     if (this.options.camera) surface.moveTo(this.options.camera);
     this.restore(surface, this.options.look);
     try {
-      const timing = await loadMesh(this.job, this.scope.signal, {
-        onBlocks: (blocks, part, isCoarse) => {
-          if (part) this.options.labels.learnColour(part.label, part.colour);
-          surface.addBlocks(blocks, part, isCoarse);
-        },
-        onProgress: ({ bytes, totalBytes, triangles, totalTriangles }) => {
-          this.bar.value = (bytes / totalBytes + triangles / Math.max(1, totalTriangles)) / 2;
-          this.status.textContent =
-            bytes < totalBytes || triangles > 0
-              ? `${formatCount(triangles)} of ${formatCount(totalTriangles)} triangles`
-              : 'Decoding';
-        },
-      });
+      const timing = await this.loadBlocks(surface);
       if (this.scope.isOver) return null;
       surface.finish();
       this.isWhole = true;
@@ -128,6 +116,31 @@ export class SurfacePane {
       );
       return null;
     }
+  }
+
+  // Ends when all of them are drawn, and so does the progress.
+  private async loadBlocks(surface: Surface): Promise<LoadTiming> {
+    let latest: LoadProgress = { bytes: 0, totalBytes: 1, totalTriangles: 1 };
+    const show = (): void => {
+      const { bytes, totalBytes, totalTriangles } = latest;
+      const shown = surface.trianglesShown;
+      this.bar.value = (bytes / totalBytes + shown / Math.max(1, totalTriangles)) / 2;
+      this.status.textContent =
+        bytes < totalBytes || shown > 0 ? `${formatCount(shown)} of ${formatCount(totalTriangles)} triangles` : 'Decoding';
+    };
+    surface.onShown = show;
+    const timing = await loadMesh(this.job, this.scope.signal, {
+      onBlocks: (blocks, part, isCoarse) => {
+        if (part) this.options.labels.learnColour(part.label, part.colour);
+        surface.addBlocks(blocks, part, isCoarse);
+      },
+      onProgress: (progress) => {
+        latest = progress;
+        show();
+      },
+    });
+    if (!this.scope.isOver) await surface.allShown();
+    return timing;
   }
 
   // Null, and says why, where there is nothing to be shown.
@@ -233,7 +246,7 @@ export class SurfacePane {
       return;
     }
     if (!picked) {
-      tell('There is no surface at this point.');
+      tell(this.isWhole ? 'There is no surface at this point.' : 'The surface is still loading. Try again when all of it is drawn.');
       return;
     }
     const ruler = surface.rulers.add(picked.point);
