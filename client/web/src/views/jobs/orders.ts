@@ -7,6 +7,7 @@ import { formatTime, shortId } from '../../ui/format';
 import { tellError } from '../../ui/notices';
 import { hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
+import { cell, row, table } from '../../ui/table';
 import { isOver, orderStates, saidOf } from './order_texts';
 
 const refreshEvery = 2000;
@@ -19,10 +20,6 @@ export async function ordersView(scope: Scope, route: Route): Promise<HTMLElemen
   await orders.refresh();
   orders.keepFresh();
   return orders.element;
-}
-
-function cell(...children: (Node | string | null)[]): HTMLElement {
-  return h('td', {}, ...children);
 }
 
 function pacsItem({ name, last_success: success, last_failure: failure, reason }: PacsList['pacs'][number]): HTMLElement {
@@ -111,17 +108,11 @@ class Orders {
     const order = focused?.closest('tr')?.dataset.order;
     const label = focused?.getAttribute('aria-label');
     const now = Date.now();
-    const heads = columns.map((name) => h('th', { scope: 'col' }, h('span', { class: name === 'Action' ? 'sr-only' : '' }, name)));
     const none = this.state === '' ? 'No orders yet.' : `No orders are ${this.state}.`;
     this.body.replaceChildren(
       this.orders.length === 0
         ? h('p', { class: 'empty' }, none)
-        : h(
-            'table',
-            { class: 'jobs' },
-            h('thead', {}, h('tr', {}, ...heads)),
-            h('tbody', {}, ...this.orders.map((each) => this.row(each, now))),
-          ),
+        : table(columns, ['Action'], this.orders.map((each) => this.row(each, now))),
     );
     // The rows are made anew; whoever is on one of them with the keyboard stays there.
     if (order !== undefined && label) {
@@ -136,8 +127,7 @@ class Orders {
       volume !== null && h('a', { href: hashOf(['volumes', volume]) }, 'volume'),
       job !== null && h('a', { href: hashOf(['jobs', job]) }, 'surface'),
     ];
-    return h(
-      'tr',
+    return row(
       { 'data-order': id },
       cell(h('span', { class: `state ${dots[state] ?? state}` }), state),
       cell(

@@ -8,23 +8,19 @@ import { formatCount, formatMilliseconds, formatTime, shortId } from '../../ui/f
 import { tellError } from '../../ui/notices';
 import { go, hashOf } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
+import { cell, row, table } from '../../ui/table';
 import { KnownVolumes } from '../../volume/known';
 
 const refreshEvery = 1500;
 const mostCompared = 4;
 const mostTogether = 8;
 const columns = ['Choose', 'State', 'Priority', 'Surface', 'Result', 'Time', 'Created', 'Action'];
-// For those who hear the table.
 const unseen = ['Choose', 'Action'];
 
 // As the daemon takes them: by priority, then by age.
 export function inOrder(jobs: readonly Job[]): Job[] {
   const rank = (job: Job): number => priorities.indexOf(job.priority);
   return [...jobs].sort((a, b) => rank(a) - rank(b) || (a.id < b.id ? -1 : 1));
-}
-
-function cell(...children: (Node | string)[]): HTMLElement {
-  return h('td', {}, ...children);
 }
 
 function progressOf(job: Job): Node | string {
@@ -53,11 +49,6 @@ function surfaceCell(job: Job, volume: string): HTMLElement {
     h('span', { class: 'faint' }, ` ${inWords(job.parameters)}`),
     h('span', { class: 'of-volume' }, volume),
   );
-}
-
-function tableOf(rows: readonly HTMLElement[]): HTMLElement {
-  const heads = columns.map((name) => h('th', { scope: 'col' }, h('span', { class: unseen.includes(name) ? 'sr-only' : '' }, name)));
-  return h('table', { class: 'jobs' }, h('thead', {}, h('tr', {}, ...heads)), h('tbody', {}, ...rows));
 }
 
 export async function queueView(scope: Scope): Promise<HTMLElement> {
@@ -133,7 +124,7 @@ class Queue {
     this.more.hidden = this.next === null;
     this.keepFocus(() =>
       this.body.replaceChildren(
-        rows.length === 0 ? h('p', { class: 'empty' }, 'No jobs yet. Choose a volume to begin.') : tableOf(rows),
+        rows.length === 0 ? h('p', { class: 'empty' }, 'No jobs yet. Choose a volume to begin.') : table(columns, unseen, rows),
       ),
     );
   }
@@ -150,8 +141,7 @@ class Queue {
 
   private row(job: Job, place: number): HTMLElement {
     const time = isFinal(job.state) && job.timing.total ? formatMilliseconds(job.timing.total) : '';
-    return h(
-      'tr',
+    return row(
       { 'data-job': job.id },
       cell(this.pickBox(job)),
       stateCell(job, place),

@@ -123,11 +123,20 @@ export class LabelList {
     if (now !== undefined) colour.value = now;
   }
 
+  // Scrolls the list alone: scrollIntoView would take the surface that was tapped off a phone's screen.
+  private scrollTo(row: HTMLElement): void {
+    const list = row.parentElement;
+    if (!list) return;
+    const [outer, inner] = [list.getBoundingClientRect(), row.getBoundingClientRect()];
+    if (inner.top < outer.top) list.scrollTop -= outer.top - inner.top;
+    else if (inner.bottom > outer.bottom) list.scrollTop += inner.bottom - outer.bottom;
+  }
+
   private markPicked(picked: LabelSummary | null): void {
     for (const [label, { element }] of this.rows) {
       if (label === picked?.label) {
         element.setAttribute('aria-current', 'true');
-        element.scrollIntoView({ block: 'nearest' });
+        this.scrollTo(element);
       } else element.removeAttribute('aria-current');
     }
   }
