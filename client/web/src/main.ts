@@ -22,11 +22,11 @@ import { currentRoute, go, hashOf, type Route } from './ui/route';
 import { Scope } from './ui/signal';
 import { startTheme, toggleTheme } from './ui/theme';
 import { tokenButtons, watchToken } from './ui/token_dialog';
-import { uploads } from './views/upload_panel';
-import { prepareView } from './views/prepare';
-import { ordersView } from './views/orders';
-import { queueView } from './views/queue';
-import { volumesView } from './views/volumes';
+import { uploads } from './views/volumes/upload_panel';
+import { prepareView } from './views/prepare/prepare';
+import { ordersView } from './views/jobs/orders';
+import { queueView } from './views/jobs/queue';
+import { volumesView } from './views/volumes/volumes';
 
 const retryEvery = 2000;
 
@@ -47,19 +47,19 @@ function placeOf({ path }: Route): Place {
   if (name === 'jobs') {
     return {
       title: 'Surface',
-      show: async (scope, route) => (await import('./views/job')).jobView(scope, route),
+      show: async (scope, route) => (await import('./views/jobs/job')).jobView(scope, route),
     };
   }
   if (name === 'compare') {
     return {
       title: 'Compare',
-      show: async (scope, route) => (await import('./views/compare')).compareView(scope, route),
+      show: async (scope, route) => (await import('./views/compare/compare')).compareView(scope, route),
     };
   }
   if (name === 'together') {
     return {
       title: 'Surfaces in one scene',
-      show: async (scope, route) => (await import('./views/together')).togetherView(scope, route),
+      show: async (scope, route) => (await import('./views/compare/together')).togetherView(scope, route),
     };
   }
   return {

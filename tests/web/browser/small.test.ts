@@ -1,7 +1,7 @@
 // A phone: 375 by 667, with fingers.
 import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { ballNrrd, contourPixels, noted, setup, settled, surfaceLoaded } from './support';
+import { ballNrrd, contourPixels, labelsNrrd, noted, setup, settled, surfaceLoaded } from './support';
 
 const at = setup({ viewport: { width: 375, height: 667 }, hasTouch: true, isMobile: true });
 
@@ -39,6 +39,68 @@ describe('on a phone', () => {
       expect((slice?.y ?? 999) + (slice?.height ?? 0), plane).toBeLessThanOrEqual(line.y);
     }
     expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBe(375);
+  });
+
+  it('a tap on a label leaves the page where it is', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(labelsNrrd(24));
+    const { id } = await daemon.submit({ volume, labels: 'all', formats: ['glb'] }, 30);
+    await page.goto(`${daemon.url}/#/jobs/${id}`);
+    await surfaceLoaded(page);
+    await page.locator('.viewport canvas').tap();
+    await expect.poll(() => page.locator('.labels [aria-current]').count()).toBe(1);
+    expect(await page.locator('.picked-label').isVisible()).toBe(true);
+    expect(await scrolled(page)).toBe(0);
+  });
+
+  it('jobs are cards that a finger can choose', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(ballNrrd(48, 18));
+    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'] }, 30);
+    await page.goto(`${daemon.url}/#/jobs`);
+    const card = page.locator(`[data-job="${id}"]`);
+    await card.waitFor();
+    // As before to those who hear it.
+    expect(await page.getByRole('row').count()).toBeGreaterThan(1);
+    const texts = await card.evaluate((row) =>
+      [...row.children].filter((cell) => cell.textContent !== '').map((cell) => {
+        const { left, right, height } = cell.getBoundingClientRect();
+        return { isIn: left >= 0 && right <= window.innerWidth, lines: height / parseFloat(getComputedStyle(cell).lineHeight) };
+      }),
+    );
+    for (const { isIn, lines } of texts) {
+      expect(isIn).toBe(true);
+      expect(lines).toBeLessThan(3.5);
+    }
+    await card.getByRole('checkbox').tap();
+    expect(await card.getByRole('checkbox').isChecked()).toBe(true);
+  });
+
+  it('nothing that is pressed is smaller than 24 pixels', async () => {
+    const { page, daemon } = at;
+    const volume = await daemon.upload(ballNrrd(48, 18));
+    const segmented = await daemon.upload(labelsNrrd(24));
+    const { id } = await daemon.submit({ volume, iso: 100, formats: ['glb'], certify: true }, 30);
+    const labels = await daemon.submit({ volume: segmented, labels: 'all', formats: ['glb', 'stl'] }, 30);
+    const found: string[] = [];
+    for (const place of ['', `volumes/${volume}`, `volumes/${segmented}`, 'jobs', `jobs/${id}?cut=z24%2B`, `jobs/${labels.id}`, `together?jobs=${id},${labels.id}`]) {
+      await page.goto(`${daemon.url}/#/${place}`);
+      await page.locator('main h1').first().waitFor();
+      await expect.poll(() => page.locator('main').getAttribute('aria-busy')).toBeNull();
+      const panes = await page.locator('.pane').count();
+      if (panes > 0) await surfaceLoaded(page, panes);
+      const small = await page.evaluate(() =>
+        [...document.querySelectorAll<HTMLElement>('a[href], button, input, select, summary')]
+          // Links in a text are as large as its lines. What cannot be seen cannot be pressed; a label is pressed for its control.
+          .filter((one) => getComputedStyle(one).display !== 'inline' && one.checkVisibility({ opacityProperty: true }))
+          .map((one) => one.closest('label') ?? one)
+          .map((one) => ({ text: `${one.tagName} ${one.className} ${one.textContent}`, box: one.getBoundingClientRect() }))
+          .filter(({ box }) => box.width > 0 && Math.min(box.width, box.height) < 23.5)
+          .map(({ text, box }) => `${text} ${Math.round(box.width)} x ${Math.round(box.height)}`),
+      );
+      found.push(...small.map((text) => `${place} ${text}`));
+    }
+    expect(found).toEqual([]);
   });
 
   it('what controls a cut is on the screen', async () => {

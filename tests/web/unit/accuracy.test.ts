@@ -1,10 +1,11 @@
 import { describe, expect, it } from 'vitest';
 import type { Job } from '@/api/types';
 import { emptyReason } from '@/job/empty';
-import { histogramPath, millimetres } from '@/views/certificate';
-import { stepsOf } from '@/views/charts';
-import { errorAt, errorInWords, placeOf } from '@/views/error_slider';
-import { keepOnlyAt } from '@/views/picked_part';
+import { millimetres } from '@/ui/format';
+import { histogramPath } from '@/views/jobs/certificate';
+import { stepsOf } from '@/views/jobs/charts';
+import { errorAt, errorInWords, placeOf } from '@/views/prepare/error_slider';
+import { keepOnlyAt } from '@/views/surface/picked_part';
 
 describe('the slider of the largest error', () => {
   it('is off at its left end, and goes from 0.02 to 2 mm in steps of the same factor', () => {

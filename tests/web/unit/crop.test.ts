@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import type { Vec3 } from '@/api/types';
 import { boxOf, cropOf, isUpright, wholeBox, within, type Box } from '@/volume/crop';
-import { SliceCrop } from '@/views/slice_crop';
+import { SliceCrop } from '@/views/slices/slice_crop';
 
 // x towards the right, y towards the back, z down.
 const turned = {

@@ -14,7 +14,7 @@ import {
   surfaceInWords,
   variantOf,
 } from '@/job/parameters';
-import { differences } from '@/job/differences';
+import { titlesOf } from '@/job/differences';
 import { commandSnippet, curlSnippet } from '@/job/snippets';
 import { parameterOf, withLabels } from '@/job/table';
 
@@ -85,8 +85,8 @@ describe('a job by labels', () => {
       'label 7',
     ]);
     expect(inWords(all)).toBe('6 tetrahedra, 10 passes');
-    const jobs = [defaults, all].map((parameters) => ({ parameters }) as Parameters<typeof differences>[0][0]);
-    expect(differences(jobs)).toEqual(['iso 60, 5 passes', 'all labels, 10 passes']);
+    const jobs = [defaults, all].map((parameters) => ({ parameters }) as Parameters<typeof titlesOf>[0][0]);
+    expect(titlesOf(jobs)).toEqual(['iso 60, 5 passes', 'all labels, 10 passes']);
   });
 });
 

@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { defaultStyle } from '@/scene/parts';
 import { History } from '@/ui/history';
-import { labelsOfText, rulersOfText, rulersToText, styleOfText, styleToText } from '@/views/look_text';
+import { labelsOfText, rulersOfText, rulersToText, styleOfText, styleToText } from '@/views/surface/look_text';
 
 describe('a look in the address', () => {
   it('is a style and back, of which only what is not as usual is said', () => {

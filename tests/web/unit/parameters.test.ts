@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import type { Job, JobParameters } from '@/api/types';
 import { parseRoute, hashOf } from '@/ui/route';
 import { formatBytes, formatCount, formatMilliseconds, formatValue } from '@/ui/format';
-import { differences } from '@/job/differences';
+import { titlesOf } from '@/job/differences';
 import {
   changed,
   defaultParameters,
@@ -15,7 +15,7 @@ import {
 import { commandSnippet, curlSnippet, librarySnippet } from '@/job/snippets';
 import { parameterOf } from '@/job/table';
 import { rawFault } from '@/volume/raw';
-import { draggedWindow } from '@/views/slice_view';
+import { draggedWindow } from '@/views/slices/slice_view';
 import { inSlice, windowToFetch } from '@/volume/slices';
 import { fitDistance, placeOfText, placeToText, turned } from '@/scene/views';
 
@@ -157,14 +157,29 @@ describe('jobs that are compared', () => {
     all.map((one) => ({ parameters: { ...defaults, ...one } }) as Job);
 
   it('are named by what differs, whichever parameter it is', () => {
-    expect(differences(jobs({ passes: 0 }, { passes: 5 }))).toEqual(['0 passes', '5 passes']);
-    expect(differences(jobs({ max_displacement_mm: null }, { max_displacement_mm: 0.5 }))).toEqual([
-      'largest displacement: no limit',
-      'largest displacement: 0.5 mm',
+    expect(titlesOf(jobs({ passes: 0 }, { passes: 5 }))).toEqual(['iso 60, 0 passes', 'iso 60, 5 passes']);
+    expect(titlesOf(jobs({ max_displacement_mm: null }, { max_displacement_mm: 0.5 }))).toEqual([
+      'iso 60, largest displacement: no limit',
+      'iso 60, largest displacement: 0.5 mm',
     ]);
-    expect(differences(jobs({ formats: ['glb'] }, { formats: ['glb', 'stl'] }))).toEqual(
-      Array(2).fill('the same parameters'),
-    );
+    expect(titlesOf(jobs({ formats: ['glb'] }, { formats: ['glb', 'stl'] }))).toEqual(['iso 60', 'iso 60']);
+  });
+
+  it('are named by their volumes if these differ', () => {
+    const names = (volume: string): string => `volume ${volume}`;
+    expect(titlesOf(jobs({ volume: 'a' }, { volume: 'b' }), names)).toEqual(['volume a, iso 60', 'volume b, iso 60']);
+    expect(titlesOf(jobs({}, {}), names)).toEqual(['iso 60', 'iso 60']);
+  });
+
+  it('say yes or no for switches, and nothing about what is not for all of them', () => {
+    expect(titlesOf(jobs({ certify: true }, { certify: false }))).toEqual([
+      expect.stringMatching(/^iso 60, [a-z ]+: yes$/),
+      expect.stringMatching(/^iso 60, [a-z ]+: no$/),
+    ]);
+    const atIso = { ...defaults, iso: 100 };
+    const byLabels = { ...defaults, labels: 'all', passes: defaults.passes, background: 0, label_names: {}, label_colors: {}, label_values: {} } as JobParameters;
+    expect(titlesOf(jobs(atIso, byLabels))).toEqual(['iso 100', 'all labels']);
+    expect(titlesOf(jobs({ smoothing: 'laplacian' }, { smoothing: 'taubin', pass_band: 0.2 }))).toEqual(['iso 60, laplacian', 'iso 60, taubin']);
   });
 });
 

@@ -45,7 +45,7 @@ describe('the parts of a surface', () => {
     const parts = new Parts(scene, atOnce, () => undefined);
     parts.add([square(0), square(3)], null);
     expect(new Set(colours(scene)).size).toBe(1);
-    expect(parts.triangles).toBe(4);
+    expect(parts.trianglesThere).toBe(4);
     expect(parts.hit(up, wholeRay)).toMatchObject({ at: 1, label: null });
     parts.setHidden(new Set([1]));
     expect(drawn(scene).length).toBe(2);
@@ -107,11 +107,11 @@ describe('the parts of a surface', () => {
     const heights = (): number[] => drawn(scene).map(({ geometry }) => geometry.getAttribute('position').array[2] ?? NaN);
     parts.add([square(9)], null, true);
     parts.add([square(1)], null);
-    expect([heights(), parts.triangles]).toEqual([[9], 2]);
+    expect([heights(), parts.trianglesThere]).toEqual([[9], 2]);
     expect(parts.hit(up, wholeRay)?.at).toBe(10);
     parts.add([square(2)], null);
     parts.finish();
-    expect([heights(), parts.triangles]).toEqual([[1, 2], 4]);
+    expect([heights(), parts.trianglesThere]).toEqual([[1, 2], 4]);
     expect(parts.hit(up, wholeRay)?.at).toBe(2);
     parts.setCoarse(true);
     expect(heights()).toEqual([9]);

@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import { commandSnippet } from '@/job/snippets';
 import { defaultParameters, estimateQuery, jobRequest, parametersOfQuery, queryOfParameters } from '@/job/parameters';
 import { applies, asText, fits, parameterOf, parameters, valueIn, withValue, type Parameter, type Value } from '@/job/table';
-import { shown } from '@/views/parameter_form';
+import { shown } from '@/views/prepare/parameter_form';
 import { estimateNames, jobParameters, notInTheForm, notOfThePage } from '../openapi';
 
 const defaults = defaultParameters('v'.repeat(64), 60);

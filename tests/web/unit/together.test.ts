@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { looksOfText, looksToText } from '@/views/together_look';
+import { looksOfText, looksToText } from '@/views/compare/together_look';
 
 describe('how several surfaces look', () => {
   it('is a text and back', () => {

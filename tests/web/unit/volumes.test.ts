@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Volume } from '@/api/types';
-import { foundVolumes } from '@/views/volume_search';
+import { foundVolumes } from '@/views/volumes/volume_search';
 import { declaredBy } from '@/volume/declared';
 import { noteTexts } from '@/volume/names';
 import { sampleHead } from '@/volume/sample';

@@ -1,41 +1,53 @@
-// The parameters in which jobs differ.
+// What tells jobs apart: the surface that each makes, and the parameters in which they differ.
 import type { Job, JobParameters } from '../api/types';
 import { formatValue } from '../ui/format';
 import { surfaceInWords } from './parameters';
-import { asText, parameters, valueIn, type Parameter } from './table';
+import { applies, asText, defaultOf, parameters, valueIn, type Parameter, type Value } from './table';
 
 // Shorter than the title and the value.
 const words: Record<string, (job: JobParameters) => string> = {
-  volume: ({ volume }) => `volume ${volume.slice(0, 8)}`,
-  iso: surfaceInWords,
-  labels: surfaceInWords,
   scheme: ({ scheme }) => `${scheme} tetrahedra`,
   interpolation: ({ interpolation }) => interpolation ?? 'midpoint',
-  passes: ({ passes }) => `${passes} passes`,
+  passes: ({ passes }) => (passes === 1 ? '1 pass' : `${passes} passes`),
   smoothing: ({ smoothing }) => smoothing,
   close: ({ close }) => (close ? 'closed' : 'open'),
 };
-// These do not change the surface.
-const besides = ['formats', 'priority'];
+// A title begins with the first three; the others do not change the surface.
+const besides = ['volume', 'iso', 'labels', 'formats', 'priority', 'label_names', 'label_colors'];
+
+function valueInWords({ kind, unit }: Parameter, value: Value): string {
+  if (typeof value === 'boolean') return value ? 'yes' : 'no';
+  if (typeof value === 'number') return `${formatValue(value)} ${unit}`.trim();
+  if (value === null) return kind === 'number' || kind === 'integer' ? 'no limit' : 'none';
+  if (kind === 'by label') return Object.keys(value).length === 0 ? 'as in the file' : `set for ${Object.keys(value).join(', ')}`;
+  return asText(value).replaceAll(',', ', ');
+}
 
 function inWords(parameter: Parameter, job: JobParameters): string {
   const own = words[parameter.name];
   if (own) return own(job);
-  const value = valueIn(job, parameter) ?? 'no limit';
-  const text = typeof value === 'number' ? `${formatValue(value)} ${parameter.unit}`.trim() : asText(value);
-  return `${parameter.title.charAt(0).toLowerCase()}${parameter.title.slice(1)}: ${text}`;
+  const title = parameter.title.charAt(0).toLowerCase() + parameter.title.slice(1);
+  return `${title}: ${valueInWords(parameter, valueIn(job, parameter) ?? defaultOf(parameter, job) ?? null)}`;
 }
 
-// The parameters in which the jobs differ, in words for each job.
-export function differences(jobs: readonly Job[]): string[] {
+function areDifferent(values: readonly unknown[]): boolean {
+  return new Set(values.map((value) => JSON.stringify(value))).size > 1;
+}
+
+// A title for each job: the volume's name if `nameOf` is given and there are several volumes, the iso-value or the labels, and
+// the parameters in which the jobs differ. A parameter that does not apply to all of them tells nothing.
+export function titlesOf(jobs: readonly Job[], nameOf: (volume: string) => string = () => ''): string[] {
+  const all = jobs.map((job) => job.parameters);
   const varying = parameters.filter(
     (parameter) =>
       !besides.includes(parameter.name) &&
-      new Set(jobs.map((job) => JSON.stringify(valueIn(job.parameters, parameter) ?? null))).size > 1,
+      all.every((job) => applies(parameter, job)) &&
+      areDifferent(all.map((job) => valueIn(job, parameter) ?? null)),
   );
-  return jobs.map((job) =>
-    varying.length > 0
-      ? [...new Set(varying.map((parameter) => inWords(parameter, job.parameters)))].join(', ')
-      : 'the same parameters',
+  const areOfSeveral = areDifferent(all.map(({ volume }) => volume));
+  return all.map((job) =>
+    [areOfSeveral ? nameOf(job.volume) : '', surfaceInWords(job), ...varying.map((parameter) => inWords(parameter, job))]
+      .filter(Boolean)
+      .join(', '),
   );
 }

@@ -9,7 +9,7 @@ import { decoders } from './pool';
 export interface LoadProgress {
   bytes: number;
   totalBytes: number;
-  triangles: number;
+  // Of all blocks that are handed over; of labels more than the mesh has, since two of them share a wall.
   totalTriangles: number;
 }
 
@@ -111,7 +111,6 @@ export async function loadMesh(
   const progress: LoadProgress = {
     bytes: 0,
     totalBytes: file.bytes,
-    triangles: 0,
     totalTriangles: job.mesh?.triangles ?? 0,
   };
   const began = performance.now();
@@ -120,9 +119,7 @@ export async function loadMesh(
     const { positionId = null, distanceId = null, part = null, isCoarse = false } = primitive ?? {};
     const done = decoders.decode(bytes, { positionId, distanceId }, signal).then((blocks) => {
       if (signal.aborted) return;
-      if (!isCoarse) for (const block of blocks) progress.triangles += block.index.length / 3;
       listener.onBlocks(blocks, part, isCoarse);
-      listener.onProgress({ ...progress });
     });
     // Awaited with the others once all bytes are here. Without a handler until then, the browser would
     // report a failure as one that nobody handles.
@@ -135,6 +132,7 @@ export async function loadMesh(
     const reader = new GlbReader({
       onPrimitives: (all) => {
         primitives = all;
+        progress.totalTriangles = all.reduce((sum, { triangles, isCoarse }) => sum + (isCoarse ? 0 : triangles), 0);
       },
       onStream: (index, bytes) => decode(bytes, primitives[index]),
     });

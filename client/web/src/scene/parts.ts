@@ -181,8 +181,9 @@ export class Parts {
     return new PartFinder(this.finest.map(({ made }) => made));
   }
 
-  get triangles(): number {
-    return this.finest.reduce((sum, { fine }) => sum + (fine.index?.count ?? 0) / 3, 0);
+  // Those of the finest blocks that can be drawn.
+  get trianglesThere(): number {
+    return this.finest.reduce((sum, { fine, isThere }) => sum + (isThere ? (fine.index?.count ?? 0) / 3 : 0), 0);
   }
 
   // Whether it takes other shaders.

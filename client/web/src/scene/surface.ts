@@ -19,6 +19,7 @@ import { FrameBudget } from './budget';
 import type { Reach } from './distances';
 import { facing } from './facing';
 import { addLights } from './lights';
+import { joinSeams } from './joining';
 import { Parts, type SurfaceStyle } from './parts';
 import { pickedAt, type Picked } from './picked';
 import { pictureOf } from './picture';
@@ -38,6 +39,8 @@ export class Surface {
   private readonly cross: Cross;
   readonly budget = new FrameBudget();
   onCamera: (() => void) | null = null;
+  // More blocks can be drawn.
+  onShown: (() => void) | null = null;
   // A click or tap; null where nothing is.
   onPick: ((picked: Picked | null) => void) | null = null;
 
@@ -59,7 +62,7 @@ export class Surface {
   private settling = 0;
   private isMoving = false;
   private isCoarse = false;
-  private isDisposed = false;
+  private readonly over = new AbortController();
   // While the graphics processor has something to do; and whether a frame waits for its end.
   private isBusy = false;
   private isWaiting = false;
@@ -68,6 +71,7 @@ export class Surface {
   private compiling = new AbortController();
   // Blocks came that the last frame does not show.
   private isStale = false;
+  private onAllShown: (() => void)[] = [];
 
   constructor(private readonly host: HTMLElement) {
     this.renderer = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' });
@@ -147,6 +151,7 @@ export class Surface {
     this.isBusy = true;
     this.isStale = true;
     this.uploading.step(this.camera);
+    this.onShown?.();
     this.whenDone(() => this.budget.soon(() => this.draw()));
   }
 
@@ -161,14 +166,23 @@ export class Surface {
     });
   }
 
-  // To be called once the last block has come: from then on the shading has no edges at the seams.
+  // To be called once the last block is drawn: from then on the shading has no edges at the seams.
   finish(): void {
     this.parts.finish();
-    this.joinSeams(0);
+    joinSeams(this.parts, this.over.signal, () => this.draw());
   }
 
-  get triangles(): number {
-    return this.parts.triangles;
+  // How many triangles of its finest blocks are drawn.
+  get trianglesShown(): number {
+    return this.parts.trianglesThere;
+  }
+
+  // Resolves once all blocks that were added are drawn.
+  allShown(): Promise<void> {
+    return new Promise((resolve) => {
+      this.onAllShown.push(resolve);
+      this.draw();
+    });
   }
 
   // Which triangles belong together. To be asked for once all is there.
@@ -247,6 +261,10 @@ export class Surface {
     this.fit(viewOffsets[view]);
   }
 
+  private get isDisposed(): boolean {
+    return this.over.signal.aborted;
+  }
+
   get place(): CameraPlace {
     const { x, y, z } = this.controls.target;
     const from = this.camera.position;
@@ -308,7 +326,7 @@ export class Surface {
   }
 
   dispose(): void {
-    this.isDisposed = true;
+    this.over.abort();
     this.compiling.abort();
     cancelAnimationFrame(this.scheduled);
     clearTimeout(this.settling);
@@ -345,6 +363,7 @@ export class Surface {
     this.whenDone(() => {
       this.budget.drawn(began, this.isMoving);
       if (this.isMoving && this.budget.isSlow) this.setCoarse(true);
+      if (this.uploading.isEmpty && !this.isStale) for (const resolve of this.onAllShown.splice(0)) resolve();
       this.noteStill();
     });
   }
@@ -405,20 +424,6 @@ export class Surface {
     this.isCoarse = isCoarse;
     this.parts.setCoarse(isCoarse);
     this.draw();
-  }
-
-  private joinSeams(member: number): void {
-    if (this.isDisposed) return;
-    const until = performance.now() + 6;
-    let next = member;
-    while (performance.now() < until) {
-      if (!this.parts.joinSeams(next)) {
-        this.draw();
-        return;
-      }
-      next += 1;
-    }
-    requestAnimationFrame(() => this.joinSeams(next));
   }
 
   private tapped(event: PointerEvent): void {

@@ -88,3 +88,10 @@ export const formatNames: Record<string, string> = {
   vti: 'VTK',
   dicom: 'DICOM',
 };
+
+// Three digits that count, so that neighbours in a table are as long.
+export function millimetres(value: number): string {
+  if (value === 0) return '0';
+  if (value < 0.0005) return '< 0.001';
+  return value.toFixed(Math.max(0, Math.min(3, 2 - Math.floor(Math.log10(value)))));
+}

@@ -28,6 +28,11 @@ export class KnownVolumes {
     );
   }
 
+  // Null: it was erased, or was not asked for.
+  get(id: string): Volume | null {
+    return this.known.get(id) ?? null;
+  }
+
   nameOf(id: string): string {
     const volume = this.known.get(id);
     if (volume === undefined) return '';

@@ -1,0 +1,37 @@
+// Other jobs from one: the same surface with changes, where its parameters are chosen, what its files are called.
+import { client } from '../client';
+import type { Job, JobParameters, Volume } from '../api/types';
+import { shortId } from '../ui/format';
+import { tell, tellError } from '../ui/notices';
+import { go, hashOf } from '../ui/route';
+import { fileStem } from '../volume/names';
+import { defaultParameters, jobRequest, queryOfParameters, surfaceInWords, variantOf } from './parameters';
+
+// Makes the same surface with other parameters, or finds it made already.
+export async function submitVariant(job: Job, variant: Partial<JobParameters>): Promise<Job> {
+  return client.submitJob(jobRequest(variantOf(job.parameters, variant)));
+}
+
+// Starts a job with these changes and goes to it.
+export function makeVariant(job: Job): (variant: Partial<JobParameters>) => void {
+  return (variant) =>
+    void submitVariant(job, variant).then(({ id }) => {
+      tell('A new job was started.');
+      go(['jobs', id]);
+    }, tellError);
+}
+
+// The file name of a surface: head-iso-60.glb.
+export function fileNameOf(job: Job, volume: Volume | null, suffix: string): string {
+  const surface = surfaceInWords(job.parameters).replaceAll(' ', '-');
+  return `${fileStem(volume, `surface-${shortId(job.id)}`)}-${surface}${suffix}`;
+}
+
+// The address of the volume with this job's parameters chosen.
+export function changeLink(job: Job): string {
+  const defaults = defaultParameters(job.volume, 0);
+  const entries = Object.entries(queryOfParameters(job.parameters, defaults)).filter(
+    ([name, value]) => value !== '' && !(name === 'iso' && value === 'otsu'),
+  );
+  return hashOf(['volumes', job.volume], new URLSearchParams(entries));
+}

@@ -1,0 +1,196 @@
+// Two to four surfaces side by side that turn together: #/compare?jobs=A,B
+import { client } from '../../client';
+import { ApiError, asApiError, errorOfProblem } from '../../api/problem';
+import { isFinal, type Job, type LabelSummary } from '../../api/types';
+import { titlesOf } from '../../job/differences';
+import { LabelState, labelsOfMesh } from '../../job/labels';
+import type { SurfaceStyle } from '../../scene/parts';
+import { graphicsStarted } from '../../scene/graphics';
+import { placeOfText, placeToText, viewNames, viewTitles, type CameraPlace } from '../../scene/views';
+import { button, h } from '../../ui/dom';
+import { formatCount, formatMilliseconds, formatNumber, formatValue } from '../../ui/format';
+import { refusal } from '../../ui/notices';
+import { hashOf, noteInAddress, type Route } from '../../ui/route';
+import type { Scope } from '../../ui/signal';
+import { KnownVolumes } from '../../volume/known';
+import { SurfacePane } from '../surface/surface_pane';
+
+const most = 4;
+const noteDelay = 300;
+
+function numbersOf(job: Job): HTMLElement {
+  const { mesh } = job;
+  if (!mesh) return h('p', {}, job.state);
+  const { extracted, smoothed } = mesh.volume_mm3;
+  const percent = extracted === 0 ? 0 : (100 * (smoothed - extracted)) / Math.abs(extracted);
+  const work = job.timing.total - job.timing.queue;
+  const volume: [string, string][] = [
+    ['Volume', `${formatValue(smoothed)} mm\u00b3`],
+    ['Change by smoothing', `${percent > 0 ? '+' : ''}${formatNumber(percent, 2)} %`],
+  ];
+  const rows: [string, string][] = [
+    ['Triangles', formatCount(mesh.triangles)],
+    ...(mesh.quality.encloses_volume ? volume : [['Volume', 'none: the surface is open'] as [string, string]]),
+    // An equal job's files were there already.
+    ['Time', work < 1 ? 'already made' : formatMilliseconds(work)],
+    ['Mean smallest angle', `${formatNumber(mesh.quality.smallest_angle_deg.smoothed.mean, 1)}\u00b0`],
+  ];
+  return h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
+}
+
+async function finished(id: string, scope: Scope, onChange: (job: Job) => void): Promise<Job> {
+  const job = await client.getJob(id);
+  return isFinal(job.state) ? job : client.follow(id, scope.signal, onChange);
+}
+
+export async function compareView(scope: Scope, route: Route): Promise<HTMLElement> {
+  const ids = (route.query.get('jobs') ?? '').split(',').filter(Boolean).slice(0, most);
+  if (ids.length < 2) {
+    const link = { href: hashOf(['jobs']), text: 'Go to the list of jobs' };
+    throw new ApiError(-1, 'Nothing to compare', 'Choose two to four jobs in the list of jobs.', [], {}, link);
+  }
+  const jobs = await Promise.all(ids.map((id) => client.getJob(id)));
+  const volumes = new KnownVolumes();
+  await volumes.find(jobs.map((job) => job.volume));
+  return new Comparison(scope, jobs, volumes, placeOfText(route.query.get('cam') ?? '')).element;
+}
+
+// One of the surfaces with its title and numbers.
+class Cell {
+  readonly element: HTMLElement;
+  private readonly status: HTMLElement;
+  private readonly view: HTMLElement;
+  private readonly numbers = h('div', { class: 'cell-numbers' });
+
+  constructor(job: Job, title: string) {
+    this.status = h('p', { class: 'cell-status', role: 'status' }, job.state);
+    this.view = h('div', { class: 'cell-view' }, this.status);
+    this.element = h(
+      'section',
+      { class: 'cell', 'aria-label': title },
+      h('header', {}, h('h2', {}, h('a', { href: hashOf(['jobs', job.id]) }, title)), this.numbers),
+      this.view,
+    );
+  }
+
+  showProgress({ state, stage, progress }: Job): void {
+    this.status.textContent = `${state === 'queued' ? 'queued' : stage}, ${Math.round(100 * progress)} %`;
+  }
+
+  showNumbers(job: Job): void {
+    this.numbers.replaceChildren(numbersOf(job));
+  }
+
+  show(content: HTMLElement): void {
+    this.view.replaceChildren(content);
+  }
+}
+
+class Comparison {
+  readonly element: HTMLElement;
+  private readonly panes: SurfacePane[] = [];
+  private noting = 0;
+
+  constructor(
+    private readonly scope: Scope,
+    jobs: readonly Job[],
+    private readonly volumes: KnownVolumes,
+    private readonly camera: CameraPlace | null,
+  ) {
+    const titles = titlesOf(jobs, (volume) => volumes.nameOf(volume));
+    const [only, ...others] = new Set(jobs.map(({ volume }) => volume));
+    const title = only !== undefined && others.length === 0 ? `Compare, ${volumes.nameOf(only)}` : 'Compare';
+    const cells = jobs.map((job, place) => this.cellFor(job, titles[place] ?? ''));
+    this.element = h(
+      'div',
+      { class: 'compare', 'data-count': cells.length, 'data-title': `Compare ${titles.join(', ')}` },
+      this.head(title, jobs.map(({ id }) => id)),
+      h('div', { class: 'grid' }, ...cells),
+    );
+    scope.onEnd(() => clearTimeout(this.noting));
+  }
+
+  private head(title: string, jobs: readonly string[]): HTMLElement {
+    const views = viewNames.map((name) =>
+      button(name, () => this.panes[0]?.look(name), { 'aria-label': viewTitles[name], title: viewTitles[name] }),
+    );
+    return h(
+      'div',
+      { class: 'section-head' },
+      h('h1', {}, title),
+      h(
+        'div',
+        { class: 'tool-group', role: 'toolbar', 'aria-label': 'View of all surfaces' },
+        ...views,
+        button('Fit', () => this.panes[0]?.fit()),
+        this.styleButton('Flat', (isOn) => ({ shading: isOn ? 'flat' : 'smooth' })),
+        this.styleButton('Edges', (isOn) => ({ wireframe: isOn })),
+      ),
+      h('span', { class: 'hint grow' }, 'All views turn together.'),
+      h('a', { class: 'button', href: hashOf(['together'], new URLSearchParams({ jobs: jobs.join(',') })) }, 'Show in one scene'),
+    );
+  }
+
+  // Switches a style of all surfaces.
+  private styleButton(text: string, styleFor: (isOn: boolean) => Partial<SurfaceStyle>): HTMLButtonElement {
+    let isOn = false;
+    const toggle = button(
+      text,
+      () => {
+        isOn = !isOn;
+        toggle.setAttribute('aria-pressed', String(isOn));
+        for (const pane of this.panes) pane.setStyle(styleFor(isOn));
+      },
+      { 'aria-pressed': 'false' },
+    );
+    return toggle;
+  }
+
+  private cellFor(job: Job, title: string): HTMLElement {
+    const cell = new Cell(job, title);
+    finished(job.id, this.scope, (now) => cell.showProgress(now)).then(
+      (done) => {
+        // The cell has its place in the page by now.
+        if (!this.scope.isOver) void this.showResult(done, cell);
+      },
+      (error: unknown) => {
+        if (!this.scope.isOver) cell.show(refusal(asApiError(error)));
+      },
+    );
+    return cell.element;
+  }
+
+  private async showResult(job: Job, cell: Cell): Promise<void> {
+    cell.showNumbers(job);
+    if (job.state !== 'succeeded') {
+      const reason = job.error ? errorOfProblem(job.error) : new ApiError(-1, 'Cancelled', 'The job made no surface.');
+      cell.show(refusal(reason));
+      return;
+    }
+    const [labels] = await Promise.all([labelsOfMesh(job), graphicsStarted()]);
+    if (this.scope.isOver) return;
+    const pane = this.addPane(job, labels);
+    cell.show(pane.element);
+    await pane.load();
+  }
+
+  // A surface whose camera moves those of the others.
+  private addPane(job: Job, labels: readonly LabelSummary[]): SurfacePane {
+    const camera = this.panes[0]?.camera ?? this.camera;
+    const pane = new SurfacePane(this.scope, job, {
+      hasKeys: false,
+      onSlices: null,
+      look: new URLSearchParams(),
+      camera,
+      volume: this.volumes.get(job.volume),
+      labels: new LabelState(labels),
+    });
+    this.panes.push(pane);
+    pane.onCamera = (place) => {
+      for (const other of this.panes) if (other !== pane) other.follow(place);
+      clearTimeout(this.noting);
+      this.noting = window.setTimeout(() => noteInAddress({ cam: placeToText(place) }), noteDelay);
+    };
+    return pane;
+  }
+}

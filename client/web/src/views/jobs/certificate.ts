@@ -1,0 +1,138 @@
+// The measured error of a mesh and the faults of its surface: the certificate, self-intersections,
+// openings.
+import type { DistanceSummary, Job, JobParameters, MeshSummary } from '../../api/types';
+import { button, h, svg, type Child } from '../../ui/dom';
+import { formatCount, formatNames, formatValue, millimetres } from '../../ui/format';
+
+type Certificate = NonNullable<MeshSummary['certificate']>;
+type MakeVariant = (variant: Partial<JobParameters>) => void;
+
+const width = 320;
+const height = 64;
+
+// Both ways over one axis, from 0 to the larger maximum. Counts differ by powers of ten: heights are
+// their logarithms, and a bin with a single point is still seen.
+export function histogramPath({ histogram, max_mm: max }: DistanceSummary, most: number, top: number): string {
+  if (max === 0) return '';
+  const step = (width * max) / most / histogram.length;
+  const parts = histogram.map((count, bin) => {
+    const share = count === 0 ? 0 : (1 + Math.log10(count)) / (1 + Math.log10(top));
+    const y = (height - share * (height - 2)).toFixed(1);
+    return `L${(bin * step).toFixed(1)} ${y}L${((bin + 1) * step).toFixed(1)} ${y}`;
+  });
+  return `M0 ${height}${parts.join('')}L${(histogram.length * step).toFixed(1)} ${height}Z`;
+}
+
+function chart({ from_mesh: mesh, from_extracted: extracted, max_mm: most }: Certificate): HTMLElement | null {
+  if (most === 0) return null;
+  const top = Math.max(1, ...mesh.histogram, ...extracted.histogram);
+  return h(
+    'figure',
+    { class: 'distribution distances' },
+    svg(
+      'svg',
+      {
+        viewBox: `0 0 ${width} ${height}`,
+        preserveAspectRatio: 'none',
+        role: 'img',
+        'aria-label': `Distribution of the distances from 0 to ${millimetres(most)} millimetres, in both directions`,
+      },
+      svg('path', { class: 'after', d: histogramPath(mesh, most, top) }),
+      svg('path', { class: 'before', d: histogramPath(extracted, most, top) }),
+    ),
+    h(
+      'div',
+      { class: 'distribution-axis', 'aria-hidden': 'true' },
+      h('span', {}, '0'),
+      h('span', {}, `${millimetres(most)} mm`),
+    ),
+    h('figcaption', {}, 'Filled: from the file. Line: to the file. The height shows the logarithm of the number of points.'),
+  );
+}
+
+function bothWays({ from_mesh: mesh, from_extracted: extracted }: Certificate): HTMLElement {
+  const row = (name: string, title: string, distances: DistanceSummary): HTMLElement =>
+    h(
+      'tr',
+      { title },
+      h('th', { scope: 'row' }, name),
+      ...[distances.max_mm, distances.p99_mm, distances.mean_mm].map((value) =>
+        h('td', { class: 'number' }, millimetres(value)),
+      ),
+    );
+  return h(
+    'table',
+    { class: 'both-ways' },
+    h('caption', { class: 'sr-only' }, 'Distances in millimetres'),
+    h(
+      'tr',
+      {},
+      h('th', { scope: 'col' }, 'mm'),
+      ...['largest', '99th percentile', 'mean'].map((name) => h('th', { scope: 'col', class: 'number' }, name)),
+    ),
+    row('from the file', 'From the file to the extracted surface; shows what was added', mesh),
+    row('to the file', 'From the extracted surface to the file; shows what was left out', extracted),
+  );
+}
+
+function spent({ budget_mm: budget }: Certificate, allowed: number | null | undefined): HTMLElement | null {
+  if (!budget || typeof allowed !== 'number') return null;
+  const parts = [
+    ['smoothing', budget.smoothing],
+    ['fewer triangles', budget.simplification],
+    ['rounding', budget.quantisation],
+  ] as const;
+  const bar = h('div', { class: 'budget', 'aria-hidden': 'true' });
+  for (const [name, value] of parts) {
+    const part = h('span', { class: `of-${name.split(' ').at(-1)}`, title: `${name} ${millimetres(value)} mm` });
+    part.style.flexGrow = String(Math.max(0, value / allowed));
+    bar.append(part);
+  }
+  const words = parts.map(([name, value]) => `${name} ${millimetres(value)}`).join(', ');
+  return h('div', { class: 'spent' }, bar, h('p', { class: 'hint' }, `The allowed ${formatValue(allowed)} mm are divided into: ${words} mm.`));
+}
+
+// Null if nothing was measured or the surface is empty.
+export function certificateBody(job: Job): HTMLElement | null {
+  const certificate = job.mesh?.certificate;
+  if (!certificate || job.mesh?.empty) return null;
+  const allowed = job.parameters.max_error_mm;
+  const isOne = Object.keys(job.mesh?.files ?? {}).length === 1;
+  const file = formatNames[certificate.file] ?? certificate.file;
+  return h(
+    'div',
+    { class: 'certificate' },
+    h(
+      'p',
+      {},
+      h('b', {}, `${millimetres(certificate.max_mm)} mm`),
+      ` is the largest distance between the ${file} file and the extracted surface.`,
+      isOne ? '' : ' Every other file is at least as near.',
+      typeof allowed === 'number' ? ` Allowed: ${formatValue(allowed)} mm.` : '',
+    ),
+    bothWays(certificate),
+    chart(certificate),
+    spent(certificate, allowed),
+  );
+}
+
+export function intersectionsText({ quality }: MeshSummary): Child {
+  const found = quality.self_intersections;
+  if (!found) return '';
+  if (found.pairs === 0) return 'none';
+  const [first] = found.places;
+  const at = first ? ` The first pair is at ${first.map((value) => value.toFixed(1)).join(', ')} mm.` : '';
+  const pairs = found.pairs === 1 ? '1 pair' : `${formatCount(found.pairs)} pairs`;
+  return h('span', { class: 'attention', title: `These triangles intersect.${at}` }, `${pairs} of triangles`);
+}
+
+// For a surface whose volume would be a number without a meaning.
+export function openText({ parameters, mesh }: Job, make: MakeVariant): Child {
+  if (mesh?.quality.closed) return h('span', { class: 'attention' }, 'none: the triangles disagree about which side is outside');
+  return h(
+    'span',
+    { class: 'attention' },
+    'none: the surface is open. ',
+    !parameters.close && button('Close it', () => make({ close: true }), { class: 'link', title: 'Starts a job that closes the surface at the border of the volume' }),
+  );
+}

@@ -1,0 +1,108 @@
+// Small charts of a job's numbers.
+import type { Distribution, QualityStages } from '../../api/types';
+import { h, svg } from '../../ui/dom';
+import { formatMilliseconds, formatNumber } from '../../ui/format';
+
+// In milliseconds, by stage.
+export type Durations = Readonly<Record<string, number>>;
+
+export interface Step {
+  name: string;
+  begin: number;
+  duration: number;
+}
+
+const order = ['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify'];
+// Left out where they took no time: few jobs have them.
+const seldom = ['simplify', 'certify'];
+
+// The stages one after the other; members that this page does not know come at the end.
+export function stepsOf(timing: Durations, more: Durations = {}): Step[] {
+  const known = order.filter((name) => name in timing && (!seldom.includes(name) || timing[name] !== 0));
+  const others = Object.keys(timing).filter((name) => !order.includes(name) && name !== 'total');
+  let begin = 0;
+  return [
+    ...[...known, ...others].map((name) => ({ name, duration: timing[name] ?? 0 })),
+    ...Object.entries(more).map(([name, duration]) => ({ name, duration })),
+  ].map(({ name, duration }) => {
+    const step = { name, begin, duration };
+    begin += duration;
+    return step;
+  });
+}
+
+export function waterfall(steps: readonly Step[]): HTMLElement {
+  const total = steps.reduce((sum, { duration }) => sum + duration, 0) || 1;
+  return h(
+    'table',
+    { class: 'waterfall' },
+    h('caption', { class: 'sr-only' }, 'Time of each stage'),
+    ...steps.map(({ name, begin, duration }) => {
+      const bar = h('span', { class: `bar of-${name}` });
+      bar.style.marginLeft = `${(100 * begin) / total}%`;
+      bar.style.width = `${Math.max(0.6, (100 * duration) / total)}%`;
+      return h(
+        'tr',
+        {},
+        h('th', { scope: 'row' }, name),
+        h('td', { class: 'track' }, bar),
+        h('td', { class: 'number' }, formatMilliseconds(duration)),
+      );
+    }),
+    h(
+      'tr',
+      { class: 'total' },
+      h('th', { scope: 'row' }, 'total'),
+      h('td', {}),
+      h('td', { class: 'number' }, formatMilliseconds(total)),
+    ),
+  );
+}
+
+const width = 150;
+const height = 44;
+
+// Both distributions in one picture: before smoothing as an outline, after it filled.
+export function distributionChart(
+  title: string,
+  stages: QualityStages,
+  most: number,
+  unit: string,
+): HTMLElement {
+  const { extracted, smoothed } = stages;
+  const top = Math.max(1, ...extracted.histogram, ...smoothed.histogram);
+  const outline = ({ histogram }: Distribution): string => {
+    const step = width / Math.max(1, histogram.length);
+    const points = histogram.map((count, bin) => {
+      const y = (height - (count / top) * (height - 2)).toFixed(1);
+      return `L${(bin * step).toFixed(1)} ${y}L${((bin + 1) * step).toFixed(1)} ${y}`;
+    });
+    return `M0 ${height}${points.join('')}L${width} ${height}Z`;
+  };
+  const digits = most > 1 ? 1 : 3;
+  const said = (value: number): string => {
+    const isTiny = value > 0 && value < 10 ** -digits;
+    return `${isTiny ? `< ${10 ** -digits}` : formatNumber(value, digits)}${unit}`;
+  };
+  return h(
+    'figure',
+    { class: 'distribution' },
+    svg(
+      'svg',
+      {
+        viewBox: `0 0 ${width} ${height}`,
+        role: 'img',
+        'aria-label': `${title}: mean ${said(extracted.mean)} before and ${said(smoothed.mean)} after smoothing`,
+      },
+      svg('path', { class: 'after', d: outline(smoothed) }),
+      svg('path', { class: 'before', d: outline(extracted) }),
+    ),
+    h('div', { class: 'distribution-axis', 'aria-hidden': 'true' }, h('span', {}, `0${unit}`), h('span', {}, `${most}${unit}`)),
+    h(
+      'figcaption',
+      {},
+      h('b', {}, title),
+      ` mean ${said(extracted.mean)} \u2192 ${said(smoothed.mean)}, minimum ${said(smoothed.min)}`,
+    ),
+  );
+}

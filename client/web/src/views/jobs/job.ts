@@ -1,0 +1,210 @@
+// One job: its way, then its surface. #/jobs/ID
+import { client } from '../../client';
+import { asApiError, errorOfProblem } from '../../api/problem';
+import { isFinal, type Job, type JobParameters, type Volume } from '../../api/types';
+import { emptyReason } from '../../job/empty';
+import { LabelState, labelsOfMesh } from '../../job/labels';
+import { inWords, surfaceInWords } from '../../job/parameters';
+import { changeLink } from '../../job/variants';
+import { graphicsStarted } from '../../scene/graphics';
+import { placeOfText, placeToText } from '../../scene/views';
+import { button, h } from '../../ui/dom';
+import { formatIso, shortId } from '../../ui/format';
+import { refusal, tellError } from '../../ui/notices';
+import { noteInAddress, type Route } from '../../ui/route';
+import type { Scope } from '../../ui/signal';
+import { volumeName } from '../../volume/names';
+import { accuracy, againSection, compareSection, downloads, numbers, quality, section, timings } from './job_panel';
+import { SlicesBeside } from './job_slices';
+import { LabelList } from '../labels/label_list';
+import { SurfacePane } from '../surface/surface_pane';
+
+const stages = ['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify'];
+const noteDelay = 300;
+
+// The stages of this job.
+function stagesOf({ parameters }: Job): string[] {
+  const isSimplified = (parameters.max_error_mm ?? parameters.triangles ?? null) !== null;
+  return stages.filter((name) => (name !== 'simplify' || isSimplified) && (name !== 'certify' || parameters.certify));
+}
+
+// The volume may be gone while its surface is still there.
+async function volumeOf(job: Job): Promise<Volume | null> {
+  try {
+    return await client.getVolume(job.volume);
+  } catch (error) {
+    if (asApiError(error).isUnreachable) throw error;
+    return null;
+  }
+}
+
+function titleOf(parameters: JobParameters): string {
+  const { labels, iso } = parameters;
+  if (labels === undefined) return `Surface at ${formatIso(iso ?? 'otsu')}`;
+  return `Surfaces of ${surfaceInWords(parameters)}`;
+}
+
+function head(job: Job, volume: Volume | null): HTMLElement {
+  return h(
+    'header',
+    { class: 'panel-head' },
+    h('h1', {}, titleOf(job.parameters)),
+    h('p', { class: 'of-volume' }, volume ? volumeName(volume) : 'The volume was erased'),
+    h('p', {}, inWords(job.parameters)),
+    h(
+      'p',
+      { class: 'links' },
+      volume && h('a', { href: changeLink(job) }, 'Change parameters'),
+      h('span', { class: 'faint' }, `job ${shortId(job.id)}`),
+    ),
+  );
+}
+
+class ProgressPanel {
+  readonly element: HTMLElement;
+  private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Progress of the job' });
+  private readonly text = h('p', { role: 'status', class: 'progress-text' });
+  private readonly steps = new Map<string, HTMLElement>();
+
+  constructor(job: Job) {
+    const cancel = button('Cancel', () => {
+      cancel.disabled = true;
+      client.cancelJob(job.id).catch((error: unknown) => {
+        cancel.disabled = false;
+        tellError(error);
+      });
+    });
+    for (const name of stagesOf(job)) this.steps.set(name, h('li', {}, name));
+    this.element = h(
+      'section',
+      { class: 'panel-section progress-panel' },
+      h('h2', {}, 'Progress'),
+      h('ol', { class: 'stages' }, ...this.steps.values()),
+      this.bar,
+      this.text,
+      h('div', { class: 'actions' }, cancel),
+    );
+  }
+
+  show(job: Job): void {
+    const now = stages.indexOf(job.stage);
+    stages.forEach((name, place) => {
+      const step = this.steps.get(name);
+      step?.classList.toggle('done', place < now);
+      step?.classList.toggle('now', place === now);
+      if (place === now) step?.setAttribute('aria-current', 'step');
+      else step?.removeAttribute('aria-current');
+    });
+    this.bar.value = job.progress;
+    this.text.textContent =
+      job.state === 'queued'
+        ? job.waiting_for
+          ? `Waiting for free space on the server's ${job.waiting_for}`
+          : `Waiting in the queue with priority ${job.priority}`
+        : `${job.stage}, ${Math.round(100 * job.progress)} % done`;
+  }
+}
+
+export async function jobView(scope: Scope, route: Route): Promise<HTMLElement> {
+  // While the daemon is asked.
+  void graphicsStarted();
+  const first = await client.getJob(route.path[1] ?? '');
+  const volume = await volumeOf(first);
+  const stageArea = h('div', { class: 'stage-area' });
+  const panel = h('aside', { class: 'panel', 'aria-label': 'Job' });
+  const element = h('div', { class: 'job', 'data-state': first.state }, stageArea, panel);
+
+  // A tab in the background says how far its job is.
+  const name = [titleOf(first.parameters), volume && volumeName(volume)].filter(Boolean).join(', ');
+  const nameTab = (job: Job): void => {
+    const far = job.state === 'succeeded' ? '' : job.state === 'running' ? `${Math.round(100 * job.progress)} %: ` : `${job.state}: `;
+    element.dataset.title = far + name;
+  };
+  nameTab(first);
+
+  const showEnd = async (job: Job): Promise<void> => {
+    element.dataset.state = job.state;
+    nameTab(job);
+    if (job.state !== 'succeeded' || !job.mesh) return showFailure(job, volume, stageArea, panel);
+    const labels = await labelsOfMesh(job);
+    if (!scope.isOver) showSurface(scope, route, job, new LabelState(labels), volume, stageArea, panel);
+  };
+  if (isFinal(first.state)) {
+    await showEnd(first);
+    return element;
+  }
+
+  const progress = new ProgressPanel(first);
+  progress.show(first);
+  stageArea.append(h('div', { class: 'waiting' }, h('p', {}, 'The surface appears here when it is ready.')));
+  panel.append(head(first, volume), progress.element);
+  client.follow(first.id, scope.signal, (job) => {
+    element.dataset.state = job.state;
+    nameTab(job);
+    progress.show(job);
+  })
+    .then(async (job) => {
+      if (!scope.isOver) await showEnd(job);
+    })
+    .catch((error: unknown) => {
+      if (!scope.isOver) panel.replaceChildren(head(first, volume), refusal(asApiError(error)));
+    });
+  return element;
+}
+
+function showFailure(job: Job, volume: Volume | null, stageArea: HTMLElement, panel: HTMLElement): void {
+  const change = h('a', { href: changeLink(job), class: 'button primary' }, 'Change parameters');
+  const body = job.error
+    ? refusal(errorOfProblem(job.error), change)
+    : h('div', { class: 'refusal' }, h('h3', {}, 'Cancelled'), h('p', {}, 'The job was cancelled and made no surface.'), h('div', { class: 'actions' }, change));
+  stageArea.replaceChildren(h('div', { class: 'waiting' }, body));
+  panel.replaceChildren(head(job, volume), timings(job));
+}
+
+function showSurface(
+  scope: Scope,
+  route: Route,
+  job: Job,
+  labels: LabelState,
+  volume: Volume | null,
+  stageArea: HTMLElement,
+  panel: HTMLElement,
+): void {
+  const { mesh } = job;
+  if (!mesh) return;
+  const camera = placeOfText(route.query.get('cam') ?? '');
+  const slices = volume && new SlicesBeside(scope, job, volume, stageArea, route.query);
+  const onSlices = slices && ((): void => slices.toggle());
+  const pane = new SurfacePane(scope, job, { hasKeys: true, camera, volume, labels, onSlices, look: route.query });
+  pane.onLook = noteInAddress;
+  slices?.linkTo(pane);
+  let noting = 0;
+  pane.onCamera = (place) => {
+    clearTimeout(noting);
+    noting = window.setTimeout(() => noteInAddress({ cam: placeToText(place) }), noteDelay);
+  };
+  scope.onEnd(() => clearTimeout(noting));
+  stageArea.replaceChildren(pane.element);
+  const times = timings(job);
+  panel.replaceChildren(
+    head(job, volume),
+    ...(labels.labels.length > 0 ? [new LabelList(scope, job, labels, volume).element] : []),
+    section('Numbers', mesh.empty ? h('p', { class: 'warning' }, emptyReason(job, volume)) : numbers(job, mesh)),
+    accuracy(job) ?? '',
+    times,
+    downloads(job, volume),
+    ...(mesh.empty ? [] : [quality(mesh)]),
+    compareSection(job),
+    againSection(job),
+  );
+  const show = (): void => {
+    if (scope.isOver) return;
+    const loading = pane.load();
+    slices?.restore();
+    void loading.then((timing) => {
+      if (timing && !scope.isOver) times.replaceWith(timings(job, { ...timing }));
+    });
+  };
+  // The canvas takes its size from the page, so the view has to be in it first.
+  void graphicsStarted().then(() => requestAnimationFrame(show));
+}

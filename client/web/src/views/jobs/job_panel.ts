@@ -1,0 +1,280 @@
+// The panel beside a surface: its numbers, timings, files, and links to make others.
+import { token } from '../../client';
+import type { Job, JobParameters, MeshFormat, MeshSummary, Volume } from '../../api/types';
+import { isSameJob, variantOf, withGlb } from '../../job/parameters';
+import { commandSnippet, curlSnippet, librarySnippet } from '../../job/snippets';
+import { isByLabels, meshFormats } from '../../job/table';
+import { fileNameOf, makeVariant, submitVariant } from '../../job/variants';
+import { button, h, type Child } from '../../ui/dom';
+import { formatBytes, formatCount, formatNames, formatNumber, formatValue } from '../../ui/format';
+import { tell, tellError } from '../../ui/notices';
+import { go, hashOf } from '../../ui/route';
+import { saveFile } from '../../ui/save';
+import { exportActions } from './export_section';
+import { certificateBody, intersectionsText, openText } from './certificate';
+import { distributionChart, stepsOf, waterfall, type Durations } from './charts';
+
+export function section(title: string, ...children: Child[]): HTMLElement {
+  return h('section', { class: 'panel-section' }, h('h2', {}, title), ...children);
+}
+
+function definitions(rows: readonly (readonly [string, Child])[]): HTMLElement {
+  return h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
+}
+
+function change(before: number, after: number): string {
+  if (before === 0) return '';
+  const percent = (100 * (after - before)) / Math.abs(before);
+  const sign = percent > 0 ? '+' : '';
+  return ` (${sign}${formatNumber(percent, Math.abs(percent) < 1 ? 2 : 1)} %)`;
+}
+
+function sized(value: number, unit: string): string {
+  return `${formatValue(value)} ${unit}`;
+}
+
+function trianglesText({ triangles, simplified }: MeshSummary): Child {
+  if (!simplified) return formatCount(triangles);
+  const bound = {
+    error: 'stopped at the allowed error',
+    triangles: 'stopped at the requested number',
+    topology: 'fewer would open or fold the surface, or change its boundary',
+  }[simplified.bound_by];
+  return h(
+    'span',
+    { title: `Simplification ${bound}` },
+    formatCount(triangles),
+    h('span', { class: 'faint' }, ` simplified from ${formatCount(simplified.triangles_before)}; ${bound}`),
+  );
+}
+
+function volumeText({ volume_mm3: { extracted, smoothed } }: MeshSummary): Child {
+  return h(
+    'span',
+    {},
+    sized(smoothed, 'mm\u00b3'),
+    h('span', { class: 'faint' }, `${change(extracted, smoothed)}, ${sized(extracted, 'mm\u00b3')} before smoothing`),
+  );
+}
+
+// People often want only the largest connected component.
+function componentsText(job: Job, { components }: MeshSummary): Child {
+  if (components < 2 || isByLabels(job.parameters)) return formatCount(components);
+  const keep = (): void => makeVariant(job)({ components: { keep: 1, min_triangles: null } });
+  return h('span', {}, `${formatCount(components)} `, button('Keep the largest', keep, { class: 'link', title: 'Starts a job that drops all other connected components' }));
+}
+
+export function numbers(job: Job, mesh: MeshSummary): HTMLElement {
+  const [low, high] = mesh.bounds;
+  const extent = low.map((value, axis) => formatNumber((high[axis as 0] ?? 0) - value, 1)).join(' \u00d7 ');
+  const { mean, max } = mesh.displacement_mm;
+  const rows: [string, Child][] = [
+    ['Iso-value', mesh.iso === undefined ? '' : `${formatValue(mesh.iso)}${job.parameters.iso === 'otsu' ? ', by Otsu' : ''}`],
+    ['Triangles', trianglesText(mesh)],
+    ['Vertices', formatCount(mesh.vertices)],
+    ['Volume', mesh.quality.encloses_volume ? volumeText(mesh) : openText(job, makeVariant(job))],
+    [
+      'Area',
+      h(
+        'span',
+        {},
+        sized(mesh.area_mm2, 'mm\u00b2'),
+        h(
+          'span',
+          { class: 'faint' },
+          `${change(mesh.area_extracted_mm2, mesh.area_mm2)}, ${sized(mesh.area_extracted_mm2, 'mm\u00b2')} before smoothing`,
+        ),
+      ),
+    ],
+    [
+      'Closed',
+      mesh.quality.closed
+        ? 'yes'
+        : h('span', { class: 'attention' }, `no, ${formatCount(mesh.boundary_edges)} boundary edges`),
+    ],
+    ['Connected components', componentsText(job, mesh)],
+    ['Genus', mesh.quality.genus === null ? '' : formatCount(mesh.quality.genus)],
+    ['Extent', `${extent} mm`],
+    ['Self-intersections', intersectionsText(mesh)],
+    ['Moved by smoothing', `mean ${formatNumber(mean, 3)}, largest ${formatNumber(max, 3)} mm`],
+  ];
+  if (mesh.dropped.components > 0) {
+    rows.push([
+      'Dropped components',
+      `${formatCount(mesh.dropped.components)}, with ${formatCount(mesh.dropped.triangles)} triangles`,
+    ]);
+  }
+  return definitions(rows.filter(([, value]) => value !== ''));
+}
+
+export function quality(mesh: MeshSummary): HTMLElement {
+  const { aspect_ratio: aspect, smallest_angle_deg: angle } = mesh.quality;
+  return section(
+    'Triangle quality',
+    h(
+      'div',
+      { class: 'distributions' },
+      distributionChart('Radius ratio', aspect, 1, ''),
+      distributionChart('Smallest angle', angle, 60, '\u00b0'),
+    ),
+    h('p', { class: 'hint' }, 'Filled: after smoothing. Line: before smoothing.'),
+  );
+}
+
+// Null where the job's error was not measured.
+export function accuracy(job: Job): HTMLElement | null {
+  const body = certificateBody(job);
+  if (!body) return null;
+  const { distances, formats } = job.parameters;
+  if (!distances) {
+    const colour = (): void => makeVariant(job)({ distances: true, formats: withGlb(formats) });
+    body.append(button('Show the distance as colour', colour, { title: 'Starts a job whose GLB file holds the distances' }));
+  }
+  return section('Distance from the scan', body);
+}
+
+export function timings(job: Job, more: Durations = {}): HTMLElement {
+  return section('Time', waterfall(stepsOf(job.timing, more)));
+}
+
+export function downloads(job: Job, volume: Volume | null): HTMLElement {
+  const files = job.mesh?.files ?? {};
+  const name = (format: string): string => fileNameOf(job, volume, `.${format}`);
+  const missing = meshFormats.filter((format) => !job.parameters.formats.includes(format));
+  const make = async (format: MeshFormat): Promise<void> => {
+    try {
+      const variant = await submitVariant(job, { formats: withGlb([...job.parameters.formats, format]) });
+      tell(`A new job was started. It also makes ${formatNames[format] ?? format}.`);
+      go(['jobs', variant.id]);
+    } catch (error) {
+      tellError(error);
+    }
+  };
+  return section(
+    'Download',
+    h(
+      'div',
+      { class: 'downloads' },
+      ...[...meshFormats, 'zip'].flatMap((format) => {
+        const file = files[format];
+        return file
+          ? [
+              button(
+                h('span', {}, h('b', {}, formatNames[format] ?? format), ` ${formatBytes(file.bytes)}`),
+                () => void saveFile(file.href, name(format), file.bytes).catch(tellError),
+                { 'data-format': format },
+              ),
+            ]
+          : [];
+      }),
+    ),
+    missing.length > 0 &&
+      h(
+        'div',
+        { class: 'make' },
+        h('span', { class: 'faint' }, 'Also make:'),
+        ...missing.map((format) =>
+          button(formatNames[format] ?? format, () => void make(format), { class: 'chip' }),
+        ),
+      ),
+    exportActions(job, volume, makeVariant(job), (suffix) => fileNameOf(job, volume, suffix)),
+  );
+}
+
+export interface Comparison {
+  title: string;
+  variants: Partial<JobParameters>[];
+}
+
+// Sets that show what a parameter does.
+export const comparisons: readonly Comparison[] = [
+  {
+    title: '5 and 6 tetrahedra, linear and midpoint',
+    variants: [
+      { scheme: 5, interpolation: 'linear' },
+      { scheme: 6, interpolation: 'linear' },
+      { scheme: 5, interpolation: 'midpoint' },
+      { scheme: 6, interpolation: 'midpoint' },
+    ],
+  },
+  { title: '0, 5 and 10 passes', variants: [{ passes: 0 }, { passes: 5 }, { passes: 10 }] },
+  {
+    title: 'Laplacian and Taubin',
+    variants: [
+      { smoothing: 'laplacian' },
+      { smoothing: 'taubin' },
+    ],
+  },
+];
+
+export function compareSection(job: Job): HTMLElement {
+  const start = async (comparison: Comparison): Promise<void> => {
+    try {
+      const jobs = await Promise.all(
+        comparison.variants.map((variant) =>
+          isSame(job, variant) ? Promise.resolve(job) : submitVariant(job, variant),
+        ),
+      );
+      go(['compare'], new URLSearchParams({ jobs: jobs.map(({ id }) => id).join(',') }));
+    } catch (error) {
+      tellError(error);
+    }
+  };
+  return section(
+    'Compare',
+    h(
+      'div',
+      { class: 'stack' },
+      ...comparisons.map((comparison) => button(comparison.title, () => void start(comparison))),
+    ),
+    h('p', { class: 'hint' }, 'Starts the jobs that are missing. The list of jobs can compare any other jobs.'),
+  );
+}
+
+function isSame(job: Job, variant: Partial<JobParameters>): boolean {
+  return job.mesh?.files.glb !== undefined && isSameJob(job.parameters, variantOf(job.parameters, variant));
+}
+
+function copyButton(text: () => string): HTMLButtonElement {
+  const copy = async (): Promise<void> => {
+    try {
+      await navigator.clipboard.writeText(text());
+      element.textContent = 'Copied';
+      setTimeout(() => (element.textContent = 'Copy'), 1500);
+    } catch {
+      // Without TLS there is no clipboard.
+      tell('The browser does not allow copying here. Select the text instead.');
+    }
+  };
+  const element = button('Copy', () => void copy());
+  return element;
+}
+
+export function againSection(job: Job): HTMLElement {
+  const hasToken = token.value !== '';
+  const origin = window.location.origin;
+  const texts = {
+    isomesh: commandSnippet(origin, job.parameters, hasToken),
+    curl: curlSnippet(origin, job.parameters, hasToken),
+    library: librarySnippet(origin, job.parameters, hasToken),
+  };
+  // With all that the address says of how it is looked at.
+  const link = (): string => window.location.href;
+  const shown = h('input', { readonly: true, value: `${origin}/${hashOf(['jobs', job.id])}`, 'aria-label': 'Link to this surface' });
+  shown.addEventListener('focus', () => (shown.value = link()));
+  const block = (name: string, text: string): HTMLElement =>
+    h(
+      'details',
+      { class: 'snippet' },
+      h('summary', {}, name),
+      h('pre', { tabindex: '0' }, text),
+      copyButton(() => text),
+    );
+  return section(
+    'Repeat this job',
+    h('div', { class: 'link-row' }, shown, copyButton(link)),
+    block('With the isomesh command', texts.isomesh),
+    block('With curl', texts.curl),
+    block('With the C++ library', texts.library),
+  );
+}

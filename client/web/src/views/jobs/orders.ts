@@ -1,0 +1,153 @@
+// A hospital's orders: what waits and why, what failed, and how the PACS are. #/orders
+import { client } from '../../client';
+import type { Order, OrderState, PacsList } from '../../api/types';
+import { surfaceInWords } from '../../job/parameters';
+import { button, field, h } from '../../ui/dom';
+import { formatTime, shortId } from '../../ui/format';
+import { tellError } from '../../ui/notices';
+import { hashOf, noteInAddress, type Route } from '../../ui/route';
+import type { Scope } from '../../ui/signal';
+import { cell, row, table } from '../../ui/table';
+import { isOver, orderStates, saidOf } from './order_texts';
+
+const refreshEvery = 2000;
+const columns = ['State', 'Details', 'Series', 'Rule', 'Created', 'Action'];
+const dots: Partial<Record<OrderState, string>> = { waiting: 'queued', fetching: 'running', meshing: 'running', sending: 'running' };
+
+export async function ordersView(scope: Scope, route: Route): Promise<HTMLElement> {
+  const wanted = route.query.get('state') as OrderState | null;
+  const orders = new Orders(scope, wanted && orderStates.includes(wanted) ? wanted : '');
+  await orders.refresh();
+  orders.keepFresh();
+  return orders.element;
+}
+
+function pacsItem({ name, last_success: success, last_failure: failure, reason }: PacsList['pacs'][number]): HTMLElement {
+  const isDown = failure !== null && (success === null || failure > success);
+  const text = isDown
+    ? `last request failed, ${formatTime(failure)}${reason === null ? '' : `: ${reason}`}`
+    : success === null
+      ? 'not contacted yet'
+      : `answered ${formatTime(success)}`;
+  return h(
+    'li',
+    { 'data-pacs': name },
+    h('span', { class: `state ${isDown ? 'failed' : success === null ? 'queued' : 'succeeded'}` }),
+    h('b', {}, name),
+    h('span', { class: isDown ? 'attention' : 'faint' }, text),
+  );
+}
+
+class Orders {
+  readonly element: HTMLElement;
+  private readonly pacs = h('ul', { class: 'pacs', 'aria-label': 'PACS' });
+  private readonly body = h('div', { class: 'queue-body', tabindex: '0', role: 'region', 'aria-label': 'Orders' });
+  private readonly more = button('Older orders', () => void this.showMore().catch(tellError), { hidden: true });
+  private orders: Order[] = [];
+  private next: string | null = null;
+
+  constructor(
+    private readonly scope: Scope,
+    private state: OrderState | '',
+  ) {
+    const choice = h(
+      'select',
+      {},
+      h('option', { value: '' }, 'all'),
+      ...orderStates.map((name) => h('option', { value: name, selected: name === state }, name)),
+    );
+    choice.addEventListener('change', () => {
+      this.state = choice.value as OrderState | '';
+      this.orders = [];
+      noteInAddress({ state: this.state });
+      this.refresh().catch(tellError);
+    });
+    this.element = h(
+      'div',
+      { class: 'queue orders' },
+      h('div', { class: 'section-head' }, h('h1', {}, 'Orders'), h('span', { class: 'grow' }), field('State', choice)),
+      this.pacs,
+      this.body,
+      h('div', { class: 'actions' }, this.more),
+    );
+  }
+
+  keepFresh(): void {
+    const timer = setInterval(() => {
+      // A lost connection is said at the top of the page.
+      if (!document.hidden) this.refresh().catch(() => undefined);
+    }, refreshEvery);
+    this.scope.onEnd(() => clearInterval(timer));
+  }
+
+  // Takes the newest over; older ones that were asked for stay as they are.
+  async refresh(): Promise<void> {
+    const { state } = this;
+    const [page, { pacs }] = await Promise.all([client.listOrders(state, '', this.scope.signal), client.listPacs(this.scope.signal)]);
+    // Another state was chosen meanwhile.
+    if (state !== this.state) return;
+    const newest = new Set(page.orders.map(({ id }) => id));
+    const older = this.orders.filter(({ id }) => !newest.has(id) && id < (page.orders.at(-1)?.id ?? ''));
+    if (older.length === 0) this.next = page.next;
+    this.orders = [...page.orders, ...older];
+    this.pacs.replaceChildren(...pacs.map(pacsItem));
+    this.show();
+  }
+
+  private async showMore(): Promise<void> {
+    if (this.next === null) return;
+    const page = await client.listOrders(this.state, this.next, this.scope.signal);
+    this.orders = [...this.orders, ...page.orders];
+    this.next = page.next;
+    this.show();
+  }
+
+  private show(): void {
+    this.more.hidden = this.next === null;
+    const focused = document.activeElement;
+    const order = focused?.closest('tr')?.dataset.order;
+    const label = focused?.getAttribute('aria-label');
+    const now = Date.now();
+    const none = this.state === '' ? 'No orders yet.' : `No orders are ${this.state}.`;
+    this.body.replaceChildren(
+      this.orders.length === 0
+        ? h('p', { class: 'empty' }, none)
+        : table(columns, ['Action'], this.orders.map((each) => this.row(each, now))),
+    );
+    // The rows are made anew; whoever is on one of them with the keyboard stays there.
+    if (order !== undefined && label) {
+      this.body.querySelector<HTMLElement>(`tr[data-order="${order}"] [aria-label="${label}"]`)?.focus();
+    }
+  }
+
+  private row(order: Order, now: number): HTMLElement {
+    const { id, state, source, rule, job, volume, created, parameters } = order;
+    const { text, isBad, next } = saidOf(order, now);
+    const made = [
+      volume !== null && h('a', { href: hashOf(['volumes', volume]) }, 'volume'),
+      job !== null && h('a', { href: hashOf(['jobs', job]) }, 'surface'),
+    ];
+    return row(
+      { 'data-order': id },
+      cell(h('span', { class: `state ${dots[state] ?? state}` }), state),
+      cell(
+        h('span', { class: isBad ? 'attention' : '' }, text),
+        next === '' ? null : h('span', { class: 'next-attempt' }, next),
+        h('span', { class: 'order-links' }, ...made),
+      ),
+      cell(source.pacs, h('span', { class: 'of-volume', title: source.series }, source.series)),
+      cell(rule ?? surfaceInWords(parameters)),
+      cell(h('span', { class: 'faint' }, formatTime(created))),
+      cell(this.action(order)),
+    );
+  }
+
+  private action({ id, state }: Order): HTMLElement | null {
+    const act = (run: (id: string) => Promise<Order>) => (): void => {
+      run(id).then(() => void this.refresh().catch(tellError), tellError);
+    };
+    const named = (text: string): Record<string, string> => ({ class: 'quiet', 'aria-label': `${text} order ${shortId(id)}` });
+    if (state === 'failed') return button('Retry', act((order) => client.retryOrder(order)), named('Retry'));
+    return isOver(state) ? null : button('Cancel', act((order) => client.cancelOrder(order)), named('Cancel'));
+  }
+}

@@ -1,0 +1,160 @@
+// The choice of labels to mesh: all labels of a volume, or some of a list.
+import { client } from '../../client';
+import { asApiError } from '../../api/problem';
+import type { JobParameters, VolumeLabel } from '../../api/types';
+import { labelTitle } from '../../job/labels';
+import { button, checkbox, field, h } from '../../ui/dom';
+import { formatCount } from '../../ui/format';
+import { refusal } from '../../ui/notices';
+import type { Scope } from '../../ui/signal';
+import { LabelSearch } from './label_search';
+
+export type Choice = Pick<JobParameters, 'labels' | 'background'>;
+
+interface Box {
+  element: HTMLElement;
+  input: HTMLInputElement;
+  size: HTMLElement;
+  voxels: number;
+}
+
+export class LabelChoice {
+  readonly element: HTMLElement;
+  private readonly body = h('div', { class: 'label-choice' });
+  private background: number;
+  private asking: AbortController | null = null;
+  private labels: readonly VolumeLabel[] = [];
+  private readonly chosen = new Set<number>();
+  private readonly boxes = new Map<number, Box>();
+  private triangles: ReadonlyMap<number, number> = new Map();
+  private search: LabelSearch<VolumeLabel> | null = null;
+
+  // `onChange` gets undefined labels while none is chosen.
+  constructor(
+    scope: Scope,
+    private readonly volume: string,
+    start: Choice,
+    private readonly onChange: (choice: Choice) => void,
+  ) {
+    this.background = start.background ?? 0;
+    const input = h('input', { type: 'number', step: 1, value: this.background });
+    input.addEventListener('change', () => {
+      if (!Number.isInteger(input.valueAsNumber)) return;
+      this.background = input.valueAsNumber;
+      this.ask('all');
+      this.changed();
+    });
+    this.element = h('div', { class: 'label-choice' }, this.body, field('Background', input, 'The value of samples without a label'));
+    scope.onEnd(() => this.asking?.abort());
+    this.ask(start.labels);
+  }
+
+  private ask(wanted: Choice['labels']): void {
+    this.asking?.abort();
+    const asking = new AbortController();
+    this.asking = asking;
+    this.body.replaceChildren(h('p', { role: 'status' }, 'Counting the labels'));
+    this.labels = [];
+    this.chosen.clear();
+    this.boxes.clear();
+    this.search = null;
+    client.labelsOf(this.volume, this.background, asking.signal).then(
+      ({ labels }) => {
+        if (!asking.signal.aborted) this.show(labels, wanted);
+      },
+      (error: unknown) => {
+        if (!asking.signal.aborted) this.body.replaceChildren(refusal(asApiError(error)));
+      },
+    );
+  }
+
+  private show(labels: readonly VolumeLabel[], start: Choice['labels']): void {
+    this.labels = labels;
+    if (labels.length === 0) {
+      this.body.replaceChildren(h('p', { class: 'warning' }, 'All samples are background. The volume has no labels.'));
+      return;
+    }
+    const wanted = Array.isArray(start) ? new Set(start) : null;
+    for (const { label } of labels) if (!wanted || wanted.has(label)) this.chosen.add(label);
+    this.search = new LabelSearch(
+      labels,
+      (label) => this.boxOf(label).element,
+      () => `${formatCount(this.chosen.size)} of ${formatCount(labels.length)} labels`,
+    );
+    this.body.replaceChildren(
+      ...this.search.elements(
+        button('All', () => this.choose(true), { title: 'Choose all labels that match the search' }),
+        button('None', () => this.choose(false), { title: 'Clear all labels that match the search' }),
+      ),
+    );
+    this.search.fill();
+  }
+
+  // The triangles of each label's surface, from the estimate.
+  showTriangles(triangles: ReadonlyMap<number, number>): void {
+    this.triangles = triangles;
+    this.update();
+  }
+
+  // All that the search finds.
+  private choose(isOn: boolean): void {
+    for (const { label } of this.search?.found ?? []) {
+      if (isOn) this.chosen.add(label);
+      else this.chosen.delete(label);
+    }
+    this.changed();
+  }
+
+  private boxOf(label: VolumeLabel): Box {
+    const known = this.boxes.get(label.label);
+    if (known) return known;
+    const check = checkbox(labelTitle(label), this.chosen.has(label.label), (isOn) => {
+      if (isOn) this.chosen.add(label.label);
+      else this.chosen.delete(label.label);
+      this.changed();
+    });
+    const swatch = h('span', { class: 'swatch', 'aria-hidden': 'true' });
+    // Not an attribute, which the content policy would not take.
+    if (label.color) swatch.style.backgroundColor = label.color;
+    const size = h('span', { class: 'faint number' });
+    const box = {
+      element: h(
+        'li',
+        { 'data-label': label.label },
+        swatch,
+        check,
+        size,
+      ),
+      input: check.querySelector('input') as HTMLInputElement,
+      size,
+      voxels: label.voxels,
+    };
+    this.boxes.set(label.label, box);
+    this.updateBox(label.label, box);
+    return box;
+  }
+
+  private update(): void {
+    for (const [label, box] of this.boxes) this.updateBox(label, box);
+    this.search?.recount();
+  }
+
+  private updateBox(label: number, { input, size, voxels }: Box): void {
+    input.checked = this.chosen.has(label);
+    const triangles = input.checked ? this.triangles.get(label) : undefined;
+    size.textContent =
+      `${formatCount(voxels)} voxels` + (triangles === undefined ? '' : `, ${formatCount(triangles)} triangles`);
+  }
+
+  private changed(): void {
+    this.update();
+    this.onChange({ labels: this.choice(), background: this.background });
+  }
+
+  // The chosen labels; undefined if there are none.
+  choice(): Choice['labels'] {
+    if (this.chosen.size === this.labels.length) return 'all';
+    const [first, ...others] = this.labels.map(({ label }) => label).filter((label) => this.chosen.has(label));
+    return first === undefined ? undefined : [first, ...others];
+  }
+}

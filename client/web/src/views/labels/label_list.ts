@@ -1,0 +1,143 @@
+// The labels of a surface beside it: to be found, hidden, isolated, coloured and downloaded.
+import type { Job, LabelSummary, Volume } from '../../api/types';
+import { labelTitle, type LabelState } from '../../job/labels';
+import { fileNameOf } from '../../job/variants';
+import { button, checkbox, h } from '../../ui/dom';
+import { formatBytes, formatCount, formatNames, formatValue } from '../../ui/format';
+import { tellError } from '../../ui/notices';
+import { saveFile } from '../../ui/save';
+import type { Scope } from '../../ui/signal';
+import { LabelSearch } from './label_search';
+
+export function volumeText({ volume_mm3: volume }: LabelSummary): string {
+  return `${formatValue(volume)} mm\u00b3`;
+}
+
+export function areaText({ area_mm2: area }: LabelSummary): string {
+  return `${formatValue(area)} mm\u00b2`;
+}
+
+interface Row {
+  element: HTMLElement;
+  shown: HTMLInputElement;
+  colour: HTMLInputElement;
+  alone: HTMLButtonElement;
+}
+
+export class LabelList {
+  readonly element: HTMLElement;
+  private readonly rows = new Map<number, Row>();
+
+  constructor(
+    scope: Scope,
+    private readonly job: Job,
+    private readonly state: LabelState,
+    private readonly volume: Volume | null,
+  ) {
+    const { labels } = state;
+    const search = new LabelSearch(
+      labels,
+      (label) => this.rowOf(label).element,
+      (found) => `${formatCount(found)} of ${formatCount(labels.length)} labels`,
+    );
+    this.element = h(
+      'section',
+      { class: 'panel-section label-list' },
+      h('h2', {}, 'Labels'),
+      ...search.elements(
+        button('Show all', () => state.showAll(), { title: 'Show every label (e)' }),
+        button('Hide all', () => state.hideAll()),
+      ),
+    );
+    search.fill();
+    scope.onEnd(state.hidden.subscribe(() => this.update()));
+    scope.onEnd(state.colours.subscribe(() => this.update()));
+    scope.onEnd(state.picked.subscribe((picked) => this.markPicked(picked)));
+  }
+
+  private rowOf(label: LabelSummary): Row {
+    const known = this.rows.get(label.label);
+    if (known) return known;
+    const title = labelTitle(label);
+    const check = checkbox(
+      title,
+      true,
+      (isOn) => this.state.show(label.label, isOn),
+      { 'aria-label': `Show ${title}` },
+    );
+    const shown = check.querySelector('input') as HTMLInputElement;
+    const colour = h('input', { type: 'color', 'aria-label': `Colour of ${title}`, title: 'Colour' });
+    colour.addEventListener('input', () => this.state.setColour(label.label, colour.value));
+    const isolate = (): void => {
+      this.state.isolate(label.label);
+      // Says its area too, to whoever has no pointer.
+      this.state.pick(label.label);
+    };
+    const alone = button('Only', isolate, {
+      class: 'quiet',
+      'aria-label': `Show only ${title}`,
+      'aria-pressed': 'false',
+      title: 'Hide all other labels',
+    });
+    const row = {
+      element: h(
+        'li',
+        { 'data-label': label.label },
+        colour,
+        h(
+          'div',
+          { class: 'label-text' },
+          check,
+          h('span', { class: 'faint' }, `${formatCount(label.triangles)} triangles, ${volumeText(label)}`),
+        ),
+        alone,
+        ...this.downloads(label, title),
+      ),
+      shown,
+      colour,
+      alone,
+    };
+    this.rows.set(label.label, row);
+    this.updateRow(label.label, row);
+    return row;
+  }
+
+  private downloads(label: LabelSummary, title: string): HTMLElement[] {
+    return Object.entries(label.files ?? {}).map(([format, { bytes, href }]) =>
+      button(
+        formatNames[format] ?? format,
+        () => void saveFile(href, fileNameOf(this.job, this.volume, `-${label.label}.${format}`), bytes).catch(tellError),
+        { class: 'quiet', 'data-format': format, title: formatBytes(bytes), 'aria-label': `Download ${title} as ${formatNames[format] ?? format}` },
+      ),
+    );
+  }
+
+  private update(): void {
+    for (const [label, row] of this.rows) this.updateRow(label, row);
+  }
+
+  private updateRow(label: number, { shown, colour, alone }: Row): void {
+    shown.checked = this.state.isShown(label);
+    alone.setAttribute('aria-pressed', String(this.state.isAlone(label)));
+    const now = this.state.colours.value.get(label);
+    if (now !== undefined) colour.value = now;
+  }
+
+  // Scrolls the list alone: scrollIntoView would take the surface that was tapped off a phone's screen.
+  private scrollTo(row: HTMLElement): void {
+    const list = row.parentElement;
+    if (!list) return;
+    const [outer, inner] = [list.getBoundingClientRect(), row.getBoundingClientRect()];
+    if (inner.top < outer.top) list.scrollTop -= outer.top - inner.top;
+    else if (inner.bottom > outer.bottom) list.scrollTop += inner.bottom - outer.bottom;
+  }
+
+  private markPicked(picked: LabelSummary | null): void {
+    for (const [label, { element }] of this.rows) {
+      if (label === picked?.label) {
+        element.setAttribute('aria-current', 'true');
+        this.scrollTo(element);
+      } else element.removeAttribute('aria-current');
+    }
+  }
+}

@@ -1,0 +1,92 @@
+// The description of a volume beside its slices.
+import { client } from '../../client';
+import type { Volume } from '../../api/types';
+import { button, h } from '../../ui/dom';
+import { formatDims, formatNames, formatSpacing, formatValue } from '../../ui/format';
+import { askText, tellError } from '../../ui/notices';
+import { noteTexts, volumeName } from '../../volume/names';
+
+// Lists the skipped files of an upload, because a user may miss them.
+function ignoredNote({ ignored }: Volume): HTMLElement | null {
+  if (ignored.length === 0) return null;
+  return h(
+    'details',
+    { class: 'more' },
+    h('summary', {}, ignored.length === 1 ? '1 file was skipped' : `${ignored.length} files were skipped`),
+    h('ul', {}, ...ignored.map(({ name, reason }) => h('li', {}, h('b', {}, name), `: ${reason}`))),
+  );
+}
+
+// Lists what the server decided or corrected when it read the upload.
+function notesOf(volume: Volume): HTMLElement | null {
+  const { notes } = volume;
+  if (notes.length === 0) return null;
+  const texts = noteTexts(volume);
+  return h(
+    'ul',
+    { class: 'notes', 'aria-label': 'Notes' },
+    ...notes.map(({ code }, place) => h('li', { 'data-note': code }, texts[place])),
+  );
+}
+
+// The volume's name, which a person can change.
+function nameHeading(volume: Volume, onRenamed: () => void): HTMLElement {
+  const text = h('span', {}, volumeName(volume));
+  const rename = async (): Promise<void> => {
+    const name = await askText('Name of this volume', volume.name ?? '', 'Rename');
+    if (name === null) return;
+    try {
+      volume.name = (await client.renameVolume(volume.id, name === '' ? null : name)).name;
+      text.textContent = volumeName(volume);
+      onRenamed();
+    } catch (error) {
+      tellError(error);
+    }
+  };
+  return h('h1', {}, text, ' ', button('Rename', () => void rename(), { class: 'quiet' }));
+}
+
+function factsOf(volume: Volume): string {
+  return [
+    formatNames[volume.format] ?? volume.format,
+    volume.modality,
+    `${formatDims(volume.dims)}, ${volume.type}`,
+    formatSpacing(volume.spacing),
+    `values ${formatValue(volume.range[0])} to ${formatValue(volume.range[1])}`,
+  ]
+    .filter(Boolean)
+    .join(' \u00b7 ');
+}
+
+// How to move in slices.
+export function sliceHelp(): HTMLElement {
+  return h(
+    'details',
+    { class: 'more slice-help' },
+    h('summary', {}, 'How to use the slices'),
+    h(
+      'ul',
+      {},
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Drag'), ' in a slice: change window and level'),
+    h('li', { class: 'by-touch' }, h('b', {}, 'Drag sideways'), ' in a slice: change window and level; drag up or down: scroll the page'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Wheel'), ' or arrow keys: next or previous slice'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Ctrl and wheel'), ', or + and \u2212: zoom; ', h('b', {}, 'Shift and drag'), ': move; 0: show the whole slice'),
+    h('li', { class: 'by-touch' }, h('b', {}, 'Two fingers'), ': zoom and move'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Click'), ': move the other slices to this point'),
+    h('li', { class: 'by-mouse' }, h('b', {}, 'Double click'), ' or i: use the value at this point as the iso-value'),
+    h('li', { class: 'by-touch' }, h('b', {}, 'Slider'), ' below a slice: choose the slice'),
+    h('li', { class: 'by-touch' }, h('b', {}, 'Tap'), ': move the other slices to this point'),
+    h('li', {}, h('b', {}, 'Line in the histogram'), ': drag it to change the iso-value', h('span', { class: 'by-mouse' }, '; the arrow keys move it too')),
+    ),
+  );
+}
+
+// Its name and what it is.
+export function aboutVolume(volume: Volume, onRenamed: () => void): HTMLElement {
+  return h('header', { class: 'about' }, nameHeading(volume, onRenamed), h('p', { class: 'facts' }, factsOf(volume)));
+}
+
+// The notes and the skipped files of the upload.
+export function notedOf(volume: Volume): (HTMLElement | null)[] {
+  return [notesOf(volume), ignoredNote(volume)];
+}

@@ -1,0 +1,41 @@
+// The texts of a job's estimate.
+import type { Estimate } from '../../api/types';
+import { h } from '../../ui/dom';
+import { formatBytes, formatCount, formatMilliseconds, formatNames } from '../../ui/format';
+
+function warning(text: string): HTMLElement {
+  return h('p', { class: 'warning' }, text);
+}
+
+export function estimateTexts(estimate: Estimate, isByLabels: boolean): HTMLElement[] {
+  const files = Object.entries(estimate.bytes).map(
+    ([format, bytes]) => `${formatNames[format] ?? format} ${formatBytes(bytes)}`,
+  );
+  const rows: [string, string][] = [
+    ['Triangles', formatCount(estimate.triangles)],
+    ['Vertices', formatCount(estimate.vertices)],
+    ['Files', `about ${files.join(', ')}`],
+    ['Time', `about ${formatMilliseconds(estimate.milliseconds)}`],
+  ];
+  const before = estimate.queue.queued + estimate.queue.running;
+  if (before > 0) rows.push(['Jobs ahead', before === 1 ? '1 job' : `${before} jobs`]);
+  const texts: HTMLElement[] = [h('dl', {}, ...rows.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]))];
+  if (estimate.triangles === 0) {
+    texts.push(
+      warning(
+        isByLabels
+          ? 'The chosen labels have no boundary. The surface would be empty.'
+          : 'No surface exists at this iso-value. The mesh would be empty.',
+      ),
+    );
+  }
+  if (!estimate.fits) {
+    texts.push(
+      warning(
+        `This job needs ${formatBytes(estimate.memory_bytes)} of memory, which is more than a job may use. ` +
+          (isByLabels ? 'Choose fewer labels.' : 'Choose an iso-value that gives fewer triangles.'),
+      ),
+    );
+  }
+  return texts;
+}

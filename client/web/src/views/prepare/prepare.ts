@@ -1,0 +1,431 @@
+// A volume and the iso-value to be chosen in it: #/volumes/ID.
+import { client } from '../../client';
+import { asApiError, type ApiError } from '../../api/problem';
+import type { Estimate, JobParameters, Vec3, Volume } from '../../api/types';
+import {
+  changed,
+  defaultParameters,
+  estimateQuery,
+  jobRequest,
+  parametersOfQuery,
+  queryOfParameters,
+} from '../../job/parameters';
+import { trianglesOf } from '../../job/labels';
+import { isByLabels, withLabels } from '../../job/table';
+import { button, field, h, isTyping, segmented } from '../../ui/dom';
+import { formatCount, formatValue } from '../../ui/format';
+import { History } from '../../ui/history';
+import { refusal } from '../../ui/notices';
+import { go, noteInAddress, type Route } from '../../ui/route';
+import type { Scope } from '../../ui/signal';
+import { cssColour, theme } from '../../ui/theme';
+import { defaultWindow, type Histogram } from '../../volume/histogram';
+import { SliceSource, type Window } from '../../volume/slices';
+import { boxOf, cropOf, isUpright, within, type Box } from '../../volume/crop';
+import { cursorOfText } from '../../volume/geometry';
+import { eachLabel, isInteger, volumeName } from '../../volume/names';
+import { aboutVolume, notedOf, sliceHelp } from './about_volume';
+import { CropControl } from './crop_control';
+import { estimateTexts } from './estimate_texts';
+import { HistogramView } from './histogram_view';
+import { LiveView } from './live_view';
+import { LabelChoice, type Choice } from '../labels/label_choice';
+import { madeSurfaces } from './made_surfaces';
+import { parameterForm } from './parameter_form';
+import { SliceView, type SliceHost } from '../slices/slice_view';
+
+const mostBins = 1024;
+const estimateDelay = 300;
+
+// Enough digits for any iso-value, and few enough to be read.
+function shortened(iso: number): number {
+  return Number(iso.toPrecision(6));
+}
+
+function windowOfQuery(query: URLSearchParams): Window | null {
+  const [low, high] = (query.get('window') ?? '').split(',').map(Number);
+  return low !== undefined && high !== undefined && high > low ? [low, high] : null;
+}
+
+export async function prepareView(scope: Scope, route: Route): Promise<HTMLElement> {
+  const volume = await client.getVolume(route.path[1] ?? '');
+  // A bin for each value where there are few: more bins would leave gaps between the values.
+  const values = isInteger(volume) ? volume.range[1] - volume.range[0] + 1 : mostBins;
+  const histogram = await client.histogramOf(volume.id, Math.min(mostBins, values), scope.signal);
+  return new Prepare(scope, route, volume, histogram).element;
+}
+
+function startOfQuery(query: URLSearchParams, volume: Volume, defaults: JobParameters): JobParameters {
+  const parameters = parametersOfQuery(query, defaults);
+  // An iso-value makes one surface of all labels above it, which users rarely want.
+  const areLabels = isInteger(volume) && volume.notes.some(({ code }) => code === 'looks-like-labels');
+  return areLabels && !query.has('iso') && !isByLabels(parameters) ? withLabels(parameters, 'all') : parameters;
+}
+
+// '' if the job is not simplified.
+function simplifiedInWords({ triangles, simplified_triangles: left }: Estimate): string {
+  if (left === undefined) return '';
+  return `About ${formatCount(left)} of ${formatCount(triangles)} triangles remain.`;
+}
+
+class Prepare {
+  readonly element: HTMLElement;
+  private parameters: JobParameters;
+  private readonly defaults: JobParameters;
+  private window: Window;
+  private cursor: Vec3;
+  private readonly slices: SliceView[];
+  private readonly histogram: HistogramView;
+  private readonly live: LiveView;
+  // Null where a box of the patient's axes is none of the volume's; then its corners are typed.
+  private readonly crop: CropControl | null;
+  private readonly isoInput: HTMLInputElement;
+  private readonly estimate = h('div', { class: 'estimate', 'aria-live': 'polite' });
+  private readonly run: HTMLButtonElement;
+  private readonly isoPart: HTMLElement;
+  private readonly labelPart = h('div');
+  private readonly kind = h('div', { class: 'kind' });
+  private labelChoice: LabelChoice | null = null;
+  private hasLabel = true;
+  // The controls in which something stands that is no value of theirs.
+  private readonly faulty = new Set<string>();
+  private readonly form = h('div');
+  private readonly simplified = h('p', { class: 'hint', 'aria-live': 'polite' });
+  private readonly problem = h('div');
+  private readonly windowText = h('span', { class: 'window-text faint' });
+  private estimating: AbortController | null = null;
+  private estimateTimer = 0;
+  private isStarting = false;
+  private readonly history: History<JobParameters>;
+  private readonly undoButton = button('Undo', () => this.goBack(this.history.undo()), { class: 'chip', title: 'Undo the last change (Ctrl Z)' });
+
+  constructor(
+    private readonly scope: Scope,
+    route: Route,
+    private readonly volume: Volume,
+    counts: Histogram,
+  ) {
+    this.defaults = defaultParameters(volume.id, shortened(volume.suggested_iso));
+    this.parameters = startOfQuery(route.query, volume, this.defaults);
+    this.history = new History(this.parameters);
+    const common = defaultWindow(counts, volume.suggested_iso);
+    this.window = windowOfQuery(route.query) ?? common;
+    this.cursor = cursorOfText(route.query.get('at') ?? '', volume);
+
+    const host: SliceHost = {
+      volume,
+      source: new SliceSource(volume, scope.signal),
+      commonWindow: common,
+      state: () => ({
+        iso: isByLabels(this.parameters) ? null : this.iso,
+        window: this.window,
+        cursor: this.cursor,
+      }),
+      setWindow: (window) => {
+        this.window = window;
+        this.update();
+      },
+      setCursor: (cursor) => {
+        this.cursor = cursor;
+        this.update();
+      },
+      setIso: (iso) => {
+        if (!isByLabels(this.parameters)) this.setIso(iso);
+      },
+      isInteger: isInteger(volume),
+      contourColour: () => cssColour('--contour'),
+      crop: isUpright(volume) ? { box: () => this.box, setBox: (box) => this.setBox(within(volume, box)) } : null,
+      onError: (error) => this.sliceFailed(error),
+    };
+    this.histogram = new HistogramView(counts, isInteger(volume), (iso) => this.setIso(iso), scope);
+    this.slices = (['axial', 'coronal', 'sagittal'] as const).map(
+      (plane) => new SliceView(plane, host, scope),
+    );
+    this.live = this.liveView(route, host);
+    this.crop = host.crop && new CropControl(volume, this.box, (box) => this.setBox(box));
+    this.isoInput = h('input', { type: 'number', step: 'any', id: 'iso', class: 'iso-input' });
+    this.listenToIso();
+    this.run = button('Make the surface', () => void this.start(), { class: 'primary' });
+    this.isoPart = h('div', { class: 'by-iso' }, this.isoRow(), this.histogram.element);
+    this.element = this.layout(common);
+    this.kind.append(this.kindChoice() ?? '');
+    this.showKind();
+    scope.onEnd(() => {
+      clearTimeout(this.estimateTimer);
+      this.estimating?.abort();
+    });
+    this.listenToPage();
+    this.update();
+    this.askForEstimate();
+  }
+
+  private liveView({ query }: Route, { volume, setCursor }: SliceHost): LiveView {
+    return new LiveView(
+      {
+        volume,
+        window: this.histogram.shown,
+        setCursor,
+        look: query.get('look') ?? '',
+        setLook: (look) => noteInAddress({ look }),
+      },
+      this.scope,
+    );
+  }
+
+  private listenToPage(): void {
+    const { scope } = this;
+    scope.onEnd(theme.subscribe(() => this.update()));
+    scope.listen(window, 'keydown', (event: KeyboardEvent) => {
+      if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) void this.start();
+      else if (event.key.toLowerCase() === 'z' && (event.ctrlKey || event.metaKey) && !isTyping(event)) {
+        event.preventDefault();
+        this.goBack(event.shiftKey ? this.history.redo() : this.history.undo());
+      } else if (event.key === '[' && !isTyping(event)) this.histogram.element.focus();
+    });
+  }
+
+  private listenToIso(): void {
+    this.isoInput.addEventListener('input', () => {
+      const isGood = Number.isFinite(this.isoInput.valueAsNumber);
+      this.isoInput.setAttribute('aria-invalid', String(!isGood));
+      this.mark('iso', isGood);
+      if (isGood) this.setIso(this.isoInput.valueAsNumber);
+    });
+    // An unfinished number is replaced by the value that is used.
+    this.isoInput.addEventListener('blur', () => {
+      this.isoInput.setAttribute('aria-invalid', 'false');
+      this.mark('iso', true);
+      this.update();
+    });
+  }
+
+  private get iso(): number {
+    const { iso } = this.parameters;
+    return typeof iso === 'number' ? iso : this.volume.suggested_iso;
+  }
+
+  private get box(): Box | null {
+    return boxOf(this.volume, this.parameters.crop);
+  }
+
+  private setBox(box: Box | null): void {
+    this.parameters = { ...this.parameters, crop: box ? cropOf(this.volume, box) : null };
+    this.changed();
+  }
+
+  // The controls that are for an iso-value, or those for labels.
+  private showKind(): void {
+    const byLabels = isByLabels(this.parameters);
+    this.isoPart.hidden = byLabels;
+    this.labelPart.hidden = !byLabels;
+    if (byLabels && !this.labelChoice) {
+      this.labelChoice = new LabelChoice(this.scope, this.volume.id, this.parameters, (choice) => this.setLabels(choice));
+      this.labelPart.append(this.labelChoice.element);
+    }
+    this.faulty.clear();
+    this.form.replaceChildren(
+      parameterForm({
+        job: () => this.parameters,
+        set: (parameter, value) => {
+          this.parameters = changed(this.parameters, parameter, value);
+          this.changed();
+        },
+        mark: (parameter, isGood) => this.mark(parameter.name, isGood),
+        slider: { spacing: this.volume.spacing, outcome: this.simplified },
+        hides: this.crop ? ['crop'] : [],
+      }),
+    );
+  }
+
+  private mark(name: string, isGood: boolean): void {
+    if (isGood === !this.faulty.has(name)) return;
+    if (isGood) this.faulty.delete(name);
+    else this.faulty.add(name);
+    this.changed();
+  }
+
+  // True if the entered values make a valid job.
+  private get isReady(): boolean {
+    return this.hasLabel && this.faulty.size === 0;
+  }
+
+  private setKind(kind: 'iso' | 'labels'): void {
+    const isNone = kind === 'labels' && this.labelChoice !== null && this.labelChoice.choice() === undefined;
+    this.hasLabel = !isNone;
+    this.parameters = withLabels(this.parameters, kind === 'labels' ? (this.labelChoice?.choice() ?? 'all') : undefined);
+    this.showKind();
+    this.changed();
+  }
+
+  // While no label is chosen nothing can be made.
+  private setLabels({ labels, background }: Choice): void {
+    this.hasLabel = labels !== undefined;
+    this.parameters = { ...this.parameters, labels: labels ?? 'all', background };
+    this.changed();
+  }
+
+  private kindChoice(): HTMLElement | null {
+    if (!isInteger(this.volume)) return null;
+    const choices = [
+      { value: 'iso', label: 'One surface', title: 'One surface around all samples at or above the iso-value' },
+      { value: 'labels', label: eachLabel, title: 'One surface around each label of a segmentation' },
+    ] as const;
+    return segmented('What to mesh', choices, isByLabels(this.parameters) ? 'labels' : 'iso', (kind) => this.setKind(kind));
+  }
+
+  private layout(common: Window): HTMLElement {
+    const { volume } = this;
+    const element = h(
+      'div',
+      { class: 'prepare', 'data-title': volumeName(volume) },
+      h('section', { class: 'slices', 'aria-label': 'Slices' }, ...this.slices.map((view) => view.element), this.live.element),
+      h(
+        'section',
+        { class: 'panel', 'aria-label': 'Parameters' },
+        aboutVolume(volume, () => (element.dataset.title = volumeName(volume))),
+        this.kind,
+        this.isoPart,
+        this.labelPart,
+        this.windowRow(common),
+        this.crop?.element ?? '',
+        ...notedOf(volume),
+        this.form,
+        madeSurfaces(volume.id),
+        sliceHelp(),
+        this.estimate,
+        this.problem,
+        h('div', { class: 'run' }, this.run, h('span', { class: 'hint by-mouse' }, 'Ctrl + Enter')),
+      ),
+    );
+    return element;
+  }
+
+  // The window of the slices, and the way back to the usual one.
+  private windowRow(common: Window): HTMLElement {
+    const reset = button(
+      'Reset window',
+      () => {
+        this.window = common;
+        this.update();
+      },
+      { class: 'chip' },
+    );
+    return h('div', { class: 'window-row' }, this.windowText, h('span', { class: 'grow' }), this.undoButton, reset);
+  }
+
+  private isoRow(): HTMLElement {
+    const { suggested_iso: otsu, presets } = this.volume;
+    const chips = [{ name: 'Otsu', iso: otsu }, ...presets].map(({ name, iso }) =>
+      button(`${name} ${formatValue(iso)}`, () => this.setIso(shortened(iso)), { class: 'chip' }),
+    );
+    return h(
+      'div',
+      { class: 'iso-row' },
+      field('Iso-value', this.isoInput),
+      h('div', { class: 'presets', role: 'group', 'aria-label': 'Presets' }, ...chips),
+    );
+  }
+
+  private setIso(iso: number): void {
+    this.parameters = { ...this.parameters, iso };
+    this.changed();
+  }
+
+  // Null where there is nothing to go back to.
+  private goBack(parameters: JobParameters | null): void {
+    if (!parameters) return;
+    this.parameters = parameters;
+    // These keep what was chosen in them.
+    this.labelChoice = null;
+    this.labelPart.replaceChildren();
+    this.kind.replaceChildren(this.kindChoice() ?? '');
+    this.showKind();
+    this.changed();
+  }
+
+  private changed(): void {
+    this.history.change(this.parameters);
+    this.run.disabled = !this.isReady || this.isStarting;
+    this.update();
+    if (this.isReady) this.askForEstimate();
+    else this.showMissing(this.hasLabel ? 'Correct the marked fields.' : 'Choose at least one label.');
+  }
+
+  private showMissing(text: string): void {
+    clearTimeout(this.estimateTimer);
+    this.estimating?.abort();
+    this.estimate.classList.remove('stale');
+    this.estimate.replaceChildren(h('p', { class: 'warning' }, text));
+  }
+
+  private update(): void {
+    this.undoButton.hidden = !this.history.canUndo;
+    for (const view of this.slices) view.update();
+    this.live.show(isByLabels(this.parameters) ? null : this.iso, this.cursor);
+    this.live.showCrop(this.box);
+    this.crop?.show(this.box);
+    this.histogram.show(this.iso, this.window);
+    const [low, high] = this.window;
+    this.windowText.textContent = `window ${formatValue(high - low)}, level ${formatValue((low + high) / 2)}`;
+    if (document.activeElement !== this.isoInput) this.isoInput.value = String(this.iso);
+    noteInAddress({
+      ...queryOfParameters(this.parameters, this.defaults),
+      window: this.window.map((value) => Number(value.toPrecision(5))).join(','),
+      at: this.cursor.join(','),
+    });
+  }
+
+  private sliceFailed(error: unknown): void {
+    const failure: ApiError = asApiError(error);
+    if (!failure.isUnreachable) this.problem.replaceChildren(refusal(failure));
+  }
+
+  private askForEstimate(): void {
+    clearTimeout(this.estimateTimer);
+    this.estimating?.abort();
+    this.estimate.classList.add('stale');
+    this.estimateTimer = window.setTimeout(() => {
+      const controller = new AbortController();
+      this.estimating = controller;
+      client.estimateOf(estimateQuery(this.parameters), controller.signal).then(
+        (estimate) => this.showEstimate(estimate),
+        (error: unknown) => {
+          if (!controller.signal.aborted) this.showNoEstimate(asApiError(error));
+        },
+      );
+    }, estimateDelay);
+  }
+
+  private showEstimate(estimate: Estimate): void {
+    this.estimate.classList.remove('stale');
+    this.labelChoice?.showTriangles(trianglesOf(estimate));
+    this.simplified.textContent = simplifiedInWords(estimate);
+    this.estimate.replaceChildren(...estimateTexts(estimate, isByLabels(this.parameters)));
+  }
+
+  private showNoEstimate(error: ApiError): void {
+    const [fault] = error.faults;
+    const text = fault ? `${fault.field}: ${fault.message}` : error.detail;
+    this.estimate.classList.remove('stale');
+    this.estimate.replaceChildren(
+      error.status === 404 ? '' : h('p', { class: 'warning' }, text),
+    );
+  }
+
+  private async start(): Promise<void> {
+    if (this.run.disabled) return;
+    this.isStarting = true;
+    this.run.disabled = true;
+    this.problem.replaceChildren();
+    try {
+      const job = await client.submitJob(jobRequest(this.parameters));
+      go(['jobs', job.id]);
+    } catch (error) {
+      const failure = asApiError(error);
+      this.problem.replaceChildren(refusal(failure, failure.isUnreachable && button('Try again', () => void this.start())));
+    } finally {
+      this.isStarting = false;
+      this.run.disabled = !this.isReady;
+    }
+  }
+}

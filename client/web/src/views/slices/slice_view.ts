@@ -1,0 +1,406 @@
+// One orthogonal slice: grey samples, the iso-contour over them, and the place of the other two planes.
+import type { Axis, Vec3, Volume } from '../../api/types';
+import { h, uniqueId } from '../../ui/dom';
+import { formatValue } from '../../ui/format';
+import type { Scope } from '../../ui/signal';
+import { contour } from '../../volume/contour';
+import { SliceCrop, type CropHost } from './slice_crop';
+import { SliceZoom } from './slice_zoom';
+import {
+  axisIndex,
+  pictureAxes,
+  placedAt,
+  slicePlacement,
+  slicePlane,
+  type Placement,
+  type Plane,
+  type SlicePlane,
+} from '../../volume/geometry';
+import { SliceLoader } from '../../volume/slice_loader';
+import { greyTable, inSlice, valueIn, windowToFetch, type Slice, type SliceSource, type Window } from '../../volume/slices';
+
+export interface SliceState {
+  iso: number | null; // of the contour
+  window: Window;
+  // The sample where the three planes meet.
+  cursor: Vec3;
+}
+
+export interface SliceHost {
+  volume: Volume;
+  source: SliceSource;
+  commonWindow: Window;
+  state: () => SliceState;
+  setWindow: (window: Window) => void;
+  setCursor: (cursor: Vec3) => void;
+  setIso: (iso: number) => void;
+  isInteger: boolean;
+  contourColour: () => string;
+  // Null where nothing can be cropped.
+  crop: CropHost | null;
+  onError: (error: unknown) => void;
+}
+
+interface Press {
+  pointer: number;
+  x: number;
+  y: number;
+  window: Window;
+  moved: boolean;
+  isWindowing: boolean;
+}
+
+const titles: Record<Plane, string> = { axial: 'Axial', coronal: 'Coronal', sagittal: 'Sagittal' };
+const padding = 14;
+// How much is seen of a slice that stands in for one that is not there yet.
+const otherSlice = 0.35;
+const cropColour = '#f2b33d';
+
+export class SliceView {
+  readonly element: HTMLElement;
+  private readonly canvas = h('canvas', { tabindex: '0', role: 'img' });
+  private readonly slider: HTMLInputElement;
+  private readonly place = h('span', { class: 'slice-place' });
+  private readonly layout: SlicePlane;
+  private readonly buffer = document.createElement('canvas');
+  private readonly loader: SliceLoader;
+  private readonly state = h('p', { class: 'slice-state', role: 'status' });
+  // The value of the sample under the pointer.
+  private readonly value = h('p', { class: 'slice-value', 'aria-hidden': 'true' });
+  private readonly zoom: SliceZoom;
+  private readonly crop: SliceCrop | null;
+  private scheduled = false;
+
+  constructor(
+    private readonly plane: Plane,
+    private readonly host: SliceHost,
+    private readonly scope: Scope,
+  ) {
+    this.layout = slicePlane(host.volume, plane);
+    const id = uniqueId('slice');
+    this.slider = h('input', {
+      type: 'range',
+      id,
+      min: 0,
+      max: this.count(this.layout.normal) - 1,
+      step: 1,
+      'aria-label': `${titles[plane]} slice`,
+    });
+    this.slider.disabled = this.count(this.layout.normal) === 1;
+    this.slider.addEventListener('input', () => this.goTo(Number(this.slider.value)));
+    this.crop = host.crop && new SliceCrop(host.crop, pictureAxes(this.layout.normal));
+    this.zoom = new SliceZoom(this.canvas, scope, () => this.draw());
+    this.element = h(
+      'figure',
+      { class: 'slice', 'data-plane': plane },
+      h('div', { class: 'slice-picture' }, this.canvas, this.state, this.value, this.zoom.element),
+      h('figcaption', {}, h('span', { class: 'slice-title' }, titles[plane]), this.slider, this.place),
+    );
+    this.loader = new SliceLoader(host.source, this.layout.normal, scope, {
+      onChange: () => this.draw(),
+      onRefused: (error) => host.onError(error),
+    });
+    this.listen();
+    this.listenToSteps();
+    this.listenToValues();
+    const resizing = new ResizeObserver(() => this.draw());
+    resizing.observe(this.canvas);
+    scope.onEnd(() => resizing.disconnect());
+  }
+
+  // Shows the state as it is now.
+  update(): void {
+    const { iso, window, cursor } = this.host.state();
+    const index = cursor[axisIndex(this.layout.normal)];
+    this.slider.value = String(index);
+    this.place.textContent = `${index + 1} / ${this.count(this.layout.normal)}`;
+    const fetched = windowToFetch(window, iso ?? window[0], this.host.commonWindow);
+    this.loader.want(index, fetched);
+    this.draw();
+  }
+
+  private count(axis: Axis): number {
+    return this.host.volume.dims[axisIndex(axis)];
+  }
+
+  private goTo(index: number): void {
+    const axis = axisIndex(this.layout.normal);
+    const cursor: Vec3 = [...this.host.state().cursor];
+    cursor[axis] = Math.max(0, Math.min(this.count(this.layout.normal) - 1, Math.round(index)));
+    this.host.setCursor(cursor);
+  }
+
+  private step(by: number): void {
+    this.goTo(this.host.state().cursor[axisIndex(this.layout.normal)] + by);
+  }
+
+  // The picture's place on the canvas, in canvas pixels.
+  private placement(): Placement {
+    const { width, height, clientWidth } = this.canvas;
+    const edge = padding * (width / (clientWidth || 1));
+    const whole = slicePlacement(this.host.volume, this.layout, { width, height, edge });
+    return this.zoom.zoom.placed(whole, width, height);
+  }
+
+  private draw(): void {
+    if (this.scheduled) return;
+    this.scheduled = true;
+    requestAnimationFrame(() => {
+      this.scheduled = false;
+      if (!this.scope.isOver) this.paint();
+    });
+  }
+
+  private paint(): void {
+    const ratio = window.devicePixelRatio || 1;
+    const width = Math.round(this.canvas.clientWidth * ratio);
+    const height = Math.round(this.canvas.clientHeight * ratio);
+    if (this.canvas.width !== width || this.canvas.height !== height) {
+      this.canvas.width = width;
+      this.canvas.height = height;
+    }
+    const context = this.canvas.getContext('2d', { willReadFrequently: true });
+    if (!context || width === 0 || height === 0) return;
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.fillStyle = '#000';
+    context.fillRect(0, 0, width, height);
+    const { iso, cursor } = this.host.state();
+    const index = cursor[axisIndex(this.layout.normal)];
+    const { slice, isLate, error } = this.loader;
+    if (slice) {
+      // A picture of another slice is never shown as this one.
+      context.globalAlpha = slice.index === index ? 1 : otherSlice;
+      this.paintSlice(context, slice, ratio);
+      context.globalAlpha = 1;
+    }
+    this.paintLetters(context, ratio);
+    const says = error ? `Slice ${index + 1} could not be loaded` : isLate ? `Loading slice ${index + 1}` : '';
+    if (this.state.textContent !== says) this.state.textContent = says;
+    this.canvas.setAttribute(
+      'aria-label',
+      `${titles[this.plane]} slice ${index + 1}${iso === null ? '' : ` with the contour at iso-value ${iso}`}`,
+    );
+  }
+
+  private paintSlice(context: CanvasRenderingContext2D, slice: Slice, ratio: number): void {
+    this.fillBuffer(slice);
+    context.save();
+    context.setTransform(...this.placement());
+    context.imageSmoothingEnabled = true;
+    context.drawImage(this.buffer, 0, 0);
+
+    const { iso, cursor } = this.host.state();
+    const segments = iso === null ? [] : contour(slice, inSlice(slice, iso));
+    const [column, row] = pictureAxes(this.layout.normal);
+    context.translate(0.5, 0.5);
+    context.beginPath();
+    context.moveTo(cursor[column], -0.5);
+    context.lineTo(cursor[column], slice.height - 0.5);
+    context.moveTo(-0.5, cursor[row]);
+    context.lineTo(slice.width - 0.5, cursor[row]);
+    strokePixels(context, ratio, 'rgba(255, 255, 255, 0.28)');
+    context.beginPath();
+    for (let i = 0; i + 3 < segments.length; i += 4) {
+      context.moveTo(segments[i] as number, segments[i + 1] as number);
+      context.lineTo(segments[i + 2] as number, segments[i + 3] as number);
+    }
+    strokePixels(context, 1.5 * ratio, this.host.contourColour());
+    if (this.crop?.paint(context)) strokePixels(context, 1.5 * ratio, cropColour);
+    context.restore();
+  }
+
+  private fillBuffer(slice: Slice): void {
+    this.buffer.width = slice.width;
+    this.buffer.height = slice.height;
+    const context = this.buffer.getContext('2d', { willReadFrequently: true });
+    if (!context) return;
+    const picture = context.createImageData(slice.width, slice.height);
+    const table = greyTable(slice, this.host.state().window);
+    const pixels = new Uint32Array(picture.data.buffer);
+    const opaque = 0xff00_0000;
+    slice.values.forEach((value, i) => {
+      const grey = table[value] ?? 0;
+      pixels[i] = (opaque | (grey << 16) | (grey << 8) | grey) >>> 0;
+    });
+    context.putImageData(picture, 0, 0);
+  }
+
+  private paintLetters(context: CanvasRenderingContext2D, ratio: number): void {
+    const { width, height } = this.canvas;
+    const { right, down } = this.layout;
+    context.font = `600 ${11 * ratio}px system-ui, sans-serif`;
+    context.fillStyle = 'rgba(255, 255, 255, 0.75)';
+    context.textAlign = 'center';
+    context.textBaseline = 'middle';
+    const edge = (padding / 2) * ratio;
+    context.fillText(right.begin, edge, height / 2);
+    context.fillText(right.end, width - edge, height / 2);
+    context.fillText(down.begin, width / 2, edge);
+    context.fillText(down.end, width / 2, height - edge);
+  }
+
+  // The column and row of the picture under a point of the screen.
+  private pointAt(event: PointerEvent | MouseEvent): [number, number] {
+    const box = this.canvas.getBoundingClientRect();
+    const scale = this.canvas.width / (box.width || 1);
+    return placedAt(this.placement(), (event.clientX - box.left) * scale, (event.clientY - box.top) * scale);
+  }
+
+  // From the middles of samples, as a box is told.
+  private placeAt(event: PointerEvent): [number, number] {
+    const [column, row] = this.pointAt(event);
+    return [column - 0.5, row - 0.5];
+  }
+
+  private edgesAt(event: PointerEvent): ReturnType<SliceCrop['at']> {
+    const [a, b, c, d] = this.placement();
+    const ratio = window.devicePixelRatio || 1;
+    const pixels: [number, number] = [Math.hypot(a, b) / ratio, Math.hypot(c, d) / ratio];
+    return this.crop?.at(this.placeAt(event), pixels, event.pointerType === 'touch') ?? null;
+  }
+
+  // The sample under a point of the screen.
+  private sampleAt(event: PointerEvent | MouseEvent): Vec3 | null {
+    const point = this.pointAt(event);
+    const cursor: Vec3 = [...this.host.state().cursor];
+    const { dims } = this.host.volume;
+    for (const [at, axis] of pictureAxes(this.layout.normal).entries()) {
+      const index = Math.floor(point[at as 0]);
+      if (index < 0 || index >= dims[axis]) return null;
+      cursor[axis] = index;
+    }
+    return cursor;
+  }
+
+  private listen(): void {
+    let press: Press | null = null;
+    const { canvas, scope } = this;
+    scope.listen(canvas, 'pointerdown', (event: PointerEvent) => {
+      if ((event.button !== 0 && event.button !== 2) || event.shiftKey) return;
+      if (!event.isPrimary) {
+        // A second finger: a pinch, or the palm.
+        press = null;
+        return;
+      }
+      canvas.setPointerCapture(event.pointerId);
+      const edges = this.edgesAt(event);
+      if (edges) {
+        this.crop?.begin(event.pointerId, edges);
+        return;
+      }
+      press = {
+        pointer: event.pointerId,
+        x: event.clientX,
+        y: event.clientY,
+        window: this.host.state().window,
+        moved: false,
+        isWindowing: false,
+      };
+    });
+    scope.listen(canvas, 'pointermove', (event: PointerEvent) => {
+      if (this.crop?.move(event.pointerId, this.placeAt(event))) return;
+      if (event.pointerType === 'mouse') canvas.classList.toggle('on-edge', this.edgesAt(event) !== null);
+      if (press?.pointer !== event.pointerId || this.zoom.isMoving(event)) return;
+      const dx = event.clientX - press.x;
+      const dy = event.clientY - press.y;
+      press.moved ||= Math.hypot(dx, dy) > (event.pointerType === 'mouse' ? 3 : 10);
+      // A finger that goes up or down scrolls the page, which the browser sees to (touch-action).
+      if (event.pointerType !== 'mouse' && Math.abs(dy) > Math.abs(dx) && !press.isWindowing) return;
+      press.isWindowing ||= press.moved;
+      if (press.moved) this.host.setWindow(draggedWindow(press.window, dx, dy));
+    });
+    scope.listen(canvas, 'pointerup', (event: PointerEvent) => {
+      if (this.crop?.end(event.pointerId) || press?.pointer !== event.pointerId) return;
+      const cursor = press.moved ? null : this.sampleAt(event);
+      press = null;
+      if (cursor) this.host.setCursor(cursor);
+    });
+    scope.listen(canvas, 'pointercancel', (event: PointerEvent) => {
+      this.crop?.end(event.pointerId);
+      // The browser has taken the finger to scroll with: what it did here before was not meant.
+      if (press?.isWindowing) this.host.setWindow(press.window);
+      press = null;
+    });
+    scope.listen(canvas, 'contextmenu', (event) => event.preventDefault());
+  }
+
+  // The value of the sample there, rounded to what the picture's eight bits tell; null where they tell none.
+  private valueOf(place: Vec3 | null): { text: string; value: number | null } {
+    const { slice } = this.loader;
+    const normal = axisIndex(this.layout.normal);
+    if (!slice || place?.[normal] !== slice.index) return { text: '', value: null };
+    const [column, row] = pictureAxes(this.layout.normal);
+    const { low, high } = valueIn(slice, place[column], place[row]);
+    if (low === -Infinity) return { text: `at most ${formatValue(high)}`, value: null };
+    if (high === Infinity) return { text: `at least ${formatValue(low)}`, value: null };
+    const digits = 10 ** Math.floor(Math.log10(Math.max(1e-12, high - low)));
+    const middle = Math.round((low + high) / 2 / digits) * digits;
+    const value = Number(middle.toPrecision(6));
+    const isExact = this.host.isInteger && high - low < 1.5;
+    return { text: `${isExact ? '' : 'about '}${formatValue(isExact ? Math.round(value) : value)}`, value: isExact ? Math.round(value) : value };
+  }
+
+  private listenToValues(): void {
+    const { canvas, scope } = this;
+    const take = (place: Vec3 | null): void => {
+      const { value } = this.valueOf(place);
+      if (value !== null) this.host.setIso(value);
+    };
+    scope.listen(canvas, 'pointermove', (event: PointerEvent) => {
+      if (event.pointerType === 'mouse') this.value.textContent = this.valueOf(this.sampleAt(event)).text;
+    });
+    scope.listen(canvas, 'pointerleave', () => (this.value.textContent = ''));
+    scope.listen(canvas, 'dblclick', (event: MouseEvent) => take(this.sampleAt(event)));
+    scope.listen(canvas, 'keydown', (event: KeyboardEvent) => {
+      if (event.key === 'i' && !event.ctrlKey && !event.metaKey && !event.altKey) take(this.host.state().cursor);
+    });
+  }
+
+  private listenToSteps(): void {
+    const { canvas, scope } = this;
+    scope.listen(
+      canvas,
+      'wheel',
+      (event: WheelEvent) => {
+        event.preventDefault();
+        if (event.ctrlKey || event.metaKey) this.zoom.wheel(event);
+        else if (event.deltaY !== 0) this.step(Math.sign(event.deltaY));
+      },
+      { passive: false },
+    );
+    scope.listen(canvas, 'keydown', (event: KeyboardEvent) => {
+      const key = event.key;
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.shiftKey && key.startsWith('Arrow')) {
+        const dx = key === 'ArrowLeft' ? -8 : key === 'ArrowRight' ? 8 : 0;
+        const dy = key === 'ArrowUp' ? -8 : key === 'ArrowDown' ? 8 : 0;
+        this.host.setWindow(draggedWindow(this.host.state().window, dx, dy));
+      } else if (key === 'ArrowUp' || key === 'ArrowRight') this.step(1);
+      else if (key === 'ArrowDown' || key === 'ArrowLeft') this.step(-1);
+      else if (key === 'PageUp') this.step(10);
+      else if (key === 'PageDown') this.step(-10);
+      else return;
+      event.preventDefault();
+    });
+  }
+}
+
+// Strokes the path with a width in pixels, however the samples are stretched.
+function strokePixels(context: CanvasRenderingContext2D, width: number, colour: string): void {
+  context.save();
+  context.setTransform(1, 0, 0, 1, 0, 0);
+  context.lineWidth = width;
+  context.lineCap = 'round';
+  context.strokeStyle = colour;
+  context.stroke();
+  context.restore();
+}
+
+// As on a radiologist's station: to the right widens the window, upwards darkens (raises its level).
+export function draggedWindow([low, high]: Window, dx: number, dy: number): Window {
+  const width = Math.max(1e-6, high - low);
+  const level = (low + high) / 2;
+  const newWidth = width * Math.exp(dx / 250);
+  const newLevel = level - (dy / 400) * width;
+  return [newLevel - newWidth / 2, newLevel + newWidth / 2];
+}

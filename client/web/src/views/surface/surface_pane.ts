@@ -1,0 +1,379 @@
+// A surface with its tools: what a job made, loaded part by part.
+import { asApiError } from '../../api/problem';
+import type { Job, MeshSummary, Vec3, Volume } from '../../api/types';
+import { loadMesh, viewableFile, type LoadProgress, type LoadTiming } from '../../mesh/load';
+import { lengthOf } from '../../scene/rulers';
+import { defaultStyle, type SurfaceStyle } from '../../scene/parts';
+import type { Picked } from '../../scene/picked';
+import { Surface } from '../../scene/surface';
+import { viewNames, viewTitles, type CameraPlace } from '../../scene/views';
+import type { LabelState } from '../../job/labels';
+import { emptyReason } from '../../job/empty';
+import { changeLink, fileNameOf, makeVariant } from '../../job/variants';
+import { button, h, isTyping } from '../../ui/dom';
+import { formatCount } from '../../ui/format';
+import { refusal, tell, tellError } from '../../ui/notices';
+import { saveBlob } from '../../ui/save';
+import { Scope } from '../../ui/signal';
+import { cssColour } from '../../ui/theme';
+import { CutTool } from './cut_tool';
+import { DistanceLook } from './distance_look';
+import { labelsOfText, rulersOfText, rulersToText, styleOfText, styleToText } from './look_text';
+import { PickedLabel } from '../labels/picked_label';
+import { PickedPart } from './picked_part';
+
+const turnStep = Math.PI / 36;
+
+export interface PaneOptions {
+  // Keys of the whole window are this pane's.
+  hasKeys: boolean;
+  camera: CameraPlace | null;
+  // Null where slices cannot be shown: the volume is gone.
+  volume: Volume | null;
+  // Shows slices beside the surface, or takes them away; null where there are none.
+  onSlices: (() => void) | null;
+  // The parameters of the address: cut, style, rulers, hide.
+  look: URLSearchParams;
+  // For a job by labels: which labels are shown, and their colours.
+  labels: LabelState;
+}
+
+export class SurfacePane {
+  readonly element: HTMLElement;
+  onCamera: ((place: CameraPlace) => void) | null = null;
+  // How it is looked at has changed: for the address.
+  onLook: ((values: Record<string, string>) => void) | null = null;
+  // A place of the surface was clicked.
+  onPoint: ((point: Vec3) => void) | null = null;
+  private surface: Surface | null = null;
+  private readonly view = h('div', { class: 'viewport' });
+  private readonly status = h('div', { class: 'load-status', role: 'status' });
+  private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Loading the surface' });
+  private readonly announcement = h('div', { class: 'sr-only', 'aria-live': 'polite' });
+  private readonly pickedLabel: PickedLabel;
+  private readonly pickedPart: PickedPart;
+  private distance: DistanceLook | null = null;
+  private style: SurfaceStyle = defaultStyle;
+  private readonly opacity = h('input', {
+    type: 'range',
+    min: 0.1,
+    max: 1,
+    step: 0.05,
+    value: 1,
+    'aria-label': 'Opacity',
+    title: 'Opacity',
+  });
+  private wantsDistance = false;
+  private isMeasuring = false;
+  // All of it is drawn.
+  private isWhole = false;
+  private cut: CutTool | null = null;
+  private readonly toggles = new Map<string, HTMLButtonElement>();
+
+  constructor(
+    private readonly scope: Scope,
+    private readonly job: Job,
+    private readonly options: PaneOptions,
+  ) {
+    this.pickedLabel = new PickedLabel(scope, options.labels);
+    this.pickedPart = new PickedPart(scope, job, makeVariant(job));
+    this.element = h('div', { class: 'pane' }, this.view, this.announcement);
+    this.view.append(h('div', { class: 'load' }, this.bar, this.status));
+  }
+
+  // Shows the mesh; resolves once all of it is there.
+  async load(): Promise<LoadTiming | null> {
+    const { mesh } = this.job;
+    const surface = mesh && this.begin(mesh);
+    if (!mesh || !surface) return null;
+    this.surface = surface;
+    this.scope.onEnd(() => surface.dispose());
+    this.prepareSurface(surface);
+    surface.setBounds(mesh.bounds);
+    if (this.options.camera) surface.moveTo(this.options.camera);
+    this.restore(surface, this.options.look);
+    try {
+      const timing = await this.loadBlocks(surface);
+      if (this.scope.isOver) return null;
+      surface.finish();
+      this.isWhole = true;
+      // A user who asked for distances wants to see them.
+      if (this.distance?.loaded()) this.distance.set(this.options.hasKeys || this.wantsDistance);
+      this.element.dataset.loaded = 'true';
+      this.bar.parentElement?.remove();
+      return timing;
+    } catch (error) {
+      if (this.scope.isOver) return null;
+      this.view.append(
+        h(
+          'div',
+          { class: 'overlay' },
+          refusal(
+            asApiError(error),
+            button('Reload', () => window.location.reload(), { class: 'primary' }),
+          ),
+        ),
+      );
+      return null;
+    }
+  }
+
+  // Ends when all of them are drawn, and so does the progress.
+  private async loadBlocks(surface: Surface): Promise<LoadTiming> {
+    let latest: LoadProgress = { bytes: 0, totalBytes: 1, totalTriangles: 1 };
+    const show = (): void => {
+      const { bytes, totalBytes, totalTriangles } = latest;
+      const shown = surface.trianglesShown;
+      this.bar.value = (bytes / totalBytes + shown / Math.max(1, totalTriangles)) / 2;
+      this.status.textContent =
+        bytes < totalBytes || shown > 0 ? `${formatCount(shown)} of ${formatCount(totalTriangles)} triangles` : 'Decoding';
+    };
+    surface.onShown = show;
+    const timing = await loadMesh(this.job, this.scope.signal, {
+      onBlocks: (blocks, part, isCoarse) => {
+        if (part) this.options.labels.learnColour(part.label, part.colour);
+        surface.addBlocks(blocks, part, isCoarse);
+      },
+      onProgress: (progress) => {
+        latest = progress;
+        show();
+      },
+    });
+    if (!this.scope.isOver) await surface.allShown();
+    return timing;
+  }
+
+  // Null, and says why, where there is nothing to be shown.
+  private begin(mesh: MeshSummary): Surface | null {
+    if (!viewableFile(this.job)) {
+      this.say('This job has no file that the page can show. Start it again with GLB or Draco.');
+      return null;
+    }
+    if (mesh.triangles === 0) {
+      this.say(emptyReason(this.job, this.options.volume), h('a', { href: changeLink(this.job) }, 'Change parameters'));
+      return null;
+    }
+    try {
+      return new Surface(this.view);
+    } catch {
+      this.say('This browser cannot draw in 3D (WebGL 2 is missing or off). Downloads still work.');
+      return null;
+    }
+  }
+
+  follow(place: CameraPlace): void {
+    this.surface?.follow(place);
+  }
+
+  get camera(): CameraPlace | null {
+    return this.surface?.place ?? null;
+  }
+
+  setStyle(change: Partial<SurfaceStyle>): void {
+    this.style = { ...this.style, ...change };
+    this.surface?.setStyle(this.style);
+    this.onLook?.({ style: styleToText(this.style) });
+    this.press('wireframe', this.style.wireframe);
+    this.press('flat', this.style.shading === 'flat');
+  }
+
+  // The point where the slices meet, in the volume's samples; null for none.
+  setCursor(cursor: Vec3 | null): void {
+    if (this.options.volume) this.surface?.setCross(this.options.volume, cursor);
+  }
+
+  fit(): void {
+    this.surface?.fit();
+  }
+
+  look(view: (typeof viewNames)[number]): void {
+    this.surface?.look(view);
+    this.announcement.textContent = viewTitles[view];
+  }
+
+  // Frame times while it moved, for measurements.
+  get frameTimes(): readonly number[] {
+    return this.surface?.budget.moving ?? [];
+  }
+
+  private say(text: string, ...more: Node[]): void {
+    this.bar.parentElement?.remove();
+    this.view.append(h('div', { class: 'overlay message' }, h('p', {}, text), ...more));
+  }
+
+  private prepareSurface(surface: Surface): void {
+    surface.canvas.setAttribute(
+      'aria-label',
+      'The surface. Drag or use the arrow keys to turn it, shift and arrow keys to move it, plus and minus to zoom. Two fingers move and zoom it.',
+    );
+    surface.onCamera = () => this.onCamera?.(surface.place);
+    surface.onPick = (picked) => this.picked(picked, surface);
+    this.followLabels(surface);
+    const distance = new DistanceLook(this.scope, surface, (isOn) => this.setStyle({ distance: isOn }));
+    this.distance = distance;
+    if (this.options.volume) this.cut = new CutTool(this.scope, this.job, this.options.volume, surface, this.view);
+    const tools = [this.toolbar(surface, distance), this.cut?.element ?? '', this.pickedLabel.element, this.pickedPart.element];
+    this.element.append(h('div', { class: 'tools' }, ...tools), distance.legend);
+    this.scope.listen(surface.canvas, 'keydown', (event: KeyboardEvent) => this.moveKey(event, surface));
+    if (this.options.hasKeys) {
+      this.scope.listen(window, 'keydown', (event: KeyboardEvent) => this.toolKey(event, surface));
+    }
+  }
+
+  // As the address says; from now on it follows.
+  private restore(surface: Surface, look: URLSearchParams): void {
+    const note = (values: Record<string, string>): void => this.onLook?.(values);
+    const style = styleOfText(look.get('style') ?? '');
+    this.setStyle({ ...style, distance: false });
+    this.opacity.value = String(style.opacity);
+    if (style.distance) this.wantsDistance = true;
+    this.cut?.restore(look.get('cut') ?? '');
+    this.press('cut', this.cut?.isOn ?? false);
+    if (this.cut) this.cut.onChange = (cut) => note({ cut });
+    surface.rulers.restore(rulersOfText(look.get('rulers') ?? ''));
+    surface.rulers.onChange = () => note({ rulers: rulersToText(surface.rulers.all) });
+    const { hidden } = this.options.labels;
+    const gone = labelsOfText(look.get('hide') ?? '');
+    if (gone.size > 0) hidden.value = gone;
+    this.scope.onEnd(hidden.subscribe((labels) => note({ hide: [...labels].join(',') })));
+  }
+
+  private picked(picked: Picked | null, surface: Surface): void {
+    if (!this.isMeasuring) {
+      this.options.labels.pick(picked?.label ?? null);
+      this.pickedPart.show(this.isWhole ? picked : null, () => surface.partFinder);
+      if (picked) this.onPoint?.(picked.point);
+      return;
+    }
+    if (!picked) {
+      tell(this.isWhole ? 'There is no surface at this point.' : 'The surface is still loading. Try again when all of it is drawn.');
+      return;
+    }
+    const ruler = surface.rulers.add(picked.point);
+    surface.draw();
+    this.announcement.textContent = ruler ? `${lengthOf(ruler).toFixed(1)} millimetres` : 'First point set';
+  }
+
+  private followLabels(surface: Surface): void {
+    const { hidden, colours } = this.options.labels;
+    this.scope.onEnd(hidden.watch((labels) => surface.setHidden(labels)));
+    this.scope.onEnd(
+      colours.watch((all) => {
+        for (const [label, colour] of all) surface.setColour(label, colour);
+      }),
+    );
+  }
+
+  private toggle(name: string, text: string, title: string, onClick: () => void): HTMLButtonElement {
+    const element = button(text, onClick, { 'aria-pressed': 'false', title, 'data-tool': name });
+    this.toggles.set(name, element);
+    return element;
+  }
+
+  press(name: string, isDown: boolean): void {
+    this.toggles.get(name)?.setAttribute('aria-pressed', String(isDown));
+  }
+
+  private toolbar(surface: Surface, distance: DistanceLook): HTMLElement {
+    const { opacity } = this;
+    opacity.addEventListener('input', () => this.setStyle({ opacity: opacity.valueAsNumber }));
+    return h(
+      'div',
+      { class: 'toolbar', role: 'toolbar', 'aria-label': 'View' },
+      h(
+        'div',
+        { class: 'tool-group' },
+        ...viewNames.map((name) =>
+          button(name, () => this.look(name), {
+            title: `${viewTitles[name]} (${name.toLowerCase()})`,
+            'aria-label': viewTitles[name],
+          }),
+        ),
+        button('Fit', () => surface.fit(), { title: 'Show the whole surface (f)' }),
+      ),
+      h(
+        'div',
+        { class: 'tool-group' },
+        this.toggle('flat', 'Flat', 'Flat shading shows every triangle (t)', () => this.toggleFlat()),
+        this.toggle('wireframe', 'Edges', 'Wireframe: show only the edges (w)', () => this.toggleWires()),
+        distance.toggle,
+        h('label', { class: 'opacity' }, h('span', {}, 'Opacity'), opacity),
+      ),
+      h(
+        'div',
+        { class: 'tool-group' },
+        this.options.volume && this.toggle('cut', 'Cut', 'Cut the surface along a slice (c)', () => this.toggleCut()),
+        this.options.onSlices && this.toggle('slices', 'Slices', 'Show slices beside the surface (x)', () => this.options.onSlices?.()),
+        this.toggle('measure', 'Measure', 'Measure the distance between two points (m)', () => this.toggleMeasure()),
+        button('Picture', () => void this.savePicture(surface), { title: 'Save this view as a PNG file' }),
+      ),
+    );
+  }
+
+  private toggleFlat(): void {
+    this.setStyle({ shading: this.style.shading === 'flat' ? 'smooth' : 'flat' });
+  }
+
+  private toggleWires(): void {
+    this.setStyle({ wireframe: !this.style.wireframe });
+  }
+
+  private toggleMeasure(): void {
+    this.isMeasuring = !this.isMeasuring;
+    this.press('measure', this.isMeasuring);
+    this.view.classList.toggle('measuring', this.isMeasuring);
+    if (this.isMeasuring) tell('Click or tap two points on the surface or on the slice of the cut. Esc removes the last point.');
+  }
+
+  private toggleCut(): void {
+    if (!this.cut) return;
+    this.cut.set(!this.cut.isOn);
+    this.press('cut', this.cut.isOn);
+  }
+
+  private async savePicture(surface: Surface): Promise<void> {
+    try {
+      const blob = await surface.picture(cssColour('--viewport'));
+      saveBlob(blob, fileNameOf(this.job, this.options.volume, '.png'));
+    } catch (error) {
+      tellError(error);
+    }
+  }
+
+  private moveKey(event: KeyboardEvent, surface: Surface): void {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const horizontal = event.key === 'ArrowLeft' ? -1 : event.key === 'ArrowRight' ? 1 : 0;
+    const vertical = event.key === 'ArrowDown' ? -1 : event.key === 'ArrowUp' ? 1 : 0;
+    if (horizontal !== 0 || vertical !== 0) {
+      if (event.shiftKey) surface.pan(-0.05 * horizontal, -0.05 * vertical);
+      else surface.turn(turnStep * horizontal, turnStep * vertical);
+    } else if (event.key === '+' || event.key === '=') surface.zoom(1 / 1.15);
+    else if (event.key === '-') surface.zoom(1.15);
+    else return;
+    event.preventDefault();
+  }
+
+  private toolKey(event: KeyboardEvent, surface: Surface): void {
+    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event)) return;
+    const key = event.key.toLowerCase();
+    const view = viewNames.find((name) => name.toLowerCase() === key);
+    if (view) this.look(view);
+    else if (key === 'f') surface.fit();
+    else if (key === 't') this.toggleFlat();
+    else if (key === 'w') this.toggleWires();
+    else if (key === 'c') this.toggleCut();
+    else if (key === 'x') this.options.onSlices?.();
+    else if (key === 'm') this.toggleMeasure();
+    else if (key === 'd') this.distance?.set(!this.distance.isOn);
+    else if (key === 'h') this.pickedLabel.hide();
+    else if (key === 'o') this.pickedLabel.isolate();
+    else if (key === 'e') this.options.labels.showAll();
+    else if (key === 'escape') {
+      surface.rulers.takeBack();
+      surface.draw();
+    } else if (key === 'delete') {
+      surface.rulers.clear();
+      surface.draw();
+    }
+  }
+}

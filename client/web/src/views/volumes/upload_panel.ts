@@ -1,0 +1,272 @@
+// The panel that takes dropped volumes: one file, a folder of slices, or several files.
+import { client } from '../../client';
+import { ApiError, asApiError, mayPass } from '../../api/problem';
+import type { RawDescription, UploadedVolume } from '../../api/types';
+import { button, h, icon } from '../../ui/dom';
+import { refusal, tell, tellError } from '../../ui/notices';
+import { hashOf } from '../../ui/route';
+import { Signal } from '../../ui/signal';
+import { filesOfDrop, filesOfList, gather, type Gathered } from '../../volume/gather';
+import { volumeName } from '../../volume/names';
+import { faultOf } from '../../volume/sniff';
+import type { NamedFile } from '../../volume/tar';
+import { outcomeList, outcomeOf, type Outcome } from './outcomes';
+import { rawForm } from './raw_form';
+import { acceptButton, choiceForms, type Choices } from './remedies';
+import { UploadProgress } from './upload_progress';
+
+const arrow = 'M8 11V2.5M4.5 6 8 2.5 11.5 6M2.5 10.5v3h11v-3';
+
+// The options that a user added to a rejected upload.
+interface Addition {
+  raw?: RawDescription;
+  choices?: Choices;
+  // The results of the upload's volumes; `choices` names the one to retry.
+  outcomes?: readonly Outcome[];
+}
+
+// Called with the only volume of an upload, or with none after an upload of several, which stay listed here.
+type OnVolumes = (only: UploadedVolume | null) => void;
+
+const idle = '';
+
+// The whole page has one. An upload goes on while other views are shown; `state` says in a word what it does.
+export class UploadPanel {
+  readonly element: HTMLElement;
+  readonly state = new Signal<string>(idle);
+  // Null while the view that shows this panel is not there.
+  onVolumes: OnVolumes | null = null;
+  private readonly body = h('div', { class: 'drop-body' });
+  private readonly queue = h('p', { class: 'upload-queue', role: 'status', hidden: true });
+  private readonly fileInput = h('input', { type: 'file', multiple: true, hidden: true, 'data-pick': 'files' });
+  private readonly folderInput = h('input', { type: 'file', webkitdirectory: true, hidden: true, 'data-pick': 'folder' });
+  private running: AbortController | null = null;
+  private waiting: Gathered[] = [];
+
+  constructor() {
+    this.element = h(
+      'section',
+      { class: 'drop', 'aria-label': 'Upload a volume' },
+      this.body,
+      this.queue,
+      this.fileInput,
+      this.folderInput,
+    );
+    this.takeChosenFiles();
+    this.showIdle();
+  }
+
+  get isBusy(): boolean {
+    return this.running !== null;
+  }
+
+  // Uploads them; after the upload that is under way.
+  take(files: NamedFile[]): void {
+    const gathered = gather(files);
+    if (!gathered) {
+      if (!this.running) this.showUnusable(new ApiError(-1, 'Nothing to upload', 'There are no files.'));
+    } else if (this.running) {
+      this.waiting.push(gathered);
+      this.showQueue();
+    } else {
+      void this.begin(gathered);
+    }
+  }
+
+  takeDrop(transfer: DataTransfer): void {
+    filesOfDrop(transfer).then(
+      (files) => this.take(files),
+      (error: unknown) => this.showUnusable(asApiError(error)),
+    );
+  }
+
+  private takeChosenFiles(): void {
+    for (const input of [this.fileInput, this.folderInput]) {
+      input.addEventListener('change', () => {
+        if (input.files && input.files.length > 0) this.take(filesOfList(input.files));
+        input.value = '';
+      });
+    }
+  }
+
+  private showQueue(): void {
+    const count = this.waiting.length;
+    this.queue.hidden = count === 0;
+    this.queue.textContent = `Next: ${this.waiting.map(({ name }) => name).join(', ')}`;
+  }
+
+  // Asks before it sends a file that is certainly not a volume.
+  private async begin(gathered: Gathered): Promise<void> {
+    this.running = new AbortController();
+    // If the browser cannot read a file, the upload fails with the reason.
+    const fault = await faultOf(gathered.files).catch(() => null);
+    if (!fault) {
+      await this.send(gathered);
+      return;
+    }
+    this.running = null;
+    const anyway = button('Upload it anyway', () => void this.send(gathered));
+    this.showProblem(fault, gathered, anyway);
+  }
+
+  private async send(gathered: Gathered, addition: Addition = {}): Promise<void> {
+    const controller = new AbortController();
+    this.running = controller;
+    const { kept } = gathered;
+    const progress = new UploadProgress(kept === undefined ? gathered.body.size : 0);
+    this.showRunning(gathered, progress, controller);
+    this.state.value = 'Uploading';
+    try {
+      const uploaded = await client.upload(gathered.body, {
+        ...addition,
+        name: gathered.name,
+        kept,
+        signal: controller.signal,
+        onProgress: (sent) => {
+          progress.show(sent);
+          if (kept === undefined) this.state.value = `Uploading ${Math.floor((100 * sent) / gathered.body.size)} %`;
+        },
+      });
+      gathered.kept = uploaded.kept ?? kept;
+      this.running = null;
+      this.state.value = idle;
+      this.showUploaded(uploaded.volumes, gathered, addition);
+    } catch (error) {
+      this.running = null;
+      const failure = asApiError(error);
+      if (kept !== undefined && failure.status === 410) {
+        // It was chosen too late.
+        gathered.kept = undefined;
+        await this.send(gathered, addition);
+        return;
+      }
+      gathered.kept = failure.remedy.kept ?? kept;
+      this.state.value = idle;
+      this.showFailed(error, gathered, addition);
+    }
+  }
+
+  // Starts the next upload, unless this one needs the user's attention.
+  private goOn(): void {
+    const [next] = this.waiting.splice(0, 1);
+    this.showQueue();
+    if (next) void this.begin(next);
+  }
+
+  private showUploaded(uploaded: UploadedVolume[], gathered: Gathered, { outcomes, choices = {} }: Addition): void {
+    const [first] = uploaded;
+    if (outcomes && first) {
+      this.showOutcomes(withOutcome(outcomes, choices, { ...first, member: choices['member'] ?? '' }), gathered);
+    } else if (uploaded.length > 1 || !first?.volume) {
+      this.showOutcomes(uploaded.map((each) => outcomeOf(each, choices)), gathered);
+    } else {
+      this.showIdle();
+      this.tellOf(first);
+      this.goOn();
+    }
+  }
+
+  // To the view that shows this panel; elsewhere a note says that it is there.
+  private tellOf(only: UploadedVolume | null): void {
+    if (this.onVolumes && this.waiting.length === 0) {
+      this.onVolumes(only);
+      return;
+    }
+    this.onVolumes?.(null);
+    if (only?.volume) {
+      const link = h('a', { href: hashOf(['volumes', only.volume.id]) }, volumeName(only.volume));
+      tell(h('span', {}, link, ' was uploaded.'));
+    }
+  }
+
+  private showFailed(error: unknown, gathered: Gathered, addition: Addition): void {
+    const { outcomes, choices = {} } = addition;
+    const isCancelled = error instanceof DOMException && error.name === 'AbortError';
+    if (outcomes) {
+      const shown = isCancelled
+        ? outcomes
+        : outcomes.map((each) => (each.member === choices['member'] ? { ...each, choices, error: asApiError(error) } : each));
+      this.showOutcomes(shown, gathered);
+    } else if (isCancelled) {
+      this.showIdle();
+      this.goOn();
+    } else {
+      this.showRefused(asApiError(error), gathered, addition);
+    }
+  }
+
+  private showIdle(): void {
+    this.element.classList.remove('busy');
+    this.state.value = idle;
+    this.body.replaceChildren(
+      icon(arrow),
+      h('h2', {}, 'Drop a volume here'),
+      h('p', {}, 'NIfTI, NRRD, MetaImage, VTK (.vti), a DICOM file or folder, raw samples, or a ZIP or TAR archive of these'),
+      h(
+        'div',
+        { class: 'actions' },
+        button('Choose files', () => this.fileInput.click(), { class: 'primary' }),
+        button('Choose a folder', () => this.folderInput.click()),
+      ),
+    );
+  }
+
+  private showRunning({ name, count }: Gathered, progress: UploadProgress, controller: AbortController): void {
+    this.element.classList.add('busy');
+    this.body.replaceChildren(
+      h('h2', {}, count > 1 ? `${name} (${count} files)` : name),
+      progress.bar,
+      progress.text,
+      h('div', { class: 'actions' }, button('Cancel', () => controller.abort())),
+    );
+  }
+
+  // A rejected upload with the ways out: another attempt, a choice, a description.
+  private showRefused(error: ApiError, gathered: Gathered, before: Addition): void {
+    const again = mayPass(error) && button('Try again', () => void this.send(gathered, before));
+    const known = before.choices ?? {};
+    const sendWith = (choices: Choices): void => void this.send(gathered, { ...before, choices });
+    this.showProblem(error, gathered, again, acceptButton(error, known, sendWith));
+    this.body.append(...choiceForms(error, known, sendWith));
+  }
+
+  private showProblem(error: ApiError, gathered: Gathered, ...actions: (HTMLElement | false)[]): void {
+    this.element.classList.remove('busy');
+    this.state.value = 'Upload: your choice is needed';
+    if (!this.onVolumes) tellError(error);
+    this.body.replaceChildren(refusal(error, ...actions, this.otherButton()));
+    if (error.status === 415 && gathered.count === 1) {
+      this.body.append(rawForm(gathered.body.size, (raw) => void this.send(gathered, { raw })));
+    }
+  }
+
+  // The results of several volumes stay until the next upload, since each rejected one can be retried.
+  private showOutcomes(outcomes: readonly Outcome[], gathered: Gathered): void {
+    this.element.classList.remove('busy');
+    const stored = outcomes.filter(({ volume }) => volume !== null).length;
+    this.body.replaceChildren(
+      h('h2', { role: 'status' }, `${stored} of ${outcomes.length} volumes in the upload were stored`),
+      outcomeList(outcomes, (_, choices) => void this.send(gathered, { choices, outcomes })),
+      h('div', { class: 'actions' }, button('Upload another', () => this.showIdle())),
+    );
+    this.tellOf(null);
+    if (outcomes.every(({ volume }) => volume !== null)) this.goOn();
+  }
+
+  private showUnusable(error: ApiError): void {
+    this.body.replaceChildren(refusal(error, this.otherButton()));
+  }
+
+  private otherButton(): HTMLButtonElement {
+    return button('Choose another file', () => {
+      this.showIdle();
+      this.goOn();
+    });
+  }
+}
+
+function withOutcome(outcomes: readonly Outcome[], choices: Choices, uploaded: UploadedVolume): Outcome[] {
+  return outcomes.map((each) => (each.member === uploaded.member ? outcomeOf(uploaded, choices) : each));
+}
+
+export const uploads = new UploadPanel();

@@ -1,0 +1,29 @@
+// How far an upload is.
+import { h } from '../../ui/dom';
+import { formatBytes } from '../../ui/format';
+
+export class UploadProgress {
+  readonly bar: HTMLProgressElement;
+  readonly text = h('p', { class: 'upload-status', role: 'status' });
+  private readonly began = performance.now();
+
+  // Without bytes: the server has them already.
+  constructor(private readonly total: number) {
+    this.bar = h('progress', { max: Math.max(1, total), value: 0, 'aria-label': 'Upload' });
+    if (total > 0) return;
+    this.bar.removeAttribute('value');
+    this.text.textContent = 'The server is reading the files that it already has';
+  }
+
+  show(sent: number): void {
+    if (this.total === 0) return;
+    this.bar.value = sent;
+    if (sent >= this.total) {
+      this.bar.removeAttribute('value');
+      this.text.textContent = `${formatBytes(this.total)} sent; the server is reading the volume`;
+      return;
+    }
+    const rate = sent / Math.max(0.001, (performance.now() - this.began) / 1000);
+    this.text.textContent = `${formatBytes(sent)} of ${formatBytes(this.total)}, ${formatBytes(rate)}/s`;
+  }
+}

@@ -1,0 +1,313 @@
+// The first view: upload, the volumes that are there, the last surfaces.
+import { client } from '../../client';
+import type { Job, UploadedVolume, Volume } from '../../api/types';
+import { inWords, surfaceInWords } from '../../job/parameters';
+import { button, h } from '../../ui/dom';
+import { formatBytes, formatCount, formatSpacing, formatTime } from '../../ui/format';
+import { ask, askText, tell, tellError } from '../../ui/notices';
+import { go, hashOf } from '../../ui/route';
+import type { Scope } from '../../ui/signal';
+import { axisIndex, slicePlacement, slicePlane } from '../../volume/geometry';
+import { KnownVolumes } from '../../volume/known';
+import { noteTexts, volumeKind, volumeName } from '../../volume/names';
+import { uploads } from './upload_panel';
+import { VolumeSearch } from './volume_search';
+
+const shownJobs = 8;
+const thumbnailPixels = 112;
+const refreshEvery = 5000;
+// Several changes of jobs are one reason to look.
+const refreshDelay = 700;
+
+// The middle axial slice, turned as radiologists look.
+async function paintThumbnail(canvas: HTMLCanvasElement, volume: Volume, signal: AbortSignal): Promise<void> {
+  const plane = slicePlane(volume, 'axial');
+  const { normal } = plane;
+  const index = Math.floor(volume.dims[axisIndex(normal)] / 2);
+  const bitmap = await createImageBitmap(
+    await client.slicePicture(volume.id, normal, index, volume.range, signal),
+  );
+  const context = canvas.getContext('2d');
+  if (!context) return;
+  const room = { width: thumbnailPixels, height: thumbnailPixels, edge: 0 };
+  context.setTransform(...slicePlacement(volume, plane, room));
+  context.drawImage(bitmap, 0, 0);
+  bitmap.close();
+  canvas.dataset.painted = '';
+}
+
+function thumbnail(volume: Volume, scope: Scope): HTMLElement {
+  const canvas = h('canvas', {
+    width: thumbnailPixels,
+    height: thumbnailPixels,
+    class: 'thumbnail',
+    'aria-hidden': 'true',
+  });
+  // Only what comes into sight is fetched.
+  const seen = new IntersectionObserver((entries) => {
+    if (!entries.some((entry) => entry.isIntersecting)) return;
+    seen.disconnect();
+    // A card without its picture still says everything.
+    paintThumbnail(canvas, volume, scope.signal).catch(() => canvas.classList.add('blank'));
+  });
+  seen.observe(canvas);
+  scope.onEnd(() => seen.disconnect());
+  return canvas;
+}
+
+function volumeCard(volume: Volume, scope: Scope, onErased: () => void, onChanged: () => void): HTMLElement {
+  const erase = async (): Promise<void> => {
+    const sure = await ask(
+      'Erase this volume?',
+      `${volumeName(volume)} and its samples will be removed from the server. The surfaces made from it stay.`,
+      'Erase',
+    );
+    if (!sure) return;
+    try {
+      await client.eraseVolume(volume.id);
+      tell('The volume was erased.');
+      onErased();
+    } catch (error) {
+      tellError(error);
+    }
+  };
+  const rename = async (): Promise<void> => {
+    const given = await askText('Name of this volume', volume.name ?? '', 'Rename');
+    if (given === null) return;
+    try {
+      await client.renameVolume(volume.id, given === '' ? null : given);
+      onChanged();
+    } catch (error) {
+      tellError(error);
+    }
+  };
+  const name = volumeName(volume);
+  const kind = volumeKind(volume);
+  return h(
+    'li',
+    { class: 'card', 'data-volume': volume.id },
+    h(
+      'a',
+      { href: hashOf(['volumes', volume.id]), class: 'card-link' },
+      thumbnail(volume, scope),
+      h(
+        'span',
+        { class: 'card-text' },
+        h('strong', { title: name }, name),
+        h('span', {}, name === kind ? volume.type : kind),
+        h('span', {}, formatSpacing(volume.spacing)),
+        h('span', { class: 'faint' }, `${formatTime(volume.created)}, ${formatBytes(volume.bytes)}`),
+      ),
+    ),
+    h(
+      'div',
+      { class: 'card-actions' },
+      button('Rename', () => void rename(), { class: 'quiet', 'aria-label': `Rename ${volumeName(volume)}` }),
+      button('Erase', () => void erase(), { class: 'quiet', 'aria-label': `Erase ${volumeName(volume)}` }),
+    ),
+  );
+}
+
+export function jobLine(job: Job): string {
+  return `${surfaceInWords(job.parameters)}, ${inWords(job.parameters)}`;
+}
+
+function surfaceRow(job: Job, volume: string): HTMLElement {
+  const result = job.mesh
+    ? `${formatCount(job.mesh.triangles)} triangles`
+    : job.state === 'running'
+      ? `${Math.round(100 * job.progress)} %`
+      : job.state;
+  return h(
+    'li',
+    {},
+    h(
+      'a',
+      { href: hashOf(['jobs', job.id]) },
+      h('span', { class: `state ${job.state}`, title: job.state }),
+      h('span', { class: 'grow' }, h('b', {}, volume), ` ${jobLine(job)}`),
+      h('span', { class: 'number' }, result),
+      h('span', { class: 'faint' }, formatTime(job.created)),
+    ),
+  );
+}
+
+export async function volumesView(scope: Scope): Promise<HTMLElement> {
+  const home = new Home(scope);
+  await home.refresh();
+  home.keepFresh();
+  return home.element;
+}
+
+class Home {
+  readonly element: HTMLElement;
+  private readonly known = new KnownVolumes();
+  // The contents of each card, and its element.
+  private readonly cards = new Map<string, { text: string; card: HTMLElement }>();
+  private readonly list = h('ul', { class: 'cards' });
+  private readonly count = h('span', { class: 'count' });
+  private readonly surfaces = h('ul', { class: 'rows' });
+  private readonly more = button('Older volumes', () => void this.showMore().catch(tellError), { hidden: true });
+  private readonly finding = new VolumeSearch(() => void this.search().catch(tellError));
+  private newest: readonly Volume[] = [];
+  private older: Volume[] = [];
+  // The cursor of the page after the older volumes.
+  private next: string | null = null;
+  private soon = 0;
+  private isSearching = false;
+
+  // For a first-time user.
+  private readonly intro = h('p', { class: 'intro', hidden: true }, 'isomesh turns a CT, MRI or label volume into a 3D surface mesh.');
+  private readonly noVolumes = h(
+    'li',
+    { class: 'empty' },
+    h('p', {}, 'No volumes yet. Drop a file above, or'),
+    button('try a sample', () => void import('../../volume/sample').then(({ sampleHead }) => uploads.take([sampleHead()]), tellError), {
+      class: 'link',
+      title: 'Makes and uploads a simple head of 112 \u00d7 112 \u00d7 112 samples',
+    }),
+  );
+
+  constructor(private readonly scope: Scope) {
+    this.element = h(
+      'div',
+      { class: 'home' },
+      h('h1', { class: 'sr-only' }, 'Volumes and surfaces'),
+      this.intro,
+      uploads.element,
+      h(
+        'section',
+        { 'aria-labelledby': 'volumes-title' },
+        h('div', { class: 'section-head' }, h('h2', { id: 'volumes-title' }, 'Volumes ', this.count), this.finding.element),
+        this.list,
+        h('div', { class: 'actions' }, this.more),
+      ),
+      h(
+        'section',
+        { 'aria-labelledby': 'surfaces-title' },
+        h(
+          'div',
+          { class: 'section-head' },
+          h('h2', { id: 'surfaces-title' }, 'Recent surfaces'),
+          h('a', { href: hashOf(['jobs']) }, 'All jobs'),
+        ),
+        this.surfaces,
+      ),
+    );
+    uploads.onVolumes = (only) => this.uploaded(only);
+    scope.onEnd(() => (uploads.onVolumes = null));
+  }
+
+  // Shows what other users do: jobs at once, volumes some seconds later.
+  keepFresh(): void {
+    const refresh = (): void => {
+      // A lost connection is said at the top of the page.
+      if (!document.hidden && !this.scope.isOver) this.refresh().catch(() => undefined);
+    };
+    const timer = setInterval(refresh, refreshEvery);
+    this.scope.onEnd(() => clearInterval(timer));
+    this.scope.onEnd(() => clearTimeout(this.soon));
+    const refreshSoon = (): void => {
+      if (this.soon !== 0) return;
+      this.soon = window.setTimeout(() => {
+        this.soon = 0;
+        refresh();
+      }, refreshDelay);
+    };
+    client.events.listen({ onBegin: refreshSoon, onChange: refreshSoon, onPause: () => undefined }, this.scope.signal);
+    this.scope.listen(document, 'visibilitychange', refresh);
+  }
+
+  async refresh(): Promise<void> {
+    const [page, { jobs }] = await Promise.all([client.listVolumes('', this.scope.signal), client.listJobs()]);
+    const newest = new Set(page.volumes.map(({ id }) => id));
+    this.older = this.older.filter(({ id }) => !newest.has(id));
+    if (this.older.length === 0) this.next = page.next;
+    this.known.learn(page.volumes);
+    const shown = jobs.slice(0, shownJobs);
+    await this.known.find(shown.map(({ volume }) => volume));
+    this.newest = page.volumes;
+    this.intro.hidden = page.volumes.length > 0 || shown.length > 0;
+    this.showVolumes([...page.volumes, ...this.older]);
+    this.surfaces.replaceChildren(...shown.map((job) => surfaceRow(job, this.known.nameOf(job.volume))));
+    if (shown.length === 0) this.surfaces.append(h('li', { class: 'empty' }, 'No surfaces yet.'));
+  }
+
+  private async showMore(): Promise<void> {
+    if (this.more.disabled) return;
+    this.more.disabled = true;
+    try {
+      await this.loadMore();
+    } finally {
+      this.more.disabled = false;
+    }
+  }
+
+  private async loadMore(): Promise<void> {
+    if (this.next === null) return;
+    const page = await client.listVolumes(this.next, this.scope.signal);
+    const known = new Set(this.older.map(({ id }) => id));
+    this.older = [...this.older, ...page.volumes.filter(({ id }) => !known.has(id))];
+    this.next = page.next;
+    await this.refresh();
+  }
+
+  // Among all volumes, also those that were not asked for yet.
+  private async search(): Promise<void> {
+    this.showVolumes([...this.newest, ...this.older]);
+    // One that is under way goes on for what is typed now.
+    if (this.isSearching) return;
+    this.isSearching = true;
+    try {
+      while (this.finding.isOn && this.next !== null && !this.scope.isOver) await this.loadMore();
+    } finally {
+      this.isSearching = false;
+    }
+  }
+
+  // Cards that stay as they are keep their elements, and with those their pictures and the focus.
+  private showVolumes(volumes: readonly Volume[]): void {
+    this.finding.element.hidden = volumes.length < 2;
+    const shown = this.finding.found(volumes);
+    const cards = shown.map((volume) => {
+      const text = JSON.stringify(volume);
+      const known = this.cards.get(volume.id);
+      if (known?.text === text) return known.card;
+      const card = volumeCard(volume, this.scope, () => this.erased(volume.id), () => void this.renewed().catch(tellError));
+      this.cards.set(volume.id, { text, card });
+      return card;
+    });
+    this.more.hidden = this.next === null;
+    const all = `${formatCount(volumes.length)}${this.next === null ? '' : '+'}`;
+    this.count.textContent = volumes.length === 0 ? '' : this.finding.isOn ? `${formatCount(shown.length)} of ${all}` : all;
+    if (volumes.length === 0) cards.push(this.noVolumes);
+    else if (cards.length === 0) cards.push(h('li', { class: 'empty' }, 'No volume matches the search.'));
+    const isSame = cards.length === this.list.children.length && cards.every((card, at) => card === this.list.children[at]);
+    if (isSame) return;
+    const focused = document.activeElement;
+    this.list.replaceChildren(...cards);
+    if (focused instanceof HTMLElement && this.list.contains(focused)) focused.focus({ preventScroll: true });
+  }
+
+  // Older ones are asked for again, or they would stay as they were.
+  private async renewed(): Promise<void> {
+    this.older = [];
+    await this.refresh();
+    await this.search();
+  }
+
+  private erased(volume: string): void {
+    this.older = this.older.filter(({ id }) => id !== volume);
+    this.refresh().catch(tellError);
+  }
+
+  private uploaded(only: UploadedVolume | null): void {
+    if (!only?.volume) {
+      this.refresh().catch(tellError);
+      return;
+    }
+    // Its page shows the notes of the file that came first.
+    if (only.status === 200) tell(['This volume is already stored.', ...noteTexts(only.volume)].join(' '));
+    go(['volumes', only.volume.id]);
+  }
+}

@@ -1,0 +1,63 @@
+// The document is never taller or wider than the window: views scroll inside, and the header stays.
+import type { Page } from 'playwright-core';
+import { beforeAll, describe, expect, it } from 'vitest';
+import { ballNrrd, labelsNrrd, setup, surfaceLoaded } from './support';
+
+const at = setup();
+const sizes = {
+  'a phone': { width: 390, height: 844 },
+  'a desktop': { width: 1400, height: 900 },
+  // What is left of it when everything is twice as large.
+  'a desktop at 200 %': { width: 700, height: 450 },
+};
+const views = new Map<string, string>();
+
+beforeAll(async () => {
+  const { daemon } = at;
+  const volume = await daemon.upload(ballNrrd(48, 18));
+  const segmented = await daemon.upload(labelsNrrd(24));
+  const { id } = await daemon.submit({ volume, iso: 100, certify: true, formats: ['glb'] }, 60);
+  const other = await daemon.submit({ volume, iso: 110, formats: ['glb'] }, 60);
+  const labels = await daemon.submit({ volume: segmented, labels: 'all', formats: ['glb'] }, 60);
+  views.set('volumes', '');
+  views.set('a volume', `volumes/${volume}`);
+  views.set('a volume of labels', `volumes/${segmented}`);
+  views.set('jobs', 'jobs');
+  views.set('a surface', `jobs/${id}`);
+  views.set('a surface with slices', `jobs/${id}?slices=on`);
+  views.set('labels', `jobs/${labels.id}`);
+  views.set('a comparison', `compare?jobs=${id},${other.id}`);
+  views.set('one scene', `together?jobs=${id},${other.id}`);
+  views.set('an error', 'jobs/gone');
+});
+
+async function open(page: Page, path: string): Promise<void> {
+  await page.goto(`${at.daemon.url}/#/${path}`);
+  await page.locator('main h1').first().waitFor();
+  await expect.poll(() => page.locator('main').getAttribute('aria-busy')).toBeNull();
+  const panes = await page.locator('.pane').count();
+  if (panes > 0) await surfaceLoaded(page, panes);
+  await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+}
+
+// How far the document can be scrolled, at each end of everything in it that scrolls.
+function excess(page: Page): Promise<{ down: number; right: number; header: number }> {
+  return page.evaluate(() => {
+    for (const element of document.querySelectorAll('main, main *')) element.scrollTop = element.scrollHeight;
+    for (const element of document.querySelectorAll('main > :last-child, .panel > :last-child')) element.scrollIntoView();
+    const root = document.scrollingElement ?? document.documentElement;
+    const header = document.querySelector('.top')?.getBoundingClientRect().top ?? -1;
+    return { down: root.scrollHeight - window.innerHeight, right: root.scrollWidth - window.innerWidth, header };
+  });
+}
+
+describe.each(Object.entries(sizes))('on %s', (_, size) => {
+  it('no view is taller or wider than the window', async () => {
+    const { page } = at;
+    await page.setViewportSize(size);
+    for (const [name, path] of views) {
+      await open(page, path);
+      expect(await excess(page), name).toEqual({ down: 0, right: 0, header: 0 });
+    }
+  });
+});
