@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -93,8 +94,9 @@ enum class EventKind {
   kDone,      // in a final state
 };
 
-// What happened to a job. Queued, claimed and done are kept; what a run tells on its way is known
-// to the process that runs it only, and a reader that comes late may miss some of it.
+// What happened to a job. Queued, claimed and done are kept; what a run tells on its way is not,
+// and a reader that comes late, or asks another process than the one that runs it, may miss some of
+// it.
 struct Event {
   // Grows, also over restarts, and is the same for all processes that share the records; whoever
   // goes on after one that it has seen misses none that is kept. It is no time.
@@ -129,6 +131,12 @@ struct JobStoreOptions {
   int attempts = 3;                             // how often a job is begun that fails
   std::chrono::milliseconds retry_delay{1000};  // after the first attempt; four times it after each
   std::string mesher_version = {};              // results of another one are not reused
+  // Of engines that several processes share: for how long after an outage leases of others that ran
+  // out meanwhile are left to whoever holds them. All see the outage, and a holder tries all the
+  // time, so each has renewed by then if it is still there.
+  std::chrono::milliseconds grace{10'000};
+  // By which leases are renewed and outages are measured.
+  std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
 };
 
 // Thread safe. Every verb is one transaction; nothing is held open between them. All may throw
@@ -138,9 +146,10 @@ struct JobStoreOptions {
 // Several processes may share the records, where the engine can that. What is said of one job is
 // then true over all of them: one of those alike runs, one key is one job, one end is told once. A
 // lease is held by one life of one process, and is over when the engine's clock says so, whatever
-// the process's own says. What a process remembers besides is never what decides. Every verb may be
-// interrupted between the engine and the process, and is then asked again by the store itself: a
-// second submit or finish of the same thing is the first one.
+// the process's own says. One that is over is anybody's to reap; its holder may still renew it, or
+// finish, if nobody has reaped it yet and the engine can tell. What a process remembers besides is
+// never what decides. Every verb may be interrupted between the engine and the process, and is then
+// asked again by the store itself: a second submit or finish of the same thing is the first one.
 class JobStore {
  public:
   virtual ~JobStore() = default;

@@ -30,6 +30,7 @@ using std::chrono::seconds;
 using testing::HasSubstr;
 
 constexpr std::size_t kNodes = 3;
+constexpr seconds kLease{2};
 
 class Cluster : public testing::Test {
  protected:
@@ -43,8 +44,9 @@ class Cluster : public testing::Test {
   // Each has a data folder of its own.
   void start(std::size_t node, std::vector<std::string> arguments = {}) {
     const std::filesystem::path data = folder_ / ("node" + std::to_string(node));
-    arguments.insert(arguments.begin(), {"--store", store_, "--blobs",
-                                         (folder_ / "shared").string(), "--lease-seconds", "2"});
+    arguments.insert(arguments.begin(),
+                     {"--store", store_, "--blobs", (folder_ / "shared").string(),
+                      "--lease-seconds", std::to_string(kLease.count())});
     nodes_[node] = std::make_unique<Daemon>(data, "127.0.0.1:0", arguments);
   }
   void start_all() {
@@ -238,6 +240,36 @@ TEST_F(Cluster, WhatIsAskedOfOneNodeIsTrueOfAll) {
   EXPECT_EQ(node(0).get("/livez").status, 200);
   postgres_->start();
   EXPECT_TRUE(eventually([&] { return node(0).get("/readyz").status == 200; }));
+}
+
+TEST_F(Cluster, ProgressIsToldByEveryNode) {
+  start(0, {"--workers", "0"});
+  start(1, {"--workers", "1"});
+  const Job running = endless_job(0);
+  int told = 0;
+  const Job ended = node(0).client().follow(running.id, [&](const JobEvent& event) {
+    if (event.stage != Stage::kSmooth || event.progress == 0) return;
+    if (++told == 3) node(0).client().cancel(running.id);
+  });
+  EXPECT_EQ(ended.state, JobState::kCancelled);
+  EXPECT_GE(told, 3);
+}
+
+TEST_F(Cluster, ARunOutlivesAnOutageThatIsLongerThanItsLease) {
+  start(0, {"--workers", "1"});
+  start(1, {"--workers", "1"});
+  const Job running = endless_job(0);
+  ask("CHECKPOINT");  // or the claim may be lost with the server
+  const std::string fence = ask("SELECT fence FROM runs");
+  postgres_->stop_at_once();
+  std::this_thread::sleep_for(2 * kLease);
+  postgres_->start();
+  ASSERT_TRUE(eventually(
+      [&] { return ask("SELECT count(*) FROM runs WHERE lease_until > isomesh_now()") == "1"; }));
+  EXPECT_EQ(ask("SELECT fence FROM runs"), fence);
+  EXPECT_EQ(ask("SELECT count(*) FROM events WHERE state = 1"), "1") << "it was begun once";
+  node(1).client().cancel(running.id);
+  EXPECT_TRUE(comes_to(0, running.id, JobState::kCancelled));
 }
 
 // A server that takes connections and answers nothing, whatever the URL says of time.

@@ -74,13 +74,55 @@ void EventFeed::fetch() {
     if (rows.is_null(0)) continue;
     // A run's own news comes before its end.
     number_told(rows.integer(0));
-    remember({event_of(rows, database_.node()), true});
+    const Event event = event_of(rows, database_.node());
+    if (event.is_elsewhere && event.state == JobState::kRunning) has_runs_elsewhere_ = true;
+    remember({event, true});
     is_new = true;
   }
   number_told(end_);
   if (!is_new && !has_told) return;
   ++generation_;
   changed_.notify_all();
+}
+
+// A run's row goes in the transaction that writes its end, so one that is there has not ended for
+// whoever has read all events of before.
+void EventFeed::look_at_runs() {
+  const Lock fetching(fetching_);
+  Rows rows = database_.query(
+      "SELECT r.job, r.fence, r.owner, r.stage, r.progress, (SELECT coalesce(max(e.tx), 0) FROM "
+      "events e WHERE e.job = r.job) FROM runs r WHERE r.node <> ?1::uuid",
+      database_.node());
+  std::map<std::string, Seen> now;
+  while (rows.next()) {
+    const std::string job = rows.text(0);
+    Seen run = {.fence = rows.integer(1)};  // as its claim told it
+    if (const auto before = seen_.find(job);
+        before != seen_.end() && before->second.fence == run.fence) {
+      run = before->second;
+    }
+    if (!rows.is_null(3)) {
+      const auto stage = static_cast<Stage>(rows.integer(3));
+      const double share = rows.real(4);
+      const bool is_other_stage = stage != run.stage;
+      if (is_other_stage || share != run.share) {
+        tell({.id = 0,
+              .owner = rows.text(2),
+              .job = job,
+              .kind = is_other_stage ? EventKind::kStage : EventKind::kProgress,
+              .state = JobState::kRunning,
+              .stage = stage,
+              .progress = share,
+              .is_elsewhere = true},
+             rows.integer(5));
+      }
+      run.stage = stage;
+      run.share = share;
+    }
+    now.emplace(job, run);
+  }
+  has_runs_elsewhere_ = !now.empty();
+  seen_ = std::move(now);
 }
 
 void EventFeed::tell(Event event, std::int64_t after) {

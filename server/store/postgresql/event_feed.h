@@ -1,8 +1,10 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -26,6 +28,13 @@ class EventFeed {
 
   // Reads what has come. Throws Error kUnavailable or kInternal.
   void fetch();
+
+  // Tells how far the runs of other nodes are by their last renewals, where that is news. What they
+  // tell meanwhile is not seen. Throws as fetch().
+  void look_at_runs();
+
+  // False until a run of another node was seen, and after a look that found none.
+  bool has_runs_elsewhere() const { return has_runs_elsewhere_; }
 
   // An event that is not kept; it is seen after those of the transaction `after`.
   void tell(Event event, std::int64_t after);
@@ -63,8 +72,17 @@ class EventFeed {
   // Those that come before what that transaction has written.
   void number_told(std::int64_t before) ISOMESH_REQUIRES(mutex_);
 
+  // A run of another node, as it was told last.
+  struct Seen {
+    std::int64_t fence = 0;
+    Stage stage = Stage::kLoad;
+    double share = 0;
+  };
+
   Database& database_;
   Mutex fetching_;
+  std::map<std::string, Seen> seen_ ISOMESH_GUARDED_BY(fetching_);  // by job
+  std::atomic<bool> has_runs_elsewhere_ = false;
   mutable Mutex mutex_;
   mutable Condition changed_;
   std::int64_t end_ ISOMESH_GUARDED_BY(mutex_) = 0;  // the first transaction that is not read

@@ -14,7 +14,7 @@ namespace isomesh::store::postgresql {
 
 // How a run is to end.
 struct PostgresJobStore::Ending {
-  bool ends_others = false;  // it is not this process's own, and its lease is over
+  bool ends_others = false;  // it is not this process's own; refused unless its lease is over
   JobState state = JobState::kQueued;
   std::string record = {};     // of those that do not run again
   std::string cancelled = {};  // the record, should it have been asked to stop
@@ -26,9 +26,13 @@ struct PostgresJobStore::Ending {
 
 namespace {
 
-// How often a run tells the database how far it is, and learns that it is to stop if it missed
-// what was told.
+// How often a run tells the database how far it is, and otherwise renews its lease and learns that
+// it is to stop if it missed what was told.
+constexpr std::chrono::milliseconds kBetweenReports{500};
 constexpr std::chrono::milliseconds kBetweenRenewals{1000};
+
+// Expired leases are looked for every second. Whoever could not for longer has seen an outage.
+constexpr std::chrono::milliseconds kLongestGap{2500};
 
 // How the functions of the database are told.
 using Json = nlohmann::json;
@@ -128,7 +132,7 @@ std::optional<Lease> PostgresJobStore::claim(const std::string& worker,
                                              std::chrono::milliseconds lease) {
   Steady asked;
   std::optional<Rows> claimed = database_.ask([&](Connection& connection, bool is_again) {
-    asked = Steady::clock::now();
+    asked = options_.now();
     std::optional<Rows> rows;
     if (is_again) {
       // What it got when it was interrupted: a worker has one run at a time.
@@ -171,15 +175,16 @@ std::optional<Lease> PostgresJobStore::claim(const std::string& worker,
 
 Standing PostgresJobStore::renew(const Lease& lease, const Progress& progress,
                                  std::chrono::milliseconds length) {
-  const Steady asked = Steady::clock::now();
+  const Steady asked = options_.now();
   bool is_fresh = false;
   {
     const Lock lock(live_mutex_);
     const Live* const run = live(lease.id, lease.fence);
     if (run == nullptr) return Standing::kLost;
-    const auto slack = std::min<std::chrono::milliseconds>(length / 3, kBetweenRenewals);
+    const auto slack = std::min<std::chrono::milliseconds>(
+        length / 3, run->recorded == progress.share ? kBetweenRenewals : kBetweenReports);
     const bool is_same_stage = run->progress && run->progress->stage == progress.stage;
-    is_fresh = is_same_stage && run->lease_until >= asked + length - slack;
+    is_fresh = is_same_stage && run->lease_until > asked + length - slack;
   }
   if (!is_fresh) {
     Rows row = database_.query("SELECT renew_run(?1, ?2, ?3, ?4::int, ?5, ?6)", lease.id,
@@ -194,6 +199,7 @@ Standing PostgresJobStore::renew(const Lease& lease, const Progress& progress,
     Live* const run = live(lease.id, lease.fence);
     if (run == nullptr) return Standing::kLost;
     run->lease_until = asked + length;
+    run->recorded = progress.share;
     run->cancelling = run->cancelling || row.boolean(0);
   }
   note(lease, progress);
@@ -249,11 +255,13 @@ bool PostgresJobStore::put_back(const Lease& lease, std::chrono::milliseconds de
 }
 
 std::size_t PostgresJobStore::reap() {
-  Rows rows = database_.query(
-      select_ +
-          "WHERE r.lease_until < isomesh_now() OR r.node IN (SELECT id FROM nodes WHERE name = "
-          "?1 AND id <> ?2::uuid)",
-      database_.node_name(), database_.node());
+  const bool is_settled = has_answered_for_long();
+  Rows rows = database_.query(select_ +
+                                  "WHERE (?3 <> 0 AND r.lease_until < isomesh_now()) OR r.node IN "
+                                  "(SELECT id FROM nodes WHERE "
+                                  "name = ?1 AND id <> ?2::uuid)",
+                              database_.node_name(), database_.node(), is_settled);
+  note_answer();
   std::size_t reaped = 0;
   while (rows.next()) {
     const Row row = row_of(rows);
@@ -263,6 +271,20 @@ std::size_t PostgresJobStore::reap() {
     if (end_run(row.job.id, row.fence, ending)) ++reaped;
   }
   return reaped;
+}
+
+bool PostgresJobStore::has_answered_for_long() const {
+  const Steady now = options_.now();
+  const Lock lock(answers_mutex_);
+  const bool is_gap = !answered_ || now - *answered_ > kLongestGap;
+  return options_.grace.count() == 0 || (!is_gap && now - answers_since_ >= options_.grace);
+}
+
+void PostgresJobStore::note_answer() {
+  const Steady now = options_.now();
+  const Lock lock(answers_mutex_);
+  if (!answered_ || now - *answered_ > kLongestGap) answers_since_ = now;
+  answered_ = now;
 }
 
 // Asks until the database has been told of all jobs that end with it.

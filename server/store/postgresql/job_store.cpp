@@ -20,9 +20,10 @@ PostgresJobStore::PostgresJobStore(Database& database, const BlobStore& blobs,
                   "LEFT JOIN runs r ON r.job = j.id "),
       database_(database),
       feed_(database),
-      messages_(database, [this](const News& news) { hear(news); }) {}
+      messages_(database, [this](const News& news) { return hear(news); }) {}
 
-void PostgresJobStore::hear(const News& news) {
+// Returns whether others run jobs, whose progress is to be looked at.
+bool PostgresJobStore::hear(const News& news) {
   {
     const Lock lock(live_mutex_);
     for (const std::string& job : news.cancelled) {
@@ -32,12 +33,13 @@ void PostgresJobStore::hear(const News& news) {
     }
   }
   if (news.has_work) wake_all_workers();
-  if (!news.has_events) return;
   try {
-    feed_.fetch();
+    if (news.has_events) feed_.fetch();
+    if (news.has_progress) feed_.look_at_runs();
   } catch (const Error& error) {
     log_debug("job events could not be read and are retried: {}", error.what());
   }
+  return feed_.has_runs_elsewhere();
 }
 
 void PostgresJobStore::wake_workers() {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,9 @@
 namespace isomesh::store::postgresql {
 
 // Jobs in a database that several processes share. A lease is a row that names the life of a
-// process (Database::node) and is over by the database's clock. What a run tells on its way reaches
-// the database about once a second.
+// process (Database::node) and is over by the database's clock; while the row is there it is still
+// its holder's. What a run tells on its way reaches the database at most twice a second, and from
+// there the other processes within a second.
 class PostgresJobStore : public SqlJobStore {
  public:
   // Both must outlive it.
@@ -59,10 +61,16 @@ class PostgresJobStore : public SqlJobStore {
   Job cancelled(Job job, std::int64_t accepted) const;
   bool end_run(const std::string& id, std::uint64_t fence, const Ending& ending);
   std::optional<Live> live_run(const Lease& lease) const;
-  void hear(const News& news);
+  bool hear(const News& news);
+  // Whether the database has answered for as long as holders of leases need to renew them.
+  bool has_answered_for_long() const;
+  void note_answer();
   void wake_workers();
 
   Database& database_;
+  mutable Mutex answers_mutex_;
+  std::optional<Steady> answered_ ISOMESH_GUARDED_BY(answers_mutex_);  // as reap() saw it last
+  Steady answers_since_ ISOMESH_GUARDED_BY(answers_mutex_);  // the end of the last outage, or start
   mutable EventFeed feed_;
   Messages messages_;  // last: its thread uses the others
 };

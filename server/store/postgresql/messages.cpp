@@ -18,6 +18,7 @@ namespace isomesh::store::postgresql {
 namespace {
 
 constexpr std::chrono::milliseconds kBetweenPolls{1000};
+constexpr std::chrono::milliseconds kBetweenLooks{300};
 constexpr std::chrono::milliseconds kBetweenTries{200};
 constexpr char kWork = 'w';
 constexpr char kEvents = 'e';
@@ -40,6 +41,14 @@ News read(const std::vector<std::string>& messages) {
     news.has_events |= message.find(kEvents) != std::string::npos;
   }
   return news;
+}
+
+// What is heard when something may have been missed.
+const News kAnything = {
+    .has_work = true, .has_events = true, .has_progress = true, .cancelled = {}};
+
+bool is_empty(const News& news) {
+  return !news.has_work && !news.has_events && !news.has_progress && news.cancelled.empty();
 }
 
 void add(News& news, const News& more) {
@@ -88,7 +97,7 @@ void Messages::run(const std::stop_token& stop) {
         log_warning("messages of other daemons cannot be received and are retried: {}",
                     error.what());
       is_told = true;
-      hear_({.has_work = true, .has_events = true, .cancelled = {}});
+      hear_(kAnything);
       std::uint64_t count = 0;
       wait_for(wake_, -1, kBetweenTries);
       if (::read(wake_, &count, sizeof count) > 0 && !stop.stop_requested()) {
@@ -101,11 +110,13 @@ void Messages::run(const std::stop_token& stop) {
 void Messages::listen(const std::stop_token& stop) {
   Connection connection(database_.url());
   connection.script("LISTEN isomesh; SET synchronous_commit = off");
-  hear_({.has_work = true, .has_events = true, .cancelled = {}});
-  auto next_poll = std::chrono::steady_clock::now() + kBetweenPolls;
+  using Clock = std::chrono::steady_clock;
+  bool looks = hear_(kAnything);
+  auto next_poll = Clock::now() + kBetweenPolls;
+  auto next_look = Clock::now() + kBetweenLooks;
   while (!stop.stop_requested()) {
-    const auto wait =
-        std::chrono::ceil<std::chrono::milliseconds>(next_poll - std::chrono::steady_clock::now());
+    const auto next = looks ? std::min(next_look, next_poll) : next_poll;
+    const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next - Clock::now());
     wait_for(connection.socket(), wake_, std::max(wait, std::chrono::milliseconds(0)));
     std::uint64_t count = 0;
     // What this process tells is heard by it, too.
@@ -113,11 +124,16 @@ void Messages::listen(const std::stop_token& stop) {
     connection.wait_until(Connection::Clock::now() + Connection::kPatience);
     if (::read(wake_, &count, sizeof count) > 0) news = send(connection);
     add(news, read(connection.take_messages()));
-    if (std::chrono::steady_clock::now() >= next_poll) {
+    const auto now = Clock::now();
+    if (now >= next_poll) {
       next_poll += kBetweenPolls;
       news.has_work = news.has_events = true;
     }
-    if (news.has_work || news.has_events || !news.cancelled.empty()) hear_(news);
+    if (looks && now >= next_look) {
+      next_look = now + kBetweenLooks;
+      news.has_progress = true;
+    }
+    if (!is_empty(news)) looks = hear_(news);
   }
 }
 

@@ -14,6 +14,7 @@ namespace isomesh::store::postgresql {
 struct News {
   bool has_work = false;
   bool has_events = false;
+  bool has_progress = false;        // runs of other nodes may be further; nobody tells that
   std::set<std::string> cancelled;  // jobs that were asked to stop
 };
 
@@ -23,9 +24,10 @@ struct News {
 // message, because a NOTIFY makes commits wait for each other. Thread safe.
 class Messages {
  public:
-  using Hear = std::function<void(const News&)>;
+  using Hear = std::function<bool(const News&)>;
 
-  // `hear` is called by the thread and must not throw.
+  // `hear` is called by the thread and must not throw. While it returns true it is also called
+  // every 300 ms because of progress.
   Messages(const Database& database, Hear hear);
   ~Messages();
   Messages(const Messages&) = delete;

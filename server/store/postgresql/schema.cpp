@@ -208,6 +208,9 @@ CREATE OR REPLACE FUNCTION isomesh_kept(us bigint) RETURNS bigint LANGUAGE sql V
 )sql",
                                 R"sql(
 ALTER TABLE audit ADD COLUMN IF NOT EXISTS chain text;  -- see AuditChain; none in entries of versions before
+)sql",
+                                R"sql(
+COMMENT ON TABLE runs IS 'leases: a row is its holder''s until somebody ends it, also after its time';
 )sql"};
 
 // As the newest version has them, each a verb in one round trip. Whoever changes one adds a
@@ -326,21 +329,22 @@ BEGIN
   END LOOP;
 END $$;
 
--- Null when the lease is lost, otherwise whether the run is to stop.
+-- Null when the lease is lost, otherwise whether the run is to stop. One that ran out while the database was away is
+-- renewed, too: nobody has taken the job while the row is there.
 CREATE OR REPLACE FUNCTION renew_run(p_job text, p_fence bigint, p_lease bigint, p_stage int, p_progress float8,
                                      p_timings text) RETURNS boolean LANGUAGE plpgsql AS $$
 DECLARE stops boolean; now_us bigint := isomesh_now();
 BEGIN
   PERFORM set_config('synchronous_commit', 'off', true);
   UPDATE runs SET lease_until = now_us + p_lease, stage = p_stage, progress = p_progress, timings = p_timings
-    WHERE job = p_job AND fence = p_fence AND lease_until >= now_us RETURNING cancelling INTO stops;
+    WHERE job = p_job AND fence = p_fence RETURNING cancelling INTO stops;
   RETURN stops;
 END $$;
 
 -- p has
 --   id, fence, node  whose run ends
 --   is_again         whether the same was asked for before
---   ends_others      it is somebody else's lease, which is over
+--   ends_others      it is somebody else's lease, which has to be over, unless it is of an earlier life of the node
 --   state, record    of the job from now on; queued: without a record, and with
 --   delay, waiting_for, counts: when it may run again, what it waits for, whether this was an attempt
 --   cancelled        the record, should it have been asked to stop
@@ -355,8 +359,10 @@ BEGIN
     id text, fence bigint, node uuid, is_again boolean, ends_others boolean, state int, record text, delay bigint,
     waiting_for int, counts boolean, cancelled text, blobs jsonb, alike jsonb);
   SELECT t.owner, t.result_key, t.ended_by INTO j FROM jobs t WHERE t.id = s.id FOR UPDATE;
-  SELECT t.cancelling, t.lease_until INTO r FROM runs t WHERE t.job = s.id AND t.fence = s.fence FOR UPDATE;
-  IF NOT FOUND OR (NOT s.ends_others AND r.lease_until < isomesh_now()) THEN
+  SELECT t.cancelling, t.lease_until, t.node INTO r FROM runs t WHERE t.job = s.id AND t.fence = s.fence FOR UPDATE;
+  IF NOT FOUND OR (s.ends_others AND r.lease_until >= isomesh_now() AND NOT EXISTS (
+                     SELECT 1 FROM nodes a JOIN nodes b USING (name) WHERE a.id = r.node AND b.id = s.node
+                       AND a.id <> b.id)) THEN
     RETURN QUERY SELECT CASE WHEN s.is_again AND j.ended_by = s.fence THEN 'done' ELSE 'lost' END, NULL::text, NULL::text,
                         0::bigint;
     RETURN;

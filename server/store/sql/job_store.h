@@ -52,6 +52,7 @@ class SqlJobStore : public JobStore {
     Steady lease_until;  // as far as this process knows
     bool cancelling = false;
     std::optional<Progress> progress = {};  // none before the first renewal
+    double recorded = 0;                    // the share of it that the last renewal recorded
     Steady told = {};
     // Where a record does not say it: the job as it was claimed, and by which transaction.
     Job job = {};

@@ -1,10 +1,13 @@
 // Processes that share the records of one PostgreSQL, for tests of what they do together.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 
@@ -27,13 +30,32 @@ inline constexpr milliseconds kLongLease{600'000};
 inline constexpr milliseconds kLong{60'000};
 inline constexpr const char* kVolume = "some-volume";
 
+// A steady clock that goes on as the test says.
+class SetClock {
+ public:
+  void pass(milliseconds time) { now_ = now_.load() + time; }
+  std::function<Steady()> reader() const {
+    return [this] { return now_.load(); };
+  }
+
+ private:
+  std::atomic<Steady> now_ = Steady::clock::now();
+};
+
 // A process, but that it shares this one's memory.
 struct Node {
-  Node(const std::string& url, const std::string& name, const BlobStore& shared)
+  Node(const std::string& url, const std::string& name, const BlobStore& shared,
+       JobStoreOptions options = {.grace = milliseconds(0)})
       : database({.url = url, .node = name}),
         volumes(database),
         outbox(database),
-        jobs(database, shared, {.retry_delay = milliseconds(0), .mesher_version = "test"}) {}
+        jobs(database, shared, for_tests(std::move(options))) {}
+
+  static JobStoreOptions for_tests(JobStoreOptions options) {
+    options.retry_delay = milliseconds(0);
+    options.mesher_version = "test";
+    return options;
+  }
 
   Lease claimed(milliseconds lease = kLongLease) { return jobs.claim("worker", lease).value(); }
   bool can_claim() { return jobs.wait_for_work({}, milliseconds(0)); }
@@ -89,6 +111,8 @@ class ClusterTest : public testing::Test {
                   "pg_backend_pid() AND backend_type = 'client backend'");
   }
   std::string ask(const std::string& sql) { return Postgres::ask(url_, sql); }
+  // As when their time is over.
+  void end_leases() { ask("UPDATE runs SET lease_until = 0"); }
 
   BlobFolders shared_folder() const {
     std::filesystem::create_directory(files_ / "shared");

@@ -45,6 +45,65 @@ TEST_F(ClusterTest, ProgressReachesTheOtherNodeWithARenewal) {
   EXPECT_EQ(seen.started, two().jobs.get("", id).started);
 }
 
+TEST_F(ClusterTest, ProgressIsToldToThoseWhoFollowTheJobAtAnotherNode) {
+  const std::string id = submit();
+  const Lease lease = two().claimed();
+  std::uint64_t since = 0;
+  // The next of it that node one tells, however long that takes.
+  const auto next = [&] {
+    Event event;
+    do {
+      event = one().jobs.events("", id, since, kLong).at(0);
+      since = event.id;
+    } while (event.state == JobState::kQueued || event.stage == Stage::kLoad);
+    return event;
+  };
+  const auto share_of = [](const Event& event) {
+    EXPECT_EQ(event.state, JobState::kRunning);
+    EXPECT_TRUE(event.is_elsewhere);
+    return event.progress;
+  };
+  two().jobs.renew(lease, {Stage::kSmooth, 0.25, {}}, kLongLease);
+  const Event begun = next();
+  EXPECT_EQ(begun.kind, EventKind::kStage);
+  EXPECT_EQ(begun.stage, Stage::kSmooth);
+  EXPECT_EQ(share_of(begun), 0.25);
+  // As a renewal by the time that has passed.
+  ask("UPDATE runs SET progress = 0.5");
+  const Event further = next();
+  EXPECT_EQ(further.kind, EventKind::kProgress);
+  EXPECT_EQ(share_of(further), 0.5);
+  EXPECT_THAT(one().jobs.events("somebody else", id, 0, milliseconds(0)), IsEmpty());
+  EXPECT_TRUE(two().jobs.finish(lease, mesh()));
+  EXPECT_EQ(next().kind, EventKind::kDone);
+  EXPECT_EQ(two().jobs.events("", id, 0, milliseconds(0)).back().kind, EventKind::kDone);
+}
+
+TEST_F(ClusterTest, ProgressIsWrittenTwiceASecondAtMost) {
+  SetClock clock;
+  two_.emplace(url_, "two", blobs_, JobStoreOptions{.now = clock.reader()});
+  submit();
+  const Lease lease = two().claimed();
+  ask("CREATE TABLE writes(n int); CREATE FUNCTION count_write() RETURNS trigger LANGUAGE plpgsql "
+      "AS "
+      "'BEGIN INSERT INTO writes VALUES(1); RETURN NULL; END'; CREATE TRIGGER counts AFTER UPDATE "
+      "ON "
+      "runs FOR EACH ROW EXECUTE FUNCTION count_write()");
+  double share = 0;
+  const auto writes_of_ten_seconds = [&](double step) {
+    ask("DELETE FROM writes");
+    for (int n = 0; n < 100; ++n) {
+      clock.pass(milliseconds(100));
+      share += step;
+      EXPECT_EQ(two().jobs.renew(lease, {Stage::kSmooth, share, {}}, kLongLease), Standing::kOk);
+    }
+    return std::stoi(ask("SELECT count(*) FROM writes"));
+  };
+  EXPECT_EQ(writes_of_ten_seconds(0.001), 20);
+  EXPECT_NEAR(one().jobs.list("", {}, "", 1).at(0).progress, share, 0.005) << "half a second ago";
+  EXPECT_EQ(writes_of_ten_seconds(0), 10);
+}
+
 // It was told by a newer node, which times more stages, or by one of the first version.
 TEST_F(ClusterTest, TimingsAreReadByTheirNames) {
   const std::string id = submit();
@@ -161,6 +220,64 @@ TEST_F(ClusterTest, ARunWhoseLeaseIsOverIsAnybodysAndItsNodeIsRefused) {
   EXPECT_EQ(one().jobs.renew(late, {}, kLongLease), Standing::kLost);
   EXPECT_FALSE(one().jobs.finish(late, mesh()));
   EXPECT_TRUE(two().jobs.finish(lease, mesh()));
+}
+
+// The database was away for longer than the lease.
+TEST_F(ClusterTest, ARunThatNobodyTookGoesOnAfterItsLease) {
+  const std::string id = submit();
+  const Lease lease = one().claimed();
+  end_leases();
+  EXPECT_EQ(one().jobs.renew(lease, {Stage::kSmooth, 0.5, {}}, kLongLease), Standing::kOk);
+  EXPECT_EQ(two().jobs.reap(), 0U);
+  end_leases();
+  EXPECT_TRUE(one().jobs.finish(lease, mesh())) << "it ended while the database was away";
+  EXPECT_EQ(one().jobs.get("", id).state, JobState::kSucceeded);
+  EXPECT_EQ(ask("SELECT count(*) FROM events WHERE state = 1"), "1");
+}
+
+TEST_F(ClusterTest, AfterAnOutageHoldersHaveTimeToRenew) {
+  constexpr seconds kGrace{10};
+  SetClock clock;
+  two_.emplace(url_, "two", blobs_, JobStoreOptions{.grace = kGrace, .now = clock.reader()});
+  submit(1);
+  const Lease first = one().claimed();
+  end_leases();
+  // Looks every second, so often; returns how many leases it ended.
+  const auto reaped_in = [&](int looks) {
+    std::size_t count = 0;
+    for (int look = 0; look < looks; ++look) {
+      clock.pass(seconds(1));
+      count += two().jobs.reap();
+    }
+    return count;
+  };
+  EXPECT_EQ(reaped_in(10), 0U) << "a start may follow an outage";
+  EXPECT_EQ(reaped_in(1), 1U);
+  EXPECT_EQ(one().jobs.renew(first, {}, kLongLease), Standing::kLost);
+  const Lease second = one().claimed();
+  end_leases();
+  clock.pass(seconds(60));  // without an answer
+  EXPECT_EQ(reaped_in(5), 0U);
+  EXPECT_EQ(one().jobs.renew(second, {}, kLongLease), Standing::kOk);
+  EXPECT_EQ(reaped_in(20), 0U);
+  end_leases();
+  EXPECT_EQ(reaped_in(1), 1U) << "no outage, no grace";
+}
+
+// Somebody saw that the lease was over, and its holder renewed it then.
+TEST_F(ClusterTest, ALeaseThatWasRenewedMeanwhileIsNotEnded) {
+  const std::string id = submit();
+  const Lease lease = one().claimed();
+  const auto end_by = [&](Node& node) {
+    return ask(R"(SELECT outcome FROM finish_run('{"id": ")" + id + R"(", "fence": )" +
+               std::to_string(lease.fence) + R"(, "node": ")" + node.database.node() +
+               R"(", "is_again": false, "ends_others": true, "state": 0, "delay": 0, "counts": )" +
+               R"(false}'))");
+  };
+  EXPECT_EQ(end_by(two()), "lost");
+  EXPECT_EQ(one().jobs.renew(lease, {}, kLongLease), Standing::kOk);
+  one_.emplace(url_, "one", blobs_);
+  EXPECT_EQ(end_by(one()), "done") << "its own earlier life's";
 }
 
 // --- Lost connections

@@ -151,7 +151,8 @@ class PostgresEngine : public Engine {
     jobs_.emplace(*database_, blobs_,
                   store::JobStoreOptions{.max_queued = options_.max_queued,
                                          .retry_delay = options_.retry_delay,
-                                         .mesher_version = "test"});
+                                         .mesher_version = "test",
+                                         .grace = std::chrono::milliseconds(0)});
   }
 
   const EngineOptions options_;
