@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/callbacks/callbacks.h"
+#include "server/hospital/orders/orders.h"
 #include "server/http/guards/auth.h"
 #include "server/http/observe/metrics.h"
 #include "server/http/requests/upload.h"
@@ -15,7 +16,6 @@
 #include "server/jobs/label_lists.h"
 #include "server/jobs/volume_library.h"
 #include "server/net/tls.h"
-#include "server/orders/orders.h"
 #include "server/store/blob_store.h"
 #include "server/store/job_store.h"
 #include "server/store/outbox.h"

@@ -15,7 +15,7 @@
 #include "proto/error.h"
 #include "proto/types.h"
 #include "server/callbacks/callbacks.h"
-#include "server/orders/orders.h"
+#include "server/hospital/orders/orders.h"
 
 namespace isomesh::http {
 

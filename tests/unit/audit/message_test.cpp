@@ -1,4 +1,4 @@
-#include "server/audit/message.h"
+#include "server/hospital/audit/message.h"
 
 #include <expat.h>
 #include <gmock/gmock.h>

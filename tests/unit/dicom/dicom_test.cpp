@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "proto/orders.h"
-#include "server/dicom/data_set.h"
-#include "server/dicom/encapsulated_stl.h"
-#include "server/dicom/uid.h"
+#include "server/hospital/objects/data_set.h"
+#include "server/hospital/objects/encapsulated_stl.h"
+#include "server/hospital/objects/uid.h"
 #include "tests/support/errors.h"
 
 namespace isomesh::dicom {

@@ -13,8 +13,8 @@
 
 #include "base/clock.h"
 #include "base/sha256.h"
-#include "server/orders/orders.h"
-#include "server/orders/received.h"
+#include "server/hospital/orders/orders.h"
+#include "server/hospital/orders/received.h"
 #include "server/store/sql/audit_trail.h"
 #include "server/store/sql/order_store.h"
 #include "server/store/sql/received_store.h"

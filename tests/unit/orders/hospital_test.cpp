@@ -1,4 +1,4 @@
-#include "server/orders/hospital.h"
+#include "server/hospital/orders/hospital.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

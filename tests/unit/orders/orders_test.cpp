@@ -1,5 +1,5 @@
 // The way of an order, from its series to its object.
-#include "server/orders/orders.h"
+#include "server/hospital/orders/orders.h"
 
 #include "tests/unit/orders/fixture.h"
 

@@ -4,15 +4,15 @@
 #include <string_view>
 
 #include "base/text.h"
-#include "server/dicom/object_classes.h"
 #include "server/import/dicom/elements/tags.h"
+#include "server/volume/object_classes.h"
 
 namespace isomesh::import::dicom {
 std::optional<std::string> reason_to_ignore(const DicomFile& file) {
   const DataSet& data = file.data();
   if (data.find(kDirectoryRecordSequence) != nullptr) return "it is a directory of DICOM files";
   const std::string_view sop_class = data.text(kSopClassUid);
-  const auto kind = isomesh::dicom::kind_without_images(
+  const auto kind = volume::kind_without_images(
       sop_class.empty() ? std::string_view(file.meta().sop_class_uid) : sop_class);
   if (kind) {
     return "it is " + std::string(*kind) + " (modality " + in_quotes(data.text(kModality)) + ")";

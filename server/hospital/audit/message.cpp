@@ -1,0 +1,158 @@
+#include "server/hospital/audit/message.h"
+
+#include <nlohmann/json.hpp>
+
+#include "base/base64.h"
+#include "base/error.h"
+#include "base/xml.h"
+
+namespace isomesh::audit {
+namespace {
+
+using Entry = nlohmann::json;
+
+struct Code {
+  std::string_view value;
+  std::string_view system;
+  std::string_view meaning;
+};
+
+constexpr Code kApplication = {"110150", "DCM", "Application"};
+constexpr Code kSource = {"110153", "DCM", "Source Role ID"};
+constexpr Code kDestination = {"110152", "DCM", "Destination Role ID"};
+constexpr Code kStudyUid = {"110180", "DCM", "Study Instance UID"};
+constexpr Code kSopClassUid = {"110181", "DCM", "SOP Class UID"};
+constexpr Code kPatientNumber = {"2", "RFC-3881", "Patient Number"};
+
+// What a query for instances of a series is called in the older service (PS3.4, C.6.2).
+constexpr std::string_view kStudyRootFind = "1.2.840.10008.5.1.4.1.2.2.1";
+
+std::string text_of(const Entry& entry, const char* name) {
+  const auto found = entry.find(name);
+  return found == entry.end() ? "" : found->get<std::string>();
+}
+
+std::string attribute(std::string_view name, std::string_view value) {
+  return ' ' + std::string(name) + "=\"" + xml_escaped(value) + '"';
+}
+
+std::string coded(std::string_view element, const Code& code) {
+  return '<' + std::string(element) + attribute("csd-code", code.value) +
+         attribute("codeSystemName", code.system) + attribute("originalText", code.meaning) + "/>";
+}
+
+std::string participant(std::string_view user, bool is_requestor, const Code* role) {
+  const std::string head = "<ActiveParticipant" + attribute("UserID", user) +
+                           attribute("UserIsRequestor", is_requestor ? "true" : "false");
+  if (role == nullptr) return head + "/>";
+  return head + '>' + coded("RoleIDCode", *role) + "</ActiveParticipant>";
+}
+
+// Types and roles: PS3.15, table A.5-1.
+std::string object(std::string_view id, std::string_view type, std::string_view role,
+                   const Code& kind, const std::string& content) {
+  return "<ParticipantObjectIdentification" + attribute("ParticipantObjectID", id) +
+         attribute("ParticipantObjectTypeCode", type) +
+         attribute("ParticipantObjectTypeCodeRole", role) + '>' +
+         coded("ParticipantObjectIDTypeCode", kind) + content +
+         "</ParticipantObjectIdentification>";
+}
+
+std::string study_object(const Entry& entry) {
+  const std::string study = text_of(entry, "study");
+  if (study.empty()) return "";
+  const std::string count = std::to_string(entry.value("instances", std::uint64_t{0}));
+  return object(study, "2", "3", kStudyUid,
+                "<ParticipantObjectDescription><SOPClass" + attribute("NumberOfInstances", count) +
+                    "/></ParticipantObjectDescription>");
+}
+
+std::string patient_object(const Entry& entry) {
+  const std::string patient = text_of(entry, "patient_id");
+  return patient.empty() ? "" : object(patient, "1", "1", kPatientNumber, "");
+}
+
+struct Event {
+  std::string_view action;  // create, execute
+  Code id;
+  Code type = {};  // empty: none
+};
+
+Event event_of(const std::string& code) {
+  const Code application = {"110100", "DCM", "Application Activity"};
+  if (code == "110120") return {"E", application, {"110120", "DCM", "Application Start"}};
+  if (code == "110121") return {"E", application, {"110121", "DCM", "Application Stop"}};
+  if (code == "110112") return {"E", {"110112", "DCM", "Query"}};
+  if (code == "110104") return {"C", {"110104", "DCM", "DICOM Instances Transferred"}};
+  if (code == "110114") {
+    return {
+        "E", {"110114", "DCM", "User Authentication"}, {"110126", "DCM", "Node Authentication"}};
+  }
+  throw Error(ErrorCode::kInternal, "an entry of the audit trail has an unknown event");
+}
+
+// Who took part in it, and what it was about.
+struct Content {
+  std::string participants;
+  std::string objects = {};
+};
+
+Content content_of(const Entry& entry, const std::string& code, const AuditSource& source) {
+  const std::string peer = text_of(entry, "pacs");
+  const std::string owner = text_of(entry, "owner");
+  const std::string asked = owner.empty() ? "" : participant(owner, true, nullptr);
+  if (code == "110112") {
+    const std::string query = "study " + text_of(entry, "study");
+    return {participant(source.station, owner.empty(), &kSource) +
+                participant(peer, false, &kDestination) + asked,
+            object(kStudyRootFind, "2", "3", kSopClassUid,
+                   "<ParticipantObjectQuery>" + to_base64(query) + "</ParticipantObjectQuery>")};
+  }
+  if (code == "110104") {
+    const bool is_in = text_of(entry, "direction") == "in";
+    return {participant(is_in ? peer : source.station, !is_in && owner.empty(), &kSource) +
+                participant(is_in ? source.station : peer, is_in && owner.empty(), &kDestination) +
+                asked,
+            study_object(entry) + patient_object(entry)};
+  }
+  if (code == "110114") {
+    return {participant(peer, true, nullptr) + participant(source.station, false, nullptr)};
+  }
+  return {participant(source.station, false, &kApplication)};
+}
+
+}  // namespace
+
+std::string audit_message(std::string_view text, const AuditSource& source) {
+  try {
+    const Entry entry = Entry::parse(text);
+    const std::string code = entry.at("event").get<std::string>();
+    const Event event = event_of(code);
+    const bool is_success = entry.at("outcome") == "success";
+    // A serious failure is one that what was begun cannot go on after; these are tried again.
+    const Content content = content_of(entry, code, source);
+    return "<?xml version=\"1.0\" encoding=\"UTF-8\"?><AuditMessage><EventIdentification" +
+           attribute("EventActionCode", event.action) +
+           attribute("EventDateTime", text_of(entry, "at")) +
+           attribute("EventOutcomeIndicator", is_success ? "0" : "4") + '>' +
+           coded("EventID", event.id) +
+           (event.type.value.empty() ? "" : coded("EventTypeCode", event.type)) +
+           "</EventIdentification>" + content.participants + "<AuditSourceIdentification" +
+           attribute("AuditSourceID", source.station) +
+           "><AuditSourceTypeCode csd-code=\"4\"/></AuditSourceIdentification>" + content.objects +
+           "</AuditMessage>";
+  } catch (const Entry::exception&) {
+    throw Error(ErrorCode::kInternal, "an entry of the audit trail is not JSON");
+  }
+}
+
+std::string syslog_frame(std::string_view entry, const AuditSource& source) {
+  // Facility 10, security; severity 5, notice. The message is UTF-8, which the mark before it says.
+  const std::string time = Entry::parse(entry).at("at").get<std::string>();
+  const std::string message = "<85>1 " + time + ' ' + source.host + " isomeshd " +
+                              std::to_string(source.process) + " DICOM+RFC3881 - \xEF\xBB\xBF" +
+                              audit_message(entry, source);
+  return std::to_string(message.size()) + ' ' + message;
+}
+
+}  // namespace isomesh::audit

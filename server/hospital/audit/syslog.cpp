@@ -1,0 +1,99 @@
+#include "server/hospital/audit/syslog.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <mutex>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/log.h"
+
+namespace isomesh::audit {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr seconds kTimeout{10};
+constexpr milliseconds kLook{500};  // for new entries
+constexpr milliseconds kLongestPause{60'000};
+constexpr milliseconds kLastWord{2'000};  // to send the end of the service
+// After so many the mark is set, or all would be sent again after a break.
+constexpr std::size_t kMostUnmarked = 100;
+
+std::uint64_t number_of(std::string_view entry) {
+  return nlohmann::json::parse(entry).at("id").get<std::uint64_t>();
+}
+
+// Returns early when `stop` is requested.
+void pause(milliseconds time, const std::stop_token& stop) {
+  std::mutex mutex;
+  std::condition_variable_any never;
+  std::unique_lock lock(mutex);
+  never.wait_for(lock, stop, time, [] { return false; });
+}
+
+}  // namespace
+
+SyslogSender::SyslogSender(store::AuditTrail& trail, TlsServer server, AuditSource source)
+    : trail_(trail),
+      server_(std::move(server)),
+      source_(std::move(source)),
+      thread_([this](const std::stop_token& stop) { run(stop); }) {}
+
+void SyslogSender::stop() {
+  if (!thread_.joinable()) return;
+  thread_.request_stop();
+  std::jthread last_word([this](const std::stop_token& stop) {
+    pause(kLastWord, stop);
+    cut_.request_stop();
+  });
+  thread_.join();
+}
+
+void SyslogSender::run(const std::stop_token& stop) {
+  milliseconds wait = kLook;
+  bool is_cut_off = false;
+  while (!cut_.stop_requested()) {
+    const bool is_last = stop.stop_requested();
+    try {
+      send_new(cut_.get_token());
+      if (is_cut_off) log_info("the audit trail reaches its collector again");
+      is_cut_off = false;
+      wait = kLook;
+    } catch (const std::exception& error) {
+      connection_.reset();
+      if (!is_cut_off && !is_last) {
+        log_warning("the audit trail cannot be sent to its collector and is retried: {}",
+                    error.what());
+      }
+      is_cut_off = true;
+      wait = std::min(2 * wait, kLongestPause);
+    }
+    if (is_last) break;
+    pause(wait, stop);
+  }
+  connection_.reset();
+}
+
+void SyslogSender::send_new(const std::stop_token& stop) {
+  std::uint64_t last = trail_.sent();
+  std::size_t unmarked = 0;
+  const auto mark = [&] {
+    connection_->await_receipt();
+    trail_.note_sent(last);
+    unmarked = 0;
+  };
+  trail_.read(last, [&](std::string_view entry) {
+    if (connection_ && unmarked == 0 && !connection_->is_open()) connection_.reset();
+    if (!connection_) connection_ = std::make_unique<TlsClient>(server_, kTimeout, stop);
+    connection_->send(syslog_frame(entry, source_));
+    last = number_of(entry);
+    if (++unmarked == kMostUnmarked) mark();
+  });
+  if (unmarked > 0) mark();
+}
+
+}  // namespace isomesh::audit

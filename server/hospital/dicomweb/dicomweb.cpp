@@ -1,0 +1,265 @@
+#include "server/hospital/dicomweb/dicomweb.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "base/files.h"
+#include "base/ids.h"
+
+namespace isomesh::dicomweb {
+namespace {
+
+using orders::FoundSeries;
+using orders::PacsFailure;
+using orders::PacsFault;
+using process::PeersObject;
+
+constexpr std::uint64_t kMostAnswerBytes = std::uint64_t{64} << 20;
+constexpr const char* kDicomJson = "application/dicom+json";
+// Optional attributes of a series and of a study that are asked for.
+constexpr const char* kSeriesFields =
+    "includefield=00201209&includefield=00080060&includefield=0008103E";
+constexpr const char* kPatientField = "includefield=00100020";
+
+// Throws where the status says that there is no answer of the kind that was asked for.
+void check_status(const PeerAnswerHead& head) {
+  const int status = head.status;
+  if (status >= 200 && status < 300) return;
+  const std::string said = "the PACS responded with status " + std::to_string(status);
+  if (status == 401 || status == 403) throw PacsFailure(PacsFault::kUnauthorized, said);
+  if (status == 408 || status == 425 || status == 429 || status >= 500) {
+    throw PacsFailure(PacsFault::kBusy, said, head.retry_after);
+  }
+  throw PacsFailure(PacsFault::kRefused, said);
+}
+
+FoundSeries series_of(const PeersObject& object) {
+  return {.study = object.study,
+          .series = object.series,
+          .modality = object.modality,
+          .description = object.series_description,
+          .instances = object.instances};
+}
+
+// What is asked for as a value stays one value.
+std::string in_query(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  std::string encoded;
+  for (const char c : text) {
+    const bool is_plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                          (c >= '0' && c <= '9') || c == '.' || c == '-' || c == '_';
+    if (is_plain) {
+      encoded += c;
+    } else {
+      const auto byte = static_cast<unsigned char>(c);
+      encoded += {'%', kDigits[byte >> 4], kDigits[byte & 15]};
+    }
+  }
+  return encoded;
+}
+
+// The texts around an object, and the object, as one stream.
+class MultipartBody {
+ public:
+  MultipartBody(std::string before, const orders::OutgoingObject& object, std::string after)
+      : before_(std::move(before)), object_(object), after_(std::move(after)) {}
+
+  std::uint64_t bytes() const { return before_.size() + object_.bytes + after_.size(); }
+
+  std::size_t read(std::span<std::byte> buffer) {
+    const std::uint64_t object_end = before_.size() + object_.bytes;
+    std::size_t count = 0;
+    if (at_ < before_.size()) {
+      count = copy(before_, at_, buffer);
+    } else if (at_ < object_end) {
+      const std::uint64_t left = object_end - at_;
+      const auto piece = buffer.first(std::min<std::uint64_t>(left, buffer.size()));
+      count = object_.read(at_ - before_.size(), piece);
+      if (count == 0) throw Error(ErrorCode::kInternal, "a stored object became shorter");
+    } else {
+      count = copy(after_, at_ - object_end, buffer);
+    }
+    at_ += count;
+    return count;
+  }
+
+ private:
+  static std::size_t copy(const std::string& text, std::uint64_t from,
+                          std::span<std::byte> buffer) {
+    const auto bytes = std::as_bytes(std::span(text)).subspan(from);
+    const std::size_t count = std::min(bytes.size(), buffer.size());
+    std::copy_n(bytes.begin(), count, buffer.begin());
+    return count;
+  }
+
+  const std::string before_;
+  const orders::OutgoingObject& object_;
+  const std::string after_;
+  std::uint64_t at_ = 0;
+};
+
+bool names(const std::vector<PeersObject>& objects, const std::string& instance) {
+  return std::ranges::find(objects, instance, &PeersObject::instance) != objects.end();
+}
+
+// What the PACS says of why it did not store the object (PS3.18, table I.2-2).
+[[noreturn]] void throw_not_stored(std::optional<std::uint16_t> reason) {
+  constexpr std::uint16_t kOutOfResources = 0xA700;
+  const std::string said =
+      reason ? "the PACS did not store the mesh and gave the reason " + std::to_string(*reason)
+             : "the PACS did not store the mesh and gave no reason";
+  const bool may_pass = !reason || (*reason & 0xFF00) == kOutOfResources;
+  throw PacsFailure(may_pass ? PacsFault::kBusy : PacsFault::kRefused, said);
+}
+
+}  // namespace
+
+DicomWeb::DicomWeb(const orders::PacsSettings& settings, std::filesystem::path scratch,
+                   std::uint64_t most_series_bytes, AnswerReader read_answer)
+    : settings_(settings),
+      peer_(settings),
+      scratch_(std::move(scratch)),
+      most_series_bytes_(most_series_bytes),
+      read_answer_(std::move(read_answer)) {}
+
+std::vector<PeersObject> DicomWeb::search(const std::string& target, const std::stop_token& stop) {
+  constexpr int kNotFound = 404;
+  const ScratchFile answer(scratch_, ".answer");
+  const PeerAnswerHead head = peer_.send({.target = target,
+                                          .accept = kDicomJson,
+                                          .answer = answer.path(),
+                                          .most_bytes = kMostAnswerBytes},
+                                         stop);
+  if (head.status == kNotFound) return {};  // some say so of what is not there
+  check_status(head);
+  return read_answer_(answer.path()).objects;
+}
+
+std::vector<PeersObject> DicomWeb::search_all(const std::string& target,
+                                              std::string PeersObject::*name,
+                                              const std::stop_token& stop) {
+  constexpr std::size_t kPage = 1000;
+  constexpr std::size_t kMost = 100'000;
+  std::vector<PeersObject> all;
+  std::set<std::string> known;
+  while (known.size() < kMost) {
+    const std::vector<PeersObject> page = search(
+        target + "&limit=" + std::to_string(kPage) + "&offset=" + std::to_string(all.size()), stop);
+    const std::size_t before = known.size();
+    for (const PeersObject& object : page) {
+      if ((object.*name).empty()) {
+        throw PacsFailure(PacsFault::kUnreadable, "the PACS lists objects without UIDs");
+      }
+      if (known.insert(object.*name).second) all.push_back(object);
+    }
+    // A PACS that knows no pages sends everything each time, and some send at most fewer than was
+    // asked for: only a page without anything new is the end.
+    if (known.size() == before) return all;
+  }
+  throw Error(ErrorCode::kTooLarge, "the PACS found more than " + std::to_string(kMost) +
+                                        " objects, the most that are accepted");
+}
+
+std::vector<FoundSeries> DicomWeb::find_recent(const std::string& from_day,
+                                               const std::string& modality,
+                                               const std::stop_token& stop) {
+  std::string target = "/series?StudyDate=" + in_query(from_day) + "-&" + kSeriesFields;
+  if (!modality.empty()) target += "&Modality=" + in_query(modality);
+  std::vector<FoundSeries> found;
+  for (const PeersObject& object : search_all(target, &PeersObject::series, stop)) {
+    if (!object.study.empty()) found.push_back(series_of(object));
+  }
+  return found;
+}
+
+std::optional<FoundSeries> DicomWeb::find_series(const std::string& study,
+                                                 const std::string& series,
+                                                 const std::stop_token& stop) {
+  const std::vector<PeersObject> found = search(
+      "/studies/" + study + "/series?SeriesInstanceUID=" + series + '&' + kSeriesFields, stop);
+  const auto same = std::ranges::find(found, series, &PeersObject::series);
+  if (same == found.end()) return std::nullopt;
+  return series_of(*same);
+}
+
+std::vector<std::string> DicomWeb::list_instances(const std::string& study,
+                                                  const std::string& series,
+                                                  const std::stop_token& stop) {
+  std::vector<std::string> instances;
+  const std::string target =
+      "/studies/" + study + "/series/" + series + "/instances?includefield=00080018";
+  for (PeersObject& object : search_all(target, &PeersObject::instance, stop)) {
+    instances.push_back(std::move(object.instance));
+  }
+  std::ranges::sort(instances);
+  return instances;
+}
+
+std::string DicomWeb::fetch_series(const std::string& study, const std::string& series,
+                                   const std::filesystem::path& target,
+                                   const std::stop_token& stop) {
+  const PeerAnswerHead head =
+      peer_.send({.target = "/studies/" + study + "/series/" + series,
+                  .accept = "multipart/related; type=\"application/dicom\"; transfer-syntax=" +
+                            settings_.transfer_syntax,
+                  .answer = target,
+                  .most_bytes = most_series_bytes_},
+                 stop);
+  constexpr int kPartialContent = 206;
+  constexpr int kNotFound = 404;
+  if (head.status == kPartialContent || head.status == kNotFound) {
+    throw PacsFailure(PacsFault::kIncomplete, "the PACS no longer has the whole series");
+  }
+  check_status(head);
+  return head.content_type;
+}
+
+std::optional<std::string> DicomWeb::patient_of(const std::string& study,
+                                                const std::stop_token& stop) {
+  const std::vector<PeersObject> found =
+      search("/studies?StudyInstanceUID=" + study + '&' + kPatientField, stop);
+  const auto same = std::ranges::find(found, study, &PeersObject::study);
+  if (same == found.end()) return std::nullopt;
+  return same->patient_id;
+}
+
+std::optional<bool> DicomWeb::has_instance(const orders::InstancePlace& place,
+                                           const std::stop_token& stop) {
+  return names(search("/studies/" + place.study + "/series/" + place.series +
+                          "/instances?SOPInstanceUID=" + place.instance,
+                      stop),
+               place.instance);
+}
+
+void DicomWeb::store(const orders::OutgoingObject& object, const std::stop_token& stop) {
+  // Random, so that no mesh holds it: a PACS would take what is before it for the whole object.
+  constexpr std::size_t kBoundaryBytes = 24;
+  const std::string boundary = random_hex(kBoundaryBytes);
+  MultipartBody multipart("--" + boundary + "\r\nContent-Type: application/dicom\r\n\r\n", object,
+                          "\r\n--" + boundary + "--\r\n");
+  const RequestBody body = {
+      .content_type = "multipart/related; type=\"application/dicom\"; boundary=" + boundary,
+      .bytes = multipart.bytes(),
+      .read = [&](std::span<std::byte> buffer) { return multipart.read(buffer); }};
+  const ScratchFile answer(scratch_, ".answer");
+  const PeerAnswerHead head = peer_.send({.target = "/studies/" + object.place.study,
+                                          .accept = kDicomJson,
+                                          .body = &body,
+                                          .answer = answer.path(),
+                                          .most_bytes = kMostAnswerBytes},
+                                         stop);
+  constexpr int kConflict = 409;  // with the reason in the body
+  if (head.status != kConflict) check_status(head);
+  const process::PeersAnswer said = read_answer_(answer.path());
+  const std::string& instance = object.place.instance;
+  if (names(said.stored, instance)) return;
+  const auto failed = std::ranges::find(said.failed, instance, &PeersObject::instance);
+  if (failed != said.failed.end()) throw_not_stored(failed->failure);
+  if (head.status == kConflict) {
+    throw PacsFailure(PacsFault::kRefused, "the PACS responded with status 409");
+  }
+  throw PacsFailure(PacsFault::kNotStored, "the PACS did not confirm that it stored the mesh");
+}
+
+}  // namespace isomesh::dicomweb

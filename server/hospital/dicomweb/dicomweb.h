@@ -1,0 +1,55 @@
+// A PACS by DICOMweb (PS3.18): QIDO-RS, WADO-RS and STOW-RS.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+
+#include "server/hospital/dicomweb/http_peer.h"
+#include "server/hospital/orders/pacs.h"
+#include "server/process/import_message.h"
+
+namespace isomesh::dicomweb {
+
+// Reads what a PACS has answered, somewhere where that does no harm: see
+// jobs::ImportRunner::read_answer.
+using AnswerReader = std::function<process::PeersAnswer(const std::filesystem::path& file)>;
+
+class DicomWeb : public orders::Pacs {
+ public:
+  // `scratch` is a folder for answers; a series may have so many bytes.
+  DicomWeb(const orders::PacsSettings& settings, std::filesystem::path scratch,
+           std::uint64_t most_series_bytes, AnswerReader read_answer);
+
+  std::vector<orders::FoundSeries> find_recent(const std::string& from_day,
+                                               const std::string& modality,
+                                               const std::stop_token& stop) override;
+  std::optional<orders::FoundSeries> find_series(const std::string& study,
+                                                 const std::string& series,
+                                                 const std::stop_token& stop) override;
+  std::vector<std::string> list_instances(const std::string& study, const std::string& series,
+                                          const std::stop_token& stop) override;
+  std::string fetch_series(const std::string& study, const std::string& series,
+                           const std::filesystem::path& target,
+                           const std::stop_token& stop) override;
+  std::optional<std::string> patient_of(const std::string& study,
+                                        const std::stop_token& stop) override;
+  std::optional<bool> has_instance(const orders::InstancePlace& place,
+                                   const std::stop_token& stop) override;
+  void store(const orders::OutgoingObject& object, const std::stop_token& stop) override;
+
+ private:
+  // One page of what a search finds.
+  std::vector<process::PeersObject> search(const std::string& target, const std::stop_token& stop);
+  // All pages; `name` is what is to be there once.
+  std::vector<process::PeersObject> search_all(const std::string& target,
+                                               std::string process::PeersObject::*name,
+                                               const std::stop_token& stop);
+
+  const orders::PacsSettings settings_;
+  const HttpPeer peer_;
+  const std::filesystem::path scratch_;
+  const std::uint64_t most_series_bytes_;
+  const AnswerReader read_answer_;
+};
+
+}  // namespace isomesh::dicomweb

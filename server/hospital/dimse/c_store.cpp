@@ -1,0 +1,148 @@
+#include "server/hospital/dimse/c_store.h"
+
+#include "server/hospital/objects/encapsulated_stl.h"
+#include "server/net/connect.h"
+#include "server/process/dimse_message.h"
+
+namespace isomesh::dimse {
+namespace {
+
+using orders::PacsFailure;
+using orders::PacsFault;
+using process::DimseEnd;
+
+// One answer is some bytes; a peer may be slow, as long as something moves.
+constexpr std::size_t kMostAnswerBytes = 4096;
+constexpr std::chrono::hours kLongest{24};
+
+std::string hex_of(std::uint16_t status) {
+  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  std::string text;
+  for (int shift = 12; shift >= 0; shift -= 4) text += kDigits[(status >> shift) & 15];
+  return text;
+}
+
+// What the status of a C-STORE response says (PS3.4, table B.2-1, and PS3.7, C).
+void check_stored(std::uint16_t status) {
+  const int high_byte = status >> 8;
+  const int high_nibble = status >> 12;
+  // A warning is of what was stored all the same.
+  constexpr int kWarning = 0xB;
+  if (status == 0 || high_nibble == kWarning) return;
+  const std::string said = "the PACS did not store the mesh; its status is " + hex_of(status);
+  constexpr int kDoesNotMatch = 0xA9;
+  constexpr int kCannotUnderstand = 0xC;
+  if (high_byte == kDoesNotMatch || high_nibble == kCannotUnderstand) {
+    throw PacsFailure(PacsFault::kRefused, said);
+  }
+  // Out of resources, or refused for a reason that an operator may take away.
+  throw PacsFailure(PacsFault::kBusy, said);
+}
+
+void check_sent(const process::DimseSent& sent) {
+  switch (sent.end) {
+    case DimseEnd::kAnswered:
+      return check_stored(sent.status);
+    case DimseEnd::kRejected:
+      throw PacsFailure(PacsFault::kUnauthorized, "the PACS rejected the association");
+    case DimseEnd::kBusy:
+      throw PacsFailure(PacsFault::kBusy, "the PACS rejected the association for now");
+    case DimseEnd::kNotAccepted:
+      throw PacsFailure(PacsFault::kBusy, "the PACS does not accept Encapsulated STL");
+    case DimseEnd::kBroken:
+      throw PacsFailure(PacsFault::kUnreachable, "the PACS ended the association");
+    case DimseEnd::kTimeout:
+      throw PacsFailure(PacsFault::kTimeout, "the PACS sent nothing for too long");
+    case DimseEnd::kUnreadable:
+      break;
+  }
+  throw PacsFailure(PacsFault::kUnreadable, "the response of the PACS cannot be read");
+}
+
+process::DimseSent sent_of(const process::Heard& heard) {
+  using Ending = process::Heard::Ending;
+  if (heard.ending == Ending::kStopped) throw Error(ErrorCode::kCancelled, "stopped");
+  if (heard.ending != Ending::kClosed || !heard.text.ends_with('\n')) {
+    return {.end = DimseEnd::kUnreadable, .status = 0};
+  }
+  const process::DimseReport report = process::dimse_report_from(heard.text);
+  if (const auto* sent = std::get_if<process::DimseSent>(&report)) return *sent;
+  return {.end = DimseEnd::kUnreadable, .status = 0};
+}
+
+Descriptor connected(const orders::PacsSettings& settings, const std::stop_token& stop) {
+  try {
+    return net::connect_to(settings.host, settings.port, settings.timeout, stop);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kUnreachable) {
+      throw PacsFailure(PacsFault::kUnreachable, "the connection to the PACS failed");
+    }
+    if (error.code() != ErrorCode::kRequestTimeout) throw;
+    throw PacsFailure(PacsFault::kTimeout, "the PACS does not respond");
+  }
+}
+
+}  // namespace
+
+orders::Pacs& CStore::web() const {
+  if (web_) return *web_;
+  throw PacsFailure(PacsFault::kRefused,
+                    "meshes can only be sent to this PACS: it has no dicomweb");
+}
+
+std::vector<orders::FoundSeries> CStore::find_recent(const std::string& from_day,
+                                                     const std::string& modality,
+                                                     const std::stop_token& stop) {
+  return web().find_recent(from_day, modality, stop);
+}
+
+std::optional<orders::FoundSeries> CStore::find_series(const std::string& study,
+                                                       const std::string& series,
+                                                       const std::stop_token& stop) {
+  return web().find_series(study, series, stop);
+}
+
+std::vector<std::string> CStore::list_instances(const std::string& study, const std::string& series,
+                                                const std::stop_token& stop) {
+  return web().list_instances(study, series, stop);
+}
+
+std::string CStore::fetch_series(const std::string& study, const std::string& series,
+                                 const std::filesystem::path& target, const std::stop_token& stop) {
+  return web().fetch_series(study, series, target, stop);
+}
+
+std::optional<std::string> CStore::patient_of(const std::string& study,
+                                              const std::stop_token& stop) {
+  if (!web_) return std::nullopt;
+  return web_->patient_of(study, stop);
+}
+
+std::optional<bool> CStore::has_instance(const orders::InstancePlace& place,
+                                         const std::stop_token& stop) {
+  if (!web_) return std::nullopt;
+  return web_->has_instance(place, stop);
+}
+
+void CStore::store(const orders::OutgoingObject& object, const std::stop_token& stop) {
+  // As over DICOMweb: a second more for each 4 MiB that it is to store.
+  constexpr std::uint64_t kBytesPerSecond = std::uint64_t{4} << 20;
+  const process::DimseSending order = {
+      .calling = settings_.calling_aet,
+      .called = settings_.aet,
+      .file = object.file.path,
+      .sop_class = std::string(dicom::kEncapsulatedStlStorage),
+      .instance = object.place.instance,
+      .timeout = settings_.timeout,
+      .answer_timeout = settings_.timeout + std::chrono::seconds(object.bytes / kBytesPerSecond)};
+  const Descriptor peer = connected(settings_, stop);
+  process::Child child = processes_.take(std::chrono::steady_clock::now() + settings_.timeout);
+  child.say(process::to_line(order), peer.number());
+  const process::Heard heard =
+      child.listen(kMostAnswerBytes, std::chrono::steady_clock::now() + kLongest, stop);
+  const process::DimseSent sent = sent_of(heard);
+  if (sent.end == DimseEnd::kUnreadable) processes_.renew();
+  check_sent(sent);
+}
+
+}  // namespace isomesh::dimse

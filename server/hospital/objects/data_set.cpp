@@ -1,0 +1,101 @@
+#include "server/hospital/objects/data_set.h"
+
+#include <algorithm>
+#include <array>
+
+namespace isomesh::dicom {
+namespace {
+
+void append_number(std::uint32_t number, int bytes, std::string& text) {
+  for (int byte = 0; byte < bytes; ++byte) {
+    text += static_cast<char>((number >> (8 * byte)) & 0xff);
+  }
+}
+
+void append_tag(Tag tag, std::string& text) {
+  append_number(tag >> 16, 2, text);
+  append_number(tag & 0xffff, 2, text);
+}
+
+// Those whose length has 32 bits.
+bool is_long(std::string_view vr) {
+  constexpr std::array<std::string_view, 5> kLong = {"OB", "OW", "SQ", "UN", "UT"};
+  return std::ranges::find(kLong, vr) != kLong.end();
+}
+
+}  // namespace
+
+std::string element_head(Tag tag, std::string_view vr, std::uint32_t bytes) {
+  std::string head;
+  append_tag(tag, head);
+  head += vr;
+  if (is_long(vr)) {
+    append_number(0, 2, head);
+    append_number(bytes, 4, head);
+  } else {
+    append_number(bytes, 2, head);
+  }
+  return head;
+}
+
+void DataSet::set(Tag tag, std::string_view vr, std::string_view text) {
+  Element& element = elements_[tag];
+  element.vr = vr;
+  element.value = text;
+  if (text.size() % 2 != 0) element.value += vr == "UI" ? '\0' : ' ';
+}
+
+void DataSet::set_told(Tag tag, std::string_view vr, std::string_view text) {
+  if (!text.empty()) set(tag, vr, text);
+}
+
+void DataSet::set_long(Tag tag, std::uint32_t number) {
+  std::string value;
+  append_number(number, 4, value);
+  set_bytes(tag, "UL", value);
+}
+
+void DataSet::set_bytes(Tag tag, std::string_view vr, std::string_view bytes) {
+  elements_[tag] = {std::string(vr), std::string(bytes)};
+}
+
+void DataSet::set_sequence(Tag tag, const std::vector<DataSet>& items) {
+  constexpr Tag kItem = 0xFFFEE000;
+  std::string value;
+  for (const DataSet& item : items) {
+    const std::string bytes = item.bytes();
+    append_tag(kItem, value);
+    append_number(static_cast<std::uint32_t>(bytes.size()), 4, value);
+    value += bytes;
+  }
+  elements_[tag] = {"SQ", value};
+}
+
+void DataSet::append(Tag tag, const Element& element, std::string& bytes) {
+  bytes += element_head(tag, element.vr, static_cast<std::uint32_t>(element.value.size()));
+  bytes += element.value;
+}
+
+std::string DataSet::bytes() const {
+  std::string bytes;
+  for (const auto& [tag, element] : elements_) append(tag, element, bytes);
+  return bytes;
+}
+
+std::string DataSet::bytes_before(Tag tag) const {
+  std::string bytes;
+  for (auto each = elements_.begin(); each != elements_.lower_bound(tag); ++each) {
+    append(each->first, each->second, bytes);
+  }
+  return bytes;
+}
+
+std::string DataSet::bytes_after(Tag tag) const {
+  std::string bytes;
+  for (auto each = elements_.upper_bound(tag); each != elements_.end(); ++each) {
+    append(each->first, each->second, bytes);
+  }
+  return bytes;
+}
+
+}  // namespace isomesh::dicom

@@ -1,0 +1,261 @@
+#include "server/hospital/orders/objects.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+
+#include "base/text.h"
+#include "proto/error.h"
+#include "proto/json.h"
+#include "proto/parameters.h"
+#include "server/hospital/objects/encapsulated_stl.h"
+#include "server/hospital/objects/uid.h"
+#include "server/jobs/label_pages.h"
+
+namespace isomesh::orders {
+namespace {
+
+// The bytes of one STL within a blob.
+struct Part {
+  std::optional<std::int64_t> label = {};
+  std::string name = {};  // the label's
+  std::string blob;
+  std::uint64_t offset = 0;
+  std::uint64_t bytes = 0;
+  std::string sha256;
+};
+
+std::vector<Part> parts_of(const Job& job, const store::BlobStore& blobs) {
+  std::vector<Part> parts;
+  if (!job.mesh) return parts;
+  const auto& files = job.mesh->files;
+  if (const auto stl = files.find(MeshFormat::kStl); stl != files.end()) {
+    parts.push_back(
+        {.blob = stl->second.sha256, .bytes = stl->second.bytes, .sha256 = stl->second.sha256});
+  }
+  const auto zip = files.find(MeshFormat::kZip);
+  if (zip == files.end()) return parts;
+  const jobs::JobLabels labels(job, blobs);
+  std::vector<LabelSummary> page = labels.after(std::nullopt);
+  for (; !page.empty(); page = labels.after(page.back().label)) {
+    for (const LabelSummary& label : page) {
+      const auto stl = label.files.find(MeshFormat::kStl);
+      if (stl == label.files.end() || label.triangles == 0) continue;
+      parts.push_back({.label = label.label,
+                       .name = label.name.value_or("Label " + std::to_string(label.label)),
+                       .blob = zip->second.sha256,
+                       .offset = stl->second.offset,
+                       .bytes = stl->second.bytes,
+                       .sha256 = stl->second.sha256});
+    }
+  }
+  return parts;
+}
+
+// What determines the mesh, and not which other files were asked for.
+std::string canonical_parameters(MeshParameters parameters) {
+  parameters.formats = {MeshFormat::kStl};
+  parameters.draco = {};
+  parameters.normals = false;
+  return to_json(parameters);
+}
+
+std::string series_uid_of(const DicomIdentity& identity, const Job& job) {
+  return dicom::name_based_uid("series\n" + identity.study_uid + '\n' + identity.series_uid + '\n' +
+                               canonical_parameters(job.parameters) + '\n' + ISOMESH_VERSION);
+}
+
+std::string instance_uid_of(const std::string& series_uid, const DicomIdentity& identity,
+                            const Part& part) {
+  std::vector<std::string> sources;
+  for (const DicomInstance& instance : identity.instances) {
+    sources.push_back(instance.sop_instance_uid);
+  }
+  std::ranges::sort(sources);
+  std::string name =
+      "instance\n" + series_uid + '\n' + std::string(dicom::kEncapsulatedStlStorage) + '\n';
+  for (const std::string& source : sources) name += source + '\n';
+  // Two labels may have the same surface.
+  if (part.label) name += "label " + std::to_string(*part.label) + '\n';
+  return dicom::name_based_uid(name + part.sha256);
+}
+
+// In LO's 64 characters.
+std::string in_short(const std::string& text) {
+  constexpr std::size_t kLongest = 64;
+  if (text.size() <= kLongest) return text;
+  std::size_t end = kLongest;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
+  return text.substr(0, end);
+}
+
+std::string without_backslashes(std::string text) {
+  std::ranges::replace(text, '\\', '/');
+  return text;
+}
+
+// With three digits behind the point, which is a certificate still.
+double rounded_up(double mm) {
+  constexpr double kThousandths = 1000;
+  return std::ceil(mm * kThousandths) / kThousandths;
+}
+
+std::string description_of(const Job& job) {
+  const MeshParameters& parameters = job.parameters;
+  const std::string what = parameters.labels ? "label"
+                           : parameters.iso  ? "iso " + to_text(*parameters.iso)
+                                             : "iso otsu";
+  std::string text = what + ", scheme " + std::to_string(static_cast<int>(parameters.scheme)) +
+                     ", " + std::to_string(parameters.passes) + " passes";
+  // How far the object's own bytes are from the surface as it was extracted.
+  if (job.mesh->certificate) {
+    text += ", within " + number_text(rounded_up(job.mesh->certificate->max_mm)) + " mm";
+  }
+  return in_short(text);
+}
+
+std::optional<DicomSegment> segment_of(const DicomIdentity& identity, const Part& part) {
+  if (!part.label) return std::nullopt;
+  const auto found = std::ranges::find(identity.segments, *part.label, &DicomSegment::label);
+  if (found != identity.segments.end()) return *found;
+  DicomSegment uncoded;
+  uncoded.label = *part.label;
+  return uncoded;
+}
+
+void copy(const store::BlobReader& from, const Part& part, store::BlobWriter& to) {
+  std::vector<std::byte> buffer(std::size_t{1} << 20);
+  for (std::uint64_t at = 0; at < part.bytes;) {
+    const auto piece =
+        std::span(buffer).first(std::min<std::uint64_t>(buffer.size(), part.bytes - at));
+    const std::size_t count = from.read_at(part.offset + at, piece);
+    if (count == 0) throw Error(ErrorCode::kInternal, "a stored mesh became shorter");
+    to.write(piece.first(count));
+    at += count;
+  }
+}
+
+void write(const std::string& text, store::BlobWriter& to) {
+  to.write(std::as_bytes(std::span(text)));
+}
+
+// Throws where there is none.
+std::vector<Part> parts_of_surface(const Job& job, const store::BlobStore& blobs) {
+  std::vector<Part> parts = parts_of(job, blobs);
+  if (job.mesh && job.mesh->triangles > 0 && !parts.empty()) return parts;
+  throw Error(ErrorCode::kUnusableVolume, "the surface is empty");
+}
+
+// Names the object, too.
+dicom::StlEnvelope envelope_of(const store::OrderRecord& record, const Job& job, const Part& part,
+                               const std::string& station_name,
+                               std::chrono::system_clock::time_point made, MadeObject& object) {
+  const DicomIdentity& identity = record.work.identity.value();
+  object.label = part.label;
+  object.series_uid = series_uid_of(identity, job);
+  object.sop_instance_uid = instance_uid_of(object.series_uid, identity, part);
+  const std::string title = part.label ? record.work.label + ' ' + part.name : record.work.label;
+  return dicom::make_envelope(
+      {.identity = identity,
+       .series_uid = object.series_uid,
+       .sop_instance_uid = object.sop_instance_uid,
+       .series_number = record.work.series_number.value_or(0),
+       .title = in_short(without_backslashes(title)),
+       .made = made,
+       .station_name = station_name,
+       .content_description = description_of(job),
+       .algorithm_parameters = without_backslashes(canonical_parameters(job.parameters)),
+       .segment = segment_of(identity, part)},
+      part.bytes);
+}
+
+std::uint64_t bytes_of(const dicom::StlEnvelope& envelope, const Part& part) {
+  return envelope.before.size() + part.bytes + envelope.after.size();
+}
+
+// What the simplified mesh's object says of that besides.
+constexpr std::uint64_t kGrowthOfText = 400;
+
+[[noreturn]] void throw_too_large(std::uint64_t bytes, std::uint64_t most_bytes,
+                                  const OrderWork& work) {
+  std::string text = "the object has " + std::to_string(bytes) +
+                     " bytes, but the PACS accepts at most " + std::to_string(most_bytes) +
+                     " (max-send-bytes)";
+  if (work.max_error_mm) {
+    text += "; within " + number_text(*work.max_error_mm) +
+            " mm of the surface (max-error-mm) it cannot be made smaller";
+  }
+  throw Error(ErrorCode::kTooLarge, text);
+}
+
+}  // namespace
+
+Error empty_surface(const MeshSummary& mesh, const std::array<double, 2>& range) {
+  const auto because = [](const std::string& why) {
+    return Error(ErrorCode::kUnusableVolume, "the surface is empty: " + why);
+  };
+  if (mesh.dropped.components > 0) return because("none of its connected components was kept");
+  if (!mesh.iso) return because("the labels have no boundary");
+  const auto [low, high] = range;
+  const std::string iso = "the iso-value " + number_text(*mesh.iso);
+  const std::string samples =
+      "the samples, which range from " + number_text(low) + " to " + number_text(high);
+  const bool is_outside = *mesh.iso <= low || *mesh.iso > high;
+  return because(iso + (is_outside ? " is outside " : " separates none of ") + samples);
+}
+
+std::vector<MadeObject> make_objects(const store::OrderRecord& record, const Job& job,
+                                     const std::string& station_name, std::uint64_t most_bytes,
+                                     std::chrono::system_clock::time_point made,
+                                     const store::BlobStore& blobs) {
+  std::vector<MadeObject> objects;
+  for (const Part& part : parts_of_surface(job, blobs)) {
+    MadeObject object;
+    const dicom::StlEnvelope envelope = envelope_of(record, job, part, station_name, made, object);
+    const std::uint64_t bytes = bytes_of(envelope, part);
+    if (bytes > most_bytes) throw_too_large(bytes, most_bytes, record.work);
+    const auto writer = blobs.begin();
+    write(envelope.before, *writer);
+    copy(*blobs.open(part.blob), part, *writer);
+    write(envelope.after, *writer);
+    object.blob = writer->commit();
+    objects.push_back(std::move(object));
+  }
+  return objects;
+}
+
+std::optional<std::uint32_t> triangles_that_fit(const store::OrderRecord& record, const Job& job,
+                                                const std::string& station_name,
+                                                std::uint64_t most_bytes,
+                                                const store::BlobStore& blobs) {
+  // An STL file has so many for each triangle.
+  constexpr std::uint64_t kTriangleBytes = 50;
+  double share = 1;
+  for (const Part& part : parts_of_surface(job, blobs)) {
+    MadeObject object;
+    const dicom::StlEnvelope envelope = envelope_of(record, job, part, station_name, {}, object);
+    const std::uint64_t bytes = bytes_of(envelope, part);
+    if (bytes <= most_bytes) continue;
+    const std::uint64_t over = bytes - most_bytes + kGrowthOfText;
+    if (over + kTriangleBytes > part.bytes) throw_too_large(bytes, most_bytes, record.work);
+    share =
+        std::min(share, static_cast<double>(part.bytes - over) / static_cast<double>(part.bytes));
+  }
+  if (share == 1) return std::nullopt;
+  // Of labels the largest is to fit, which may keep another share than all of them together.
+  constexpr double kOfLabels = 0.95;
+  if (job.parameters.labels) share *= kOfLabels;
+  return std::max<std::uint32_t>(
+      1, static_cast<std::uint32_t>(share * static_cast<double>(job.mesh->triangles)));
+}
+
+bool can_make_objects(const Job& job, const store::BlobStore& blobs) {
+  const auto& list = job.mesh ? job.mesh->label_list : std::nullopt;
+  if (list && !store::is_there_and_intact(blobs, list->sha256, {})) return false;
+  const std::vector<Part> parts = parts_of(job, blobs);
+  return std::ranges::all_of(
+      parts, [&](const Part& part) { return store::is_there_and_intact(blobs, part.blob, {}); });
+}
+
+}  // namespace isomesh::orders

@@ -1,0 +1,354 @@
+#include "server/hospital/orders/orders.h"
+
+#include <algorithm>
+#include <exception>
+#include <random>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "proto/error.h"
+
+namespace isomesh::orders {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using store::Time;
+
+constexpr milliseconds kLongestSleep{1'000};
+constexpr std::size_t kMostDue = 200;
+constexpr std::size_t kMostMeshing = 1'000'000;
+
+// Doubles, and is spread over its upper half, so that what failed together does not come back
+// together.
+milliseconds delay_after(std::uint32_t failures, const Hospital& hospital) {
+  constexpr std::uint32_t kMostDoublings = 20;
+  const milliseconds whole = std::min<milliseconds>(
+      hospital.first_delay * (std::int64_t{1} << std::min(failures, kMostDoublings)),
+      hospital.longest_delay);
+  thread_local std::mt19937_64 random{std::random_device()()};
+  return milliseconds(
+      std::uniform_int_distribution<std::int64_t>(whole.count() / 2, whole.count())(random));
+}
+
+// What may be otherwise next time, for reasons of this machine.
+bool may_pass(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kUnavailable:
+    case ErrorCode::kTooManyRequests:
+    case ErrorCode::kOutOfSpace:
+    case ErrorCode::kInternal:
+    case ErrorCode::kNotFound:
+    case ErrorCode::kPacsUnreachable:
+    case ErrorCode::kSeriesIncomplete:
+      return true;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+Orders::Orders(const OrderServices& services, const Hospital& hospital, OrderOptions options)
+    : services_(services),
+      hospital_(hospital),
+      options_(std::move(options)),
+      steps_(services, hospital, options_.now) {
+  services_.audit.add({.event = store::AuditEvent::kStart});
+  for (const PacsSettings& each : hospital_.pacs) status_[each.name].name = each.name;
+  // Their jobs may have ended while nobody waited for them.
+  for (const Order& order :
+       services_.orders.list(std::nullopt, {.state = OrderState::kMeshing}, "", kMostMeshing)) {
+    services_.orders.hurry(order.id);
+  }
+  try {
+    for (std::size_t n = 0; n < options_.threads; ++n) {
+      threads_.emplace_back([this](const std::stop_token& stop) { work(stop); });
+    }
+    threads_.emplace_back([this](const std::stop_token& stop) { watch(stop); });
+    if (hospital_.dimse) {
+      threads_.emplace_back([this](const std::stop_token& stop) { receive(stop); });
+    }
+  } catch (...) {
+    stop();  // or what those that did start wait for would not be cut off
+    throw;
+  }
+}
+
+Orders::~Orders() { stop(); }
+
+void Orders::stop() {
+  if (threads_.empty()) return;
+  for (std::jthread& thread : threads_) thread.request_stop();
+  {
+    const Lock lock(mutex_);
+    for (auto& [id, running] : running_) running.stop.request_stop();
+    changed_.notify_all();
+  }
+  if (options_.cut_off) options_.cut_off();
+  threads_.clear();
+  on_end({});
+  try {
+    services_.audit.add({.event = store::AuditEvent::kStop});
+  } catch (const std::exception& error) {
+    log_error("the audit trail lacks the entry of this stop: {}", error.what());
+  }
+}
+
+std::pair<Order, bool> Orders::submit(const Orderer& orderer, const OrderRequest& request,
+                                      const std::string& idempotency_key,
+                                      const std::string& request_digest) {
+  using Kind = store::OrderSubmission::Kind;
+  const store::OrderSubmission submission =
+      services_.orders.submit({.record = make_order(hospital_, orderer, request),
+                               .idempotency_key = idempotency_key,
+                               .request_digest = request_digest},
+                              hospital_.most_open);
+  if (submission.kind == Kind::kConflict) {
+    throw Error(ErrorCode::kKeyReused, "the idempotency key was used for another request");
+  }
+  if (submission.kind == Kind::kBusy) {
+    throw Error(ErrorCode::kUnavailable, "too many orders are open");
+  }
+  changed();
+  return {submission.order, submission.kind == Kind::kNew};
+}
+
+Order Orders::cancel(const store::Viewer& viewer, const std::string& id) {
+  const Order order = services_.orders.cancel(viewer, id);
+  {
+    const Lock lock(mutex_);
+    if (const auto running = running_.find(id); running != running_.end()) {
+      running->second.stop.request_stop();
+    }
+  }
+  if (order.job && order.state == OrderState::kCancelled) {
+    try {
+      services_.jobs.cancel(std::nullopt, *order.job);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kNotFound && error.code() != ErrorCode::kGone) throw;
+    }
+  }
+  ended(order.id);
+  changed();
+  return order;
+}
+
+Order Orders::retry(const store::Viewer& viewer, const std::string& id) {
+  Order order = services_.orders.retry(viewer, id);
+  changed();
+  return order;
+}
+
+void Orders::job_ended(const std::string& job) {
+  std::string order;
+  {
+    const Lock lock(mutex_);
+    const auto waiting = by_job_.find(job);
+    if (waiting == by_job_.end()) return;
+    order = waiting->second;
+    by_job_.erase(waiting);
+  }
+  services_.orders.hurry(order);
+  changed();
+}
+
+std::vector<PacsStatus> Orders::pacs() const {
+  const Lock lock(mutex_);
+  std::vector<PacsStatus> all;
+  for (const PacsSettings& each : hospital_.pacs) all.push_back(status_.at(each.name));
+  return all;
+}
+
+std::vector<Attempts> Orders::attempts() const {
+  const Lock lock(mutex_);
+  std::vector<Attempts> all;
+  for (const auto& [what, count] : failed_) {
+    all.push_back({.pacs = what.first, .fault = what.second, .count = count});
+  }
+  return all;
+}
+
+std::uint64_t Orders::generation() const {
+  const Lock lock(mutex_);
+  return generation_;
+}
+
+void Orders::wake() { changed(); }
+
+void Orders::changed() {
+  const Lock lock(mutex_);
+  ++generation_;
+  changed_.notify_all();
+}
+
+std::optional<std::string> Orders::take(std::stop_token& cancelled) {
+  for (const store::OrderRecord& record : services_.orders.due(options_.now(), kMostDue)) {
+    const std::string pacs = OrderSteps::pacs_of(record);
+    const Lock lock(mutex_);
+    const auto busy = std::ranges::count_if(running_, [&](const auto& running) {
+      return !pacs.empty() && running.second.pacs == pacs;
+    });
+    if (static_cast<std::size_t>(busy) >= options_.per_pacs) continue;
+    const auto [running, is_free] = running_.try_emplace(record.order.id, Running{pacs, {}});
+    if (!is_free) continue;
+    cancelled = running->second.stop.get_token();
+    return record.order.id;
+  }
+  return std::nullopt;
+}
+
+void Orders::give_back(const std::string& id) {
+  const Lock lock(mutex_);
+  running_.erase(id);
+  ++generation_;
+  changed_.notify_all();
+}
+
+void Orders::work(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    const std::uint64_t seen = generation();
+    milliseconds sleep = kLongestSleep;
+    bool is_in_trouble = false;
+    try {
+      std::stop_token cancelled;
+      if (const auto id = take(cancelled)) {
+        const struct GiveBack {
+          Orders& orders;
+          const std::string& id;
+          ~GiveBack() { orders.give_back(id); }
+        } give_back{*this, *id};
+        // Read once more: another thread may have made the step meanwhile.
+        auto record = services_.orders.if_due(*id, options_.now());
+        if (record) advance(*std::move(record), cancelled);
+        continue;
+      }
+      if (const auto next = services_.orders.next_after(options_.now())) {
+        const auto wait = std::chrono::ceil<milliseconds>(*next - options_.now());
+        sleep = std::clamp(wait, milliseconds(1), kLongestSleep);
+      }
+    } catch (const std::exception& error) {
+      log_error("orders could not be processed and are retried: {}", error.what());
+      is_in_trouble = true;  // such as a database that cannot be written: not at once again
+    }
+    Lock lock(mutex_);
+    changed_.wait_for(lock, stop, sleep, [&]() ISOMESH_REQUIRES(mutex_) {
+      return !is_in_trouble && generation_ != seen;
+    });
+  }
+}
+
+void Orders::advance(store::OrderRecord record, const std::stop_token& stop) {
+  const std::string pacs = OrderSteps::pacs_of(record);
+  const OrderState before = record.order.state;
+  try {
+    steps_.advance(record, stop);
+    if (!pacs.empty()) note_success(pacs);
+    if (record.order.state == OrderState::kMeshing && record.order.job) wait_for_job(record.order);
+    if (is_final(record.order.state)) ended(record.order.id);
+    if (record.order.state != before) log(record, "");
+    changed();
+  } catch (const OrderIsOver&) {
+  } catch (const PacsFailure& failure) {
+    if (stop.stop_requested()) return;
+    note_failure(pacs, failure, record.order.id);
+    fail_step(record, before, failure, failure.may_pass(), failure.retry_after());
+  } catch (const Error& error) {
+    // It was cancelled, or goes on in the next process.
+    if (stop.stop_requested()) return;
+    fail_step(record, before, error, may_pass(error.code()), {});
+  } catch (const std::exception& error) {
+    fail_step(record, before, Error(ErrorCode::kInternal, error.what()), true, {});
+  }
+}
+
+void Orders::wait_for_job(const Order& order) {
+  {
+    const Lock lock(mutex_);
+    by_job_[*order.job] = order.id;
+  }
+  // It may have ended before anybody waited for it.
+  if (is_final(services_.jobs.get(std::nullopt, *order.job).state)) job_ended(*order.job);
+}
+
+void Orders::ended(const std::string& order) {
+  std::function<void(const std::string&)> listener;
+  {
+    const Lock lock(mutex_);
+    listener = on_end_;
+  }
+  if (listener) listener(order);
+}
+
+void Orders::on_end(std::function<void(const std::string& order)> listener) {
+  const Lock lock(mutex_);
+  on_end_ = std::move(listener);
+}
+
+void Orders::fail_step(store::OrderRecord& record, OrderState failed, const Error& error,
+                       bool may_pass, seconds retry_after) {
+  const Time now = options_.now();
+  const bool is_over = now - time_of(record.work.begun) >= hospital_.give_up;
+  if (!may_pass || is_over) return end(record, error);
+  Order& order = record.order;
+  const milliseconds delay =
+      std::max<milliseconds>(delay_after(record.work.failures, hospital_), retry_after);
+  ++record.work.failures;
+  record.work.failed_in = std::max(record.work.failed_in, std::optional(failed));
+  ++order.attempts;
+  order.error = to_problem(error, "/v1/orders/" + order.id);
+  const Time next = now + std::min<milliseconds>(delay, hospital_.give_up);
+  order.next_attempt = timestamp_of(next);
+  services_.orders.save(record, next);
+  log(record, std::string(describe(error.code()).name));
+  if (error.code() == ErrorCode::kInternal) {
+    log_error("a step of order {} failed and is retried: {}", order.id, error.what());
+  }
+  changed();
+}
+
+void Orders::end(store::OrderRecord& record, const Error& error) {
+  Order& order = record.order;
+  order.state = OrderState::kFailed;
+  order.finished = timestamp_of(options_.now());
+  order.next_attempt.reset();
+  order.error = to_problem(error, "/v1/orders/" + order.id);
+  services_.orders.save(record, options_.now());
+  log(record, std::string(describe(error.code()).name));
+  ended(order.id);
+  changed();
+}
+
+void Orders::note_success(const std::string& pacs) {
+  const Lock lock(mutex_);
+  if (const auto status = status_.find(pacs); status != status_.end()) {
+    status->second.last_success = timestamp();
+  }
+}
+
+void Orders::note_failure(const std::string& pacs, const PacsFailure& failure,
+                          const std::string& order) {
+  if (failure.fault() == PacsFault::kUnauthorized) {
+    services_.audit.add({.event = store::AuditEvent::kAuthenticationFailure,
+                         .success = false,
+                         .order = order,
+                         .pacs = pacs});
+  }
+  const Lock lock(mutex_);
+  ++failed_[{pacs, failure.fault()}];
+  if (const auto status = status_.find(pacs); status != status_.end()) {
+    status->second.last_failure = timestamp();
+    status->second.reason = std::string(to_string(failure.fault()));
+  }
+}
+
+void Orders::log(const store::OrderRecord& record, const std::string& reason) const {
+  const Order& order = record.order;
+  LogLine line("order", order.state == OrderState::kFailed ? LogLevel::kWarn : LogLevel::kInfo);
+  line.add("id", order.id).add("state", to_string(order.state)).add("attempts", order.attempts);
+  if (order.rule) line.add("rule", *order.rule);
+  if (order.job) line.add("job", *order.job);
+  if (!reason.empty()) line.add("reason", reason);
+}
+
+}  // namespace isomesh::orders

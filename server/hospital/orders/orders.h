@@ -1,0 +1,130 @@
+// The hospital's loop: orders go their way, whoever asked for them, however often a peer or this
+// process ends on it.
+#pragma once
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <set>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/mutex.h"
+#include "server/hospital/orders/requests.h"
+#include "server/hospital/orders/steps.h"
+
+namespace isomesh::orders {
+
+// Attempts that failed, for the metrics.
+struct Attempts {
+  std::string pacs;
+  PacsFault fault = PacsFault::kUnreachable;
+  std::uint64_t count = 0;
+};
+
+struct OrderOptions {
+  std::chrono::hours keep{30 * 24};  // orders that have ended
+  std::function<store::Time()> now = [] { return std::chrono::system_clock::now(); };
+  // The same as far as it can be believed, for what is not kept any longer; empty: the same.
+  std::function<store::Time()> believed_now = {};
+  // Ends what steps may wait for long, such as imports; called when this stops.
+  std::function<void()> cut_off = {};
+  std::size_t threads = 6;
+  std::size_t per_pacs = 2;  // steps at the same time that speak to one PACS: one that hangs holds
+                             // up nobody else
+};
+
+// Thread safe. What it is made of must outlive it.
+class Orders {
+ public:
+  // Begins to work on what is open.
+  Orders(const OrderServices& services, const Hospital& hospital, OrderOptions options);
+
+  // Cuts off what is under way; the next process goes on with it.
+  ~Orders();
+  Orders(const Orders&) = delete;
+  Orders& operator=(const Orders&) = delete;
+
+  // The same, before its life is over. To be called by one thread; nothing else is called later but
+  // what only reads.
+  void stop();
+
+  // Has that called with each order that ends, by the thread that ended it; at most one.
+  void on_end(std::function<void(const std::string& order)> listener);
+
+  // Throws as make_order does, Error kKeyReused and kUnavailable. Second: whether it is new.
+  std::pair<Order, bool> submit(const Orderer& orderer, const OrderRequest& request,
+                                const std::string& idempotency_key,
+                                const std::string& request_digest);
+
+  // Throw Error kNotFound; retry also kNotReady.
+  Order get(const store::Viewer& viewer, const std::string& id) const {
+    return services_.orders.get(viewer, id);
+  }
+  Order cancel(const store::Viewer& viewer, const std::string& id);
+  Order retry(const store::Viewer& viewer, const std::string& id);
+
+  std::vector<Order> list(const store::Viewer& viewer, const store::OrderFilter& filter,
+                          const std::string& after, std::size_t limit) const {
+    return services_.orders.list(viewer, filter, after, limit);
+  }
+
+  // A job has ended: an order may wait for it.
+  void job_ended(const std::string& job);
+
+  // In the order of the configuration.
+  std::vector<PacsStatus> pacs() const;
+
+  std::vector<Attempts> attempts() const;
+  store::OrderCounts counts() const { return services_.orders.counts(); }
+
+  // Looks at what is due: for those who set the clock.
+  void wake();
+
+ private:
+  struct Running {
+    std::string pacs;
+    std::stop_source stop;
+  };
+
+  void work(const std::stop_token& stop);
+  void watch(const std::stop_token& stop);
+  void forget();
+  void receive(const std::stop_token& stop);
+  store::ReceivedFate look_at_received(const store::HeldSeries& series);
+  void look_at_rule(const Rule& rule, const std::stop_token& stop);
+  // The next order that may be worked on, which is this thread's then; empty when there is none.
+  std::optional<std::string> take(std::stop_token& cancelled);
+  void give_back(const std::string& id);
+  void advance(store::OrderRecord record, const std::stop_token& stop);
+  // The record may be at an earlier step by now than the one that failed.
+  void fail_step(store::OrderRecord& record, OrderState failed, const Error& error, bool may_pass,
+                 std::chrono::seconds retry_after);
+  void end(store::OrderRecord& record, const Error& error);
+  void note_success(const std::string& pacs);
+  void note_failure(const std::string& pacs, const PacsFailure& failure, const std::string& order);
+  std::uint64_t generation() const;
+  void wait_for_job(const Order& order);
+  void ended(const std::string& order);
+  void changed();
+  void log(const store::OrderRecord& record, const std::string& reason) const;
+
+  const OrderServices services_;
+  const Hospital& hospital_;
+  const OrderOptions options_;
+  const OrderSteps steps_;
+
+  mutable Mutex mutex_;
+  Condition changed_;
+  std::function<void(const std::string&)> on_end_ ISOMESH_GUARDED_BY(mutex_);
+  std::uint64_t generation_ ISOMESH_GUARDED_BY(mutex_) = 0;
+  std::map<std::string, Running> running_ ISOMESH_GUARDED_BY(mutex_);     // by order
+  std::map<std::string, std::string> by_job_ ISOMESH_GUARDED_BY(mutex_);  // orders that wait
+  std::map<std::string, PacsStatus> status_ ISOMESH_GUARDED_BY(mutex_);
+  std::map<std::pair<std::string, PacsFault>, std::uint64_t> failed_ ISOMESH_GUARDED_BY(mutex_);
+  std::vector<std::jthread> threads_;  // last: run on all of the above
+};
+
+}  // namespace isomesh::orders

@@ -1,0 +1,152 @@
+#include "server/hospital/orders/received.h"
+
+#include <algorithm>
+
+#include <fcntl.h>
+
+#include "base/clock.h"
+#include "base/descriptor.h"
+#include "base/ids.h"
+#include "base/log.h"
+#include "server/hospital/orders/orders.h"
+
+namespace isomesh::orders {
+namespace {
+
+constexpr std::string_view kPrefix = "dimse:";
+
+void append(const Descriptor& file, const std::string& text) {
+  write_all(file, std::as_bytes(std::span(text)));
+}
+
+void append(const Descriptor& file, const store::BlobReader& blob) {
+  std::vector<std::byte> buffer(std::size_t{1} << 20);
+  std::uint64_t at = 0;
+  while (const std::size_t count = blob.read_at(at, buffer)) {
+    write_all(file, std::span(buffer).first(count));
+    at += count;
+  }
+}
+
+}  // namespace
+
+std::string received_by(const std::string& title) { return std::string(kPrefix) + title; }
+
+bool is_received(std::string_view pacs) { return pacs.starts_with(kPrefix); }
+
+std::vector<FoundSeries> Received::find_recent(const std::string&, const std::string&,
+                                               const std::stop_token&) {
+  return {};
+}
+
+std::optional<FoundSeries> Received::find_series(const std::string& study,
+                                                 const std::string& series,
+                                                 const std::stop_token&) {
+  const auto known = received_.instances({title_, study, series});
+  if (known.empty()) return std::nullopt;
+  return FoundSeries{.study = study,
+                     .series = series,
+                     .modality = "",
+                     .description = "",
+                     .instances = static_cast<std::uint32_t>(known.size())};
+}
+
+std::vector<std::string> Received::list_instances(const std::string& study,
+                                                  const std::string& series,
+                                                  const std::stop_token&) {
+  std::vector<std::string> instances;
+  for (const store::ReceivedInstance& each : received_.instances({title_, study, series})) {
+    instances.push_back(each.instance);
+  }
+  return instances;
+}
+
+std::string Received::fetch_series(const std::string& study, const std::string& series,
+                                   const std::filesystem::path& target,
+                                   const std::stop_token& stop) {
+  constexpr std::size_t kBoundaryBytes = 24;
+  const std::string boundary = random_hex(kBoundaryBytes);
+  const Descriptor file(::open(target.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
+  if (file.number() < 0) throw_system_error("open", errno);
+  for (const store::ReceivedInstance& each : received_.instances({title_, study, series})) {
+    if (stop.stop_requested()) throw Error(ErrorCode::kCancelled, "the order was cancelled");
+    if (each.blob.empty()) {
+      throw PacsFailure(PacsFault::kIncomplete,
+                        "some instances of the series were received earlier and are no longer "
+                        "stored: send the whole series again");
+    }
+    append(file, "\r\n--" + boundary + "\r\nContent-Type: application/dicom\r\n\r\n");
+    append(file, *blobs_.open(each.blob));
+  }
+  append(file, "\r\n--" + boundary + "--\r\n");
+  return "multipart/related; type=\"application/dicom\"; boundary=" + boundary;
+}
+
+std::optional<std::string> Received::patient_of(const std::string&, const std::stop_token&) {
+  return std::nullopt;
+}
+
+std::optional<bool> Received::has_instance(const InstancePlace&, const std::stop_token&) {
+  return std::nullopt;
+}
+
+void Received::store(const OutgoingObject&, const std::stop_token&) {
+  throw PacsFailure(PacsFault::kRefused, "meshes cannot be stored among received images");
+}
+
+// What was held for the order, or came once more, goes when that has ended.
+store::ReceivedFate Orders::look_at_received(const store::HeldSeries& held) {
+  const auto& [title, study, series] = held.series;
+  const auto route = hospital_.dimse->routes.find(title);
+  // Kept: the route may come back.
+  if (route == hospital_.dimse->routes.end()) return store::ReceivedFate::kOpen;
+  const Rule& rule = *hospital_.find_rule(route->second);
+  const FoundSeries found = {
+      .study = study, .series = series, .modality = "", .description = "", .instances = held.known};
+  store::OrderRecord record = make_order(rule, received_by(title), found);
+  // It has been seen to be still.
+  for (const auto& each : services_.received.instances(held.series)) {
+    record.work.listed.push_back(each.instance);
+  }
+  record.work.listed_since = timestamp_of(held.last);
+  const store::ReceivedFate fate = services_.orders.submit_received(
+      {.record = record, .idempotency_key = "", .request_digest = ""},
+      {.rule = rule.name, .study = study, .series = series, .instances = held.known}, held.last,
+      hospital_.most_open);
+  if (fate == store::ReceivedFate::kNew) {
+    log(record, "");
+    changed();
+  } else if (fate == store::ReceivedFate::kDone) {
+    services_.blobs.erase_unnamed(
+        services_.received.release(held), {},
+        [this](const std::string& key) { return services_.volumes.names(key); });
+  }
+  return fate;
+}
+
+void Orders::receive(const std::stop_token& stop) {
+  constexpr std::chrono::milliseconds kPause{500};
+  // Nobody could send before.
+  const store::Time begun = options_.now();
+  // When to look again at series whose orders are open.
+  std::map<store::ReceivedSeries, store::Time> waiting;
+  while (!stop.stop_requested()) {
+    try {
+      const store::Time now = options_.now();
+      std::erase_if(waiting, [&](const auto& each) { return each.second <= now; });
+      for (const store::HeldSeries& held : services_.received.held()) {
+        if (std::max(held.last, begun) + hospital_.settle > now || waiting.contains(held.series))
+          continue;
+        // First, so that one that fails waits, too, and holds up no other.
+        waiting[held.series] = now + hospital_.poll;
+        if (look_at_received(held) == store::ReceivedFate::kDone) waiting.erase(held.series);
+      }
+    } catch (const std::exception& error) {
+      log_error("received series could not be processed and are retried: {}", error.what());
+    }
+    Lock lock(mutex_);
+    changed_.wait_for(lock, stop, kPause, [] { return false; });
+  }
+}
+
+}  // namespace isomesh::orders

@@ -1,0 +1,44 @@
+// Series that peers have sent by themselves, as a PACS that orders take their images from.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "server/hospital/orders/pacs.h"
+#include "server/store/received_store.h"
+
+namespace isomesh::orders {
+
+// What an order's source calls what was sent to that title. No configured PACS has such a name.
+std::string received_by(const std::string& title);
+bool is_received(std::string_view pacs);
+
+// What was sent to one title. Thread safe; the stores must outlive it. Nothing can be stored in it.
+class Received : public Pacs {
+ public:
+  Received(std::string title, const store::ReceivedStore& received, const store::BlobStore& blobs)
+      : title_(std::move(title)), received_(received), blobs_(blobs) {}
+
+  std::vector<FoundSeries> find_recent(const std::string& from_day, const std::string& modality,
+                                       const std::stop_token& stop) override;
+  std::optional<FoundSeries> find_series(const std::string& study, const std::string& series,
+                                         const std::stop_token& stop) override;
+  std::vector<std::string> list_instances(const std::string& study, const std::string& series,
+                                          const std::stop_token& stop) override;
+  // Throws PacsFailure kIncomplete when some of the instances were held once, and are not now.
+  std::string fetch_series(const std::string& study, const std::string& series,
+                           const std::filesystem::path& target,
+                           const std::stop_token& stop) override;
+  std::optional<std::string> patient_of(const std::string& study,
+                                        const std::stop_token& stop) override;
+  std::optional<bool> has_instance(const InstancePlace& place,
+                                   const std::stop_token& stop) override;
+  void store(const OutgoingObject& object, const std::stop_token& stop) override;
+
+ private:
+  const std::string title_;
+  const store::ReceivedStore& received_;
+  const store::BlobStore& blobs_;
+};
+
+}  // namespace isomesh::orders

@@ -1,0 +1,108 @@
+#include "server/hospital/orders/requests.h"
+
+#include <algorithm>
+#include <string_view>
+
+#include "base/clock.h"
+#include "base/ids.h"
+#include "proto/error.h"
+
+namespace isomesh::orders {
+namespace {
+
+constexpr const char* kLabel = "Surface";
+constexpr std::int64_t kSeriesNumber = 9000;
+
+const Rule* rule_of(const Hospital& hospital, const Orderer& orderer, const OrderRequest& request) {
+  if (!request.rule) return nullptr;
+  const Rule* rule = hospital.find_rule(*request.rule);
+  if (rule == nullptr) throw invalid_parameter("rule", "is not configured");
+  if (!orderer.is_administrator && rule->owner != orderer.name) {
+    throw Error(ErrorCode::kForbidden, "the rule belongs to another owner");
+  }
+  return rule;
+}
+
+// Only names are taken from a request, never addresses.
+const PacsSettings& pacs_of(const Hospital& hospital, const std::string& name,
+                            std::string_view field) {
+  const PacsSettings* pacs = hospital.find_pacs(name);
+  if (pacs == nullptr) throw invalid_parameter(std::string(field), "is not configured");
+  return *pacs;
+}
+
+void check_owner(const PacsSettings& pacs, const Orderer& orderer) {
+  if (orderer.is_administrator || pacs.owners.empty()) return;
+  if (std::ranges::find(pacs.owners, orderer.name) != pacs.owners.end()) return;
+  throw Error(ErrorCode::kForbidden, "this PACS can be used only by a rule");
+}
+
+// Whatever else is asked for, an object is made of the STL.
+void add_sent_formats(Order& order) {
+  std::vector<MeshFormat>& formats = order.parameters.formats;
+  for (const SendTarget& target : order.send) {
+    if (std::ranges::find(formats, target.format) == formats.end()) {
+      formats.push_back(target.format);
+    }
+  }
+}
+
+}  // namespace
+
+store::OrderRecord make_order(const Hospital& hospital, const Orderer& orderer,
+                              const OrderRequest& request) {
+  const Rule* rule = rule_of(hospital, orderer, request);
+  store::OrderRecord record;
+  Order& order = record.order;
+  order.id = time_ordered_id();
+  order.created = timestamp();
+  order.rule = request.rule;
+  order.source = request.source;
+  const PacsSettings& source = pacs_of(hospital, request.source.pacs, "source.pacs");
+  order.parameters = parse_order_parameters(rule == nullptr ? "" : rule->parameters,
+                                            request.parameters.value_or(""), "parameters.");
+  order.priority = request.priority.value_or(Priority::kRoutine);
+  if (request.send) {
+    order.send = *request.send;
+  } else if (rule != nullptr) {
+    order.send = rule->send;
+  }
+  if (source.dicomweb.empty()) {
+    throw invalid_parameter("source.pacs", "is a PACS to which meshes are only sent");
+  }
+  if (rule == nullptr) check_owner(source, orderer);
+  for (const SendTarget& target : order.send) {
+    const PacsSettings& pacs = pacs_of(hospital, target.pacs, "send.pacs");
+    if (rule == nullptr || request.send) check_owner(pacs, orderer);
+  }
+  add_sent_formats(order);
+  record.owner = rule != nullptr && orderer.is_administrator && !rule->owner.empty() ? rule->owner
+                                                                                     : orderer.name;
+  record.work.begun = order.created;
+  record.work.label = rule == nullptr ? kLabel : rule->label;
+  record.work.series_number = rule == nullptr ? kSeriesNumber : rule->series_number;
+  if (rule != nullptr) record.work.max_error_mm = rule->max_error_mm;
+  if (request.callback) record.work.callback = request.callback->url;
+  return record;
+}
+
+store::OrderRecord make_order(const Rule& rule, const std::string& pacs,
+                              const FoundSeries& series) {
+  store::OrderRecord record;
+  record.owner = rule.owner;
+  Order& order = record.order;
+  order.id = time_ordered_id();
+  order.created = timestamp();
+  order.rule = rule.name;
+  order.source = {.pacs = pacs, .study = series.study, .series = series.series};
+  order.parameters = parse_order_parameters(rule.parameters, "", "parameters.");
+  order.send = rule.send;
+  add_sent_formats(order);
+  record.work.begun = order.created;
+  record.work.label = rule.label;
+  record.work.series_number = rule.series_number;
+  record.work.max_error_mm = rule.max_error_mm;
+  return record;
+}
+
+}  // namespace isomesh::orders

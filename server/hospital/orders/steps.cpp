@@ -1,0 +1,379 @@
+#include "server/hospital/orders/steps.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "base/clock.h"
+#include "base/sha256.h"
+#include "proto/error.h"
+#include "proto/json.h"
+#include "server/hospital/orders/objects.h"
+#include "server/hospital/orders/received.h"
+#include "server/jobs/settle_labels.h"
+
+namespace isomesh::orders {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using store::Time;
+
+// A series that was not there so often will not come.
+constexpr std::uint32_t kMostLooks = 4;
+// The end of a job is told at once; this is for an end that was missed.
+constexpr seconds kJobLook{30};
+
+// An order that begins anew, or fetches its images again, has another job, even if the volume is
+// the same.
+std::string job_key(const store::OrderRecord& record) {
+  constexpr std::size_t kEnough = 12;
+  const std::string what =
+      sha256_of(record.order.volume.value_or("") + ' ' + record.work.begun + ' ' +
+                std::to_string(record.order.attempts) +
+                (record.work.triangles ? ' ' + std::to_string(*record.work.triangles) : ""))
+          .substr(0, kEnough);
+  return "order-" + record.order.id + '-' + what;
+}
+
+// The parameters of a job whose mesh fits into its object.
+void simplify(const OrderWork& work, JobParameters& parameters) {
+  parameters.triangles = std::min(*work.triangles, parameters.triangles.value_or(*work.triangles));
+  parameters.max_error_mm =
+      std::min(*work.max_error_mm, parameters.max_error_mm.value_or(*work.max_error_mm));
+  parameters.certify = true;
+}
+
+// Forgets the list of instances, the images, and all that was made of them.
+void forget_images(store::OrderRecord& record) {
+  record.order.state = OrderState::kWaiting;
+  record.order.volume.reset();
+  record.order.job.reset();
+  record.order.results.clear();
+  record.order.source.instances.reset();
+  record.work.identity.reset();
+  record.work.blobs.clear();
+  record.work.listed.clear();
+  record.work.listed_since.reset();
+  record.work.triangles.reset();
+}
+
+}  // namespace
+
+std::string OrderSteps::pacs_of(const store::OrderRecord& record) {
+  switch (record.order.state) {
+    case OrderState::kWaiting:
+    case OrderState::kFetching:
+      return record.order.source.pacs;
+    case OrderState::kSending:
+      for (const OrderResult& result : record.order.results) {
+        if (!result.stored) return result.pacs;
+      }
+      return "";
+    default:
+      return "";
+  }
+}
+
+Time OrderSteps::advance(store::OrderRecord& record, const std::stop_token& stop) const {
+  switch (record.order.state) {
+    case OrderState::kWaiting:
+      return wait_for_series(record, stop);
+    case OrderState::kFetching:
+      return fetch(record, stop);
+    case OrderState::kMeshing:
+      return mesh(record);
+    case OrderState::kSending:
+      return send(record, stop);
+    default:
+      throw OrderIsOver();
+  }
+}
+
+Pacs& OrderSteps::pacs(const std::string& name) const {
+  const auto found = services_.pacs.find(name);
+  if (found != services_.pacs.end()) return *found->second;
+  throw PacsFailure(PacsFault::kUnreachable, "the PACS is no longer configured");
+}
+
+Time OrderSteps::save(store::OrderRecord& record, Time next) const {
+  record.order.next_attempt.reset();
+  if (!services_.orders.save(record, next)) throw OrderIsOver();
+  return next;
+}
+
+// A series that can be listed and not fetched would otherwise be fetched again without a pause.
+Time OrderSteps::save_after(OrderState step, store::OrderRecord& record, Time next) const {
+  if (record.work.failed_in <= step) {
+    record.order.error.reset();
+    record.work.failures = 0;
+    record.work.failed_in.reset();
+  }
+  return save(record, next);
+}
+
+// Later queries of an order ask for the same again, so that only its first one is kept.
+void OrderSteps::note_query(store::OrderRecord& record, bool success) const {
+  const OrderSource& source = record.order.source;
+  if (record.work.queried || is_received(source.pacs)) return;
+  services_.audit.add({.event = store::AuditEvent::kQuery,
+                       .success = success,
+                       .order = record.order.id,
+                       .owner = record.owner,
+                       .pacs = source.pacs,
+                       .study = source.study});
+  record.work.queried = timestamp_of(now_());
+}
+
+Time OrderSteps::wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const {
+  OrderSource& source = record.order.source;
+  OrderWork& work = record.work;
+  Pacs& peer = pacs(source.pacs);
+  std::optional<FoundSeries> series;
+  std::vector<std::string> listed;
+  try {
+    series = peer.find_series(source.study, source.series, stop);
+    if (series) listed = peer.list_instances(source.study, source.series, stop);
+  } catch (const Error&) {
+    note_query(record, false);
+    throw;
+  }
+  note_query(record, true);
+  const Time now = now_();
+  if (listed.empty()) {
+    if (++work.looks >= kMostLooks) {
+      throw PacsFailure(PacsFault::kRefused, "the PACS does not know the series");
+    }
+    return save_after(OrderState::kWaiting, record,
+                      now + hospital_.first_delay * (1 << work.looks));
+  }
+  work.looks = 0;
+  if (listed != work.listed || !work.listed_since) {
+    work.listed = listed;
+    work.listed_since = timestamp_of(now);
+  }
+  const Time settled = time_of(*work.listed_since) + hospital_.settle;
+  const bool is_whole = !series->instances || *series->instances == listed.size();
+  if (now < settled || !is_whole) {
+    const Time poll = now + hospital_.poll;
+    return save_after(OrderState::kWaiting, record, now < settled ? std::min(settled, poll) : poll);
+  }
+  source.instances = static_cast<std::uint32_t>(listed.size());
+  record.order.state = OrderState::kFetching;
+  return save_after(OrderState::kWaiting, record, now);
+}
+
+Time OrderSteps::fetch(store::OrderRecord& record, const std::stop_token& stop) const {
+  const OrderSource& source = record.order.source;
+  const store::ScratchFolder scratch(services_.folder.scratch());
+  const std::filesystem::path file = scratch.path() / "series";
+  try {
+    const std::string type =
+        pacs(source.pacs).fetch_series(source.study, source.series, file, stop);
+    auto [volume, identity] = services_.library.add_peers(record.owner, file,
+                                                          {.content_type = type,
+                                                           .study = source.study,
+                                                           .series = source.series,
+                                                           .instances = record.work.listed});
+    services_.audit.add({.event = store::AuditEvent::kTransferred,
+                         .order = record.order.id,
+                         .owner = record.owner,
+                         .pacs = source.pacs,
+                         .direction = "in",
+                         .study = source.study,
+                         .instances = record.work.listed.size(),
+                         .patient_id = identity.patient_id});
+    record.order.volume = volume.id;
+    record.work.identity = std::move(identity);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kSeriesIncomplete) throw;
+    // Never a mesh of half a head: it is listed anew, too.
+    forget_images(record);
+    throw PacsFailure(PacsFault::kIncomplete, error.what());
+  }
+  record.order.state = OrderState::kMeshing;
+  return save_after(OrderState::kFetching, record, now_());
+}
+
+Time OrderSteps::submit_job(store::OrderRecord& record) const {
+  JobParameters parameters;
+  static_cast<MeshParameters&>(parameters) = record.order.parameters;
+  if (record.work.triangles) simplify(record.work, parameters);
+  parameters.volume = *record.order.volume;
+  parameters.priority = record.order.priority;
+  const store::Viewer viewer = record.owner;
+  if (parameters.labels) {
+    const Volume volume = services_.volumes.get(viewer, parameters.volume);
+    parameters = jobs::settle_labels(std::move(parameters), viewer, volume, services_.labels);
+  }
+  const store::Submission submission =
+      services_.jobs.submit({.owner = record.owner,
+                             .parameters = parameters,
+                             .idempotency_key = job_key(record),
+                             .request_digest = sha256_of(to_json(parameters))});
+  record.order.job = store::job_of(submission).id;
+  return save_after(OrderState::kMeshing, record, now_() + kJobLook);
+}
+
+// Whether the volume or the job has expired, was removed, or the volume is damaged.
+bool OrderSteps::is_lost(const Error& error, const store::OrderRecord& record) const {
+  if (error.code() == ErrorCode::kNotFound || error.code() == ErrorCode::kGone) return true;
+  return error.code() == ErrorCode::kUnusableVolume &&
+         !store::is_there_and_intact(services_.blobs, *record.order.volume, {});
+}
+
+Time OrderSteps::mesh(store::OrderRecord& record) const {
+  try {
+    if (!record.order.job) return submit_job(record);
+    const Job job = services_.jobs.get(std::nullopt, *record.order.job);
+    if (!is_final(job.state)) {
+      return save_after(OrderState::kMeshing, record, now_() + kJobLook);
+    }
+    if (job.state == JobState::kFailed && job.error) throw to_error(*job.error);
+    if (job.state != JobState::kSucceeded) {
+      throw Error(ErrorCode::kUnusableVolume, "the order's job was cancelled");
+    }
+    return make(record, job);
+  } catch (const Error& error) {
+    if (!is_lost(error, record)) throw;
+    forget_images(record);
+    record.work.failed_in = OrderState::kSending;
+    throw Error(
+        ErrorCode::kUnavailable,
+        "the volume or the job of the order is gone or damaged; the images are fetched again");
+  }
+}
+
+Time OrderSteps::make(store::OrderRecord& record, const Job& job) const {
+  record.order.results.clear();
+  record.work.blobs.clear();
+  std::vector<MadeObject> objects;
+  if (!record.order.send.empty()) {
+    if (job.mesh && job.mesh->triangles == 0) {
+      throw empty_surface(*job.mesh,
+                          services_.volumes.get(record.owner, *record.order.volume).range);
+    }
+    if (!can_make_objects(job, services_.blobs)) {
+      record.order.job = services_.jobs.remake(job.id).id;
+      record.work.failed_in = OrderState::kSending;
+      throw Error(ErrorCode::kUnavailable,
+                  "the mesh is damaged or missing in the store; its job is repeated");
+    }
+    std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();
+    for (const SendTarget& target : record.order.send) {
+      const PacsSettings* pacs = hospital_.find_pacs(target.pacs);
+      if (pacs != nullptr) most_bytes = std::min(most_bytes, pacs->max_send_bytes);
+    }
+    if (record.work.max_error_mm && !record.work.triangles) {
+      const auto triangles =
+          triangles_that_fit(record, job, hospital_.station_name, most_bytes, services_.blobs);
+      if (triangles) {
+        record.work.triangles = *triangles;
+        record.order.job.reset();
+        return save_after(OrderState::kMeshing, record, now_());
+      }
+    }
+    const Time made = job.finished ? time_of(*job.finished) : now_();
+    objects = make_objects(record, job, hospital_.station_name, most_bytes, made, services_.blobs);
+  }
+  for (const SendTarget& target : record.order.send) {
+    for (const MadeObject& object : objects) {
+      record.order.results.push_back({.pacs = target.pacs,
+                                      .format = target.format,
+                                      .label = object.label,
+                                      .series_uid = object.series_uid,
+                                      .sop_instance_uid = object.sop_instance_uid,
+                                      .bytes = object.blob.bytes});
+      record.work.blobs.push_back(object.blob.key);
+    }
+  }
+  record.order.state = OrderState::kSending;
+  const Time next = save_after(OrderState::kMeshing, record, now_());
+  for (const MadeObject& object : objects) services_.blobs.settle(object.blob.key);
+  return next;
+}
+
+bool OrderSteps::is_same_patient(const store::OrderRecord& record, const OrderResult& result,
+                                 const std::stop_token& stop) const {
+  const DicomIdentity& identity = *record.work.identity;
+  const auto patient = pacs(result.pacs).patient_of(identity.study_uid, stop);
+  if (patient) return *patient == identity.patient_id;
+  // A PACS that the images did not come from need not know the study.
+  if (result.pacs != record.order.source.pacs) return true;
+  throw PacsFailure(PacsFault::kChanged, "the study is no longer in the PACS");
+}
+
+void OrderSteps::check_before_sending(store::OrderRecord& record, std::size_t index,
+                                      const std::stop_token& stop) const {
+  if (!is_same_patient(record, record.order.results[index], stop)) {
+    forget_images(record);
+    // Until the order succeeds: other objects of it may be stored each time.
+    record.work.failed_in = OrderState::kSucceeded;
+    throw PacsFailure(PacsFault::kChanged,
+                      "the study has another Patient ID than the images; they are fetched again");
+  }
+  if (!store::is_there_and_intact(services_.blobs, record.work.blobs[index], stop)) {
+    record.order.state = OrderState::kMeshing;
+    record.work.failed_in = OrderState::kSucceeded;
+    throw Error(ErrorCode::kUnavailable,
+                "the object is damaged or missing in the store; it is made again");
+  }
+}
+
+void OrderSteps::send_one(store::OrderRecord& record, std::size_t index,
+                          const std::stop_token& stop) const {
+  const OrderResult& result = record.order.results[index];
+  const DicomIdentity& identity = *record.work.identity;
+  const auto blob = services_.blobs.open(record.work.blobs[index]);
+  Pacs& peer = pacs(result.pacs);
+  const InstancePlace place = {.study = identity.study_uid,
+                               .series = result.series_uid,
+                               .instance = result.sop_instance_uid};
+  store::AuditEntry entry = {.event = store::AuditEvent::kTransferred,
+                             .success = false,
+                             .order = record.order.id,
+                             .owner = record.owner,
+                             .pacs = result.pacs,
+                             .direction = "out",
+                             .study = identity.study_uid,
+                             .instances = 1,
+                             .patient_id = identity.patient_id};
+  try {
+    peer.store({.place = place,
+                .bytes = blob->size(),
+                .read = [&](std::uint64_t offset,
+                            std::span<std::byte> bytes) { return blob->read_at(offset, bytes); },
+                .file = services_.blobs.local(record.work.blobs[index])},
+               stop);
+    // What it says is one thing.
+    if (peer.has_instance(place, stop) == false) {
+      throw PacsFailure(PacsFault::kNotStored,
+                        "the PACS confirmed that it stored the mesh, but does not find it");
+    }
+  } catch (const Error&) {
+    services_.audit.add(entry);
+    throw;
+  }
+  entry.success = true;
+  services_.audit.add(entry);
+}
+
+Time OrderSteps::send(store::OrderRecord& record, const std::stop_token& stop) const {
+  for (std::size_t index = 0; index < record.order.results.size(); ++index) {
+    OrderResult& result = record.order.results[index];
+    if (result.stored) continue;
+    const InstancePlace place = {.study = record.work.identity->study_uid,
+                                 .series = result.series_uid,
+                                 .instance = result.sop_instance_uid};
+    if (pacs(result.pacs).has_instance(place, stop) != true) {
+      check_before_sending(record, index, stop);
+      send_one(record, index, stop);
+    }
+    result.stored = true;
+    save_after(OrderState::kSending, record, now_());
+  }
+  record.order.state = OrderState::kSucceeded;
+  record.order.finished = timestamp_of(now_());
+  return save_after(OrderState::kSucceeded, record, now_());
+}
+
+}  // namespace isomesh::orders

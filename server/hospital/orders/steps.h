@@ -1,0 +1,94 @@
+// What an order does, one step at a time.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <map>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "server/hospital/orders/hospital.h"
+#include "server/hospital/orders/pacs.h"
+#include "server/jobs/label_lists.h"
+#include "server/jobs/volume_library.h"
+#include "server/store/audit_trail.h"
+#include "server/store/blob_store.h"
+#include "server/store/files/data_folder.h"
+#include "server/store/job_store.h"
+#include "server/store/order_store.h"
+#include "server/store/received_store.h"
+#include "server/store/volume_store.h"
+
+namespace isomesh::orders {
+
+using PacsByName = std::map<std::string, std::unique_ptr<Pacs>, std::less<>>;
+
+// What orders need of everything else.
+struct OrderServices {
+  const store::DataFolder& folder;
+  const store::BlobStore& blobs;
+  const store::VolumeStore& volumes;
+  store::JobStore& jobs;
+  jobs::VolumeLibrary& library;
+  jobs::LabelLists& labels;
+  store::OrderStore& orders;
+  store::AuditTrail& audit;
+  store::ReceivedStore& received;
+  const PacsByName& pacs;  // and what stands for series that were received
+};
+
+// The order has ended, by somebody else's wish, while a step was made.
+struct OrderIsOver {};
+
+// Steps follow from the order's record alone, so that any process can make the next one, and each
+// may be made again: it saves what it has come to before anything follows from that. Thread safe
+// for different orders; what it is made of must outlive it.
+class OrderSteps {
+ public:
+  using Clock = std::function<store::Time()>;
+
+  OrderSteps(const OrderServices& services, const Hospital& hospital, Clock now)
+      : services_(services), hospital_(hospital), now_(std::move(now)) {}
+
+  // Makes the next step of an open order and saves it. Returns when the next one is due. Throws
+  // PacsFailure and Error when the step failed; the record is then what is to be saved of that.
+  // Every return to an earlier step is such a failure, so that none repeats without a pause.
+  // Throws OrderIsOver.
+  store::Time advance(store::OrderRecord& record, const std::stop_token& stop) const;
+
+  // The PACS that the next step speaks to; empty for none.
+  static std::string pacs_of(const store::OrderRecord& record);
+
+ private:
+  // Puts a query of the order's PACS into the audit trail, with its outcome.
+  void note_query(store::OrderRecord& record, bool success) const;
+  store::Time wait_for_series(store::OrderRecord& record, const std::stop_token& stop) const;
+  store::Time fetch(store::OrderRecord& record, const std::stop_token& stop) const;
+  store::Time mesh(store::OrderRecord& record) const;
+  bool is_lost(const Error& error, const store::OrderRecord& record) const;
+  store::Time submit_job(store::OrderRecord& record) const;
+  store::Time make(store::OrderRecord& record, const Job& job) const;
+  store::Time send(store::OrderRecord& record, const std::stop_token& stop) const;
+  // False when the study is another patient's now.
+  bool is_same_patient(const store::OrderRecord& record, const OrderResult& result,
+                       const std::stop_token& stop) const;
+  // Throws PacsFailure kChanged when the study is another patient's now, and Error kUnavailable
+  // when the object is damaged or missing. The record is then at the step that repairs that.
+  void check_before_sending(store::OrderRecord& record, std::size_t index,
+                            const std::stop_token& stop) const;
+  void send_one(store::OrderRecord& record, std::size_t index, const std::stop_token& stop) const;
+  // Saves the order after `step` has succeeded, which forgets failures of that and of earlier
+  // steps. Returns `next`. Throws OrderIsOver.
+  store::Time save_after(OrderState step, store::OrderRecord& record, store::Time next) const;
+  // The same, forgetting no failures.
+  store::Time save(store::OrderRecord& record, store::Time next) const;
+  Pacs& pacs(const std::string& name) const;
+
+  const OrderServices services_;
+  const Hospital& hospital_;
+  const Clock now_;
+};
+
+}  // namespace isomesh::orders

@@ -1,0 +1,106 @@
+// What rules find by themselves, and what is forgotten.
+#include <array>
+#include <ctime>
+#include <utility>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "server/hospital/orders/orders.h"
+
+namespace isomesh::orders {
+namespace {
+
+constexpr std::chrono::minutes kForgetPause{10};
+// What this makes itself is never taken for images.
+constexpr std::string_view kOwnModality = "M3D";
+
+// DA of so many days before. Studies have dates without time zones, so one day more is asked for.
+std::string day_before(store::Time now, std::uint32_t days) {
+  const std::time_t moment =
+      std::chrono::system_clock::to_time_t(now - std::chrono::days(days) - std::chrono::days(1));
+  std::tm parts = {};
+  ::gmtime_r(&moment, &parts);
+  std::array<char, 16> text = {};
+  std::strftime(text.data(), text.size(), "%Y%m%d", &parts);
+  return text.data();
+}
+
+bool is_wanted(const FoundSeries& series, const SeriesMatch& match) {
+  if (series.modality == kOwnModality) return false;
+  if (!match.modality.empty() && series.modality != match.modality) return false;
+  if (!match.series_description.empty() && !matches(match.series_description, series.description)) {
+    return false;
+  }
+  return series.instances.value_or(match.min_instances) >= match.min_instances;
+}
+
+}  // namespace
+
+void Orders::look_at_rule(const Rule& rule, const std::stop_token& stop) {
+  const auto peer = services_.pacs.find(*rule.watch);
+  if (peer == services_.pacs.end()) return;
+  try {
+    bool is_told = false;
+    const auto found = peer->second->find_recent(day_before(options_.now(), rule.match.days),
+                                                 rule.match.modality, stop);
+    for (const FoundSeries& series : found) {
+      if (!is_wanted(series, rule.match)) continue;
+      const store::OrderRecord record = make_order(rule, *rule.watch, series);
+      const bool is_new = services_.orders.submit_watched(
+          {.record = record, .idempotency_key = "", .request_digest = ""},
+          {.rule = rule.name,
+           .study = series.study,
+           .series = series.series,
+           .instances = series.instances.value_or(0)},
+          hospital_.most_open);
+      if (!is_new) continue;
+      // A watch asks the same all day; what is kept is when that led to something.
+      if (!std::exchange(is_told, true)) {
+        services_.audit.add(
+            {.event = store::AuditEvent::kQuery, .owner = rule.owner, .pacs = *rule.watch});
+      }
+      log(record, "");
+      changed();
+    }
+    note_success(*rule.watch);
+  } catch (const PacsFailure& failure) {
+    note_failure(*rule.watch, failure, "");
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kCancelled)
+      log_error("the watch of rule {} failed and is retried: {}", rule.name, error.what());
+  } catch (const std::exception& error) {
+    log_error("the watch of rule {} failed and is retried: {}", rule.name, error.what());
+  }
+}
+
+void Orders::watch(const std::stop_token& stop) {
+  store::Time next_forgetting = options_.now();
+  while (!stop.stop_requested()) {
+    for (const Rule& rule : hospital_.rules) {
+      if (rule.watch && !stop.stop_requested()) look_at_rule(rule, stop);
+    }
+    try {
+      const store::Time now = options_.now();
+      if (now >= next_forgetting) {
+        next_forgetting = now + kForgetPause;
+        forget();
+      }
+    } catch (const std::exception& error) {
+      log_error("ended orders could not be removed and are retried: {}", error.what());
+    }
+    Lock lock(mutex_);
+    changed_.wait_for(lock, stop, hospital_.poll, [] { return false; });
+  }
+}
+
+void Orders::forget() {
+  const store::Time before =
+      (options_.believed_now ? options_.believed_now() : options_.now()) - options_.keep;
+  const std::size_t orders = services_.orders.forget(before);
+  const std::size_t instances = services_.received.forget(before);
+  if (orders + instances == 0) return;
+  log_info("removed {} orders that ended before {} (--keep-days) and the notes of {} instances",
+           orders, timestamp_of(before), instances);
+}
+
+}  // namespace isomesh::orders
