@@ -26,13 +26,6 @@
 #include "server/callbacks/targets.h"
 #include "server/commands.h"
 #include "server/ending.h"
-#include "server/hospital/audit/syslog.h"
-#include "server/hospital/dicomweb/dicomweb.h"
-#include "server/hospital/dimse/c_store.h"
-#include "server/hospital/dimse/listener.h"
-#include "server/hospital/orders/hospital.h"
-#include "server/hospital/orders/orders.h"
-#include "server/hospital/orders/received.h"
 #include "server/http/app/outcomes.h"
 #include "server/http/guards/auth.h"
 #include "server/http/observe/metrics.h"
@@ -53,6 +46,9 @@
 #include "server/store/files/data_folder.h"
 #include "server/store/postgresql/connection.h"
 #include "server/store/retention.h"
+#ifdef ISOMESH_HOSPITAL
+#include "server/hospital/hospital.h"
+#endif
 
 namespace {
 
@@ -164,6 +160,22 @@ void check_places(const Options& options) {
   }
 }
 
+#ifndef ISOMESH_HOSPITAL
+namespace hospital {
+
+void check(const std::filesystem::path& /*file*/) {
+  throw invalid_parameter("hospital", "is not known to this isomeshd: it was built without");
+}
+
+std::unique_ptr<http::Wing> open(const http::WingSettings& settings,
+                                 const http::WingServices& /*services*/) {
+  if (!settings.file.empty()) check(settings.file);
+  return nullptr;
+}
+
+}  // namespace hospital
+#endif
+
 // Tells what would be used. Throws what a start would that finds a mistake in it; touches neither
 // the data folder nor the address.
 int tell_configuration(const Options& options, const CLI::App& cli) {
@@ -174,96 +186,9 @@ int tell_configuration(const Options& options, const CLI::App& cli) {
   callback_secrets(options);
   if (!options.store.empty()) store::postgresql::check_url(options.store);
   check_blobs(options.blobs);
-  if (!options.hospital.empty()) {
-    const orders::Hospital hospital = orders::read_hospital(options.hospital);
-    if (hospital.dimse) dimse::listen_address(*hospital.dimse);
-  }
+  if (!options.hospital.empty()) hospital::check(options.hospital);
   std::cout << as_config(cli, Remarks::kNo);
   return 0;
-}
-
-bool needs_dimse(const orders::Hospital& hospital) {
-  return hospital.dimse || std::ranges::any_of(hospital.pacs, [](const orders::PacsSettings& pacs) {
-           return pacs.send_by == orders::SendBy::kCStore;
-         });
-}
-
-// Who is spoken to, and where their answers are read.
-struct OpenHospital {
-  OpenHospital(orders::Hospital the_settings, const jobs::RunnerOptions& runner)
-      : settings(std::move(the_settings)), answers(runner) {
-    // As many as may soon be asked for at once; further ones take a moment.
-    constexpr std::size_t kPrepared = 2;
-    if (needs_dimse(settings)) {
-      dimse =
-          std::make_unique<process::PreparedProcesses>(program_of_ours("isomesh-dimse"), kPrepared);
-    }
-  }
-
-  std::unique_ptr<orders::Pacs> peer(const orders::PacsSettings& pacs,
-                                     const std::filesystem::path& scratch, const Options& options) {
-    std::unique_ptr<orders::Pacs> web;
-    if (!pacs.dicomweb.empty()) {
-      web = std::make_unique<dicomweb::DicomWeb>(
-          pacs, scratch, options.http.upload.max_bytes,
-          [this](const std::filesystem::path& file) { return answers.read_answer(file); });
-    }
-    if (pacs.send_by == orders::SendBy::kStow) return web;
-    return std::make_unique<dimse::CStore>(pacs, std::move(web), *dimse);
-  }
-
-  orders::PacsByName peers(const std::filesystem::path& scratch, const Options& options,
-                           const store::ReceivedStore& received, const store::BlobStore& blobs) {
-    orders::PacsByName all;
-    for (const orders::PacsSettings& pacs : settings.pacs) {
-      all[pacs.name] = peer(pacs, scratch, options);
-    }
-    if (!settings.dimse) return all;
-    for (const auto& [title, rule] : settings.dimse->routes) {
-      all[orders::received_by(title)] = std::make_unique<orders::Received>(title, received, blobs);
-    }
-    return all;
-  }
-
-  // Cuts off what is read and sent.
-  void stop() {
-    answers.stop();
-    if (dimse) dimse->stop();
-  }
-
-  const orders::Hospital settings;
-  jobs::ImportRunner answers;
-  std::unique_ptr<process::PreparedProcesses> dimse;  // null where nobody speaks it
-};
-
-std::unique_ptr<OpenHospital> open_hospital(const Options& options,
-                                            const std::filesystem::path& import_program) {
-  if (options.hospital.empty()) return nullptr;
-  jobs::RunnerOptions runner;
-  runner.program = import_program;
-  runner.bounds = {.memory_bytes = std::uint64_t{1} << 30, .time = std::chrono::minutes(1)};
-  return std::make_unique<OpenHospital>(orders::read_hospital(options.hospital), runner);
-}
-
-std::string host_name() {
-  std::array<char, 256> name = {};
-  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "-";
-}
-
-// Null where nobody collects it.
-std::unique_ptr<audit::SyslogSender> send_trail(const orders::Hospital& hospital,
-                                                store::AuditTrail& trail) {
-  if (!hospital.syslog) return nullptr;
-  const orders::SyslogSettings& to = *hospital.syslog;
-  return std::make_unique<audit::SyslogSender>(
-      trail,
-      audit::TlsServer{.host = to.host,
-                       .port = to.port,
-                       .authorities = to.ca_file,
-                       .certificate = to.certificate_file,
-                       .key = to.key_file},
-      audit::AuditSource{
-          .station = hospital.station_name, .host = host_name(), .process = ::getpid()});
 }
 
 int run(const Options& options, const sigset_t& signals) {
@@ -312,38 +237,17 @@ int run(const Options& options, const sigset_t& signals) {
   server_options.tls = files.tls.get();
   server_options.part_bytes = options.max_disk / 4;
   server_options.connections = net::connections_within(net::raise_descriptor_limit());
-  const auto hospital = open_hospital(options, runner.program);
-  store::OrderStore& order_store = records->orders();
-  store::AuditTrail& audit = records->audit();
-  store::ReceivedStore& received = records->received();
-  if (hospital) records->take_orders();
-  const orders::PacsByName peers =
-      hospital ? hospital->peers(folder.scratch(), options, received, blobs) : orders::PacsByName();
-  const auto audit_sender = hospital ? send_trail(hospital->settings, audit) : nullptr;
-  std::unique_ptr<orders::Orders> orders;
-  std::unique_ptr<dimse::DimseListener> dimse_listener;
-  if (hospital) {
-    orders = std::make_unique<orders::Orders>(
-        orders::OrderServices{folder, blobs, volumes, jobs, library, labels, order_store, audit,
-                              received, peers},
-        hospital->settings,
-        orders::OrderOptions{.keep = std::chrono::duration_cast<std::chrono::hours>(keep),
-                             .believed_now = [&records] { return records->now(); },
-                             .cut_off =
-                                 [&] {
-                                   hospital->stop();
-                                   library.stop_imports();
-                                 }});
-    if (hospital->settings.dimse) {
-      dimse_listener = std::make_unique<dimse::DimseListener>(
-          dimse::ListenerServices{folder, blobs, received, audit, *hospital->dimse},
-          *hospital->settings.dimse);
-      log_info("receiving series by C-STORE on {}", dimse_listener->authority());
-    }
-  }
+  if (!options.hospital.empty()) records->take_orders();
+  const std::unique_ptr<http::Wing> hospital = hospital::open(
+      {.file = options.hospital,
+       .max_upload_bytes = options.http.upload.max_bytes,
+       .keep = std::chrono::duration_cast<std::chrono::hours>(keep),
+       .program = program_of_ours},
+      {folder, blobs, volumes, jobs, library, labels, records->orders(), records->audit(),
+       records->received(), [&records] { return records->now(); }});
   const http::Services services = {
-      folder,    blobs,   volumes, jobs,      library, histograms,         labels,      estimator,
-      retention, metrics, outbox,  callbacks, targets, files.tokens.get(), orders.get()};
+      folder,    blobs,   volumes, jobs,      library, histograms,         labels,        estimator,
+      retention, metrics, outbox,  callbacks, targets, files.tokens.get(), hospital.get()};
   http::Server server(services, server_options);
   const std::string url = server.bind(address);
   server.start();
@@ -365,13 +269,12 @@ int run(const Options& options, const sigset_t& signals) {
   while (::sigwait(&signals, &signal) == 0 && signal == SIGHUP) reload(options, files, callbacks);
   log_info("signal {}: draining", signal);
   server.begin_drain();
-  if (dimse_listener) dimse_listener->stop();
+  if (hospital) hospital->begin_drain();
   if (!workers.drain(std::chrono::seconds(options.drain_seconds))) {
     log_warning("jobs are still running after {} s; they are stopped and put back",
                 options.drain_seconds);
   }
-  if (orders) orders->stop();
-  if (audit_sender) audit_sender->stop();
+  if (hospital) hospital->stop();
   server.stop();
   return 0;
 }

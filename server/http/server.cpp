@@ -31,7 +31,7 @@ void watch_jobs(App& app) {
         is_heard |= app.events.publish(event);
         if (event.kind != store::EventKind::kDone) continue;
         app.connections.job_ended(event.job);
-        if (app.services.orders != nullptr) app.services.orders->job_ended(event.job);
+        if (app.services.hospital != nullptr) app.services.hospital->job_ended(event.job);
         if (!event.is_elsewhere) report_ended(app, event.job);
       }
       if (is_heard) app.connections.wake_sources();
@@ -62,7 +62,7 @@ Server::Server(const Services& services, const ServerOptions& options)
   add_page_routes(state_->app);
   add_service_routes(state_->app);
   add_metrics_route(state_->app);
-  add_order_routes(state_->app);
+  if (services.hospital != nullptr) services.hospital->add_routes(state_->app);
 }
 
 Server::~Server() {
@@ -83,8 +83,8 @@ std::string Server::bind(const net::Address& address) {
 void Server::start() {
   App& app = state_->app;
   app.connections.open(state_->listener->descriptor());
-  if (app.services.orders != nullptr) {
-    app.services.orders->on_end([&app](const std::string& order) {
+  if (app.services.hospital != nullptr) {
+    app.services.hospital->on_end([&app](const std::string& order) {
       app.connections.job_ended(order);
       app.services.callbacks.wake();
     });

@@ -1,7 +1,9 @@
 # The component daemon: programs, unit, configuration, manual page, completions.
 install(TARGETS isomeshd RUNTIME DESTINATION ${CMAKE_INSTALL_SBINDIR} COMPONENT daemon)
-install(TARGETS isomesh-dimse isomesh-import isomesh-job RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/isomesh
-  COMPONENT daemon)
+install(TARGETS isomesh-import isomesh-job RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/isomesh COMPONENT daemon)
+if(ISOMESH_HOSPITAL)
+  install(TARGETS isomesh-dimse RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/isomesh COMPONENT daemon)
+endif()
 
 # What is installed in /usr has its configuration in /etc and its data in /var.
 set(config ${CMAKE_INSTALL_SYSCONFDIR}/isomesh)

@@ -44,12 +44,10 @@ void report_refused(Metrics& metrics, const std::string& address, const Error& e
       .add("remote", address.empty() ? "unix" : address);
 }
 
-// Requests wait for jobs and for orders.
+// Requests wait for jobs, and for what wings make of them.
 bool has_ended(const Services& services, const std::string& id) {
-  try {
-    if (services.orders != nullptr) return is_final(services.orders->get(std::nullopt, id).state);
-  } catch (const Error&) {
-    // it is no order
+  if (services.hospital != nullptr) {
+    if (const auto ended = services.hospital->has_ended(id)) return *ended;
   }
   try {
     return is_final(services.jobs.get(std::nullopt, id).state);

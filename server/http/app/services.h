@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "server/callbacks/callbacks.h"
-#include "server/hospital/orders/orders.h"
+#include "server/http/app/wing.h"
 #include "server/http/guards/auth.h"
 #include "server/http/observe/metrics.h"
 #include "server/http/requests/upload.h"
@@ -57,8 +57,8 @@ struct Services {
   const store::Outbox& outbox;
   callbacks::Callbacks& callbacks;
   const callbacks::CallbackTargets& callback_targets;
-  const Tokens* tokens = nullptr;    // null: requests are not authenticated
-  orders::Orders* orders = nullptr;  // null: no PACS is configured
+  const Tokens* tokens = nullptr;  // null: requests are not authenticated
+  Wing* hospital = nullptr;        // null: the build has none
 };
 
 }  // namespace isomesh::http

@@ -83,6 +83,20 @@ std::uint64_t open_files() {
   return count;
 }
 
+prometheus::MetricFamily family_of(const MeasuredFamily& measured) {
+  using prometheus::MetricType;
+  prometheus::MetricFamily family;
+  family.name = measured.name;
+  family.help = measured.help;
+  family.type = measured.is_counter ? MetricType::Counter : MetricType::Gauge;
+  for (const auto& [labels, value] : measured.values) {
+    prometheus::ClientMetric& metric = family.metric.emplace_back();
+    for (const auto& [name, text] : labels) metric.label.push_back({name, text});
+    (measured.is_counter ? metric.counter.value : metric.gauge.value) = value;
+  }
+  return family;
+}
+
 // The library writes the older form of the text, where a counter's family is called like its
 // sample. In OpenMetrics the family lacks the suffix, and an end is marked.
 std::string to_openmetrics(const std::string& text) {
@@ -116,51 +130,8 @@ std::string_view name_of(callbacks::CallbackOutcome outcome) {
   return "given_up";
 }
 
-// What is there only where a PACS is configured.
-class OrderMetrics {
- public:
-  explicit OrderMetrics(prometheus::Registry& registry)
-      : orders_(prometheus::BuildGauge()
-                    .Name("isomesh_orders")
-                    .Help("Orders by state and rule")
-                    .Register(registry)),
-        failed_(prometheus::BuildCounter()
-                    .Name("isomesh_order_attempts_failed_total")
-                    .Help("Failed attempts of orders, by PACS and reason")
-                    .Register(registry)),
-        oldest_(prometheus::BuildGauge()
-                    .Name("isomesh_oldest_open_order_seconds")
-                    .Help("Age of the oldest open order; 0 without one")
-                    .Register(registry)
-                    .Add({})) {}
-
-  void set(const OrderLevels& levels) {
-    for (Gauge* gauge : told_) gauge->Set(0);
-    for (const auto& [what, count] : levels.counts.by_state_and_rule) {
-      Gauge& gauge =
-          orders_.Add({{"state", std::string(to_string(what.first))}, {"rule", what.second}});
-      gauge.Set(static_cast<double>(count));
-      told_.insert(&gauge);
-    }
-    for (const orders::Attempts& attempts : levels.failed) {
-      Counter& counter = failed_.Add(
-          {{"pacs", attempts.pacs}, {"reason", std::string(orders::to_string(attempts.fault))}});
-      counter.Increment(static_cast<double>(attempts.count) - counter.Value());
-    }
-    oldest_.Set(levels.oldest_open_seconds);
-  }
-
- private:
-  Family<Gauge>& orders_;
-  Family<Counter>& failed_;
-  Gauge& oldest_;
-  std::set<Gauge*> told_;  // in the last answer
-};
-
 struct Metrics::State {
   prometheus::Registry registry;
-  Mutex orders_mutex;
-  std::optional<OrderMetrics> orders ISOMESH_GUARDED_BY(orders_mutex);
 
   Family<Counter>& counter(const char* name, const char* help) {
     return prometheus::BuildCounter().Name(name).Help(help).Register(registry);
@@ -265,15 +236,12 @@ std::string Metrics::text(const Levels& levels) const {
   state.waiting_callbacks.Set(static_cast<double>(levels.callbacks));
   state.disk_used.Set(static_cast<double>(levels.disk_used_bytes));
   state.disk_free.Set(static_cast<double>(levels.disk_free_bytes));
-  if (levels.orders) {
-    const Lock lock(state.orders_mutex);
-    if (!state.orders) state.orders.emplace(state.registry);
-    state.orders->set(*levels.orders);
-  }
   state.memory.Set(static_cast<double>(process_status("VmRSS:")) * kKibibyte);
   state.threads.Set(static_cast<double>(process_status("Threads:")));
   state.files.Set(static_cast<double>(open_files()));
-  return to_openmetrics(prometheus::TextSerializer().Serialize(state.registry.Collect()));
+  std::vector<prometheus::MetricFamily> families = state.registry.Collect();
+  for (const MeasuredFamily& family : levels.others) families.push_back(family_of(family));
+  return to_openmetrics(prometheus::TextSerializer().Serialize(families));
 }
 
 }  // namespace isomesh::http

@@ -15,7 +15,6 @@
 #include "proto/error.h"
 #include "proto/types.h"
 #include "server/callbacks/callbacks.h"
-#include "server/hospital/orders/orders.h"
 
 namespace isomesh::http {
 
@@ -31,11 +30,17 @@ struct AnsweredRequest {
 
 std::string_view name_of(callbacks::CallbackOutcome outcome);
 
-// Of a service that knows a PACS.
-struct OrderLevels {
-  store::OrderCounts counts;
-  std::vector<orders::Attempts> failed;
-  double oldest_open_seconds = 0;
+// A family of metrics that a part of the service measures when somebody asks.
+struct MeasuredFamily {
+  struct Value {
+    std::map<std::string, std::string> labels;
+    double value = 0;
+  };
+
+  std::string name;
+  std::string help;
+  bool is_counter = false;  // otherwise it is a gauge
+  std::vector<Value> values = {};
 };
 
 // What is measured when somebody asks.
@@ -46,7 +51,7 @@ struct Levels {
   std::uint64_t callbacks = 0;  // that wait to be delivered
   std::uint64_t disk_used_bytes = 0;
   std::uint64_t disk_free_bytes = 0;
-  std::optional<OrderLevels> orders = {};
+  std::vector<MeasuredFamily> others = {};
 };
 
 // Thread safe.

@@ -18,15 +18,7 @@ Levels levels_of(const App& app) {
   std::error_code unknown;  // then 0 is told
   const auto space = std::filesystem::space(app.services.folder.blobs(), unknown);
   if (!unknown) levels.disk_free_bytes = space.available;
-  if (const orders::Orders* orders = app.services.orders) {
-    OrderLevels& told = levels.orders.emplace();
-    told.counts = orders->counts();
-    told.failed = orders->attempts();
-    if (const auto oldest = told.counts.oldest_open) {
-      told.oldest_open_seconds =
-          std::chrono::duration<double>(std::chrono::system_clock::now() - *oldest).count();
-    }
-  }
+  if (app.services.hospital != nullptr) levels.others = app.services.hospital->measure();
   return levels;
 }
 

@@ -115,6 +115,5 @@ void add_inspect_routes(App& app);
 void add_page_routes(App& app);
 void add_service_routes(App& app);
 void add_metrics_route(App& app);
-void add_order_routes(App& app);
 
 }  // namespace isomesh::http

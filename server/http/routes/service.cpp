@@ -18,9 +18,10 @@ void add_service_routes(App& app) {
   });
   add_get(app, "/version", [&app](const auto& request, auto& response) {
     check_known(request, {});
-    const nlohmann::json version = {{"version", ISOMESH_VERSION},
-                                    {"mesher", jobs::kMesherVersion},
-                                    {"orders", app.services.orders != nullptr}};
+    const nlohmann::json version = {
+        {"version", ISOMESH_VERSION},
+        {"mesher", jobs::kMesherVersion},
+        {"orders", app.services.hospital != nullptr && app.services.hospital->is_open()}};
     response.set_body(version.dump(), "application/json");
   });
   add_get(app, "/openapi.yaml", [](const auto& /*request*/, auto& response) {

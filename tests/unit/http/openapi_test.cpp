@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
+#include "server/hospital/routes.h"
 #include "server/http/routes/routes.h"
 #include "server/store/files/blob_store.h"
 #include "server/store/retention.h"
@@ -31,7 +32,7 @@ class OpenApi : public testing::Test {
     add_page_routes(app_);
     add_service_routes(app_);
     add_metrics_route(app_);
-    add_order_routes(app_);
+    hospital::add_order_routes(app_, nullptr);
   }
 
   static Methods methods_of(const Route& route) {

@@ -57,17 +57,18 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/callbacks", {"server/store"}},
     {"server/net", {"proto"}},
     {"server/hospital/audit", {"server/store", "server/net"}},
+    {"server/hospital",
+     {"server/http", "server/hospital/audit", "server/hospital/dicomweb", "server/hospital/dimse"}},
     {"server/http/requests", {"server/net", "server/store", "server/process"}},
     {"server/http/connections", {"server/http/requests"}},
-    {"server/http/observe", {"server/callbacks", "server/hospital/orders"}},
+    {"server/http/observe", {"server/callbacks", "server/jobs"}},
     {"server/http/guards", {"server/http/connections", "server/http/observe"}},
     {"server/http/answers", {"server/http/requests"}},
     {"server/http/app",
-     {"server/http/guards", "server/http/answers", "server/callbacks", "server/hospital/orders"}},
+     {"server/http/guards", "server/http/answers", "server/callbacks", "server/jobs"}},
     {"server/http/routes", {"server/http/app"}},
     {"server/http", {"server/http/routes"}},
-    {"server",
-     {"server/http", "server/hospital/audit", "server/hospital/dicomweb", "server/hospital/dimse"}},
+    {"server", {"server/hospital"}},
     {"client/isomesh", {"proto"}},
     {"client/cli", {"client/isomesh"}},
 };
@@ -147,6 +148,17 @@ TEST(Layers, OneFileOfTheServerKnowsTheHttpLibrary) {
     }
   }
   EXPECT_EQ(users, std::vector<std::string>{"server/http/connections/library.cpp"});
+}
+
+// So that it can be left out: see ISOMESH_HOSPITAL.
+TEST(Layers, OneFileKnowsTheHospital) {
+  std::vector<std::string> users;
+  for (const auto& [file, folder, included] : project_includes()) {
+    if (is_in(included, "server/hospital") && !is_in(folder, "server/hospital")) {
+      users.push_back(file);
+    }
+  }
+  EXPECT_EQ(users, std::vector<std::string>{"server/main.cpp"});
 }
 
 TEST(Layers, KernelsKnowNoFilesNoJsonNoHttp) {

@@ -1,4 +1,4 @@
-#include "proto/orders.h"
+#include "server/hospital/routes.h"
 
 #include <chrono>
 #include <optional>
@@ -6,18 +6,22 @@
 #include <utility>
 
 #include "base/sha256.h"
+#include "proto/orders.h"
 #include "server/http/requests/request_values.h"
 #include "server/http/routes/routes.h"
 
-namespace isomesh::http {
+namespace isomesh::hospital {
 namespace {
+
+using namespace http;
+using orders::Orders;
 
 const std::string kOrders = "/v1/orders";
 constexpr const char* kOrderCursor = "orders";
 
 // Throws Error kNotFound where no PACS is configured.
-orders::Orders& orders_of(const App& app) {
-  if (app.services.orders != nullptr) return *app.services.orders;
+Orders& configured(Orders* orders) {
+  if (orders != nullptr) return *orders;
   throw Error(ErrorCode::kNotFound, "this service has no PACS: it was started without --hospital");
 }
 
@@ -25,9 +29,9 @@ orders::Orderer orderer_of(const Request& request) {
   return {.name = owner_of(request), .is_administrator = !viewer_of(request)};
 }
 
-void submit(App& app, const Request& request, Response& response) {
+void submit(App& app, Orders* orders, const Request& request, Response& response) {
   check_known(request, {});
-  orders::Orders& all = orders_of(app);
+  Orders& all = configured(orders);
   const std::string body = json_body(app, request);
   const OrderRequest asked = parse_order_request(body);
   if (asked.callback) app.services.callback_targets.check(asked.callback->url);
@@ -44,10 +48,11 @@ void submit(App& app, const Request& request, Response& response) {
   }
 }
 
-std::optional<Continuation> get(App& app, const Request& request, Response& response) {
+std::optional<Continuation> get(App& app, Orders* orders, const Request& request,
+                                Response& response) {
   check_known(request, {"wait"});
   const auto wait = wait_of(request);
-  orders::Orders& all = orders_of(app);
+  Orders& all = configured(orders);
   const std::string id = request.path_parameter("id");
   const Order order = all.get(viewer_of(request), id);
   if (is_final(order.state) || wait.count() == 0 || app.stopping) {
@@ -75,9 +80,9 @@ store::OrderFilter filter_of(const Request& request) {
   return filter;
 }
 
-void list(App& app, const Request& request, Response& response) {
+void list(Orders* orders, const Request& request, Response& response) {
   check_known(request, {"state", "rule", "cursor", "limit"});
-  const orders::Orders& all = orders_of(app);
+  const Orders& all = configured(orders);
   const std::string after = id_after(request, kOrderCursor);
   const std::size_t limit = whole_number_of(request, "limit", kListLengths, kUsualListLength);
   answer_list<Order>(
@@ -91,38 +96,41 @@ void list(App& app, const Request& request, Response& response) {
        .place_of = [](const Order& order) { return order.id; }});
 }
 
-void cancel(App& app, const Request& request, Response& response) {
+void cancel(Orders* orders, const Request& request, Response& response) {
   check_known(request, {});
   answer_json(response, 200,
-              to_json(orders_of(app).cancel(viewer_of(request), request.path_parameter("id"))));
+              to_json(configured(orders).cancel(viewer_of(request), request.path_parameter("id"))));
 }
 
-void retry(App& app, const Request& request, Response& response) {
+void retry(Orders* orders, const Request& request, Response& response) {
   check_known(request, {});
   answer_json(response, 202,
-              to_json(orders_of(app).retry(viewer_of(request), request.path_parameter("id"))));
+              to_json(configured(orders).retry(viewer_of(request), request.path_parameter("id"))));
 }
 
-void pacs(App& app, const Request& request, Response& response) {
+void pacs(Orders* orders, const Request& request, Response& response) {
   check_known(request, {});
-  answer_json(response, 200, to_json(orders_of(app).pacs()));
+  answer_json(response, 200, to_json(configured(orders).pacs()));
 }
 
 }  // namespace
 
-void add_order_routes(App& app) {
-  add_post(app, kOrders,
-           [&app](const auto& request, auto& response) { submit(app, request, response); });
-  add_computed_get(app, kOrders,
-                   [&app](const auto& request, auto& response) { list(app, request, response); });
-  add_get(app, kOrders + "/{id}",
-          [&app](const auto& request, auto& response) { return get(app, request, response); });
+void add_order_routes(App& app, Orders* orders) {
+  add_post(app, kOrders, [&app, orders](const auto& request, auto& response) {
+    submit(app, orders, request, response);
+  });
+  add_computed_get(app, kOrders, [orders](const auto& request, auto& response) {
+    list(orders, request, response);
+  });
+  add_get(app, kOrders + "/{id}", [&app, orders](const auto& request, auto& response) {
+    return get(app, orders, request, response);
+  });
   add_delete(app, kOrders + "/{id}",
-             [&app](const auto& request, auto& response) { cancel(app, request, response); });
+             [orders](const auto& request, auto& response) { cancel(orders, request, response); });
   add_post(app, kOrders + "/{id}/retry",
-           [&app](const auto& request, auto& response) { retry(app, request, response); });
+           [orders](const auto& request, auto& response) { retry(orders, request, response); });
   add_get(app, "/v1/pacs",
-          [&app](const auto& request, auto& response) { pacs(app, request, response); });
+          [orders](const auto& request, auto& response) { pacs(orders, request, response); });
 }
 
-}  // namespace isomesh::http
+}  // namespace isomesh::hospital

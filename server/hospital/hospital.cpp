@@ -1,0 +1,232 @@
+#include "server/hospital/hospital.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+
+#include <unistd.h>
+
+#include "base/log.h"
+#include "server/hospital/audit/syslog.h"
+#include "server/hospital/dicomweb/dicomweb.h"
+#include "server/hospital/dimse/c_store.h"
+#include "server/hospital/dimse/listener.h"
+#include "server/hospital/orders/hospital.h"
+#include "server/hospital/orders/orders.h"
+#include "server/hospital/orders/received.h"
+#include "server/hospital/routes.h"
+#include "server/jobs/import_runner.h"
+#include "server/process/prepared.h"
+
+namespace isomesh::hospital {
+namespace {
+
+jobs::RunnerOptions answer_runner(const http::WingSettings& settings) {
+  jobs::RunnerOptions runner;
+  runner.program = settings.program("isomesh-import");
+  runner.bounds = {.memory_bytes = std::uint64_t{1} << 30, .time = std::chrono::minutes(1)};
+  return runner;
+}
+
+bool needs_dimse(const orders::Hospital& hospital) {
+  return hospital.dimse || std::ranges::any_of(hospital.pacs, [](const orders::PacsSettings& pacs) {
+           return pacs.send_by == orders::SendBy::kCStore;
+         });
+}
+
+// Null where nobody speaks DIMSE.
+std::unique_ptr<process::PreparedProcesses> prepare_dimse(const orders::Hospital& hospital,
+                                                          const http::WingSettings& settings) {
+  // As many as may soon be asked for at once; further ones take a moment.
+  constexpr std::size_t kPrepared = 2;
+  if (!needs_dimse(hospital)) return nullptr;
+  return std::make_unique<process::PreparedProcesses>(settings.program("isomesh-dimse"), kPrepared);
+}
+
+std::string host_name() {
+  std::array<char, 256> name = {};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "-";
+}
+
+// Null where nobody collects it.
+std::unique_ptr<audit::SyslogSender> send_trail(const orders::Hospital& hospital,
+                                                store::AuditTrail& trail) {
+  if (!hospital.syslog) return nullptr;
+  const orders::SyslogSettings& to = *hospital.syslog;
+  return std::make_unique<audit::SyslogSender>(
+      trail,
+      audit::TlsServer{.host = to.host,
+                       .port = to.port,
+                       .authorities = to.ca_file,
+                       .certificate = to.certificate_file,
+                       .key = to.key_file},
+      audit::AuditSource{
+          .station = hospital.station_name, .host = host_name(), .process = ::getpid()});
+}
+
+// A hospital that is configured.
+class OpenHospital {
+ public:
+  OpenHospital(const http::WingSettings& settings, const http::WingServices& services)
+      : hospital_(orders::read_hospital(settings.file)),
+        answers_(answer_runner(settings)),
+        dimse_(prepare_dimse(hospital_, settings)),
+        peers_(peers(settings, services)),
+        audit_(send_trail(hospital_, services.audit)),
+        orders_({services.folder, services.blobs, services.volumes, services.jobs, services.library,
+                 services.labels, services.orders, services.audit, services.received, peers_},
+                hospital_,
+                {.keep = settings.keep,
+                 .believed_now = services.believed_now,
+                 .cut_off = [this, &services] {
+                   answers_.stop();
+                   if (dimse_) dimse_->stop();
+                   services.library.stop_imports();
+                 }}) {
+    if (!hospital_.dimse) return;
+    listener_ = std::make_unique<dimse::DimseListener>(
+        dimse::ListenerServices{services.folder, services.blobs, services.received, services.audit,
+                                *dimse_},
+        *hospital_.dimse);
+    log_info("receiving series by C-STORE on {}", listener_->authority());
+  }
+
+  orders::Orders& orders() { return orders_; }
+
+  void begin_drain() {
+    if (listener_) listener_->stop();
+  }
+
+  void stop() {
+    orders_.stop();
+    if (audit_) audit_->stop();
+  }
+
+ private:
+  std::unique_ptr<orders::Pacs> peer(const orders::PacsSettings& pacs,
+                                     const http::WingSettings& settings,
+                                     const std::filesystem::path& scratch) {
+    std::unique_ptr<orders::Pacs> web;
+    if (!pacs.dicomweb.empty()) {
+      web = std::make_unique<dicomweb::DicomWeb>(
+          pacs, scratch, settings.max_upload_bytes,
+          [this](const std::filesystem::path& file) { return answers_.read_answer(file); });
+    }
+    if (pacs.send_by == orders::SendBy::kStow) return web;
+    return std::make_unique<dimse::CStore>(pacs, std::move(web), *dimse_);
+  }
+
+  orders::PacsByName peers(const http::WingSettings& settings, const http::WingServices& services) {
+    orders::PacsByName all;
+    for (const orders::PacsSettings& pacs : hospital_.pacs) {
+      all[pacs.name] = peer(pacs, settings, services.folder.scratch());
+    }
+    if (!hospital_.dimse) return all;
+    for (const auto& [title, rule] : hospital_.dimse->routes) {
+      all[orders::received_by(title)] =
+          std::make_unique<orders::Received>(title, services.received, services.blobs);
+    }
+    return all;
+  }
+
+  const orders::Hospital hospital_;
+  jobs::ImportRunner answers_;
+  std::unique_ptr<process::PreparedProcesses> dimse_;
+  const orders::PacsByName peers_;
+  std::unique_ptr<audit::SyslogSender> audit_;
+  orders::Orders orders_;
+  std::unique_ptr<dimse::DimseListener> listener_;  // null where no series are received
+};
+
+http::MeasuredFamily orders_of(const store::OrderCounts& counts) {
+  http::MeasuredFamily family{.name = "isomesh_orders", .help = "Orders by state and rule"};
+  for (const auto& [what, count] : counts.by_state_and_rule) {
+    family.values.push_back({{{"state", std::string(to_string(what.first))}, {"rule", what.second}},
+                             static_cast<double>(count)});
+  }
+  return family;
+}
+
+http::MeasuredFamily failures_of(const std::vector<orders::Attempts>& failed) {
+  http::MeasuredFamily family{.name = "isomesh_order_attempts_failed_total",
+                              .help = "Failed attempts of orders, by PACS and reason",
+                              .is_counter = true};
+  for (const orders::Attempts& attempts : failed) {
+    family.values.push_back(
+        {{{"pacs", attempts.pacs}, {"reason", std::string(orders::to_string(attempts.fault))}},
+         static_cast<double>(attempts.count)});
+  }
+  return family;
+}
+
+http::MeasuredFamily oldest_of(const store::OrderCounts& counts) {
+  const auto age = counts.oldest_open ? std::chrono::system_clock::now() - *counts.oldest_open
+                                      : std::chrono::system_clock::duration::zero();
+  return {.name = "isomesh_oldest_open_order_seconds",
+          .help = "Age of the oldest open order; 0 without one",
+          .values = {{{}, std::chrono::duration<double>(age).count()}}};
+}
+
+class HospitalWing final : public http::Wing {
+ public:
+  HospitalWing(const http::WingSettings& settings, const http::WingServices& services)
+      : services_(services) {
+    if (!settings.file.empty()) hospital_ = std::make_unique<OpenHospital>(settings, services_);
+  }
+
+  bool is_open() const override { return hospital_ != nullptr; }
+
+  void add_routes(http::App& app) override {
+    add_order_routes(app, hospital_ ? &hospital_->orders() : nullptr);
+  }
+
+  std::optional<bool> has_ended(const std::string& id) const override {
+    if (!hospital_) return std::nullopt;
+    try {
+      return is_final(hospital_->orders().get(std::nullopt, id).state);
+    } catch (const Error&) {
+      return std::nullopt;  // it is no order
+    }
+  }
+
+  void on_end(std::function<void(const std::string& order)> listener) override {
+    if (hospital_) hospital_->orders().on_end(std::move(listener));
+  }
+
+  void job_ended(const std::string& job) override {
+    if (hospital_) hospital_->orders().job_ended(job);
+  }
+
+  std::vector<http::MeasuredFamily> measure() const override {
+    if (!hospital_) return {};
+    const store::OrderCounts counts = hospital_->orders().counts();
+    return {orders_of(counts), failures_of(hospital_->orders().attempts()), oldest_of(counts)};
+  }
+
+  void begin_drain() override {
+    if (hospital_) hospital_->begin_drain();
+  }
+
+  void stop() override {
+    if (hospital_) hospital_->stop();
+  }
+
+ private:
+  const http::WingServices services_;
+  std::unique_ptr<OpenHospital> hospital_;  // null where none is configured
+};
+
+}  // namespace
+
+void check(const std::filesystem::path& file) {
+  const orders::Hospital hospital = orders::read_hospital(file);
+  if (hospital.dimse) dimse::listen_address(*hospital.dimse);
+}
+
+std::unique_ptr<http::Wing> open(const http::WingSettings& settings,
+                                 const http::WingServices& services) {
+  return std::make_unique<HospitalWing>(settings, services);
+}
+
+}  // namespace isomesh::hospital
