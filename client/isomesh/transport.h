@@ -74,7 +74,8 @@ struct TransportOptions {
 // Constant after construction; `send` may be called from several threads. Each call has a
 // connection of its own. It goes straight to the server: the environment's proxies are not used,
 // because volumes and the token must not pass by a machine that the caller did not name, and
-// redirects are not followed.
+// redirects are not followed. libcurl announces bodies of more than a megabyte (Expect:
+// 100-continue), so a server can reject them before they are sent.
 class Transport {
  public:
   explicit Transport(TransportOptions options) : options_(std::move(options)) {}

@@ -13,9 +13,10 @@ namespace isomesh::process {
 struct Confinement {
   std::filesystem::path readable;  // the one file that may be read
   std::filesystem::path writable;  // the one folder in which anything may be done
-  std::uint64_t memory_bytes = 0;  // of private memory
-  std::uint64_t file_bytes = 0;    // of any one file, and of those that are mapped together
-  std::chrono::seconds time{0};    // of the processor
+  // Private memory only: the canonical file is mapped, and may be larger than the memory.
+  std::uint64_t memory_bytes = 0;
+  std::uint64_t file_bytes = 0;  // of any one file, and of those that are mapped together
+  std::chrono::seconds time{0};  // of the processor
 };
 
 // What can be taken from a process before it is known what it is to read. It cannot gain rights,

@@ -159,6 +159,7 @@ export class SliceView {
       this.canvas.width = width;
       this.canvas.height = height;
     }
+    // Drawn by the processor: if the graphics processor is emulated, it needs seconds for a long contour.
     const context = this.canvas.getContext('2d', { willReadFrequently: true });
     if (!context || width === 0 || height === 0) return;
     context.setTransform(1, 0, 0, 1, 0, 0);
