@@ -7,6 +7,7 @@
 
 #include "proto/error.h"
 #include "proto/parameters.h"
+#include "proto/stages.h"
 #include "proto/types.h"
 
 namespace isomesh {
@@ -129,13 +130,9 @@ void visit(Is<Callback> auto& self, auto&& field) {
 }
 
 void visit(Is<Timing> auto& self, auto&& field) {
-  field("queue", self.queue);
-  field("load", self.load);
-  field("extract", self.extract);
-  field("smooth", self.smooth);
-  field("simplify", self.simplify);
-  field("encode", self.encode);
-  field("certify", self.certify);
+  for (const StageRow& row : kStages) {
+    if (row.elapsed != nullptr) field(row.name, self.*row.elapsed);
+  }
   field("total", self.total);
 }
 

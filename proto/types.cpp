@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "proto/samples.h"
+#include "proto/stages.h"
 
 namespace isomesh {
 namespace {
@@ -80,11 +81,11 @@ struct Names<JobState> {
 
 template <>
 struct Names<Stage> {
-  static constexpr std::array kTable = {
-      std::pair{Stage::kQueue, "queue"},       std::pair{Stage::kLoad, "load"},
-      std::pair{Stage::kExtract, "extract"},   std::pair{Stage::kSmooth, "smooth"},
-      std::pair{Stage::kSimplify, "simplify"}, std::pair{Stage::kEncode, "encode"},
-      std::pair{Stage::kCertify, "certify"},   std::pair{Stage::kDone, "done"}};
+  static constexpr auto kTable = [] {
+    std::array<std::pair<Stage, const char*>, kStages.size()> names = {};
+    for (std::size_t i = 0; i < kStages.size(); ++i) names[i] = {kStages[i].stage, kStages[i].name};
+    return names;
+  }();
 };
 
 template <>

@@ -8,6 +8,7 @@
 
 #include "client/cli/text.h"
 #include "proto/json.h"
+#include "proto/stages.h"
 
 namespace isomesh::cli {
 namespace {
@@ -141,13 +142,10 @@ std::string timing_report(const Timing& timing, const ClientTiming& client) {
     rows.push_back({name, human_duration(milliseconds), percent(milliseconds, timing.total)});
   };
   if (client.upload) rows.push_back({"upload", human_duration(*client.upload)});
-  stage("queue", timing.queue);
-  stage("load", timing.load);
-  stage("extract", timing.extract);
-  stage("smooth", timing.smooth);
-  if (timing.simplify > 0) stage("simplify", timing.simplify);
-  stage("encode", timing.encode);
-  if (timing.certify > 0) stage("certify", timing.certify);
+  for (const StageRow& row : kStages) {
+    if (row.elapsed == nullptr || (!row.is_always_run && timing.*row.elapsed == 0)) continue;
+    stage(row.name, timing.*row.elapsed);
+  }
   stage("total", timing.total);
   if (client.download) rows.push_back({"download", human_duration(*client.download)});
   return in_columns({Align::kLeft, Align::kRight, Align::kRight}, rows);

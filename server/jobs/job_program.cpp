@@ -183,7 +183,7 @@ MadeMesh make(Task task, const std::stop_token& stop, Speaker& speaker, Workspac
     reporter.tell(stage, share, timing);
   };
   Progress progress(stop, report);
-  progress.enter(Stage::kLoad, kLoadShare, &Timing::load);
+  progress.enter(Stage::kLoad, kLoadShare);
   const volume::CanonicalVolume canonical(InputFile(std::move(task.file)));
   canonical.preload();
   std::vector<codec::Sink> sinks;

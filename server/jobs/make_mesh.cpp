@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "proto/samples.h"
+#include "proto/stages.h"
 #include "server/jobs/certify_stage.h"
 #include "server/jobs/error_budget.h"
 #include "server/jobs/mesh_cost.h"
@@ -99,19 +100,19 @@ void leave_out_parts(const MeshParameters& parameters, const Progress& progress,
 
 }  // namespace
 
-void Progress::enter(Stage stage, double share, double Timing::*elapsed) {
+void Progress::enter(Stage stage, double share) {
   end_stage();
   stage_ = stage;
   done_before_ += share_;
   share_ = share;
-  elapsed_ = elapsed;
   began_ = Clock::now();
   report_(stage_, done_before_, timing_);
 }
 
 void Progress::end_stage() {
-  if (elapsed_ == nullptr) return;
-  timing_.*elapsed_ = std::chrono::duration<double, std::milli>(Clock::now() - began_).count();
+  double Timing::*elapsed = row_of(stage_).elapsed;
+  if (stage_ == Stage::kQueue) return;
+  timing_.*elapsed = std::chrono::duration<double, std::milli>(Clock::now() - began_).count();
 }
 
 mesh::SurfaceSize count_surface(const SampleArray& samples, const MeshParameters& parameters,
@@ -136,7 +137,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   const StageShares shares = shares_of(request);
   MeshSummary summary;
   summary.iso = request.iso;
-  progress.enter(Stage::kExtract, shares.extract, &Timing::extract);
+  progress.enter(Stage::kExtract, shares.extract);
   extract(samples, request, progress, mesh);
   leave_out_parts(parameters, progress, mesh, summary.dropped);
   if (!is_simplified(parameters)) check_disk(mesh, request);
@@ -149,7 +150,7 @@ MeshSummary make_mesh(const SampleArray& samples, const MeshRequest& request,
   set_size(mesh, summary);
   if (is_simplified(parameters)) check_disk(mesh, request);
 
-  progress.enter(Stage::kEncode, shares.encode, &Timing::encode);
+  progress.enter(Stage::kEncode, shares.encode);
   const KeptFiles files(written, sinks);
   encode_and_measure(provenance_of(samples, written), files.sinks(), extracted, progress, mesh,
                      summary);

@@ -33,7 +33,7 @@ class Progress {
   Progress(std::stop_token stop, const Report& report) : stop_(std::move(stop)), report_(report) {}
 
   // Ends the stage before and starts this one, which takes `share` of the whole job.
-  void enter(Stage stage, double share, double Timing::*elapsed);
+  void enter(Stage stage, double share);
   void end_stage();
 
   // The context of the part [from, to] of the present stage.
@@ -55,7 +55,6 @@ class Progress {
   Stage stage_ = Stage::kQueue;
   double done_before_ = 0;
   double share_ = 0;
-  double Timing::*elapsed_ = nullptr;
   std::chrono::steady_clock::time_point began_;
 };
 

@@ -97,7 +97,7 @@ std::optional<mesh::TriangleGrid> grid_for_distances(const MeshParameters& param
 
 void smooth_stage(const SampleArray& samples, const MeshRequest& request, Progress& progress,
                   mesh::Mesh& mesh, MeshSummary& summary) {
-  progress.enter(Stage::kSmooth, shares_of(request).smooth, &Timing::smooth);
+  progress.enter(Stage::kSmooth, shares_of(request).smooth);
   const mesh::Shapes extracted = measure_shapes(mesh, progress.quiet());
   summary.quality.aspect_ratio.extracted = extracted.aspect_ratio;
   summary.quality.smallest_angle_deg.extracted = extracted.smallest_angle_deg;
@@ -116,7 +116,7 @@ void simplify_stage(const MeshRequest& request, const ExtractedSurface& extracte
                     MeshSummary& summary) {
   const MeshParameters& parameters = request.parameters;
   if (!is_simplified(parameters)) return;
-  progress.enter(Stage::kSimplify, shares_of(request).simplify, &Timing::simplify);
+  progress.enter(Stage::kSimplify, shares_of(request).simplify);
   mesh::SimplifyOptions options;
   if (parameters.max_error_mm) {
     options.max_error_mm = *parameters.max_error_mm - quantisation_mm(parameters, mesh);

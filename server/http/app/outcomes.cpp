@@ -1,6 +1,7 @@
 #include "server/http/app/outcomes.h"
 
 #include "base/log.h"
+#include "proto/fields.h"
 
 namespace isomesh::http {
 namespace {
@@ -11,13 +12,10 @@ void log_ended(const store::JobAccount& account) {
   line.add("id", job.id)
       .add("state", to_string(job.state))
       .add("priority", to_string(job.parameters.priority))
-      .add("attempts", account.attempts)
-      .add("queue_ms", job.timing.queue)
-      .add("load_ms", job.timing.load)
-      .add("extract_ms", job.timing.extract)
-      .add("smooth_ms", job.timing.smooth)
-      .add("encode_ms", job.timing.encode)
-      .add("total_ms", job.timing.total);
+      .add("attempts", account.attempts);
+  visit(job.timing, [&](const std::string& name, double milliseconds) {
+    line.add(name + "_ms", milliseconds);
+  });
   if (job.mesh) line.add("triangles", job.mesh->triangles);
   // The code alone: a detail may quote what stands in a volume's header.
   if (job.error) line.add("reason", describe(to_error(*job.error).code()).name);

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "base/mutex.h"
+#include "proto/fields.h"
 #include "server/jobs/pipeline.h"
 
 namespace isomesh::http {
@@ -35,15 +36,6 @@ const Histogram::BucketBoundaries kStageSeconds = {
 
 constexpr std::array kPriorities = {Priority::kStat, Priority::kRoutine, Priority::kBulk};
 constexpr std::array kEnds = {JobState::kSucceeded, JobState::kFailed, JobState::kCancelled};
-
-struct TimedStage {
-  std::string_view name;
-  double Timing::*milliseconds;
-};
-constexpr std::array kStages = {
-    TimedStage{"queue", &Timing::queue},     TimedStage{"load", &Timing::load},
-    TimedStage{"extract", &Timing::extract}, TimedStage{"smooth", &Timing::smooth},
-    TimedStage{"encode", &Timing::encode},   TimedStage{"total", &Timing::total}};
 
 std::string_view known_method(std::string_view method) {
   for (const std::string_view known :
@@ -177,9 +169,10 @@ Metrics::Metrics() : state_(std::make_unique<State>()) {
       .Set(1);
   // What has not happened yet is 0, not missing: rates need a beginning.
   for (const JobState state : kEnds) state_->ended.Add(label("state", to_string(state)));
-  for (const TimedStage& stage : kStages) {
-    state_->stages.Add(label("stage", stage.name), kStageSeconds);
-  }
+  const Timing none;
+  visit(none, [&](const char* stage, double /*milliseconds*/) {
+    state_->stages.Add(label("stage", stage), kStageSeconds);
+  });
   for (const auto result :
        {callbacks::CallbackOutcome::kDelivered, callbacks::CallbackOutcome::kRetried,
         callbacks::CallbackOutcome::kGivenUp}) {
@@ -210,10 +203,10 @@ void Metrics::count_ended(const Job& job) {
   if (!job.mesh) return;
   state_->triangles.Increment(static_cast<double>(job.mesh->triangles));
   constexpr double kMillisecondsPerSecond = 1000;
-  for (const TimedStage& stage : kStages) {
-    state_->stages.Add(label("stage", stage.name), kStageSeconds)
-        .Observe(job.timing.*stage.milliseconds / kMillisecondsPerSecond);
-  }
+  visit(job.timing, [&](const char* stage, double milliseconds) {
+    state_->stages.Add(label("stage", stage), kStageSeconds)
+        .Observe(milliseconds / kMillisecondsPerSecond);
+  });
 }
 
 void Metrics::count_refused(ErrorCode reason) {
