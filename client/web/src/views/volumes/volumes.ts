@@ -10,6 +10,7 @@ import type { Scope } from '../../ui/signal';
 import { axisIndex, slicePlacement, slicePlane } from '../../volume/geometry';
 import { KnownVolumes } from '../../volume/known';
 import { noteTexts, volumeKind, volumeName } from '../../volume/names';
+import { skippedText } from '../../volume/skipped';
 import { uploads } from './upload_panel';
 import { VolumeSearch } from './volume_search';
 
@@ -307,7 +308,10 @@ class Home {
       return;
     }
     // Its page shows the notes of the file that came first.
-    if (only.status === 200) tell(['This volume is already stored.', ...noteTexts(only.volume)].join(' '));
+    if (only.status === 200) {
+      const skipped = skippedText([only.volume]);
+      tell(['This volume is already stored.', ...noteTexts(only.volume), skipped && `${skipped}.`].filter(Boolean).join(' '));
+    }
     go(['volumes', only.volume.id]);
   }
 }
