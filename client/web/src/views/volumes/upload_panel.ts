@@ -143,6 +143,8 @@ export class UploadPanel {
       gathered.kept = failure.remedy.kept ?? kept;
       this.state.value = idle;
       this.showFailed(error, gathered, addition);
+    } finally {
+      progress.end();
     }
   }
 
