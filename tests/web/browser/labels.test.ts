@@ -44,6 +44,62 @@ async function make(page: Page): Promise<JobAnswer> {
 }
 
 describe('the labels of a volume', () => {
+  it('have their colours in slices and in a preview, and their names under the pointer', async () => {
+    const { page } = at;
+    await page.setViewportSize({ width: 1180, height: 760 });
+    const rows = await openForm(page);
+    const axial = page.locator('[data-plane=axial]');
+    // Half of the ball is each label, so that two colours are there; what is between has none.
+    const colours = (): Promise<string[]> =>
+      axial.locator('canvas').evaluate((canvas: HTMLCanvasElement) => {
+        const { data } = canvas.getContext('2d')?.getImageData(0, 0, canvas.width, canvas.height) ?? { data: [] };
+        const counts = new Map<string, number>();
+        for (let at = 0; at < data.length; at += 4) {
+          const [red = 0, green = 0, blue = 0] = [data[at], data[at + 1], data[at + 2]];
+          // Grey has equal parts.
+          if (Math.max(red, green, blue) - Math.min(red, green, blue) < 40) continue;
+          const hue = [red, green, blue].map((part) => Math.round((4 * part) / Math.max(red, green, blue))).join();
+          counts.set(hue, (counts.get(hue) ?? 0) + 1);
+        }
+        return [...counts].filter(([, count]) => count > 400).map(([hue]) => hue);
+      });
+    await expect.poll(async () => (await colours()).length).toBe(2);
+    await expect.poll(() => page.locator('.live-picture[data-still]').count()).toBe(1);
+    const preview = async (): Promise<number> => {
+      const { red, green, blue } = await hues(page, page.locator('.live-picture'));
+      return red + green + blue;
+    };
+    await expect.poll(preview).toBeGreaterThan(2000);
+    const box = await axial.locator('canvas').boundingBox();
+    if (!box) throw new Error('there is no slice');
+    await page.mouse.move(box.x + 0.42 * box.width, box.y + box.height / 2);
+    await expect.poll(() => axial.locator('.slice-value').innerText()).toContain('label 1');
+    await page.mouse.move(box.x + 0.58 * box.width, box.y + box.height / 2);
+    await expect.poll(() => axial.locator('.slice-value').innerText()).toContain('label 2');
+    // What is not chosen is not seen.
+    await rows.filter({ hasText: 'label 1' }).getByRole('checkbox').uncheck();
+    await expect.poll(async () => (await colours()).length).toBe(1);
+  });
+
+  it('have the colours of their surfaces beside these and in their cut, also when a person chooses others', async () => {
+    const { page, daemon } = at;
+    await page.goto(`${daemon.url}/#/jobs/${made.id}?slices=on`);
+    await surfaceLoaded(page);
+    const seen = async (): Promise<Hues> => hues(page, page.locator('[data-plane=axial] canvas'));
+    await expect.poll(async () => (await seen()).red).toBeGreaterThan(300);
+    await expect.poll(async () => (await seen()).blue).toBeGreaterThan(300);
+    await page.getByLabel('Colour of Right half').fill('#20c020');
+    await expect.poll(async () => (await seen()).green).toBeGreaterThan(300);
+    expect((await seen()).red).toBe(0);
+    // The cut from above shows the slice.
+    await page.keyboard.press('s');
+    await page.keyboard.press('c');
+    await page.locator('.viewport[data-slice]').waitFor();
+    await page.getByRole('button', { name: 'Hide all' }).click();
+    await still(page);
+    expect(await hues(page, page.locator('.viewport'))).toMatchObject({ red: 0, green: 0, blue: 0 });
+  });
+
   it('are all meshed unless some are picked', async () => {
     const { page } = at;
     const rows = await openForm(page);

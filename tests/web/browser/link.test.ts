@@ -60,6 +60,7 @@ describe('parameters', () => {
     const volume = await daemon.upload(ballNrrd(32, 12));
     await page.goto(`${daemon.url}/#/volumes/${volume}?iso=100`);
     const undo = page.getByRole('button', { name: 'Undo' });
+    await page.locator('.parameters summary').click();
     await page.locator('[data-parameter=passes] input').waitFor();
     await expect.poll(() => undo.isVisible()).toBe(false);
     await page.locator('[data-parameter=passes] input').fill('9');

@@ -105,7 +105,7 @@ describe('the surface beside the slices', () => {
     await expect.poll(() => page.locator('.live-picture').isVisible()).toBe(true);
     const labels = await daemon.upload(labelsNrrd(24));
     await page.goto(`${daemon.url}/#/volumes/${labels}`);
-    await expect.poll(() => page.locator('.live .slice-state').innerText()).toMatch(/iso-values only, not labels/);
+    await expect.poll(async () => (await page.locator('.live canvas').getAttribute('aria-label')) ?? '').toMatch(/labels/);
   });
 
   it('comes when the daemon has it again', async () => {

@@ -41,14 +41,15 @@ describe('an upload of several volumes', () => {
     ]);
     const rows = page.locator('.outcomes > li');
     await expect.poll(() => rows.count()).toBe(3);
+    expect(await page.locator('.skipped').innerText()).toBe('1 file was skipped: readme.txt');
     await expectText(hostileName);
     await expect.poll(() => page.locator('.drop h2').innerText()).toBe('1 of 3 volumes in the upload were stored');
     await expect.poll(() => page.locator('[data-member="cut.nrrd"]').innerText()).toContain('truncated');
     await expect.poll(() => page.locator('[data-volume]').count()).toBe(1);
 
     const times = page.locator('[data-member="times.nii"]');
-    await times.getByLabel('Volume to read').selectOption({ label: 'time 1 (1)' });
-    await times.getByRole('button', { name: 'Use this volume' }).click();
+    expect(await times.innerText()).toContain('Which volume?');
+    await times.getByRole('button', { name: 'time 1' }).click();
     await expect.poll(() => page.locator('.outcomes .stored').count()).toBe(2);
     const [kept = ''] = /upload=\w{32}/.exec(queries[1] ?? '') ?? [];
     expect(queries).toEqual(['?keep=true', `?keep=true&${kept}&member=times.nii&volume=1`]);
@@ -68,9 +69,7 @@ describe('a refusal', () => {
     const { daemon, page } = at;
     await page.goto(daemon.url);
     await drop(page, [{ name: 'two.nii', bytes: seriesNifti() }]);
-    await expect.poll(() => page.locator('.refusal').innerText()).toContain('2 volumes');
-    await page.getByLabel('Volume to read').selectOption('0');
-    await page.getByRole('button', { name: 'Use this volume' }).click();
+    await page.getByRole('list', { name: 'Which volume?' }).getByRole('button', { name: 'time 0' }).click();
     await page.waitForURL(volumePage);
     await expect.poll(() => page.locator('[data-note="volume-chosen"]').innerText()).toContain('Volume 0');
   });
@@ -125,10 +124,12 @@ describe('notes and what was left out', () => {
       { name, bytes: Buffer.from('no volume') },
     ]);
     await page.waitForURL(volumePage);
-    await page.locator('summary', { hasText: '1 file was skipped' }).click();
+    const summary = page.locator('summary', { hasText: '1 file was skipped' });
+    await summary.click();
     const id = new URL(page.url()).hash.split(/[/?]/)[2] ?? '';
-    const { ignored } = await daemon.json<{ ignored: { reason: string }[] }>(`/v1/volumes/${id}`);
+    const { ignored } = await daemon.json<{ ignored: { name: string; reason: string }[] }>(`/v1/volumes/${id}`);
     expect(ignored).toHaveLength(1);
+    expect(await summary.innerText()).toContain(ignored[0]?.name);
     await expectText(ignored[0]?.reason ?? '');
   });
 });

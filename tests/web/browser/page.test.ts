@@ -216,7 +216,7 @@ describe('a surface', () => {
     await page.waitForURL(/#\/compare/);
     await surfaceLoaded(page, 3);
     const titles = await page.locator('.cell h2').allInnerTexts();
-    expect(titles).toEqual(['0 passes', '5 passes', '10 passes']);
+    expect(titles).toEqual(['iso 100, 0 passes', 'iso 100, 5 passes', 'iso 100, 10 passes']);
     const third = page.locator('.cell .viewport').nth(2);
     const before = await third.screenshot();
     const first = await page.locator('.cell .viewport canvas').first().boundingBox();

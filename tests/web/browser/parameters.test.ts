@@ -5,7 +5,7 @@ import type { Locator, Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { parameters } from '../../../client/web/src/job/table';
 import { jobParameters, notInTheForm } from '../openapi';
-import { ballNrrd, setup, openedJob } from './support';
+import { ballNrrd, noted, setup, openedJob } from './support';
 
 const at = setup();
 let ball: string;
@@ -82,6 +82,25 @@ async function change(element: Locator): Promise<void> {
   throw new Error('every value is chosen');
 }
 
+describe('the kind of a surface', () => {
+  it('is one of three, and sets the parameters behind it', async () => {
+    const { page } = at;
+    await page.goto('about:blank');
+    await page.goto(`${at.daemon.url}/#/volumes/${ball}?iso=100`);
+    const kind = (name: string): Locator => page.getByRole('radio', { name, exact: true });
+    await expect.poll(() => kind('Smooth').isChecked()).toBe(true);
+    expect(await control(page, 'passes').isVisible()).toBe(false);
+    expect(await control(page, 'scheme').isVisible()).toBe(false);
+    await kind('As scanned').check({ force: true });
+    await expect.poll(() => noted(page, 'passes')).toBe('0');
+    await kind('For printing').check({ force: true });
+    await expect.poll(() => kind('For printing').isChecked()).toBe(true);
+    const job = await make(page);
+    expect(job).toMatchObject({ close: true, certify: true, passes: 5 });
+    expect(job['formats']).toEqual(expect.arrayContaining(['glb', 'stl', '3mf']));
+  });
+});
+
 describe('the form', () => {
   it('shows each parameter of the schema, and what is set there reaches the job', async () => {
     const { page } = at;
@@ -131,6 +150,7 @@ describe('the kind of smoothing', () => {
     await page.goto('about:blank');
     await page.goto(`${daemon.url}/#/jobs/${id}`);
     await page.getByRole('link', { name: 'Change parameters' }).click();
+    await page.locator('.parameters summary').click();
     await control(page, 'smoothing').getByLabel(to).check();
     return make(page);
   };

@@ -139,6 +139,7 @@ describe('parameters', () => {
     const { page } = at;
     await open(page);
     const passes = page.locator('[data-parameter=passes] input');
+    await page.locator('.parameters summary').click();
     const run = page.getByRole('button', { name: 'Make the surface' });
     for (const wrong of ['1001', '2.5', '', '-1']) {
       await passes.fill(wrong);

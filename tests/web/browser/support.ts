@@ -420,7 +420,7 @@ export async function silhouette(page: Page, element: Locator, tolerance = 24): 
 
 // Waits until all parts of the surfaces are there and drawn.
 export async function surfaceLoaded(page: Page, count = 1): Promise<void> {
-  await expect.poll(() => page.locator('.pane[data-loaded]').count(), { timeout: slowest }).toBe(count);
+  await expect.poll(() => page.locator('.pane[data-loaded]').count(), { timeout: 2 * slowest }).toBe(count);
   await still(page);
 }
 

@@ -92,10 +92,10 @@ describe('an upload', () => {
       bytes: ctSlice(index, '1.9.1', index < 3 ? 'chest' : 'none', index < 3 ? '1.2.3.4' : ''),
     }));
     await drop(page, slices);
-    const choice = page.getByLabel('Series to read');
-    await choice.waitFor();
-    await choice.selectOption({ index: (await choice.locator('option').allInnerTexts()).findIndex((text) => text.startsWith('none')) });
-    await page.getByRole('button', { name: 'Use this series' }).click();
+    const chest = page.getByRole('button', { name: 'chest, CT, 2 slices' });
+    await expect.poll(() => chest.innerText()).toContain('2024-05-17');
+    await expect.poll(() => chest.locator('canvas').evaluate((canvas: HTMLCanvasElement) => canvas.width)).toBe(4);
+    await page.getByRole('button', { name: 'none, CT, 2 slices' }).click();
     await page.waitForURL(volumePage);
     await expect.poll(() => page.locator('.facts').innerText()).toContain('4 \u00d7 4 \u00d7 2');
     const bytes = slices.reduce((sum, slice) => sum + slice.bytes.length, 0);
@@ -109,8 +109,8 @@ describe('what was uploaded and refused', () => {
     const { page, daemon } = at;
     await page.goto(daemon.url);
     await drop(page, [{ name: 'two.nii', bytes: seriesNifti() }]);
-    const choice = page.getByLabel('Volume to read');
-    await choice.waitFor();
+    const second = page.getByRole('list', { name: 'Which volume?' }).getByRole('button').nth(1);
+    await second.waitFor();
     const statuses: number[] = [];
     page.on('response', (response) => {
       if (response.request().method() === 'POST') statuses.push(response.status());
@@ -119,7 +119,7 @@ describe('what was uploaded and refused', () => {
     for (let other = 0; other < 2; other += 1) {
       await fetch(`${daemon.url}/v1/volumes?keep=true`, { method: 'POST', body: new Uint8Array(seriesNifti()) });
     }
-    await page.getByRole('button', { name: 'Use this volume' }).click();
+    await second.click();
     await page.waitForURL(volumePage);
     expect(statuses).toEqual([410, 201]);
   });

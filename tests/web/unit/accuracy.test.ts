@@ -76,8 +76,10 @@ describe('the stages of a job', () => {
   it('are told without those that it did not have', () => {
     const timing = { queue: 1, load: 1, extract: 1, smooth: 0, simplify: 0, encode: 1, certify: 0, total: 4 };
     const names = (more: object): string[] => stepsOf({ ...timing, ...more }).map(({ name }) => name);
-    expect(names({})).toEqual(['queue', 'load', 'extract', 'smooth', 'encode']);
-    expect(names({ simplify: 2, certify: 3 })).toEqual(['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify']);
+    expect(names({})).toEqual(['queue', 'load', 'extract', 'encode']);
+    // Cancelled before it was extracted.
+    expect(names({ extract: 0, smooth: 0, encode: 0 })).toEqual(['queue', 'load']);
+    expect(names({ simplify: 2, certify: 3 })).toEqual(['queue', 'load', 'extract', 'simplify', 'encode', 'certify']);
   });
 });
 

@@ -32,6 +32,19 @@ describe('a look in the address', () => {
 });
 
 describe('what was changed', () => {
+  it('takes a drag as one change, however long it rests', () => {
+    const { history: one, wait } = history();
+    one.change(1);
+    one.hold();
+    for (const value of [2, 3, 4]) {
+      wait(5000);
+      one.change(value);
+    }
+    one.release();
+    one.change(5);
+    expect([one.undo(), one.undo(), one.undo(), one.undo()]).toEqual([4, 1, 0, null]);
+  });
+
   function history(): { history: History<number>; wait: (time: number) => void } {
     let now = 0;
     return { history: new History(0, () => now), wait: (time) => (now += time) };

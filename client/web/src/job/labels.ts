@@ -2,6 +2,7 @@
 import { client } from '../client';
 import type { Estimate, Job, LabelSummary } from '../api/types';
 import { Signal } from '../ui/signal';
+import { LabelMap, seriesColour, type LabelLook } from '../volume/label_map';
 
 export interface Named {
   label: number;
@@ -41,11 +42,20 @@ export class LabelState {
   // The colours that a person chose or the file has; the others' are known once their surfaces come.
   readonly colours = new Signal<ReadonlyMap<number, string>>(new Map());
   readonly picked = new Signal<LabelSummary | null>(null);
+  private map: LabelMap | null = null;
   private readonly byLabel: ReadonlyMap<number, LabelSummary>;
 
   constructor(readonly labels: readonly LabelSummary[]) {
     this.byLabel = new Map(labels.map((one) => [one.label, one]));
     this.colours.value = new Map(labels.flatMap(({ label, color }) => (color ? [[label, color]] : [])));
+  }
+
+  // How slices show them; null for a surface without labels.
+  look(): LabelLook | null {
+    if (this.labels.length === 0) return null;
+    this.map ??= new LabelMap(this.labels);
+    const colours = this.colours.value;
+    return { map: this.map, colourOf: (label) => colours.get(label) ?? seriesColour(label), isShown: (label) => this.isShown(label) };
   }
 
   isShown(label: number): boolean {

@@ -7,8 +7,21 @@ export function printingVariant({ formats }: JobParameters): Partial<JobParamete
   return { close: true, certify: true, formats: withGlb([...formats, 'stl', '3mf']) };
 }
 
-export function isForPrinting({ parameters: { formats, certify }, mesh }: Job): boolean {
-  return certify === true && (mesh?.quality.closed ?? false) && formats.includes('stl') && formats.includes('3mf');
+const printers: readonly string[] = ['stl', '3mf'];
+
+// True if the job was asked for what a printer needs.
+export function isForPrinter({ formats, certify }: JobParameters): boolean {
+  return certify === true && printers.every((format) => formats.some((one) => one === format));
+}
+
+// Without what only a printer needs.
+export function usualFormats({ formats }: JobParameters): Partial<JobParameters> {
+  return { close: false, certify: false, formats: withGlb(formats.filter((format) => !printers.includes(format))) };
+}
+
+// True if it came out closed, too.
+export function isForPrinting({ parameters, mesh }: Job): boolean {
+  return isForPrinter(parameters) && (mesh?.quality.closed ?? false);
 }
 
 // The measurements, the files and the parameters, to keep with a print.

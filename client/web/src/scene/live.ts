@@ -24,7 +24,7 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Vec3 } from '../api/types';
-import { blockSize, firstCrossing, type Preview } from '../volume/preview';
+import { blockSize, firstCrossing, firstLabel, type Preview } from '../volume/preview';
 import { compile, whenDrawn } from './compile';
 import { drawable, letGo, tablesOf, type Drawable } from './live_textures';
 import type { Look } from '../volume/looks';
@@ -78,6 +78,7 @@ export class LiveSurface {
     iso: { value: 0.5 },
     reach: { value: 1 },
     isThrough: { value: false },
+    isOfLabels: { value: false },
     look: { value: null as DataTexture | null },
     sums: { value: null as DataTexture | null },
     edges: { value: 0 },
@@ -92,6 +93,7 @@ export class LiveSurface {
     new LineBasicMaterial({ color: '#2ce0cb', transparent: true, opacity: 0.45, depthTest: false }),
   );
   private cursor: Vec3 | null = null;
+  private labelTable = new Uint8Array(0);
   private crop: readonly [Vec3, Vec3] | null = null;
   // What is drawn with fewer pixels than the canvas has. A canvas that changes its size holds the page up until
   // all that was drawn before is done.
@@ -241,9 +243,19 @@ export class LiveSurface {
     cropHigh.value.set(...(this.crop?.[1] ?? [1, 1, 1])).multiply(last);
   }
 
+  // The preview is one of labels, with these colours.
+  setLabels(table: Uint8Array): void {
+    const whole = new Uint8Array(4 * 256);
+    whole.set(table.subarray(0, whole.length));
+    this.setLook({ table: whole, edges: 0 });
+    this.uniforms.isOfLabels.value = true;
+    this.labelTable = whole;
+  }
+
   // Null: the surface at the iso-value.
   setLook(look: Look | null): void {
-    const { isThrough, look: table, sums, edges } = this.uniforms;
+    const { isThrough, isOfLabels, look: table, sums, edges } = this.uniforms;
+    isOfLabels.value = false;
     if (isThrough.value !== (look !== null)) {
       const factor = look ? costOfLook : 1 / costOfLook;
       for (const kind of ['moving', 'resting'] as const) this.costs[kind] *= factor;
@@ -417,12 +429,10 @@ export class LiveSurface {
     const toSamples = new Matrix4().copy(this.box.matrix).invert();
     const from = this.camera.position.clone().applyMatrix4(toSamples);
     const through = new Vector3(...new Vector2(x, y).toArray(), 0.5).unproject(this.camera).applyMatrix4(toSamples);
-    const place = firstCrossing(
-      this.best.preview,
-      this.uniforms.iso.value,
-      from.toArray(),
-      through.sub(from).toArray(),
-    );
+    const { isOfLabels, iso } = this.uniforms;
+    const ray = [from.toArray(), through.sub(from).toArray()] as const;
+    const { preview } = this.best;
+    const place = isOfLabels.value ? firstLabel(preview, this.labelTable, ...ray) : firstCrossing(preview, iso.value, ...ray);
     if (place) this.onPick(place);
   }
 }

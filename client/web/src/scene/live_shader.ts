@@ -58,6 +58,8 @@ uniform float iso;
 uniform float reach;
 // Whether what is looked through is drawn: colours and opacities of 256 values, and for each the sum of those below it.
 uniform bool isThrough;
+// Whether samples are numbers of labels, whose colours the same table has; nothing lies between two of them.
+uniform bool isOfLabels;
 // What of the volume is drawn.
 uniform bool isCropped;
 uniform vec3 cropLow;
@@ -147,6 +149,50 @@ vec4 lookedThrough(vec3 direction, float t, float end, float stride) {
   return seen;
 }
 
+vec4 labelAt(vec3 p) {
+  ivec3 nearest = ivec3(clamp(floor(p + 0.5), vec3(0.0), dims - 1.0));
+  return texelFetch(look, ivec2(round(255.0 * texelFetch(samples, nearest, 0).r), 0), 0);
+}
+
+// Turned to where nothing is seen around it.
+vec3 labelNormal(vec3 p) {
+  vec3 open = vec3(0.0);
+  for (int i = 0; i < 27; i++) {
+    vec3 offset = vec3(i % 3, (i / 3) % 3, i / 9) - 1.0;
+    if (labelAt(p + 1.5 * offset).a <= 0.0) open += offset / max(1.0, length(offset));
+  }
+  vec3 normal = toNormal * open;
+  float size = length(normal);
+  return size > 0.0 ? normal / size : towardsEye;
+}
+
+// The first label that is met.
+vec4 labelled(vec3 direction, float t, float end, float stride) {
+  float blockEnd = -1.0;
+  for (int i = 0; i < mostSteps && t < end; i++) {
+    if (t >= blockEnd) {
+      vec3 p = clamp(eye + (t + 0.001 * stride) * direction, vec3(0.0), dims - 1.001);
+      ivec3 block = ivec3(p / blockSize);
+      vec3 low = vec3(block) * blockSize;
+      vec3 exits = (low + step(vec3(0.0), direction) * blockSize - eye) / direction;
+      blockEnd = min(min(exits.x, exits.y), exits.z);
+      if (!hasAny(texelFetch(blocks, block, 0).rg)) {
+        t = max(blockEnd, t + 0.01 * stride);
+        continue;
+      }
+    }
+    vec3 p = eye + t * direction;
+    vec4 here = labelAt(p);
+    if (here.a > 0.0) {
+      vec3 normal = labelNormal(p);
+      if (dot(normal, towardsEye) < 0.0) normal = -normal;
+      return vec4(here.rgb * (0.32 + 0.74 * max(0.0, dot(normal, towardsLight))), 1.0);
+    }
+    t += stride;
+  }
+  return vec4(0.0);
+}
+
 void main() {
   vec3 direction = place - eye;
   vec3 first = (cropLow - eye) / direction;
@@ -158,6 +204,11 @@ void main() {
   if (!(t < end)) discard;
 
   float stride = reach / max(max(abs(direction.x), abs(direction.y)), abs(direction.z));
+  if (isOfLabels) {
+    pixel = labelled(direction, t, end, stride);
+    if (pixel.a <= 0.0) discard;
+    return;
+  }
   if (isThrough) {
     pixel = lookedThrough(direction, t, end, stride);
     if (pixel.a < 0.004) discard;

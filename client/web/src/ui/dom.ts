@@ -113,6 +113,11 @@ export function segmented<T extends string>(
   );
 }
 
+// Of a row of choices, without telling `onChange`.
+export function choose(row: HTMLElement, value: string): void {
+  for (const input of row.querySelectorAll('input')) input.checked = input.value === value;
+}
+
 export function checkbox(
   label: string,
   isOn: boolean,

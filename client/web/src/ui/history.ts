@@ -7,6 +7,7 @@ export class History<T> {
   private readonly past: T[] = [];
   private future: T[] = [];
   private changedAt = -Infinity;
+  private isHeld = false;
 
   constructor(
     private present: T,
@@ -24,11 +25,23 @@ export class History<T> {
   change(next: T): void {
     if (JSON.stringify(next) === JSON.stringify(this.present)) return;
     const now = this.now();
-    if (now - this.changedAt > together || this.past.length === 0) this.past.push(this.present);
+    const isSame = this.isHeld ? this.changedAt > -Infinity : now - this.changedAt <= together;
+    if (!isSame || this.past.length === 0) this.past.push(this.present);
     if (this.past.length > most) this.past.shift();
     this.changedAt = now;
     this.future = [];
     this.present = next;
+  }
+
+  // Until `release` all changes are one, however long they take: a pointer is down.
+  hold(): void {
+    this.isHeld = true;
+    this.changedAt = -Infinity;
+  }
+
+  release(): void {
+    this.isHeld = false;
+    this.changedAt = -Infinity;
   }
 
   // Null where there is nothing to take back.

@@ -45,7 +45,7 @@ function refusalWith(error: ApiError, advice: string, actions: readonly Child[])
   return h(
     'div',
     { class: 'refusal', role: 'alert' },
-    h('h3', {}, error.title),
+    h('h2', {}, error.title),
     h('p', {}, error.detail),
     faults.length > 0 &&
       h('ul', {}, ...faults.map(({ field, message }) => h('li', {}, h('b', {}, field), ` ${message}`))),

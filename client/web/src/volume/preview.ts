@@ -1,5 +1,6 @@
 // A volume reduced by the daemon, as the page draws it while an iso-value is looked for.
 import type { Vec3 } from '../api/types';
+import { LabelMap, type MappedLabel } from './label_map';
 import type { Window } from './slices';
 
 export interface Preview {
@@ -49,6 +50,25 @@ export function previewOf(file: ArrayBuffer, window: Window): Preview {
   };
 }
 
+// The same for labels: the samples are their numbers in the map, of which there are at most 255. There is a file for each of
+// the map's windows.
+export function labelPreviewOf(files: readonly ArrayBuffer[], labels: readonly MappedLabel[]): Preview {
+  const map = new LabelMap(labels);
+  const numbers: { samples: Uint8Array<ArrayBuffer> | null } = { samples: null };
+  let made: Preview | null = null;
+  files.forEach((file, at) => {
+    const window = map.windows[at];
+    if (!window) return;
+    made = previewOf(file, window);
+    numbers.samples ??= new Uint8Array(made.samples.length);
+    map.take(made.samples, window, numbers.samples);
+  });
+  const { samples } = numbers;
+  const last = made as Preview | null;
+  if (!last || !samples) throw new Error('There are no labels.');
+  return { ...last, samples, window: [NaN, NaN], ...blocksOf(samples, last.dims) };
+}
+
 export function blocksOf(samples: Uint8Array, dims: Vec3): Pick<Preview, 'blocks' | 'blockDims'> {
   const blockDims = dims.map((count) => Math.max(1, Math.ceil((count - 1) / blockSize))) as Vec3;
   const [across, down, deep] = blockDims;
@@ -96,6 +116,19 @@ export function valueAt({ dims, samples }: Pick<Preview, 'dims' | 'samples'>, pl
   const line = (dy: number, dz: number): number => mix(at(0, dy, dz), at(1, dy, dz), x - i);
   const plane = (dz: number): number => mix(line(0, dz), line(1, dz), y - j);
   return mix(plane(0), plane(1), z - k) / 255;
+}
+
+// The first sample that the ray comes to of which something is seen, by the opacities of the numbers; null for none.
+export function firstLabel({ dims, samples }: Pick<Preview, 'dims' | 'samples'>, table: Uint8Array, from: Vec3, direction: Vec3): Vec3 | null {
+  const step = 0.5 / Math.max(...direction.map(Math.abs));
+  const reach = (Math.hypot(...from) + Math.hypot(...dims)) / Math.hypot(...direction);
+  for (let part = 0; part < reach; part += step) {
+    const place = from.map((value, axis) => Math.round(value + part * direction[axis as 0])) as Vec3;
+    if (place.some((value, axis) => value < 0 || value >= dims[axis as 0])) continue;
+    const number = samples[(place[2] * dims[1] + place[1]) * dims[0] + place[0]] as number;
+    if ((table[4 * number + 3] ?? 0) > 0) return place;
+  }
+  return null;
 }
 
 // Where the ray first meets the surface, in samples; null where it does not.

@@ -1,11 +1,10 @@
 // Reads previews beside the page.
-import { previewOf, type Preview } from './preview';
+import { labelPreviewOf, previewOf, type Preview } from './preview';
+import type { MappedLabel } from './label_map';
 import type { Window } from './slices';
 
-export interface PreviewRequest {
-  file: ArrayBuffer;
-  window: Window;
-}
+// Of values over a window, or of labels.
+export type PreviewRequest = { file: ArrayBuffer; window: Window } | { files: ArrayBuffer[]; labels: readonly MappedLabel[] };
 
 export interface PreviewAnswer {
   preview: Preview | null;
@@ -18,9 +17,9 @@ interface WorkerScope {
 }
 const scope = self as unknown as WorkerScope;
 
-scope.onmessage = ({ data: { file, window } }) => {
+scope.onmessage = ({ data }) => {
   try {
-    const preview = previewOf(file, window);
+    const preview = 'labels' in data ? labelPreviewOf(data.files, data.labels) : previewOf(data.file, data.window);
     scope.postMessage({ preview, error: '' }, [preview.samples.buffer, preview.blocks.buffer]);
   } catch (error) {
     scope.postMessage({ preview: null, error: String(error) }, []);

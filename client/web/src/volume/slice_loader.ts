@@ -3,6 +3,7 @@ import { connected } from '../client';
 import { asApiError, mayPass, type ApiError } from '../api/problem';
 import type { Axis } from '../api/types';
 import type { Scope } from '../ui/signal';
+import type { LabelMap } from './label_map';
 import { sliceKey, type Slice, type SliceSource, type Window } from './slices';
 
 export interface SliceLoaderHost {
@@ -16,6 +17,7 @@ interface Wanted {
   key: string;
   index: number;
   window: Window;
+  map: LabelMap | null;
 }
 
 // Sooner nobody notices that a slice is not there yet.
@@ -51,10 +53,10 @@ export class SliceLoader {
     });
   }
 
-  want(index: number, window: Window): void {
-    const key = sliceKey(this.axis, index, window);
+  want(index: number, window: Window, map: LabelMap | null = null): void {
+    const key = sliceKey(this.axis, index, window, map);
     if (key === this.wanted?.key) return;
-    this.wanted = { key, index, window };
+    this.wanted = { key, index, window, map };
     this.error = null;
     this.failures = 0;
     clearTimeout(this.retry);
@@ -64,7 +66,7 @@ export class SliceLoader {
   private load(): void {
     const { wanted } = this;
     if (!wanted || this.scope.isOver) return;
-    const found = this.source.find(this.axis, wanted.index, wanted.window);
+    const found = this.source.find(this.axis, wanted.index, wanted.window, wanted.map);
     if (found) this.show(found);
     else if (!this.isBusy) void this.fetch(wanted);
     if (!found && this.late === 0) {
@@ -80,7 +82,7 @@ export class SliceLoader {
     let slice: Slice | null = null;
     let error: ApiError | null = null;
     try {
-      slice = await this.source.get(this.axis, wanted.index, wanted.window);
+      slice = await this.source.get(this.axis, wanted.index, wanted.window, wanted.map);
     } catch (caught) {
       error = asApiError(caught);
     }

@@ -1,6 +1,7 @@
 // Slices of a volume as samples: fetched as pictures of 8 bits over a window, kept while they are near.
 import { client } from '../client';
 import type { Axis, Volume } from '../api/types';
+import type { LabelMap } from './label_map';
 
 export type Window = [number, number];
 
@@ -12,6 +13,8 @@ export interface Slice {
   height: number;
   values: Uint8Array;
   window: Window;
+  // Of a segmentation: the numbers of the labels in their map.
+  labels?: Uint16Array;
 }
 
 const mostSlices = 96;
@@ -32,8 +35,8 @@ async function grey(picture: Blob): Promise<{ width: number; height: number; val
   return { width, height, values };
 }
 
-export function sliceKey(axis: Axis, index: number, window: Window): string {
-  return `${axis}/${index}/${window.join(',')}`;
+export function sliceKey(axis: Axis, index: number, window: Window, map: LabelMap | null = null): string {
+  return `${axis}/${index}/${map ? map.key : window.join(',')}`;
 }
 
 export class SliceSource {
@@ -47,21 +50,20 @@ export class SliceSource {
   ) {}
 
   // The slice if it is here already.
-  find(axis: Axis, index: number, window: Window): Slice | null {
-    return this.made.get(sliceKey(axis, index, window)) ?? null;
+  find(axis: Axis, index: number, window: Window, map: LabelMap | null = null): Slice | null {
+    return this.made.get(sliceKey(axis, index, window, map)) ?? null;
   }
 
-  get(axis: Axis, index: number, window: Window): Promise<Slice> {
-    const key = sliceKey(axis, index, window);
+  // With a map the slice has the numbers of its labels, and its window is the first of the map's.
+  get(axis: Axis, index: number, window: Window, map: LabelMap | null = null): Promise<Slice> {
+    const key = sliceKey(axis, index, window, map);
     const found = this.kept.get(key);
     if (found) {
       this.kept.delete(key);
       this.kept.set(key, found);
       return found;
     }
-    const slice = client.slicePicture(this.volume.id, axis, index, window, this.signal)
-      .then(grey)
-      .then((samples) => ({ axis, index, window, ...samples }));
+    const slice = map ? this.fetchLabels(axis, index, map) : this.fetch(axis, index, window);
     this.kept.set(key, slice);
     slice.then((made) => this.made.set(key, made), () => undefined);
     slice.catch(() => this.kept.delete(key));
@@ -71,6 +73,20 @@ export class SliceSource {
       this.made.delete(oldest);
     }
     return slice;
+  }
+
+  private async fetch(axis: Axis, index: number, window: Window): Promise<Slice> {
+    const samples = await grey(await client.slicePicture(this.volume.id, axis, index, window, this.signal));
+    return { axis, index, window, ...samples };
+  }
+
+  private async fetchLabels(axis: Axis, index: number, map: LabelMap): Promise<Slice> {
+    const pictures = await Promise.all(map.windows.map((window) => this.fetch(axis, index, window)));
+    const [first] = pictures;
+    if (!first) throw new Error('There are no labels.');
+    const labels = new Uint16Array(first.values.length);
+    for (const { values, window } of pictures) map.take(values, window, labels);
+    return { ...first, labels };
   }
 }
 

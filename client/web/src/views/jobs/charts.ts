@@ -13,12 +13,10 @@ export interface Step {
 }
 
 const order = ['queue', 'load', 'extract', 'smooth', 'simplify', 'encode', 'certify'];
-// Left out where they took no time: few jobs have them.
-const seldom = ['simplify', 'certify'];
 
-// The stages one after the other; members that this page does not know come at the end.
+// The stages that ran, one after the other; members that this page does not know come at the end.
 export function stepsOf(timing: Durations, more: Durations = {}): Step[] {
-  const known = order.filter((name) => name in timing && (!seldom.includes(name) || timing[name] !== 0));
+  const known = order.filter((name) => (timing[name] ?? 0) > 0);
   const others = Object.keys(timing).filter((name) => !order.includes(name) && name !== 'total');
   let begin = 0;
   return [

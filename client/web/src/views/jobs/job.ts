@@ -25,7 +25,8 @@ const noteDelay = 300;
 // The stages of this job.
 function stagesOf({ parameters }: Job): string[] {
   const isSimplified = (parameters.max_error_mm ?? parameters.triangles ?? null) !== null;
-  return stages.filter((name) => (name !== 'simplify' || isSimplified) && (name !== 'certify' || parameters.certify));
+  const isLeftOut: Partial<Record<string, boolean>> = { smooth: parameters.passes === 0, simplify: !isSimplified, certify: !parameters.certify };
+  return stages.filter((name) => !isLeftOut[name]);
 }
 
 // The volume may be gone while its surface is still there.
@@ -156,7 +157,7 @@ function showFailure(job: Job, volume: Volume | null, stageArea: HTMLElement, pa
   const change = h('a', { href: changeLink(job), class: 'button primary' }, 'Change parameters');
   const body = job.error
     ? refusal(errorOfProblem(job.error), change)
-    : h('div', { class: 'refusal' }, h('h3', {}, 'Cancelled'), h('p', {}, 'The job was cancelled and made no surface.'), h('div', { class: 'actions' }, change));
+    : h('div', { class: 'refusal' }, h('h2', {}, 'Cancelled'), h('p', {}, 'The job was cancelled and made no surface.'), h('div', { class: 'actions' }, change));
   stageArea.replaceChildren(h('div', { class: 'waiting' }, body));
   panel.replaceChildren(head(job, volume), timings(job));
 }
@@ -173,7 +174,7 @@ function showSurface(
   const { mesh } = job;
   if (!mesh) return;
   const camera = placeOfText(route.query.get('cam') ?? '');
-  const slices = volume && new SlicesBeside(scope, job, volume, stageArea, route.query);
+  const slices = volume && new SlicesBeside(scope, job, volume, labels, stageArea, route.query);
   const onSlices = slices && ((): void => slices.toggle());
   const pane = new SurfacePane(scope, job, { hasKeys: true, camera, volume, labels, onSlices, look: route.query });
   pane.onLook = noteInAddress;

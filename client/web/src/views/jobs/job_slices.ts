@@ -1,6 +1,7 @@
 // Three slices beside a surface, through the place that was clicked on it.
 import { client } from '../../client';
 import type { Job, Vec3, Volume } from '../../api/types';
+import type { LabelState } from '../../job/labels';
 import { h } from '../../ui/dom';
 import { tellError } from '../../ui/notices';
 import { noteInAddress } from '../../ui/route';
@@ -24,6 +25,7 @@ class JobSlices {
 
   constructor(
     private readonly volume: Volume,
+    private readonly labels: LabelState,
     place: string,
   ) {
     this.cursor = cursorOfText(place, volume);
@@ -42,7 +44,7 @@ class JobSlices {
       volume,
       source: new SliceSource(volume, scope.signal),
       commonWindow: common,
-      state: () => ({ iso, window, cursor: this.cursor }),
+      state: () => ({ iso, labels: this.labels.look(), window, cursor: this.cursor }),
       setWindow: (next) => {
         window = next;
         update();
@@ -56,6 +58,8 @@ class JobSlices {
     };
     this.views = (['axial', 'coronal', 'sagittal'] as const).map((plane) => new SliceView(plane, host, scope));
     this.element.replaceChildren(...this.views.map(({ element }) => element));
+    scope.onEnd(this.labels.hidden.subscribe(update));
+    scope.onEnd(this.labels.colours.subscribe(update));
     requestAnimationFrame(update);
   }
 
@@ -82,10 +86,11 @@ export class SlicesBeside {
     scope: Scope,
     private readonly job: Job,
     volume: Volume,
+    labels: LabelState,
     private readonly area: HTMLElement,
     private readonly query: URLSearchParams,
   ) {
-    this.slices = new JobSlices(volume, query.get('at') ?? '');
+    this.slices = new JobSlices(volume, labels, query.get('at') ?? '');
     this.slices.onCursor = (cursor) => {
       this.pane?.setCursor(cursor);
       noteInAddress({ at: cursor.join(',') });

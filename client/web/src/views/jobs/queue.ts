@@ -6,7 +6,7 @@ import { priorities } from '../../job/table';
 import { button, h } from '../../ui/dom';
 import { formatCount, formatMilliseconds, formatTime, shortId } from '../../ui/format';
 import { tellError } from '../../ui/notices';
-import { go, hashOf } from '../../ui/route';
+import { go, hashOf, noteInAddress, type Route } from '../../ui/route';
 import type { Scope } from '../../ui/signal';
 import { cell, row, table } from '../../ui/table';
 import { KnownVolumes } from '../../volume/known';
@@ -51,9 +51,10 @@ function surfaceCell(job: Job, volume: string): HTMLElement {
   );
 }
 
-export async function queueView(scope: Scope): Promise<HTMLElement> {
+export async function queueView(scope: Scope, { query }: Route): Promise<HTMLElement> {
   const queue = new Queue();
   await queue.refresh();
+  queue.restore((query.get('chosen') ?? '').split(','));
   const timer = setInterval(() => {
     // A lost connection is said at the top of the page.
     if (!document.hidden) queue.refresh().catch(() => undefined);
@@ -175,6 +176,21 @@ class Queue {
   private choose(id: string, isOn: boolean): void {
     if (isOn) this.chosen.add(id);
     else this.chosen.delete(id);
+    // So that the way back from a comparison leads to what was chosen.
+    noteInAddress({ chosen: [...this.chosen].join(',') });
+    this.showChosen();
+  }
+
+  // What the address says, as far as it is listed and can be shown.
+  restore(ids: readonly string[]): void {
+    const listed = this.jobs.filter(({ id, state }) => ids.includes(id) && state === 'succeeded');
+    if (listed.length === 0) return;
+    for (const { id } of listed) this.chosen.add(id);
+    this.show();
+    this.showChosen();
+  }
+
+  private showChosen(): void {
     const { size } = this.chosen;
     this.together.disabled = size < 2 || size > mostTogether;
     this.compare.disabled = size < 2 || size > mostCompared;

@@ -7,6 +7,8 @@ import { button, checkbox, field, h } from '../../ui/dom';
 import { formatCount } from '../../ui/format';
 import { refusal } from '../../ui/notices';
 import type { Scope } from '../../ui/signal';
+import { colourOf, LabelMap, type LabelLook } from '../../volume/label_map';
+import { opacityControl } from './label_opacity';
 import { LabelSearch } from './label_search';
 
 export type Choice = Pick<JobParameters, 'labels' | 'background'>;
@@ -28,13 +30,15 @@ export class LabelChoice {
   private readonly boxes = new Map<number, Box>();
   private triangles: ReadonlyMap<number, number> = new Map();
   private search: LabelSearch<VolumeLabel> | null = null;
+  private map: LabelMap | null = null;
 
-  // `onChange` gets undefined labels while none is chosen.
+  // `onChange` gets undefined labels while none is chosen. `onLook`: other labels are to be seen, see `look`.
   constructor(
     scope: Scope,
     private readonly volume: string,
     start: Choice,
     private readonly onChange: (choice: Choice) => void,
+    private readonly onLook: () => void,
   ) {
     this.background = start.background ?? 0;
     const input = h('input', { type: 'number', step: 1, value: this.background });
@@ -44,7 +48,7 @@ export class LabelChoice {
       this.ask('all');
       this.changed();
     });
-    this.element = h('div', { class: 'label-choice' }, this.body, field('Background', input, 'The value of samples without a label'));
+    this.element = h('div', { class: 'label-choice' }, this.body, opacityControl(), field('Background', input, 'The value of samples without a label'));
     scope.onEnd(() => this.asking?.abort());
     this.ask(start.labels);
   }
@@ -55,6 +59,7 @@ export class LabelChoice {
     this.asking = asking;
     this.body.replaceChildren(h('p', { role: 'status' }, 'Counting the labels'));
     this.labels = [];
+    this.map = null;
     this.chosen.clear();
     this.boxes.clear();
     this.search = null;
@@ -88,6 +93,15 @@ export class LabelChoice {
       ),
     );
     this.search.fill();
+    this.map = new LabelMap(labels);
+    this.onLook();
+  }
+
+  // What is seen of the volume: the labels that are chosen. Null until they are counted.
+  look(): LabelLook | null {
+    const { map, labels, chosen } = this;
+    const colours = new Map(labels.map((one) => [one.label, colourOf(one)]));
+    return map && { map, colourOf: (label) => colours.get(label) ?? '#000000', isShown: (label) => chosen.has(label) };
   }
 
   // The triangles of each label's surface, from the estimate.
@@ -115,7 +129,7 @@ export class LabelChoice {
     });
     const swatch = h('span', { class: 'swatch', 'aria-hidden': 'true' });
     // Not an attribute, which the content policy would not take.
-    if (label.color) swatch.style.backgroundColor = label.color;
+    swatch.style.backgroundColor = colourOf(label);
     const size = h('span', { class: 'faint number' });
     const box = {
       element: h(

@@ -7,6 +7,7 @@ import { formatBytes, formatCount, formatNames, formatValue } from '../../ui/for
 import { tellError } from '../../ui/notices';
 import { saveFile } from '../../ui/save';
 import type { Scope } from '../../ui/signal';
+import { opacityControl } from './label_opacity';
 import { LabelSearch } from './label_search';
 
 export function volumeText({ volume_mm3: volume }: LabelSummary): string {
@@ -49,6 +50,7 @@ export class LabelList {
         button('Hide all', () => state.hideAll()),
       ),
     );
+    this.element.append(opacityControl());
     search.fill();
     scope.onEnd(state.hidden.subscribe(() => this.update()));
     scope.onEnd(state.colours.subscribe(() => this.update()));

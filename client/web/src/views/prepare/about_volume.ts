@@ -4,15 +4,17 @@ import type { Volume } from '../../api/types';
 import { button, h } from '../../ui/dom';
 import { formatDims, formatNames, formatSpacing, formatValue } from '../../ui/format';
 import { askText, tellError } from '../../ui/notices';
+import { skippedText } from '../../volume/skipped';
 import { noteTexts, volumeName } from '../../volume/names';
 
 // Lists the skipped files of an upload, because a user may miss them.
-function ignoredNote({ ignored }: Volume): HTMLElement | null {
+function ignoredNote(volume: Volume): HTMLElement | null {
+  const { ignored } = volume;
   if (ignored.length === 0) return null;
   return h(
     'details',
     { class: 'more' },
-    h('summary', {}, ignored.length === 1 ? '1 file was skipped' : `${ignored.length} files were skipped`),
+    h('summary', {}, skippedText([volume])),
     h('ul', {}, ...ignored.map(({ name, reason }) => h('li', {}, h('b', {}, name), `: ${reason}`))),
   );
 }

@@ -39,3 +39,9 @@ export function estimateTexts(estimate: Estimate, isByLabels: boolean): HTMLElem
   }
   return texts;
 }
+
+// '' if the job is not simplified.
+export function simplifiedInWords({ triangles, simplified_triangles: left }: Estimate): string {
+  if (left === undefined) return '';
+  return `About ${formatCount(left)} of ${formatCount(triangles)} triangles remain.`;
+}

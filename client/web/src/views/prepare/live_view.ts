@@ -9,15 +9,17 @@ import { formatValue } from '../../ui/format';
 import type { Scope } from '../../ui/signal';
 import { toPatient } from '../../volume/geometry';
 import type { Box } from '../../volume/crop';
+import { coloursOf, LabelMap, type LabelLook } from '../../volume/label_map';
 import { lookOf, looksFor, type LookName } from '../../volume/looks';
 import { inPreview, type Preview } from '../../volume/preview';
-import type { PreviewAnswer } from '../../volume/preview.worker';
+import type { PreviewAnswer, PreviewRequest } from '../../volume/preview.worker';
 import type { Window } from '../../volume/slices';
 
 // Samples along an axis: what is there soon, and what is drawn then.
 const firstSize = 64;
 const softwareSize = 128;
 const hardwareSize = 256;
+const mostLabels = 255;
 const retryDelay = 3000;
 const turnStep = Math.PI / 24;
 
@@ -31,6 +33,11 @@ export interface LiveHost {
   setLook: (look: LookName | '') => void;
 }
 
+// As many of them as eight bits can number.
+function inBytes(map: LabelMap): LabelMap {
+  return map.labels.length <= mostLabels ? map : new LabelMap(map.labels.slice(0, mostLabels));
+}
+
 export class LiveView {
   readonly element: HTMLElement;
   private readonly view = h('div', { class: 'live-picture' });
@@ -40,23 +47,28 @@ export class LiveView {
   private preview: Preview | null = null;
   private iso: number | null = null;
   private cursor: Vec3 = [0, 0, 0];
+  // What is fetched: a window, or the key of a map of labels.
+  private wanted = '';
   private window: Window | null = null;
+  private labels: LabelLook | null = null;
   private loading: AbortController | null = null;
   private worker: Worker | null = null;
   private retry = 0;
   private hasFailed = false;
   private look: LookName | '' = '';
+  private readonly choice: HTMLElement;
   private box: Box | null = null;
 
   constructor(
     private readonly host: LiveHost,
     private readonly scope: Scope,
   ) {
+    this.choice = this.lookChoice();
     this.element = h(
       'figure',
       { class: 'slice live' },
       h('div', { class: 'slice-picture' }, this.view, this.state),
-      h('figcaption', {}, this.lookChoice(), this.place),
+      h('figcaption', {}, this.choice, this.place),
     );
     scope.onEnd(() => {
       clearTimeout(this.retry);
@@ -93,9 +105,10 @@ export class LiveView {
   }
 
   private showLook(): void {
-    const { look, preview } = this;
+    const { look, preview, labels } = this;
     if (!preview) return;
-    this.surface?.setLook(look === '' ? null : lookOf(look, preview.window));
+    if (labels) this.surface?.setLabels(coloursOf(labels));
+    else this.surface?.setLook(look === '' ? null : lookOf(look, preview.window));
     this.element.dataset.look = look;
   }
 
@@ -107,15 +120,38 @@ export class LiveView {
     this.surface?.setCrop(box && [parts(box[0]), parts(box[1])]);
   }
 
-  // No iso-value: the labels of a segmentation. The cursor is where the slices meet.
-  show(iso: number | null, cursor: Vec3): void {
-    this.iso = iso;
+  // The labels of a segmentation; null while they are counted. The cursor is where the slices meet.
+  showLabels(look: LabelLook | null, cursor: Vec3): void {
+    this.choice.hidden = true;
     this.cursor = cursor;
-    if (iso === null) {
-      this.say('The preview shows iso-values only, not labels.');
-      this.view.hidden = true;
+    const isTooLarge = this.host.volume.dims.some((count) => count > hardwareSize);
+    this.view.hidden = look === null || isTooLarge;
+    if (!look || isTooLarge) {
+      this.say(isTooLarge ? `The preview shows labels of volumes with at most ${hardwareSize} samples along each axis.` : '');
       return;
     }
+    this.iso = null;
+    this.labels = { ...look, map: inBytes(look.map) };
+    this.want(look.map.key);
+    this.showPlace('Preview of the labels');
+    if (this.preview && Number.isNaN(this.preview.window[0])) this.showLook();
+  }
+
+  private want(key: string): void {
+    if (key === this.wanted) {
+      if (!this.hasFailed) this.say('');
+      return;
+    }
+    this.wanted = key;
+    this.load();
+  }
+
+  // The surface at that iso-value. The cursor is where the slices meet.
+  show(iso: number, cursor: Vec3): void {
+    this.choice.hidden = false;
+    this.labels = null;
+    this.iso = iso;
+    this.cursor = cursor;
     this.view.hidden = false;
     const window = this.windowFor(iso);
     if (!window) {
@@ -123,12 +159,8 @@ export class LiveView {
       this.view.hidden = true;
       return;
     }
-    if (this.window?.join() !== window.join()) {
-      this.window = window;
-      this.load();
-    } else if (!this.hasFailed) {
-      this.say('');
-    }
+    this.window = window;
+    this.want(window.join());
     this.showIso();
   }
 
@@ -141,12 +173,15 @@ export class LiveView {
   }
 
   private showIso(): void {
-    if (!this.surface || !this.preview || this.iso === null) return;
-    const name = `Preview of the surface at iso-value ${formatValue(this.iso)}. Drag or use the arrow keys to turn it.`;
-    this.surface.canvas.setAttribute('aria-label', name);
+    if (!this.surface || !this.preview || this.iso === null || Number.isNaN(this.preview.window[0])) return;
+    this.showPlace(`Preview of the surface at iso-value ${formatValue(this.iso)}`);
     this.surface.setIso(inPreview(this.preview, this.iso));
-    this.surface.setCursor(toPatient(this.host.volume, this.cursor));
     this.element.dataset.iso = String(this.iso);
+  }
+
+  private showPlace(name: string): void {
+    this.surface?.canvas.setAttribute('aria-label', `${name}. Drag or use the arrow keys to turn it.`);
+    this.surface?.setCursor(toPatient(this.host.volume, this.cursor));
   }
 
   private say(text: string): void {
@@ -170,8 +205,9 @@ export class LiveView {
 
   private async run(signal: AbortSignal): Promise<void> {
     if (!this.preview) this.say('Loading the preview');
+    const { labels } = this;
     const [first, { LiveSurface }] = await Promise.all([
-      this.fetch(firstSize, signal),
+      labels ? this.fetchLabels(labels.map, signal) : this.fetch(firstSize, signal),
       import('../../scene/live'),
       graphicsStarted(),
     ]);
@@ -185,7 +221,7 @@ export class LiveView {
     this.say('');
     this.take(first);
     const size = this.surface.isSoftware ? softwareSize : hardwareSize;
-    if (this.host.volume.dims.every((count) => count <= firstSize)) return;
+    if (labels || this.host.volume.dims.every((count) => count <= firstSize)) return;
     this.take(await this.fetch(size, signal));
   }
 
@@ -193,6 +229,17 @@ export class LiveView {
     const { window } = this;
     if (!window) throw new Error('There is no window.');
     const file = await client.previewFile(this.host.volume.id, size, window, signal);
+    return this.read({ file, window }, [file], signal);
+  }
+
+  // All samples: a mean of labels is none of them.
+  private async fetchLabels({ windows, labels }: LabelMap, signal: AbortSignal): Promise<Preview> {
+    const { id } = this.host.volume;
+    const files = await Promise.all(windows.map((window) => client.previewFile(id, hardwareSize, [...window], signal)));
+    return this.read({ files, labels }, files, signal);
+  }
+
+  private read(request: PreviewRequest, buffers: ArrayBuffer[], signal: AbortSignal): Promise<Preview> {
     return new Promise((resolve, reject) => {
       const worker = new Worker(new URL('../../volume/preview.worker.ts', import.meta.url), { type: 'module' });
       this.worker?.terminate();
@@ -204,7 +251,7 @@ export class LiveView {
         else reject(new Error(error));
       };
       worker.onerror = (event) => reject(new Error(event.message));
-      worker.postMessage({ file, window }, [file]);
+      worker.postMessage(request, buffers);
     });
   }
 
@@ -225,6 +272,7 @@ export class LiveView {
     this.preview = preview;
     this.surface?.setPreview(preview);
     this.showIso();
+    if (this.labels) this.showPlace('Preview of the labels');
     this.showLook();
     this.showCrop(this.box);
     this.element.dataset.size = String(Math.max(...preview.dims));

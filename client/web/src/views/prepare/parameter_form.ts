@@ -39,15 +39,9 @@ interface Control {
 // These are chosen elsewhere: the volume before, the iso-value in the histogram, labels in their list.
 // Names, colours and values of labels come from the volume.
 const elsewhere = ['volume', 'iso', 'labels', 'background', 'label_names', 'label_colors', 'label_values'];
-// The parameters that are always visible, in rows. All others are under "More".
-const front = [
-  ['scheme', 'interpolation'],
-  ['smoothing', 'passes'],
-  ['max_error_mm'],
-  ['triangles', 'certify'],
-  ['fill_cavities'],
-  ['priority'],
-];
+// The parameters that are always visible, in rows. All others are under "More", these first.
+const front = [['max_error_mm'], ['triangles', 'certify'], ['fill_cavities']];
+const behind = [['scheme', 'interpolation'], ['smoothing', 'passes'], ['priority']];
 
 export const shown = parameters.filter(({ name }) => !elsewhere.includes(name));
 
@@ -217,8 +211,8 @@ function controlFor(parameter: Parameter, host: FormHost): Control {
   throw new Error(`${parameter.name}: the page has no control for it`);
 }
 
-// For a job at an iso-value, or for one by labels, as the present one is.
-export function parameterForm(host: FormHost): HTMLElement {
+// For a job at an iso-value, or for one by labels, as the present one is. With `isOpen` all of it is shown.
+export function parameterForm(host: FormHost, isOpen: boolean): HTMLElement {
   const dependents: { on: readonly string[]; update: () => void }[] = [];
   const watching: FormHost = {
     ...host,
@@ -236,18 +230,18 @@ export function parameterForm(host: FormHost): HTMLElement {
     return element;
   };
   const offered = shown.filter((parameter) => isOfKind(parameter, host.job()) && !host.hides.includes(parameter.name));
-  const rows = front.map((names) =>
-    h('div', { class: 'row' }, ...names.map(parameterOf).filter((one) => offered.includes(one)).map(elementFor)),
-  );
-  const others = offered.filter(({ name }) => !front.flat().includes(name));
+  const rowsOf = (rows: readonly (readonly string[])[]): HTMLElement[] =>
+    rows.map((names) => h('div', { class: 'row' }, ...names.map(parameterOf).filter((one) => offered.includes(one)).map(elementFor)));
+  const others = offered.filter(({ name }) => ![...front, ...behind].flat().includes(name));
   return h(
     'div',
     { class: 'parameters' },
-    ...rows,
+    ...rowsOf(front),
     h(
       'details',
-      { class: 'more' },
+      { class: 'more', open: isOpen },
       h('summary', {}, 'More'),
+      ...rowsOf(behind),
       h('div', { class: 'pair' }, ...others.filter(isNumber).map(elementFor)),
       ...others.filter((parameter) => !isNumber(parameter)).map(elementFor),
     ),

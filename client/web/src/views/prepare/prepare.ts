@@ -10,10 +10,11 @@ import {
   parametersOfQuery,
   queryOfParameters,
 } from '../../job/parameters';
+import { kindOf, kinds, withKind, type Kind } from '../../job/kinds';
 import { trianglesOf } from '../../job/labels';
 import { isByLabels, withLabels } from '../../job/table';
-import { button, field, h, isTyping, segmented } from '../../ui/dom';
-import { formatCount, formatValue } from '../../ui/format';
+import { button, choose, field, h, isTyping, segmented } from '../../ui/dom';
+import { formatValue } from '../../ui/format';
 import { History } from '../../ui/history';
 import { refusal } from '../../ui/notices';
 import { go, noteInAddress, type Route } from '../../ui/route';
@@ -23,10 +24,11 @@ import { defaultWindow, type Histogram } from '../../volume/histogram';
 import { SliceSource, type Window } from '../../volume/slices';
 import { boxOf, cropOf, isUpright, within, type Box } from '../../volume/crop';
 import { cursorOfText } from '../../volume/geometry';
+import type { LabelLook } from '../../volume/label_map';
 import { eachLabel, isInteger, volumeName } from '../../volume/names';
 import { aboutVolume, notedOf, sliceHelp } from './about_volume';
 import { CropControl } from './crop_control';
-import { estimateTexts } from './estimate_texts';
+import { estimateTexts, simplifiedInWords } from './estimate_texts';
 import { HistogramView } from './histogram_view';
 import { LiveView } from './live_view';
 import { LabelChoice, type Choice } from '../labels/label_choice';
@@ -62,12 +64,6 @@ function startOfQuery(query: URLSearchParams, volume: Volume, defaults: JobParam
   return areLabels && !query.has('iso') && !isByLabels(parameters) ? withLabels(parameters, 'all') : parameters;
 }
 
-// '' if the job is not simplified.
-function simplifiedInWords({ triangles, simplified_triangles: left }: Estimate): string {
-  if (left === undefined) return '';
-  return `About ${formatCount(left)} of ${formatCount(triangles)} triangles remain.`;
-}
-
 class Prepare {
   readonly element: HTMLElement;
   private parameters: JobParameters;
@@ -90,6 +86,7 @@ class Prepare {
   // The controls in which something stands that is no value of theirs.
   private readonly faulty = new Set<string>();
   private readonly form = h('div');
+  private readonly surfaceKind = segmented('Kind of surface', kinds, 'smooth', (kind) => this.setSurfaceKind(kind));
   private readonly simplified = h('p', { class: 'hint', 'aria-live': 'polite' });
   private readonly problem = h('div');
   private readonly windowText = h('span', { class: 'window-text faint' });
@@ -118,6 +115,7 @@ class Prepare {
       commonWindow: common,
       state: () => ({
         iso: isByLabels(this.parameters) ? null : this.iso,
+        labels: this.labelLook,
         window: this.window,
         cursor: this.cursor,
       }),
@@ -175,6 +173,8 @@ class Prepare {
   private listenToPage(): void {
     const { scope } = this;
     scope.onEnd(theme.subscribe(() => this.update()));
+    scope.listen(window, 'pointerdown', () => this.history.hold());
+    for (const end of ['pointerup', 'pointercancel'] as const) scope.listen(window, end, () => this.history.release());
     scope.listen(window, 'keydown', (event: KeyboardEvent) => {
       if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) void this.start();
       else if (event.key.toLowerCase() === 'z' && (event.ctrlKey || event.metaKey) && !isTyping(event)) {
@@ -204,6 +204,11 @@ class Prepare {
     return typeof iso === 'number' ? iso : this.volume.suggested_iso;
   }
 
+  // Null for a job at an iso-value, and until the labels are counted.
+  private get labelLook(): LabelLook | null {
+    return isByLabels(this.parameters) ? (this.labelChoice?.look() ?? null) : null;
+  }
+
   private get box(): Box | null {
     return boxOf(this.volume, this.parameters.crop);
   }
@@ -219,10 +224,11 @@ class Prepare {
     this.isoPart.hidden = byLabels;
     this.labelPart.hidden = !byLabels;
     if (byLabels && !this.labelChoice) {
-      this.labelChoice = new LabelChoice(this.scope, this.volume.id, this.parameters, (choice) => this.setLabels(choice));
+      this.labelChoice = new LabelChoice(this.scope, this.volume.id, this.parameters, (choice) => this.setLabels(choice), () => this.update());
       this.labelPart.append(this.labelChoice.element);
     }
     this.faulty.clear();
+    const isOpen = this.form.querySelector('details')?.open ?? false;
     this.form.replaceChildren(
       parameterForm({
         job: () => this.parameters,
@@ -233,7 +239,7 @@ class Prepare {
         mark: (parameter, isGood) => this.mark(parameter.name, isGood),
         slider: { spacing: this.volume.spacing, outcome: this.simplified },
         hides: this.crop ? ['crop'] : [],
-      }),
+      }, isOpen),
     );
   }
 
@@ -253,6 +259,12 @@ class Prepare {
     const isNone = kind === 'labels' && this.labelChoice !== null && this.labelChoice.choice() === undefined;
     this.hasLabel = !isNone;
     this.parameters = withLabels(this.parameters, kind === 'labels' ? (this.labelChoice?.choice() ?? 'all') : undefined);
+    this.showKind();
+    this.changed();
+  }
+
+  private setSurfaceKind(kind: Kind): void {
+    this.parameters = withKind(this.parameters, kind);
     this.showKind();
     this.changed();
   }
@@ -289,6 +301,7 @@ class Prepare {
         this.windowRow(common),
         this.crop?.element ?? '',
         ...notedOf(volume),
+        this.surfaceKind,
         this.form,
         madeSurfaces(volume.id),
         sliceHelp(),
@@ -360,8 +373,10 @@ class Prepare {
 
   private update(): void {
     this.undoButton.hidden = !this.history.canUndo;
+    choose(this.surfaceKind, kindOf(this.parameters));
     for (const view of this.slices) view.update();
-    this.live.show(isByLabels(this.parameters) ? null : this.iso, this.cursor);
+    if (isByLabels(this.parameters)) this.live.showLabels(this.labelLook, this.cursor);
+    else this.live.show(this.iso, this.cursor);
     this.live.showCrop(this.box);
     this.crop?.show(this.box);
     this.histogram.show(this.iso, this.window);

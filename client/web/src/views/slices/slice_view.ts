@@ -1,9 +1,12 @@
 // One orthogonal slice: grey samples, the iso-contour over them, and the place of the other two planes.
 import type { Axis, Vec3, Volume } from '../../api/types';
+import { labelTitle } from '../../job/labels';
 import { h, uniqueId } from '../../ui/dom';
 import { formatValue } from '../../ui/format';
 import type { Scope } from '../../ui/signal';
 import { contour } from '../../volume/contour';
+import { coloursOf, paintLabels, type LabelLook } from '../../volume/label_map';
+import { labelOpacity } from '../labels/label_opacity';
 import { SliceCrop, type CropHost } from './slice_crop';
 import { SliceZoom } from './slice_zoom';
 import {
@@ -21,6 +24,8 @@ import { greyTable, inSlice, valueIn, windowToFetch, type Slice, type SliceSourc
 
 export interface SliceState {
   iso: number | null; // of the contour
+  // Null where samples are values, and not labels.
+  labels: LabelLook | null;
   window: Window;
   // The sample where the three planes meet.
   cursor: Vec3;
@@ -106,16 +111,17 @@ export class SliceView {
     const resizing = new ResizeObserver(() => this.draw());
     resizing.observe(this.canvas);
     scope.onEnd(() => resizing.disconnect());
+    scope.onEnd(labelOpacity.subscribe(() => this.draw()));
   }
 
   // Shows the state as it is now.
   update(): void {
-    const { iso, window, cursor } = this.host.state();
+    const { iso, labels, window, cursor } = this.host.state();
     const index = cursor[axisIndex(this.layout.normal)];
     this.slider.value = String(index);
     this.place.textContent = `${index + 1} / ${this.count(this.layout.normal)}`;
     const fetched = windowToFetch(window, iso ?? window[0], this.host.commonWindow);
-    this.loader.want(index, fetched);
+    this.loader.want(index, fetched, labels?.map ?? null);
     this.draw();
   }
 
@@ -184,13 +190,14 @@ export class SliceView {
   }
 
   private paintSlice(context: CanvasRenderingContext2D, slice: Slice, ratio: number): void {
-    this.fillBuffer(slice);
+    const { iso, labels, cursor } = this.host.state();
+    if (slice.labels && labels) this.fillLabels(slice, slice.labels, labels);
+    else this.fillBuffer(slice);
     context.save();
     context.setTransform(...this.placement());
-    context.imageSmoothingEnabled = true;
+    context.imageSmoothingEnabled = labels === null;
     context.drawImage(this.buffer, 0, 0);
 
-    const { iso, cursor } = this.host.state();
     const segments = iso === null ? [] : contour(slice, inSlice(slice, iso));
     const [column, row] = pictureAxes(this.layout.normal);
     context.translate(0.5, 0.5);
@@ -208,6 +215,13 @@ export class SliceView {
     strokePixels(context, 1.5 * ratio, this.host.contourColour());
     if (this.crop?.paint(context)) strokePixels(context, 1.5 * ratio, cropColour);
     context.restore();
+  }
+
+  private fillLabels({ width, height }: Slice, numbers: Uint16Array, look: LabelLook): void {
+    this.buffer.width = width;
+    this.buffer.height = height;
+    const pixels = paintLabels({ width, height, labels: numbers }, coloursOf(look), labelOpacity.value);
+    this.buffer.getContext('2d', { willReadFrequently: true })?.putImageData(new ImageData(pixels, width, height), 0, 0);
   }
 
   private fillBuffer(slice: Slice): void {
@@ -331,6 +345,11 @@ export class SliceView {
     const normal = axisIndex(this.layout.normal);
     if (!slice || place?.[normal] !== slice.index) return { text: '', value: null };
     const [column, row] = pictureAxes(this.layout.normal);
+    const { labels } = this.host.state();
+    if (labels && slice.labels) {
+      const label = labels.map.at(slice.labels[place[row] * slice.width + place[column]] ?? 0);
+      return { text: label ? labelTitle(label) : '', value: null };
+    }
     const { low, high } = valueIn(slice, place[column], place[row]);
     if (low === -Infinity) return { text: `at most ${formatValue(high)}`, value: null };
     if (high === Infinity) return { text: `at least ${formatValue(low)}`, value: null };

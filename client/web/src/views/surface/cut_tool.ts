@@ -1,15 +1,29 @@
 // The cut along a slice: its controls, and the slice's picture on it.
 import { client } from '../../client';
 import type { Axis, Job, Volume } from '../../api/types';
+import type { LabelState } from '../../job/labels';
 import type { Surface } from '../../scene/surface';
 import { checkbox, h } from '../../ui/dom';
 import { tellError } from '../../ui/notices';
 import type { Scope } from '../../ui/signal';
 import { axisIndex, patientAxes } from '../../volume/geometry';
 import { defaultWindow } from '../../volume/histogram';
-import type { Window } from '../../volume/slices';
+import { coloursOf, paintLabels, type LabelLook, type NumberedSlice } from '../../volume/label_map';
+import { SliceSource, type Window } from '../../volume/slices';
+import { labelOpacity } from '../labels/label_opacity';
 
 const bins = 512;
+
+// Over black.
+function paintedLabels(slice: NumberedSlice, look: LabelLook): Promise<ImageBitmap> {
+  const pixels = paintLabels(slice, coloursOf(look), labelOpacity.value);
+  for (let at = 0; at < pixels.length; at += 4) {
+    const opacity = (pixels[at + 3] as number) / 255;
+    for (let channel = 0; channel < 3; channel += 1) pixels[at + channel] = (pixels[at + channel] as number) * opacity;
+    pixels[at + 3] = 255;
+  }
+  return createImageBitmap(new ImageData(pixels, slice.width, slice.height));
+}
 
 export class CutTool {
   readonly element = h('div', { class: 'cut-controls', hidden: true });
@@ -24,11 +38,14 @@ export class CutTool {
   private window: Window | null = null;
   private pictureWanted = '';
   private isFetching = false;
+  private readonly source: SliceSource;
+  private paintings = 0;
 
   constructor(
     private readonly scope: Scope,
     private readonly job: Job,
     private readonly volume: Volume,
+    private readonly labels: LabelState,
     private readonly surface: Surface,
     private readonly view: HTMLElement,
   ) {
@@ -40,6 +57,11 @@ export class CutTool {
     ];
     this.axis = axial;
     this.index = this.middle;
+    this.source = new SliceSource(volume, scope.signal);
+    // Labels are painted anew where others are seen, or the same ones otherwise.
+    if (labels.labels.length > 0) {
+      for (const changed of [labels.hidden, labels.colours, labelOpacity]) scope.onEnd(changed.subscribe(() => this.repaint()));
+    }
   }
 
   // As `onChange` told it; what is no cut of this volume changes nothing.
@@ -108,28 +130,46 @@ export class CutTool {
     const { axis, index, flipped } = this;
     this.surface.cut.place(this.volume, { axis, index, flipped });
     this.surface.draw();
-    this.pictureWanted = `${axis}/${index}`;
+    this.pictureWanted = this.wanted;
     this.onChange?.(`${axis}${index}${flipped ? '-' : '+'}`);
     void this.fetchPicture();
+  }
+
+  private get wanted(): string {
+    return `${this.axis}/${this.index}${this.paintings > 0 ? `/${this.paintings}` : ''}`;
+  }
+
+  private repaint(): void {
+    this.paintings += 1;
+    if (!this.isOn) return;
+    this.pictureWanted = this.wanted;
+    void this.fetchPicture();
+  }
+
+  private async picture(): Promise<ImageBitmap> {
+    const { axis, index, volume } = this;
+    const look = this.labels.look();
+    if (look) {
+      const { width, height, labels } = await this.source.get(axis, index, volume.range, look.map);
+      return paintedLabels({ width, height, labels: labels ?? new Uint16Array(width * height) }, look);
+    }
+    if (this.window === null) {
+      const { iso: asked } = this.job.parameters;
+      const iso = typeof asked === 'number' ? asked : volume.suggested_iso;
+      this.window = defaultWindow(await client.histogramOf(volume.id, bins, this.scope.signal), iso);
+    }
+    return createImageBitmap(await client.slicePicture(volume.id, axis, index, this.window, this.scope.signal));
   }
 
   // One request at a time; the place that is wanted last is the next.
   private async fetchPicture(): Promise<void> {
     if (this.isFetching) return;
     this.isFetching = true;
-    const { volume } = this;
     try {
       let shown = '';
       while (this.pictureWanted !== '' && this.pictureWanted !== shown && !this.scope.isOver) {
         shown = this.pictureWanted;
-        const { axis, index } = this;
-        if (this.window === null) {
-          const { iso: asked } = this.job.parameters;
-          const iso = typeof asked === 'number' ? asked : volume.suggested_iso;
-          this.window = defaultWindow(await client.histogramOf(volume.id, bins, this.scope.signal), iso);
-        }
-        const blob = await client.slicePicture(volume.id, axis, index, this.window, this.scope.signal);
-        const picture = await createImageBitmap(blob);
+        const picture = await this.picture();
         if (this.scope.isOver || !this.isOn) picture.close();
         else {
           this.surface.cut.show(picture);

@@ -60,6 +60,10 @@ export class DistanceLook {
     return this.reach !== null;
   }
 
+  get hasValues(): boolean {
+    return this.reach !== null;
+  }
+
   set(isOn: boolean): void {
     if (!this.reach) return;
     this.isOn = isOn;

@@ -8,6 +8,7 @@ import type { Picked } from '../../scene/picked';
 import { Surface } from '../../scene/surface';
 import { viewNames, viewTitles, type CameraPlace } from '../../scene/views';
 import type { LabelState } from '../../job/labels';
+import { withGlb } from '../../job/parameters';
 import { emptyReason } from '../../job/empty';
 import { changeLink, fileNameOf, makeVariant } from '../../job/variants';
 import { button, h, isTyping } from '../../ui/dom';
@@ -211,7 +212,7 @@ export class SurfacePane {
     this.followLabels(surface);
     const distance = new DistanceLook(this.scope, surface, (isOn) => this.setStyle({ distance: isOn }));
     this.distance = distance;
-    if (this.options.volume) this.cut = new CutTool(this.scope, this.job, this.options.volume, surface, this.view);
+    if (this.options.volume) this.cut = new CutTool(this.scope, this.job, this.options.volume, this.options.labels, surface, this.view);
     const tools = [this.toolbar(surface, distance), this.cut?.element ?? '', this.pickedLabel.element, this.pickedPart.element];
     this.element.append(h('div', { class: 'tools' }, ...tools), distance.legend);
     this.scope.listen(surface.canvas, 'keydown', (event: KeyboardEvent) => this.moveKey(event, surface));
@@ -325,6 +326,17 @@ export class SurfacePane {
     if (this.isMeasuring) tell('Click or tap two points on the surface or on the slice of the cut. Esc removes the last point.');
   }
 
+  private toggleDistance(): void {
+    const { distance, job } = this;
+    if (!distance || !this.isWhole) return;
+    if (distance.hasValues) {
+      distance.set(!distance.isOn);
+      return;
+    }
+    const make = (): void => makeVariant(job)({ distances: true, formats: withGlb(job.parameters.formats) });
+    tell(h('span', {}, 'The file of this surface holds no distances. ', button('Make one that does', make, { class: 'link' })));
+  }
+
   private toggleCut(): void {
     if (!this.cut) return;
     this.cut.set(!this.cut.isOn);
@@ -364,7 +376,7 @@ export class SurfacePane {
     else if (key === 'c') this.toggleCut();
     else if (key === 'x') this.options.onSlices?.();
     else if (key === 'm') this.toggleMeasure();
-    else if (key === 'd') this.distance?.set(!this.distance.isOn);
+    else if (key === 'd') this.toggleDistance();
     else if (key === 'h') this.pickedLabel.hide();
     else if (key === 'o') this.pickedLabel.isolate();
     else if (key === 'e') this.options.labels.showAll();

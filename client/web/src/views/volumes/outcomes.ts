@@ -4,7 +4,9 @@ import type { UploadedVolume, Volume } from '../../api/types';
 import { h } from '../../ui/dom';
 import { formatDims } from '../../ui/format';
 import { hashOf } from '../../ui/route';
-import { acceptButton, choiceForms, type Choices } from './remedies';
+import { skippedText } from '../../volume/skipped';
+import type { NamedFile } from '../../volume/tar';
+import { acceptButton, choiceLists, questionOf, type Choices } from './remedies';
 
 // Either a volume or an error.
 export interface Outcome {
@@ -40,19 +42,21 @@ function refusedRow(
   error: ApiError,
   name: string,
   choices: Choices,
+  files: readonly NamedFile[],
   onAgain: (choices: Choices) => void,
 ): (Node | false)[] {
   return [
     h('b', {}, name),
-    h('p', {}, error.detail || error.title),
+    h('p', {}, questionOf(error, choices) || error.detail || error.title),
     acceptButton(error, choices, onAgain),
-    ...choiceForms(error, choices, onAgain),
+    ...choiceLists(error, choices, files, onAgain),
   ];
 }
 
-// `onAgain` has a refused one read once more, with other choices.
+// `onAgain` has a refused one read once more, with other choices. `files` are those of the upload.
 export function outcomeList(
   outcomes: readonly Outcome[],
+  files: readonly NamedFile[],
   onAgain: (outcome: Outcome, choices: Choices) => void,
 ): HTMLElement {
   const row = (outcome: Outcome): HTMLElement => {
@@ -60,10 +64,16 @@ export function outcomeList(
     const name = member === dicomMember ? 'DICOM files' : member;
     return h(
       'li',
-      { 'data-member': member, class: error ? 'refused' : 'stored' },
+      { 'data-member': member, class: !error ? 'stored' : questionOf(error, outcome.choices) ? 'asked' : 'refused' },
       ...(volume ? storedRow(volume, name, wasThere) : []),
-      ...(error ? refusedRow(error, name, outcome.choices, (choices) => onAgain(outcome, choices)) : []),
+      ...(error ? refusedRow(error, name, outcome.choices, files, (choices) => onAgain(outcome, choices)) : []),
     );
   };
-  return h('ul', { class: 'outcomes', 'aria-label': 'Volumes in the upload' }, ...outcomes.map(row));
+  const skipped = skippedText(outcomes.flatMap(({ volume }) => volume ?? []));
+  return h(
+    'div',
+    { class: 'stack' },
+    h('ul', { class: 'outcomes', 'aria-label': 'Volumes in the upload' }, ...outcomes.map(row)),
+    skipped !== '' && h('p', { class: 'skipped' }, skipped),
+  );
 }

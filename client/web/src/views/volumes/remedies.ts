@@ -1,7 +1,9 @@
 // The options that a user can add to a rejected upload so that the server accepts it.
 import { choicesOf, type ApiError } from '../../api/problem';
 import type { Choice } from '../../api/types';
-import { button, field, h } from '../../ui/dom';
+import { button, h } from '../../ui/dom';
+import { peekAtSeries, type Peek } from '../../volume/dicom_peek';
+import type { NamedFile } from '../../volume/tar';
 
 // The values of the query's parameters that choose or accept something.
 export type Choices = Readonly<Record<string, string>>;
@@ -17,32 +19,62 @@ export function acceptButton(
   return button('Accept it anyway', () => onChoices({ ...before, accept }));
 }
 
-function choiceForm(
-  parameter: Choice['parameter'],
-  choices: Choice[],
-  onChoice: (value: string) => void,
-): HTMLElement {
-  const noun = { series: 'series', member: 'file', volume: 'volume' }[parameter];
-  const select = h(
-    'select',
-    {},
-    ...choices.map(({ value, title }) => h('option', { value }, title === '' ? value : `${title} (${value})`)),
-  );
-  return h(
-    'div',
-    { class: 'series' },
-    field(`${noun.charAt(0).toUpperCase()}${noun.slice(1)} to read`, select),
-    button(`Use this ${noun}`, () => onChoice(select.value), { class: 'primary' }),
-  );
+const nouns = { series: 'series', member: 'file', volume: 'volume' } as const;
+
+// The question that a rejected upload leaves open. '' if there is none, or if it was answered: then what the server says about
+// the answer is to be seen.
+export function questionOf(error: ApiError, before: Choices): string {
+  const [first] = choicesOf(error).keys();
+  return first === undefined || before[first] !== undefined ? '' : `Which ${nouns[first]}?`;
 }
 
-// A form for each parameter that the refusal leaves to be chosen.
-export function choiceForms(
+// Of a series, as far as the page can read its files.
+function showPeek({ date, picture }: Peek, thumbnail: HTMLCanvasElement, facts: HTMLElement): void {
+  facts.textContent = date;
+  const context = picture && thumbnail.getContext('2d');
+  if (!context) return;
+  const { width, height, grey } = picture;
+  [thumbnail.width, thumbnail.height] = [width, height];
+  const image = context.createImageData(width, height);
+  grey.forEach((value, i) => image.data.set([value, value, value, 255], 4 * i));
+  context.putImageData(image, 0, 0);
+}
+
+function choiceList(
+  parameter: Choice['parameter'],
+  choices: readonly Choice[],
+  files: readonly NamedFile[],
+  onChoice: (value: string) => void,
+): HTMLElement {
+  const rows = choices.map(({ value, title }) => {
+    const thumbnail = h('canvas', { width: 1, height: 1, 'aria-hidden': 'true', hidden: parameter !== 'series' });
+    const facts = h('span', { class: 'faint' });
+    const text = h('span', { class: 'choice-text' }, h('b', {}, title === '' ? `${nouns[parameter]} ${value}` : title), facts);
+    return { value, thumbnail, facts, element: h('li', {}, button(h('span', { class: 'choice' }, thumbnail, text), () => onChoice(value))) };
+  });
+  if (parameter === 'series') {
+    peekAtSeries(files.map(({ file }) => file), choices.map(({ value }) => value)).then(
+      (found) => {
+        for (const { value, thumbnail, facts } of rows) {
+          const peek = found.get(value);
+          if (peek) showPeek(peek, thumbnail, facts);
+        }
+      },
+      // The browser cannot read the files any more. The titles are enough to choose.
+      () => undefined,
+    );
+  }
+  return h('ul', { class: 'choices', 'aria-label': `Which ${nouns[parameter]}?` }, ...rows.map(({ element }) => element));
+}
+
+// A list for each parameter that the rejection leaves to be chosen.
+export function choiceLists(
   error: ApiError,
   before: Choices,
+  files: readonly NamedFile[],
   onChoices: (choices: Choices) => void,
 ): HTMLElement[] {
   return [...choicesOf(error)].map(([parameter, choices]) =>
-    choiceForm(parameter, choices, (value) => onChoices({ ...before, [parameter]: value })),
+    choiceList(parameter, choices, files, (value) => onChoices({ ...before, [parameter]: value })),
   );
 }

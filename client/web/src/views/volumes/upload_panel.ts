@@ -12,7 +12,7 @@ import { faultOf } from '../../volume/sniff';
 import type { NamedFile } from '../../volume/tar';
 import { outcomeList, outcomeOf, type Outcome } from './outcomes';
 import { rawForm } from './raw_form';
-import { acceptButton, choiceForms, type Choices } from './remedies';
+import { acceptButton, choiceLists, questionOf, type Choices } from './remedies';
 import { UploadProgress } from './upload_progress';
 
 const arrow = 'M8 11V2.5M4.5 6 8 2.5 11.5 6M2.5 10.5v3h11v-3';
@@ -143,6 +143,8 @@ export class UploadPanel {
       gathered.kept = failure.remedy.kept ?? kept;
       this.state.value = idle;
       this.showFailed(error, gathered, addition);
+    } finally {
+      progress.end();
     }
   }
 
@@ -226,8 +228,24 @@ export class UploadPanel {
     const again = mayPass(error) && button('Try again', () => void this.send(gathered, before));
     const known = before.choices ?? {};
     const sendWith = (choices: Choices): void => void this.send(gathered, { ...before, choices });
-    this.showProblem(error, gathered, again, acceptButton(error, known, sendWith));
-    this.body.append(...choiceForms(error, known, sendWith));
+    const accept = acceptButton(error, known, sendWith);
+    const question = questionOf(error, known);
+    const lists = choiceLists(error, known, gathered.files, sendWith);
+    if (question !== '' && !accept) {
+      this.showQuestion(question, gathered, lists);
+      return;
+    }
+    this.showProblem(error, gathered, again, accept);
+    this.body.append(...lists);
+  }
+
+  // Nothing is wrong: the upload holds more than one.
+  private showQuestion(question: string, { name }: Gathered, lists: readonly HTMLElement[]): void {
+    this.element.classList.remove('busy');
+    this.state.value = 'Upload: your choice is needed';
+    if (!this.onVolumes) tell(h('a', { href: hashOf([]) }, `${name}: ${question}`));
+    const asked = h('div', { role: 'status' }, h('h2', {}, question), h('p', {}, name));
+    this.body.replaceChildren(asked, ...lists, h('div', { class: 'actions' }, this.otherButton()));
   }
 
   private showProblem(error: ApiError, gathered: Gathered, ...actions: (HTMLElement | false)[]): void {
@@ -246,7 +264,7 @@ export class UploadPanel {
     const stored = outcomes.filter(({ volume }) => volume !== null).length;
     this.body.replaceChildren(
       h('h2', { role: 'status' }, `${stored} of ${outcomes.length} volumes in the upload were stored`),
-      outcomeList(outcomes, (_, choices) => void this.send(gathered, { choices, outcomes })),
+      outcomeList(outcomes, gathered.files, (_, choices) => void this.send(gathered, { choices, outcomes })),
       h('div', { class: 'actions' }, button('Upload another', () => this.showIdle())),
     );
     this.tellOf(null);

@@ -2,10 +2,14 @@
 import { h } from '../../ui/dom';
 import { formatBytes } from '../../ui/format';
 
+// Sooner a pause is none.
+const stillAfter = 3000;
+
 export class UploadProgress {
   readonly bar: HTMLProgressElement;
   readonly text = h('p', { class: 'upload-status', role: 'status' });
   private readonly began = performance.now();
+  private still = 0;
 
   // Without bytes: the server has them already.
   constructor(private readonly total: number) {
@@ -17,6 +21,7 @@ export class UploadProgress {
 
   show(sent: number): void {
     if (this.total === 0) return;
+    clearTimeout(this.still);
     this.bar.value = sent;
     if (sent >= this.total) {
       this.bar.removeAttribute('value');
@@ -24,6 +29,13 @@ export class UploadProgress {
       return;
     }
     const rate = sent / Math.max(0.001, (performance.now() - this.began) / 1000);
-    this.text.textContent = `${formatBytes(sent)} of ${formatBytes(this.total)}, ${formatBytes(rate)}/s`;
+    const text = `${formatBytes(sent)} of ${formatBytes(this.total)}`;
+    this.text.textContent = `${text}, ${formatBytes(rate)}/s`;
+    this.still = window.setTimeout(() => (this.text.textContent = `${text}. Waiting for the server`), stillAfter);
+  }
+
+  // The upload is over: nothing is waited for any more.
+  end(): void {
+    clearTimeout(this.still);
   }
 }

@@ -1,4 +1,5 @@
 // The first view: upload, the volumes that are there, the last surfaces.
+import introPicture from '../../intro.webp';
 import { client } from '../../client';
 import type { Job, UploadedVolume, Volume } from '../../api/types';
 import { inWords, surfaceInWords } from '../../job/parameters';
@@ -10,6 +11,7 @@ import type { Scope } from '../../ui/signal';
 import { axisIndex, slicePlacement, slicePlane } from '../../volume/geometry';
 import { KnownVolumes } from '../../volume/known';
 import { noteTexts, volumeKind, volumeName } from '../../volume/names';
+import { skippedText } from '../../volume/skipped';
 import { uploads } from './upload_panel';
 import { VolumeSearch } from './volume_search';
 
@@ -21,6 +23,8 @@ const refreshDelay = 700;
 
 // The middle axial slice, turned as radiologists look.
 async function paintThumbnail(canvas: HTMLCanvasElement, volume: Volume, signal: AbortSignal): Promise<void> {
+  // All samples are the same: there is no picture to ask for.
+  if (volume.range[0] === volume.range[1]) return;
   const plane = slicePlane(volume, 'axial');
   const { normal } = plane;
   const index = Math.floor(volume.dims[axisIndex(normal)] / 2);
@@ -157,7 +161,12 @@ class Home {
   private isSearching = false;
 
   // For a first-time user.
-  private readonly intro = h('p', { class: 'intro', hidden: true }, 'isomesh turns a CT, MRI or label volume into a 3D surface mesh.');
+  private readonly intro = h(
+    'figure',
+    { class: 'intro', hidden: true },
+    h('figcaption', {}, 'isomesh turns a CT, MRI or label volume into a 3D surface mesh.'),
+    h('img', { src: introPicture, width: 560, height: 220, alt: 'Left: a slice of a head\u2019s CT with the outline of the bone. Right: the surface of the skull.' }),
+  );
   private readonly noVolumes = h(
     'li',
     { class: 'empty' },
@@ -307,7 +316,10 @@ class Home {
       return;
     }
     // Its page shows the notes of the file that came first.
-    if (only.status === 200) tell(['This volume is already stored.', ...noteTexts(only.volume)].join(' '));
+    if (only.status === 200) {
+      const skipped = skippedText([only.volume]);
+      tell(['This volume is already stored.', ...noteTexts(only.volume), skipped && `${skipped}.`].filter(Boolean).join(' '));
+    }
     go(['volumes', only.volume.id]);
   }
 }

@@ -1,0 +1,11 @@
+// How much is seen of labels within their outlines, in slices and cuts: one choice for the whole page.
+import { h } from '../../ui/dom';
+import { Signal } from '../../ui/signal';
+
+export const labelOpacity = new Signal(0.75);
+
+export function opacityControl(): HTMLElement {
+  const input = h('input', { type: 'range', min: 0, max: 1, step: 0.05, value: labelOpacity.value, 'aria-label': 'Opacity of labels in slices' });
+  input.addEventListener('input', () => (labelOpacity.value = input.valueAsNumber));
+  return h('label', { class: 'label-opacity' }, h('span', {}, 'Labels in slices'), input);
+}
