@@ -62,7 +62,7 @@ Labels label(const std::string& name, std::string_view value) {
   return {{name, std::string(value)}};
 }
 
-// A line's number, such as the 4711 of "VmRSS: 4711 kB".
+// The number in a line such as "VmRSS: 4711 kB".
 std::uint64_t process_status(std::string_view name) {
   std::ifstream file("/proc/self/status");
   for (std::string line; std::getline(file, line);) {
@@ -83,8 +83,8 @@ std::uint64_t open_files() {
   return count;
 }
 
-// The library writes the older form of the text, where a counter's family is called like its
-// sample. In OpenMetrics the family lacks the suffix, and an end is marked.
+// The library writes the older text format, where a counter's family has its sample's name. In
+// OpenMetrics the family lacks the suffix, and the end is marked.
 std::string to_openmetrics(const std::string& text) {
   constexpr std::string_view kTotal = "_total";
   std::istringstream lines(text);
@@ -116,7 +116,7 @@ std::string_view name_of(callbacks::CallbackOutcome outcome) {
   return "given_up";
 }
 
-// What is there only where a PACS is configured.
+// Metrics that exist only if a PACS is configured.
 class OrderMetrics {
  public:
   explicit OrderMetrics(prometheus::Registry& registry)
@@ -154,7 +154,7 @@ class OrderMetrics {
   Family<Gauge>& orders_;
   Family<Counter>& failed_;
   Gauge& oldest_;
-  std::set<Gauge*> told_;  // in the last answer
+  std::set<Gauge*> told_;  // present in the last response
 };
 
 struct Metrics::State {
@@ -204,7 +204,7 @@ Metrics::Metrics() : state_(std::make_unique<State>()) {
   state_->gauge("isomesh_build_info", "Running version as a label; always 1")
       .Add({{"version", ISOMESH_VERSION}, {"mesher", jobs::kMesherVersion}})
       .Set(1);
-  // What has not happened yet is 0, not missing: rates need a beginning.
+  // Register counters at 0, because rates need a first sample.
   for (const JobState state : kEnds) state_->ended.Add(label("state", to_string(state)));
   for (const TimedStage& stage : kStages) {
     state_->stages.Add(label("stage", stage.name), kStageSeconds);

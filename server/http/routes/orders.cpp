@@ -15,7 +15,7 @@ namespace {
 const std::string kOrders = "/v1/orders";
 constexpr const char* kOrderCursor = "orders";
 
-// Throws Error kNotFound where no PACS is configured.
+// Throws Error kNotFound if no PACS is configured.
 orders::Orders& orders_of(const App& app) {
   if (app.services.orders != nullptr) return *app.services.orders;
   throw Error(ErrorCode::kNotFound, "this service has no PACS: it was started without --hospital");
