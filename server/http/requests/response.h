@@ -52,8 +52,8 @@ struct Continuation {
   std::string job = {};
   std::chrono::steady_clock::time_point until = {};
   std::function<void(const Request& request, Response& response)> resume;
-  // Called once, instead of `resume`, if the client has disconnected. If it is empty, `resume` is
-  // called.
+  // Called once, before `resume`, as soon as the client has disconnected. If it is empty, `resume`
+  // is called then.
   std::function<void(const Request& request)> abandoned = {};
   std::optional<std::string> computing_for = {};
 };
