@@ -58,12 +58,12 @@ namespace {
 
 using namespace isomesh;
 
-// Three quarters of the machine's memory, divided by the number of jobs that run at the same time.
+// Three quarters of the machine's memory, divided by the number of concurrent jobs.
 std::uint64_t default_job_memory(std::size_t workers) {
   return jobs::usable_memory() / 4 * 3 / std::max<std::size_t>(workers, 1);
 }
 
-// Where a build puts it, or where an installation does.
+// In the folder of a build or of an installation.
 std::filesystem::path program_of_ours(const std::string& name) {
   const auto folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   for (const auto& program :
@@ -75,15 +75,15 @@ std::filesystem::path program_of_ours(const std::string& name) {
                                         ISOMESH_LIBEXEC + " relative to it");
 }
 
-// A quarter of the time that things are kept, within bounds: what expired goes soon, and the disk
+// A quarter of the retention time, within bounds: expired objects are removed soon, and the disk
 // cannot fill up between two rounds.
 std::chrono::milliseconds housekeeping_interval(std::chrono::milliseconds keep) {
   return std::clamp<std::chrono::milliseconds>(keep / 4, std::chrono::seconds(1),
                                                std::chrono::seconds(30));
 }
 
-// How far the clock may be ahead of what was stored last. A clock that is wrong by less makes
-// things expire early by a quarter of their time at most.
+// How far the clock may be ahead of the last stored time. A smaller error expires objects early by
+// at most a quarter of their time.
 std::chrono::milliseconds clock_tolerance(std::chrono::milliseconds keep) {
   return std::clamp<std::chrono::milliseconds>(keep / 4, std::chrono::hours(1),
                                                std::chrono::days(7));
@@ -134,7 +134,7 @@ callbacks::CallbackOptions callback_options(const Options& options) {
               std::chrono::duration<double>(options.callback_retry_seconds))};
 }
 
-// Keeps what was read before when the file cannot be read now.
+// Keeps the previous content if the file cannot be read.
 void reload_one(const std::function<void()>& read) {
   try {
     read();
@@ -150,7 +150,7 @@ void reload(const Options& options, const Files& files, callbacks::Callbacks& ca
   reload_one([&] { callbacks.set_secrets(callback_secrets(options)); });
 }
 
-// What a start would make of the places of files. Makes none.
+// Checks the places of files as a start would, without creating any.
 void check_places(const Options& options) {
   std::error_code absent;
   if (options.data.empty()) throw invalid_parameter("data", "must name a folder");
@@ -164,8 +164,8 @@ void check_places(const Options& options) {
   }
 }
 
-// Tells what would be used. Throws what a start would that finds a mistake in it; touches neither
-// the data folder nor the address.
+// Prints the effective configuration. Throws as a start would for errors in it; touches neither the
+// data folder nor the address.
 int tell_configuration(const Options& options, const CLI::App& cli) {
   const net::Address address = net::parse_address(options.listen);
   check_reach(options, address, open_files(options, address, http::ReadBy::kAdministrator));
@@ -188,11 +188,11 @@ bool needs_dimse(const orders::Hospital& hospital) {
          });
 }
 
-// Who is spoken to, and where their answers are read.
+// The configured PACS, and the processes that read their responses.
 struct OpenHospital {
   OpenHospital(orders::Hospital the_settings, const jobs::RunnerOptions& runner)
       : settings(std::move(the_settings)), answers(runner) {
-    // As many as may soon be asked for at once; further ones take a moment.
+    // The usual number of simultaneous requests; further ones take a moment.
     constexpr std::size_t kPrepared = 2;
     if (needs_dimse(settings)) {
       dimse =
@@ -225,7 +225,7 @@ struct OpenHospital {
     return all;
   }
 
-  // Cuts off what is read and sent.
+  // Aborts transfers in both directions.
   void stop() {
     answers.stop();
     if (dimse) dimse->stop();
@@ -233,7 +233,7 @@ struct OpenHospital {
 
   const orders::Hospital settings;
   jobs::ImportRunner answers;
-  std::unique_ptr<process::PreparedProcesses> dimse;  // null where nobody speaks it
+  std::unique_ptr<process::PreparedProcesses> dimse;  // null if DIMSE is not used
 };
 
 std::unique_ptr<OpenHospital> open_hospital(const Options& options,
@@ -250,7 +250,7 @@ std::string host_name() {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "-";
 }
 
-// Null where nobody collects it.
+// Null without a collector.
 std::unique_ptr<audit::SyslogSender> send_trail(const orders::Hospital& hospital,
                                                 store::AuditTrail& trail) {
   if (!hospital.syslog) return nullptr;
@@ -349,8 +349,8 @@ int run(const Options& options, const sigset_t& signals) {
   server.start();
   starting.request_stop();
   starting.join();
-  // Declared after the server, so that the workers end before it and the end of their last job is
-  // still logged and counted.
+  // Declared after the server, so that the workers end first and the end of their last job is still
+  // logged and counted.
   const jobs::WorkerOptions worker_options = {
       .threads = options.workers,
       .program = job_program,
@@ -376,8 +376,8 @@ int run(const Options& options, const sigset_t& signals) {
   return 0;
 }
 
-// A daemon that cannot start says why whatever its log's level is, and in the log's form where that
-// is read by machines.
+// A daemon that cannot start reports the reason regardless of the log's level, in the log's form if
+// machines read it.
 void tell_failure(LogFormat format, const std::string& reason) {
   if (format == LogFormat::kText) {
     std::cerr << "isomeshd: " << reason << std::endl;
